@@ -83,7 +83,7 @@ def assert_failed(result: Result, message: str) -> None:
 NAMES = (
     "reproduce", "list", "show", "cite", "solve", "inspect", "fit", "convert", "hysteresis", "fit-dynamic", "campaign",
     "fit-volume", "plan", "bench", "size", "simulate", "sweep", "tune", "compare", "export",
-    "schema",
+    "studio", "schema",
 )  # fmt: skip
 
 

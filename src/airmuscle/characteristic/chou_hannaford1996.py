@@ -42,7 +42,7 @@ class ChouHannaford1996(ForceLaw):
     def contraction_range(self) -> tuple[float, float]:
         """From straight threads to the maximum volume."""
         start, _ = self.geometry.contraction_range
-        return (start, float(1.0 - self.thread / (ops.sqrt(3.0) * self.geometry.resting_length)))
+        return (start, 1.0 - self.thread / (ops.sqrt(3.0) * self.geometry.resting_length))
 
     def force(self, pressure: Value, contraction: Value) -> Value:
         return pressure * self._effective_area(contraction)

@@ -52,7 +52,7 @@ class MartensBoblan2017(ForceLaw):
     def contraction_range(self) -> tuple[float, float]:
         """From -5 %, or half the contraction of straight threads if greater, to 40 %, the validity range of E(L)."""
         straight, _ = self.geometry.contraction_range
-        return (max(-0.05, straight / 2), 0.4)
+        return (ops.maximum(-0.05, straight / 2), 0.4)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
         return ops.maximum(self.unclamped_force(pressure, contraction), 0.0)

@@ -45,7 +45,7 @@ class TonduLopez2000(ForceLaw):
         """From straight threads in the middle to zero force."""
         start, _ = self.geometry.contraction_range
         zero_force = 1.0 - ops.sqrt(self._b / self._a)
-        return (float(start / self.end_correction), float(zero_force / self.end_correction))
+        return (start / self.end_correction, zero_force / self.end_correction)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
         return pressure * self._effective_area(contraction)

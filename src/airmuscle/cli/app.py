@@ -58,6 +58,7 @@ COMMANDS = (
     CommandRow("tune", "tune", "tune", "Tune the controller of a scenario for a family of plants."),
     CommandRow("compare", "compare", "compare", "Compare controllers of an antagonistic joint on common tasks."),
     CommandRow("export", "export", "export", "Export a scenario, law or controller to C, JavaScript or MATLAB."),
+    CommandRow("studio", "studio", "studio", "Show muscles and plants in the browser."),
     CommandRow("schema", "schema", "schema", "Print the JSON schema of scenario or muscle files."),
 )
 """All commands, in the order of use."""

@@ -43,6 +43,11 @@ def part_toml(name: str, thing: Any) -> str:
     return _to_text({name: _model_table(thing)})
 
 
+def tables_toml(tables: Mapping[str, Any]) -> str:
+    """Text of tables of plain values."""
+    return _to_text(tables)
+
+
 def scenario_toml(
     title: str, plant: Any, input_table: Mapping[str, Any], run: Mapping[str, Any], note: str = ""
 ) -> str:

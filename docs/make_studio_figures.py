@@ -1,0 +1,64 @@
+"""Figures docs/images/studio-*.png: the page of `airmuscle studio` in Chromium.
+
+Run python docs/make_studio_figures.py with the packages playwright and Pillow, while a server runs, and its address as
+the argument: http://127.0.0.1:8765/
+"""
+
+from __future__ import annotations
+
+import io
+import shutil
+import sys
+from pathlib import Path
+from typing import Any
+
+IMAGES = Path(__file__).with_name("images")
+COLOURS = 128
+
+
+def save(page: Any, name: str) -> None:
+    """Write what is visible as a PNG with few colours."""
+    from PIL import Image
+
+    picture = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+    picture.quantize(COLOURS).save(IMAGES / f"studio-{name}.png", optimize=True)
+    print(f"wrote {IMAGES / f'studio-{name}.png'}")
+
+
+def opened(browser: Any, address: str, tab: str, name: str, **options: Any) -> Any:
+    """The page with a tab, as soon as it shows a muscle or a plant."""
+    page = browser.new_context(**options).new_page()
+    page.goto(address)
+    page.wait_for_selector("html[data-ready]")
+    page.get_by_role("tab", name=tab).click()
+    page.wait_for_selector(f'#panel-{tab.lower()}[data-shown="{name}"]')
+    return page
+
+
+def main(address: str) -> None:
+    """Write the figures of both tabs, in light, dark and on a phone."""
+    from playwright.sync_api import sync_playwright
+
+    wide = {"viewport": {"width": 1200, "height": 800}}
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
+        page = opened(browser, address, "Muscle", "dmsp-20-300", **wide)
+        page.get_by_label("Muscle or law of the library").select_option("sarosi-dmsp-20-400n")
+        page.wait_for_selector('#panel-muscle[data-shown="sarosi-dmsp-20-400n"]')
+        page.get_by_label("Muscle or law of the library").select_option("dmsp-20-300")
+        page.wait_for_selector('#panel-muscle[data-shown="dmsp-20-300"]')
+        save(page, "muscle")
+        page = opened(browser, address, "Plant", "lift", color_scheme="dark", **wide)
+        page.get_by_label("Plant of the library").select_option("joint-dmsp-20-proportional")
+        page.wait_for_selector('#panel-plant[data-shown="joint-dmsp-20-proportional"]')
+        page.get_by_label("Instant of the run").fill("400")
+        page.wait_for_timeout(300)
+        save(page, "plant")
+        page = opened(browser, address, "Plant", "lift", viewport={"width": 390, "height": 800})
+        page.get_by_label("Instant of the run").fill("300")
+        page.wait_for_timeout(300)
+        save(page, "phone")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

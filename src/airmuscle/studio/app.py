@@ -1,0 +1,260 @@
+"""Application of the studio: the page, sheets of the library, and sheets of texts of users.
+
+The server computes no curve and no run: it sends printed programs, which the page evaluates.
+"""
+
+from __future__ import annotations
+
+import collections
+import json
+import threading
+from collections.abc import Callable, Mapping
+from importlib import metadata
+from typing import Any
+
+from ..core.errors import AirmuscleError
+from ..library.files import LAWS, list_laws, read_toml
+from .page import self_contained_page, server_page, web_files
+from .security import COOKIE, Access, Application, given_token, secured
+from .tasks import (
+    plant_names,
+    plant_title,
+    sheet_of_law,
+    sheet_of_law_text,
+    sheet_of_offered_plant,
+    sheet_of_scenario_text,
+)
+from .uploads import MAX_TEXT
+from .worker import LimitError, WorkerPool
+
+WORKERS = 2
+"""Number of worker processes (chosen)."""
+TIME_LIMIT = 20.0
+"""Limit [s] of the computation of a sheet (chosen: those of the library take less than one second)."""
+MAX_SHEETS = 100
+"""Number of sheets that the server keeps (chosen)."""
+MAX_PAGE = 256 * 1024
+"""Greatest size of a request for a self-contained page [bytes] (chosen)."""
+MAX_PAGE_SHEETS = 12
+"""Greatest number of muscles and plants in a self-contained page (chosen)."""
+
+
+class BadRequest(AirmuscleError):
+    """A request that the server does not understand, with its status."""
+
+    def __init__(self, message: str, status: int = 400) -> None:
+        super().__init__(message)
+        self.status = status
+
+
+class Sheets:
+    """The sheets that were requested last, by their identifier."""
+
+    def __init__(self, pool: WorkerPool) -> None:
+        self._pool = pool
+        self._kept: collections.OrderedDict[str, dict[str, Any]] = collections.OrderedDict()
+        self._of_library: dict[tuple[str, str], str] = {}
+        self._lock = threading.Lock()
+
+    def get(self, identifier: str) -> dict[str, Any] | None:
+        """The sheet of this identifier; None if it is no longer kept."""
+        with self._lock:
+            return self._kept.get(identifier)
+
+    def of_library(self, task: Callable[[str], dict[str, Any]], name: str) -> dict[str, Any]:
+        """The sheet that a task makes of a name of the library."""
+        key = (task.__name__, name)
+        known = self.get(self._of_library.get(key, ""))
+        if known is None:
+            known = self.of_text(task, name)
+            self._of_library[key] = known["id"]
+        return known
+
+    def of_text(self, task: Callable[[str], dict[str, Any]], text: str) -> dict[str, Any]:
+        """The sheet that a task makes of a text."""
+        return self.keep(self._pool.call(task, text, limit=TIME_LIMIT))
+
+    def keep(self, sheet: dict[str, Any]) -> dict[str, Any]:
+        """The sheet, which is kept."""
+        with self._lock:
+            self._kept[sheet["id"]] = sheet
+            self._kept.move_to_end(sheet["id"])
+            while len(self._kept) > MAX_SHEETS:
+                self._kept.popitem(last=False)
+        return sheet
+
+
+def library_list() -> dict[str, Any]:
+    """Names and titles of the laws and plants that the page offers."""
+    laws = [{"name": name, **_texts(read_toml(LAWS / f"{name}.toml"))} for name in list_laws()]
+    plants = [{"name": name, **plant_title(name)} for name in plant_names()]
+    return {"version": metadata.version("airmuscle"), "laws": laws, "plants": plants}
+
+
+def _texts(tables: Mapping[str, Any]) -> dict[str, Any]:
+    return {"title": tables["title"], "provenance": tables["provenance"]}
+
+
+def create_app(
+    access: Access = Access(), pool: WorkerPool | None = None, opened: tuple[dict[str, Any], ...] = ()
+) -> Application:
+    """The ASGI application. `opened` are sheets with which the page begins. Raises ImportError without starlette."""
+    from starlette.applications import Starlette
+    from starlette.routing import Route
+
+    sheets = Sheets(pool or WorkerPool(WORKERS))
+    handlers = Handlers(sheets, access, opened)
+    routes = [
+        Route("/", handlers.page),
+        Route("/web/{name:path}", handlers.web),
+        Route("/program/{name}", handlers.program),
+        Route("/api/library", handlers.library),
+        Route("/api/law/{name}", handlers.law),
+        Route("/api/law", handlers.own_law, methods=["POST"]),
+        Route("/api/plant/{name}", handlers.plant),
+        Route("/api/plant", handlers.own_plant, methods=["POST"]),
+        Route("/api/page", handlers.save_page, methods=["POST"]),
+    ]
+    errors: dict[Any, Any] = {AirmuscleError: _refused, 404: _missing, 405: _missing, 500: _failed}
+    return secured(Starlette(routes=routes, exception_handlers=errors), access)
+
+
+class Handlers:
+    """The functions that answer requests."""
+
+    def __init__(self, sheets: Sheets, access: Access, opened: tuple[dict[str, Any], ...]) -> None:
+        self._sheets, self._access, self._opened = sheets, access, opened
+        self._web, self._page, self._library = web_files(), server_page(), library_list()
+        for sheet in opened:
+            sheets.keep(sheet)
+
+    async def page(self, request: Any) -> Any:
+        """The page; a token in its address becomes a cookie, so that it does not stay in the address."""
+        from starlette.responses import HTMLResponse, RedirectResponse
+
+        if self._access.token and given_token(request.scope):
+            answer = RedirectResponse("/", status_code=303)
+            answer.set_cookie(COOKIE, self._access.token, httponly=True, samesite="strict")
+            return answer
+        return HTMLResponse(self._page)
+
+    async def web(self, request: Any) -> Any:
+        """A file of the page."""
+        from starlette.responses import Response
+
+        kind, text = self._web.get(request.path_params["name"], ("", ""))
+        if not kind:
+            raise BadRequest("there is no such file.", 404)
+        return Response(text, media_type=kind)
+
+    async def program(self, request: Any) -> Any:
+        """The printed program of a sheet."""
+        from starlette.responses import Response
+
+        sheet = self._sheets.get(request.path_params["name"].removesuffix(".js"))
+        if sheet is None:
+            raise BadRequest("this program is no longer kept; reload the page.", 404)
+        return Response(sheet["script"], media_type="text/javascript")
+
+    async def library(self, request: Any) -> Any:
+        """Names of the library, and the sheets with which the page begins."""
+        return _json({**self._library, "opened": [_without_script(sheet) for sheet in self._opened]})
+
+    async def law(self, request: Any) -> Any:
+        """The sheet of a law of the library."""
+        name = request.path_params["name"]
+        if name not in list_laws():
+            raise BadRequest(f"the library has no muscle or law '{name[:80]}'.", 404)
+        return await self._computed(self._sheets.of_library, sheet_of_law, name)
+
+    async def own_law(self, request: Any) -> Any:
+        """The sheet of a text of a user."""
+        text = decoded(await limited_body(request, MAX_TEXT))
+        return await self._computed(self._sheets.of_text, sheet_of_law_text, text)
+
+    async def plant(self, request: Any) -> Any:
+        """The sheet of a plant that the page offers."""
+        name = request.path_params["name"]
+        if name not in plant_names():
+            raise BadRequest(f"there is no plant '{name[:80]}'.", 404)
+        return await self._computed(self._sheets.of_library, sheet_of_offered_plant, name)
+
+    async def own_plant(self, request: Any) -> Any:
+        """The sheet of a scenario of a user."""
+        text = decoded(await limited_body(request, MAX_TEXT))
+        return await self._computed(self._sheets.of_text, sheet_of_scenario_text, text)
+
+    async def _computed(self, function: Callable[..., dict[str, Any]], *arguments: Any) -> Any:
+        from starlette.concurrency import run_in_threadpool
+
+        return _json(_without_script(await run_in_threadpool(function, *arguments)))
+
+    async def save_page(self, request: Any) -> Any:
+        """One file of what is on the screen: the request names the sheets and the state of the page."""
+        from starlette.responses import Response
+
+        wanted = read_page_request(decoded(await limited_body(request, MAX_PAGE)))
+        found = [self._sheets.get(identifier) for identifier in wanted["sheets"]]
+        sheets = [sheet for sheet in found if sheet is not None]
+        if len(sheets) < len(found):
+            raise BadRequest("a program is no longer kept; reload the page.", 404)
+        return Response(self_contained_page(sheets, wanted["state"]), media_type="text/html")
+
+
+def read_page_request(text: str) -> dict[str, Any]:
+    """The identifiers of sheets and the state in a request for a page. Raises BadRequest."""
+    try:
+        wanted = json.loads(text)
+    except (ValueError, RecursionError):
+        raise BadRequest("the request is not JSON.") from None
+    if not isinstance(wanted, dict) or not isinstance(wanted.get("state"), dict):
+        raise BadRequest("the request must contain sheets and a state.")
+    names = wanted.get("sheets")
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise BadRequest("sheets must be a list of identifiers.")
+    if not 1 <= len(names) <= MAX_PAGE_SHEETS:
+        raise BadRequest(f"{len(names)} sheets are requested; allowed range: 1 to {MAX_PAGE_SHEETS}.")
+    return {"sheets": names, "state": wanted["state"]}
+
+
+async def limited_body(request: Any, limit: int) -> bytes:
+    """The body of a request. Raises BadRequest as soon as it exceeds the limit [bytes]."""
+    parts, size = [], 0
+    async for part in request.stream():
+        size += len(part)
+        if size > limit:
+            raise BadRequest(f"the text is larger than {limit // 1024} kB.", 413)
+        parts.append(part)
+    return b"".join(parts)
+
+
+def decoded(body: bytes) -> str:
+    """A body as text. Raises BadRequest unless it is UTF-8."""
+    try:
+        return body.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise BadRequest(f"the text is not UTF-8 (byte {error.start}).") from None
+
+
+def _without_script(sheet: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in sheet.items() if key != "script"}
+
+
+def _json(content: Any, status: int = 200) -> Any:
+    from starlette.responses import JSONResponse
+
+    return JSONResponse(content, status_code=status)
+
+
+async def _refused(request: Any, error: Exception) -> Any:
+    assert isinstance(error, AirmuscleError)
+    status = error.status if isinstance(error, BadRequest) else 503 if isinstance(error, LimitError) else 422
+    return _json({"error": str(error.message)}, status)
+
+
+async def _missing(request: Any, error: Any) -> Any:
+    return _json({"error": "there is no such address."}, int(error.status_code))
+
+
+async def _failed(request: Any, error: Exception) -> Any:
+    return _json({"error": "the server failed; its terminal states the reason."}, 500)

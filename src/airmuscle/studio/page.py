@@ -1,0 +1,91 @@
+"""Page of the studio: its files, and one self-contained file of what is on the screen."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from importlib import metadata, resources
+from typing import Any
+
+SCRIPTS = (
+    "vendor/uPlot.iife.min.js",
+    "scripts/numbers.js",
+    "scripts/roots.js",
+    "scripts/law.js",
+    "scripts/elements.js",
+    "scripts/source.js",
+    "scripts/figure.js",
+    "scripts/chart.js",
+    "scripts/outline.js",
+    "scripts/parameters.js",
+    "scripts/muscle-chart.js",
+    "scripts/muscle-point.js",
+    "scripts/muscle-tab.js",
+    "scripts/plant-start.js",
+    "scripts/plant-run.js",
+    "scripts/plant-drawing.js",
+    "scripts/plant-traces.js",
+    "scripts/plant-tab.js",
+    "scripts/main.js",
+)
+"""Scripts in the order in which the page runs them."""
+STYLES = ("vendor/uPlot.min.css", "style.css")
+LICENCE = "vendor/uPlot.LICENSE"
+TYPES = {".js": "text/javascript", ".css": "text/css", ".LICENSE": "text/plain"}
+
+
+def web_file(name: str) -> str:
+    """The text of a file of the page."""
+    return resources.files(__package__).joinpath("web", *name.split("/")).read_text(encoding="utf-8")
+
+
+def web_files() -> dict[str, tuple[str, str]]:
+    """Type and text of every file of the page by its name; nothing else can be requested."""
+    return {
+        name: (next(kind for end, kind in TYPES.items() if name.endswith(end)), web_file(name))
+        for name in (*SCRIPTS, *STYLES, LICENCE)
+    }
+
+
+def server_page() -> str:
+    """The page as the server sends it: scripts and styles are separate files."""
+    head = "\n".join(f'<link rel="stylesheet" href="web/{name}">' for name in STYLES)
+    scripts = "\n".join(f'<script src="web/{name}" defer></script>' for name in SCRIPTS)
+    return _filled("", f"{head}\n{scripts}", "")
+
+
+def self_contained_page(sheets: Sequence[Mapping[str, Any]], state: Mapping[str, Any]) -> str:
+    """One file without server and network: sheets with their programs, and the state of the page.
+
+    Its policy allows the scripts and styles in it by their digests, and nothing else.
+    """
+    data = {"state": state, "sheets": [{k: v for k, v in s.items() if k != "script"} for s in sheets]}
+    embedded = json.dumps(data).replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+    scripts = [web_file(name) for name in SCRIPTS[:-1]]
+    scripts += [sheet["script"] for sheet in sheets] + [web_file(SCRIPTS[-1])]
+    styles = [web_file(name) for name in STYLES]
+    policy = (
+        f"default-src 'none'; script-src {' '.join(map(_digest, scripts))}; "
+        f"style-src {' '.join(map(_digest, styles))}; img-src data: blob:; base-uri 'none'; form-action 'none'"
+    )
+    head = "\n".join(
+        [
+            f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
+            *(f"<style>{text}</style>" for text in styles),
+        ]
+    )
+    licence = web_file(LICENCE).replace("--", "- -")
+    comment = f"<!--\nuPlot, in the first script, is used under this licence:\n\n{licence}\n-->"
+    body = f'<script type="application/json" id="embedded">{embedded}</script>\n'
+    return _filled(comment, head, body + "\n".join(f"<script>{text}</script>" for text in scripts))
+
+
+def _digest(text: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+
+
+def _filled(comment: str, head: str, end: str) -> str:
+    page = web_file("index.html").replace("@version@", metadata.version("airmuscle"))
+    return page.replace("<!--comment-->", comment).replace("<!--head-->", head).replace("<!--end-->", end)

@@ -1,0 +1,153 @@
+"""Security of the studio: response headers, allowed hosts and origins, token, and limits of requests.
+
+The page has access to the programs that it computes and to nothing else: scripts and styles come from this server
+only, none are written in the page itself, and nothing is sent elsewhere. A request that changes something, or that
+costs computation, needs the header X-Airmuscle, which a page of another origin cannot send, and an Origin of this
+server. The Host of every request is compared, so that another name that leads to this machine is of no use.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import ipaddress
+import secrets
+from collections.abc import Awaitable, Callable, Mapping, MutableMapping
+from http.cookies import CookieError, SimpleCookie
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+Scope = MutableMapping[str, Any]
+Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
+Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
+Application = Callable[[Scope, Receive, Send], Awaitable[None]]
+
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+HEADERS = (
+    (b"content-security-policy", POLICY.encode()),
+    (b"x-content-type-options", b"nosniff"),
+    (b"x-frame-options", b"DENY"),
+    (b"referrer-policy", b"no-referrer"),
+    (b"cross-origin-opener-policy", b"same-origin"),
+    (b"cross-origin-resource-policy", b"same-origin"),
+    (b"cache-control", b"no-store"),
+)
+COOKIE = "airmuscle_token"
+READING = ("GET", "HEAD")
+MAX_TARGET = 2048
+"""Greatest length of the path of a request (chosen)."""
+
+
+def is_loopback(host: str) -> bool:
+    """Whether a host name or address is this machine itself."""
+    try:
+        return ipaddress.ip_address(host.strip("[]")).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+@dataclasses.dataclass(frozen=True)
+class Access:
+    """Who may send requests: the names of the server, and the token that is required of other machines.
+
+    hosts   allowed values of the header Host without a port; any if empty
+    token   text that a request must know; none is required if empty
+    """
+
+    hosts: tuple[str, ...] = ("127.0.0.1", "localhost", "[::1]")
+    token: str = ""
+
+    def refusal(self, scope: Scope) -> tuple[int, str] | None:
+        """Status and reason if a request is not allowed."""
+        headers = _headers(scope)
+        host = headers.get("host", "")
+        if self.hosts and _without_port(host) not in self.hosts:
+            return 421, "This server does not answer for this host."
+        if len(scope.get("raw_path") or scope["path"]) > MAX_TARGET:
+            return 414, "The path is too long."
+        if self.token and not self._knows_token(scope, headers):
+            return 401, "A token is required; open the address that the command printed."
+        if scope["method"] in READING:
+            return None
+        if scope["method"] != "POST":
+            return 405, "This method is not allowed."
+        if headers.get("x-airmuscle") != "1" or headers.get("sec-fetch-site", "same-origin") != "same-origin":
+            return 403, "This request does not come from the page of this server."
+        origin = headers.get("origin")
+        if origin is not None and urlsplit_netloc(origin) != host:
+            return 403, "This request comes from another origin."
+        return None
+
+    def _knows_token(self, scope: Scope, headers: Mapping[str, str]) -> bool:
+        given = [cookie_value(headers.get("cookie", "")), *given_token(scope)]
+        return any(secrets.compare_digest(text.encode(), self.token.encode()) for text in given)
+
+
+def given_token(scope: Scope) -> list[str]:
+    """The token in the query of a request."""
+    query = scope.get("query_string", b"").decode("latin-1")
+    try:
+        return parse_qs(query, max_num_fields=5).get("token", [])
+    except ValueError:
+        return []
+
+
+def cookie_value(text: str) -> str:
+    """The token in a header Cookie; empty if there is none."""
+    cookie: SimpleCookie = SimpleCookie()
+    try:
+        cookie.load(text)
+    except CookieError:
+        return ""
+    return cookie[COOKIE].value if COOKIE in cookie else ""
+
+
+def urlsplit_netloc(origin: str) -> str:
+    """Host and port of an origin; empty for one that is no address."""
+    try:
+        return urlsplit(origin).netloc
+    except ValueError:
+        return ""
+
+
+def _headers(scope: Scope) -> dict[str, str]:
+    return {name.decode("latin-1").lower(): value.decode("latin-1") for name, value in scope["headers"]}
+
+
+def _without_port(host: str) -> str:
+    name, _, port = host.rpartition(":")
+    return name if name and port.isdecimal() else host
+
+
+def secured(application: Application, access: Access) -> Application:
+    """The application behind these rules, with the headers of security in every response."""
+
+    async def handle(scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] == "lifespan":
+            await application(scope, receive, send)
+            return
+        if scope["type"] != "http":
+            return
+
+        async def send_with_headers(message: MutableMapping[str, Any]) -> None:
+            if message["type"] == "http.response.start":
+                own = {name for name, _ in HEADERS}
+                kept = [row for row in message.get("headers", []) if row[0].lower() not in own]
+                message = {**message, "headers": [*kept, *HEADERS]}
+            await send(message)
+
+        refusal = access.refusal(scope)
+        if refusal is not None:
+            await _answer(send_with_headers, *refusal)
+        else:
+            await application(scope, receive, send_with_headers)
+
+    return handle
+
+
+async def _answer(send: Send, status: int, text: str) -> None:
+    headers = [(b"content-type", b"text/plain; charset=utf-8")]
+    await send({"type": "http.response.start", "status": status, "headers": headers})
+    await send({"type": "http.response.body", "body": text.encode()})

@@ -1,0 +1,57 @@
+"""Self-contained page: sheets of the library or of files, written as one file."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from ..core.errors import FileError, ParameterError
+from .app import MAX_PAGE_SHEETS
+from .page import self_contained_page
+from .tasks import sheet_of_any
+
+MAX_MUSCLES = 6
+"""Greatest number of muscles in one chart (chosen)."""
+
+
+def open_sheets(names: Sequence[str]) -> tuple[dict[str, Any], ...]:
+    """The sheets of muscles, laws and plants by name or by path. Raises the errors of their loaders."""
+    if len(names) > MAX_PAGE_SHEETS:
+        raise ParameterError(f"{len(names)} names are given; allowed range: at most {MAX_PAGE_SHEETS}.")
+    return tuple(sheet_of_any(name) for name in names)
+
+
+def first_state(sheets: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """The state of a page that begins with these sheets."""
+    muscles = [{"text": sheet["own_text"], "values": {}} for sheet in sheets if "plant" not in sheet]
+    plants = [sheet for sheet in sheets if "plant" in sheet]
+    first = plants[0] if plants else {}
+    plant = {"text": first["own_text"]} if first.get("own_text") else {"name": first.get("name", "")}
+    return {
+        "tab": "muscle" if muscles else "plant",
+        "muscle": {"muscles": muscles[:MAX_MUSCLES], "active": 0},
+        "plant": plant,
+    }
+
+
+def export_page(names: Sequence[str], path: str | Path) -> Path:
+    """Write a page without server and network that shows these muscles and plants; the file is complete or unchanged.
+
+    Raises the errors of the loaders, ParameterError without a name, FileError if the file cannot be written.
+    """
+    if not names:
+        raise ParameterError("no muscle or plant is named; give at least one name of the library or a file.")
+    sheets = open_sheets(names)
+    text = self_contained_page(sheets, first_state(sheets))
+    path = Path(path)
+    unfinished = path.with_name(f"{path.name}.part")
+    try:
+        unfinished.write_text(text, encoding="utf-8")
+        unfinished.replace(path)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            unfinished.unlink()
+        raise FileError(f"{path}: cannot be written ({error.strerror}).") from None
+    return path

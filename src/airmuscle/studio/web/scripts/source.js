@@ -1,0 +1,73 @@
+/* Source of sheets: the server, or what is embedded in a self-contained page. */
+"use strict";
+
+(() => {
+  const place = document.getElementById("embedded");
+  const embedded = place ? JSON.parse(place.textContent) : null;
+
+  async function request(address, options) {
+    let answer;
+    try { answer = await fetch(address, options); } catch { throw new Error("The server does not answer. Start airmuscle studio again."); }
+    if (answer.ok) return answer;
+    const content = await answer.json().catch(() => ({ error: answer.statusText }));
+    throw new Error(content.error || answer.statusText);
+  }
+
+  const post = (address, body) => request(address, { method: "POST", headers: { "X-Airmuscle": "1", "Content-Type": "text/plain; charset=utf-8" }, body });
+
+  /* The program of a sheet enters the table of programs as a script of this server. */
+  function loadProgram(sheet) {
+    if (airmusclePrograms[sheet.id]) return Promise.resolve(sheet);
+    return new Promise((resolve, reject) => {
+      const script = airmuscle.element("script", { src: `program/${sheet.id}.js` });
+      script.addEventListener("load", () => resolve(sheet));
+      script.addEventListener("error", () => reject(new Error("The program of this model could not be loaded; reload the page.")));
+      document.head.append(script);
+    });
+  }
+
+  const source = {
+    embedded,
+
+    async library() {
+      if (!embedded) return (await request("api/library")).json();
+      const rows = (kind) => embedded.sheets.filter((s) => Boolean(s.plant) === kind).map((s) => ({ name: s.name, title: s.title, provenance: s.provenance }));
+      return { laws: rows(false), plants: rows(true), opened: [] };
+    },
+
+    async named(kind, name) {
+      if (!embedded) return loadProgram(await (await request(`api/${kind}/${encodeURIComponent(name)}`)).json());
+      const sheet = embedded.sheets.find((s) => s.name === name && Boolean(s.plant) === (kind === "plant"));
+      if (!sheet) throw new Error(`This page does not contain ${name}.`);
+      return sheet;
+    },
+
+    async ownText(kind, text) {
+      if (!embedded) return loadProgram(await (await post(`api/${kind}`, text)).json());
+      const sheet = embedded.sheets.find((s) => s.own_text === text);
+      if (!sheet) throw new Error("A saved page has no server that could read a file; start airmuscle studio.");
+      return sheet;
+    },
+
+    loadProgram,
+
+    async page(sheets, state) { return (await post("api/page", JSON.stringify({ sheets, state }))).blob(); },
+  };
+
+  /* State of the page in its address, as base64url of JSON. */
+  const link = {
+    encode(state) {
+      const bytes = new TextEncoder().encode(JSON.stringify(state));
+      return btoa(String.fromCharCode(...bytes)).replaceAll("+", "-").replaceAll("/", "_").replace(/=+$/, "");
+    },
+    decode(text) {
+      try {
+        const bytes = Uint8Array.from(atob(text.replaceAll("-", "+").replaceAll("_", "/")), (c) => c.charCodeAt(0));
+        const state = JSON.parse(new TextDecoder().decode(bytes));
+        return state && typeof state === "object" ? state : null;
+      } catch { return null; }
+    },
+  };
+
+  Object.assign(airmuscle, { source, link });
+})();

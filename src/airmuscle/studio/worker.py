@@ -1,0 +1,149 @@
+"""Worker processes of the studio: tasks on texts of users, with limits of time and memory.
+
+A task that exceeds its limit of time is ended with its process; the next task starts a new one. A text of a user is
+never read in the process of the server.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import queue
+import signal
+import sys
+import threading
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from multiprocessing.connection import Connection
+from typing import Any
+
+from ..core.errors import AirmuscleError, InputError
+
+MEMORY = 4 * 2**30
+"""Greatest data memory of a worker [bytes] (chosen); it is not limited on Windows and macOS."""
+_START = 60.0
+"""Limit [s] of the start of a process with its imports (chosen)."""
+
+
+class LimitError(InputError):
+    """A task took more time or memory than is allowed, or all workers are occupied."""
+
+
+class Worker:
+    """One process that runs one task at a time."""
+
+    def __init__(self) -> None:
+        self._process: Any = None
+        self._pipe: Connection | None = None
+
+    def call(self, task: Callable[..., Any], arguments: tuple[Any, ...], limit: float) -> Any:
+        """The result of `task(*arguments)`. Raises what the task raises, LimitError after `limit` [s]."""
+        if self._process is None or not self._process.is_alive():
+            self._start()
+        assert self._pipe is not None
+        try:
+            self._pipe.send((task, arguments))
+            if not self._pipe.poll(limit):
+                self.stop()
+                raise LimitError(f"the computation takes more than {limit:g} s; give a smaller model or file.")
+            result, error = self._pipe.recv()
+        except (EOFError, OSError):
+            self.stop()
+            raise LimitError(
+                "the computation ended without a result, for lack of memory; give a smaller model."
+            ) from None
+        if error is not None:
+            raise error
+        return result
+
+    def _start(self) -> None:
+        self.stop()
+        context = multiprocessing.get_context("spawn")
+        self._pipe, other = context.Pipe()
+        self._process = context.Process(target=serve_tasks, args=(other,), name="airmuscle studio", daemon=True)
+        self._process.start()
+        other.close()
+        if not self._pipe.poll(_START):
+            self.stop()
+            raise LimitError("no process could be started for the computation.")
+        self._pipe.recv()
+
+    def stop(self) -> None:
+        """End the process."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.join()
+            self._process = None
+        if self._pipe is not None:
+            self._pipe.close()
+            self._pipe = None
+
+
+def serve_tasks(pipe: Connection) -> None:
+    """Run the tasks that arrive through a pipe until it is closed, in a process of its own."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends it to all processes; the parent ends this one
+    _limit_memory()
+    warnings.simplefilter("ignore")
+    with contextlib.suppress(EOFError, OSError):
+        pipe.send("ready")
+        while True:
+            task, arguments = pipe.recv()
+            pipe.send(_outcome(task, arguments))
+    os._exit(0)
+
+
+def _outcome(task: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[Any, Exception | None]:
+    try:
+        return task(*arguments), None
+    except AirmuscleError as error:
+        return None, error
+    except MemoryError:
+        return None, LimitError("the computation needs more memory than is allowed; give a smaller model or file.")
+    except Exception as error:  # the reason belongs to the terminal of the server, not to the page
+        print(f"airmuscle studio: {type(error).__name__}: {error}", file=sys.stderr)
+        return None, InputError("this input cannot be processed; the terminal of the server states the reason.")
+
+
+def _limit_memory() -> None:
+    if sys.platform != "linux":
+        return
+    import resource
+
+    hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
+    limit = MEMORY if hard == resource.RLIM_INFINITY else min(MEMORY, hard)
+    resource.setrlimit(resource.RLIMIT_DATA, (limit, hard))
+
+
+class WorkerPool:
+    """Some workers, which are started when they are needed."""
+
+    def __init__(self, count: int) -> None:
+        self._all = [Worker() for _ in range(count)]
+        self._free: queue.Queue[Worker] = queue.Queue()
+        self._lock = threading.Lock()
+        for worker in self._all:
+            self._free.put(worker)
+
+    def call(self, task: Callable[..., Any], *arguments: Any, limit: float) -> Any:
+        """The result of a task in a free worker. Raises what it raises, LimitError after `limit` [s]."""
+        end = time.monotonic() + limit
+        with self._borrowed(limit) as worker:
+            return worker.call(task, arguments, max(0.1, end - time.monotonic()))
+
+    @contextlib.contextmanager
+    def _borrowed(self, limit: float) -> Iterator[Worker]:
+        try:
+            worker = self._free.get(timeout=limit)
+        except queue.Empty:
+            raise LimitError("all workers of the studio are occupied; try again later.") from None
+        try:
+            yield worker
+        finally:
+            self._free.put(worker)
+
+    def stop(self) -> None:
+        """End all processes."""
+        for worker in self._all:
+            worker.stop()

@@ -1,0 +1,217 @@
+"""Page of the studio in a browser: each tab as a user works with it, by mouse, by keyboard and without a network."""
+
+from __future__ import annotations
+
+import contextlib
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import airmuscle as am
+from airmuscle.library.location import Location
+from airmuscle.library.write import to_toml
+from airmuscle.scenario.scenario import build_scenario
+
+pytest.importorskip("starlette", reason="needs the extra studio")
+playwright = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
+CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(CHROMIUM is None, reason="needs chromium"),
+    pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning"),
+]
+OPTIONS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update", "--disable-sync"]  # fmt: skip
+WAIT = 60_000
+REFUSED = "status of 422"
+"""Message of the browser on a text that the server refused."""
+
+
+@pytest.fixture(scope="module")
+def address():
+    """The address of a server on a free port."""
+    command = [sys.executable, "-u", "-m", "airmuscle", "studio", "--no-browser", "--port", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        try:
+            yield server.stdout.readline().split()[1]
+        finally:
+            server.terminate()
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with playwright.sync_playwright() as p:
+        running = p.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
+        yield running
+        running.close()
+
+
+@contextlib.contextmanager
+def opened(browser, address, *, width=1280, height=900, scheme="light", offline=False):
+    """The page; it must report no error and request nothing from elsewhere."""
+    context = browser.new_context(viewport={"width": width, "height": height}, color_scheme=scheme, offline=offline)
+    page, errors = context.new_page(), []
+    page.on(
+        "console", lambda m: errors.append(m.text) if m.type in ("error", "warning") and REFUSED not in m.text else None
+    )
+    page.on("pageerror", lambda e: errors.append(str(e)))
+    page.on("request", lambda r: None if r.url.startswith((address, "data:", "blob:")) else errors.append(r.url))
+    page.goto(address)
+    page.wait_for_selector("html[data-ready]", timeout=WAIT)
+    yield page
+    context.close()
+    assert errors == []
+
+
+def wait_for(page, tab, name):
+    page.wait_for_selector(f'#panel-{tab}[data-shown="{name}"]', timeout=WAIT)
+
+
+def downloaded(page, panel, name, folder):
+    with page.expect_download() as download:
+        page.locator(f"#panel-{panel}").get_by_role("button", name=name, exact=True).click()
+    file = folder / download.value.suggested_filename
+    download.value.save_as(file)
+    return file
+
+
+def number(page, label):
+    return float(page.get_by_label(label, exact=True).input_value().replace("−", "-"))
+
+
+@pytest.fixture
+def muscle(browser, address):
+    with opened(browser, address) as page:
+        wait_for(page, "muscle", "dmsp-20-300")
+        yield page
+
+
+def test_two_of_three_quantities_give_the_third(muscle):
+    law = am.load("dmsp-20-300").characteristic
+    muscle.get_by_label("Pressure [bar]").fill("2.5")
+    muscle.get_by_label("Force [N]").fill("150")
+    assert number(muscle, "Contraction [%]") == pytest.approx(100 * law.contraction(2.5e5, 150.0), rel=1e-5)
+    muscle.get_by_label("Solve for force").check()
+    muscle.get_by_label("Contraction [%]").fill("10")
+    assert number(muscle, "Force [N]") == pytest.approx(law.force(2.5e5, 0.10), rel=1e-5)
+    muscle.get_by_label("Solve for pressure").check()
+    muscle.get_by_label("Force [N]").fill("300")
+    assert number(muscle, "Pressure [bar]") == pytest.approx(law.pressure(0.10, 300.0) / 1e5, rel=1e-5)
+    muscle.get_by_label("Contraction [%]").fill("abc")
+    assert muscle.get_by_label("Contraction [%]").get_attribute("aria-invalid") == "true"
+
+
+def test_the_working_point_is_dragged_and_moved_by_keys(muscle):
+    muscle.get_by_label("Solve for pressure").check()
+    box = muscle.locator("#panel-muscle .chart .u-over").bounding_box()
+    muscle.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+    muscle.mouse.down()
+    muscle.mouse.move(box["x"] + 0.4 * box["width"], box["y"] + 0.6 * box["height"], steps=5)
+    muscle.mouse.up()
+    muscle.wait_for_timeout(100)
+    law = am.load("dmsp-20-300").characteristic
+    contraction, force = number(muscle, "Contraction [%]") / 100, number(muscle, "Force [N]")
+    assert 0.05 < contraction < 0.15
+    assert number(muscle, "Pressure [bar]") == pytest.approx(law.pressure(contraction, force) / 1e5, rel=1e-4)
+    muscle.locator("#panel-muscle .chart").press("ArrowRight")
+    assert number(muscle, "Contraction [%]") == pytest.approx(100 * contraction + 0.1, abs=2e-4)
+
+
+def test_the_isobars_of_the_file_are_those_of_the_library(muscle, tmp_path):
+    law = am.load("dmsp-20-300").characteristic
+    rows = np.genfromtxt(downloaded(muscle, "muscle", "CSV", tmp_path), delimiter=",", skip_header=1)
+    assert rows.shape == (1000, 7)
+    for pressure, column in zip((1e5, 2e5, 3e5, 4e5, 5e5, 6e5), rows.T[1:], strict=True):
+        inside = np.isfinite(column)
+        np.testing.assert_allclose(column[inside], law.force(pressure, rows[inside, 0]), atol=1e-12 * 2000)
+        assert inside.mean() > 0.95
+
+
+def test_figures_and_muscle_file_are_downloaded(muscle, tmp_path):
+    picture = downloaded(muscle, "muscle", "SVG", tmp_path).read_text(encoding="utf-8")
+    assert picture.count("<path") > 15
+    assert "contraction [%]" in picture
+    assert downloaded(muscle, "muscle", "PNG", tmp_path).read_bytes().startswith(b"\x89PNG")
+    file = downloaded(muscle, "muscle", "TOML", tmp_path)
+    assert am.load(file).characteristic == am.load("dmsp-20-300").characteristic
+
+
+def test_a_changed_parameter_reaches_chart_address_and_file(browser, address, muscle, tmp_path):
+    field = muscle.locator("#panel-muscle .parameter input[type=text]").first
+    field.fill("12")
+    muscle.wait_for_timeout(400)
+    changed = am.load(downloaded(muscle, "muscle", "TOML", tmp_path))
+    assert changed.characteristic.geometry.radius == pytest.approx(0.012, rel=1e-15)
+    force = changed.characteristic.contraction(3e5, 100.0)
+    assert number(muscle, "Contraction [%]") == pytest.approx(100 * force, rel=1e-5)
+    muscle.reload()
+    muscle.wait_for_selector("html[data-ready]", timeout=WAIT)
+    assert muscle.locator("#panel-muscle .parameter input[type=text]").first.input_value() == "12"
+    muscle.locator("#panel-muscle .parameter input[type=text]").first.fill("-1")
+    assert muscle.locator("#panel-muscle .parameter input[type=text]").first.get_attribute("aria-invalid") == "true"
+
+
+def test_muscles_are_compared_and_own_files_are_read(muscle, tmp_path):
+    muscle.get_by_label("Muscle or law of the library").select_option("chou-hannaford")
+    wait_for(muscle, "muscle", "chou-hannaford")
+    muscle.get_by_text("Own muscle file", exact=True).click()
+    own = muscle.get_by_label("Muscle file (TOML)", exact=True)
+    own.fill("title = ")
+    muscle.get_by_role("button", name="Read this muscle").click()
+    muscle.get_by_text("is not valid TOML").wait_for(timeout=WAIT)
+    own.fill(to_toml(am.load("tondu-lopez")))
+    muscle.get_by_role("button", name="Read this muscle").click()
+    wait_for(muscle, "muscle", "chou-hannaford own muscle")
+    heading = downloaded(muscle, "muscle", "CSV", tmp_path).read_text().partition("\n")[0]
+    assert "force of own muscle at" in heading
+    muscle.get_by_label("Remove own muscle").click()
+    wait_for(muscle, "muscle", "chou-hannaford")
+
+
+def test_a_plant_runs_by_schedule_and_by_hand_and_is_simulated_from_its_file(browser, address, tmp_path):
+    with opened(browser, address) as page:
+        page.get_by_role("tab", name="Muscle").press("ArrowRight")
+        wait_for(page, "plant", "lift")
+        assert "steps" in page.locator("#panel-plant").inner_text()
+        page.locator("#panel-plant .parameter", has_text="fill").first.get_by_role("button", name="1").click()
+        page.wait_for_timeout(1500)
+        page.get_by_role("button", name="Run the schedule").click()
+        rows = np.genfromtxt(downloaded(page, "plant", "CSV", tmp_path), delimiter=",", names=True)
+        text = downloaded(page, "plant", "TOML", tmp_path).read_text(encoding="utf-8")
+    scenario = build_scenario(tomllib.loads(text), Location("page", "", Path()))
+    recording = scenario.simulate()
+    pressure = np.interp(recording["time"], rows["time_s"], rows["pressure_kPa"] * 1e3)
+    assert scenario.problem.duration > 0.3
+    assert pressure.max() > 5e4
+    np.testing.assert_allclose(pressure, recording["pressure"], atol=2e-3 * pressure.max())
+
+
+def test_a_saved_page_works_without_a_network(browser, address, tmp_path):
+    with opened(browser, address) as page:
+        wait_for(page, "muscle", "dmsp-20-300")
+        page.get_by_label("Force [N]").fill("222")
+        page.get_by_role("tab", name="Plant").click()
+        wait_for(page, "plant", "lift")
+        with page.expect_download() as download:
+            page.get_by_role("button", name="Save page").click()
+        download.value.save_as(tmp_path / "saved.html")
+    with opened(browser, (tmp_path / "saved.html").as_uri(), offline=True) as page:
+        wait_for(page, "plant", "lift")
+        page.get_by_role("tab", name="Muscle").click()
+        wait_for(page, "muscle", "dmsp-20-300")
+        assert number(page, "Force [N]") == 222.0
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [360, 768, 1600])
+def test_the_page_fits_every_width(browser, address, width, scheme):
+    with opened(browser, address, width=width, scheme=scheme) as page:
+        assert page.evaluate("document.documentElement.dataset.theme") == scheme
+        for tab, name in (("muscle", "dmsp-20-300"), ("plant", "lift")):
+            page.get_by_role("tab", name=tab.title()).click()
+            wait_for(page, tab, name)
+            assert page.evaluate("document.documentElement.scrollWidth") <= width

@@ -1,0 +1,368 @@
+"""Numbers of the studio: what its scripts compute in the page is what the library computes."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import re
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from studio_pages import BEGINNING, WEB, run_script, scripts
+from typer.testing import CliRunner
+
+import airmuscle as am
+from airmuscle.cli.app import app
+from airmuscle.core import flatten, leaves
+from airmuscle.core.errors import FileError, ParameterError, PhysicsError, TraceError
+from airmuscle.core.tree import with_parameters
+from airmuscle.geometry import Braid, PleatedTube, StraightFibre
+from airmuscle.library.build import build
+from airmuscle.library.files import list_laws, list_plants
+from airmuscle.library.location import Location
+from airmuscle.library.write import to_toml
+from airmuscle.scenario.scenario import build_scenario
+from airmuscle.studio import export_page
+from airmuscle.studio.law_sheet import law_sheet
+from airmuscle.studio.tasks import plant_names, sheet_of_any, sheet_of_scenario_text
+from airmuscle.studio.toml_template import fill_template
+
+WITHOUT_CLOSED_FORM = ("festo-tool-dmsp-10", "festo-tool-dmsp-20", "festo-tool-dmsp-40", "saga2007-exact")
+pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
+LAWS = [name for name in list_laws() if name not in WITHOUT_CLOSED_FORM]
+TOLERANCE = 1e-12
+EVALUATE = """
+console.log(JSON.stringify(DATA.map(([sheet, values, points]) => {
+  const law = new airmuscle.Law(sheet);
+  law.values.set(values); law.prepare();
+  return points.map(([p, c, f]) => [law.force(p, c), law.contraction(p, f), law.pressure(c, f), law.stiffness(p, c)].map(String));
+})));
+"""
+
+
+def or_nan(function, *arguments):
+    try:
+        return float(function(*arguments))
+    except PhysicsError:
+        return float("nan")
+
+
+def points_of(law, limits):
+    """Pressures, contractions and forces (N, 3) over the validity range, some of them without a solution."""
+    rng = np.random.default_rng(0)
+    low, high = [0.0, 0.0], [min(law.pressure_range[1], 6e5), 0.25]
+    if limits is not None:
+        low, high = [limits.min_pressure, limits.min_contraction], [limits.max_pressure, limits.max_contraction]
+    return rng.uniform([*low, 0.0], [*high, 500.0], (6, 3))
+
+
+def changed(law):
+    """The law with every parameter one per cent greater, where that is allowed."""
+    for factor in (1.01, 0.99):
+        try:
+            return with_parameters(law, flatten(law) * factor)
+        except ParameterError:
+            continue
+    return law
+
+
+def library_values(law, points):
+    return np.array(
+        [
+            [or_nan(law.force, p, c), or_nan(law.contraction, p, f), or_nan(law.pressure, c, f), or_nan(law.stiffness, p, c)]
+            for p, c, f in points
+        ]
+    )  # fmt: skip
+
+
+def test_every_law_of_the_page_gives_the_numbers_of_the_library(tmp_path):
+    """Also with changed parameters; a point without a solution has none in the page."""
+    text, data, expected = scripts(*BEGINNING), [], {}
+    for name in LAWS:
+        entry = am.load(name)
+        sheet = law_sheet(entry)
+        text += sheet.pop("script")
+        points = points_of(entry.characteristic, entry.validity_range)
+        for kind, law in (("", entry.characteristic), (" changed", changed(entry.characteristic))):
+            values = flatten(law).tolist() + sheet["values"][sum(1 for _ in leaves(law)) :]
+            data.append((sheet, values, points.tolist()))
+            expected[name + kind] = library_values(law, points)
+    found = run_script(text + EVALUATE, data, tmp_path)
+    wrong = {}
+    for (name, wanted), rows in zip(expected.items(), found, strict=True):
+        values = np.array(rows).astype(float)
+        assert (np.isnan(values) == np.isnan(wanted)).all(), name
+        both = np.isfinite(values) & np.isfinite(wanted)
+        scale = np.abs(np.where(both, wanted, 0.0)).max(axis=0)
+        worst = np.where(both, np.abs(values - wanted), 0.0).max(axis=0)
+        if not (worst <= TOLERANCE * scale).all():
+            wrong[name] = worst / scale
+    assert wrong == {}
+
+
+def test_a_law_without_a_closed_form_is_approximated_and_the_error_is_stated():
+    sheet = law_sheet(am.load("festo-tool-dmsp-20"))
+    assert 0.0 < sheet["approximation"]["rms_error"] < sheet["approximation"]["max_error"] < 25.0
+    assert sheet["parameters"] == []
+    with pytest.raises(TraceError, match=r"saga2007-exact: ExactMeridian has no closed form and no validity range"):
+        law_sheet(am.load("saga2007-exact"))
+
+
+OUTLINE = """
+console.log(JSON.stringify(DATA.map(([sheet, contractions]) => {
+  const law = new airmuscle.Law(sheet);
+  return contractions.map((c) => { const o = law.outline(c, 40); return [o.axial, o.radius]; });
+})));
+"""
+
+
+def test_the_outline_of_the_page_is_that_of_the_geometry(tmp_path):
+    """A closed form exactly, any other geometry by linear interpolation."""
+    entry = am.load("saga2007-circle")
+    braid = Braid(0.01, 0.4, 0.3)
+    shapes = [StraightFibre(0.2, 0.02, rings=2), braid, PleatedTube(0.2, 0.02)]
+    text, data = scripts(*BEGINNING), []
+    for shape in shapes:
+        from_file = am.load("sarosi-dmsp-10") if not isinstance(shape, StraightFibre) else entry
+        law = from_file.characteristic
+        if isinstance(shape, StraightFibre):
+            law = build({"model": "VirtualWork", "geometry": {"model": "Braid", "radius": 0.01, "braid_angle": 0.4, "resting_length": 0.2}}, Location("", "", Path()))  # fmt: skip
+        sheet = law_sheet(dataclasses.replace(from_file, characteristic=law, geometry=shape))
+        text += sheet.pop("script")
+        data.append((sheet, [0.0, 0.1, 0.2]))
+    found = run_script(text + OUTLINE, data, tmp_path)
+    for shape, outlines in zip(shapes, found, strict=True):
+        for contraction, (axial, radius) in zip((0.0, 0.1, 0.2), outlines, strict=True):
+            x, r = shape.outline(contraction, 6001)
+            tolerance = 1e-9 if not isinstance(shape, PleatedTube) else 2e-4
+            np.testing.assert_allclose(np.interp(axial, x, r), radius, atol=max(tolerance, 2e-5 * r.max()))
+            assert max(axial) == pytest.approx(x.max(), abs=1e-12)
+
+
+NUMBERS = (0.0, -0.0, 1.0, 5.0, 0.1, 1e-4, 9.999e-5, 1e-7, 123456.789, 1e15, 1e16, 1.5e22, 5e-324, 1.7976931348623157e308, -2.5e-9, 2.6167e-09, 4096.0)  # fmt: skip
+
+
+def test_the_page_writes_numbers_as_python_does(tmp_path):
+    text = scripts("numbers") + "console.log(JSON.stringify(DATA.map(airmuscle.pythonFloat)));"
+    assert run_script(text, NUMBERS, tmp_path) == [repr(x) for x in NUMBERS]
+
+
+def test_the_page_reads_what_users_type(tmp_path):
+    text = scripts("numbers") + "console.log(JSON.stringify(DATA.map((t) => String(airmuscle.readNumber(t)))));"
+    given = ["1", " 2.5 ", "2,5", "−3", "1e3", ".5", "", "abc", "1 2", "1,000,000", "0x10", "Infinity", "--1"]
+    wanted = ["1", "2.5", "2.5", "-3", "1000", "0.5", *["NaN"] * 7]
+    assert run_script(text, given, tmp_path) == wanted
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_a_muscle_file_of_the_page_is_that_of_the_library(name, tmp_path):
+    entry = am.load(name)
+    sheet = law_sheet(entry)
+    assert sheet["toml"]["unchanged"] == to_toml(entry)
+    text = fill_template(sheet["toml"]["changed"], [v * 1.01 for v in sheet["values"]])
+    file = tmp_path / "own.toml"
+    file.write_text(text)
+    again = am.load(file)
+    law = again.characteristic
+    np.testing.assert_array_equal(flatten(law), flatten(entry.characteristic) * 1.01)
+    assert again.provenance == "chosen"
+    assert again.uncertainty is None
+    assert name in again.note
+
+
+RUN = """
+const run = new airmuscle.PlantRun(DATA);
+const r = run.scheduled(run.program.run.segments, 0.01);
+console.log(JSON.stringify([r.status, r.steps, r.columns]));
+"""
+
+
+@pytest.mark.parametrize("name", ["lift", "joint-dmsp-20-proportional", pytest.param("joint-dmsp-20-matrix", marks=pytest.mark.slow)])  # fmt: skip
+def test_a_run_of_the_page_is_that_of_the_library(name, tmp_path):
+    sheet = sheet_of_any(name)
+    text = scripts("numbers") + sheet.pop("script") + scripts("plant-start", "plant-run") + RUN
+    status, _, columns = run_script(text, sheet, tmp_path)
+    assert status == 0
+    scenario = scenario_of(name)
+    times = np.array(columns["time"])
+    recording = am.simulate(
+        scenario.plant, scenario.problem.input, duration=scenario.problem.duration,
+        initial_state=dict(scenario.initial_state), output_times=times, integrator=scenario.problem.integrator,
+    )  # fmt: skip
+    for column in recording:
+        wanted = recording[column]
+        np.testing.assert_allclose(
+            columns[column], wanted, atol=1e-10 * max(1e-300, np.abs(wanted).max()) + 1e-13, err_msg=column
+        )
+
+
+def scenario_of(name):
+    from airmuscle.library.files import read_toml
+    from airmuscle.library.plant_file import plant_tables
+    from airmuscle.studio.tasks import SCENARIOS
+
+    if name in list_plants():
+        tables, location = plant_tables(name)
+    else:
+        tables, location = read_toml(SCENARIOS / f"{name}.toml"), Location(name, "", SCENARIOS)
+    return build_scenario({key: tables[key] for key in ("title", "plant", "input", "run")}, location)
+
+
+BY_HAND = """
+const run = new airmuscle.PlantRun(DATA), live = run.live();
+live.drive(0, 1);
+for (let k = 0; k < 50; k++) live.advance(0.02);
+live.drive(0, 0); live.drive(1, 0.5);
+for (let k = 0; k < 50; k++) live.advance(0.02);
+const again = run.scheduled(run.segmentsOf(live.schedule, live.time), 0.02);
+console.log(JSON.stringify([live.schedule, live.columns, again.columns]));
+"""
+
+
+def test_a_run_by_hand_is_the_run_of_its_schedule(tmp_path):
+    """To the tolerance of the integrator: a run by hand meets every row with a step, the schedule interpolates."""
+    sheet = sheet_of_any("lift")
+    text = scripts("numbers") + sheet.pop("script") + scripts("plant-start", "plant-run") + BY_HAND
+    schedule, live, again = run_script(text, sheet, tmp_path)
+    assert [name for name in schedule if schedule[name]] == ["fill", "discharge"]
+    for column in ("pressure", "position", "air_mass"):
+        size = np.abs(live[column]).max()
+        np.testing.assert_allclose(again[column], live[column], atol=2e-5 * size)
+
+
+OWN = """
+title = "own"
+[plant]
+muscle = "dmsp-20-300"
+circuit = { model = "FillDischarge", supply = { model = "Supply", pressure = "6 bar" }, fill = { library = "matrix-821" }, discharge = { library = "matrix-821" } }
+mechanism = { model = "HangingMass", mass = "5 kg" }
+[input]
+fill = [["1 s", 1]]
+[run]
+duration = "2 s"
+"""
+START = """
+const run = new airmuscle.PlantRun(DATA[0]);
+for (const [path, value] of Object.entries(DATA[1])) run.set(DATA[0].parameters.find((row) => row.path === path), value);
+console.log(JSON.stringify([run.initial.settled, Array.from(run.initial.state), Array.from(run.values)]));
+"""
+CHANGES = {
+    "lift": ({"mechanism.mass": 17.0}, {"muscle.contractile.geometry.radius": 0.012, "ambient.pressure": 9e4}),
+    "joint-dmsp-20-proportional": ({"mechanism.weight_torque": 4.0, "mechanism.radius": 0.035},),
+}
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_a_run_with_other_parameters_begins_at_their_equilibrium(name, tmp_path):
+    sheet = sheet_of_any(name)
+    text = scripts("numbers") + sheet.pop("script") + scripts("plant-start", "plant-run") + START
+    scenario = scenario_of(name)
+    pressure = 2.5e5 if name.startswith("joint") else 0.0
+    for changes in CHANGES[name]:
+        settled, state, values = run_script(text, [sheet, changes], tmp_path)
+        plant = with_parameters(scenario.plant, values)
+        expected = am.find_equilibrium(plant, pressure=pressure)
+        assert settled
+        for variable, found in zip(plant.states, state, strict=True):
+            assert found == pytest.approx(expected[variable.name], rel=1e-8, abs=1e-9 * variable.nominal)
+
+
+def test_a_start_that_the_page_cannot_find_is_the_original_one(tmp_path):
+    """With an energy balance, the temperature of the air depends on the parameters as well."""
+    sheet = sheet_of_scenario_text(
+        OWN.replace("[plant]", '[plant]\ngas = { model = "EnergyBalance", heat_transfer = 1.0 }')
+    )
+    text = scripts("numbers") + sheet.pop("script") + scripts("plant-start", "plant-run") + START
+    settled, state, _ = run_script(text, [sheet, {"mechanism.mass": 7.0}], tmp_path)
+    assert not settled
+    assert run_script(text, [sheet, {}], tmp_path)[:2] == [True, state]
+
+
+def test_a_scenario_of_a_user_is_read_with_its_parameters():
+    sheet = sheet_of_scenario_text(OWN)
+    rows = {row["path"]: row for row in sheet["parameters"]}
+    assert rows["mechanism.mass"]["value"] == 5.0
+    assert len(rows["muscle.contractile.geometry.radius"]["places"]) == 2
+    assert sheet["own_text"] == OWN
+    values = list(sheet["values"])
+    values[rows["mechanism.mass"]["places"][0]] = 7.5
+    parts = sheet["toml"]
+    written = tomllib.loads(fill_template(parts["plant"], values) + parts["input"] + "\n" + parts["run"])
+    scenario = build_scenario(written, Location("page", "", Path()))
+    assert scenario.plant.mechanism.mass == 7.5
+    np.testing.assert_array_equal(flatten(scenario.plant), values)
+
+
+def test_the_studio_offers_a_lift_and_the_plants_of_the_library():
+    assert plant_names() == ("lift", *list_plants())
+
+
+def test_a_saved_page_contains_everything(tmp_path):
+    file = export_page(["dmsp-20-300", "lift"], tmp_path / "page.html")
+    page = file.read_text(encoding="utf-8")
+    policy = re.search(r'Content-Security-Policy" content="([^"]*)"', page).group(1)
+    assert "unsafe" not in policy
+    assert "default-src 'none'" in policy
+    assert policy.count("sha256-") == page.count("<script>") + page.count("<style>")
+    assert not re.search(r'<(?:script|link|img)[^>]*(?:src|href)="(?!data:)', page)
+    assert "Permission is hereby granted" in page
+    assert page.count("airmusclePrograms[") >= 2
+
+
+def test_a_page_that_cannot_be_written_leaves_no_file(tmp_path):
+    with pytest.raises(FileError, match="cannot be written"):
+        export_page(["dmsp-20-300"], tmp_path / "missing" / "page.html")
+    with pytest.raises(ParameterError, match="give at least one name"):
+        export_page([], tmp_path / "page.html")
+    with pytest.raises(ParameterError, match="allowed range: at most 12"):
+        export_page(["dmsp-20-300"] * 13, tmp_path / "page.html")
+    assert list(tmp_path.iterdir()) == []
+
+
+def luminance(colour):
+    """Relative luminance of #rrggbb, WCAG 2.2."""
+    parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
+    return float(np.dot([0.2126, 0.7152, 0.0722], linear))
+
+
+def contrast(a, b):
+    low, high = sorted((luminance(a), luminance(b)))
+    return (high + 0.05) / (low + 0.05)
+
+
+@pytest.mark.parametrize("theme", [0, 1], ids=["light", "dark"])
+def test_colours_of_the_page_have_the_contrast_of_wcag_aa(theme):
+    """4.5 for texts, 3 for curves and edges of fields."""
+    block = re.findall(r":root[^{]*\{(.*?)\}", (WEB / "style.css").read_text(encoding="utf-8"), re.DOTALL)[theme]
+    colours = dict(re.findall(r"--([\w-]+): (#\w{6})", block))
+    texts = [(a, b) for a in ("ink", "soft", "accent") for b in ("card", "ground")]
+    texts += [("on-accent", "accent"), ("ink", "wash"), ("error", "error-wash"), ("soft", "wash"), ("card", "ink")]
+    curves = [(f"c{i}", "card") for i in range(1, 7)] + [("edge", "card"), ("edge", "ground")]
+    pairs = [*((pair, 4.5) for pair in texts), *((pair, 3.0) for pair in curves)]
+    assert {pair: c for pair, least in pairs if (c := contrast(colours[pair[0]], colours[pair[1]])) < least} == {}
+
+
+def test_the_command_writes_a_page_and_names_a_missing_package(tmp_path, monkeypatch):
+    runner = CliRunner()
+    file = tmp_path / "page.html"
+    done = runner.invoke(app, ["studio", "tondu-lopez", "--export", str(file)])
+    assert (done.exit_code, done.stdout) == (0, f"page: {file}\n")
+    assert file.read_text(encoding="utf-8").startswith("<!doctype html>")
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    done = runner.invoke(app, ["studio"])
+    assert done.exit_code == 1
+    assert (
+        "error: the studio needs starlette and uvicorn. Install the extra: pip install 'airmuscle[studio]'"
+        in done.stderr
+    )
+
+
+@pytest.mark.parametrize("name", ["unknown-muscle", "matrix-821", "missing.toml"])
+def test_the_command_names_what_cannot_be_shown(name):
+    done = CliRunner().invoke(app, ["studio", name, "--no-browser"])
+    assert done.exit_code == 1
+    assert done.stderr.startswith("error: ")
+    assert name in done.stderr

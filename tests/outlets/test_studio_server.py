@@ -1,0 +1,274 @@
+"""Server of the studio: it answers its own page only, within limits, and never with a traceback or a file."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+from studio_pages import HOST, InThisProcess, request
+
+pytest.importorskip("starlette", reason="needs the extra studio")
+
+from airmuscle import load
+from airmuscle.core.errors import InputError, ParameterError
+from airmuscle.library.write import to_toml
+from airmuscle.studio.app import MAX_PAGE, create_app
+from airmuscle.studio.security import Access, is_loopback
+from airmuscle.studio.server import access_of, bound_socket
+from airmuscle.studio.uploads import MAX_TEXT, read_text_tables
+from airmuscle.studio.worker import LimitError, WorkerPool
+
+MUSCLE = to_toml(load("tondu-lopez"))
+SCENARIO = """
+[plant]
+muscle = "dmsp-20-300"
+circuit = { model = "FillDischarge", supply = { model = "Supply", pressure = "6 bar" }, fill = { library = "matrix-821" }, discharge = { library = "matrix-821" } }
+mechanism = { model = "HangingMass", mass = "5 kg" }
+[input]
+fill = [["1 s", 1]]
+[run]
+duration = "2 s"
+"""
+
+
+@pytest.fixture(scope="module")
+def app():
+    return create_app(pool=InThisProcess())
+
+
+def test_the_page_allows_scripts_of_this_server_only(app):
+    answer = request(app, "GET", "/")
+    policy = answer.headers["content-security-policy"]
+    assert answer.status == 200
+    assert "script-src 'self';" in policy
+    assert "unsafe" not in policy
+    assert answer.headers["x-content-type-options"] == "nosniff"
+    assert " style=" not in answer.text
+    assert "<script>" not in answer.text
+
+
+def test_every_file_that_the_page_names_is_sent(app):
+    page = request(app, "GET", "/").text
+    names = [part.split('"')[0] for part in page.replace('href="web/', 'src="web/').split('src="web/')[1:]]
+    assert len(names) > 15
+    assert {request(app, "GET", f"/web/{name}").status for name in names} == {200}
+    assert "MIT" in request(app, "GET", "/web/vendor/uPlot.LICENSE").text
+
+
+def test_a_muscle_of_the_library_and_its_program_are_sent(app):
+    sheet = request(app, "GET", "/api/law/dmsp-20-300").json()
+    program = request(app, "GET", f"/program/{sheet['id']}.js")
+    assert sheet["law"] == "MartensBoblan2017"
+    assert program.headers["content-type"].startswith("text/javascript")
+    assert program.text.startswith('"use strict";\nairmusclePrograms[')
+
+
+def test_own_files_are_read(app):
+    muscle = request(app, "POST", "/api/law", MUSCLE.encode())
+    plant = request(app, "POST", "/api/plant", SCENARIO.encode())
+    assert (muscle.status, plant.status) == (200, 200)
+    assert muscle.json()["own_text"] == MUSCLE
+    assert [row["name"] for row in plant.json()["inputs"]] == ["fill", "discharge"]
+
+
+PATHS = (
+    "/../../etc/passwd", "/web/../app.py", "/web/..%2f..%2fapp.py", "/web/scripts/../../app.py", "/web//etc/passwd",
+    "/web/", "/web/.", "/web/scripts", "/web/index.html", "/web/\0", "/program/../../x.js", "/program/", "/api/law/..",
+    "/api/law/../plants/lift", "/api/law/%2e%2e", "/api/law/matrix-821", "/api/law/lift", "/api/plant/dmsp-20-300",
+    "/api/plant/../lift", "/api/law/<script>", "/api/law/" + "x" * 1500, "/api", "/docs", "/openapi.json", "/favicon.ico",
+    "/.git/config", "//", "/api/law/a\r\nx: y", "/api/law/é", "/program/" + "0" * 32 + ".js",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("path", PATHS)
+def test_other_addresses_do_not_exist(app, path):
+    answer = request(app, "GET", path, raw=path.encode())
+    assert answer.status == 404
+    assert "Traceback" not in answer.text
+    assert "root:" not in answer.text
+    assert set(answer.json()) == {"error"}
+
+
+@pytest.mark.parametrize(
+    "host",
+    [
+        "",
+        "evil.example",
+        "evil.example:8765",
+        "127.0.0.1.evil.example",
+        "[::2]:8765",
+        "0.0.0.0",
+        "localhost.",
+        "a" * 500,
+    ],
+)
+def test_another_host_name_is_refused(app, host):
+    assert request(app, "GET", "/", headers={"host": host}).status == 421
+    assert request(app, "GET", "/api/library", headers={"host": None}).status == 421
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "localhost:80", "[::1]:8765", "[::1]"])
+def test_the_names_of_this_machine_are_accepted(app, host):
+    assert request(app, "GET", "/", headers={"host": host}).status == 200
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"x-airmuscle": None},
+        {"x-airmuscle": "0"},
+        {"origin": "http://evil.example"},
+        {"origin": "null"},
+        {"origin": "http://127.0.0.1:9999"},
+        {"origin": "https://["},
+        {"origin": ""},
+        {"sec-fetch-site": "cross-site"},
+        {"sec-fetch-site": "same-site"},
+    ],
+)
+@pytest.mark.parametrize("path", ["/api/law", "/api/plant", "/api/page"])
+def test_requests_of_other_pages_are_refused(app, path, headers):
+    assert request(app, "POST", path, b"", headers=headers).status == 403
+
+
+@pytest.mark.parametrize("method", ["PUT", "DELETE", "PATCH", "OPTIONS", "TRACE", "CONNECT", "post", "X" * 100])
+def test_other_methods_are_refused(app, method):
+    assert request(app, method, "/api/law").status == 405
+
+
+def test_posts_of_the_own_page_are_accepted(app):
+    headers = {"origin": f"http://{HOST}", "sec-fetch-site": "same-origin"}
+    assert request(app, "POST", "/api/law", MUSCLE.encode(), headers=headers).status == 200
+
+
+def test_a_path_of_any_length_is_refused_early(app):
+    assert request(app, "GET", "/" + "x" * 5000).status == 414
+
+
+@pytest.mark.parametrize("path", ["/api/law", "/api/plant"])
+def test_a_large_text_is_refused_before_it_is_read(app, path):
+    answer = request(app, "POST", path, b"x" * (20 * MAX_TEXT))
+    assert answer.status == 413
+    assert answer.json()["error"] == "the text is larger than 64 kB."
+    assert answer.unread > 100
+
+
+BAD_TEXTS = (
+    b"", b"\xff\xfe\x00", b"\x00" * 100, b"[", b"a = ", b"[[[[", b"title = 1", b"x" * 60000, b"a = " + b"[" * 30000,
+    b"a = " + b"{ a = " * 5000, b"<script>alert(1)</script>", b"title = '${7*7}{{7*7}}'", b"[characteristic]",
+    b"title='x'\nprovenance='x'\n[characteristic]\nmodel='os.system'",
+    b"title='x'\nprovenance='x'\n[characteristic]\nmodel='Braid'",
+    b"title='x'\nprovenance='x'\n[characteristic]\nmodel='TonduLopez2000'\nend_correction=nan",
+    b"title='x'\nprovenance='x'\n[characteristic]\nmodel='TonduLopez2000'\nend_correction=1e400",
+    b"title='x'\nprovenance='x'\n[characteristic]\nmodel='Tabulated'\npressures={file='/etc/passwd',column='x'}",
+    b"title='x'\nprovenance='x'\n[characteristic]\nmodel='Tabulated'\npressures=[]\ncontractions=[]\nforces=[]",
+    b"title='x'\nprovenance='x'\nproduct='../../x'\n[characteristic]\nmodel='Serres2009'",
+    b"title='x'\nprovenance='x'\n[characteristic]\nmodel='ContractileSurface'\ndegree=1000000",
+    MUSCLE.encode().replace(b"radius = ", b"radius = -"), MUSCLE.encode().replace(b"0.", b"inf #"),
+    MUSCLE.encode() + b"\n[unknown]\n", MUSCLE.encode() * 3, "title = 'ü'\r\n".encode("latin-1"),
+    b"[plant]", b"[plant]\nmuscle='/etc/passwd'", b"[plant]\nmuscle='../x.toml'\n[run]\nduration='1 s'",
+    b"[plant]\nmuscle='x.toml'", b"[plant]\nlibrary='/dev/zero'", b"[plant]\nlibrary='lift/../x'",
+    b"[plant]\nmuscle=[]", b"[plant]\nmuscle=1\n[run]\nduration=1", b"plant = 1", b"[[plant]]", b"[plant.muscle]",
+    SCENARIO.encode().replace(b"2 s", b"-2 s"), SCENARIO.encode().replace(b"2 s", b"1e9 s"),
+    SCENARIO.encode().replace(b"2 s", b"nan s"), SCENARIO.encode().replace(b"fill = [[\"1 s\", 1]]", b"file='x.csv'"),
+    SCENARIO.encode().replace(b"fill = [[\"1 s\", 1]]", b"[input.controller]\nmodel='PID'"),
+    SCENARIO.encode().replace(b"fill = [[\"1 s\", 1]]", b"fill=[[1,2]]"),
+    SCENARIO.encode().replace(b"matrix-821", b"/tmp/valve.toml"),
+    SCENARIO.encode().replace(b"matrix-821", b"1 x/../../valve"), SCENARIO.encode().replace(b"5 kg", b"0 kg"),
+    SCENARIO.encode().replace(b"5 kg", b"5 m"), SCENARIO.encode().replace(b"HangingMass", b"__import__"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("text", BAD_TEXTS, ids=lambda text: text[:40].decode("latin-1").replace("\0", "0"))
+@pytest.mark.parametrize("path", ["/api/law", "/api/plant"])
+def test_a_wrong_text_is_answered_with_its_reason(app, path, text):
+    answer = request(app, "POST", path, text)
+    assert answer.status in (400, 422)
+    error = answer.json()["error"]
+    assert 10 < len(error) < 3000
+    assert not any(word in error for word in ("Traceback", "root:", 'File "', "/src/"))
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        b"", b"{", b"[]", b"null", b"1", b'{"sheets": []}', b'{"sheets": [], "state": {}}', b'{"sheets": ["x"], "state": {}}',
+        b'{"sheets": "x", "state": {}}', b'{"sheets": [1], "state": {}}', b'{"sheets": ["x"], "state": []}',
+        b'{"sheets": ["../x"], "state": {}}', b'{"sheets": ["' + b'x","' * 13 + b'x"], "state": {}}', b"[" * 100000,
+        b"\xff", b'{"sheets": {"a": 1}, "state": {}}',
+    ],
+    ids=range(16),
+)  # fmt: skip
+def test_a_wrong_request_for_a_page_is_refused(app, body):
+    answer = request(app, "POST", "/api/page", body)
+    assert answer.status in (400, 404)
+    assert set(answer.json()) == {"error"}
+
+
+def test_a_large_request_for_a_page_is_refused(app):
+    assert request(app, "POST", "/api/page", b" " * (MAX_PAGE + 1)).status == 413
+
+
+@pytest.mark.parametrize("text", ["</script><script>alert(1)</script>", "<!--", "&amp;\u2028"])
+def test_texts_in_a_saved_page_remain_texts(app, text):
+    sheet = request(app, "POST", "/api/law", MUSCLE.replace("Pneumatic", text).encode()).json()
+    body = f'{{"sheets": ["{sheet["id"]}"], "state": {{"tab": "</script><script>alert(2)</script>"}}}}'
+    page = request(app, "POST", "/api/page", body.encode()).text
+    assert "<script>alert" not in page
+    assert "unsafe" not in page
+
+
+ALLOWED = ('note = "a/b.toml"', 'x = "2.6 m3/(s Pa)"', 'x = "-1.5e-3 1/bar"', '[[reference]]\nwhere = "https://x/y"')
+REFUSED = ('x = "/etc/passwd"', 'x = "a.toml"', 'x = ["../y"]', "x = { file = 1 }", 'x = "2 a/../b"', 'x = "C:\\\\y"')
+
+
+def test_a_text_may_contain_units_and_references_but_no_paths():
+    assert [read_text_tables(text) != {} for text in ALLOWED] == [True] * len(ALLOWED)
+    for text in REFUSED:
+        with pytest.raises(ParameterError, match=r"must not refer to files"):
+            read_text_tables(text)
+
+
+def test_other_machines_need_the_token():
+    token = "secret-of-the-test"
+    app = create_app(Access((), token), pool=InThisProcess())
+    assert request(app, "GET", "/").status == 401
+    assert request(app, "GET", "/api/library", query=b"token=wrong").status == 401
+    assert request(app, "GET", "/", headers={"cookie": "airmuscle_token=wrong"}).status == 401
+    assert request(app, "GET", "/", query=b"token=" + b"&token=" * 50).status == 401
+    first = request(app, "GET", "/", query=f"token={token}".encode())
+    assert (first.status, first.headers["location"]) == (303, "/")
+    cookie = first.headers["set-cookie"]
+    assert "HttpOnly" in cookie
+    assert "samesite=strict" in cookie.lower()
+    assert request(app, "GET", "/", headers={"cookie": cookie.split(";")[0], "host": "any.example"}).status == 200
+
+
+def test_only_this_machine_needs_no_token():
+    assert [is_loopback(h) for h in ("127.0.0.1", "127.8.8.8", "localhost", "::1", "[::1]")] == [True] * 5
+    assert [is_loopback(h) for h in ("0.0.0.0", "192.168.1.2", "::", "example.org", "")] == [False] * 5
+    assert access_of("127.0.0.1").token == ""
+    assert len(access_of("0.0.0.0").token) > 30
+
+
+def test_a_port_in_use_is_named():
+    with bound_socket("127.0.0.1", 0) as used:
+        used.listen()
+        port = used.getsockname()[1]
+        with pytest.raises(InputError, match=rf"port {port}: no server can be started there .* Choose another --port"):
+            bound_socket("127.0.0.1", port)
+    with pytest.raises(InputError, match="allowed range: 0 to 65535"):
+        bound_socket("127.0.0.1", 70000)
+
+
+def test_a_task_is_ended_at_its_limit_and_the_next_one_runs():
+    pool = WorkerPool(1)
+    try:
+        assert pool.call(sum, [1, 2], limit=60.0) == 3
+        with pytest.raises(LimitError, match="takes more than"):
+            pool.call(time.sleep, 60, limit=0.3)
+        with pytest.raises(InputError, match="cannot be processed"):
+            pool.call(int, "x", limit=60.0)
+        assert pool.call(sum, [3, 4], limit=60.0) == 7
+    finally:
+        pool.stop()
