@@ -237,6 +237,15 @@ def part_rows(title: str, part: Mapping[str, Any]) -> list[str]:
     return [*lines, ""]
 
 
+HISTORY = (
+    "How the rules came about: the tuning (an air weight, a step among the tuning tasks, larger sines, a "
+    "family plant with Dahl friction) was changed four times after results on the truth had been seen, "
+    "and is published in its last form; the bound of the learning curve's rises, 0.007 degree, is the "
+    "spread of thirty repeats and replaced a rule of 10 % that an earlier run had failed."
+)
+"""What was seen before the rules of the benchmark were settled."""
+
+
 def page(results: Mapping[str, Any]) -> str:
     """The page in Markdown."""
     data, switched = results["proportional"], results["on/off"]
@@ -245,7 +254,7 @@ def page(results: Mapping[str, Any]) -> str:
         f"Results of `benchmarks/control.py --budget {results['budget']} --seed {results['seed']}` on "
         f"{datetime.date.today()}, Python {platform.python_version()}. All figures are simulations. "
         "[Comparison of controllers](../docs/compare.md) describes joint, truth, tasks and metrics; their numbers are "
-        "chosen.", "",
+        "chosen.", "", HISTORY, "",
         "## Targets", "",
         f"Valves: {data['valve']}; for on/off valves: {switched['valve']}. rms errors of the last two periods.", "",
         *target_rows(results),
