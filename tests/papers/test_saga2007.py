@@ -27,6 +27,7 @@ from airmuscle.library.catalogue import load
 from airmuscle.report.chapter import DEPENDS, DIFFERS, HOLDS, NOT_PRINTED, NOT_TESTABLE, Kind, statements
 from airmuscle.reproduce import saga2007_claims as claims
 from airmuscle.reproduce import saga2007_further_claims as further
+from airmuscle.reproduce import saga2007_joint as joining
 from airmuscle.reproduce import saga2007_pairs as pairs
 from airmuscle.reproduce.saga2007 import chapter
 from airmuscle.reproduce.saga2007_muscle import (
@@ -612,7 +613,7 @@ def test_the_chapter_judges_all_seven_claims():
     whole = chapter()
     assert {claim.claim[0] for claim in whole.claims if claim.claim[0].isdigit()} == set("1234567")
     assert {claim.verdict for claim in whole.claims} <= {HOLDS, DIFFERS, NOT_PRINTED, NOT_TESTABLE}
-    assert len(whole.plots) == 8
+    assert len(whole.plots) == 9
     verdicts = {s.claim: s.verdict for s in statements(whole.claims)}
     assert verdicts["5. The model is accurate below 20 %"] == NOT_TESTABLE
     assert verdicts["2. About 200 N at 0.11 MPa and 35 % or more"] == DEPENDS
@@ -629,3 +630,33 @@ def test_the_library_holds_the_muscle_of_table_1(name):
     if name == "saga2007":
         assert structure(law) == structure(DEFAULT)
         assert flatten(law) == pytest.approx(flatten(DEFAULT), rel=1e-14)
+
+
+# Feed-forward control of a pair
+
+
+@pytest.mark.parametrize("line", ["A", "B"])
+def test_the_pressures_of_the_exact_model_place_the_exact_pair_at_each_angle(line):
+    np.testing.assert_allclose(joining.reached_angles("exact meridian", line), joining.ANGLES, rtol=1e-5)
+
+
+@pytest.mark.parametrize("line", ["A", "B"])
+def test_the_pair_is_in_balance_at_the_angle_that_a_model_reaches(line):
+    """Equal tensions of both exact muscles at the pressures of the model, by Newton's method instead of a spline."""
+    name, exact = "circular meridian, virtual work", exact_meridian(LINES[line])
+    law = joining.models(LINES[line])[name]
+    for wanted, reached in zip(joining.ANGLES, joining.reached_angles(name, line), strict=True):
+        contractions = [
+            joining.OFFSET + sign * joining.RADIUS / joining.LENGTH * np.array([wanted, reached]) for sign in (1, -1)
+        ]
+        tensions = [float(exact.force(float(law.pressure(c[0], joining.TENSION)), c[1])) for c in contractions]
+        assert tensions[0] == pytest.approx(tensions[1], rel=1e-3)
+
+
+def test_the_printed_model_leaves_both_muscles_slack_and_the_circular_one_is_accurate():
+    verdicts = {c.case: (c.reproduced, c.verdict) for c in joining.feed_forward_comparisons()}
+    assert len(verdicts) == 6
+    for line in ("A", "B"):
+        assert verdicts[rf"printed, \(w = 2\), \(q = 1\), line {line}"] == (100.0, DIFFERS)
+        assert verdicts[f"circular meridian, virtual work, line {line}"][1] == HOLDS
+        assert verdicts[f"exact mechanics of the parabola, line {line}"][1] == DIFFERS

@@ -16,6 +16,7 @@ from ..characteristic.saga2007 import RUBBER_TEST_STRAIN, Saga2007
 from ..core.errors import SolveError
 from ..report.chapter import AtLeast, AtMost, Claim, Equal, Kind, PublishedValue
 from .saga2007_further_claims import further_claims
+from .saga2007_joint import feed_forward_comparisons
 from .saga2007_muscle import (
     DEFAULT,
     INTERPRETATIONS,
@@ -256,5 +257,6 @@ def all_claims() -> tuple[Claim, ...]:
         rubber_test_finding(DEFAULT),
         *further_claims(),
         *previous_model_claims(),
+        *feed_forward_comparisons(),
     ]
     return tuple(sorted(claims, key=lambda claim: claim.claim[:2] if claim.claim[0].isdigit() else "9"))

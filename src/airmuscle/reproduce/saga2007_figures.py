@@ -11,6 +11,7 @@ from ..core.plotting import BLACK, DASHES, LINES, legend_outside, new_figure
 from ..report.chapter import Plot
 from ..report.formula import to_mathtext
 from .saga2007_claims import FIG_2
+from .saga2007_joint import feed_forward_figure
 from .saga2007_muscle import (
     DEFAULT,
     INTERPRETATIONS,
@@ -39,6 +40,7 @@ def plots() -> tuple[Plot, ...]:
         snap_through,
         interpretations,
         pairs,
+        feed_forward_figure,
     )
     return tuple(draw() for draw in drawn)
 

@@ -11,6 +11,7 @@ from ..core import autodiff
 from ..report.chapter import Table
 from . import saga2007_pairs
 from .saga2007_claims import FIG_2
+from .saga2007_joint import feed_forward_table
 from .saga2007_muscle import (
     DEFAULT,
     INTERPRETATIONS,
@@ -41,6 +42,7 @@ def tables() -> tuple[Table, ...]:
         curve_table(),
         previous_model_table(),
         *saga2007_pairs.tables(),
+        feed_forward_table(),
     )
 
 

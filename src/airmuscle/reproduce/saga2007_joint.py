@@ -1,0 +1,143 @@
+"""Feed-forward control of an antagonistic pair of straight-fibre muscles: error of the angle with each model.
+
+The paper proposes its closed form for feed-forward control. Here the pressures that a model gives for an angle drive
+a pair of muscles with the exact meridian, in steady state and without friction; the paper has no such experiment.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import numpy as np
+
+from ..characteristic.base import Characteristic
+from ..characteristic.rubber import RubberLine
+from ..core.arrays import Array
+from ..core.plotting import BLACK, DASHES, legend_outside, new_figure
+from ..core.plotting import LINES as COLOURS
+from ..report.chapter import AtMost, Claim, Kind, Plot, Table
+from .saga2007_muscle import (
+    LENGTH,
+    LINES,
+    PAPER,
+    circular_meridian,
+    exact_mechanics,
+    exact_meridian,
+    interpretation,
+    pressure_along,
+)
+
+RADIUS, OFFSET, TENSION = 0.012, 0.08, 50.0
+"""Pulley radius [m], contraction of both muscles at angle 0, and tension of both muscles [N] (chosen)."""
+ANGLES = np.radians((5.0, 10.0, 15.0))
+"""Wanted angles [rad] (chosen); by symmetry the errors of negative angles are opposite."""
+REACH = np.radians(25.0)
+"""Greatest angle [rad] of the search for the angle that is reached: contractions of 0.7 % to 15.3 % (chosen)."""
+LIMIT = 10.0
+"""Error of the greatest angle [%] up to which feed-forward alone is called accurate (chosen)."""
+GRID = 31
+"""Angles of the search, between which the torque is interpolated by a cubic spline."""
+
+
+def models(line: RubberLine) -> dict[str, Characteristic]:
+    """Return the models that compute the pressures, by name, for one rubber line."""
+    return {
+        r"printed, \(w = 2\), \(q = 1\)": interpretation(line, 2.0, 1.0),
+        "exact mechanics of the parabola": exact_mechanics(line),
+        "circular meridian, virtual work": circular_meridian(line),
+        "exact meridian": exact_meridian(line),
+    }
+
+
+@functools.cache
+def reached_angles(name: str, line: str) -> Array:
+    """Return the angles [rad] of the exact pair at the pressures of a model for ANGLES; NaN where it is slack."""
+    law, truth = models(LINES[line])[name], exact_meridian(LINES[line])
+    pressures = [pressure_along(law, OFFSET + sign * ANGLES * RADIUS / LENGTH, TENSION) for sign in (1.0, -1.0)]
+    trial = np.linspace(-REACH, REACH, GRID)
+    reached = []
+    for pair in zip(*pressures, strict=True):
+        tensions = [
+            np.asarray(truth.shape_at_pressure(np.full(GRID, p), OFFSET + sign * trial * RADIUS / LENGTH).force)
+            for p, sign in zip(pair, (1.0, -1.0), strict=True)
+        ]
+        reached.append(_first_zero(trial, tensions[0] - tensions[1]))
+    return np.array(reached)
+
+
+def _first_zero(angles: Array, difference: Array) -> float:
+    """Return the angle at which the falling difference of the tensions is zero; NaN without one."""
+    from scipy.interpolate import CubicSpline
+
+    taut = np.isfinite(difference)
+    if np.count_nonzero(taut) < 4:
+        return float("nan")
+    roots = CubicSpline(angles[taut], difference[taut]).roots(extrapolate=False)
+    return float(roots[0]) if roots.size else float("nan")
+
+
+def angle_errors(name: str, line: str) -> Array:
+    """Return the errors of the angles [rad]."""
+    return reached_angles(name, line) - ANGLES
+
+
+def feed_forward_comparisons() -> tuple[Claim, ...]:
+    """Return the comparisons on claim 7: the greatest error of the angle with the paper's model and with others."""
+    note = (
+        f"Pulley radius {1e3 * RADIUS:g} mm, {100 * OFFSET:g} % contraction at angle 0, {TENSION:g} N in both muscles, "
+    )
+    note += f"angles to {np.degrees(ANGLES[-1]):g} degrees: chosen. The paper describes no control experiment."
+    text = "7. Feed-forward control of a pair of muscles, greatest error of the angle relative to the greatest angle"
+    claims = []
+    for line in LINES:
+        for name in models(LINES[line]):
+            if name == "exact meridian":
+                continue
+            errors, slack = angle_errors(name, line), ""
+            if np.isnan(errors).any():
+                slack = " With the pressures of this model both muscles are slack: the joint is not moved, error 100 %."
+            largest = 100.0 * float(np.max(np.abs(np.nan_to_num(errors / ANGLES[-1], nan=1.0))))
+            limit = AtMost(LIMIT, chosen=True)
+            case = f"{name}, line {line}"
+            claims.append(Claim(PAPER, text, limit, largest, "%", note + slack, case, kind=Kind.FINDING))
+    return tuple(claims)
+
+
+def feed_forward_table() -> Table:
+    """Return the angles that the exact pair reaches."""
+    rows = [(name, line) for line in LINES for name in models(LINES[line])]
+    columns: dict[str, list[Any]] = {"model": [name for name, _ in rows], "rubber line": [line for _, line in rows]}
+    for i, angle in enumerate(np.degrees(ANGLES)):
+        columns[f"angle for {angle:g} degrees [degree]"] = [
+            round(float(np.degrees(reached_angles(name, line)[i])), 3) for name, line in rows
+        ]
+    note = (
+        "The model gives the pressures of both muscles for the wanted angle at equal tensions; the pair has the exact "
+        "meridian. No value: both muscles are slack. The last row of each line checks the "
+        "computation: the exact model reaches each angle."
+    )
+    return Table("saga2007_feed_forward", "Angle of a pair of muscles under feed-forward control", columns, note)
+
+
+def feed_forward_figure() -> Plot:
+    """Return the error of the angle over the wanted angle."""
+    figure, axes = new_figure(1, 2, height=3.0, sharey=True)
+    wanted = np.degrees(np.concatenate([-ANGLES[::-1], [0.0], ANGLES]))
+    for axis, line in zip(axes, LINES, strict=True):
+        for i, name in enumerate(list(models(LINES[line]))[:-1]):
+            error = np.degrees(angle_errors(name, line))
+            both = np.concatenate([-error[::-1], [0.0], error])
+            axis.plot(
+                wanted, both, linestyle=DASHES[i], color=COLOURS[i], label=name.replace(r"\(", "$").replace(r"\)", "$")
+            )
+        axis.axhline(0.0, color=BLACK, linewidth=0.6)
+        axis.set(xlabel="wanted angle [degree]", title=f"rubber line {line}")
+    axes[0].set_ylabel("error of the angle [degree]")
+    legend_outside(axes[1])
+    return Plot(
+        "saga2007_feed_forward",
+        "Feed-forward control of an antagonistic pair: the pressures are those of a model, the pair has the exact "
+        "meridian; steady state without friction. With the pressures of the printed model both muscles are slack.",
+        figure,
+    )
