@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from studio_pages import HOST, InThisProcess, request
@@ -12,6 +13,7 @@ pytest.importorskip("starlette", reason="needs the extra studio")
 from airmuscle import load
 from airmuscle.core.errors import InputError, ParameterError
 from airmuscle.library.write import to_toml
+from airmuscle.studio import app as studio_app
 from airmuscle.studio.app import MAX_PAGE, create_app
 from airmuscle.studio.security import Access, is_loopback
 from airmuscle.studio.server import access_of, bound_socket
@@ -270,5 +272,41 @@ def test_a_task_is_ended_at_its_limit_and_the_next_one_runs():
         with pytest.raises(InputError, match="cannot be processed"):
             pool.call(int, "x", limit=60.0)
         assert pool.call(sum, [3, 4], limit=60.0) == 7
+    finally:
+        pool.stop()
+
+
+@pytest.mark.slow
+def test_ten_users_at_once_are_answered():
+    pool = WorkerPool(2)
+    app = create_app(pool=pool)
+    try:
+        texts = [MUSCLE + f"# user {i}\n" for i in range(10)]
+        with ThreadPoolExecutor(10) as users:
+            answers = list(users.map(lambda text: request(app, "POST", "/api/law", text.encode()), texts))
+    finally:
+        pool.stop()
+    assert [answer.status for answer in answers] == [200] * 10
+    assert [answer.json()["own_text"] for answer in answers] == texts
+
+
+@pytest.mark.slow
+def test_a_plant_that_takes_too_long_is_refused_in_time(monkeypatch):
+    """The next request is answered, by a new process."""
+    pool = WorkerPool(1)
+    app = create_app(pool=pool)
+    tube = 'circuit = { model = "WithTubes", tube = { model = "DistributedTube", length = "2 m", diameter = "4 mm", segment_count = 200 }, circuit = { model = "FillDischarge"'
+    text = SCENARIO.replace('circuit = { model = "FillDischarge"', tube).replace(
+        '"matrix-821" } }', '"matrix-821" } } }'
+    )
+    try:
+        assert request(app, "POST", "/api/law", MUSCLE.encode()).status == 200
+        monkeypatch.setattr(studio_app, "TIME_LIMIT", 2.0)
+        begin = time.monotonic()
+        answer = request(app, "POST", "/api/plant", text.encode())
+        assert time.monotonic() - begin < 10.0
+        assert answer.status == 503, answer.text
+        monkeypatch.setattr(studio_app, "TIME_LIMIT", 60.0)
+        assert request(app, "POST", "/api/law", MUSCLE.encode()).status == 200
     finally:
         pool.stop()
