@@ -18,7 +18,7 @@ from typing import Any
 
 PACKAGES = (
     *("numpy", "scipy", "numba", "llvmlite", "casadi", "lmfit"),
-    *("scikit-sundae", "diffrax", "jax", "control", "mujoco"),
+    *("scikit-sundae", "diffrax", "jax", "control", "mujoco", "gymnasium"),
 )
 MIN_DURATION = 0.004
 """Minimum duration [s] of a timing: faster variants are called several times per round, because of clock resolution."""

@@ -20,9 +20,11 @@ import bootstrap
 import calls
 import components
 import derivative
+import environments
 import growth
 import identification
 import live
+import loops
 import memory
 import model_comparison
 import mujoco_peer
@@ -42,6 +44,7 @@ SECTIONS: tuple[tuple[Callable[[int], Section], int], ...] = (
     (peers.section, 9),
     (ode8.section, 15),
     (batch.section, 7),
+    (loops.section, 3),
     (mujoco_peer.section, 5),
     (derivative.section, 25),
     (components.section, 25),
@@ -51,6 +54,7 @@ SECTIONS: tuple[tuple[Callable[[int], Section], int], ...] = (
     (identification.section, 3),
     (static_fit.section, 15),
     (live.section, 1),
+    (environments.section, 9),
     (bootstrap.section, 5),
     (model_comparison.section, 3),
     (new_plant.section, 7),

@@ -16,6 +16,8 @@ WORDS = Path(__file__).with_name("words.toml")
 ARGUMENTS = {
     "acceleration_setpoint": "name of the set point of an acceleration",
     "load_setpoint": "name of the set point of a load",
+    "mean_setpoint": "name of the set point of the mean pressure of two muscles",
+    "rate": "name of the set point of the rate of a signal",
     "setpoint_names": "names of the set points of a control law",
     "feed_forward": "control law without measurement, whose commands are added to those of the feedback",
     "feedback": "control law with measurement, whose commands are added to those of the feed-forward",
@@ -63,6 +65,9 @@ ARGUMENTS = {
     "coordinate": "name of a coordinate of a mechanism",
     "forces": "generalised forces on the coordinates of a mechanism [N, N m]",
     "values": "values by name",
+    "parameters": "values of all parameters of a plant, in the order of its leaves",
+    "speed": "shortening speed of a muscle [m/s], or speed of an animation, 1 for real time",
+    "snapshot": "time, states and inputs of a stepper",
     "friction": "friction model of a muscle",
     "displacement": "displacement of a friction element [m]",
     "bristles": "bristle deflections of a friction model by name",

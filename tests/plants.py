@@ -30,10 +30,12 @@ from airmuscle.mechanism import (
     ArmLink,
     ConstantRadius,
     CrankProfile,
+    ExternalLoad,
     HangingMass,
     Isometric,
     Isotonic,
     JointWithEndStops,
+    JointWithExternalTorque,
     JointWithFriction,
     Lever,
     MuscleRoute,
@@ -175,6 +177,7 @@ EXAMPLES = {
     "mass on a spring": pulled(SpringLoad(5.0, 2000.0, 20.0, 50.0)),
     "constant force": pulled(Isotonic(100.0, 2.0, 5.0)),
     "prescribed": pulled(PrescribedMotion()),
+    "load in another program": pulled(ExternalLoad(("m0", "m1"), (0.005, 0.01)), 2),
     "lever": pulled(Lever((0.03,), 3.0, 0.2)),
     "pulley with stops": pulled(WithEndStops(Pulley(0.02, 5.0), -0.005, 0.02, HuntCrossley(1e9))),
     "joint with stops": pulled(
@@ -185,6 +188,7 @@ EXAMPLES = {
             AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.1, 1.5, -1.2, 1.2, PolynomialProfile((0.2, -0.1))), 0.3
         ), 2
     ),
+    "joint with an external torque": pulled(JointWithExternalTorque(AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.1)), 2),
     "arm": pulled(
         PlanarArm(
             (ArmLink(0.3, 1.5, 0.14, 0.01, 0.1, -1.3, 1.3), ArmLink(0.25, 1.0, 0.11, 0.005, 0.1, -1.3, 1.3)),

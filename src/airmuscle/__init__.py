@@ -24,6 +24,9 @@ if TYPE_CHECKING:
         control as control,
     )
     from . import (
+        environments as environments,
+    )
+    from . import (
         export as export,
     )
     from . import (
@@ -54,6 +57,9 @@ if TYPE_CHECKING:
         simulation as simulation,
     )
     from . import (
+        sizing as sizing,
+    )
+    from . import (
         units as units,
     )
     from .analysis import linearise
@@ -74,7 +80,7 @@ if TYPE_CHECKING:
     from .pneumatics import Circuit, FillDischarge, Supply, Valve
     from .pneumatics.gas import Ambient, Isothermal, Polytropic
     from .recording import Recording, read, read_csv, write_csv
-    from .simulation import DormandPrince8, Problem, Rodas4, RungeKutta4, Solution, advance, compiled, simulate, solve
+    from .simulation import DormandPrince8, Problem, Rodas4, RungeKutta4, Solution, Stepper, advance, simulate, solve
     from .simulation.batch import simulate_batch
 
 __version__ = "0.1.0"
@@ -97,13 +103,13 @@ _MODULES = {
     "pneumatics": "Circuit FillDischarge Supply Valve",
     "pneumatics.gas": "Ambient Isothermal Polytropic",
     "recording": "Recording read read_csv write_csv",
-    "simulation": "DormandPrince8 Problem Rodas4 RungeKutta4 Solution advance compiled simulate solve",
+    "simulation": "DormandPrince8 Problem Rodas4 RungeKutta4 Solution Stepper advance simulate solve",
     "simulation.batch": "simulate_batch",
 }
 """The module of each public name."""
 _SUBPACKAGES = (
-    "analysis", "characteristic", "control", "export", "friction", "geometry", "identify", "library", "mechanism",
-    "muscle", "pneumatics", "recording", "simulation", "units",
+    "analysis", "characteristic", "control", "environments", "export", "friction", "geometry", "identify", "library",
+    "mechanism", "muscle", "pneumatics", "recording", "simulation", "sizing", "units",
 )  # fmt: skip
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names.split()}
 
@@ -134,6 +140,7 @@ __all__ = [
     "Schedule",
     "Solution",
     "Status",
+    "Stepper",
     "Supply",
     "System",
     "Valve",
@@ -141,7 +148,6 @@ __all__ = [
     "advance",
     "characteristic",
     "cite",
-    "compiled",
     "find_equilibrium",
     "fit",
     "geometry",

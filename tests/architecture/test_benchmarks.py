@@ -8,6 +8,8 @@ from __future__ import annotations
 import dataclasses
 
 import batch
+import environments
+import loops
 import measure
 import new_plant
 import numpy as np
@@ -95,10 +97,25 @@ def test_the_section_of_the_batch_has_its_rows_and_targets():
     assert any("NumPy" in target.name for target in section.targets)
 
 
+def test_the_section_of_the_environments_has_a_row_for_each_variant():
+    section = environments.section(rounds=1, count=16)
+    names = [row[0] for row in section.rows]
+    assert names[0] == "Stepper.step, 10 ms"
+    assert ("vector environment, double" in names) == environments.is_installed("gymnasium")
+    assert ("mujoco.rollout" in names) == environments.is_installed("mujoco")
+
+
 def test_lmfit_computes_the_same_coefficients():
     pytest.importorskip("lmfit")
     section = static_fit.section(rounds=1)
     assert all(target.met for target in section.targets)
+
+
+def test_the_section_of_loops_has_a_row_for_each_plant_and_integrator():
+    section = loops.section(rounds=1, count=2, duration=0.02)
+    assert len(section.rows) == 6
+    assert [row[-1] for row in section.rows[::3]] == ["0.0e+00"] * 2
+    assert len(section.targets) == 1
 
 
 def test_a_section_and_its_targets_are_printed():

@@ -32,8 +32,8 @@ NOT_IN_A_PLANT = {
     "commands, what drives valves by them, and methods": (
         "Schedule", "SampledSignal", "SolenoidDriver", "PWM", "Rodas4", "DormandPrince8", "RungeKutta4"),
     "controllers, which look at a plant from outside": (
-        "PID", "OnOffController", "SplitRange", "DeadZoneController", "Decentralised", "SetpointCommand", "SigmaDelta",
-        "SlidingMode", "StaticFeedForward", "StaticInverse", "WithFeedForward"),
+        "PID", "OnOffController", "SplitRange", "DeadZoneController", "CoContraction", "Decentralised", "SetpointCommand",
+        "SetpointLead", "SigmaDelta", "SlidingMode", "StaticFeedForward", "StaticInverse", "WithFeedForward"),
     "laws solved for pressure or contraction, where as_force_law stands in, and their readings": (
         "BorzikovaDirect", "BorzikovaExponential", "Hunt2017", "Saga2007", "ArcIntegral", "AxialIntegral",
         "UniformFibreSum", "UserDefinedFibreSum", "HalfShellFibreSum", "PrintedFibreSum",

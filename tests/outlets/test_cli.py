@@ -82,7 +82,8 @@ def assert_failed(result: Result, message: str) -> None:
 
 NAMES = (
     "reproduce", "list", "show", "cite", "solve", "inspect", "fit", "convert", "hysteresis", "fit-dynamic", "campaign",
-    "fit-volume", "plan", "bench", "simulate", "sweep", "export", "studio", "schema",
+    "fit-volume", "plan", "bench", "size", "simulate", "sweep", "tune", "compare", "export",
+    "studio", "schema",
 )  # fmt: skip
 
 
@@ -649,7 +650,7 @@ def assert_printable(text: str) -> None:
 @pytest.mark.parametrize(
     ("command", "suffix"),
     [("fit --characteristic ContractileSurface", "csv"), ("inspect", "csv"), ("inspect", "txt"), ("hysteresis", "tdms"),
-     ("show", "toml"), ("simulate", "toml"), ("sweep", "toml"), ("fit-dynamic", "toml")],
+     ("show", "toml"), ("simulate", "toml"), ("sweep", "toml"), ("tune", "toml"), ("fit-dynamic", "toml")],
 )  # fmt: skip
 @pytest.mark.parametrize(
     "content", [bytes(range(256)) * 8, b"\x1b[2J\x07 = \x1b]0;title\x07\n" * 20], ids=["all", "escapes"]

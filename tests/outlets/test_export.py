@@ -24,6 +24,7 @@ from airmuscle.control import PID, ControlLoop, SampledSignal, Schedule
 from airmuscle.core import autodiff
 from airmuscle.core.errors import AirmuscleWarning, FileError, ParameterError
 from airmuscle.export import C99, JavaScript, Octave, make_identifiers, write_law, write_program
+from airmuscle.export.building import build_and_run
 from airmuscle.export.identifiers import LONGEST, RESERVED
 from airmuscle.library.files import list_laws
 from airmuscle.library.law_file import load_law
@@ -117,19 +118,41 @@ def test_the_program_makes_the_steps_of_the_library(case, target, tmp_path):
     check_run(*RUN[target](tmp_path), problem)
 
 
-@pytest.mark.parametrize("case", ["one muscle", "fixed steps"])
+@pytest.mark.parametrize("case", ["one muscle", pytest.param("fixed steps", marks=pytest.mark.slow)])
 def test_the_octave_program_makes_the_steps_of_the_library(case, tmp_path):
     problem = problem_of(*CASES[case], duration=0.2)
     write_program(problem, tmp_path, Octave(), name="plant")
     check_run(*run_octave(tmp_path), problem)
 
 
+def end_of(problem, factor=1.0):
+    """The states at the end of the library's run from an initial state times a factor."""
+    start = {name: value * factor for name, value in problem.initial_state.items()}
+    solution = solve(dataclasses.replace(problem, initial_state=start))
+    assert solution.status == 0
+    return np.array([solution.final_state[s.name] for s in problem.system.states])
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", plants.EXAMPLES)
-def test_every_plant_makes_the_steps_of_the_library_in_c(name, tmp_path):
-    problem = problem_of(name, Rodas4(1e-6), 0.5)
-    write_program(problem, tmp_path, C99(), name="plant")
-    check_run(*run_c(tmp_path), problem)
+def test_every_plant_ends_in_c_where_it_ends_in_the_library(name, tmp_path):
+    """To 1e-10 of each state, or to the effect of roundings: ten times that of one ulp of the initial state.
+
+    A contact amplifies rounding, because it decides whether a step is accepted.
+    """
+    plant = plants.EXAMPLES[name]
+    scale = {i.name: 0.01 if "shortening" in i.name else 8e5 if i.unit == "Pa" else 1.0 for i in plant.input_variables}
+    signal = SampledSignal({i: tuple((t, v * scale[i]) for t, v in RAMPS) for i in plant.inputs})
+    places = {"position": 0.005} if any(s.name == "position" for s in plant.states) else {}
+    problem = Problem(plant, signal, 0.5, plant.state_at(pressure=1e5, **places))
+    write_program(problem, tmp_path, C99(), name="plant", columns=[s.name for s in plant.states])
+    text, csv = run_c(tmp_path)
+    assert "time 0.5 s" in text
+    found = np.array(csv.splitlines()[-1].split(","), dtype=float)[1:]
+    expected = end_of(problem)
+    rounding = np.max([np.abs(end_of(problem, 1.0 + k * 2.0**-52) - expected) for k in (-2, -1, 1, 2)], axis=0)
+    allowed = np.maximum(1e-10 * (np.abs(expected) + np.array([s.nominal for s in plant.states])), 10 * rounding)
+    assert (np.abs(found - expected) <= allowed).all()
 
 
 def test_jumps_and_a_later_start_are_met(tmp_path):
@@ -140,6 +163,7 @@ def test_jumps_and_a_later_start_are_met(tmp_path):
     check_run(*run_c(tmp_path), problem)
 
 
+@pytest.mark.slow
 def test_a_system_without_inputs_is_exported(tmp_path):
     plant = plants.EXAMPLES["closed"]
     problem = Problem(plant, Schedule({}), 0.3, plant.state_at(pressure=1e5, position=0.01))
@@ -148,6 +172,7 @@ def test_a_system_without_inputs_is_exported(tmp_path):
         check_run(*RUN[target](tmp_path / type(target).__name__), problem)
 
 
+@pytest.mark.slow
 def test_the_program_has_no_undefined_behaviour(tmp_path):
     write_program(problem_of("overlap", duration=0.2), tmp_path, C99(), name="plant")
     run_c(tmp_path, "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
@@ -333,6 +358,7 @@ def test_identifiers_are_distinct_in_any_case_and_of_limited_length():
     assert all(make_identifiers([word]) == (word,) for word in words)
 
 
+@pytest.mark.slow
 def test_names_of_users_cannot_leave_their_text(tmp_path):
     """Quotes, comment ends, keywords, trigraphs and other alphabets in the name of a muscle, in every language."""
     names = ('*/ "\\', "while'??/", "筋肉 % \u2028")
@@ -463,3 +489,27 @@ def test_the_command_refuses_a_wrong_use(arguments, message, tmp_path):
     assert done.exit_code == 2
     assert message in " ".join(done.output.replace("│", " ").split())
     assert not (tmp_path / "out").exists()
+
+
+def test_the_command_builds_and_runs_the_program(tmp_path):
+    printed.require("gcc")
+    done = airmuscle("export", EXAMPLES / "fill_discharge.toml", "--to", "c", "--out", tmp_path, "--build")
+    assert done.exit_code == 0, done.output
+    assert re.search(r"program: 2501 rows; 404 steps, \d+ rejected, time 25 s; code \d+ bytes", done.output)
+    assert {path.suffix for path in tmp_path.iterdir()} == {".c", ".h"}
+
+
+def test_without_a_compiler_it_says_what_can_be_done(tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    done = airmuscle("export", EXAMPLES / "fill_discharge.toml", "--to", "c", "--out", tmp_path / "out", "--build")
+    assert done.exit_code == 1
+    message = r"no C compiler \(cc, gcc, clang\) was found\. The sources are in .*out; install gcc or clang, or compile"
+    assert re.search(message, done.stderr), done.stderr
+    assert (tmp_path / "out" / "main.c").exists()
+
+
+def test_a_failing_compiler_is_quoted(tmp_path):
+    printed.require("gcc")
+    (tmp_path / "main.c").write_text("int main(void) { return undeclared; }\n")
+    with pytest.raises(FileError, match=r"cc failed with exit code 1: .*undeclared"):
+        build_and_run([tmp_path / "main.c"])

@@ -14,6 +14,7 @@ import math
 import os
 import re
 import sys
+import time
 import types
 from collections.abc import Callable
 from html.parser import HTMLParser
@@ -417,6 +418,48 @@ def test_an_interrupted_run_leaves_the_chapters_that_are_complete(
         run.reproduce(None, tmp_path)
     assert papers_in(tmp_path) == ["Saga 2007"]
     assert "(incomplete)" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+PAPER_MODULE = """
+import time
+from airmuscle.core.plotting import new_figure
+from airmuscle.report.chapter import Chapter, Claim, Equal, Plot
+
+def chapter():
+    time.sleep({seconds})
+    figure, axes = new_figure()
+    axes.plot([0, 1], [0, 1])
+    return Chapter("{name}", "Title", "Text.", (Claim("{name}", "c", Equal(1.0), 1.0, "1"),), plots=(Plot("{name}", "p", figure),))
+"""
+
+
+def write_papers(folder: Path, monkeypatch: pytest.MonkeyPatch, seconds: dict[str, float]) -> None:
+    """Modules of papers that other processes can import too."""
+    for name, duration in seconds.items():
+        (folder / f"paper_{name}.py").write_text(PAPER_MODULE.format(name=name, seconds=duration), encoding="utf-8")
+    monkeypatch.syspath_prepend(folder)
+    monkeypatch.setattr(run, "PAPERS", {name: f"paper_{name}" for name in seconds})
+
+
+def test_processes_write_the_same_report_as_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    write_papers(tmp_path, monkeypatch, {"first": 0.0, "second": 0.0})
+    run.reproduce(None, tmp_path / "one", workers=1)
+    run.reproduce(None, tmp_path / "two", workers=2)
+    for file in ("claims.json", "figures/first.svg", "figures/first.png", "figures/second.svg"):
+        assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes(), file
+
+
+def test_an_interruption_does_not_wait_for_the_processes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    write_papers(tmp_path, monkeypatch, {"long": 300.0, "short": 0.0})
+
+    def interrupt(name: str, chapter: Chapter, seconds: float) -> None:
+        raise KeyboardInterrupt
+
+    start = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        run.reproduce(None, tmp_path / "out", workers=2, finished=interrupt)
+    assert time.monotonic() - start < 120.0
+    assert papers_in(tmp_path / "out") == ["short"]
 
 
 def test_the_table_of_papers_names_modules_of_this_package():

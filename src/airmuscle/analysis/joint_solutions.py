@@ -7,6 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import numpy.typing as npt
 
+from ..compile.cache.kernel import Kernel
+from ..compile.lanes_function import LANES, lanes_array
 from ..core.arrays import Array
 from .joint_torque import QUANTITIES, TorqueFunction, TracedRow
 
@@ -20,10 +22,12 @@ _RESIDUAL = 1e-11
 """Relative residual of torque and stiffness at which a solution is accepted (chosen)."""
 _MARGIN = 1e-12
 """Fraction of the pressure range by which a solution may exceed it through rounding."""
-_ITERATIONS = 30
+ROOM = 4
+"""Number of solutions of a point for which room is made at first (chosen)."""
 MAX_BISECTIONS = 80
 AT_PRESSURE = QUANTITIES[:4]
-BALANCE = ("torque", "stiffness", "tension")
+
+pair_solutions = Kernel("pair_solutions")
 
 Functions = Sequence[TorqueFunction]
 Rows = npt.NDArray[np.intp]
@@ -48,20 +52,31 @@ def affine_candidates(unlimited: Functions, pressures: Range, angle: Array, torq
 
 def general_candidates(limited: Functions, pressures: Range, angle: Array, torque: Array, stiffness: Array) -> Array:
     """All pressures (N, S, 2) of any force laws, by a search in cells and Newton's method, by ascending first pressure;
-    S is the maximum number of solutions of a point, at least 1."""
-    rows, found = [], []
-    for start in range(0, angle.size, CHUNK):
-        part = slice(start, start + CHUNK)
-        row, guess = _cells(limited, pressures, angle[part], torque[part], stiffness[part])
-        row = row + start
-        at = (angle[row], torque[row], stiffness[row])
-        result = _newton(limited, pressures, guess, *at)
-        first, second = (f(angle[row], result[:, i], *BALANCE) for i, f in enumerate(limited))
-        with np.errstate(all="ignore"):
-            accepted = _within(result, pressures) & are_balanced(first, second, *at[1:])
-        rows.append(row[accepted])
-        found.append(np.clip(result[accepted], *pressures))
-    return _table(np.concatenate(rows), np.concatenate(found), angle.size, pressures)
+    S is the maximum number of solutions of a point, at least 1.
+
+    The torques and stiffnesses at the boundaries of CELLS cells of each pressure exclude most of the CELLS^2 cells; as
+    they need not be monotonic in a cell, its range is widened by half on both sides. Newton's method starts from the
+    centre of each cell that is left. All this is compiled, several levels or cells at once.
+    """
+    first, second = (function.compiled for function in limited)
+    levels = np.linspace(*pressures, CELLS + 1)
+    padded = np.append(levels, np.full(-levels.size % LANES, levels[-1])).reshape(-1, LANES)
+    counts, room = np.zeros(angle.size, dtype=np.int64), ROOM
+    work = lanes_array(3), lanes_array(5), lanes_array(5), np.zeros((2, 3, 2, CELLS))
+    cells, points = np.zeros(CELLS**2 + LANES, dtype=np.int64), [np.array(v) for v in (angle, torque, stiffness)]
+    while True:
+        found = np.full((angle.size, room, 2), np.nan)
+        pair_solutions(
+            first.address, second.address, float(pressures[0]), float(pressures[1]), *points, padded, found, counts,
+            *work, cells,
+        )  # fmt: skip
+        most = int(counts.max(initial=1))
+        if most <= room:
+            break
+        room = most
+    found = found[:, : max(most, 1)]
+    order = np.argsort(found[..., 0], axis=1)
+    return np.asarray(np.take_along_axis(found, order[..., None], axis=1))
 
 
 def balanced_angles(
@@ -124,59 +139,3 @@ def are_balanced(first: Sequence[Array], second: Sequence[Array], torque: Array,
     balanced = np.abs(q + other_q - torque) <= _RESIDUAL * scale
     stiff = np.abs(k + other_k - stiffness) <= _RESIDUAL * rigid
     return np.asarray(balanced & stiff & (tension > 0.0) & (other_tension > 0.0))
-
-
-def _cells(functions: Functions, pressures: Range, angle: Array, torque: Array, stiffness: Array) -> tuple[Rows, Array]:
-    """Point and central pressures (M, 2) of every cell in which torque and stiffness may both be balanced."""
-    levels = np.linspace(*pressures, CELLS + 1)
-    ends = []
-    for function in functions:
-        torques, stiffnesses, tensions = function(angle[:, None], levels, *BALANCE)
-        taut = np.maximum(tensions[:, :-1], tensions[:, 1:]) > 0.0
-        for values in (torques, stiffnesses):
-            both = values[:, :-1], values[:, 1:]
-            ends.append((np.where(taut, np.minimum(*both), np.inf), np.where(taut, np.maximum(*both), -np.inf)))
-    possible = np.ones((angle.size, CELLS, CELLS), dtype=bool)
-    for (low, high), (other_low, other_high), wanted in zip(ends[:2], ends[2:], (torque, stiffness), strict=True):
-        # The values need not be monotonic in a cell, so that its range is widened by half on both sides.
-        widened, other_widened = (
-            0.5 * np.where(np.isfinite(a), b - a, 0.0) for a, b in ((low, high), (other_low, other_high))
-        )
-        most, least = wanted[:, None] - low + widened, wanted[:, None] - high - widened
-        possible &= (other_low - other_widened)[:, None, :] <= most[:, :, None]
-        possible &= (other_high + other_widened)[:, None, :] >= least[:, :, None]
-    row, first, second = np.nonzero(possible)
-    centres = 0.5 * (levels[:-1] + levels[1:])
-    return row, np.stack([centres[first], centres[second]], axis=1)
-
-
-def _newton(
-    functions: Functions, pressures: Range, guess: Array, angle: Array, torque: Array, stiffness: Array
-) -> Array:
-    """Newton's method from each guess (M, 2), kept within the pressure range; it may end without a solution."""
-    x, span = guess, pressures[1] - pressures[0]
-    for _ in range(_ITERATIONS):
-        (q, k, a, c), (other_q, other_k, b, d) = (f(angle, x[:, i], *AT_PRESSURE) for i, f in enumerate(functions))
-        residual = q + other_q - torque, k + other_k - stiffness
-        with np.errstate(all="ignore"):
-            determinant = a * d - b * c
-            step = np.stack([b * residual[1] - d * residual[0], c * residual[0] - a * residual[1]], axis=1)
-            step = np.nan_to_num(step / determinant[:, None], nan=0.0, posinf=0.0, neginf=0.0)
-        x = np.clip(x + np.clip(step, -0.2 * span, 0.2 * span), *pressures)
-        if (np.abs(step) <= 1e-15 * span).all():
-            break
-    return x
-
-
-def _table(rows: Rows, found: Array, count: int, pressures: Range) -> Array:
-    """Solutions (M, 2) of points as a table (count, S, 2) without repetitions."""
-    order = np.lexsort((found[:, 1], found[:, 0], rows))
-    rows, found = rows[order], found[order]
-    near = 1e-7 * (pressures[1] - pressures[0])
-    new = np.ones(rows.size, dtype=bool)
-    new[1:] = (rows[1:] != rows[:-1]) | (np.abs(np.diff(found, axis=0)) > near).any(axis=1)
-    rows, found = rows[new], found[new]
-    size = np.bincount(rows, minlength=count)
-    table = np.full((count, max(1, int(size.max(initial=0))), 2), np.nan)
-    table[rows, np.arange(rows.size) - np.searchsorted(rows, rows)] = found
-    return table

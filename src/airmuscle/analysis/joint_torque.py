@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
+from ..compile.lanes_function import LanesFunction
 from ..core.arrays import Array
 from ..core.errors import ParameterError
 from ..core.ops import Value
@@ -69,6 +71,15 @@ class TorqueFunction:
     def __call__(self, angle: Array, pressure: Array, *names: str) -> list[Array]:
         """The named QUANTITIES at angles and pressures that broadcast."""
         return self.row(angle, pressure, names=names)
+
+    @functools.cached_property
+    def compiled(self) -> LanesFunction:
+        """The first five QUANTITIES, up to the tension, compiled for several points at once."""
+        import casadi
+
+        angle, pressure = casadi.SX.sym("angle"), casadi.SX.sym("pressure")
+        values = self.row.function(angle, pressure)[: QUANTITIES.index("tension") + 1]
+        return LanesFunction({"angle": angle, "pressure": pressure}, {"values": values.T})
 
 
 def check_joint(plant: Plant) -> None:

@@ -8,8 +8,10 @@ import numpy as np
 
 from ..control.state_feedback import StateFeedback
 from ..core.arrays import Array
-from ..core.errors import ParameterError, suggestion
+from ..core.errors import ParameterError
+from .design_checks import check_numbers
 from .linear_model import LinearModel
+from .riccati import discretised, observer_gain, regulator
 
 
 def design_lqg(
@@ -33,17 +35,17 @@ def design_lqg(
     Reference: Franklin, Powell and Workman (1998), chapters 8 and 9.
     """
     selected = model.select(outputs=list(measured))
-    _check_names("permitted", permitted, (*model.states, *model.inputs), model.inputs)
-    _check_names("permitted_integral", permitted_integral, controlled, controlled)
-    _check_names("process_noise", process_noise, model.states, ())
-    _check_names("measurement_noise", measurement_noise, measured, measured)
+    check_numbers("design_lqg", "permitted", permitted, (*model.states, *model.inputs), model.inputs)
+    check_numbers("design_lqg", "permitted_integral", permitted_integral, controlled, controlled)
+    check_numbers("design_lqg", "process_noise", process_noise, model.states, ())
+    check_numbers("design_lqg", "measurement_noise", measurement_noise, measured, measured)
     for name, row in zip(measured, selected.D, strict=True):
         if row.any():
             raise ParameterError(
                 f"design_lqg: '{name}' depends on the inputs at once; measure states, or outputs of states."
             )
     n, scale = len(model.states), _scales(model, permitted, process_noise)
-    a, b = _discretised(model.A * scale / scale[:, None], model.B / scale[:, None], sample_time)
+    a, b = discretised(model.A * scale / scale[:, None], model.B / scale[:, None], sample_time)
     c = selected.C * scale
     rows = [list(measured).index(name) for name in controlled]
     wide = np.block([[a, np.zeros((n, len(rows)))], [sample_time * c[rows], np.eye(len(rows))]])
@@ -53,12 +55,12 @@ def design_lqg(
     ]
     weights += [1.0 / permitted_integral[name] ** 2 for name in controlled]
     costs = np.diag([1.0 / permitted[name] ** 2 for name in model.inputs])
-    gains = _regulator(
-        wide, wide_inputs, np.diag(weights) * sample_time, costs * sample_time, "inputs do not stabilise"
+    gains, _ = regulator(
+        "design_lqg", wide, wide_inputs, np.diag(weights) * sample_time, costs * sample_time, "inputs do not stabilise"
     )
     noise = [(process_noise.get(name, 0.0) / s) ** 2 for name, s in zip(model.states, scale, strict=True)]
     covariance = np.diag([measurement_noise[name] ** 2 for name in measured])
-    observer = _observer(a, c, np.diag(noise) * sample_time, covariance)
+    observer = observer_gain("design_lqg", a, c, np.diag(noise) * sample_time, covariance)
     return StateFeedback(
         tuple(measured), tuple(controlled), model.inputs, model.states,
         _flat(a * scale[:, None] / scale), _flat(b * scale[:, None]), _flat(selected.C),
@@ -67,60 +69,9 @@ def design_lqg(
     )  # fmt: skip
 
 
-def _check_names(argument: str, given: Mapping[str, float], known: Sequence[str], needed: Sequence[str]) -> None:
-    for name, value in given.items():
-        if name not in known:
-            raise ParameterError(
-                f"design_lqg: {argument} names '{name}'; there are {', '.join(known)}.{suggestion(name, known)}"
-            )
-        if not 0 < value < float("inf"):
-            raise ParameterError(f"design_lqg: {argument} of '{name}' is {value!r}; it must be positive and finite.")
-    for name in needed:
-        if name not in given:
-            raise ParameterError(f"design_lqg: {argument} has no number for '{name}'; give one.")
-
-
 def _scales(model: LinearModel, permitted: Mapping[str, float], noise: Mapping[str, float]) -> Array:
     """Magnitude of each state, by which the equations are scaled."""
     return np.array([permitted.get(name, noise.get(name, max(abs(model.state[name]), 1.0))) for name in model.states])
-
-
-def _discretised(a: Array, b: Array, sample_time: float) -> tuple[Array, Array]:
-    """State and input matrix of the sampled plant with held inputs."""
-    from scipy.linalg import expm
-
-    n, m = b.shape
-    both = expm(np.block([[a, b], [np.zeros((m, n + m))]]) * sample_time)
-    return both[:n, :n], both[:n, n:]
-
-
-def _regulator(a: Array, b: Array, weights: Array, costs: Array, reason: str) -> Array:
-    """Gain (m, n) of the linear-quadratic regulator."""
-    from scipy.linalg import solve_discrete_are
-
-    try:
-        p = solve_discrete_are(a, b, weights, costs)
-        gain = np.linalg.solve(costs + b.T @ p @ b, b.T @ p @ a)
-    except np.linalg.LinAlgError:
-        raise ParameterError(
-            f"design_lqg: these {reason} the plant, or a weight is missing. Give states a permitted deviation or a "
-            "process noise, and measure or command more."
-        ) from None
-    return np.asarray(gain)
-
-
-def _observer(a: Array, c: Array, noise: Array, covariance: Array) -> Array:
-    """Gain (n, p) of the stationary Kalman filter, which corrects a prediction by a measurement."""
-    from scipy.linalg import solve_discrete_are
-
-    try:
-        p = solve_discrete_are(a.T, c.T, noise, covariance)
-    except np.linalg.LinAlgError:
-        raise ParameterError(
-            "design_lqg: these measured columns do not detect all states, or a process noise is missing. Give the "
-            "states a process noise, or measure more."
-        ) from None
-    return np.asarray(np.linalg.solve(c @ p @ c.T + covariance, c @ p).T)
 
 
 def _flat(matrix: Array) -> tuple[float, ...]:

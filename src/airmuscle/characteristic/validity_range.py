@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
+from typing import Any
+
 from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
 from ..core.ops import Value
@@ -48,3 +51,11 @@ class ValidityRange:
         """Return whether points are within the range, limits included; arrays broadcast."""
         in_pressure = (pressure >= self.min_pressure) & (pressure <= self.max_pressure)
         return in_pressure & (contraction >= self.min_contraction) & (contraction <= self.max_contraction)
+
+
+def validity_range_of(characteristic: Any, stated: ValidityRange | None = None) -> ValidityRange | None:
+    """Return the stated validity range, otherwise the one stored in the law by its fit, otherwise None."""
+    names = [field.name for field in dataclasses.fields(ValidityRange)]
+    if stated is not None or not all(hasattr(characteristic, name) for name in names):
+        return stated
+    return ValidityRange(*(getattr(characteristic, name) for name in names))

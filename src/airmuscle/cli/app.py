@@ -52,9 +52,12 @@ COMMANDS = (
     CommandRow("fit-volume", "fit_volume", "fit_volume_command", "Fit the volume of a muscle over its contraction."),
     CommandRow("plan", "plan", "plan", "Design the most informative static experiments (D-optimal)."),
     CommandRow("bench", "bench", "bench", "Fit a surface while rows arrive; name the next point."),
+    CommandRow("size", "size", "size", "Size muscles of the catalogue for a lift or a joint."),
     CommandRow("simulate", "simulate", "simulate", "Simulate the plant of a scenario file."),
     CommandRow("sweep", "sweep", "sweep", "Run a parameter study of a scenario."),
-    CommandRow("export", "export", "export", "Export a scenario or a law as a C, JavaScript or MATLAB program."),
+    CommandRow("tune", "tune", "tune", "Tune the controller of a scenario for a family of plants."),
+    CommandRow("compare", "compare", "compare", "Compare controllers of an antagonistic joint on common tasks."),
+    CommandRow("export", "export", "export", "Export a scenario, law or controller to C, JavaScript or MATLAB."),
     CommandRow("studio", "studio", "studio", "Show muscles and plants in the browser."),
     CommandRow("schema", "schema", "schema", "Print the JSON schema of scenario or muscle files."),
 )

@@ -11,6 +11,7 @@ import numpy as np
 import typer
 
 from ..characteristic import ValidityRange
+from ..characteristic.validity_range import validity_range_of
 from ..core import leaves
 from ..core.errors import ParameterError
 from ..core.units import quantity
@@ -20,7 +21,6 @@ from ..identify.conversion import GRID_POINTS, sample_on_grid
 from ..library.entry import Entry
 from ..library.law_file import load_law
 from ..library.write import save
-from ..report.isobar_plot import validity_range_of
 from .initial_law import find_initial_law
 from .options import Json, Name
 from .terminal import echo, percent, print_json, print_table

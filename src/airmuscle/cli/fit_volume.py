@@ -11,6 +11,7 @@ import typer
 
 from ..analysis.energy_defect import EnergyDefect, maxwell_defect
 from ..characteristic import ValidityRange
+from ..characteristic.validity_range import validity_range_of
 from ..core.declaration import parameters
 from ..core.errors import ParameterError, PhysicsError
 from ..core.units import quantity
@@ -19,7 +20,6 @@ from ..library.entry import Entry
 from ..library.law_file import load_law
 from ..library.write import part_toml, save
 from ..recording import Recording
-from ..report.isobar_plot import validity_range_of
 from ..report.output_folder import atomic_folder, check_writable
 from ..report.volume_chapter import volume_chapter
 from ..report.write import write_into

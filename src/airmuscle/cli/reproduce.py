@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
-import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..core.errors import AirmuscleError
+from ..core.processes import available_cores
 from ..report.chapter import DEPENDS, DIFFERS, HOLDS, NOT_PRINTED, NOT_TESTABLE, Chapter, Claim, Kind
 from ..report.formatting import MARKS, count_verdicts, format_number, format_published
 from ..report.formula import to_plain
-from ..reproduce import reproduce as reproduce_papers
+from ..reproduce.run import reproduce as reproduce_papers
+from ..reproduce.run import select_papers
 from .options import Folder
 from .terminal import echo, print_table
 
@@ -42,26 +41,23 @@ def reproduce(
       airmuscle reproduce
       airmuscle reproduce saga hosovsky --out report
     """
-    chapters: list[Chapter] = []
+    from rich.console import Console
+
+    console, chapters = Console(stderr=True, highlight=False), dict[str, Chapter]()
+
+    def show(name: str, chapter: Chapter, seconds: float) -> None:
+        chapters[name] = chapter
+        console.print(f"{name}: {seconds:.1f} s")
+
     try:
-        page = reproduce_papers(papers, out, stage=_show_stage, finished=chapters.append)
+        with console.status("reproducing the papers ..."):
+            page = reproduce_papers(papers, out, workers=available_cores(), finished=show)
     except (AirmuscleError, KeyboardInterrupt):
         if chapters:
             echo(f"\nthe completed chapters were written to {out}", err=True)
         raise
-    _print_claims([claim for chapter in chapters for claim in chapter.claims])
+    _print_claims([claim for name in select_papers(papers) for claim in chapters[name].claims])
     echo(f"report: {page}")
-
-
-@contextlib.contextmanager
-def _show_stage(paper: str) -> Iterator[None]:
-    """Show on stderr which paper is being reproduced, and at the end the computation time."""
-    from rich.console import Console
-
-    console, start = Console(stderr=True, highlight=False), time.perf_counter()
-    with console.status(f"reproducing {paper} ..."):
-        yield
-    console.print(f"{paper}: {time.perf_counter() - start:.1f} s")
 
 
 def _print_claims(claims: list[Claim]) -> None:

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from ..characteristic import Characteristic, ForceLaw, ValidityRange
+from ..characteristic.validity_range import validity_range_of
 from ..core import leaves
 from ..core.errors import AirmuscleWarning, GeometryLimitError, PhysicsError, RatingError, SolveError
 from ..core.plotting import save
@@ -26,7 +27,6 @@ from ..report.isobar_plot import (
     describe_point,
     isobar_plot,
     isobar_table,
-    validity_range_of,
 )
 from ..report.output_folder import atomic_folder
 from ..report.write import save_table

@@ -6,7 +6,7 @@ import enum
 
 
 class DriverKind(enum.IntEnum):
-    """Kinds of drivers that kernels know."""
+    """Kinds of drivers that kernels implement."""
 
     MODULATOR = 0
     SWITCH = 1

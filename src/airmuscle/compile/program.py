@@ -1,4 +1,4 @@
-"""Compiled systems: machine code shared by all systems of one structure, and what belongs to one system."""
+"""Compiled systems: machine code shared by all systems of one structure, and the data of one system."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _FUNCTIONS = ("rhs", "jac", "factor", "solve", "stage", "df_dt", "outputs")
 
 
 class Program:
-    """The compiled functions of one structure; it keeps the machine code alive and is never pickled."""
+    """The compiled functions of one structure; it owns the machine code and cannot be pickled."""
 
     def __init__(self, system: System) -> None:
         self._system = system
@@ -43,7 +43,7 @@ class Program:
         self.output_names = self._form.output_names
         self._engine = load_module(text)
         self.address = {name: int(self._engine.get_function_address(name)) for name in _FUNCTIONS}
-        self._prepare = _prepare_function(self._engine)
+        self._prepare = prepare_function(self._engine)
         self._steps: dict[Any, tuple[Any, int]] = {}
         self._compiling = threading.Lock()  # of two threads that need a step, one compiles it: an engine must stay
 
@@ -63,7 +63,7 @@ class Program:
                 text, size = self._step_module(tableau)
                 self._steps[tableau] = load_module(text), size
         engine, size = self._steps[tableau]
-        return int(engine.get_function_address("step")), _prepare_function(engine)(parameters, size)
+        return int(engine.get_function_address("step")), prepare_function(engine)(parameters, size)
 
     def _step_module(self, tableau: Tableau) -> tuple[str, int]:
         if isinstance(self._form, sensitivities.TangentSystem):
@@ -84,7 +84,7 @@ class Program:
 _PREPARE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
 
 
-def _prepare_function(engine: Any) -> Callable[[Array, int], Array]:
+def prepare_function(engine: Any) -> Callable[[Array, int], Array]:
     """The function `prepare` of an engine: from parameters to so many values for its other functions."""
     function = _PREPARE(engine.get_function_address("prepare"))
 
@@ -97,7 +97,7 @@ def _prepare_function(engine: Any) -> Callable[[Array, int], Array]:
 
 
 class Description:
-    """Everything that a run needs to know of one system, derived once and kept as long as the system lives."""
+    """Data of one system that runs need, derived once and stored for the lifetime of the system."""
 
     def __init__(self, system: System) -> None:
         self.program = _program(system)
@@ -153,7 +153,7 @@ def _program(system: System) -> Program:
 
 
 def describe(system: System) -> Description:
-    """The description of a system, which is kept as long as the system lives."""
+    """The description of a system, stored for the lifetime of the system."""
     key = id(system)
     stored = _descriptions.get(key)
     if stored is not None and stored[0]() is system:

@@ -47,7 +47,7 @@ class TangentSystem:
 
 
 def tangent_system(system: SensitivitySystem) -> TangentSystem:
-    """The inner system of a differentiated one, traced, with what is observed as its outputs."""
+    """The traced inner system of a differentiated one, with the observed quantities as its outputs."""
     import casadi
 
     inner, names = trace_system(system.inner), [s.name for s in system.inner.states]
@@ -86,7 +86,7 @@ class Values:
         self, printer: Printer, block: FunctionBody, wanted: Sequence[Operand], names: Sequence[str] = POINT,
         given: Mapping[Operand, str] | None = None,
     ) -> dict[Operand, LlvmValue]:  # fmt: skip
-        """Append what some operands need to a function, and give their values."""
+        """Append the instructions that some operands need to a function; the values of the operands."""
         distinct = tuple(dict.fromkeys(wanted))
         code = finished(Code(tuple(self.tape.body), tuple((0, i, operand) for i, operand in enumerate(distinct))))
         found = printer.compute(block, code, names, given)
@@ -158,7 +158,7 @@ def implicit_module(t: TangentSystem) -> tuple[str, ArraySizes]:
 def _print_along(
     printer: Printer, name: str, values: Values, arguments: Sequence[str], target: str, last: Values | None = None
 ) -> None:
-    """A function that writes values, their columns, and what is to come last."""
+    """A function that writes values, their derivatives by every column, and the final values."""
     block, along = FunctionBody(), values.along(values.results)
     found = values.compute(printer, block, [*values.results, *along.parts], arguments)
     rows = [found[v] for v in values.results] + along.rows(found, values.t.rows(block, "x"))
@@ -170,7 +170,7 @@ def _print_along(
 
 
 class _Step:
-    """What the functions of a Rosenbrock step share."""
+    """Common data of the functions of a Rosenbrock step."""
 
     def __init__(self, t: TangentSystem) -> None:
         self.t, self.rates = t, Values(t, t.inner.f)

@@ -3,6 +3,8 @@
 from .angle_and_stiffness import AngleAndStiffness
 from .antagonistic_inverse import AntagonisticInverse
 from .cascade import Cascade
+from .co_contraction import CoContraction
+from .computed_torque import ComputedTorque
 from .control_law import ControlLaw
 from .control_loop import ControlLoop, ControlLoopState
 from .controller import Controller, Measurement
@@ -11,19 +13,25 @@ from .decentralised import Decentralised
 from .driver import PWM, Driver, SolenoidDriver
 from .feed_forward import StaticFeedForward
 from .gain_schedule import GainSchedule
+from .hysteresis_compensation import HysteresisCompensation
+from .hysteresis_operator import HysteresisOperator, InverseHysteresisOperator
 from .inputs import ZERO_INPUT, InputSignal, Periodic, SampledSignal, Schedule
 from .iterative_learning import IterativeLearning
+from .linear_model_predictive import LinearModelPredictive
 from .on_off import OnOffController
 from .pid import PID
 from .piecewise_linear import PiecewiseLinear
+from .proportional_feedback import ProportionalFeedback
 from .sensors import ColumnSensor, WithSensors
 from .setpoint_command import SetpointCommand
+from .setpoint_lead import SetpointLead
 from .sigma_delta import SigmaDelta
 from .siso import SisoController
 from .sliding_mode import SlidingMode
 from .split_range import SplitRange
 from .state_feedback import StateFeedback
 from .static_inverse import StaticInverse
+from .stuck_valve import WithStuckValve
 from .super_twisting import SuperTwisting
 from .trajectory import Trajectory, spline_trajectory
 from .with_drivers import WithDrivers
@@ -36,7 +44,9 @@ __all__ = [
     "AngleAndStiffness",
     "AntagonisticInverse",
     "Cascade",
+    "CoContraction",
     "ColumnSensor",
+    "ComputedTorque",
     "ControlLaw",
     "ControlLoop",
     "ControlLoopState",
@@ -45,15 +55,21 @@ __all__ = [
     "Decentralised",
     "Driver",
     "GainSchedule",
+    "HysteresisCompensation",
+    "HysteresisOperator",
     "InputSignal",
+    "InverseHysteresisOperator",
     "IterativeLearning",
+    "LinearModelPredictive",
     "Measurement",
     "OnOffController",
     "Periodic",
     "PiecewiseLinear",
+    "ProportionalFeedback",
     "SampledSignal",
     "Schedule",
     "SetpointCommand",
+    "SetpointLead",
     "SigmaDelta",
     "SisoController",
     "SlidingMode",
@@ -67,5 +83,6 @@ __all__ = [
     "WithDrivers",
     "WithFeedForward",
     "WithSensors",
+    "WithStuckValve",
     "spline_trajectory",
 ]

@@ -20,7 +20,7 @@ class ControlLaw(Controller):
     @property
     @abc.abstractmethod
     def initial_memory(self) -> Mapping[str, float]:
-        """The values that are kept from one sample to the next, by name, and what they are before the first sample."""
+        """The values that are stored from one sample to the next, by name, with their initial values."""
 
     def init(self) -> dict[str, Value]:
         return dict(self.initial_memory)

@@ -52,6 +52,10 @@ class Controller(abc.ABC):
         it.
         """
 
+    def notes(self, memory: Any) -> tuple[str, ...]:
+        """Remarks on a run that ended with this memory, for the notes of its recording; none by default."""
+        return ()
+
 
 def relative_unit(unit: str, measured: str, commanded: str) -> str:
     """A declared unit, with the units y and u inserted where it is one of RELATIVE: `u/y` is `1/Pa`, say."""

@@ -1,4 +1,4 @@
-"""Input signals: what the inputs of a plant do in time; between two instants every input is linear in time."""
+"""Input signals: inputs of a plant as functions of time, linear between two instants."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class InputSignal(abc.ABC):
 
     @property
     def names(self) -> tuple[str, ...] | None:
-        """The inputs that the signal names; None where it does not say."""
+        """The inputs that the signal names; None if it names none."""
         return None
 
 

@@ -50,7 +50,7 @@ class ColumnSensor:
     def measure(
         self, memory: Mapping[str, Value], value: Value, deviate: Value, started: Value, dt: Value
     ) -> tuple[Value, dict[str, Value]]:
-        """What the sensor delivers for a value and a normal deviate, and its memory; `started` is 0 at the first."""
+        """The output of the sensor for a value and a normal deviate, and its memory; first sample: `started` is 0."""
         lag = ops.where(self.lag > 0, self.lag, 1.0)
         share = ops.where(self.lag > 0, 1.0 - ops.exp(-dt / lag), 1.0)
         lagged = ops.where(started > 0, memory["lagged"] + share * (value - memory["lagged"]), value)

@@ -7,7 +7,7 @@ from .split_range import Commanded, inputs_of
 
 
 class SisoController(ControlLaw):
-    """A control law that compares one column, `measured`, with its set point; `commanded` is what it manipulates."""
+    """A control law that compares one column, `measured`, with its set point; `commanded` is the manipulated input."""
 
     measured: str
     commanded: Commanded

@@ -1,10 +1,11 @@
-"""Diagnostic: what the reader of a result must know, by code and subject, with the rows it concerns and a hint."""
+"""Diagnostic: remark on a result, with its code, its subject, the rows concerned and a hint."""
 
 from __future__ import annotations
 
 import dataclasses
 import enum
 from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 
 from .arrays import Array
 from .hints import Hint, HintedText
@@ -50,6 +51,16 @@ class Diagnostic:
 
     def __str__(self) -> str:
         return str(self.message)
+
+
+class ColumnLimit(NamedTuple):
+    """Lower and upper limit of a column of a run; `subject` is the muscle or component that it belongs to."""
+
+    subject: str
+    code: DiagnosticCode
+    column: str
+    quantity: str
+    bounds: tuple[float, float]
 
 
 class Columns(Mapping[str, Array]):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from typing import Any
 
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, RED, PURPLE = (
@@ -43,12 +44,31 @@ def new_figure(rows: int = 1, columns: int = 1, *, width: float = 6.3, height: f
 
 def save(figure: Any, path: Any) -> None:
     """Write a figure in the format of the path's suffix; equal content gives identical bytes."""
+    suffix = str(path).rpartition(".")[2]
+    with open(path, "wb") as file:
+        file.write(rendered(figure, (suffix,))[suffix])
+
+
+def rendered(figure: Any, formats: tuple[str, ...] = ("svg", "png")) -> dict[str, bytes]:
+    """A figure in several formats, by format, with one layout; equal content gives identical bytes."""
     import matplotlib as mpl
 
     _apply_text_style(figure)
+    files = {}
+    layout = figure.get_layout_engine()
     with mpl.rc_context(_STYLE):
-        metadata = {"Date": None} if str(path).endswith(".svg") else None
-        figure.savefig(path, metadata=metadata)
+        if layout is not None:  # `savefig` would compute it anew for each format
+            figure.draw_without_rendering()
+            figure.set_layout_engine("none")
+        try:
+            for name in formats:
+                buffer = io.BytesIO()
+                figure.savefig(buffer, format=name, metadata={"Date": None} if name == "svg" else None)
+                files[name] = buffer.getvalue()
+        finally:
+            if layout is not None:
+                figure.set_layout_engine(layout)
+    return files
 
 
 def _apply_text_style(figure: Any) -> None:

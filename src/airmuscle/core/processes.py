@@ -24,11 +24,12 @@ def available_cores() -> int:
 
 
 @contextlib.contextmanager
-def process_pool(workers: int, *, one_thread_each: bool = False) -> Iterator[Executor | None]:
+def process_pool(workers: int, *, one_thread_each: bool = False, terminate: bool = False) -> Iterator[Executor | None]:
     """A context manager for an executor with `workers` local processes; None for one worker, the process itself.
 
     `one_thread_each` limits the linear algebra of each worker to one thread, unless the environment states a number.
-    If the block is left by an exception, the workers stop between two runs; if this process is killed, they exit.
+    If the block is left by an exception, the workers stop between two runs, or at once with `terminate`, for tasks
+    that write nothing; if this process is killed, they exit.
     Raises InputError for a number of workers below 1.
     """
     if workers < 1:
@@ -45,6 +46,8 @@ def process_pool(workers: int, *, one_thread_each: bool = False) -> Iterator[Exe
         yield executor
     except BaseException:
         stop_event.set()
+        if terminate:
+            executor.terminate()
         raise
     finally:
         executor.shutdown(cancel_futures=True)
@@ -72,6 +75,11 @@ class _ProcessPool(ProcessPoolExecutor):
     def submit(self, *task: Any, **arguments: Any) -> Future[Any]:
         with _sigint_blocked():
             return super().submit(*task, **arguments)
+
+    def terminate(self) -> None:
+        """End all workers at once; their tasks are lost."""
+        for process in list((self._processes or {}).values()):
+            process.terminate()
 
 
 @contextlib.contextmanager

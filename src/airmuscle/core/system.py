@@ -6,7 +6,7 @@ import abc
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from .diagnostics import Columns, Diagnostic
+from .diagnostics import ColumnLimit, Columns, Diagnostic
 from .ops import Value
 from .variables import Input, StateVariable
 
@@ -64,6 +64,11 @@ class System(abc.ABC):
         return ()
 
     @property
+    def column_limits(self) -> Sequence[ColumnLimit]:
+        """Limits of states and outputs beyond which the model is not valid, or a component is not permitted."""
+        return ()
+
+    @property
     def constants(self) -> Mapping[str, float | str]:
         """Constants of a recording of this system, such as the resting length [m]."""
         return {}
@@ -81,20 +86,20 @@ class System(abc.ABC):
         """Raise ParameterError or GeometryLimitError for a state that is impossible; names and signs were checked."""
 
     def describe(self) -> tuple[Diagnostic, ...]:
-        """Assumptions of the model that the reader of a result must know."""
+        """Assumptions of the model that limit the use of a result."""
         return ()
 
     def diagnose(self, columns: Columns) -> list[Diagnostic]:
-        """What a run, its columns (N,) by name, did beyond the validity of the model."""
+        """Diagnostics of the rows of a run, columns (N,) by name, in which the model is not valid."""
         return []
 
     def failure_hint(self, state: Mapping[str, float]) -> str:
-        """What to do about a run that ended early at this state; empty where nothing particular can be said."""
+        """Remedy for a run that ended early at this state; empty if there is no specific one."""
         return ""
 
 
 class SensitivitySystem(System):
-    """A system that carries another's states, then their derivatives along columns, state by state.
+    """A system with the states of another one, followed by their derivatives along columns, state by state.
 
     It is a System like any other; its program is generated from the inner one, which costs less than its own rates.
     """

@@ -8,6 +8,7 @@ by `dataclasses.replace` derives anew only what changed.
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple, TypeVar
 
@@ -149,22 +150,32 @@ def unflatten(obj: T, values: Sequence[Any]) -> T:
     return rebuilt
 
 
+@functools.cache
+def _fields(cls: type[Any]) -> tuple[tuple[str, bool], ...] | None:
+    """The fields of a model class, each with whether it is declared; None for any other class."""
+    if not dataclasses.is_dataclass(cls):
+        return None
+    declared = {p.name for p in parameters(cls)}
+    return tuple((field.name, field.name in declared) for field in dataclasses.fields(cls))
+
+
 def _unflatten(obj: Any, values: Iterator[Any]) -> Any:
     if isinstance(obj, tuple):
-        return tuple(_unflatten(item, values) for item in obj)
-    if not _is_model(obj):
+        return tuple([_unflatten(item, values) for item in obj])
+    kind: Any = type(obj)
+    fields = _fields(kind)
+    if fields is None:
         return obj
-    declared = {p.name for p in parameters(obj)}
     new = object.__new__(type(obj))
-    for field in dataclasses.fields(obj):
-        value = getattr(obj, field.name)
-        if field.name not in declared:
+    for name, declared in fields:
+        value = getattr(obj, name)
+        if not declared:
             value = _unflatten(value, values)
         elif isinstance(value, tuple):
-            value = tuple(next(values) for _ in value)
+            value = tuple([next(values) for _ in value])
         else:
             value = next(values)
-        object.__setattr__(new, field.name, value)
+        object.__setattr__(new, name, value)
     return new
 
 

@@ -82,7 +82,7 @@ def with_article(name: str) -> str:
 
 
 def check_type(thing: Any, kind: type[Any], location: Location) -> Any:
-    """Return `thing` if it is an instance of `kind`; otherwise raise ParameterError."""
+    """Return an object if it is an instance of `kind`; otherwise raise ParameterError."""
     if not isinstance(thing, kind):
         raise ParameterError(
             f"{location}: {type(thing).__name__} is not allowed here; {with_article(kind.__name__)} is required."

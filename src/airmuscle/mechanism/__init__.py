@@ -4,6 +4,8 @@ from .antagonistic_joint import AntagonisticJoint
 from .base import Coordinate, Mechanism
 from .contact import HuntCrossley
 from .end_stops import JointWithEndStops, WithEndStops
+from .external_load import ExternalLoad
+from .external_torque import JointWithExternalTorque
 from .hanging_mass import HangingMass
 from .isometric import Isometric
 from .isotonic import Isotonic
@@ -25,11 +27,13 @@ __all__ = [
     "ConstantRadius",
     "Coordinate",
     "CrankProfile",
+    "ExternalLoad",
     "HangingMass",
     "HuntCrossley",
     "Isometric",
     "Isotonic",
     "JointWithEndStops",
+    "JointWithExternalTorque",
     "JointWithFriction",
     "Lever",
     "Mechanism",

@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.arrays import Array
-from ..core.diagnostics import Columns, Diagnostic, DiagnosticCode
+from ..core.diagnostics import ColumnLimit, Columns, Diagnostic, DiagnosticCode
 from ..core.errors import ParameterError
+from ..core.ops import Value
 from ..core.variables import select_prefix
 from ..friction import NoFriction
 from ..muscle import INNER_CONTRACTION, ElasticSeriesElement, Muscle
@@ -28,16 +29,6 @@ def describe_friction(muscles: Sequence[Muscle]) -> str:
         return f"friction: {muscles[0].friction}"
     parts = [f"{m.name} {'none' if isinstance(m.friction, NoFriction) else m.friction}" for m in muscles]
     return f"friction: {', '.join(parts)}"
-
-
-class ColumnLimit(NamedTuple):
-    """Lower and upper limit of a column of a run, for one muscle."""
-
-    muscle: str
-    code: DiagnosticCode
-    column: str
-    quantity: str
-    bounds: tuple[float, float]
 
 
 def column_limits(muscles: Sequence[Muscle], prefixes: Sequence[str]) -> tuple[ColumnLimit, ...]:
@@ -146,6 +137,16 @@ def enclosures(
     return result
 
 
+def check_volumes(muscles: Sequence[Muscle], pressures: Sequence[float], volumes: Sequence[Value]) -> None:
+    """Raise ParameterError for a muscle whose volume [m3] at its gauge pressure [Pa] would not be positive."""
+    for muscle, pressure, volume in zip(muscles, pressures, volumes, strict=True):
+        if not volume > 0.0:
+            raise ParameterError(
+                f"Plant: the volume of {muscle.name} would be {volume:.4g} m3 at {pressure:.4g} Pa; its wall deforms "
+                "too far."
+            )
+
+
 def check_enclosures(given: Sequence[Enclosure]) -> None:
     """Raise GeometryLimitError for an impossible contraction, ParameterError for a volume that is not positive."""
     for muscle, contraction, inner, volume in given:
@@ -169,3 +170,8 @@ def geometry_limit_hint(enclosure: Enclosure) -> str:
         "the load from moving it so far: wrap the mechanism in WithEndStops, or choose a higher pressure or a smaller "
         "load."
     )
+
+
+def first_hint(given: Sequence[Enclosure]) -> str:
+    """Remedy for the first muscle that is at a limit of its geometry; empty if none is."""
+    return next(filter(None, map(geometry_limit_hint, given)), "")

@@ -5,10 +5,11 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 from ..core.declaration import as_finite_float, model
-from ..core.diagnostics import Columns, Diagnostic, DiagnosticCode
+from ..core.diagnostics import ColumnLimit, Columns, Diagnostic, DiagnosticCode
 from ..core.errors import GeometryLimitError, ParameterError
 from ..core.ops import Value
 from ..core.system import System
@@ -18,7 +19,10 @@ from ..muscle import Muscle
 from ..pneumatics import Circuit, CircuitFlows
 from ..pneumatics.gas import Air, Ambient, Gas, Polytropic, check_above_vacuum
 from ..pneumatics.ports import key_by_muscle, key_by_port
+from ..recording import Recording
 from . import diagnostics
+from .animation import Animation
+from .drawing import scene_of
 from .evaluation import PlantEvaluation
 from .muscle_state import MuscleState, air_states, muscle_outputs, muscle_state, states_of_muscle
 from .steady_state import fill_muscles, settle_muscles
@@ -122,7 +126,7 @@ class Plant(System):
     @property
     def constants(self) -> Mapping[str, float | str]:
         """Ambient pressure [Pa]; with one muscle its resting length [m]."""
-        lengths = {"resting_length": self.muscles[0].geometry.resting_length} if len(self.muscles) == 1 else {}
+        lengths = {"resting_length": self.resting_lengths[0]} if len(self.muscles) == 1 else {}
         return {"ambient": self.ambient.pressure, **lengths}
 
     @property
@@ -144,15 +148,17 @@ class Plant(System):
         """Values under the plant's names, by a circuit's own names."""
         return key_by_port(self.prefixes, values) if self._shared else select_prefix(prefix, values)
 
-    def muscle_states(self, state: Mapping[str, Value]) -> tuple[MuscleState, ...]:
-        """Every muscle at a state."""
-        contractions = self.mechanism.contractions(state, self.resting_lengths)
-        speeds = self.mechanism.contraction_speeds(state, state, self.resting_lengths)
+    def muscle_states(
+        self, state: Mapping[str, Value], inputs: Mapping[str, Value] = MappingProxyType({})
+    ) -> tuple[MuscleState, ...]:
+        """Every muscle at a state; `inputs` are required if shortenings are inputs."""
+        place = {**inputs, **state}
+        contractions = self.mechanism.contractions(place, self.resting_lengths)
+        speeds = self.mechanism.contraction_speeds(place, place, self.resting_lengths)
+        each = zip(self.muscles, self.prefixes, contractions, speeds, strict=True)
         return tuple(
             muscle_state(muscle, select_prefix(prefix, state), contraction, speed, self.gas, self.ambient)
-            for muscle, prefix, contraction, speed in zip(
-                self.muscles, self.prefixes, contractions, speeds, strict=True
-            )
+            for muscle, prefix, contraction, speed in each
         )
 
     def circuit_flows(
@@ -167,7 +173,7 @@ class Plant(System):
 
     def evaluate(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> PlantEvaluation:
         """Muscles, circuits, forces and accelerations at a state."""
-        muscles = self.muscle_states(state)
+        muscles = self.muscle_states(state, inputs)
         forces = self.mechanism.generalised_forces(state, [m.tension for m in muscles], self.resting_lengths)
         accelerations = self.mechanism.acceleration(state, state, forces, inputs)
         return PlantEvaluation(muscles, self.circuit_flows(muscles, state, inputs), forces, accelerations)
@@ -189,8 +195,8 @@ class Plant(System):
         return rates
 
     def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
-        """Gauge pressure, contraction, tension, volume and mass flow of every muscle, with its friction force,
-        shortening speed and temperature where they are modelled; outputs of the circuits; accelerations."""
+        """Gauge pressure, contraction, tension, volume, mass flow and, where modelled, friction force, shortening speed
+        and temperature of every muscle; outputs of the circuits; accelerations."""
         return self.outputs_of(self.evaluate(state, inputs))
 
     def outputs_of(self, at: PlantEvaluation) -> dict[str, Value]:
@@ -215,7 +221,7 @@ class Plant(System):
         Coordinates and speeds that are not given are 0; walls, tubes, tanks and series springs are in steady state at
         this pressure, bristles relaxed. Names with a dot are passed as `**{"left.bristle": 1e-4}`. Raises
         ParameterError for a pressure below absolute zero, another number of pressures than muscles, an unknown name, or
-        a muscle whose volume would not be positive; GeometryLimitError for an impossible contraction.
+        a volume that is not positive; GeometryLimitError for an impossible contraction.
         """
         given = pressure if isinstance(pressure, tuple) else (pressure,) * len(self.muscles)
         pressures = [as_finite_float("Plant: the pressure of a state", p) for p in given]
@@ -231,12 +237,7 @@ class Plant(System):
             check_above_vacuum(p, self.ambient)
             muscle.geometry.check_contraction(contraction)
         state, volumes = self.settle_muscles(pressures, state)
-        for muscle, p, volume in zip(self.muscles, pressures, volumes, strict=True):
-            if not volume > 0.0:
-                raise ParameterError(
-                    f"Plant: the volume of {muscle.name} would be {volume:.4g} m3 at {p:.4g} Pa; its wall deforms too "
-                    "far."
-                )
+        diagnostics.check_volumes(self.muscles, pressures, volumes)
         state = self.fill_muscles(pressures, volumes, state)
         return {s.name: float(state[s.name]) for s in self.states}
 
@@ -268,27 +269,31 @@ class Plant(System):
 
     def describe(self) -> tuple[Diagnostic, ...]:
         """The gas and the friction."""
-        texts = {"gas": f"gas: {self.gas}", "friction": diagnostics.describe_friction(self.muscles)}
-        return tuple(Diagnostic(DiagnosticCode.MODEL, *item) for item in texts.items())
+        friction = Diagnostic(DiagnosticCode.MODEL, "friction", diagnostics.describe_friction(self.muscles))
+        return Diagnostic(DiagnosticCode.MODEL, "gas", f"gas: {self.gas}"), friction
 
     def diagnose(self, columns: Columns) -> list[Diagnostic]:
         """Extrapolation of characteristics, limits of geometries, components beyond the validity of their model."""
         remarks: dict[str, str] = {}
         for prefix, circuit in self._circuits():
             remarks |= self._outside(prefix, circuit.validity_warnings(self._within(prefix, columns), self.ambient))
-        names = [(name.removesuffix("."), text) for name, text in remarks.items()]
-        components = [Diagnostic(DiagnosticCode.COMPONENT, name, f"{name}: {text}") for name, text in names]
+        named = {name.removesuffix("."): text for name, text in remarks.items()}
+        components = [Diagnostic(DiagnosticCode.COMPONENT, name, f"{name}: {text}") for name, text in named.items()]
         rated = diagnostics.rated_temperature(self.muscles, self.ambient.temperature)
-        return [*rated, *diagnostics.extrapolation(self._column_limits, columns), *components]
+        return [*rated, *diagnostics.extrapolation(self.column_limits, columns), *components]
 
     @functools.cached_property
-    def _column_limits(self) -> tuple[diagnostics.ColumnLimit, ...]:
+    def column_limits(self) -> tuple[ColumnLimit, ...]:
+        """Validity ranges and ratings of the muscles, and the ranges of their geometries."""
         return diagnostics.column_limits(self.muscles, self.prefixes)
 
     def failure_hint(self, state: Mapping[str, float]) -> str:
-        """What to do about the first muscle that is at, or beyond, a limit of its geometry."""
+        """Remedy for the first muscle that is at, or beyond, a limit of its geometry."""
         try:
-            enclosures = self._enclosures(state)
+            return diagnostics.first_hint(self._enclosures(state))
         except GeometryLimitError as error:
             return str(error)
-        return next(filter(None, map(diagnostics.geometry_limit_hint, enclosures)), "")
+
+    def animate(self, recording: Recording, speed: float = 1.0) -> Animation:
+        """Animation of a run of this plant; see Recording.animate."""
+        return Animation(scene_of([m.geometry for m in self.muscles], self.prefixes, self.mechanism), recording, speed)

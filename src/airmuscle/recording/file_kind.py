@@ -1,4 +1,4 @@
-"""File kind: what a path is, checked before any of its contents is read.
+"""File kind: type of a path, checked before any of its contents is read.
 
 A pipe or a device may have no end, and the contents of a binary file are no table.
 """

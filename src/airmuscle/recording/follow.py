@@ -1,4 +1,4 @@
-"""Follower of a growing table: rows of a file, a pipe or a serial log as they come, in SI units."""
+"""Follower of a growing table: rows of a file, a pipe or a serial log as they arrive, in SI units."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ def follow_lines(
     source: str | Path | TextIO, *, idle: float, poll: float = 0.005, clock: Callable[[], float] = time.monotonic,
     pause: Callable[[float], Any] = time.sleep,
 ) -> Iterator[str]:  # fmt: skip
-    """Complete lines of a growing file, or of an open stream, until nothing has come for `idle` seconds.
+    """Complete lines of a growing file, or of an open stream, until nothing has arrived for `idle` seconds.
 
     A line without its end is held back until the rest of it comes, or until the end. A stream that is closed, such as
     a pipe, ends at once. Raises FileError if the file cannot be opened, or for a line of more than 65 536 characters.

@@ -42,7 +42,7 @@ CONSTANT_NAMES = ("resting_length", "ambient", "specimen", "run")
 
 @dataclasses.dataclass(frozen=True)
 class ColumnMapping:
-    """Interpretation of files of one kind. What the mapping does not state is read from the file.
+    """Interpretation of files of one kind. Information that the mapping does not state is read from the file.
 
     columns    by heading, or by number from 1, a heading with quantity and unit, `pressure [bara]`; an empty text
                excludes the column

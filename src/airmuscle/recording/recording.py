@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core.arrays import Array
-from ..core.errors import ColumnError, suggestion
+from ..core.errors import ColumnError, ParameterError, suggestion
 from ..core.units import conversion
 from .columns import quantity_of
 from .heading import split_unit
@@ -126,6 +126,18 @@ class Recording:
         columns = {name: self[name] for name in (names or self) if name != "time"}
         time = self.columns.get("time")
         return plot_columns(columns, time, self.origin)
+
+    def animate(self, plant: Any, speed: float = 1.0) -> Any:
+        """An animation of this run of a plant: a joint of two muscles, or a load on one muscle.
+
+        The muscles bulge as their geometry does and are coloured by their pressure. `speed` is that of the display, 1
+        for real time. `animation.save("run.gif")` writes it (.gif, .mp4, .html), `animation.still(time)` is the figure
+        at a time [s]; a notebook shows it. Raises ParameterError for another plant, ColumnError for a column that is
+        missing.
+        """
+        if not hasattr(plant, "animate"):
+            raise ParameterError(f"animate: {str(plant)[:80]} is no plant; give the Plant of the run.")
+        return plant.animate(self, speed)
 
     def __repr__(self) -> str:
         return f"Recording({self.origin}: {len(self)} rows of {', '.join(self.columns)})"

@@ -46,14 +46,6 @@ class Isobars:
     forces: Array
 
 
-def validity_range_of(characteristic: Characteristic, stated: ValidityRange | None = None) -> ValidityRange | None:
-    """Return the stated validity range, otherwise the one stored in the law by its fit, otherwise None."""
-    names = [field.name for field in dataclasses.fields(ValidityRange)]
-    if stated is not None or not all(hasattr(characteristic, name) for name in names):
-        return stated
-    return ValidityRange(*(getattr(characteristic, name) for name in names))
-
-
 def compute_isobars(
     characteristic: Characteristic,
     validity_range: ValidityRange | None = None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import datetime
 import json
 import math
@@ -57,10 +58,17 @@ def write_into(
 
 
 def save_figure(figure: Any, stem: Path) -> None:
-    """Write a figure as `stem`.svg and `stem`.png."""
+    """Write a figure, or the files of a rendered one, as `stem`.svg and `stem`.png."""
     stem.parent.mkdir(parents=True, exist_ok=True)
-    for suffix in ("svg", "png"):
-        plotting.save(figure, stem.with_name(f"{stem.name}.{suffix}"))
+    files = figure if isinstance(figure, dict) else plotting.rendered(figure)
+    for suffix, content in files.items():
+        stem.with_name(f"{stem.name}.{suffix}").write_bytes(content)
+
+
+def with_rendered_figures(chapter: Chapter) -> Chapter:
+    """The chapter with the files of its figures, by format, in place of the figures, to be sent to another process."""
+    plots = tuple(dataclasses.replace(plot, figure=plotting.rendered(plot.figure)) for plot in chapter.plots)
+    return dataclasses.replace(chapter, plots=plots)
 
 
 def save_table(table: Table, path: Path) -> None:

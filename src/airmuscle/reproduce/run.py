@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
 import importlib
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, as_completed
 from pathlib import Path
 from typing import Any
 
+from ..core.processes import process_pool
 from ..library.files import complete_name
 from ..report.chapter import Chapter
 from ..report.output_folder import check_writable
-from ..report.write import write_report
+from ..report.write import with_rendered_figures, write_report
 
 PAPERS: dict[str, str] = {
     "saga2007": "airmuscle.reproduce.saga2007",
@@ -23,36 +24,58 @@ PAPERS: dict[str, str] = {
 
 TITLE = "Reproduction of three papers on pneumatic artificial muscles"
 
-Stage = Callable[[str], AbstractContextManager[Any]]
-"""Context manager around the computation of the named paper, such as a progress display."""
+Finished = Callable[[str, Chapter, float], Any]
+"""Function of a paper, its completed chapter and its computing time [s]."""
 
 
 def reproduce(
     papers: Sequence[str] | None = None,
     folder: Path | str = "report",
     *,
-    stage: Stage = contextlib.nullcontext,
-    finished: Callable[[Chapter], Any] = lambda chapter: None,
+    workers: int = 1,
+    finished: Finished = lambda name, chapter, seconds: None,
 ) -> Path:
     """Reproduce the named papers, or all if None, and return the path of the report's page.
 
-    A unique beginning of a name is sufficient. `finished` is called with each completed chapter. If the computation
-    is interrupted or a paper fails, the completed chapters are still written. Raises UnknownNameError, FileError,
-    and the exceptions of a chapter.
+    A unique beginning of a name is sufficient. `workers` is the number of processes. `finished` is called with each
+    completed chapter. If the computation is interrupted or a paper fails, the completed chapters are still written.
+    Raises UnknownNameError, FileError, and the exceptions of a chapter.
     """
     selected = select_papers(papers)
     check_writable(folder)
-    chapters: list[Chapter] = []
+    completed: dict[str, Chapter] = {}
     try:
-        for name in selected:
-            with stage(name):
-                chapters.append(importlib.import_module(PAPERS[name]).chapter())
-            finished(chapters[-1])
+        with process_pool(min(workers, max(len(selected), 1)), one_thread_each=True, terminate=True) as pool:
+            for name, chapter, seconds in _chapters(selected, pool):
+                completed[name] = chapter
+                finished(name, chapter, seconds)
     except BaseException:
-        if chapters:
-            write_report(chapters, folder, title=f"{TITLE} (incomplete)")
+        if completed:
+            write_report([completed[n] for n in selected if n in completed], folder, title=f"{TITLE} (incomplete)")
         raise
-    return write_report(chapters, folder, title=TITLE)
+    return write_report([completed[name] for name in selected], folder, title=TITLE)
+
+
+def _chapters(selected: Sequence[str], pool: Executor | None) -> Iterator[tuple[str, Chapter, float]]:
+    """Each paper with its chapter and its computing time, as they are completed."""
+    if pool is None:
+        for name in selected:
+            yield name, *_compute(PAPERS[name])
+        return
+    futures = {pool.submit(_compute_in_worker, PAPERS[name]): name for name in reversed(selected)}  # the longest first
+    for future in as_completed(futures):
+        yield futures[future], *future.result()
+
+
+def _compute(module: str) -> tuple[Chapter, float]:
+    start = time.perf_counter()
+    chapter = importlib.import_module(module).chapter()
+    return chapter, time.perf_counter() - start
+
+
+def _compute_in_worker(module: str) -> tuple[Chapter, float]:
+    chapter, seconds = _compute(module)
+    return with_rendered_figures(chapter), seconds
 
 
 def select_papers(papers: Sequence[str] | None) -> list[str]:

@@ -2,23 +2,24 @@
 
 from .integrators import DormandPrince8, ExplicitRungeKutta, Integrator, Rodas4, RungeKutta4
 from .problem import Problem
-from .run import CompiledPlant, advance, compiled, simulate, solve
+from .run import advance, simulate, solve
 from .solution import Solution, Statistics
+from .stepper import Snapshot, Stepper
 from .with_sensitivities import WithSensitivities, sensitivity
 
 __all__ = [
-    "CompiledPlant",
     "DormandPrince8",
     "ExplicitRungeKutta",
     "Integrator",
     "Problem",
     "Rodas4",
     "RungeKutta4",
+    "Snapshot",
     "Solution",
     "Statistics",
+    "Stepper",
     "WithSensitivities",
     "advance",
-    "compiled",
     "sensitivity",
     "simulate",
     "solve",

@@ -20,7 +20,7 @@ _PAUSED, _TOO_MANY = Status.PAUSED.value, Status.TOO_MANY_STEPS.value
 
 
 class RawSolution(NamedTuple):
-    """What an integrator computed: rows (N, n), how many were reached, where and why it stopped, and its counts."""
+    """Result of an integrator: rows (N, n), number of rows reached, end time, status and counts."""
 
     rows: Array
     reached: int
@@ -32,7 +32,7 @@ class RawSolution(NamedTuple):
 
 
 class Binding(NamedTuple):
-    """What binds an integrator to a system: kernel, arguments before and after those of a run, workspace size."""
+    """Binding of an integrator to a system: kernel, arguments before and after those of a run, workspace size."""
 
     kernel: Kernel
     leading: tuple[Any, ...]
@@ -52,10 +52,17 @@ class BoundIntegrator:
         work = np.zeros(max(binding.work, 1))
         run = (self.state, self._end, self._inputs, slopes, *no_rows)
         end = (self._clock, self._count, INTERRUPT_CHECK_STEPS, work)
+        self._bound_values = (*binding.leading, *binding.trailing)
         self._kernel = binding.kernel.bind(*binding.leading, *run, *binding.trailing, *end)
         self._first = len(binding.leading) + 1
         self._clock_view, self._count_view = flat_view(self._clock), flat_view(self._count)
         self._budget = len(binding.leading) + len(run) + len(binding.trailing) + 2
+
+    def rebind(self, binding: Binding) -> None:
+        """Take the values of the same integrator at a system of the same structure with other parameters."""
+        for own, other in zip(self._bound_values, (*binding.leading, *binding.trailing), strict=True):
+            if isinstance(own, np.ndarray):
+                own[...] = other
 
     def run(
         self, segments: PiecewiseLinear, start: float, state: Array, times: Array, max_steps: int = MAX_STEPS,
@@ -72,14 +79,25 @@ class BoundIntegrator:
         """Advance `state` (n,) in place by `duration` [s] with the inputs (m,) held. Not to be mixed with `run`."""
         self.state[:] = state
         self._inputs[0] = inputs
+        status = self.proceed(duration)
+        state[:] = self.state
+        return status
+
+    def proceed(self, duration: float) -> Status:
+        """Advance `self.state` by `duration` [s] with `self.held` held. Not to be mixed with `run`."""
         if duration != self._duration:
             self._end[0] = self._duration = duration
         self._progress.fill(0)
         status = self._kernel()
         if status == _PAUSED:
             status = self._continue(status, MAX_STEPS)
-        state[:] = self.state
         return Status.DONE if status == 0 else Status(status)
+
+    @property
+    def held(self) -> Array:
+        """The inputs (m,) of `proceed`."""
+        held: Array = self._inputs[0]
+        return held
 
     def run_part(
         self, begin: float, segments: tuple[int, int, int], count: int, times: int, rows: int, wanted: int

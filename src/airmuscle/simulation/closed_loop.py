@@ -179,8 +179,10 @@ def _solution(problem: Problem, run: CompiledRun | CalledRun) -> Solution:
     way = "compiled with the plant" if isinstance(run, CompiledRun) else "called from Python at each sample"
     note = f"controlled by {prepared.loop.describe(units)}; {way}"
     remark = Diagnostic(DiagnosticCode.CONTROLLER, type(prepared.loop.controller).__name__, note)
+    notes = prepared.loop.controller.notes(run.control_state.controller)
+    remarks = (remark, *(Diagnostic(DiagnosticCode.CONTROLLER, remark.subject, text) for text in notes))
     more = _controller_columns(problem, run, times[: raw.reached])
-    recording, diagnostics = make_recording(compiled, raw, table, times, integrator, problem.end_time, more, (remark,))
+    recording, diagnostics = make_recording(compiled, raw, table, times, integrator, problem.end_time, more, remarks)
     final = dict(zip(compiled.description.state_names, run.state.tolist(), strict=True))
     statistics = Statistics(raw.steps, raw.rejected)
     return Solution(problem, recording, raw.status, statistics, diagnostics, run.time, final, run.control_state)

@@ -25,7 +25,7 @@ FIRST_SEGMENTS = 4096
 
 
 class CompiledLoop:
-    """A prepared loop whose controller is a control law, with what all runs of it have in common."""
+    """A prepared loop whose controller is a control law, with the data that all its runs share."""
 
     def __init__(self, compiled: CompiledSystem, prepared: SampledLoop) -> None:
         loop, known = prepared.loop, compiled.description
@@ -50,7 +50,7 @@ class CompiledLoop:
 
 
 def can_be_compiled(prepared: SampledLoop) -> bool:
-    """Whether a loop consists of what kernels know: a control law, and drivers of this package."""
+    """Whether a loop consists of a control law and of drivers that kernels implement."""
     loop = prepared.loop
     if not isinstance(loop.controller, ControlLaw) or not are_known(loop):
         return False
@@ -70,14 +70,34 @@ class CompiledRun:
         control_state: ControlLoopState, parameters: Array | None = None,
     ) -> None:  # fmt: skip
         self.loop, self._begin_state = loop, control_state
+        self._integrator, self._precomputed = integrator, compiled.precomputed
         self.bound = integrator.bind(compiled)
         self.bound.state[:] = initial_state
         self.status, self.stopped_at = Status.DONE, float(loop.edges[0])
         self._drivers = DriverTable(loop.prepared, control_state, loop.capacity)
         self._make_arrays(compiled.sizes.states, compiled.sizes.inputs)
-        arguments = self._arguments(compiled, parameters_of(loop.law) if parameters is None else parameters)
+        self._parameters = parameters_of(loop.law) if parameters is None else parameters
+        arguments = self._arguments(compiled, self._parameters)
         self._first_buffer = len(arguments) - 9
         self._kernel = kernel.sampled_loop.bind(*arguments)
+
+    def restart(self, compiled: CompiledSystem, initial_state: Array, parameters: Array) -> None:
+        """Begin again in the same arrays, with a plant of the same structure and other parameters; arguments as before.
+
+        Everything that was returned by this run is overwritten.
+        """
+        self.bound.rebind(self._integrator.binding(compiled))
+        self._precomputed[:], self._parameters[:] = compiled.precomputed, parameters
+        state, inputs = self._begin_state, self.loop.prepared.inputs
+        self.bound.state[:] = self._kept[:] = initial_state
+        self.bound.count[:] = 0
+        self.progress.fill(0)
+        self._memory[:] = [state.controller[name] for name in self.loop.law.initial_memory]
+        self._measured[:], self._command[:] = state.measured, state.commanded
+        self._applied[:] = state.applied_inputs or inputs.values[0]
+        self._kept_inputs[:] = self._applied
+        self._drivers.restart()
+        self.status, self.stopped_at = Status.DONE, float(self.loop.edges[0])
 
     @property
     def prepared(self) -> SampledLoop:

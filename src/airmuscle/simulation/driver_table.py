@@ -1,4 +1,4 @@
-"""Drivers of a loop as arrays, for the kernel that computes what they make of commands."""
+"""Drivers of a loop as arrays, for the kernel that passes commands through them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _STATES: dict[type, Any] = {PWM: PwmState, SolenoidDriver: SolenoidState}
 
 
 def are_known(loop: ControlLoop) -> bool:
-    """Whether a kernel knows all drivers of a loop."""
+    """Whether the kernel implements all drivers of a loop."""
     return all(type(driver) in _KINDS for chain in _chains(loop).values() for driver in chain)
 
 
@@ -54,9 +54,13 @@ class DriverTable:
         self.kinds = np.array([(names.index(n), _KINDS[type(d)]) for n, d in self._order], np.int64).reshape(-1, 2)
         self.settings = _table([_settings(driver) for _, driver in self._order])
         self.kept = _table([tuple(one) for name in chains for one in state.drivers[name]])
-        self.states = self.kept.copy()
+        self.states, self._first = self.kept.copy(), self.kept.copy()
         self.columns, self.scratch = np.empty((m, 3, capacity)), np.empty((2, 3, capacity))
         self.counts, self.begins = np.zeros((2, m), dtype=np.int64), np.empty(m)
+
+    def restart(self) -> None:
+        """The states at the beginning of the loop."""
+        self.states[:] = self.kept[:] = self._first
 
     def as_mapping(self) -> Mapping[str, tuple[Any, ...]]:
         """The drivers' states at the end of the last completed interval, by input."""

@@ -148,7 +148,7 @@ def plain_numbers(values: Mapping[str, float], limits: Mapping[str, float]) -> l
 
 
 def default_state(compiled: CompiledSystem) -> Array:
-    """The default initial state (n,): a Plant's equilibrium at ambient pressure, found once for a system.
+    """The default initial state (n,): a Plant's equilibrium at ambient pressure, computed once for a system.
 
     Raises ParameterError for a system that has none, EquilibriumError for a plant without a stable equilibrium.
     """
@@ -182,13 +182,25 @@ def check_input_range(compiled: CompiledSystem, segments: PiecewiseLinear, start
         if _are_within(table, known.input_limits.values()):
             continue
         low, high = known.input_lower_limits, known.input_upper_limits
-        row, column = np.argwhere((table < low) | (table > high))[0]
-        variable = compiled.system.input_variables[column]
-        unit = "" if variable.unit in ("", "1") else f" {variable.unit}"
-        raise ParameterError(
-            f"the input '{variable.name}' is {table[row, column]:g}{unit} before {segments.ends[row]:g} s; allowed "
-            f"range: {variable.minimum:g} to {variable.maximum:g}{unit} ({variable.meaning})."
-        )
+        row, column = np.argwhere(~((table >= low) & (table <= high)))[0]
+        _refuse_input(compiled, int(column), table[row, column], f"before {segments.ends[row]:g} s")
+
+
+def check_inputs(compiled: CompiledSystem, values: Array, when: str) -> None:
+    """Raise ParameterError where one of the values (m,) of the inputs is beyond its range, or not a number."""
+    known = compiled.description
+    outside = np.flatnonzero(~((values >= known.input_lower_limits) & (values <= known.input_upper_limits)))
+    if outside.size:
+        _refuse_input(compiled, int(outside[0]), values[outside[0]], when)
+
+
+def _refuse_input(compiled: CompiledSystem, column: int, value: float, when: str) -> None:
+    variable = compiled.system.input_variables[column]
+    unit = "" if variable.unit in ("", "1") else f" {variable.unit}"
+    raise ParameterError(
+        f"the input '{variable.name}' is {value:g}{unit} {when}; allowed "
+        f"range: {variable.minimum:g} to {variable.maximum:g}{unit} ({variable.meaning})."
+    )
 
 
 def _are_within(table: Array, limits: Iterable[tuple[int, tuple[float, float]]]) -> bool:

@@ -48,6 +48,10 @@ class RowRecorder:
             outputs, *self._ranges,
         )  # fmt: skip
 
+    def adopt(self, compiled: CompiledSystem) -> None:
+        """Take another compiled system of the same structure."""
+        self._kernel.replace(1, compiled.precomputed)
+
     def evaluate(self, states: Array, times: Array, segments: PiecewiseLinear, start: float) -> RowTable:
         """Inputs and outputs at states (N, n) and rising times (N,) of a run whose segments begin at `start` [s]."""
         count = times.size
@@ -60,17 +64,13 @@ class RowRecorder:
         return RowTable(inputs, outputs, lower, upper, first)
 
 
-def evaluate_rows(
-    compiled: CompiledSystem, states: Array, times: Array, segments: PiecewiseLinear, start: float
-) -> RowTable:
-    """Inputs and outputs at states (N, n) and rising times (N,) of a run whose segments begin at `start` [s]."""
-    return RowRecorder(compiled).evaluate(states, times, segments, start)
-
-
 def recorded_rows(
     compiled: CompiledSystem, states: Array, times: Array, segments: PiecewiseLinear, start: float
 ) -> RowTable:
-    """The same of a system with its own parameters, whose recorder is kept with its description."""
+    """Inputs and outputs at states (N, n) and rising times (N,) of a run whose segments begin at `start` [s].
+
+    For a system with its own parameters, whose recorder is stored in its description.
+    """
     idle = compiled.description.recorders
     recorder = idle.pop() if idle else RowRecorder(compiled)
     table = recorder.evaluate(states, times, segments, start)
@@ -142,7 +142,7 @@ def make_recording(
 
 
 def early_end(compiled: CompiledSystem, raw: RawSolution, end: float) -> Diagnostic:
-    """When, why and at which state a run ended early, and what to do."""
+    """Time, reason and state of an early end of a run, and the remedy."""
     state = dict(zip(compiled.description.state_names, raw.state.tolist(), strict=True))
     units = [s.unit for s in compiled.system.states]
     at = ", ".join(f"{name} {v:.4g} {unit}" for (name, v), unit in zip(state.items(), units, strict=True))

@@ -13,7 +13,6 @@ from ..compile.program import CompiledSystem, compile_system
 from ..control.control_loop import ControlLoop
 from ..control.inputs import InputSignal, Schedule
 from ..control.piecewise_linear import PiecewiseLinear
-from ..core.arrays import Array
 from ..core.declaration import as_float
 from ..core.errors import ParameterError, SimulationError
 from ..core.status import Status
@@ -103,7 +102,7 @@ def advance(
 
     Inputs that vary meanwhile are given as PiecewiseLinear from `start_time` on:
     `segments, states = WithDrivers(signal, drivers).step(states, plant.inputs, start_time, dt)`. For many steps of one
-    plant, `compiled(plant).step(state, inputs, dt)` on arrays is quicker. Raises SimulationError where the step fails,
+    plant a `Stepper` is quicker. Raises SimulationError where the step fails,
     ParameterError for an unknown name or an input beyond its range.
     """
     check_system("advance", plant)
@@ -132,7 +131,7 @@ _NO_TIMES = np.empty(0)
 def _hold(
     compiled: CompiledSystem, integrator: Integrator, state: Mapping[str, float], inputs: Mapping[str, float], dt: float
 ) -> list[float] | None:
-    """The state after a step with held inputs; None for what `advance` must check in full, or report as failed."""
+    """The state after a step with held inputs; None if `advance` must check the arguments or report a failure."""
     known = compiled.description
     x = plain_numbers(state, known.state_limits)
     if x is None:
@@ -175,40 +174,3 @@ def _segments(
         raise ParameterError(f"advance: inputs are {str(inputs)[:80]}; give a value for each name, or PiecewiseLinear.")
     check_input_range(compiled, segments, start)
     return segments
-
-
-class CompiledPlant:
-    """A plant compiled for repeated steps on arrays, without allocation: controllers, other simulators, learning.
-
-    state_names, input_names, output_names    order of the arrays
-    """
-
-    def __init__(self, plant: System, integrator: Integrator | None = None) -> None:
-        check_system("compiled", plant)
-        self.plant, self.integrator = plant, default_integrator(integrator)
-        self._compiled = compile_system(plant)
-        known = self._compiled.description
-        self.state_names, self.input_names = known.state_names, known.input_names
-        self.output_names = known.output_names
-        self._bound = self.integrator.bind(self._compiled)
-
-    def state(self, values: Mapping[str, float]) -> Array:
-        """The state (n,) of values by name, checked."""
-        return state_vector(self.plant, values)
-
-    def step(self, state: Array, inputs: Array, dt: float) -> Array:
-        """Advance `state` (n,) in place by `dt` [s] with `inputs` (m,) held, and return it.
-
-        Inputs are not checked against their ranges. Raises SimulationError where the step fails; `state` is then where
-        it failed.
-        """
-        status = self._bound.hold(state, inputs, dt)
-        if status is not Status.DONE:
-            names = ", ".join(f"{n} {v:.4g}" for n, v in zip(self.state_names, state.tolist(), strict=True))
-            raise SimulationError(f"a step of {dt:g} s failed because {status.message}, at {names}.")
-        return state
-
-
-def compiled(plant: System, integrator: Integrator | None = None) -> CompiledPlant:
-    """A handle for repeated steps of one plant on arrays: `handle.step(state, inputs, dt)`."""
-    return CompiledPlant(plant, integrator)

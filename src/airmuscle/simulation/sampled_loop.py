@@ -153,7 +153,7 @@ def _snap(signal: InputSignal, names: tuple[str, ...], edges: Array, close: floa
 def make_measurement(
     compiled: CompiledSystem, loop: ControlLoop, state: Array
 ) -> Callable[[Sequence[float]], list[float]]:
-    """A function of the inputs (m,) that gives the measured columns at what `state` (n,) holds when it is called."""
+    """A function of the inputs (m,) that returns the measured columns at the present contents of `state` (n,)."""
     known, names, view = compiled.description, loop.controller.measured_columns, flat_view(state)
     if all(name in known.state_names for name in names):
         indices = [known.state_names.index(name) for name in names]

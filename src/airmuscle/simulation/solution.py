@@ -74,7 +74,7 @@ class Solution:
         )
 
     def raise_if_incomplete(self) -> Solution:
-        """The solution itself; raises SimulationError, which carries it, where the run ended early."""
+        """The solution itself; raises SimulationError with the solution if the run ended early."""
         if self.complete:
             return self
         raise SimulationError(self.diagnostics[-1].message, self, interrupted=self.status == Status.INTERRUPTED)

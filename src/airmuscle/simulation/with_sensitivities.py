@@ -1,4 +1,4 @@
-"""Forward sensitivities: a system that also carries the derivatives of its states by chosen parameters."""
+"""Forward sensitivities: a system extended by the derivatives of its states with respect to chosen parameters."""
 
 from __future__ import annotations
 
@@ -68,12 +68,12 @@ class WithSensitivities(SensitivitySystem):
 
     @property
     def observed_names(self) -> tuple[str, ...]:
-        """What is observed, by name."""
+        """Names of the observed quantities."""
         return self.observed or tuple(_Symbols(self.inner).call("outputs"))
 
     @property
     def output_names(self) -> tuple[str, ...]:
-        """Values of what is observed, the derivatives of each by every column, their slopes in time."""
+        """Names of the observed quantities, of the derivatives of each by every column, and of their slopes in time."""
         names = self.observed_names
         further = [sensitivity(n, k) for n in names for k in range(len(self.columns))]
         return (*names, *further, *(f"{n}.rate" for n in names))
@@ -115,7 +115,7 @@ class WithSensitivities(SensitivitySystem):
         return {**{n: rates[n] for n in order}, **further}
 
     def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
-        """What is observed, its derivatives by every column, and its slopes in time (`pressure.rate`)."""
+        """The observed quantities, their derivatives by every column, and their slopes in time (`pressure.rate`)."""
         values, along = self._differentiated("outputs", state, inputs)
         slopes, names = self._slopes(state, inputs), self.observed_names
         further = {sensitivity(n, k): column[n] for n in names for k, column in enumerate(along)}
@@ -124,7 +124,7 @@ class WithSensitivities(SensitivitySystem):
     def _differentiated(
         self, method: str, state: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> tuple[dict[str, Value], list[dict[str, Value]]]:
-        """What `inner.method` gives, and its total derivative along every column."""
+        """The result of `inner.method`, and its total derivative along every column."""
         import casadi
 
         traced = _Symbols(self.inner)

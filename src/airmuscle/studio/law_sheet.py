@@ -13,6 +13,7 @@ import numpy as np
 
 from ..characteristic import Characteristic, ContractionLaw, ForceLaw
 from ..characteristic.polynomial_surrogate import PolynomialSurrogate, as_force_law
+from ..characteristic.validity_range import validity_range_of
 from ..core import cite, leaves
 from ..core.errors import TraceError
 from ..core.tree import Leaf
@@ -21,7 +22,6 @@ from ..geometry import Geometry
 from ..geometry.straight_fibre import FibreTube
 from ..library.entry import Entry
 from ..library.write import to_toml
-from ..report.isobar_plot import validity_range_of
 from .law_program import print_law
 from .toml_template import Template, toml_template
 

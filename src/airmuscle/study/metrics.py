@@ -1,4 +1,4 @@
-"""Metrics kept from each run: scalar values of a column, and time series.
+"""Metrics stored for each run: scalar values of a column, and time series.
 
 Means are over time: the integral (trapezoidal rule) between the recorded rows, divided by the duration of the window. A
 level is reached where the straight line between two rows crosses it. The output step of the scenario ([run] output)

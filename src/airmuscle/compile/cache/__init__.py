@@ -1,1 +1,1 @@
-"""Cache of compiled kernels: machine code kept as files, loaded without numba."""
+"""Cache of compiled kernels: machine code stored in files and loaded without numba."""

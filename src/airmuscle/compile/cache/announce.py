@@ -6,5 +6,5 @@ import sys
 
 
 def announce(name: str) -> None:
-    """Say on stderr that a kernel is about to be compiled, which takes some seconds."""
+    """Print to stderr that a kernel is being compiled, which takes some seconds."""
     print(f"compiling {name}, once on this machine (some seconds) ...", file=sys.stderr, flush=True)

@@ -67,7 +67,7 @@ class Kernel:
 
     @property
     def numba(self) -> Any:
-        """The kernel as it is written, which numba compiles for whatever it is called with."""
+        """The Python function of the kernel, which numba compiles for the types of its arguments."""
         return getattr(importlib.import_module(f"...kernels.{self.module}", __name__), self.name)
 
     def entry(self, kinds: tuple[str, ...]) -> Any:
@@ -80,7 +80,7 @@ class Kernel:
         return loaded and loaded[0]
 
     def _load(self, kinds: tuple[str, ...]) -> tuple[Any, Any] | None:
-        """The entry point and the engine that must live as long."""
+        """The entry point, and the engine that owns its machine code."""
         code = store.load(self.name, kinds)
         if code is None:
             announce(self.name)
@@ -92,7 +92,7 @@ class Kernel:
 
 
 class BoundKernel:
-    """A kernel with its arguments, to be run many times; arrays are passed by address and kept alive.
+    """A kernel with its arguments, for many runs; arrays are passed by address and referenced.
 
     Between two runs the contents of arrays may change, and arguments may be replaced by others of their kind.
     """
@@ -130,7 +130,7 @@ class BoundKernel:
                 slots[offset] = length
 
     def point(self, index: int, addresses: Sequence[int], length: int) -> None:
-        """Let arrays from number `index` on begin at other addresses within live arrays, with this first dimension."""
+        """Set the addresses of the arrays from number `index` on, within live arrays, and their first dimension."""
         slots, offsets, arguments = self._slots, self._offsets, self._arguments
         for i, address in enumerate(addresses, index):
             offset = offsets[i]
@@ -164,3 +164,5 @@ class BoundKernel:
 rodas4, fixed_step, lanes = Kernel("rodas4"), Kernel("fixed_step"), Kernel("lanes")
 evaluate, evaluate_rates, record = Kernel("evaluate"), Kernel("evaluate_rates", "rates"), Kernel("record")
 newton, sampled_loop = Kernel("newton"), Kernel("sampled_loop")
+begin_step, end_step = Kernel("begin_step", "bounds"), Kernel("end_step", "bounds")
+lane_blocks = Kernel("lane_blocks")

@@ -53,7 +53,7 @@ def _numba_type(kind: str) -> Any:
 
 
 def _emit(text: str, inner: str) -> bytes:
-    """Machine code of `entry` and what it needs of a module; empty where that is not all in the module."""
+    """Machine code of `entry` and of the functions that it calls; empty if the module does not contain all of them."""
     import llvmlite.binding as llvm
 
     module, machine = llvm.parse_assembly(text), native(3)

@@ -70,7 +70,7 @@ def _remove_oldest(folder: pathlib.Path) -> None:
 
 
 def cache_folder() -> pathlib.Path | None:
-    """The folder of the kernel cache, made if it is missing; None, with one warning, where none is private."""
+    """The folder of the kernel cache, created if it is missing; None, with one warning, if no folder is private."""
     try:
         folder = _chosen_folder()
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -130,7 +130,7 @@ def _file_name(name: str, kinds: Sequence[str]) -> str:
 
 @functools.cache
 def _origin() -> bytes:
-    """Hash of what machine code is compiled from: the sources of kernels and cache, numba and LLVM."""
+    """Hash of the sources of kernels and cache, and of the versions of numba and LLVM."""
     import llvmlite
 
     numba = importlib.util.find_spec("numba")

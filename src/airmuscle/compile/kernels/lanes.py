@@ -190,7 +190,7 @@ def lanes(
     chosen: Any, rows: Any, final: Any, status: Any, stop: Any,
     segment: Any, ended: Any, done: Any, total: Any, start: Any,
 ) -> Any:  # fmt: skip
-    """Carry the states `y` (n, W) of W systems from `begin` through their segments; DONE or INTERRUPTED.
+    """Integrate the states `y` (n, W) of W systems from `begin` through their segments; DONE or INTERRUPTED.
 
     prepare(p, c), step(x, u, c, w, h, y), outputs(x, u, c, o)  addresses of the printed functions, W lanes each
     p, c, y, other, u, base, w, h, o  (k, W) arrays of the printed numbers, each beginning at a multiple of 64 bytes;

@@ -73,7 +73,7 @@ def substitute_back(a: Any, b: Any) -> Any:
 def newton(
     function: Any, p: Any, target: Any, sizes: Any, x: Any, values: Any, by_x: Any, by_p: Any, a: Any, b: Any
 ) -> Any:
-    """Move `x` (n,) to the root; `values` (n,), `by_x` (n, n) and `by_p` (n, m) hold what the function gave last.
+    """Move `x` (n,) to the root; `values` (n,), `by_x` (n, n) and `by_p` (n, m) hold the last results of the function.
 
     function(x, p, values, by_x, by_p)  its address
     a, b  (n, n), (n,): workspace

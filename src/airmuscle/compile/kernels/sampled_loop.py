@@ -211,7 +211,7 @@ def sampled_loop(
     new_ends: Any, new_values: Any, new_slopes: Any, times: Any, rows: Any, samples: Any, commands: Any,
     progress: Any, budget: Any,
 ) -> Any:  # fmt: skip
-    """Run intervals until the end, an event, or so many steps that the caller should look; a status.
+    """Run the intervals until the end, an event, or the step limit of one call; a status.
 
     integrate, slots, places, clock, count, y  entry point of the integrator, its slots, the places in them of ends,
                   values, slopes, times and rows; its clock, counts and state

@@ -13,6 +13,9 @@ from .types import DOUBLE, LlvmType
 FLAGS = "nsz arcp contract reassoc afn"
 """Fast-math flags without nnan and ninf: a failed step must remain detectable by NaN or infinity."""
 
+STEADY_POWER = "steadypow"
+"""Name of the power with an exponent that depends on parameters alone, in lanes."""
+
 _BINARY = {Operation.ADD: "fadd", Operation.SUBTRACT: "fsub", Operation.MULTIPLY: "fmul", Operation.DIVIDE: "fdiv"}
 _INTRINSICS = {Operation.SQRT: "sqrt", Operation.ABS: "fabs", Operation.FLOOR: "floor"}
 _CALLS = {
@@ -38,6 +41,7 @@ class FunctionBody(FunctionBlock):
         super().__init__(scalars)
         self.number = number
         self._constants: dict[str, float] = {}
+        self._steady: set[str] = set()
 
     def assignment(self, name: str, expression: str) -> str:
         return f"  {name} = {expression}"
@@ -61,7 +65,10 @@ class FunctionBody(FunctionBlock):
         if array in self.scalars:
             return f"%{array}"
         place = self.put(f"getelementptr inbounds {self.number.text}, ptr %{array}, i64 {index}")
-        return self.put(f"load {self.number.text}, ptr {place}, align {self.number.alignment}")
+        value = self.put(f"load {self.number.text}, ptr {place}, align {self.number.alignment}")
+        if array.startswith("c"):
+            self._steady.add(value)
+        return value
 
     def store(self, array: str, index: int, value: str) -> None:
         """Write a value into an array element."""
@@ -89,10 +96,14 @@ class FunctionBody(FunctionBlock):
         return self.put(f"call {flags} {self.number.text} @{self.number.intrinsic(name)}({arguments})")
 
     def power(self, base: str, exponent: str) -> str:
-        """base**exponent; in lanes, integer and half-integer constants give products, as LLVM does for scalars."""
+        """base**exponent; in lanes, integer and half-integer constants give products, as LLVM does for scalars, and
+        other exponents that are constant or depend on parameters alone the shorter form of `steady_power`."""
         value = self._constants.get(exponent)
         if self.number == DOUBLE or value is None or abs(value) > 16 or not (2 * value).is_integer():
-            return self.call("pow", (base, exponent))
+            if self.number == DOUBLE or (value is None and exponent not in self._steady):
+                return self.call("pow", (base, exponent))
+            self.needed["pow"] = 2  # for arguments beyond the range of the shorter form
+            return self.call(STEADY_POWER, (base, exponent))
         result, square, left = self.constant(1.0), base, int(abs(value))
         while left:
             if left % 2:
@@ -195,8 +206,10 @@ def function(name: str, arguments: Sequence[str], block: FunctionBlock, attribut
     return f"define void @{name}({signature}) {attributes} {{\n" + "\n".join(block.lines) + "\n  ret void\n}\n"
 
 
-def function_of_values(name: str, arguments: Sequence[str], block: FunctionBlock, number: LlvmType, value: str) -> str:
+def function_of_values(
+    name: str, arguments: Sequence[str], block: FunctionBlock, number: LlvmType, value: str, more: str = ""
+) -> str:
     """The LLVM text of a function within a module, which takes and returns values."""
     signature = ", ".join(f"{number.text} {a}" for a in arguments)
-    head = f"define internal {number.text} @{name}({signature}) nounwind {{\n"
+    head = f"define internal {number.text} @{name}({signature}) nounwind{more} {{\n"
     return head + "\n".join(block.lines) + f"\n  ret {number.text} {value}\n}}\n"

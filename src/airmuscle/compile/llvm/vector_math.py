@@ -3,7 +3,8 @@
 The C library processes one lane per call; these functions consist of operations on all lanes. Maximum error against
 extended precision, in units in the last place: exp 0.85, log 0.51, pow 1.0, sin and cos 0.81
 (tests/dynamics/test_lanes.py), over the whole range, with zero, infinity and NaN as in IEEE 754; angles beyond
-LARGEST_ANGLE are computed by the C library. Single precision is computed in double precision and rounded once.
+LARGEST_ANGLE are computed by the C library. Single precision is computed in double precision and rounded once. Powers
+with a steady exponent have a shorter form (`steady_power`).
 
 References: range reduction and the exact product by the parts of ln 2 after Tang, P. T. P., ACM TOMS 15(2), 1989;
 sum and product with their rounding error after Dekker, T. J., Numerische Mathematik 18, 1971.
@@ -14,7 +15,9 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 
-from .emit import FunctionBody, function_of_values
+from .emit import STEADY_POWER, FunctionBody, function_of_values
+from .exact import ExactBody
+from .steady_power import steady_power
 from .types import LlvmType
 
 LN2_HIGH, LN2_LOW = 0.693147180559890330187, 5.497923018708371e-14
@@ -25,79 +28,11 @@ LARGEST_ANGLE = 1e6
 """Largest angle [rad] for which these parts are sufficient."""
 TWO_THIRDS_LOW = 2.0**-53 / 3
 """2/3 minus the nearest double."""
-ROUNDER = 1.5 * 2.0**52
-"""Added to an integer of moderate size, this leaves the integer in the last bits of the sum."""
 LEAST_NORMAL = 2.0**-1022
 
 
-class _Exact(FunctionBody):
-    """Arithmetic in double lanes without fast-math flags: no reordering, no assumptions on NaN or zero."""
-
-    def __init__(self, lanes: int) -> None:
-        super().__init__((), LlvmType(64, lanes))
-
-    def add(self, a: str, b: str) -> str:
-        return self.put(f"fadd {self.number.text} {a}, {b}")
-
-    def subtract(self, a: str, b: str) -> str:
-        return self.put(f"fsub {self.number.text} {a}, {b}")
-
-    def times(self, a: str, b: str) -> str:
-        return self.put(f"fmul {self.number.text} {a}, {b}")
-
-    def over(self, a: str, b: str) -> str:
-        return self.put(f"fdiv {self.number.text} {a}, {b}")
-
-    def fused(self, a: str, b: str, c: str) -> str:
-        """a b + c, rounded once."""
-        return self.intrinsic("fma", (a, b, c), "")
-
-    def negative(self, a: str) -> str:
-        return self.put(f"fneg {self.number.text} {a}")
-
-    def rounded(self, a: str) -> str:
-        return self.intrinsic("rint", (a,), "")
-
-    def size_of(self, a: str) -> str:
-        return self.intrinsic("fabs", (a,), "")
-
-    def polynomial(self, x: str, coefficients: Sequence[float]) -> str:
-        """c0 + x (c1 + x (c2 + ...))."""
-        total = self.constant(coefficients[-1])
-        for c in reversed(coefficients[:-1]):
-            total = self.fused(total, x, self.constant(c))
-        return total
-
-    def bits(self, a: str) -> str:
-        return self.put(f"bitcast {self.number.text} {a} to {self.number.whole}")
-
-    def from_bits(self, a: str) -> str:
-        return self.put(f"bitcast {self.number.whole} {a} to {self.number.text}")
-
-    def on_bits(self, operation: str, a: str, b: float | str) -> str:
-        """An integer operation with a constant, given as the double of the same bits, or with a value."""
-        other = self.bits(self.constant(b)) if isinstance(b, float) else b
-        return self.put(f"{operation} {self.number.whole} {a}, {other}")
-
-    def shifted(self, operation: str, a: str) -> str:
-        """Shift by the 52 bits of the mantissa."""
-        return self.on_bits(operation, a, 52 * 5e-324)
-
-    def power_of_two(self, n: str) -> str:
-        """2**n for an integer n from -1022 to 1023."""
-        low = self.shifted("shl", self.bits(self.add(n, self.constant(ROUNDER))))
-        return self.from_bits(self.on_bits("add", low, 1.0))
-
-    def sum_of(self, large: str, small: str) -> tuple[str, str]:
-        """large + small and its rounding error."""
-        total = self.add(large, small)
-        return total, self.subtract(small, self.subtract(total, large))
-
-    def sum_of_any(self, a: str, b: str) -> tuple[str, str]:
-        """a + b and its rounding error, whichever is the larger."""
-        total = self.add(a, b)
-        of_b = self.subtract(total, a)
-        return total, self.add(self.subtract(a, self.subtract(total, of_b)), self.subtract(b, of_b))
+class _Functions(ExactBody):
+    """Elementary functions in double lanes."""
 
     def exponential(self, x: str, low: str | None = None) -> str:
         """e**(x + low) with low of the order of the rounding error of x: 2**n e**r, |r| <= ln 2 / 2, Taylor series."""
@@ -120,7 +55,7 @@ class _Exact(FunctionBody):
         offset = self.choose("olt", x, self.constant(LEAST_NORMAL), self.constant(-54.0), self.constant(0.0))
         exponent = self.shifted("ashr", self.on_bits("sub", bits, math.sqrt(0.5)))
         m = self.from_bits(self.on_bits("sub", bits, self.shifted("shl", exponent)))
-        n = self.subtract(self.from_bits(self.on_bits("add", exponent, ROUNDER)), self.constant(ROUNDER))
+        n = self.subtract(self.from_bits(self.on_bits("add", exponent, self.rounder)), self.constant(self.rounder))
         n = self.add(n, offset)
         one = self.constant(1.0)
         above, below = self.subtract(m, one), self.add(m, one)
@@ -194,7 +129,7 @@ class _Exact(FunctionBody):
         near, one = self.subtract(self.constant(1.0), half), self.constant(1.0)
         left = self.subtract(self.subtract(one, near), half)
         cosine = self.add(near, self.fused(self.times(z, z), even, self.subtract(left, self.times(r, lost))))
-        turn = self.bits(self.add(self.add(n, self.constant(quarters)), self.constant(ROUNDER)))
+        turn = self.bits(self.add(self.add(n, self.constant(quarters)), self.constant(self.rounder)))
         which = self.put(f"trunc {self.number.whole} {turn} to {self.number.mask}")
         chosen = self.put(f"select {self.number.mask} {which}, {self.number.text} {cosine}, {self.number.text} {sine}")
         sign = self.on_bits("shl", self.on_bits("and", turn, 2 * 5e-324), 62 * 5e-324)
@@ -217,9 +152,11 @@ class _Exact(FunctionBody):
 def definition(name: str, count: int, number: LlvmType) -> str:
     """The LLVM text of a function of the C library, of one or two arguments, in lanes."""
     double = LlvmType(64, number.lanes)
+    if name == STEADY_POWER:
+        return steady_power(number)
     if number != double:
         return _in_double(name, count, number, double)
-    block, arguments = _Exact(number.lanes), [f"%{a}" for a in "xy"[:count]]
+    block, arguments = _Functions(number.lanes), [f"%{a}" for a in "xy"[:count]]
     before = ""
     if name == "exp":
         value = block.exponential("%x")
@@ -239,7 +176,7 @@ def definition(name: str, count: int, number: LlvmType) -> str:
 
 def _in_double(name: str, count: int, number: LlvmType, double: LlvmType) -> str:
     """A function in single precision by that in double precision, which is printed with it."""
-    block, arguments = _Exact(number.lanes), [f"%{a}" for a in "xy"[:count]]
+    block, arguments = _Functions(number.lanes), [f"%{a}" for a in "xy"[:count]]
     wide = [block.put(f"fpext {number.text} {a} to {double.text}") for a in arguments]
     given = ", ".join(f"{double.text} {a}" for a in wide)
     value = block.put(f"call {double.text} @{double.function(name)}({given})")
@@ -264,6 +201,6 @@ def declarations(numbers: Collection[LlvmType]) -> str:
     ):
         for name, count in (("sqrt", 1), ("fabs", 1), ("rint", 1), ("copysign", 2), ("fma", 3)):
             text += f"declare {kind.text} @{kind.intrinsic(name)}({', '.join([kind.text] * count)})\n"
-        if kind.bits == 64:
-            text += f"declare i1 @llvm.vector.reduce.or.v{kind.lanes}i1({kind.mask})\n"
+    for kind in sorted({LlvmType(64, number.lanes) for number in numbers}, key=lambda k: k.lanes):
+        text += f"declare i1 @llvm.vector.reduce.or.v{kind.lanes}i1({kind.mask})\n"
     return text

@@ -47,7 +47,7 @@ class Prediction(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Campaign:
-    """The records of a rig with their use, the result of each stage, and what to measure next."""
+    """The records of a rig with their use, the result of each stage, and the next experiments."""
 
     records: tuple[CampaignRecord, ...]
     creep: CreepStage | LeftOutStage

@@ -32,7 +32,7 @@ class NextExperiment:
 def plan_next(
     stages: Sequence[object], static: StaticStage | LeftOutStage, records: Sequence[CampaignRecord]
 ) -> tuple[NextExperiment, ...]:
-    """What to measure next: first what is missing, then what is not determined, then further static runs."""
+    """The next experiments: missing ones, then those that determine weak parameters, then static runs."""
     missing = [
         NextExperiment(_sentence(stage.remedy), f"{stage.name}: {stage.reason.rstrip('.')}")
         for stage in stages
@@ -46,7 +46,7 @@ def _sentence(text: str) -> str:
 
 
 def _undetermined(stages: Sequence[object]) -> list[NextExperiment]:
-    """The experiments that separate what the fills do not, and longer holds."""
+    """The experiments that separate parameters that the fills do not, and longer holds."""
     experiments = []
     for stage in stages:
         if isinstance(stage, FillStage):

@@ -56,7 +56,7 @@ def given_states(system: System, given: Mapping[str, npt.ArrayLike], count: int)
 
 
 def check_states(variations: Variations, states: Array) -> None:
-    """Raise what `simulate` raises for an impossible initial state (N, n), with its row."""
+    """Raise the error of `simulate` for an impossible initial state (N, n), with its row."""
     names = [s.name for s in variations.system.states]
     try:
         columns = {name: column.view(Column) for name, column in zip(names, states.T, strict=True)}

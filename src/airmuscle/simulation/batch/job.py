@@ -16,7 +16,7 @@ from ...core.arrays import Array
 from ...core.status import Status
 from ..bound_integrator import RawSolution
 from ..integrators import Integrator
-from ..rows import evaluate_rows
+from ..rows import RowRecorder
 from .loops import LoopBatch
 from .variations import Variations
 
@@ -26,7 +26,7 @@ NOT_RUN = -1
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class BatchJob:
-    """N plants to be simulated: initial states (N, n), segments of the inputs of each, rows and columns to be kept.
+    """N plants to be simulated: initial states (N, n), segments of the inputs of each, rows and columns to be stored.
 
     Results are written into `columns` (N, T) by name, `final` (N, n), `status` (N,), the number of rows `reached` (N,),
     and `reasons`, which say why plants failed.
@@ -47,17 +47,18 @@ class BatchJob:
     reasons: dict[int, str]
     nominal: Array
     loops: LoopBatch | None = None
+    _recorders: list[RowRecorder] = dataclasses.field(default_factory=list)
 
     @functools.cached_property
     def names(self) -> tuple[str, ...]:
-        """All columns that can be kept: states, then outputs, then inputs."""
+        """All columns that can be stored: states, then outputs, then inputs."""
         known = self.compiled.description
         of_loop = () if self.loops is None else self.loops.column_names
         return (*known.state_names, *known.output_names, *known.input_names, *of_loop)
 
     @functools.cached_property
     def kept(self) -> npt.NDArray[np.int64]:
-        """Indices of the columns to be kept among `names`."""
+        """Indices of the stored columns among `names`."""
         return np.array([self.names.index(name) for name in self.columns], dtype=np.int64)
 
     @property
@@ -88,8 +89,9 @@ class BatchJob:
         if not signal.ends.size:
             inputs = np.zeros((1, self.compiled.sizes.inputs))
             signal = PiecewiseLinear(self.times[-1:], inputs, inputs)
-        more = loops.columns(index, run, self.times[: at.size]) if len(run.measured) else {}
+        more = loops.columns(self.columns, run, at.size) if len(run.measured) else {}
         self._write(index, one, self._truncate(raw), signal, more)
+        loops.release(run)
 
     def _truncate(self, raw: RawSolution) -> RawSolution:
         """The solution up to the first row with a negative air mass, as `simulate` ends it."""
@@ -106,7 +108,9 @@ class BatchJob:
     ) -> None:
         reached = raw.reached
         states = np.ascontiguousarray(raw.rows[:reached])
-        table = evaluate_rows(one, states, self.times[:reached], segments, self.start_time)
+        recorder = self._recorder(one)
+        table = recorder.evaluate(states, self.times[:reached], segments, self.start_time)
+        self._recorders.append(recorder)
         parts = (states, table.outputs, table.inputs)
         places = [(i, j) for i, part in enumerate(parts) for j in range(part.shape[1])]
         for place, (name, column) in zip(self.kept, self.columns.items(), strict=True):
@@ -121,6 +125,15 @@ class BatchJob:
         self.final[index], self.status[index], self.reached[index] = raw.state, raw.status, reached
         if raw.status:
             self.reasons[index] = self._reason(raw)
+
+    def _recorder(self, one: CompiledSystem) -> RowRecorder:
+        """A recorder that no thread uses at present, for this plant."""
+        try:
+            recorder = self._recorders.pop()
+        except IndexError:
+            return RowRecorder(one)
+        recorder.adopt(one)
+        return recorder
 
     def _reason(self, raw: RawSolution) -> str:
         states = self.compiled.system.states

@@ -40,7 +40,7 @@ class LaneBlock:
 
 
 def _bounded_states(job: BatchJob) -> npt.NDArray[np.int64]:
-    """States with a lower bound; their rows are checked after the run and not kept."""
+    """States with a lower bound; their rows are checked after the run and not stored."""
     return np.flatnonzero(np.isfinite(job.lower_bounds)).astype(np.int64)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from ...compile.program import CompiledSystem
 from ...control.control_law import ControlLaw
-from ...control.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop
+from ...control.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop, ControlLoopState
 from ...core.arrays import Array
 from ...core.errors import ParameterError
 from ...core.system import System
@@ -44,6 +44,8 @@ class LoopBatch:
     times: Array
     _prepared: dict[int, SampledLoop | CompiledLoop] = dataclasses.field(default_factory=dict)
     _preparing: Any = dataclasses.field(default_factory=threading.Lock)
+    _idle: dict[int, list[CompiledRun]] = dataclasses.field(default_factory=dict)
+    _at_rows: dict[int, tuple[npt.NDArray[np.intp], Array]] = dataclasses.field(default_factory=dict)
 
     @classmethod
     def of(
@@ -76,11 +78,30 @@ class LoopBatch:
         run: CompiledRun | CalledRun
         if isinstance(prepared, CompiledLoop):
             parameters = parameters_of(prepared.law) if self.laws is None else self.laws.parameters(index)
-            run = CompiledRun(prepared, compiled, integrator, state, start, parameters)
+            run = self._compiled(prepared, compiled, state, start, parameters)
         else:
             run = self._called(index, plants, loop, prepared, state)
         run.integrate()
         return run
+
+    def _compiled(
+        self, prepared: CompiledLoop, compiled: CompiledSystem, state: Array, start: ControlLoopState, parameters: Array
+    ) -> CompiledRun:
+        """A run in the arrays of one that is not needed any more, or a new one."""
+        idle = self._idle.setdefault(id(prepared), [])
+        try:
+            run = idle.pop()
+        except IndexError:
+            integrator = self.template.integrator
+            assert integrator is not None
+            return CompiledRun(prepared, compiled, integrator, state, start, parameters)
+        run.restart(compiled, state, parameters)
+        return run
+
+    def release(self, run: CompiledRun | CalledRun) -> None:
+        """State that nothing of a run is needed any more; its arrays serve another one."""
+        if isinstance(run, CompiledRun):
+            self._idle[id(run.loop)].append(run)
 
     def _called(
         self, index: int, plants: Variations, loop: ControlLoop, prepared: SampledLoop, state: Array
@@ -109,19 +130,22 @@ class LoopBatch:
         rows = first_rows_of(self.times, prepared.instants)
         return dataclasses.replace(prepared, times=self.times, first_rows=rows)
 
-    def columns(self, index: int, run: CompiledRun | CalledRun, times: Array) -> Mapping[str, Array]:
-        """Set points, measurements and commands at the rows (R,) of one plant."""
+    def columns(self, wanted: Collection[str], run: CompiledRun | CalledRun, count: int) -> dict[str, Array]:
+        """The wanted ones of set points, measurements and commands at the first rows (R,) of one plant."""
         prepared, controller = run.prepared, self.loops[0].controller
-        intervals = np.clip(
-            np.searchsorted(prepared.instants, times, side="right") - 1, 0, max(len(run.measured) - 1, 0)
-        )
-        setpoints = prepared.setpoint_signal.inputs_at(times, self.template.start_time)
-        columns = {f"{SETPOINT}{name}": setpoints[:, i] for i, name in enumerate(controller.setpoints)}
-        for values, prefix, names in (
-            (run.measured, MEASURED, controller.measured_columns),
-            (run.commanded, COMMAND, controller.inputs),
+        key = id(prepared.loop)  # a loop that is called is prepared anew for each run
+        if key not in self._at_rows:
+            at = np.maximum(np.searchsorted(prepared.instants, self.times, side="right") - 1, 0)
+            self._at_rows[key] = at, prepared.setpoint_signal.inputs_at(self.times, self.template.start_time)
+        intervals, setpoints = self._at_rows[key]
+        intervals = np.minimum(intervals[:count], max(len(run.measured) - 1, 0))
+        columns: dict[str, Array] = {}
+        for values, rows, prefix, names in (
+            (setpoints, slice(count), SETPOINT, controller.setpoints),
+            (run.measured, intervals, MEASURED, controller.measured_columns),
+            (run.commanded, intervals, COMMAND, controller.inputs),
         ):
-            columns |= {f"{prefix}{name}": values[intervals, i] for i, name in enumerate(names)}
+            columns |= {f"{prefix}{n}": values[rows, i] for i, n in enumerate(names) if f"{prefix}{n}" in wanted}
         return columns
 
 

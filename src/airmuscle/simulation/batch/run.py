@@ -100,7 +100,7 @@ def _times(
     given: float | npt.ArrayLike | None, start: float, duration: float, instants: Array | None,
     keep: Sequence[str] | None,
 ) -> Array:  # fmt: skip
-    """The times of the rows, with the instants of the input that all plants share; the end if no column is kept."""
+    """The times of the rows, with the instants of the input that all plants share; the end if no column is stored."""
     end = np.array([start + duration])
     if keep is not None and len(keep) == 0:
         return end

@@ -1,4 +1,4 @@
-"""BatchSolution: final states, kept columns and status of every plant."""
+"""BatchSolution: final states, stored columns and status of every plant."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class BatchSolution:
         return self.status.size
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
-        """A kept column (N, T) by its name."""
+        """A stored column (N, T) by its name."""
         if name not in self.columns:
             known = ", ".join(self.columns) or "none; name them in keep"
             raise ColumnError(f"batch: no column '{name}'; kept are {known}.{suggestion(name, self.columns)}")
@@ -83,7 +83,7 @@ class BatchSolution:
         return int(index) % len(self)
 
     def recording(self, index: int) -> Recording:
-        """The kept columns of one plant as a Recording, as far as it got."""
+        """The stored columns of one plant as a Recording, up to the end of its run."""
         index = self._row(index)
         system = self.plant(index)
         rows = slice(int(self.reached[index]))

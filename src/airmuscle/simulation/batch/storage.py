@@ -74,7 +74,7 @@ class OnDisk(InMemory):
         return {name: np.load(self.path / file_of(name), mmap_mode="r") for name in names}
 
     def abandon(self) -> None:
-        """Remove what was written."""
+        """Remove the written files."""
         self.columns = {}
         shutil.rmtree(self._folder, ignore_errors=True)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import contextvars
 import os
 import sys
 import threading
@@ -15,6 +16,7 @@ import numpy.typing as npt
 
 BAR_DELAY = 2.0
 """Seconds after which a progress bar is drawn, on a terminal."""
+_hidden = contextvars.ContextVar("hidden", default=False)
 
 
 def available_cores() -> int:
@@ -72,12 +74,22 @@ def run_workers(queue: Queue, workers: list[Callable[[int], Any]], advanced: Cal
 
 
 @contextlib.contextmanager
+def hidden_progress() -> Iterator[None]:
+    """A block without progress bars, for a caller that draws its own."""
+    token = _hidden.set(True)
+    try:
+        yield
+    finally:
+        _hidden.reset(token)
+
+
+@contextlib.contextmanager
 def progress(what: str, total: int) -> Iterator[Callable[[int], None]]:
     """A function that takes the number of items done and draws a bar on a terminal once that takes long."""
     started, bar = time.monotonic(), _Bar(what, total)
 
     def advanced(done: int) -> None:
-        if time.monotonic() - started > BAR_DELAY and sys.stderr.isatty():
+        if time.monotonic() - started > BAR_DELAY and sys.stderr.isatty() and not _hidden.get():
             bar.show(done)
 
     try:

@@ -1,0 +1,134 @@
+"""Control loops in a batch, as they are simulated for the tuning of gains: a lifted load and an antagonistic joint."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+
+import numpy as np
+from filling import Array
+from joints import chosen_muscle
+from measure import Section, Target, format_time, print_section
+
+from airmuscle.analysis.equilibrium import find_equilibrium
+from airmuscle.control import (
+    PID,
+    AngleAndStiffness,
+    AntagonisticInverse,
+    Cascade,
+    ControlLoop,
+    Decentralised,
+    Schedule,
+    SplitRange,
+)
+from airmuscle.mechanism import AntagonisticJoint, HangingMass
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import FillDischarge, Supply, Valve
+from airmuscle.simulation import Integrator, Rodas4, RungeKutta4
+from airmuscle.simulation.batch import BatchSolution, simulate_batch
+from airmuscle.simulation.batch.thread_pool import available_cores
+
+COUNT, DURATION, SAMPLE_TIME = 10_000, 5.0, 5e-3
+SIMULATED = 400
+"""Number of loops that are simulated; times are scaled to COUNT, because all loops cost about the same."""
+HEADER = ("plant", "integrator", "CPU time of a loop", "of a sample", f"{COUNT} loops, wall time", "difference")
+TEXT = (
+    f"Loops of {DURATION:g} s with a sample time of {1e3 * SAMPLE_TIME:g} ms and different gains, with the columns "
+    f"from which the tuning computes its metrics. {SIMULATED} loops are simulated and the wall time is scaled to "
+    f"{COUNT}. The lifted load has three states and a cascade of two PID; the joint has four states, feed-forward, and "
+    "three PID. Difference: greatest difference of the controlled column to the default integrator. Loops run on one "
+    "core at a time, not in vector lanes. All numbers of the plants are chosen."
+)
+REASON = "other load: the CPU time of a loop, divided by the number of cores, is the wall time on an idle machine"
+
+
+@dataclasses.dataclass(frozen=True)
+class LoopVariant:
+    """A plant with its loop, initial state, the path of the varied gain with its values, and its columns."""
+
+    name: str
+    plant: Plant
+    loop: ControlLoop
+    start: dict[str, float]
+    gain: str
+    gains: tuple[float, float]
+    columns: tuple[str, ...]
+
+    def simulate(self, count: int, duration: float, integrator: Integrator) -> BatchSolution:
+        """So many loops with gains between both values."""
+        gains = np.geomspace(*self.gains, count)
+        return simulate_batch(
+            self.plant, {f"controller.{self.gain}": gains}, self.loop, duration=duration, initial_states=self.start,
+            output_times=SAMPLE_TIME, integrator=integrator, keep=self.columns,
+        )  # fmt: skip
+
+
+def lifted_load() -> LoopVariant:
+    """A cascade of position and pressure control."""
+    valve = Valve(2.6e-9, 0.4)
+    plant = Plant(chosen_muscle(), FillDischarge(Supply(5.5e5), valve, valve), HangingMass(2.0))
+    inner = PID("pressure", SplitRange("fill", "discharge"), gain=5e-5)
+    law = Cascade(PID("position", "pressure", 4e6, 0.3, initial_output=1e5), inner, (0.0,), (5e5,))
+    loop = ControlLoop(law, SAMPLE_TIME, Schedule({"position": ((0, 0.01), (1, 0.02), (3, 0.01))}))
+    columns = ("position", "setpoint.position", "command.fill", "command.discharge", "air_mass")
+    start = find_equilibrium(plant, pressure=1e5)
+    return LoopVariant("lifted load", plant, loop, start, "outer.gain", (1e6, 8e6), columns)
+
+
+def joint() -> LoopVariant:
+    """Control of angle and stiffness, with a pressure controller for each muscle."""
+    valve, names = Valve(1e-8, 0.4), ("left", "right")
+    muscles = tuple(dataclasses.replace(chosen_muscle(), name=name) for name in names)
+    mechanism = AntagonisticJoint(radius=0.02, inertia=0.02, damping=0.05, weight_torque=0.5, offset=0.08)
+    circuit = FillDischarge(Supply(5.5e5), valve, valve)
+    plant = Plant(muscles, (circuit, circuit), mechanism)
+    inverse = AntagonisticInverse(muscles, mechanism, 0.2e5, 5e5)
+    inner = Decentralised(
+        tuple(PID(f"{n}.pressure", SplitRange(f"{n}.fill", f"{n}.discharge"), gain=2e-5) for n in names)
+    )
+    outer = AngleAndStiffness(inverse, ("left.pressure", "right.pressure"), gain=5.0, integral_time=0.5)
+    law = Cascade(outer, inner, (0.2e5,) * 2, (5e5,) * 2)
+    stiffness = float(inverse.stiffness(2e5, 2e5, 0.0))
+    wanted = Schedule({"angle": ((0, 0.0), (1, 0.2), (3, 0.0)), "stiffness": ((0, stiffness),)})
+    columns = ("angle", "setpoint.angle", *(f"command.{n}.{i}" for n in names for i in ("fill", "discharge")))
+    start = find_equilibrium(plant, pressure=2e5)
+    return LoopVariant("joint", plant, ControlLoop(law, SAMPLE_TIME, wanted), start, "outer.gain", (2.0, 10.0), columns)
+
+
+def section(rounds: int = 5, count: int = SIMULATED, duration: float = DURATION) -> Section:
+    """The complete benchmark."""
+    rows, targets = [], []
+    for case in (lifted_load(), joint()):
+        reference: Array | None = None
+        for integrator in (Rodas4(), Rodas4(1e-4), RungeKutta4(2.5e-3)):
+            batch = case.simulate(count, duration, integrator)
+            controlled = np.asarray(batch[case.columns[0]], dtype=float)
+            reference = controlled if reference is None else reference
+            cpu, wall = _times(case, count, duration, integrator, rounds)
+            error = f"{np.abs(controlled - reference).max():.1e}"
+            samples = duration / SAMPLE_TIME
+            total = wall * COUNT
+            rows.append(
+                (case.name, str(integrator), format_time(cpu), format_time(cpu / samples), format_time(total), error)
+            )
+            if case.name == "lifted load" and reference is controlled:
+                name = f"{COUNT} control loops of {DURATION:g} s on {available_cores()} cores"
+                targets.append(Target(name, total * DURATION / duration, 10.0, "s", reason=REASON))
+    return Section("Control loops in a batch", TEXT, HEADER, tuple(rows), tuple(targets))
+
+
+def _times(
+    case: LoopVariant, count: int, duration: float, integrator: Integrator, rounds: int
+) -> tuple[float, float]:  # fmt: skip
+    """Minimum CPU time and minimum wall time of a loop [s]."""
+    cpu, wall = [], []
+    for _ in range(rounds):
+        begin, started = time.process_time(), time.perf_counter()
+        case.simulate(count, duration, integrator)
+        cpu.append((time.process_time() - begin) / count)
+        wall.append((time.perf_counter() - started) / count)
+    return min(cpu), min(wall)
+
+
+if __name__ == "__main__":
+    print_section(section())

@@ -1,0 +1,25 @@
+"""Figure docs/images/sizing.png: working points of a lift. Run python docs/make_sizing_figure.py"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import airmuscle as am
+from airmuscle.core.plotting import save
+from airmuscle.report.sizing_plot import sizing_plot
+from airmuscle.sizing import LiftRequirement, SizingConditions, choose
+
+PICTURE = Path(__file__).with_name("images") / "sizing.png"
+
+
+def main() -> None:
+    """Write the figure."""
+    choice = choose(
+        am.load("dmsp-20-300"), LiftRequirement(stroke="40 mm", mass="20 kg"), SizingConditions(supply="6 bar")
+    )
+    save(sizing_plot(choice).figure, PICTURE)
+    print(f"wrote {PICTURE}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,44 @@
+"""Sizing of muscles for a lift or a joint: shortest muscles of a catalogue, ranked, and a scenario of the choice.
+
+It is a package of its own between the library, whose entries it scales, and the reports that show its result. The
+analysis of a given plant (equilibria, statics of a joint) is below the library and knows no catalogue.
+"""
+
+from .choice import (
+    MuscleChoice,
+    MuscleDesign,
+    UnsuitableMuscle,
+    by_air,
+    by_count,
+    by_diameter,
+    by_length,
+    by_reserve,
+)
+from .requirement import JointRequirement, LiftRequirement, SizingConditions
+from .scenario import scenario_text
+from .search import SizingResult, catalogue, choose, size_muscles
+from .static_muscle import EndPoint, StaticMuscle
+from .valve_sizing import discharge_valve, fill_valve
+
+__all__ = [
+    "EndPoint",
+    "JointRequirement",
+    "LiftRequirement",
+    "MuscleChoice",
+    "MuscleDesign",
+    "SizingConditions",
+    "SizingResult",
+    "StaticMuscle",
+    "UnsuitableMuscle",
+    "by_air",
+    "by_count",
+    "by_diameter",
+    "by_length",
+    "by_reserve",
+    "catalogue",
+    "choose",
+    "discharge_valve",
+    "fill_valve",
+    "scenario_text",
+    "size_muscles",
+]

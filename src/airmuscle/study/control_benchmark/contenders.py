@@ -1,0 +1,175 @@
+"""Contenders of the control benchmark: control laws with the ranges of their gains, and the standard ones."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from ...control.angle_and_stiffness import AngleAndStiffness
+from ...control.antagonistic_inverse import AntagonisticInverse
+from ...control.cascade import Cascade
+from ...control.co_contraction import DIFFERENCE, CoContraction
+from ...control.control_law import ControlLaw
+from ...control.pid import PID
+from ...control.proportional_feedback import ProportionalFeedback
+from ...control.sensors import WithSensors
+from ...control.setpoint_lead import SetpointLead
+from ...control.sigma_delta import SigmaDelta
+from ...control.sliding_mode import SlidingMode
+from ...control.split_range import SplitRange
+from ...control.super_twisting import SuperTwisting
+from ...control.with_feed_forward import WithFeedForward
+from ...core.errors import ParameterError
+from .joints import SIDES, BenchmarkJoint
+
+BAR = 1e5
+Bounds = Mapping[str, tuple[float, float]]
+PRESSURE_GAIN, ZONE = (1.0 / BAR, 60.0 / BAR), (0.005 * BAR, 0.2 * BAR)
+"""Ranges of the gain and of the dead zone of the inner pressure control (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Contender:
+    """A controller that takes part in the benchmark.
+
+    name     for tables
+    law      commands half the pressure difference (`difference`), both pressures (`left.pressure`, `right.pressure`) or
+             the valves. It may measure the angle, the angular speed and both pressures. Its set points are names of
+             TaskSignals: `angle`, `angular_speed`, `angular_acceleration`, `mean_pressure`, `stiffness`,
+             `feed_forward`, `feed_forward_rate`
+    bounds   minimum and maximum [SI] of the gains of the law that are tuned, by path. Without bounds, and with a law
+             that commands the valves, nothing is tuned
+    """
+
+    name: str
+    law: ControlLaw
+    bounds: Bounds = dataclasses.field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.law, ControlLaw):
+            raise ParameterError(
+                f"contender '{self.name}': its law is a {type(self.law).__name__}; give a ControlLaw, so that the "
+                "sensors of the benchmark can be put in front of it."
+            )
+
+
+class CompleteLaw(NamedTuple):
+    """A law that commands the valves of a joint through its sensors, and the ranges of all gains that are tuned."""
+
+    law: WithSensors
+    bounds: dict[str, tuple[float, float]]
+
+
+def complete(joint: BenchmarkJoint, contender: Contender, seed: int = 1) -> CompleteLaw:
+    """The law of a contender with the parts that it lacks: co-contraction, pressure control, modulation, sensors.
+
+    Raises ParameterError for a law that commands other inputs, or measures a column without a sensor.
+    """
+    law, bounds = contender.law, dict(contender.bounds)
+    if law.inputs == (DIFFERENCE,):
+        span = (joint.pressure_span,)
+        law = Cascade(law, CoContraction(joint.pressures, 0.0, "mean_pressure"), (-span[0],), span)
+        bounds = _within("outer.", bounds)
+    if set(law.inputs) == set(joint.pressures):
+        law, bounds = _with_pressure_control(joint, law, bounds)
+    if set(law.inputs) != set(joint.model.inputs) - {"external_torque"}:
+        raise ParameterError(
+            f"contender '{contender.name}' commands {', '.join(law.inputs)}; allowed are '{DIFFERENCE}', the pressures "
+            f"{', '.join(joint.pressures)}, or all valves."
+        )
+    known = {sensor.column: sensor for sensor in joint.sensors}
+    if without := [name for name in law.measured_columns if name not in known]:
+        raise ParameterError(
+            f"contender '{contender.name}' measures '{without[0]}'; the joint has sensors of {', '.join(known)}."
+        )
+    sensors = tuple(known[name] for name in law.measured_columns)
+    return CompleteLaw(WithSensors(law, sensors, float(seed)), _within("law.", bounds))
+
+
+def _with_pressure_control(
+    joint: BenchmarkJoint, law: ControlLaw, bounds: dict[str, tuple[float, float]]
+) -> tuple[ControlLaw, dict[str, tuple[float, float]]]:
+    """A law that commands pressures with the inner pressure control of a joint, and its ranges."""
+    valves = tuple(SplitRange(f"{side}.fill", f"{side}.discharge") for side in SIDES)
+    inner = ProportionalFeedback(joint.pressures, valves, 10.0 / BAR, 0.02 * BAR if joint.switching else 0.0)
+    limits = (joint.min_pressure,) * 2, (joint.max_pressure,) * 2
+    cascade = Cascade(law, inner, *limits)
+    bounds = {**_within("outer.", bounds), "inner.gain": PRESSURE_GAIN}
+    if not joint.switching:
+        return cascade, bounds
+    return SigmaDelta(cascade), _within("law.", {**bounds, "inner.zone": ZONE})
+
+
+def _within(prefix: str, bounds: Bounds) -> dict[str, tuple[float, float]]:
+    return {f"{prefix}{path}": pair for path, pair in bounds.items()}
+
+
+_GAIN, _INTEGRAL, _DERIVATIVE, _LEAD = (2e4, 2e6), (0.02, 3.0), (1e-3, 0.2), (1e-3, 0.1)
+PID_BOUNDS: Bounds = {"gain": _GAIN, "integral_time": _INTEGRAL, "derivative_time": _DERIVATIVE}
+
+
+def _pid() -> PID:
+    return PID("angle", DIFFERENCE, gain=2e5, integral_time=0.3, derivative_time=0.02, derivative_filter=5.0)
+
+
+def _feed_forward() -> SetpointLead:
+    return SetpointLead("feed_forward", "feed_forward_rate", DIFFERENCE, 0.02)
+
+
+def pid_contender() -> Contender:
+    """PID of the angle without a model of the muscles."""
+    return Contender("PID", _pid(), PID_BOUNDS)
+
+
+def open_loop_contender() -> Contender:
+    """Feed-forward by the static inverse of the model, without feedback of the angle."""
+    without = WithFeedForward(_feed_forward(), PID("angle", DIFFERENCE, gain=0.0))
+    return Contender("feed-forward", without, {"feed_forward.lead_time": _LEAD})
+
+
+def feed_forward_contender() -> Contender:
+    """Feed-forward by the static inverse of the model, and PID."""
+    bounds = {"feed_forward.lead_time": _LEAD, **_within("feedback.", PID_BOUNDS)}
+    return Contender("feed-forward + PID", WithFeedForward(_feed_forward(), _pid()), bounds)
+
+
+def sliding_mode_contender() -> Contender:
+    """Sliding mode with a boundary layer beside the feed-forward."""
+    law = SlidingMode("angle", DIFFERENCE, 5e4, sliding_time=0.05, boundary_layer=0.1, filter_time=0.004)
+    bounds = {
+        "feed_forward.lead_time": _LEAD, "feedback.amplitude": (5e3, 2e5), "feedback.sliding_time": (3e-3, 0.3),
+        "feedback.boundary_layer": (3e-3, 1.0),
+    }  # fmt: skip
+    return Contender("feed-forward + sliding mode", WithFeedForward(_feed_forward(), law), bounds)
+
+
+def super_twisting_contender() -> Contender:
+    """Super-twisting beside the feed-forward."""
+    law = SuperTwisting("angle", DIFFERENCE, 1e5, 1e5, sliding_time=0.05, filter_time=0.004)
+    bounds = {
+        "feed_forward.lead_time": _LEAD, "feedback.proportional": (1e4, 1e6), "feedback.integral": (1e4, 3e6),
+        "feedback.sliding_time": (3e-3, 0.3),
+    }  # fmt: skip
+    return Contender("feed-forward + super-twisting", WithFeedForward(_feed_forward(), law), bounds)
+
+
+def angle_and_stiffness_contender(joint: BenchmarkJoint) -> Contender:
+    """Angle and stiffness by the inverse of the model for torque and stiffness."""
+    inverse = AntagonisticInverse(
+        joint.model.muscles, joint.model.mechanism, joint.min_pressure, joint.max_pressure, steps=2
+    )
+    law = AngleAndStiffness(
+        inverse, joint.pressures, gain=20.0, integral_time=0.3, speed_gain=0.3, speed_column="angular_speed",
+        acceleration_setpoint="angular_acceleration",
+    )  # fmt: skip
+    bounds = {"gain": (2.0, 300.0), "integral_time": (0.01, 3.0), "speed_gain": (0.01, 10.0)}
+    return Contender("angle and stiffness", law, bounds)
+
+
+def standard_contenders(joint: BenchmarkJoint) -> tuple[Contender, ...]:
+    """The contenders of the package for a joint; all ranges of gains are chosen."""
+    return (
+        pid_contender(), open_loop_contender(), feed_forward_contender(), sliding_mode_contender(),
+        super_twisting_contender(), angle_and_stiffness_contender(joint),
+    )  # fmt: skip

@@ -1,0 +1,92 @@
+"""Figures of the control benchmark: errors of all tasks, runs of some tasks, learning curves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...core.plotting import BLACK, DASHES, LINES, MARKERS, legend_below, new_figure
+from ...report.chapter import Plot
+from .benchmark import BenchmarkResult
+from .learning import LearningCurve
+
+MAX_PANELS = 4
+DRAWN = ("step", "sine 2 Hz", "minimum jerk", "load change", "torque disturbance", "sine 1 Hz", "valve stuck", "hold")
+"""Tasks that are drawn over time, the first four that the benchmark contains."""
+
+
+def benchmark_plots(result: BenchmarkResult, curves: Sequence[LearningCurve] = ()) -> tuple[Plot, ...]:
+    """All figures of a benchmark."""
+    plots = [error_plot(result)]
+    names = [task.name for task in result.tasks]
+    drawn = [name for name in (*DRAWN, *names) if name in names]
+    plots += [run_plot(result, list(dict.fromkeys(drawn))[:MAX_PANELS])]
+    return (*plots, *([learning_plot(curves)] if curves else []))
+
+
+def error_plot(result: BenchmarkResult) -> Plot:
+    """The rms error of every controller in every task."""
+    names = [task.name for task in result.tasks]
+    figure, axis = new_figure(height=1.2 + 0.32 * len(names))
+    rows = np.arange(len(names))
+    for i, each in enumerate(result.contenders):
+        errors = [result.metric(each.name, name, "rmse") for name in names]
+        shift = 0.08 * (i - (len(result.contenders) - 1) / 2)
+        marker, colour = MARKERS[i % len(MARKERS)], LINES[i % len(LINES)]
+        axis.plot(errors, rows + shift, linestyle="none", marker=marker, color=colour, label=each.name)
+    axis.set(xscale="log", xlabel="rms error [degree]")
+    axis.set_yticks(rows, names)
+    axis.set_ylim(len(names) - 0.5, -0.5)
+    for which in (axis.xaxis.set_major_formatter, axis.xaxis.set_minor_formatter):
+        which(lambda value, _: f"{value:g}" if f"{value:.0e}"[0] in "125" else "")
+    legend_below(figure, axis, columns=3)
+    caption = f"Error in each task on the true joint with {result.joint.name}; {result.joint.valve}."
+    return Plot("errors", caption, figure)
+
+
+def run_plot(result: BenchmarkResult, names: Sequence[str]) -> Plot:
+    """Angle and error over time of some tasks, one column for each."""
+    count = len(names)
+    figure, axes = new_figure(2, count, width=2.4 * max(count, 2), height=4.4, squeeze=False, sharex="col")
+    for column, name in enumerate(names):
+        upper, lower = axes[:, column]
+        task = next(task for task in result.tasks if task.name == name)
+        limit, begin = 0.0, _first_time(task.begin, task.event)
+        for i, each in enumerate(result.contenders):
+            record = result.runs[each.name, name].recording
+            if record is None:
+                continue
+            time = np.asarray(record["time"])
+            kept = time >= begin
+            wanted = np.degrees(task.motion.at(time)[0])
+            error = wanted - np.degrees(np.asarray(record["angle"]))
+            style = {"color": LINES[i % len(LINES)], "linestyle": DASHES[i % len(DASHES)], "linewidth": 1.0}
+            upper.plot(time[kept], (wanted - error)[kept], label=each.name, **style)
+            lower.plot(time[kept], error[kept], **style)
+            limit = max(limit, result.metric(each.name, name, "rmse"))
+            if i == len(result.contenders) - 1:
+                upper.plot(time[kept], wanted[kept], color=BLACK, linewidth=0.7, label="set point")
+        upper.set_title(name)
+        lower.set(xlabel="time [s]", ylim=(-2.5 * limit - 1e-3, 2.5 * limit + 1e-3))
+    axes[0, 0].set_ylabel("angle [degree]")
+    axes[1, 0].set_ylabel("error [degree]")
+    legend_below(figure, axes[0, 0], columns=3)
+    return Plot("runs", "Angle of the true joint and its error over time.", figure)
+
+
+def _first_time(begin: float, event: float | None) -> float:
+    """The time from which a run is drawn: a little before the event and before what is judged."""
+    return max(0.0, (begin if event is None else min(begin, event)) - 0.2)
+
+
+def learning_plot(curves: Sequence[LearningCurve]) -> Plot:
+    """The rms error of repeated trials."""
+    figure, axis = new_figure(height=2.8)
+    for i, curve in enumerate(curves):
+        trials = np.arange(1, curve.errors.size + 1)
+        label = f"{curve.contender}, {curve.task.name}"
+        axis.semilogy(trials, curve.errors, marker=MARKERS[i % len(MARKERS)], color=LINES[i % len(LINES)], label=label)
+    axis.set(xlabel="trial", ylabel="rms error [degree]")
+    legend_below(figure, axis)
+    return Plot("learning", "Iterative learning: rms error of repeated trials on the true joint.", figure)

@@ -1,0 +1,127 @@
+"""Tasks of the control benchmark: wanted motion, disturbance and fault, with the time window that is judged."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+from ...core.errors import ParameterError, suggestion
+from .motions import JointMotion, MinimumJerkMotion, RampMotion, SineMotion, StepMotion, SumOfMotions
+
+DEGREE = math.pi / 180.0
+SINES = {0.1: 20.0, 0.5: 20.0, 1.0: 20.0, 2.0: 20.0, 3.0: 20.0, 5.0: 5.0}
+"""Amplitudes [degree] of the sines by frequency [Hz] (chosen); at 5 Hz 20 degrees exceed the torque of the pair."""
+SINE_PERIODS, JUDGED_PERIODS = 5, 2
+
+
+@dataclasses.dataclass(frozen=True)
+class StuckValve:
+    """A fault: the valve of an input remains at an opening from a time [s] on."""
+
+    input: str
+    time: float
+    opening: float
+
+
+@dataclasses.dataclass(frozen=True)
+class ControlTask:
+    """A task of the control benchmark.
+
+    motion     wanted angle of the joint
+    duration   of the run [s]
+    begin      from which on the errors are judged [s]
+    event      time of a step, a disturbance or the end of a motion [s], from which settling is counted; None: no
+               settling
+    torque     points (time [s], torque [N m]) of the external torque, linear between them
+    stiffening points (time [s], pressure [Pa]) that are added to the mean pressure of the pair, linear between them
+    stuck      a valve that sticks
+    """
+
+    name: str
+    motion: JointMotion
+    duration: float
+    begin: float = 0.0
+    event: float | None = None
+    torque: tuple[tuple[float, float], ...] = ()
+    stiffening: tuple[tuple[float, float], ...] = ()
+    stuck: StuckValve | None = None
+
+    def __post_init__(self) -> None:
+        if not 0 < self.duration < math.inf:
+            raise ParameterError(f"task '{self.name}': duration is {self.duration!r} s; it must be positive, finite.")
+        if not 0 <= self.begin < self.duration:
+            raise ParameterError(
+                f"task '{self.name}': begin is {self.begin:g} s; allowed range: 0 to {self.duration:g} s."
+            )
+        if self.event is not None and not 0 <= self.event < self.duration:
+            raise ParameterError(
+                f"task '{self.name}': event is {self.event:g} s; allowed range: 0 to {self.duration:g} s."
+            )
+
+
+def _sine(frequency: float, amplitude: float) -> ControlTask:
+    periods = SINE_PERIODS if frequency > 0.2 else 2
+    judged = JUDGED_PERIODS if frequency > 0.2 else 1
+    return ControlTask(
+        f"sine {frequency:g} Hz",
+        SineMotion(amplitude * DEGREE, frequency),
+        periods / frequency,
+        begin=(periods - judged) / frequency,
+    )
+
+
+def _pulse(begin: float, width: float, height: float) -> tuple[tuple[float, float], ...]:
+    """A half sine as nine points."""
+    points = [(begin + width * i / 8, height * math.sin(math.pi * i / 8)) for i in range(9)]
+    return ((0.0, 0.0), *points)
+
+
+_HOLD = MinimumJerkMotion(10.0 * DEGREE, 0.0, 0.6)
+STANDARD_TASKS: tuple[ControlTask, ...] = (
+    ControlTask("step", StepMotion(15.0 * DEGREE, 0.2), 2.2, begin=0.2, event=0.2),
+    ControlTask("ramp", RampMotion(20.0 * DEGREE, 0.2, 1.0), 2.2, begin=0.2, event=1.2),
+    *(_sine(frequency, amplitude) for frequency, amplitude in SINES.items()),
+    ControlTask("minimum jerk", MinimumJerkMotion(25.0 * DEGREE, 0.2, 0.5), 2.0, begin=0.2, event=0.7),
+    ControlTask(
+        "load change", _HOLD, 3.0, begin=1.5, event=1.5, torque=((0.0, 0.0), (1.5, 0.0), (1.502, -2.0)),
+    ),
+    ControlTask("hold", _HOLD, 4.0, begin=2.0),
+    ControlTask("torque disturbance", _HOLD, 3.0, begin=1.5, event=1.5, torque=_pulse(1.5, 0.1, 4.0)),
+    ControlTask(
+        "stiffness change", _HOLD, 3.0, begin=1.5, event=1.5, stiffening=((0.0, 0.0), (1.5, 0.0), (1.7, 0.75e5)),
+    ),
+    ControlTask(
+        "valve stuck", SineMotion(10.0 * DEGREE, 0.5), 6.0, begin=2.0, stuck=StuckValve("left.discharge", 2.0, 0.1),
+    ),
+)  # fmt: skip
+"""The tasks of the benchmark; all amplitudes, times and disturbances are chosen."""
+
+TUNING_TASKS: tuple[ControlTask, ...] = (
+    ControlTask(
+        "tuning: motions",
+        SumOfMotions(
+            (
+                MinimumJerkMotion(10.0 * DEGREE, 0.1, 0.6),
+                MinimumJerkMotion(-14.0 * DEGREE, 1.0, 0.5),
+                SineMotion(8.0 * DEGREE, 0.8),
+                SineMotion(8.0 * DEGREE, 1.7),
+            )
+        ),
+        3.0,
+        torque=((0.0, 0.0), (1.8, 0.0), (1.81, 1.0)),
+    ),
+    ControlTask("tuning: step", StepMotion(18.0 * DEGREE, 0.1), 3.0),
+)
+"""What all controllers are tuned for (chosen): smooth motions up to 1.7 Hz with a step of the torque, and a step of the
+angle that must have settled; none of the tasks that are judged. Their durations are equal."""
+TUNING_BEGIN = 0.7
+"""Time from which on errors count in tuning [s] (chosen): 0.6 s after the step."""
+
+
+def find_tasks(names: tuple[str, ...]) -> tuple[ControlTask, ...]:
+    """Standard tasks by their names, all without names. Raises ParameterError for an unknown one."""
+    known = {task.name: task for task in STANDARD_TASKS}
+    for name in names:
+        if name not in known:
+            raise ParameterError(f"there is no task '{name}'; there are {', '.join(known)}.{suggestion(name, known)}")
+    return tuple(known[name] for name in dict.fromkeys(names)) or STANDARD_TASKS

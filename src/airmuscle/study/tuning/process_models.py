@@ -1,0 +1,193 @@
+"""Process models of the step response: first order or integrator, with dead time, and their identification."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core.arrays import Array
+from ...core.errors import ParameterError
+from ...core.reference import Reference
+
+SMITH1972 = Reference(
+    key="smith-1972",
+    authors="Smith, C. L.",
+    title="Digital Computer Process Control",
+    where="Intext Educational Publishers, Scranton",
+    year=1972,
+    note="times at 28.3 % and 63.2 % of a step response; cited after textbooks, not read",
+)
+ASTROM_HAGGLUND1984 = Reference(
+    key="astrom-hagglund-1984",
+    authors="Åström, K. J., Hägglund, T.",
+    title="Automatic tuning of simple regulators with specifications on phase and amplitude margins",
+    where="Automatica 20(5), 645-651",
+    year=1984,
+    note="relay experiment and describing function; cited after textbooks, not read",
+)
+UNSETTLED = 0.05
+"""Relative change in the last tenth of a step response from which on it is not settled (chosen)."""
+MIN_ROWS = 10
+"""Smallest number of rows of an experiment (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class FirstOrderDeadTime:
+    """G(s) = K exp(-L s)/(T s + 1): gain K [y/u], time constant T [s], dead time L [s]."""
+
+    gain: float
+    time_constant: float
+    dead_time: float
+
+    def __post_init__(self) -> None:
+        _check(self, "gain", self.gain, math.isfinite(self.gain) and self.gain != 0.0)
+        _check(self, "time_constant", self.time_constant, 0 < self.time_constant < math.inf)
+        _check(self, "dead_time", self.dead_time, 0 <= self.dead_time < math.inf)
+
+    def step_response(self, time: Array) -> Array:
+        """The response (N,) to a unit step at time 0, at times (N,) [s]."""
+        late = np.maximum(time - self.dead_time, 0.0)
+        return np.asarray(-self.gain * np.expm1(-late / self.time_constant))
+
+
+@dataclasses.dataclass(frozen=True)
+class IntegratorDeadTime:
+    """G(s) = K_v exp(-L s)/s: rate K_v [y/(u s)], dead time L [s]."""
+
+    rate: float
+    dead_time: float
+
+    def __post_init__(self) -> None:
+        _check(self, "rate", self.rate, math.isfinite(self.rate) and self.rate != 0.0)
+        _check(self, "dead_time", self.dead_time, 0 <= self.dead_time < math.inf)
+
+    def step_response(self, time: Array) -> Array:
+        """The response (N,) to a unit step at time 0, at times (N,) [s]."""
+        return np.asarray(self.rate * np.maximum(time - self.dead_time, 0.0))
+
+
+ProcessModel = FirstOrderDeadTime | IntegratorDeadTime
+
+
+@dataclasses.dataclass(frozen=True)
+class UltimatePoint:
+    """The point of the frequency response at a phase of -180 degrees: ultimate gain K_u [u/y] and period T_u [s]."""
+
+    references: ClassVar[tuple[Reference, ...]] = (ASTROM_HAGGLUND1984,)
+
+    gain: float
+    period: float
+
+    def __post_init__(self) -> None:
+        _check(self, "gain", self.gain, math.isfinite(self.gain) and self.gain != 0.0)
+        _check(self, "period", self.period, 0 < self.period < math.inf)
+
+    def first_order(self, static_gain: float) -> FirstOrderDeadTime:
+        """The first-order model with dead time of this static gain [y/u] that passes through the point:
+
+            T = T_u/(2 pi) sqrt((K K_u)^2 - 1),    L = T_u/(2 pi) (pi - atan(2 pi T/T_u))
+
+        Raises ParameterError for K K_u of 1 or less, where there is none.
+        """
+        product = static_gain * self.gain
+        if not product > 1:
+            raise ParameterError(
+                f"UltimatePoint: static gain times ultimate gain is {product:.4g}; it must be above 1 for a model of "
+                "first order with dead time."
+            )
+        frequency = 2 * math.pi / self.period
+        constant = math.sqrt(product**2 - 1) / frequency
+        return FirstOrderDeadTime(static_gain, constant, (math.pi - math.atan(frequency * constant)) / frequency)
+
+
+def _check(model: object, name: str, value: float, possible: bool) -> None:
+    if not possible:
+        raise ParameterError(f"{type(model).__name__}: {name} is {value}; no step response has that.")
+
+
+def first_order_of_step(time: npt.ArrayLike, output: npt.ArrayLike, step: float) -> FirstOrderDeadTime:
+    """The first-order model with dead time of a step response, by the times at 28.3 % and 63.2 % (Smith 1972).
+
+    time, output  rows (N,) from the step on; the last tenth of the output is its final value
+    step          size of the step [u]
+
+    T = 1.5 (t_63 - t_28), L = t_63 - T. Raises ParameterError for an output that does not settle or does not change.
+    """
+    t, y = _rows(time, output, step)
+    change = float(y[-max(1, y.size // 10) :].mean() - y[0])
+    spread = float(np.ptp(y[-max(1, y.size // 10) :]))
+    if change == 0.0 or spread > UNSETTLED * abs(change):
+        raise ParameterError(
+            f"step response: the output changes by {change:.4g} and still by {spread:.4g} in its last tenth; record "
+            "until it settles, or identify an integrator."
+        )
+    part = (y - y[0]) / change
+    early, late = (_first_time(t, part, level) for level in (1 - math.exp(-1 / 3), 1 - math.exp(-1)))
+    constant = 1.5 * (late - early)
+    return FirstOrderDeadTime(change / step, max(constant, 1e-12), max(late - constant, 0.0))
+
+
+def integrator_of_step(time: npt.ArrayLike, output: npt.ArrayLike, step: float) -> IntegratorDeadTime:
+    """The integrator with dead time of a step response: the straight line through the second half of the rows.
+
+    The dead time is where the line passes through the initial output. Arguments as in `first_order_of_step`.
+    """
+    t, y = _rows(time, output, step)
+    half = t >= (t[0] + t[-1]) / 2
+    slope, offset = np.polyfit(t[half], y[half], 1)
+    if slope == 0.0:
+        raise ParameterError("step response: the output does not move in its second half; it is no integrator.")
+    return IntegratorDeadTime(float(slope) / step, max(float((y[0] - offset) / slope), 0.0))
+
+
+def ultimate_point(
+    time: npt.ArrayLike, output: npt.ArrayLike, amplitude: float, hysteresis: float = 0.0
+) -> UltimatePoint:
+    """The ultimate point of a relay experiment: K_u = 4 d/(pi sqrt(a^2 - e^2)) by the describing function.
+
+    time, output  rows (N,) of the oscillation; its last half counts, which must contain two periods or more
+    amplitude     d, half the difference between both commands of the relay [u]
+    hysteresis    e, half the width of the relay's hysteresis [y]
+
+    Reference: Åström and Hägglund (1984). Raises ParameterError for an output that does not oscillate.
+    """
+    t, y = _rows(time, output, amplitude)
+    late = t >= (t[0] + t[-1]) / 2
+    t, y = t[late], y[late]
+    a = float(np.ptp(y)) / 2
+    around = y - (y.max() + y.min()) / 2
+    rising = np.flatnonzero((around[:-1] < 0) & (around[1:] >= 0))
+    if rising.size < 3 or a <= abs(hysteresis):
+        raise ParameterError(
+            f"relay experiment: {rising.size} rising crossings and an amplitude of {a:.4g} in the second half; at "
+            "least three crossings and an amplitude above the hysteresis are needed. Record for longer."
+        )
+    crossings = t[rising] - around[rising] * (t[rising + 1] - t[rising]) / (around[rising + 1] - around[rising])
+    gain = 4 * amplitude / (math.pi * math.sqrt(a**2 - hysteresis**2))
+    return UltimatePoint(gain, float(crossings[-1] - crossings[0]) / (rising.size - 1))
+
+
+def _rows(time: npt.ArrayLike, output: npt.ArrayLike, size: float) -> tuple[Array, Array]:
+    t, y = np.asarray(time, dtype=float), np.asarray(output, dtype=float)
+    if t.ndim != 1 or t.shape != y.shape or t.size < MIN_ROWS or not (np.diff(t) > 0).all():
+        raise ParameterError(
+            f"experiment: times of shape {t.shape} and outputs of shape {y.shape}; at least {MIN_ROWS} rows at rising "
+            "times are needed."
+        )
+    if not (np.isfinite(y).all() and math.isfinite(size) and size != 0.0):
+        raise ParameterError(f"experiment: the output must be finite and the step, {size}, finite and not 0.")
+    return t - t[0], y
+
+
+def _first_time(time: Array, part: Array, level: float) -> float:
+    """The time at which the lines between the rows first reach a level."""
+    i = int(np.argmax(part >= level))
+    if part[i] < level:
+        raise ParameterError(f"step response: it does not reach {100 * level:.3g} % of its change.")
+    if i == 0:
+        return float(time[0])
+    return float(time[i - 1] + (level - part[i - 1]) / (part[i] - part[i - 1]) * (time[i] - time[i - 1]))

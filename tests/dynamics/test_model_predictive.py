@@ -1,0 +1,249 @@
+"""Linear model predictive control: the plan is the minimum of the stated quadratic program, by its optimality conditions
+and by an exhaustive search of the active limits; without active limits the command is that of the linear-quadratic
+regulator; there is no offset at rest; a limit of a column is kept, and a program without solution is stated.
+"""
+
+from __future__ import annotations
+
+import itertools
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import airmuscle as am
+from airmuscle.analysis import design_predictive, linearise
+from airmuscle.analysis.riccati import regulator
+from airmuscle.control import ControlLoop, Measurement
+from airmuscle.core.errors import AirmuscleError, ParameterError
+
+pytest.importorskip("daqp", reason="the package daqp is not installed")
+H = 0.01
+REGULATED = am.load("joint-dmsp-20-regulators").plant
+REST = am.find_equilibrium(REGULATED, pressure=2.5e5)
+SETPOINT = 2.5e5
+AT = linearise(REGULATED, {**REST}, {"left.setpoint": SETPOINT, "right.setpoint": SETPOINT})
+MEASURED = ("left.pressure", "right.pressure", "angle")
+GIVEN = {
+    "measured": MEASURED,
+    "controlled": ("angle",),
+    "disturbed": ("left.air_mass", "right.air_mass", "angular_speed"),
+    "permitted": {"angle": 0.02, "angular_speed": 1.0, "left.setpoint": 1e5, "right.setpoint": 1e5},
+    "process_noise": {
+        "left.air_mass": 1e-6, "right.air_mass": 1e-6, "angular_speed": 0.1, "left.air_mass.disturbance": 1e-5,
+        "right.air_mass.disturbance": 1e-5, "angular_speed.disturbance": 5.0, "left.lagged_setpoint_rate": 1e3,
+        "right.lagged_setpoint_rate": 1e3,
+    },
+    "measurement_noise": {"left.pressure": 300.0, "right.pressure": 300.0, "angle": 1e-4},
+}  # fmt: skip
+
+
+def law(**changes):
+    return design_predictive(AT, H, **{**GIVEN, **changes})
+
+
+def measurement(angle, setpoint, low=0.0, high=6e5, pressures=(2.5e5, 2.5e5)):
+    columns = dict(zip(MEASURED, (*pressures, angle), strict=True))
+    return Measurement(
+        columns, {"angle": setpoint}, dict.fromkeys(GIVEN["permitted"].keys() - {"angle", "angular_speed"}, (low, high))
+    )
+
+
+def bounds(judged, error, steady, low, high):
+    """The limits of z as stated in CondensedProblem, written down once more."""
+    problem, target, n = judged.problem, judged.target, len(error)
+    rows = problem.rows
+    shift = (target.columns @ steady[:n])[problem.limited] + problem.rows_by_state @ error
+    top, bottom = (limit[problem.limited] - shift for limit in (target.upper, target.lower))
+    lower = [*(list(low - steady[n:]) * problem.horizon), *[0.0] * problem.slacks]
+    upper = [*(list(high - steady[n:]) * problem.horizon), *[np.inf] * problem.slacks]
+    matrix = np.vstack([np.eye(rows.shape[1]), -np.eye(rows.shape[1]), rows[problem.upper], -rows[~problem.upper]])
+    limit = np.concatenate([upper, [-x for x in lower], top[problem.upper], -bottom[~problem.upper]])
+    return matrix[np.isfinite(limit)], limit[np.isfinite(limit)]
+
+
+def target_of(judged, estimate, setpoint):
+    """Deviation (n,) of the state from its target, and the target (n + m,) of state and inputs."""
+    n = judged.problem.gradient.shape[1]
+    steady = judged.target.by_disturbance @ estimate[n:] + judged.target.by_setpoint @ setpoint
+    return estimate[:n] - steady[:n], steady
+
+
+def test_the_target_is_at_rest_and_has_the_set_point():
+    judged, rng = law(), np.random.default_rng(6)
+    model, n = judged.observer, judged.problem.gradient.shape[1]
+    estimate, setpoint = rng.normal(size=n + 3), np.array([0.1])
+    _, steady = target_of(judged, estimate, setpoint)
+    state = np.concatenate([steady[:n], estimate[n:]])
+    assert model.transition @ state + model.input_matrix @ steady[n:] == pytest.approx(state, abs=1e-9)
+    assert (model.output_matrix @ state)[2] == pytest.approx(0.1, abs=1e-10)
+
+
+def test_the_plan_satisfies_the_optimality_conditions():
+    """Stationarity, feasibility and complementarity for 40 random states, many of them with active limits."""
+    judged, rng, count = (
+        law(limits={"angle": (-0.3, 0.3), "left.pressure": (1.5e5, 3.5e5)}),
+        np.random.default_rng(1),
+        0,
+    )
+    n = judged.problem.gradient.shape[1]
+    for _ in range(40):
+        estimate, setpoint = rng.normal(scale=0.8, size=n + 3), 0.3 * rng.normal(size=1)
+        error, steady = target_of(judged, estimate, setpoint)
+        low, high = np.full(2, -2.5), np.full(2, 3.5)
+        free = judged.init().active
+        plan = judged.plan(estimate, setpoint, low, high, free)[0] - steady[n:]
+        matrix, limit = bounds(judged, error, steady, low, high)
+        size = plan.size
+        z = np.concatenate([plan.ravel(), np.zeros(judged.problem.slacks)])
+        excess = (matrix[:, :size] @ z[:size] - limit)[:, None] / np.where(matrix[:, size:] < 0, 1.0, np.inf)
+        excess[(matrix[:, :size] == 0.0).all(axis=1)] = -np.inf
+        z[size:] = np.maximum(excess.max(axis=0), 0.0)
+        slope = judged.problem.hessian @ z + judged.problem.gradient @ error
+        scale = np.abs(judged.problem.hessian) @ np.abs(z) + np.abs(judged.problem.gradient @ error) + 1e-3
+        left = limit - matrix @ z
+        sizes = np.abs(matrix) @ np.abs(z) + np.abs(limit)
+        assert (left >= -2e-6 * sizes).all()
+        active = left <= 2e-6 * sizes
+        multipliers = nonnegative_least_squares(matrix[active].T / scale[:, None], -slope / scale)
+        count += int(active.sum())
+        rest = (slope + matrix[active].T @ multipliers) / scale
+        assert np.abs(rest).max() <= 1e-5
+    assert count > 100
+
+
+def nonnegative_least_squares(a, b):
+    from scipy.optimize import nnls
+
+    size = np.maximum(np.abs(a).max(axis=0), 1e-300) if a.size else np.ones(a.shape[1])
+    return nnls(a / size, b, maxiter=1000)[0] / size if a.shape[1] else np.zeros(0)
+
+
+def test_a_short_plan_is_that_of_an_exhaustive_search_of_the_active_limits():
+    judged, rng = law(horizon=2), np.random.default_rng(3)
+    n, found = judged.problem.gradient.shape[1], 0
+    low, high = np.full(2, -0.2), np.full(2, 0.1)
+    for _ in range(10):
+        estimate = np.concatenate([0.3 * rng.normal(size=n), np.zeros(3)])
+        error = estimate[:n]
+        hessian, gradient = judged.problem.hessian, judged.problem.gradient @ error
+        best = np.inf, None
+        for state in itertools.product((None, 0, 1), repeat=4):
+            fixed = [i for i, s in enumerate(state) if s is not None]
+            free = [i for i, s in enumerate(state) if s is None]
+            z = np.array([0.0 if s is None else (low[i % 2], high[i % 2])[s] for i, s in enumerate(state)])
+            if free:
+                z[free] = np.linalg.solve(
+                    hessian[np.ix_(free, free)], -gradient[free] - hessian[np.ix_(free, fixed)] @ z[fixed]
+                )
+            if (z >= np.tile(low, 2) - 1e-9).all() and (z <= np.tile(high, 2) + 1e-9).all():
+                best = min(best, (0.5 * z @ hessian @ z + gradient @ z, z), key=lambda pair: pair[0])
+        plan, _ = judged.plan(estimate, np.zeros(1), low, high, judged.init().active)
+        found += np.isclose(plan, 0.1).any() or np.isclose(plan, -0.2).any()
+        assert plan.ravel() == pytest.approx(best[1], abs=1e-6)
+    assert found > 5
+
+
+def test_without_active_limits_the_plan_is_that_of_the_linear_quadratic_regulator():
+    judged, rng = law(horizon=7), np.random.default_rng(2)
+    n = judged.problem.gradient.shape[1]
+    a, b = judged.observer.transition[:n, :n], judged.observer.input_matrix[:n]
+    weights = np.diag([1.0 if s in GIVEN["permitted"] else 0.0 for s in AT.states])
+    gain, _ = regulator("test", a, b, weights, np.eye(2), "")
+    wide = np.full(2, 1e4)
+    for _ in range(5):
+        estimate, setpoint = 0.1 * rng.normal(size=n + 3), np.array([0.05])
+        error, steady = target_of(judged, estimate, setpoint)
+        plan, active = judged.plan(estimate, setpoint, -wide, wide, judged.init().active)
+        assert plan[0] == pytest.approx(steady[n:] - gain @ error, rel=1e-6)
+        assert not active.any()
+
+
+def run(judged, plant=REGULATED, duration=3.0, setpoint=0.25, pressure=2.5e5):
+    start = am.find_equilibrium(plant, pressure=pressure)
+    loop = ControlLoop(judged, H, am.Schedule({"angle": ((0.0, 0.0), (0.5, setpoint))}))
+    return am.simulate(plant, loop, duration=duration, initial_state=start)
+
+
+def test_the_angle_has_no_offset_with_another_load_and_another_muscle():
+    """The weight is 50 % heavier and one muscle has friction-free, stiffer damping; the model does not know it."""
+    other = replace(REGULATED, mechanism=replace(REGULATED.mechanism, weight_torque=3.0, damping=0.4))
+    record = run(law(limits={"left.pressure": (0.5e5, 4.5e5)}), other)
+    assert record["angle"][-1] == pytest.approx(0.25, abs=5e-4)
+    assert "called from Python at each sample" in " ".join(record.notes)
+    assert "no solution" not in " ".join(record.notes)
+
+
+def test_a_limit_of_a_column_is_kept_where_the_set_point_would_leave_it():
+    free, limited = run(law()), run(law(limits={"left.pressure": (0.5e5, 3.1e5)}))
+    assert free["left.pressure"].max() > 3.2e5
+    assert limited["left.pressure"].max() < 3.13e5
+
+
+def test_a_program_without_solution_applies_the_last_plan_and_is_stated():
+    """Hard limits of the angle of +-0.1 rad are impossible while it is 0.4 rad."""
+    judged = law(limits={"angle": (-0.1, 0.1)}, slack_weight=float("inf"))
+    _, memory = judged.step(judged.init(), measurement(0.0, 0.0), H)
+    assert memory.failures == 0
+    for _ in range(30):
+        command, memory = judged.step(memory, measurement(0.9, 0.05), H)
+        assert all(0.0 <= value <= 6e5 for value in command.values())
+    assert memory.failures > 0
+    assert judged.notes(memory)[0].startswith(
+        f"LinearModelPredictive: the quadratic program had no solution at {memory.failures}"
+    )
+
+
+def test_soft_limits_always_have_a_solution():
+    judged = law(limits={"angle": (-0.1, 0.1)})
+    memory = judged.init()
+    for angle in (0.05, 0.9, -0.9, 0.5):
+        _, memory = judged.step(memory, measurement(angle, 0.3), H)
+    assert memory.failures == 0
+
+
+def test_a_run_is_repeated_to_the_last_bit():
+    judged = law(limits={"left.pressure": (0.5e5, 3.1e5)})
+    first, second = run(judged, duration=1.0), run(judged, duration=1.0)
+    assert (first["angle"] == second["angle"]).all()
+
+
+def test_a_pickled_controller_gives_the_same_command():
+    judged = law(limits={"left.pressure": (0.5e5, 3.1e5)})
+    command, _ = judged.step(judged.init(), measurement(0.1, 0.3), H)
+    assert pickle.loads(pickle.dumps(judged)).step(judged.init(), measurement(0.1, 0.3), H)[0] == command
+
+
+def test_a_continued_run_is_the_undivided_run():
+    from airmuscle.simulation import Problem, solve
+
+    judged = law(limits={"left.pressure": (0.5e5, 3.1e5)})
+    loop = ControlLoop(judged, H, am.Schedule({"angle": ((0.0, 0.0), (0.2, 0.25))}))
+    whole = solve(Problem(REGULATED, loop, 0.8, REST))
+    part = solve(solve(Problem(REGULATED, loop, 0.4, REST)).continuation(0.4))
+    assert part.final_state == whole.final_state
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"controlled": ("angel",)}, "controlled names 'angel'.*Did you mean 'angle'"),
+        ({"disturbed": ("angular_speed",)}, "1 states are disturbed and 3 columns measured"),
+        ({"horizon": 0}, "horizon is 0; allowed range: 1 to 200"),
+        ({"limits": {"angle": (0.1, -0.1)}}, "the limits of 'angle' are 0.1 and -0.1"),
+        ({"slack_weight": float("nan")}, "slack_weight is nan; it must be positive"),
+        ({"permitted": {"angle": 0.02}}, "permitted has no number for 'left.setpoint'"),
+        ({"controlled": MEASURED}, "cannot keep every set point at rest"),
+    ],
+)
+def test_an_impossible_design_is_refused(changes, message):
+    with pytest.raises(ParameterError, match=message):
+        law(**changes)
+
+
+def test_without_the_solver_the_package_is_named(monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "daqp", None)
+    judged = law()
+    with pytest.raises(AirmuscleError, match=r"needs the package 'daqp'; pip install airmuscle\[control\]"):
+        judged.step(judged.init(), measurement(0.0, 0.1), H)

@@ -1,0 +1,110 @@
+"""Laws of the joint's benchmark by hand: co-contraction, proportional feedback, set-point lead, stuck valve.
+
+p_1 = p_0 + d, p_2 = p_0 - d;  u_i = K (r_i - y_i) outside the dead zone;  u = K_f (r + T r');  u_i = u_f from t_f on.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+from airmuscle.control import (
+    PID,
+    CoContraction,
+    ColumnSensor,
+    ProportionalFeedback,
+    SetpointLead,
+    SplitRange,
+    WithSensors,
+    WithStuckValve,
+)
+from airmuscle.control.controller import Measurement
+from airmuscle.core.errors import ParameterError
+from airmuscle.mechanism import AntagonisticJoint, HangingMass, JointWithExternalTorque
+
+PRESSURES = ("left.pressure", "right.pressure")
+RANGES = dict.fromkeys(("left.fill", "left.discharge", "right.fill", "right.discharge"), (0.0, 1.0))
+VALVES = (SplitRange("left.fill", "left.discharge"), SplitRange("right.fill", "right.discharge"))
+
+
+def stepped(law, setpoints=None, columns=None, ranges=RANGES, memory=None):
+    return law.step(law.init() if memory is None else memory, Measurement(columns or {}, setpoints or {}, ranges), 0.01)
+
+
+def test_the_pressures_are_the_mean_and_half_the_difference():
+    told, _ = stepped(CoContraction(PRESSURES, 2e5), {"difference": 3e4})
+    assert told == {"left.pressure": 2.3e5, "right.pressure": 1.7e5}
+    law = CoContraction(PRESSURES, 2e5, "mean_pressure")
+    assert law.setpoints == ("difference", "mean_pressure")
+    told, _ = stepped(law, {"difference": 3e4, "mean_pressure": 1e5})
+    assert told == {"left.pressure": 1.3e5, "right.pressure": 0.7e5}
+
+
+def test_proportional_feedback_opens_one_valve_of_each_pair_and_none_in_the_dead_zone():
+    law = ProportionalFeedback(PRESSURES, VALVES, gain=2e-5, zone=1e3)
+    wanted, measured = dict.fromkeys(PRESSURES, 2e5), {"left.pressure": 1.8e5, "right.pressure": 2.1e5}
+    told, _ = stepped(law, wanted, measured)
+    assert told == {
+        "left.fill": pytest.approx(0.4), "left.discharge": 0.0,
+        "right.fill": 0.0, "right.discharge": pytest.approx(0.2),
+    }  # fmt: skip
+    told, _ = stepped(law, wanted, {"left.pressure": 2e5 - 999.0, "right.pressure": 1e5})
+    assert told["left.fill"] == told["left.discharge"] == 0.0, "within the dead zone"
+    assert told["right.fill"] == 1.0, "limited to the range of the valve"
+
+
+def test_a_set_point_is_advanced_by_the_lead_time():
+    law = SetpointLead("r", "r_rate", "u", lead_time=0.02, share=0.5)
+    told, _ = stepped(law, {"r": 4.0, "r_rate": 10.0})
+    assert told == {"u": 0.5 * (4.0 + 0.02 * 10.0)}
+
+
+@pytest.mark.parametrize(("stuck_time", "samples"), [(0.0, 0), (0.03, 3), (0.035, 4)])
+def test_a_valve_sticks_from_its_time_on(stuck_time, samples):
+    law = WithStuckValve(ProportionalFeedback(("y",), ("u",), 1.0), "u", stuck_time, 0.25)
+    memory, told = None, []
+    for _ in range(6):
+        commands, memory = stepped(law, {"y": 1.0}, {"y": 0.0}, {"u": (0.0, 1.0)}, memory)
+        told.append(commands["u"])
+    assert told == [1.0] * samples + [0.25] * (6 - samples)
+
+
+def test_the_other_valves_and_the_memory_of_the_law_are_untouched():
+    inner = PID("y", SplitRange("u", "v"), 2.0, 0.5)
+    plain, stuck = WithSensors(inner, (ColumnSensor("y", noise=0.1),)), None
+    stuck = WithStuckValve(plain, "u", 0.0, 0.0)
+    ranges, memory, other = {"u": (0.0, 1.0), "v": (0.0, 1.0)}, None, None
+    for y in (0.0, 0.4, 1.5, 0.9):
+        a, memory = stepped(plain, {"y": 1.0}, {"y": y}, ranges, memory)
+        b, other = stepped(stuck, {"y": 1.0}, {"y": y}, ranges, other)
+        assert b == {"u": 0.0, "v": a["v"]}
+        assert {name: other[f"law.{name}"] for name in memory} == memory
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: CoContraction(("left.pressure",), 2e5), "1 commanded pressures; name two"),
+        (lambda: ProportionalFeedback(PRESSURES, ("u",), 1.0), "2 columns and 1 commanded inputs"),
+        (lambda: ProportionalFeedback((), (), 1.0), "0 columns and 0 commanded inputs"),
+        (lambda: WithStuckValve(PID("y", "fill", 1.0), "fil", 0.0), "does not command 'fil'.*Did you mean 'fill'"),
+        (lambda: ProportionalFeedback(("y",), ("u",), float("nan")), "gain .* is nan; it must be finite"),
+        (lambda: JointWithExternalTorque(HangingMass(5.0)), "needs a mechanism with one angle"),
+    ],
+)
+def test_impossible_laws_are_rejected(make, message):
+    with pytest.raises(ParameterError, match=message):
+        make()
+
+
+def test_an_external_torque_adds_to_that_of_the_muscles():
+    inner = AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.1)
+    joint = JointWithExternalTorque(inner)
+    q, v = {"angle": 0.3}, {"angular_speed": 0.5}
+    with_torque = joint.acceleration(q, v, {"angle": 1.0}, {"external_torque": 0.7})["angle"]
+    assert with_torque == pytest.approx(inner.acceleration(q, v, {"angle": 1.7}, {})["angle"])
+    lost = joint.dissipated_power(q, v, {"angle": 1.0}, {"external_torque": 0.7})
+    assert lost == pytest.approx(inner.dissipated_power(q, v, {"angle": 1.7}, {}) - 0.7 * 0.5)
+    assert [each.name for each in joint.inputs] == ["external_torque"]
+    assert dataclasses.asdict(joint.inputs[0])["unit"] == "N m"

@@ -1,0 +1,433 @@
+"""Sizing: the shortest muscle whose law holds the load at both end points.
+
+lift   F(p_1, eps_1) = F_1/n,   F(p_2, eps_1 + S/L) = F_2/n,   S_F F <= F_max(eps) = min(F(p_max, eps), F_rated)
+joint  n r (F(p_c, eps_c) - F(p_min, eps_e)) = M,   eps_c - eps_e = r Theta/L
+air    m = p V/(R T) of both end points
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.interpolate import PchipInterpolator
+
+import airmuscle as am
+from airmuscle.characteristic import EffectiveLength, MartensBoblan2017, ValidityRange
+from airmuscle.characteristic.base import PressureLaw
+from airmuscle.core.constants import STANDARD_GRAVITY
+from airmuscle.core.errors import AirmuscleError, ParameterError, SolveError
+from airmuscle.library.entry import Entry
+from airmuscle.muscle import Ratings
+from airmuscle.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY
+from airmuscle.sizing import (
+    JointRequirement,
+    LiftRequirement,
+    MuscleChoice,
+    SizingConditions,
+    by_length,
+    by_reserve,
+    catalogue,
+    choose,
+    scenario_text,
+    size_muscles,
+)
+from airmuscle.sizing.static_muscle import static_muscle
+from airmuscle.sizing.valve_sizing import air_path, discharge_valve, fill_valve
+
+pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
+
+SIX_BAR = SizingConditions(supply=6e5)
+LIFT = LiftRequirement(stroke=0.040, mass=20.0)
+SPRING = LiftRequirement(stroke=0.030, force=80.0, stiffness=4000.0)
+FALLING = LiftRequirement(stroke=0.030, force=300.0, stiffness=-8000.0)
+JOINT = JointRequirement(angle=math.radians(60.0), torque=5.0, inertia=0.05)
+MUSCLES = ("dmsp-10-250", "dmsp-20-300", "festo-tool-dmsp-20", "sarosi-dmsp-20-400n")
+
+
+def effective_length(length: float = 0.3) -> Entry:
+    """A muscle with rigid ends of 60 mm, whose force at a contraction depends on its length."""
+    entry = am.load("sarosi-dmsp-20-400n")
+    law = EffectiveLength(entry.characteristic, resting_length=length, dead_length=0.06)
+    geometry = dataclasses.replace(am.load("dmsp-20-300").geometry, resting_length=length)
+    return dataclasses.replace(entry, name="with rigid ends", characteristic=law, geometry=geometry, checks=())
+
+
+def force(choice: MuscleChoice, pressure: float, contraction: float) -> float:
+    """Force of the law itself."""
+    return float(choice.entry.characteristic.force(pressure, contraction))
+
+
+# Force balance
+
+
+@pytest.mark.parametrize("name", MUSCLES)
+@pytest.mark.parametrize("requirement", [LIFT, SPRING, FALLING])
+@pytest.mark.parametrize("count", [1, 2])
+def test_the_law_holds_the_load_at_both_ends_of_the_stroke(name: str, requirement: LiftRequirement, count: int):
+    choice = choose(am.load(name), requirement, SIX_BAR, count)
+    first, last = choice.design.extended, choice.design.contracted
+    loads = requirement.load(0.0) / count, requirement.load(requirement.stroke) / count
+    for point, load in zip((first, last), loads, strict=True):
+        assert force(choice, point.pressure, point.contraction) == pytest.approx(load, rel=1e-9)
+        assert SIX_BAR.safety_factor * load <= point.capacity * (1 + 1e-9)
+        assert SIX_BAR.min_pressure <= point.pressure <= 6e5
+    assert (last.contraction - first.contraction) * choice.length == pytest.approx(requirement.stroke, rel=1e-9)
+    assert choice.design.reserve >= SIX_BAR.safety_factor - 1.0 - 1e-9
+
+
+def test_the_load_is_the_weight_plus_force_and_spring():
+    both = LiftRequirement(stroke=0.02, mass=3.0, force=10.0, stiffness=500.0)
+    assert both.load(0.02) == 3.0 * STANDARD_GRAVITY + 10.0 + 500.0 * 0.02
+    assert both.work == pytest.approx((3.0 * STANDARD_GRAVITY + 10.0) * 0.02 + 0.5 * 500.0 * 0.02**2)
+
+
+@pytest.mark.parametrize("name", MUSCLES)
+def test_the_muscles_hold_the_torque_at_the_ends_of_the_angle(name: str):
+    choice = choose(am.load(name), JOINT, SIX_BAR)
+    design = choice.design
+    rest, pulling = design.extended, design.contracted
+    slack = max(force(choice, rest.pressure, rest.contraction), 0.0)
+    pull = force(choice, pulling.pressure, pulling.contraction)
+    assert design.radius * (pull - slack) == pytest.approx(JOINT.torque, rel=1e-9)
+    used = pulling.contraction - rest.contraction
+    assert used == pytest.approx(design.radius * JOINT.angle / choice.length, rel=1e-9)
+    assert design.radii[0] <= 1.1 * design.radius
+    assert design.radius <= design.radii[1]
+
+
+def test_the_extended_muscle_of_a_joint_accelerates_the_inertia():
+    heavy = dataclasses.replace(JOINT, inertia=20.0)
+    choice = choose(am.load("dmsp-20-300"), heavy, SIX_BAR)
+    design, muscle = choice.design, choice.muscle
+    torque = heavy.torque + heavy.inertia * 0.5 * heavy.angle * (2 * math.pi / SIX_BAR.cycle_time) ** 2
+    opposing = float(muscle.floor(design.contracted.contraction))
+    reached = design.radius * (design.extended.capacity - opposing)
+    assert reached == pytest.approx(1.5 * torque, rel=1e-6)  # it limits: the length is the shortest
+    assert choice.length > choose(am.load("dmsp-20-300"), JOINT, SIX_BAR).length
+
+
+# Shortest length
+
+
+def some_mounting_suffices(entry: Entry, requirement: LiftRequirement, length: float, count: int = 1) -> bool:
+    """Whether any contraction at the start meets the requirement with this length: independent of the search."""
+    muscle = static_muscle(am.library.scaling.scale_entry(entry, resting_length=length), SIX_BAR)
+    low, high = muscle.contraction_range
+    starts = np.linspace(low, high, 4001)[:, None]
+    displacement, load = requirement.path
+    contraction = starts + displacement / length
+    inside = contraction[:, -1] <= high
+    fits = (muscle.capacity(contraction) >= 1.5 * load / count) & (muscle.floor(contraction) <= load / count)
+    return bool((fits.all(axis=1) & inside).any())
+
+
+@pytest.mark.parametrize("requirement", [LIFT, SPRING, FALLING])
+@pytest.mark.parametrize("entry", [am.load("dmsp-10-250"), am.load("dmsp-20-300"), effective_length()],
+                         ids=lambda e: e.name)  # fmt: skip
+def test_no_shorter_muscle_meets_the_requirement(entry: Entry, requirement: LiftRequirement):
+    length = choose(entry, requirement, SIX_BAR).length
+    assert some_mounting_suffices(entry, requirement, length * 1.002)
+    assert not any(some_mounting_suffices(entry, requirement, length * part) for part in (0.999, 0.97, 0.8))
+
+
+def test_no_shorter_muscle_holds_the_torque_of_a_joint():
+    choice = choose(am.load("dmsp-20-300"), JOINT, SIX_BAR)
+    muscle = choice.muscle
+    eps = np.linspace(*muscle.contraction_range, 1501)
+    arms = np.maximum(eps - eps[:, None], 0.0) * 0.999 * choice.length / JOINT.angle  # rows: extended
+    torque = arms * (muscle.capacity(eps) - muscle.floor(eps)[:, None])
+    assert torque.max() < 1.5 * JOINT.torque
+    assert torque.max() == pytest.approx(0.999 * 1.5 * JOINT.torque, rel=1e-3)
+
+
+def test_a_law_that_depends_on_the_length_needs_the_length_at_which_it_is_evaluated():
+    entry = effective_length()
+    choice = choose(entry, LIFT, SIX_BAR)
+    assert choice.entry.characteristic.resting_length == choice.length == choice.entry.geometry.resting_length
+    assert choice.length > 1.2 * choose(am.load("sarosi-dmsp-20-400n"), LIFT, SIX_BAR).length
+
+
+def test_a_muscle_is_at_least_as_long_as_the_least_nominal_length():
+    small = dataclasses.replace(LIFT, stroke=0.001)
+    assert choose(am.load("dmsp-20-300"), small, SIX_BAR).length == 0.040
+
+
+def test_a_law_of_one_length_is_not_scaled():
+    entry = am.load("saga2007-circle")
+    own = entry.geometry.resting_length
+    limits = ValidityRange(0.0, 1.6e5, 0.0, 0.2)
+    fixed = dataclasses.replace(entry, validity_range=limits)
+    conditions = SizingConditions(supply=1.6e5)
+    assert choose(fixed, LiftRequirement(stroke=0.004, force=20.0), conditions).length == own
+    with pytest.raises(SolveError, match="with 72 mm"):
+        choose(fixed, LiftRequirement(stroke=0.04, force=20.0), conditions)
+
+
+@pytest.mark.parametrize(
+    ("name", "limits"),
+    [
+        ("hunt2017-festo-10", None),
+        ("borzikova-monotone", ValidityRange(0.5e5, 3.5e5, 0.0, 0.3)),
+    ],
+)
+def test_a_law_that_is_not_solved_for_the_force_is_sized_by_its_own_direction(name: str, limits: ValidityRange | None):
+    entry = am.load(name)
+    entry = entry if limits is None else dataclasses.replace(entry, validity_range=limits)
+    choice = choose(entry, LiftRequirement(stroke=0.02, force=60.0), SizingConditions(supply=4e5))
+    law = entry.characteristic
+    for point in (choice.design.extended, choice.design.contracted):
+        assert point.force == pytest.approx(60.0, rel=1e-9)
+        if isinstance(law, PressureLaw):
+            assert float(law.pressure(point.contraction, 60.0)) == pytest.approx(point.pressure, rel=1e-9)
+        else:
+            assert float(law.contraction(point.pressure, 60.0)) == pytest.approx(point.contraction, rel=1e-9)
+
+
+def test_a_muscle_is_used_up_to_the_end_of_its_table():
+    for stroke in np.linspace(0.02, 0.06, 9):
+        choice = choose(am.load("festo-tool-dmsp-40"), LiftRequirement(stroke=float(stroke), mass=20.0), SIX_BAR)
+        assert choice.design.contracted.contraction == pytest.approx(0.25, rel=1e-12)
+
+
+# Number in parallel
+
+
+def test_two_muscles_in_parallel_each_hold_half_the_force():
+    doubled = dataclasses.replace(LIFT, mass=2 * LIFT.mass)
+    one, two = choose(am.load("dmsp-20-300"), LIFT, SIX_BAR), choose(am.load("dmsp-20-300"), doubled, SIX_BAR, 2)
+    assert two.length == pytest.approx(one.length, rel=1e-12)
+    assert two.design.contracted.force == pytest.approx(one.design.contracted.force, rel=1e-12)
+    assert two.air == pytest.approx(2 * one.air, rel=1e-9)
+    same_load = choose(am.load("dmsp-20-300"), LIFT, SIX_BAR, 2)
+    assert same_load.design.extended.force == pytest.approx(0.5 * one.design.extended.force, rel=1e-9)
+
+
+def test_an_exact_number_is_the_only_one_that_is_tried():
+    exact = dataclasses.replace(SIX_BAR, min_count=2, max_count=2)
+    result = size_muscles(LIFT, exact, [am.load(name) for name in MUSCLES])
+    assert {choice.count for choice in result.choices} == {2}
+    with pytest.raises(ParameterError, match="max_count is 2; allowed range: 3 to 20"):
+        dataclasses.replace(exact, min_count=3)
+
+
+def test_a_load_that_decreases_over_the_stroke_takes_air_and_has_no_scenario():
+    choice = choose(am.load("dmsp-20-300"), FALLING, SIX_BAR)
+    assert choice.air > 0.0
+    with pytest.raises(SolveError, match="the scenario of a load that decreases over the stroke is not written"):
+        scenario_text(choice)
+
+
+def test_a_number_that_is_neither_shorter_nor_takes_less_air_is_left_out():
+    result = size_muscles(LIFT, SIX_BAR, [am.load("sarosi-dmsp-20-400n"), am.load("dmsp-20-300")])
+    by_name = {name: [c.count for c in result.choices if c.entry.name == name] for name in ("sarosi-dmsp-20-400n",)}
+    assert by_name["sarosi-dmsp-20-400n"] == [1]  # two are longer, because the least pressure limits them
+    assert choose(am.load("sarosi-dmsp-20-400n"), LIFT, SIX_BAR, 2).length > result.choices[-1].length
+
+
+# Air and valves
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_the_air_of_a_cycle_is_the_difference_of_mass_by_the_gas_law(count: int):
+    choice = choose(am.load("dmsp-20-300"), LIFT, SIX_BAR, count)
+    ambient, geometry = SIX_BAR.ambient, choice.entry.geometry
+    masses = [
+        (point.pressure + ambient.pressure) * geometry.volume(point.contraction) / (GAS_CONSTANT * ambient.temperature)
+        for point in (choice.design.contracted, choice.design.extended)
+    ]
+    assert choice.air == pytest.approx(count * (masses[0] - masses[1]), rel=1e-12)
+    assert choice.reference_volume == pytest.approx(choice.air / REFERENCE_DENSITY, rel=1e-12)
+
+
+def test_a_joint_takes_the_air_of_both_muscles():
+    choice = choose(am.load("dmsp-20-300"), JOINT, SIX_BAR)
+    path = air_path(choice)
+    assert choice.air == pytest.approx(2 * (path.mass[-1] - path.mass[0]), rel=1e-12)
+
+
+def test_the_efficiency_is_the_work_per_available_energy_and_less_than_one():
+    choice = choose(am.load("dmsp-20-300"), LIFT, SIX_BAR)
+    ratio = (6e5 + 101_325.0) / 101_325.0
+    assert choice.air_energy == pytest.approx(choice.air * GAS_CONSTANT * 293.15 * math.log(ratio), rel=1e-12)
+    assert 0.0 < choice.efficiency == pytest.approx(LIFT.work / choice.air_energy, rel=1e-12)
+    assert choice.efficiency < 1.0
+
+
+def test_a_muscle_without_geometry_has_no_air_and_no_diameter():
+    choice = choose(am.load("festo-tool-dmsp-20"), LIFT, SIX_BAR)
+    assert (choice.air, choice.air_energy, choice.efficiency, choice.diameter) == (None, None, None, None)
+    with pytest.raises(SolveError, match="has no geometry; valves and a scenario need it"):
+        fill_valve(choice, 1.0)
+
+
+def test_a_valve_for_half_the_time_has_twice_the_conductance():
+    choice = choose(am.load("dmsp-20-300"), LIFT, SIX_BAR)
+    for size in (fill_valve, discharge_valve):
+        assert size(choice, 0.5).conductance == pytest.approx(2 * size(choice, 1.0).conductance, rel=1e-12)
+    with pytest.raises(SolveError, match=r"sonic conductance of .*; allowed range: above 0 to 1000"):
+        fill_valve(choice, 1e-5)
+
+
+@pytest.mark.parametrize("size", [fill_valve, discharge_valve])
+def test_the_quasi_static_motion_through_a_valve_takes_the_wanted_time(size):
+    choice = choose(am.load("dmsp-20-300"), LIFT, SIX_BAR)
+    path, valve = air_path(choice), size(choice, 0.7)
+    pressure = PchipInterpolator(path.mass, path.pressure)
+    fills = size is fill_valve
+
+    def rate(_: float, mass):
+        p = pressure(mass)
+        ends = (6e5 + 101_325.0, p) if fills else (p, 101_325.0)
+        return (1 if fills else -1) * valve.mass_flow(*ends, 1.0, 293.15)
+
+    start, end = (path.mass[0], path.mass[-1]) if fills else (path.mass[-1], path.mass[0])
+    moved = solve_ivp(rate, (0.0, 0.7), [start], rtol=1e-9, atol=1e-14).y[0, -1]
+    assert moved == pytest.approx(end, rel=2e-3)
+
+
+# Catalogue and ranking
+
+
+def test_the_catalogue_has_the_muscles_whose_maker_states_permitted_values():
+    entries = catalogue()
+    assert all(entry.ratings is not None and not entry.warning for entry in entries)
+    assert {"dmsp-10-250", "dmsp-20-300", "festo-tool-dmsp-40"} <= {entry.name for entry in entries}
+
+
+def test_the_choices_are_ranked_by_air_then_length_and_by_other_criteria():
+    entries = [am.load(name) for name in MUSCLES]
+    result = size_muscles(LIFT, SIX_BAR, entries)
+    airs = [choice.air for choice in result.choices if choice.air is not None]
+    assert airs == sorted(airs)
+    assert len(airs) >= 2
+    unknown = [choice.length for choice in result.choices[len(airs) :]]
+    assert unknown
+    assert unknown == sorted(unknown)
+    lengths = [choice.length for choice in size_muscles(LIFT, SIX_BAR, entries, by_length).choices]
+    assert lengths == sorted(lengths)
+    reserves = [choice.design.reserve for choice in size_muscles(LIFT, SIX_BAR, entries, by_reserve).choices]
+    assert reserves == sorted(reserves, reverse=True)
+
+
+def test_every_entry_of_the_catalogue_is_a_choice_or_has_a_reason():
+    result = size_muscles(LIFT, SIX_BAR)
+    named = {choice.entry.name for choice in result.choices}
+    refused = {item.name: item.reason for item in result.unsuitable}
+    assert {entry.name for entry in catalogue()} <= named | set(refused)
+    assert not named & set(refused)
+    assert refused["borzikova-monotone"].startswith("no validity range is stated")
+    assert refused["shadow-20-210"] == "no law of this product is published"
+
+
+def test_the_permitted_force_of_the_maker_limits_the_muscle():
+    entry = am.load("festo-tool-dmsp-20")
+    rated = dataclasses.replace(entry, ratings=dataclasses.replace(entry.ratings, max_force=200.0))
+    with pytest.raises(SolveError, match=r"is 200 N, which the maker permits; 294\.2 N is needed"):
+        choose(rated, LIFT, SIX_BAR)
+
+
+def test_an_outer_diameter_beyond_the_limit_is_refused():
+    narrow = dataclasses.replace(SIX_BAR, max_diameter=0.02)
+    assert choose(am.load("dmsp-10-250"), LIFT, narrow, 2).diameter < 0.02
+    with pytest.raises(ParameterError, match=r"at the contracted end is .* mm; at most 20 mm is allowed"):
+        choose(am.load("dmsp-20-300"), LIFT, narrow)
+    with pytest.raises(ParameterError, match="diameter is not known"):
+        choose(am.load("festo-tool-dmsp-20"), LIFT, narrow)
+
+
+# Requests that cannot be met
+
+
+def test_an_unreachable_load_states_the_reason_and_what_is_reachable():
+    result = size_muscles(dataclasses.replace(LIFT, mass=500.0), SIX_BAR, [am.load("dmsp-20-300")])
+    with pytest.raises(SolveError, match=r"force at 6 bar and 1.333 % is 1445 N; 2452 N is needed") as error:
+        result.check_reachable()
+    assert "Reachable: " in str(error.value)
+    assert "3 x dmsp-20-300" in str(error.value)
+
+
+def test_what_is_stated_as_reachable_is_reachable_and_more_is_not():
+    entry, short = am.load("dmsp-20-300"), dataclasses.replace(SIX_BAR, max_length=0.15, max_count=1)
+    with pytest.raises(SolveError, match=r"over 40 mm: dmsp-20-300: with 150 mm") as error:
+        size_muscles(LIFT, short, [entry]).check_reachable()
+    stroke = 1e-3 * float(re.search(r"196\.1 N over ([\d.]+) mm \(1 x dmsp-20-300", str(error.value))[1])
+    assert choose(entry, dataclasses.replace(LIFT, stroke=stroke), short).length <= 0.15
+    with pytest.raises(SolveError):
+        choose(entry, dataclasses.replace(LIFT, stroke=1.02 * stroke), short)
+
+
+def test_a_stroke_that_is_too_long_states_the_contraction():
+    with pytest.raises(SolveError, match="with 150 mm, the stroke needs a contraction of 28 %; 25 % is allowed"):
+        choose(am.load("dmsp-20-300"), LIFT, dataclasses.replace(SIX_BAR, max_length=0.15))
+
+
+def test_a_supply_above_the_permitted_pressure_is_refused():
+    with pytest.raises(ParameterError, match="supply pressure of 9 bar exceeds the permitted 6 bar; reduce it"):
+        choose(am.load("dmsp-20-300"), LIFT, SizingConditions(supply=9e5))
+
+
+def test_a_supply_below_the_validity_range_is_refused():
+    with pytest.raises(
+        ParameterError, match=r"its law is valid from 3 to 6\.2 bar; the working range is 0\.1 to 2 bar"
+    ):
+        choose(am.load("festo-tool-dmsp-10"), LIFT, SizingConditions(supply=2e5))
+
+
+def test_a_load_below_the_least_force_is_refused():
+    entry = am.load("sarosi-dmsp-20-400n")
+    narrow = dataclasses.replace(entry, validity_range=ValidityRange(1e5, 5e5, 0.0, 0.05))
+    with pytest.raises(
+        SolveError, match=r"the load at the start, 9.807 N, is less than the force at the least pressure"
+    ):
+        choose(narrow, dataclasses.replace(LIFT, mass=1.0, stroke=0.01), SIX_BAR)
+
+
+def test_a_joint_beyond_the_length_states_the_torque():
+    with pytest.raises(SolveError, match=r"with 60 mm, the torque at the ends is at most .* N m; 7.5 N m is needed"):
+        choose(am.load("dmsp-20-300"), JOINT, dataclasses.replace(SIX_BAR, max_length=0.06))
+
+
+@pytest.mark.parametrize("make", [
+    lambda: LiftRequirement(stroke=0.0, mass=1.0),
+    lambda: LiftRequirement(stroke=-0.04, mass=1.0),
+    lambda: LiftRequirement(stroke=math.nan, mass=1.0),
+    lambda: LiftRequirement(stroke=0.04, mass=-1.0),
+    lambda: LiftRequirement(stroke=0.04, force=math.inf),
+    lambda: LiftRequirement(stroke=0.04),
+    lambda: LiftRequirement(stroke=0.04, force=100.0, stiffness=-5000.0),
+    lambda: LiftRequirement(stroke="40 kg", mass=1.0),
+    lambda: JointRequirement(angle=0.0, torque=1.0),
+    lambda: JointRequirement(angle=1.0, torque=-1.0),
+    lambda: JointRequirement(angle=1.0, torque=0.0),
+    lambda: JointRequirement(angle=7.0, torque=1.0),
+    lambda: SizingConditions(supply=0.0),
+    lambda: SizingConditions(supply=math.nan),
+    lambda: SizingConditions(supply=6e5, safety_factor=1.0),
+    lambda: SizingConditions(supply=6e5, cycle_time=0.0),
+    lambda: SizingConditions(supply=6e5, max_count=0),
+    lambda: SizingConditions(supply=6e5, max_count=True),
+    lambda: SizingConditions(supply=2e4, min_pressure=3e4),
+    lambda: choose(am.load("dmsp-20-300"), LIFT, SIX_BAR, 0),
+    lambda: choose(am.load("dmsp-20-300"), LIFT, SIX_BAR, 1.5),
+    lambda: size_muscles(LIFT, SIX_BAR, []),
+    lambda: size_muscles(LIFT, SIX_BAR, ["dmsp-20-300"]),
+    lambda: size_muscles("20 kg", SIX_BAR),
+    lambda: size_muscles(LIFT, SIX_BAR, [am.load("dmsp-20-300")], sort="air"),
+])  # fmt: skip
+def test_wrong_input_is_refused_with_a_sentence(make):
+    with pytest.raises(AirmuscleError) as error:
+        make()
+    assert re.search(r"allowed range|must be|give |cannot be converted|expected", str(error.value)), str(error.value)
+
+
+def test_a_new_muscle_of_ones_own_is_sized_as_those_of_the_library():
+    law = am.load("dmsp-20-300").characteristic
+    assert isinstance(law, MartensBoblan2017)
+    own = Entry("own", "A muscle of my own", "chosen", law, law.geometry,
+                validity_range=ValidityRange(3e4, 7e5, 0.0, 0.25), ratings=Ratings(max_force=1200.0))  # fmt: skip
+    assert choose(own, LIFT, SIX_BAR).length < choose(am.load("dmsp-20-300"), LIFT, SIX_BAR).length * 1.01

@@ -1,0 +1,57 @@
+"""`airmuscle compare`: table and report of a benchmark, and one line for what is impossible."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from airmuscle.cli.app import app
+
+FAST = ["compare", "--controller", "PID", "--task", "step", "--budget", "0"]
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, list(arguments))
+
+
+def test_a_benchmark_writes_its_report_tables_and_figures(tmp_path):
+    result = run(*FAST, "--out", str(tmp_path / "compare"))
+    assert result.exit_code == 0, result.output
+    assert "PID" in result.stdout
+    names = {path.relative_to(tmp_path / "compare").as_posix() for path in (tmp_path / "compare").rglob("*.*")}
+    tables = {f"data/{name}.csv" for name in ("ranking", "rmse", "greatest", "metrics", "gains")}
+    assert {"report.html", "figures/errors.png", "figures/runs.png", *tables} <= names
+    page = (tmp_path / "compare" / "report.html").read_text(encoding="utf-8")
+    for text in ("LuGre", "12-bit encoder", "1e-08 m3/(s Pa)", "weight x 2"):
+        assert text in page, text
+
+
+def test_json_contains_every_metric_of_every_run(tmp_path):
+    result = run(*FAST, "--json", "--out", str(tmp_path / "compare"))
+    content = json.loads(result.stdout)
+    assert content["scores"] == {"PID": 1.0}
+    (row,) = content["runs"]
+    assert (row["controller"], row["task"], row["reason"]) == ("PID", "step", "")
+    assert 0 < row["rmse"] < row["greatest"] < 30
+    assert row["settling"] is None or row["settling"] >= 0
+    assert content["gains"] == {}, "nothing was tuned"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--controller", "PDI"], "there is no controller 'PDI'; there are PID, feed-forward"),
+        (["--task", "steps"], "there is no task 'steps'"),
+        (["--controller", "PID", "--trials", "3"], "--trials needs at least 2 trials and the controller"),
+        (["--trials", "1"], "--trials needs at least 2 trials"),
+        (["--controller", "PID", "--task", "step", "--budget", "20"], "budget is 20"),
+    ],
+)
+def test_an_impossible_benchmark_is_rejected_in_one_line(arguments, message, tmp_path):
+    result = run("compare", *arguments, "--out", str(tmp_path / "compare"))
+    assert result.exit_code == 1
+    assert message in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert not (tmp_path / "compare").exists()

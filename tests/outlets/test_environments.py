@@ -1,0 +1,310 @@
+"""Claims about learning environments: Gymnasium's checker finds nothing, a vector environment is its plants one by
+one, seeds repeat episodes, what is impossible is refused, and quantities have the documented units."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from control_plants import JOINT, LIFT
+
+from airmuscle.core.errors import ParameterError
+from airmuscle.environments import (
+    FactorRange,
+    FitUncertainty,
+    JointTracking,
+    LoadLifting,
+    ValueRange,
+    register_environments,
+)
+from airmuscle.library.uncertainty import ParameterUncertainty
+from airmuscle.simulation import RungeKutta4, Stepper
+from airmuscle.simulation.batch import Double, Single
+from airmuscle.simulation.batch.stepper import BatchStepper
+
+NAMES = ("Joint", "Lift", "Arm")
+gymnasium = pytest.importorskip("gymnasium", reason="gymnasium is not installed")
+register_environments()
+
+from gymnasium.utils.env_checker import check_env  # noqa: E402
+
+TASK = JointTracking(JOINT)
+VARIED = (ValueRange(("target_frequency",), 0.2, 1.0), FactorRange(("plant.mechanism.inertia",), 0.8, 1.2))
+
+
+def single(task=TASK, **options):
+    return gymnasium.make("airmuscle/Joint-v0", task=task, **options)
+
+
+def vector(count, task=TASK, **options):
+    return gymnasium.make_vec(
+        "airmuscle/Joint-v0", num_envs=count, vectorization_mode="vector_entry_point", task=task, **options
+    )
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_gymnasium_finds_no_fault(name):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(gymnasium.make(f"airmuscle/{name}-v0").unwrapped, skip_render_check=True)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_vector_is_its_plants_one_by_one_also_where_episodes_begin_anew(name):
+    """Actions that soon end episodes of the joint, and a truncation after 15 periods; 19 plants fill no block."""
+    count, periods = 19, 40
+    options = {"num_envs": count, "max_episode_steps": 15}
+    together = gymnasium.make_vec(f"airmuscle/{name}-v0", vectorization_mode="vector_entry_point", cores=2, **options)
+    apart = gymnasium.make_vec(f"airmuscle/{name}-v0", vectorization_mode="sync", **options)
+    assert together.metadata["autoreset_mode"] == apart.metadata["autoreset_mode"]
+    first, second = together.reset(seed=5)[0], apart.reset(seed=5)[0]
+    np.testing.assert_array_equal(first, second)
+    rng, ended = np.random.default_rng(0), 0
+    for _ in range(periods):
+        actions = rng.uniform(-1.2, 1.2, together.action_space.shape).astype(np.float32)
+        found, expected = together.step(actions), apart.step(actions)
+        for value, exact in zip(found[:2], expected[:2], strict=True):
+            np.testing.assert_allclose(value, exact, rtol=1e-6, atol=1e-9)
+        np.testing.assert_array_equal(found[2], expected[2])
+        np.testing.assert_array_equal(found[3], expected[3])
+        ended += found[2].sum() + found[3].sum()
+    assert ended >= 2 * count
+    together.close()
+
+
+def test_an_episode_of_a_vector_ends_where_the_task_ends_it():
+    """Plant 0 is driven to its limit of angle; the step after its end begins anew, without reward."""
+    env = vector(3, dataclasses.replace(TASK, largest_angle=0.2))
+    env.reset(seed=1)
+    actions = np.zeros((3, 2), np.float32)
+    actions[0] = 1.0, -1.0
+    for _ in range(200):
+        observations, rewards, terminated, truncated, _ = env.step(actions)
+        if terminated.any():
+            break
+    assert terminated.tolist() == [True, False, False]
+    assert abs(observations[0, 0]) > 0.2
+    observations, rewards, terminated, truncated, _ = env.step(actions)
+    assert rewards[0] == 0.0 < rewards[1]
+    assert not terminated[0]
+    assert not truncated[0]
+    assert abs(observations[0, 0]) <= 0.1
+    assert observations[0, 1] == 0.0
+
+
+def test_seeds_repeat_episodes_and_different_seeds_differ():
+    def episode(seed):
+        env = single(randomisation=VARIED)
+        rows = [env.reset(seed=seed)[0]]
+        for k in range(5):
+            rows.append(env.step(np.array([0.1 * k, -0.2], np.float32))[0])
+        return np.array(rows), env.reset()[0]
+
+    (first, next_first), (second, next_second), (other, _) = episode(3), episode(3), episode(4)
+    assert np.array_equal(first, second)
+    assert np.array_equal(next_first, next_second)
+    assert not np.array_equal(first[0], next_first)
+    assert not np.array_equal(first, other)
+
+
+@pytest.mark.parametrize("precision", [Double(), Single()], ids=["double", "single"])
+def test_a_vector_does_not_depend_on_the_threads_and_repeats_itself(precision):
+    def run(cores):
+        env = vector(70, randomisation=VARIED, cores=cores, precision=precision)
+        env.reset(seed=8)
+        rng = np.random.default_rng(1)
+        rows = [env.step(rng.uniform(-1, 1, (70, 2)).astype(np.float32))[0] for _ in range(20)]
+        env.close()
+        return rows[-1]
+
+    assert np.array_equal(run(1), run(2))
+
+
+def test_single_precision_agrees_to_some_digits():
+    def run(precision):
+        env = vector(4, precision=precision)
+        env.reset(seed=2)
+        for _ in range(50):
+            observations = env.step(np.full((4, 2), 0.3, np.float32))[0]
+        return observations
+
+    np.testing.assert_allclose(run(Single()), run(Double()), rtol=2e-4, atol=1e-4)
+
+
+def test_observations_have_the_documented_units():
+    env = single()
+    env.reset(seed=0)
+    for _ in range(10):
+        found, reward, *_ = env.step(np.array([0.5, -0.25], np.float32))
+    stepper, task = env.unwrapped._stepper, env.unwrapped.task
+    state = dict(zip(stepper.state_names, stepper.state.tolist(), strict=True))
+    inputs = {"left.fill": 0.5, "left.discharge": 0.0, "right.fill": 0.0, "right.discharge": 0.25}
+    outputs = JOINT.outputs(state, inputs)
+    expected = {
+        "angle": state["angle"], "angular_speed": state["angular_speed"],
+        "left.pressure": outputs["left.pressure"] / 1e5, "right.pressure": outputs["right.pressure"] / 1e5,
+        "target": 0.3 * np.sin(2 * np.pi * 0.5 * 0.1), "next_target": 0.3 * np.sin(2 * np.pi * 0.5 * 0.11),
+    }  # fmt: skip
+    assert [o.name for o in task.observations] == list(expected)
+    np.testing.assert_allclose(found, list(expected.values()), rtol=1e-5)
+    error = state["angle"] - expected["target"]
+    assert reward == pytest.approx(np.exp(-((error / 0.1) ** 2)) - 0.01 * (0.25 + 0.0625) / 2)
+
+
+def test_the_units_of_a_lift_are_documented_too():
+    env = single(LoadLifting(LIFT, target_height=0.02))
+    found, _ = env.reset(seed=0)
+    state = env.unwrapped._stepper.state
+    assert found[0] == pytest.approx(100 * state[1])
+    assert found[3] == pytest.approx(2.0)
+    assert 1.0 <= found[2] <= 2.0
+
+
+@pytest.mark.parametrize("actions", [[np.nan, 0.0], [np.inf, 0.0], [0.0], None, [0.0, 0.0, 0.0]])
+def test_an_action_that_is_not_finite_or_of_another_shape_is_refused(actions):
+    env = single()
+    env.reset(seed=0)
+    with pytest.raises(ParameterError, match="give 2 finite numbers from -1 to 1"):
+        env.unwrapped.step(actions)
+
+
+def test_the_row_of_an_action_that_is_not_finite_is_named():
+    env = vector(4)
+    env.reset(seed=0)
+    actions = np.zeros((4, 2), np.float32)
+    actions[2, 1] = np.nan
+    with pytest.raises(ParameterError, match=r"the actions, row 2.*nan"):
+        env.step(actions)
+    with pytest.raises(ParameterError, match=r"the shape \(2, 4\); give \(4, 2\)"):
+        env.step(actions.T)
+
+
+def test_an_impossible_state_ends_the_episode_with_zeros():
+    """A step far too long for the plant: its state is soon no number, alone and in a vector."""
+    coarse = dataclasses.replace(TASK, period=0.5, largest_angle=3.2)
+    options = {"integrator": RungeKutta4(0.5)}
+    alone, together = single(coarse, **options), vector(2, coarse, **options)
+    alone.reset(seed=0)
+    together.reset(seed=0)
+    for _ in range(100):
+        found = alone.unwrapped.step(np.array([1.0, -1.0]))
+        if found[2]:
+            break
+    assert (found[0].tolist(), found[1:4]) == ([0.0] * 6, (0.0, True, False))
+    ended = False
+    for _ in range(100):
+        observations, rewards, terminated, *_ = together.step(np.tile([1.0, -1.0], (2, 1)))
+        assert np.isfinite(observations).all()
+        assert np.isfinite(rewards).all()
+        ended |= bool(terminated.any())
+    assert ended
+
+
+def test_randomisation_reaches_the_plants():
+    env = vector(64, randomisation=VARIED)
+    env.reset(seed=3)
+    parameters = env.unwrapped._plants.parameters
+    spread = np.ptp(parameters.transpose(0, 2, 1).reshape(-1, parameters.shape[1])[:64], axis=0)
+    assert np.count_nonzero(spread) == 2
+    (frequency,) = (s for s in spread if s > 0.1)
+    assert 0.6 < frequency <= 0.8
+    assert 0.3 * 0.02 < min(spread[spread > 0]) <= 0.4 * 0.02
+
+
+def test_the_covariance_of_a_fit_is_that_of_the_draws():
+    told = ParameterUncertainty(("characteristic.a", "b"), (2.0, 0.5), ((1.0, -0.8), (-0.8, 1.0)))
+    normal = FitUncertainty(told, muscles=(0, 1))
+    draws = normal.values(np.array([10.0, 1.0, 20.0, 2.0]), np.random.default_rng(0).random((20000, 2)))
+    np.testing.assert_allclose(draws.mean(axis=0), [10.0, 1.0, 20.0, 2.0], rtol=0.02)
+    np.testing.assert_allclose(np.cov(draws[:, :2].T), told.covariance, rtol=0.05)
+    np.testing.assert_allclose(draws[:, 2:] - draws[:, :2], [[10.0, 1.0]] * 20000, rtol=1e-12)
+    assert normal.paths == (
+        "plant.muscle[0].contractile.a", "plant.muscle[0].b", "plant.muscle[1].contractile.a", "plant.muscle[1].b"
+    )  # fmt: skip
+
+
+def test_the_uncertainty_of_a_muscle_file_varies_its_law():
+    name = "contractile.max_force"
+    told = ParameterUncertainty((name.replace("contractile", "characteristic"),), (5.0,), ((1.0,),))
+    env = single(LoadLifting(LIFT), randomisation=(FitUncertainty(told),))
+    first, second = (env.reset(seed=i)[0] for i in (0, 1))
+    assert not np.array_equal(first, second)
+
+
+@pytest.mark.parametrize(
+    ("randomisation", "message"),
+    [
+        ((ValueRange(("plant.mechanism.inertai",), 0.1, 0.2),), "no parameter 'plant.mechanism.inertai'. Did you mean"),
+        ((ValueRange(("plant.mechanism.inertia",), -1.0, 0.2),), "would be -1; allowed range: 1e-06 to 1e"),
+        ((VARIED[1], VARIED[1]), "'plant.mechanism.inertia' is varied twice"),
+        (VARIED[0], "give a tuple, such as"),
+    ],
+)
+def test_an_impossible_randomisation_is_refused(randomisation, message):
+    with pytest.raises(ParameterError, match=message):
+        single(randomisation=randomisation)
+
+
+def test_other_impossible_requests_are_refused():
+    with pytest.raises(ParameterError, match="must be finite and rise"):
+        FactorRange(("a",), 1.0, float("nan"))
+    with pytest.raises(ParameterError, match="give a tuple of one path or more"):
+        FactorRange("plant.mechanism.inertia", 0.8, 1.2)
+    with pytest.raises(ParameterError, match=r"give that of a muscle file with a table \[uncertainty\]"):
+        FitUncertainty(None)
+    with pytest.raises(ParameterError, match="give an EnvironmentTask"):
+        single(JOINT)
+    with pytest.raises(ParameterError, match="the period must be a whole number of steps"):
+        single(integrator=RungeKutta4(0.003))
+    with pytest.raises(ParameterError, match="max_episode_steps is 0"):
+        vector(2, max_episode_steps=0)
+    with pytest.raises(ParameterError, match="count is 0"):
+        vector(0)
+    with pytest.raises(ParameterError, match=r"call reset\(\) before the first step"):
+        vector(2).step(np.zeros((2, 2)))
+    with pytest.raises(ParameterError, match="there are 2 seeds for 3 plants"):
+        vector(3).reset(seed=[1, 2])
+    with pytest.raises(ParameterError, match="it must have a fixed step"):
+        BatchStepper(JOINT, 2, None)
+
+
+def test_a_batch_of_steppers_is_its_steppers():
+    start = JOINT.state_at(pressure=2e5)
+    batch = BatchStepper(JOINT, 3, RungeKutta4(1e-3), cores=1)
+    batch.states[:] = np.array(list(start.values()))[None, :, None]
+    batch.inputs[:, :, 1] = 0.5, 0.0, 0.0, 0.5
+    batch.advance(100)
+    one = Stepper(JOINT, start, integrator=RungeKutta4(1e-3))
+    one.step([0.5, 0.0, 0.0, 0.5], 0.1)
+    np.testing.assert_allclose(batch.states[0, :, 1], one.state, rtol=1e-11)
+    np.testing.assert_allclose(batch.outputs[0, :, 1], one.outputs, rtol=1e-9, atol=1e-9)
+    assert abs(batch.states[0, 2, 0]) < abs(one["angle"])
+
+
+def test_the_package_is_imported_without_gymnasium_which_the_error_names():
+    code = (
+        "import sys; sys.modules['gymnasium'] = None\n"
+        "import airmuscle.environments as e, importlib.util\n"
+        "importlib.util.find_spec = lambda name: None\n"
+        "try: e.register_environments()\n"
+        "except Exception as error: print(type(error).__name__, error)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.startswith("InputError learning environments need the package gymnasium. Install it: pip")
+
+
+def test_the_example_of_the_page_is_an_environment():
+    page = Path(__file__).parents[2] / "docs" / "environments.md"
+    (code,) = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    names: dict[str, object] = {}
+    exec(code, names)
+    env = gymnasium.make("airmuscle/Joint-v0", task=names["task"], randomisation=names["randomisation"])
+    observation, _ = env.reset(seed=0)
+    assert env.observation_space.contains(observation)
+    assert env.step(env.action_space.sample())[1] > -0.01
