@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
+import re
 import time
+import tomllib
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from studio_pages import HOST, InThisProcess, request
+from studio_pages import HOST, InThisProcess, request, run_script
 
 pytest.importorskip("starlette", reason="needs the extra studio")
 
 from airmuscle import load
 from airmuscle.core.errors import InputError, ParameterError
+from airmuscle.library.location import Location
 from airmuscle.library.write import to_toml
 from airmuscle.studio import app as studio_app
 from airmuscle.studio.app import MAX_PAGE, create_app
+from airmuscle.studio.page import self_contained_page
+from airmuscle.studio.plant_sheet import sheet_of_tables
 from airmuscle.studio.security import Access, is_loopback
 from airmuscle.studio.server import access_of, bound_socket
 from airmuscle.studio.uploads import MAX_TEXT, read_text_tables
@@ -218,6 +225,29 @@ def test_texts_in_a_saved_page_remain_texts(app, text):
     page = request(app, "POST", "/api/page", body.encode()).text
     assert "<script>alert" not in page
     assert "unsafe" not in page
+
+
+@pytest.mark.parametrize(
+    "name", ["</script><script>alert(1)</script>", "<!--<script>", "*/ alert(1) //", "`${alert(1)}`", '"; alert(1); "']
+)
+def test_names_in_the_program_of_a_saved_page_remain_names(name, tmp_path):
+    """Each script of the page has its digest in the policy; the program runs in Node, and its states have the name."""
+    tables = tomllib.loads(SCENARIO)
+    plant = tables["plant"]
+    plant |= {"muscle": [{"library": "dmsp-20-300", "name": name}, "dmsp-20-300"], "circuit": [plant["circuit"]] * 2}
+    plant["mechanism"] = {"model": "AntagonisticJoint", "radius": 0.04, "inertia": 0.05}
+    tables["input"] = {"muscle.fill": [[1.0, 1.0]]}
+    sheet = sheet_of_tables(tables, Location("own", "", tmp_path), name, {}, "")
+    page = self_contained_page([sheet], {"name": name})
+    scripts = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
+    digests = [base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in scripts]
+    policy = re.search(r"script-src ([^;]*);", page).group(1)
+    assert policy.split() == [f"'sha256-{digest}'" for digest in digests]
+    assert not any("<!--" in text for text in scripts)
+    program = next(text for text in scripts if text.startswith('"use strict";\nairmusclePrograms["'))
+    show = f"console.log(JSON.stringify(airmusclePrograms['{sheet['id']}'].states));"
+    states = run_script(f"const airmusclePrograms = {{}};\n{program}\n{show}", 0, tmp_path)
+    assert states[0] == f"{name}.air_mass"
 
 
 ALLOWED = ('note = "a/b.toml"', 'x = "2.6 m3/(s Pa)"', 'x = "-1.5e-3 1/bar"', '[[reference]]\nwhere = "https://x/y"')
