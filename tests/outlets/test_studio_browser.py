@@ -215,3 +215,18 @@ def test_the_page_fits_every_width(browser, address, width, scheme):
             page.get_by_role("tab", name=tab.title()).click()
             wait_for(page, tab, name)
             assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def test_the_content_is_reached_by_keyboard(browser, address):
+    """The first element leads to the content and keeps what is on the screen."""
+    with opened(browser, address) as page:
+        wait_for(page, "muscle", "dmsp-20-300")
+        page.get_by_label("Force [N]").fill("321")
+        page.get_by_text("Skip to the content").focus()
+        page.keyboard.press("Enter")
+        assert page.evaluate("document.activeElement.id") == "main"
+        page.keyboard.press("Tab")
+        assert page.evaluate("document.activeElement.tagName") == "SELECT"
+        assert number(page, "Force [N]") == 321.0
+        page.get_by_role("button", name="Dark").press("Enter")
+        assert page.evaluate("document.documentElement.dataset.theme") == "dark"

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
+import re
 import time
+import tomllib
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from studio_pages import HOST, InThisProcess, request
+from studio_pages import HOST, InThisProcess, request, run_script
 
 pytest.importorskip("starlette", reason="needs the extra studio")
 
 from airmuscle import load
 from airmuscle.core.errors import InputError, ParameterError
+from airmuscle.library.location import Location
 from airmuscle.library.write import to_toml
+from airmuscle.studio import app as studio_app
 from airmuscle.studio.app import MAX_PAGE, create_app
+from airmuscle.studio.page import self_contained_page
+from airmuscle.studio.plant_sheet import sheet_of_tables
 from airmuscle.studio.security import Access, is_loopback
 from airmuscle.studio.server import access_of, bound_socket
 from airmuscle.studio.uploads import MAX_TEXT, read_text_tables
@@ -218,6 +227,29 @@ def test_texts_in_a_saved_page_remain_texts(app, text):
     assert "unsafe" not in page
 
 
+@pytest.mark.parametrize(
+    "name", ["</script><script>alert(1)</script>", "<!--<script>", "*/ alert(1) //", "`${alert(1)}`", '"; alert(1); "']
+)
+def test_names_in_the_program_of_a_saved_page_remain_names(name, tmp_path):
+    """Each script of the page has its digest in the policy; the program runs in Node, and its states have the name."""
+    tables = tomllib.loads(SCENARIO)
+    plant = tables["plant"]
+    plant |= {"muscle": [{"library": "dmsp-20-300", "name": name}, "dmsp-20-300"], "circuit": [plant["circuit"]] * 2}
+    plant["mechanism"] = {"model": "AntagonisticJoint", "radius": 0.04, "inertia": 0.05}
+    tables["input"] = {"muscle.fill": [[1.0, 1.0]]}
+    sheet = sheet_of_tables(tables, Location("own", "", tmp_path), name, {}, "")
+    page = self_contained_page([sheet], {"name": name})
+    scripts = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
+    digests = [base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in scripts]
+    policy = re.search(r"script-src ([^;]*);", page).group(1)
+    assert policy.split() == [f"'sha256-{digest}'" for digest in digests]
+    assert not any("<!--" in text for text in scripts)
+    program = next(text for text in scripts if text.startswith('"use strict";\nairmusclePrograms["'))
+    show = f"console.log(JSON.stringify(airmusclePrograms['{sheet['id']}'].states));"
+    states = run_script(f"const airmusclePrograms = {{}};\n{program}\n{show}", 0, tmp_path)
+    assert states[0] == f"{name}.air_mass"
+
+
 ALLOWED = ('note = "a/b.toml"', 'x = "2.6 m3/(s Pa)"', 'x = "-1.5e-3 1/bar"', '[[reference]]\nwhere = "https://x/y"')
 REFUSED = ('x = "/etc/passwd"', 'x = "a.toml"', 'x = ["../y"]', "x = { file = 1 }", 'x = "2 a/../b"', 'x = "C:\\\\y"')
 
@@ -270,5 +302,41 @@ def test_a_task_is_ended_at_its_limit_and_the_next_one_runs():
         with pytest.raises(InputError, match="cannot be processed"):
             pool.call(int, "x", limit=60.0)
         assert pool.call(sum, [3, 4], limit=60.0) == 7
+    finally:
+        pool.stop()
+
+
+@pytest.mark.slow
+def test_ten_users_at_once_are_answered():
+    pool = WorkerPool(2)
+    app = create_app(pool=pool)
+    try:
+        texts = [MUSCLE + f"# user {i}\n" for i in range(10)]
+        with ThreadPoolExecutor(10) as users:
+            answers = list(users.map(lambda text: request(app, "POST", "/api/law", text.encode()), texts))
+    finally:
+        pool.stop()
+    assert [answer.status for answer in answers] == [200] * 10
+    assert [answer.json()["own_text"] for answer in answers] == texts
+
+
+@pytest.mark.slow
+def test_a_plant_that_takes_too_long_is_refused_in_time(monkeypatch):
+    """The next request is answered, by a new process."""
+    pool = WorkerPool(1)
+    app = create_app(pool=pool)
+    tube = 'circuit = { model = "WithTubes", tube = { model = "DistributedTube", length = "2 m", diameter = "4 mm", segment_count = 200 }, circuit = { model = "FillDischarge"'
+    text = SCENARIO.replace('circuit = { model = "FillDischarge"', tube).replace(
+        '"matrix-821" } }', '"matrix-821" } } }'
+    )
+    try:
+        assert request(app, "POST", "/api/law", MUSCLE.encode()).status == 200
+        monkeypatch.setattr(studio_app, "TIME_LIMIT", 2.0)
+        begin = time.monotonic()
+        answer = request(app, "POST", "/api/plant", text.encode())
+        assert time.monotonic() - begin < 10.0
+        assert answer.status == 503, answer.text
+        monkeypatch.setattr(studio_app, "TIME_LIMIT", 60.0)
+        assert request(app, "POST", "/api/law", MUSCLE.encode()).status == 200
     finally:
         pool.stop()

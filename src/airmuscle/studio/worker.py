@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator
 from multiprocessing.connection import Connection
 from typing import Any
 
-from ..core.errors import AirmuscleError, InputError
+from ..core.errors import AirmuscleError, InputError, printable
 
 MEMORY = 4 * 2**30
 """Greatest data memory of a worker [bytes] (chosen); it is not limited on Windows and macOS."""
@@ -102,7 +102,7 @@ def _outcome(task: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[Any,
     except MemoryError:
         return None, LimitError("the computation needs more memory than is allowed; give a smaller model or file.")
     except Exception as error:  # the reason belongs to the terminal of the server, not to the page
-        print(f"airmuscle studio: {type(error).__name__}: {error}", file=sys.stderr)
+        print(printable(f"airmuscle studio: {type(error).__name__}: {error}"), file=sys.stderr)
         return None, InputError("this input cannot be processed; the terminal of the server states the reason.")
 
 

@@ -84,7 +84,8 @@
     buildTabs();
     await Promise.all(Object.entries(tabs).map(([name, { view }]) => view.start(library, state[name])));
     show(tabs[state.tab] ? state.tab : TABS[0][0]);
-    window.addEventListener("hashchange", () => location.reload());
+    window.addEventListener("hashchange", () => { if (link.decode(location.hash.slice(1))) location.reload(); });
+    document.querySelector(".skip").addEventListener("click", (event) => { event.preventDefault(); main.focus(); });
     document.documentElement.dataset.ready = "true";
   }
 

@@ -3,14 +3,14 @@
 
 (() => {
   const { Chart, shortText, roundSteps } = airmuscle;
-  const POINTS = 1000, MAX_RATIO = 8, LABEL_GAP = 15;
+  const POINTS = 1000, MAX_RATIO = 8, LABEL_GAP = 15, LABEL_WIDTH = 48;
   const COLOURS = ["c1", "c2", "c3", "c4", "c5", "c6"];
   const DASHES = [[], [8, 5], [2, 4], [], [8, 5], [2, 4]];
   const SPARE = 0.04;
 
   /* Pressures of the isobars [Pa]: round steps over the validity range, or below the greatest rated pressure. */
   function usualPressures(laws) {
-    const highest = Math.max(...laws.map(greatestPressure)), steps = roundSteps(0, highest / 1e5, 8).map((b) => b * 1e5);
+    const highest = Math.max(...laws.map(greatestPressure)), steps = roundSteps(0, highest / 1e5, laws.length > 1 ? 4 : 8).map((b) => b * 1e5);
     return steps.filter((p) => p > 0);
   }
 
@@ -153,13 +153,13 @@
 
     /* Pressure at the left end of each isobar of the active law; labels that would overlap are left out. */
     labels(chart, box) {
-      const found = [], free = (y) => found.every((other) => Math.abs(other.y - y) >= LABEL_GAP);
+      const found = [], free = (x, y) => found.every((other) => Math.abs(other.y - y) >= LABEL_GAP || Math.abs(other.x - x) >= LABEL_WIDTH);
       for (const { values, law, pressure, colour } of [...this.lines].reverse()) {
         if (law !== this.active) continue;
         const i = values.findIndex((v) => v !== null && v <= this.top * 0.95 && v > 0);
         if (i < 0) continue;
         const x = Math.max(box.left + 5, chart.px(this.percent[i]) + 5), y = Math.min(box.top + box.height - 4, chart.py(values[i]) - 4);
-        if (i < POINTS * 0.6 && free(y)) found.push({ x, y: Math.max(y, box.top + 13), text: `${shortText(pressure / 1e5)} bar`, colour });
+        if (i < POINTS * 0.6 && free(x, Math.max(y, box.top + 13))) found.push({ x, y: Math.max(y, box.top + 13), text: `${shortText(pressure / 1e5)} bar`, colour });
       }
       return found;
     }

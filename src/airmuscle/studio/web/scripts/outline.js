@@ -3,7 +3,7 @@
 
 (() => {
   const { svg } = airmuscle;
-  const WIDTH = 900, MARGIN = 34, FITTING = 22;
+  const WIDTH = 900, MARGIN = 34, FITTING = 22, HIGHEST = 150;
 
   function pathOf(outline, x, y) {
     const upper = outline.axial.map((a, i) => `${x(a).toFixed(1)} ${y(outline.radius[i]).toFixed(1)}`);
@@ -28,7 +28,7 @@
       }
       const limits = law.contractionRange, longest = length * Math.max(1, 1 - Math.max(limits[0], -0.1));
       const largest = rest ? Math.max(0.02 * length, ...[0, 0.25, 0.5, 0.75, 1].map((t) => widest(law.outline(limits[0] + t * (limits[1] - limits[0]))))) : 0.03 * length;
-      const scale = (WIDTH - 2 * MARGIN - FITTING - 120) / longest, middle = Math.max(46, largest * scale + 26), height = 2 * middle + 30;
+      const scale = Math.min((WIDTH - 2 * MARGIN - FITTING - 120) / longest, HIGHEST / largest), middle = Math.max(46, largest * scale + 26), height = 2 * middle + 30;
       const shift = (of) => (a) => MARGIN + FITTING + (a + of / 2) * scale, y = (r) => middle - r * scale;
       const current = length * (1 - contraction), end = MARGIN + FITTING + current * scale, parts = [];
       parts.push(svg("rect", { x: MARGIN, y: middle - 20, width: FITTING, height: 40, fill: "var(--fitting)" }));

@@ -76,7 +76,7 @@
       try {
         const sheet = await load();
         if (request === this.request) this.open(sheet, state);
-      } catch (error) { if (request === this.request) this.complain(error.message); }
+      } catch (error) { if (request === this.request) { this.complain(error.message); if (this.sheet) this.nameSelected(); } }
       if (request === this.request) this.host.removeAttribute("aria-busy");
     }
 
@@ -94,7 +94,7 @@
         if (Number.isFinite(value) && value >= (low ?? -Infinity) && value <= (high ?? Infinity)) this.run.set(row, value);
       }
       if (state.schedule && validSchedule(state.schedule, sheet)) { this.schedule = state.schedule; this.duration = Math.min(MOST_LIVE, Math.max(0.1, Number(state.duration) || sheet.duration)); }
-      this.select.value = sheet.own_text ? "" : sheet.name;
+      this.nameSelected();
       this.parameters.show(sheet.parameters, sheet.parameters.map((row) => this.run.values[row.places[0]]), (i, value) => { this.run.set(sheet.parameters[i], value); this.changed(); }, (path) => groupName(path, sheet));
       this.about.replaceChildren(element("p", {}, element("strong", {}, sheet.title)), ...(sheet.warning ? [element("p.message", {}, sheet.warning)] : []), element("p.soft", {}, `Numbers: ${sheet.provenance}. ${sheet.note}`), element("ul", {}, ...sheet.references.map((r) => element("li", {}, r))));
       this.drawing.begin(this.run);
@@ -103,6 +103,8 @@
       this.setMode("schedule");
       this.host.dataset.shown = sheet.name;
     }
+
+    nameSelected() { this.select.value = this.sheet.own_text ? "" : this.sheet.name; }
 
     buildInputs() {
       const first = this.run.program.run.segments.values[0] ?? [];

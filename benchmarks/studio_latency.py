@@ -1,0 +1,80 @@
+"""Latency of the studio: time from a key to the painted page, with ten isobars of 1000 points.
+
+Run python benchmarks/studio_latency.py with the package playwright and Chromium; prints median and 95th percentile
+[ms], and the time of the page's scripts and of its whole main thread for each key [ms], as thread CPU time.
+"""
+
+from __future__ import annotations
+
+import shutil
+import statistics
+import subprocess
+import sys
+from typing import Any
+
+KEYS = 200
+PRESSURES = "0.5; 1; 1.5; 2; 2.5; 3; 3.5; 4; 4.5; 5"
+MEASURE = """
+window.latencies = [];
+addEventListener("keydown", (event) => {
+  const begin = event.timeStamp;
+  requestAnimationFrame(() => {
+    const channel = new MessageChannel();  // its message arrives after the frame has been painted
+    channel.port1.onmessage = () => latencies.push(performance.now() - begin);
+    channel.port2.postMessage(0);
+  });
+}, true);
+"""
+OPTIONS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update"]
+
+
+def measured(page: Any, control: Any, keys: tuple[str, str]) -> str:
+    """One line of results for a control that takes two keys."""
+    session = page.context.new_cdp_session(page)
+    session.send("Performance.enable", {"timeDomain": "threadTicks"})
+
+    def durations() -> dict[str, float]:
+        return {row["name"]: row["value"] for row in session.send("Performance.getMetrics")["metrics"]}
+
+    control.focus()
+    for i in range(20):
+        control.press(keys[i // 10 % 2])
+    page.evaluate("latencies.length = 0")
+    before = durations()
+    for i in range(KEYS):
+        control.press(keys[i // 20 % 2])
+        page.wait_for_timeout(20)
+    after, found = durations(), sorted(page.evaluate("latencies"))
+    script, task = (1e3 * (after[n] - before[n]) / KEYS for n in ("ScriptDuration", "TaskDuration"))
+    return (
+        f"median {statistics.median(found):.1f} ms, 95 % {found[int(0.95 * len(found))]:.1f} ms; "
+        f"CPU of scripts {script:.1f} ms, of the main thread {task:.1f} ms"
+    )
+
+
+def main() -> None:
+    """Start a server and a browser, and print both lines."""
+    from playwright.sync_api import sync_playwright
+
+    command = [sys.executable, "-u", "-m", "airmuscle", "studio", "--no-browser", "--port", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server, sync_playwright() as playwright:
+        assert server.stdout is not None
+        address = server.stdout.readline().split()[1]
+        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=OPTIONS)
+        context = browser.new_context(viewport={"width": 1280, "height": 1000})
+        context.add_init_script(MEASURE)
+        page = context.new_page()
+        page.goto(address)
+        page.wait_for_selector('#panel-muscle[data-shown="dmsp-20-300"]')
+        isobars = page.get_by_label("Pressures of the isobars [bar]")
+        isobars.fill(PRESSURES)
+        isobars.press("Enter")
+        slider = page.locator("#panel-muscle input[type=range]").first
+        print("slider, ten isobars of 1000 points:", measured(page, slider, ("ArrowRight", "ArrowLeft")))
+        print("working point:", measured(page, page.locator("#panel-muscle .chart"), ("ArrowUp", "ArrowDown")))
+        browser.close()
+        server.terminate()
+
+
+if __name__ == "__main__":
+    main()
