@@ -17,7 +17,7 @@ from airmuscle.library.location import Location
 from airmuscle.library.write import to_toml
 from airmuscle.scenario.scenario import build_scenario
 
-pytest.importorskip("starlette", reason="needs the extra studio")
+pytest.importorskip("starlette", reason="needs starlette")
 playwright = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 pytestmark = [

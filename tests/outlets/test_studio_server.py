@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from studio_pages import HOST, InThisProcess, request, run_script
 
-pytest.importorskip("starlette", reason="needs the extra studio")
+pytest.importorskip("starlette", reason="needs starlette")
 
 from airmuscle import load
 from airmuscle.core.errors import InputError, ParameterError

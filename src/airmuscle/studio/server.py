@@ -23,7 +23,7 @@ def check_packages() -> None:
     missing = [name for name in PACKAGES if importlib.util.find_spec(name) is None]
     if missing:
         raise InputError(
-            f"the studio needs {' and '.join(missing)}. Install the extra: pip install 'airmuscle[studio]'. A page "
+            f"the studio needs {' and '.join(missing)}. Install them: pip install starlette uvicorn. A page "
             "without a server needs neither: airmuscle studio NAME --export page.html"
         )
 

@@ -1,6 +1,6 @@
 """Control benchmark of the antagonistic joint: all standard controllers, learning, on/off valves, and the targets.
 
-    python benchmarks/control.py [--budget 2400] [--seed 1] [--out benchmarks/CONTROL.md]
+    python benchmarks/control_benchmark.py [--budget 2400] [--seed 1] [--out benchmarks/CONTROL.md]
 
 Every controller is tuned with the same optimiser and budget for perturbed models and judged on the truth. Figures and
 verdicts are computed; a reason is printed for a target that is missed.
@@ -251,7 +251,7 @@ def page(results: Mapping[str, Any]) -> str:
     data, switched = results["proportional"], results["on/off"]
     lines = [
         "# Results of the control benchmark", "",
-        f"Results of `benchmarks/control.py --budget {results['budget']} --seed {results['seed']}` on "
+        f"Results of `benchmarks/control_benchmark.py --budget {results['budget']} --seed {results['seed']}` on "
         f"{datetime.date.today()}, Python {platform.python_version()}. All figures are simulations. "
         "[Comparison of controllers](../docs/compare.md) describes joint, truth, tasks and metrics; their numbers are "
         "chosen.", "", HISTORY, "",
