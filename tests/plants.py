@@ -30,6 +30,7 @@ from airmuscle.mechanism import (
     ArmLink,
     ConstantRadius,
     CrankProfile,
+    ExternalLoad,
     HangingMass,
     Isometric,
     Isotonic,
@@ -175,6 +176,7 @@ EXAMPLES = {
     "mass on a spring": pulled(SpringLoad(5.0, 2000.0, 20.0, 50.0)),
     "constant force": pulled(Isotonic(100.0, 2.0, 5.0)),
     "prescribed": pulled(PrescribedMotion()),
+    "load in another program": pulled(ExternalLoad(("m0", "m1"), (0.005, 0.01)), 2),
     "lever": pulled(Lever((0.03,), 3.0, 0.2)),
     "pulley with stops": pulled(WithEndStops(Pulley(0.02, 5.0), -0.005, 0.02, HuntCrossley(1e9))),
     "joint with stops": pulled(

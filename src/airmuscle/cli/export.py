@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..export import C99, JavaScript, Octave, Target, write_law, write_program
+from ..export import C99, JavaScript, Octave, Target, write_controller, write_law, write_program
 from ..export.identifiers import make_identifier
 from ..library.law_file import load_law
 from ..report.output_folder import check_writable
@@ -30,20 +30,23 @@ ProgramName = Annotated[
     str, typer.Option("--name", metavar="NAME", help="Name of the program; default: that of the source.")
 ]
 Law = Annotated[bool, typer.Option("--law", help="Export only the static characteristic of a muscle.")]
+ControllerOnly = Annotated[
+    bool, typer.Option("--controller", help="Export only the controller of a scenario, to C for a microcontroller.")
+]
 Tunable = Annotated[
     list[str] | None,
     typer.Option(
         "--tunable", metavar="PATH",
-        help="A parameter that the program can change; repeatable. Default: all; otherwise the rest are constants.",
+        help="A parameter that the program can change; repeatable. Default: all, of a controller none.",
     ),
 ]  # fmt: skip
 
 
 def export(
     source: Source, to: To, out: Folder = Path("export"), name: ProgramName = "", law: Law = False,
-    tunable: Tunable = None, json: Json = False,
+    controller: ControllerOnly = False, tunable: Tunable = None, json: Json = False,
 ) -> None:  # fmt: skip
-    """Export a scenario or a law as a C, JavaScript or MATLAB program.
+    """Export a scenario, law or controller to C, JavaScript or MATLAB.
 
     \b
     The program contains the equations of the plant, the integrator, and a run of the scenario that writes CSV. Nothing
@@ -55,9 +58,12 @@ def export(
       airmuscle export examples/fill_discharge.toml --to c --out fill_c
       airmuscle export examples/fill_discharge.toml --to octave --tunable mechanism.mass --out fill_m
       airmuscle export dmsp-20-300 --law --to js --out law_js
+      airmuscle export examples/pressure_loop.toml --controller --to c --out controller
     """
     if to not in TARGETS:
         raise typer.BadParameter(f"--to {to}: there are {', '.join(TARGETS)}.")
+    if controller and (law or to != "c"):
+        raise typer.BadParameter("--controller: a controller is exported to C, and without --law; write --to c.")
     if law and tunable:
         raise typer.BadParameter("--tunable: all parameters of a law can be changed; leave it out.")
     check_writable(out)
@@ -65,6 +71,9 @@ def export(
     if law:
         entry = load_law(source)
         paths = write_law(entry.characteristic, out, TARGETS[to], name=name, title=entry.title)
+    elif controller:
+        scenario = load_scenario(source)
+        paths = write_controller(scenario.problem, out, name=name, title=scenario.title, tunable=tunable or ())
     else:
         scenario = load_scenario(source)
         paths = write_program(
@@ -76,14 +85,16 @@ def export(
         return
     for path in paths:
         echo(f"file: {path}")
-    echo(f"run: {_instruction(to, paths, law)}")
+    echo(f"run: {_instruction(to, paths, law, controller)}")
 
 
-def _instruction(to: str, paths: tuple[Path, ...], law: bool) -> str:
+def _instruction(to: str, paths: tuple[Path, ...], law: bool, controller: bool) -> str:
     """How to run or use the files."""
     names = [path.name for path in paths]
     if to == "c":
         sources = " ".join(name for name in names if name.endswith(".c"))
+        if controller:
+            return f"cc -std=c99 -O2 {sources} -lm -o replay && ./replay"
         return f"cc -O2 -c {sources}" if law else f"cc -O2 {sources} -lm -o run && ./run run.csv"
     if to == "js":
         return f'import {{law}} from "./{names[0]}"' if law else f"node {names[1]} > run.csv"

@@ -4,6 +4,7 @@ from .antagonistic_joint import AntagonisticJoint
 from .base import Coordinate, Mechanism
 from .contact import HuntCrossley
 from .end_stops import JointWithEndStops, WithEndStops
+from .external_load import ExternalLoad
 from .hanging_mass import HangingMass
 from .isometric import Isometric
 from .isotonic import Isotonic
@@ -25,6 +26,7 @@ __all__ = [
     "ConstantRadius",
     "Coordinate",
     "CrankProfile",
+    "ExternalLoad",
     "HangingMass",
     "HuntCrossley",
     "Isometric",

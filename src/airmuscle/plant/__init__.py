@@ -2,6 +2,7 @@
 
 from .energy_balance import WithEnergyMeters, total_air
 from .muscle_state import MuscleState
+from .opening import open_plant
 from .plant import Plant
 
-__all__ = ["MuscleState", "Plant", "WithEnergyMeters", "total_air"]
+__all__ = ["MuscleState", "Plant", "WithEnergyMeters", "open_plant", "total_air"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 from ..core.declaration import as_finite_float, model
@@ -144,10 +145,13 @@ class Plant(System):
         """Values under the plant's names, by a circuit's own names."""
         return key_by_port(self.prefixes, values) if self._shared else select_prefix(prefix, values)
 
-    def muscle_states(self, state: Mapping[str, Value]) -> tuple[MuscleState, ...]:
-        """Every muscle at a state."""
-        contractions = self.mechanism.contractions(state, self.resting_lengths)
-        speeds = self.mechanism.contraction_speeds(state, state, self.resting_lengths)
+    def muscle_states(
+        self, state: Mapping[str, Value], inputs: Mapping[str, Value] = MappingProxyType({})
+    ) -> tuple[MuscleState, ...]:
+        """Every muscle at a state; `inputs` are required if shortenings are inputs."""
+        place = {**inputs, **state}
+        contractions = self.mechanism.contractions(place, self.resting_lengths)
+        speeds = self.mechanism.contraction_speeds(place, place, self.resting_lengths)
         return tuple(
             muscle_state(muscle, select_prefix(prefix, state), contraction, speed, self.gas, self.ambient)
             for muscle, prefix, contraction, speed in zip(
@@ -167,7 +171,7 @@ class Plant(System):
 
     def evaluate(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> PlantEvaluation:
         """Muscles, circuits, forces and accelerations at a state."""
-        muscles = self.muscle_states(state)
+        muscles = self.muscle_states(state, inputs)
         forces = self.mechanism.generalised_forces(state, [m.tension for m in muscles], self.resting_lengths)
         accelerations = self.mechanism.acceleration(state, state, forces, inputs)
         return PlantEvaluation(muscles, self.circuit_flows(muscles, state, inputs), forces, accelerations)

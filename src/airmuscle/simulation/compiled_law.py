@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
+from typing import Any
+
 import numpy as np
 
 from ..compile.function import Function
@@ -11,6 +14,7 @@ from ..core import autodiff, tree
 from ..core.arrays import Array
 from ..core.errors import TraceError
 
+_ARGUMENTS = ("measured", "setpoints", "memory", "minimum", "maximum", "sample_time", "parameters")
 _functions: dict[tree.Structure, Function] = {}
 
 
@@ -31,7 +35,29 @@ def parameters_of(law: ControlLaw) -> Array:
     return parameters if len(parameters) else np.zeros(1)
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class TracedSample:
+    """A sample of a control law as expressions; the arguments are vectors in the order of the names of the law."""
+
+    measured: Any
+    setpoints: Any
+    memory: Any
+    minimum: Any
+    maximum: Any
+    sample_time: Any
+    parameters: Any
+    commands: Any
+    later: Any
+
+
 def _trace(law: ControlLaw) -> Function:
+    sample = trace_sample(law)
+    inputs = {name: getattr(sample, name) for name in _ARGUMENTS}
+    return Function(inputs, {"commands": sample.commands, "later": sample.later})
+
+
+def trace_sample(law: ControlLaw) -> TracedSample:
+    """A sample of a law with symbols. Raises TraceError if the law cannot be traced."""
     import casadi
 
     symbolic, parameters = autodiff.symbolic(law)
@@ -63,4 +89,4 @@ def _trace(law: ControlLaw) -> Function:
             "of math, numpy and `if`, or derive the controller from Controller."
         ) from None
     autodiff.check_finite(casadi.vertcat(commanded, later), f"{owner}.step")
-    return Function({**vectors, "parameters": parameters}, {"commands": commanded, "later": later})
+    return TracedSample(**vectors, parameters=parameters, commands=commanded, later=later)

@@ -1,0 +1,175 @@
+"""A control law on a microcontroller: the C function of its memory gives, bit by bit, the commands of the operations that
+were printed, and those of the library to 1e-12 of their range."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import printed
+import pytest
+from called_controller import Called
+from control_plants import LIFT, PRESSURE, SPLIT
+from typer.testing import CliRunner
+
+from airmuscle.cli.app import app
+from airmuscle.control import (
+    PID,
+    PWM,
+    Cascade,
+    ColumnSensor,
+    ControlLoop,
+    DeadZoneController,
+    GainSchedule,
+    OnOffController,
+    Schedule,
+    SigmaDelta,
+    SlidingMode,
+    SuperTwisting,
+    WithSensors,
+)
+from airmuscle.core.errors import ParameterError
+from airmuscle.export import write_controller
+from airmuscle.export.controller import print_controller
+from airmuscle.simulation import Problem, solve
+from airmuscle.simulation.sampled_loop import prepare_loop
+
+SENSED = (ColumnSensor("position", resolution=5e-5, delay=2, lag=3e-3), ColumnSensor("pressure", noise=500.0, delay=1))
+OUTER = PID("position", "pressure", gain=4e6, integral_time=0.4, derivative_time=0.01)
+CASCADE = Cascade(OUTER, PRESSURE, (0.0,), (5e5,))
+POSITION = Schedule({"position": ((0.0, 0.004), (0.2, 0.01))})
+STEP = Schedule({"pressure": ((0.0, 1e5), (0.2, 3e5))})
+
+
+def problem_of(law, setpoint=STEP, duration=0.5):
+    return Problem(LIFT, ControlLoop(law, 0.005, setpoint), duration, LIFT.state_at(pressure=1e5))
+
+
+def replay(folder, *options):
+    """What the replay says."""
+    sources = sorted(path.name for path in folder.glob("*.c"))
+    command = [
+        printed.require("gcc"),
+        *printed.STRICT,
+        "-pedantic",
+        *(options or ("-O1",)),
+        *sources,
+        "-o",
+        "replay",
+        "-lm",
+    ]
+    built = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    assert built.returncode == 0, built.stderr[:2000]
+    return subprocess.run(["./replay"], cwd=folder, capture_output=True, text=True)
+
+
+CASES = {
+    "PI": (PRESSURE, STEP),
+    "on-off": (OnOffController("pressure", SPLIT, 1e4), STEP),
+    "cascade": (CASCADE, POSITION),
+    "sliding mode": (SlidingMode("position", SPLIT, 1.0, 0.05, 1e-3, 5e-3), POSITION),
+    "super-twisting": (SuperTwisting("position", SPLIT, 10.0, 1.0, 0.05, 5e-3), POSITION),
+    "dead zone": (DeadZoneController("position", SPLIT, 3e-4, lead_time=0.04, filter_time=5e-3), POSITION),
+    "gain schedule": (Cascade(GainSchedule(OUTER, "gain", "pressure", (0.0, 3e5), (6e6, 2e6)), PRESSURE, (0.0,), (5e5,)), POSITION),
+    "sigma-delta": (SigmaDelta(CASCADE, 0.05), POSITION),
+    "sensors with noise": (WithSensors(CASCADE, SENSED, 7.0), POSITION),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_replay_agrees_bit_by_bit(name, tmp_path):
+    law, setpoint = CASES[name]
+    write_controller(problem_of(law, setpoint), tmp_path, name="law")
+    for options in (("-O0",), ("-O2",)):
+        done = replay(tmp_path, *options)
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert re.match(r"100 samples, 0 commands differ; memory \d+ bytes, parameters \d+ bytes", done.stdout)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_replayed_commands_are_those_of_the_recorded_run(name):
+    """The library computes with fused and reordered operations: equal to 1e-9 of the range of the command."""
+    law, setpoint = CASES[name]
+    problem = problem_of(law, setpoint)
+    prepared = prepare_loop(problem, problem.input.init(0.0))
+    recording = solve(problem).recording
+    rows = np.searchsorted(recording["time"], prepared.instants[:-1] - 1e-9)
+    columns = [recording[f"measured.{n}"][rows] for n in law.measured_columns]
+    samples = print_controller(prepared, "law").replay(np.column_stack(columns), prepared.setpoint_values)
+    recorded = np.column_stack([recording[f"command.{n}"][rows] for n in law.inputs])
+    assert np.ptp(recorded) > 0
+    np.testing.assert_allclose(samples.commands, recorded, rtol=0, atol=1e-9)
+
+
+def test_a_tunable_gain_is_a_variable_and_the_others_are_constants(tmp_path):
+    write_controller(problem_of(PRESSURE), tmp_path, name="law", tunable=["gain"])
+    assert replay(tmp_path).returncode == 0
+    header = (tmp_path / "law.h").read_text()
+    assert "#define LAW_PARAMETERS 1\n" in header
+    main = (
+        (tmp_path / "main.c")
+        .read_text()
+        .replace("int k, i;", "int k, i;\n  law_parameters[LAW_PARAMETER_GAIN] *= 2.0;")
+    )
+    (tmp_path / "main.c").write_text(main)
+    done = replay(tmp_path)
+    assert done.returncode == 1
+    assert int(re.search(r"(\d+) commands differ", done.stdout).group(1)) > 10
+
+
+def test_a_command_that_is_not_finite_is_reported_and_changes_nothing(tmp_path):
+    write_controller(problem_of(PRESSURE), tmp_path, name="law")
+    (tmp_path / "main.c").write_text("""
+#include "law.h"
+#include <math.h>
+int main(void) {
+  double memory[LAW_MEMORY + 1] = {7.0, 8.0, 9.0, 10.0}, y[] = {NAN, 0.0}, r[] = {2e5, 0.0}, u[] = {0.25, 0.5, 0.0};
+  return !(law_step(memory, y, r, u) == 1 && memory[1] == 8.0 && u[0] == 0.25 && u[1] == 0.5);
+}
+""")
+    assert replay(tmp_path).returncode == 0
+
+
+def test_the_source_allocates_nothing_and_does_not_call_itself(tmp_path):
+    write_controller(problem_of(CASCADE, POSITION), tmp_path, name="law")
+    source = (tmp_path / "law.c").read_text().split("*/", 1)[1]
+    assert not re.search(r"\b(malloc|calloc|realloc|free|goto|while|static double)\b", source)
+    assert source.count("law_step(") == 1
+    assert source.count("law_sample(") == 2
+
+
+def test_drivers_that_are_not_part_of_the_program_are_named(tmp_path):
+    loop = ControlLoop(PRESSURE, 0.02, STEP, drivers={"fill": PWM(50.0)})
+    problem = Problem(LIFT, loop, 0.2, LIFT.state_at(pressure=1e5))
+    write_controller(problem, tmp_path, name="law")
+    assert "Not part of this program: the drivers" in (tmp_path / "law.h").read_text()
+    assert "fill: PWM(frequency=50.0" in (tmp_path / "law.h").read_text()
+
+
+def test_what_cannot_be_printed_is_refused_by_name(tmp_path):
+    with pytest.raises(
+        ParameterError, match="Called is a controller in Python and cannot be exported; derive it from Contr"
+    ):
+        write_controller(problem_of(Called(PRESSURE)), tmp_path)
+    with pytest.raises(ParameterError, match="the problem has no controller to export"):
+        write_controller(Problem(LIFT, Schedule({}), 0.1, LIFT.state_at(pressure=1e5)), tmp_path)
+    with pytest.raises(
+        ParameterError, match=r"'measured' is fixed when a program is printed.*tunable parameters are gain"
+    ):
+        write_controller(problem_of(PRESSURE), tmp_path, tunable=["measured"])
+    with pytest.raises(ParameterError, match=r"cannot be the name of an exported program"):
+        write_controller(problem_of(PRESSURE), tmp_path, name="switch")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_command_exports_the_controller_of_a_scenario(tmp_path):
+    scenario = Path(__file__).parents[2] / "examples" / "pressure_loop.toml"
+    done = CliRunner().invoke(app, ["export", str(scenario), "--controller", "--to", "c", "--out", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    assert {path.name for path in tmp_path.iterdir()} == {"pressure_loop.h", "pressure_loop.c", "main.c"}
+    assert "250 samples, 0 commands differ" in replay(tmp_path).stdout
+    wrong = CliRunner().invoke(app, ["export", str(scenario), "--controller", "--to", "js", "--out", str(tmp_path)])
+    assert wrong.exit_code == 2
+    assert "a controller is exported to C" in " ".join(wrong.output.replace("\u2502", " ").split())
