@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..export import C99, JavaScript, Octave, Target, write_controller, write_law, write_program
+from ..export import C99, JavaScript, Octave, Target, write_controller, write_fmu, write_law, write_program
 from ..export.identifiers import make_identifier
 from ..library.law_file import load_law
 from ..report.output_folder import check_writable
@@ -16,8 +16,10 @@ from .options import Folder, Json
 from .terminal import echo, print_json
 
 TARGETS: dict[str, Target] = {"c": C99(), "js": JavaScript(), "octave": Octave()}
-"""Targets by the names of the option --to."""
-
+"""Languages by the names of the option --to."""
+NAMES = (*TARGETS, "fmu")
+"""All values of the option --to."""
+DEFAULT_FOLDER = Path("export")
 
 Source = Annotated[
     str,
@@ -25,7 +27,7 @@ Source = Annotated[
         metavar="SOURCE", help="A scenario file or a plant of the library; with --law a library entry or a muscle file."
     ),
 ]
-To = Annotated[str, typer.Option("--to", metavar="TARGET", help=f"Language: {', '.join(TARGETS)}.")]
+To = Annotated[str, typer.Option("--to", metavar="TARGET", help=f"Target: {', '.join(NAMES)}.")]
 ProgramName = Annotated[
     str, typer.Option("--name", metavar="NAME", help="Name of the program; default: that of the source.")
 ]
@@ -40,13 +42,16 @@ Tunable = Annotated[
         help="A parameter that the program can change; repeatable. Default: all, of a controller none.",
     ),
 ]  # fmt: skip
+Fmi = Annotated[int | None, typer.Option("--fmi", metavar="2|3", help="Version of FMI for --to fmu. Default: 3.")]
+SourcesOnly = Annotated[bool, typer.Option("--sources-only", help="An FMU without a binary; --to fmu.")]
 
 
 def export(
-    source: Source, to: To, out: Folder = Path("export"), name: ProgramName = "", law: Law = False,
-    controller: ControllerOnly = False, tunable: Tunable = None, json: Json = False,
+    source: Source, to: To, out: Folder = DEFAULT_FOLDER, name: ProgramName = "", law: Law = False,
+    controller: ControllerOnly = False, tunable: Tunable = None, fmi: Fmi = None, sources_only: SourcesOnly = False,
+    json: Json = False,
 ) -> None:  # fmt: skip
-    """Export a scenario, law or controller to C, JavaScript or MATLAB.
+    """Export a scenario, law or controller to C, JavaScript, MATLAB or FMU.
 
     \b
     The program contains the equations of the plant, the integrator, and a run of the scenario that writes CSV. Nothing
@@ -59,15 +64,14 @@ def export(
       airmuscle export examples/fill_discharge.toml --to octave --tunable mechanism.mass --out fill_m
       airmuscle export dmsp-20-300 --law --to js --out law_js
       airmuscle export examples/pressure_loop.toml --controller --to c --out controller
+      airmuscle export examples/fill_discharge.toml --to fmu --fmi 2 --out fill.fmu
     """
-    if to not in TARGETS:
-        raise typer.BadParameter(f"--to {to}: there are {', '.join(TARGETS)}.")
-    if controller and (law or to != "c"):
-        raise typer.BadParameter("--controller: a controller is exported to C, and without --law; write --to c.")
-    if law and tunable:
-        raise typer.BadParameter("--tunable: all parameters of a law can be changed; leave it out.")
-    check_writable(out)
+    _check_options(to, law, controller, tunable, fmi is not None or sources_only)
     name = name or make_identifier(Path(source).stem)
+    if to == "fmu":
+        _export_fmu(source, out, name, tunable, 3 if fmi is None else fmi, not sources_only, json)
+        return
+    check_writable(out)
     if law:
         entry = load_law(source)
         paths = write_law(entry.characteristic, out, TARGETS[to], name=name, title=entry.title)
@@ -86,6 +90,41 @@ def export(
     for path in paths:
         echo(f"file: {path}")
     echo(f"run: {_instruction(to, paths, law, controller)}")
+
+
+def _check_options(to: str, law: bool, controller: bool, tunable: list[str] | None, of_an_fmu: bool) -> None:
+    """Raise BadParameter for options that do not fit together."""
+    if to not in NAMES:
+        raise typer.BadParameter(f"--to {to}: there are {', '.join(NAMES)}.")
+    if controller and (law or to != "c"):
+        raise typer.BadParameter("--controller: a controller is exported to C, and without --law; write --to c.")
+    if law and to == "fmu":
+        raise typer.BadParameter("--law: an FMU contains a scenario; leave --law out, or write --to c.")
+    if law and tunable:
+        raise typer.BadParameter("--tunable: all parameters of a law can be changed; leave it out.")
+    if of_an_fmu and to != "fmu":
+        raise typer.BadParameter("--fmi and --sources-only belong to --to fmu.")
+
+
+def _export_fmu(
+    source: str, out: Path, name: str, tunable: list[str] | None, fmi: int, binary: bool, json: bool
+) -> None:
+    """Write an FMU into a folder, or to a file that ends in .fmu."""
+    path = out if out.suffix == ".fmu" else out / f"{name}.fmu"
+    check_writable(path.parent)
+    scenario = load_scenario(source)
+    written = write_fmu(
+        scenario.problem, path, fmi=fmi, name=name, title=scenario.title, tunable=tunable, binary=binary
+    )
+    if json:
+        print_json({"files": [str(path)], "platform": written.platform, "remark": written.remark})
+        return
+    echo(f"file: {path}")
+    if written.platform:
+        echo(f"FMI {fmi}.0, Model Exchange and Co-Simulation, with sources and a binary for {written.platform}")
+    else:
+        echo(f"FMI {fmi}.0, Model Exchange and Co-Simulation, sources without a binary: {written.remark}")
+    echo(f"run: fmpy simulate {path}")
 
 
 def _instruction(to: str, paths: tuple[Path, ...], law: bool, controller: bool) -> str:

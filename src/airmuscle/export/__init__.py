@@ -1,6 +1,7 @@
-"""Export of plants, laws and controllers as source text of other languages: C99, JavaScript, MATLAB and Octave."""
+"""Export of plants, laws and controllers as source text of other languages, and as FMUs."""
 
 from .controller import write_controller
+from .fmu import WrittenFmu, write_fmu
 from .identifiers import make_identifiers
 from .targets import C99, JavaScript, Octave, Target
 from .write import write_law, write_program
@@ -10,8 +11,10 @@ __all__ = [
     "JavaScript",
     "Octave",
     "Target",
+    "WrittenFmu",
     "make_identifiers",
     "write_controller",
+    "write_fmu",
     "write_law",
     "write_program",
 ]
