@@ -7,7 +7,17 @@ from typing import Annotated
 
 import typer
 
-from ..export import C99, JavaScript, Octave, Target, write_controller, write_fmu, write_law, write_program
+from ..export import (
+    C99,
+    JavaScript,
+    Octave,
+    Target,
+    write_controller,
+    write_fmu,
+    write_law,
+    write_mujoco_plugin,
+    write_program,
+)
 from ..export.identifiers import make_identifier
 from ..library.law_file import load_law
 from ..report.output_folder import check_writable
@@ -17,7 +27,7 @@ from .terminal import echo, print_json
 
 TARGETS: dict[str, Target] = {"c": C99(), "js": JavaScript(), "octave": Octave()}
 """Languages by the names of the option --to."""
-NAMES = (*TARGETS, "fmu")
+NAMES = (*TARGETS, "fmu", "mujoco")
 """All values of the option --to."""
 DEFAULT_FOLDER = Path("export")
 
@@ -43,13 +53,14 @@ Tunable = Annotated[
     ),
 ]  # fmt: skip
 Fmi = Annotated[int | None, typer.Option("--fmi", metavar="2|3", help="Version of FMI for --to fmu. Default: 3.")]
+MuscleName = Annotated[str, typer.Option("--muscle", metavar="NAME", help="One muscle of the plant; --to mujoco.")]
 SourcesOnly = Annotated[bool, typer.Option("--sources-only", help="An FMU without a binary; --to fmu.")]
 
 
 def export(
     source: Source, to: To, out: Folder = DEFAULT_FOLDER, name: ProgramName = "", law: Law = False,
     controller: ControllerOnly = False, tunable: Tunable = None, fmi: Fmi = None, sources_only: SourcesOnly = False,
-    json: Json = False,
+    muscle: MuscleName = "", json: Json = False,
 ) -> None:  # fmt: skip
     """Export a scenario, law or controller to C, JavaScript, MATLAB or FMU.
 
@@ -71,7 +82,12 @@ def export(
     if to == "fmu":
         _export_fmu(source, out, name, tunable, 3 if fmi is None else fmi, not sources_only, json)
         return
+    if muscle and to != "mujoco":
+        raise typer.BadParameter("--muscle belongs to --to mujoco.")
     check_writable(out)
+    if to == "mujoco":
+        _export_mujoco(source, out, name, muscle, json)
+        return
     if law:
         entry = load_law(source)
         paths = write_law(entry.characteristic, out, TARGETS[to], name=name, title=entry.title)
@@ -98,8 +114,10 @@ def _check_options(to: str, law: bool, controller: bool, tunable: list[str] | No
         raise typer.BadParameter(f"--to {to}: there are {', '.join(NAMES)}.")
     if controller and (law or to != "c"):
         raise typer.BadParameter("--controller: a controller is exported to C, and without --law; write --to c.")
-    if law and to == "fmu":
-        raise typer.BadParameter("--law: an FMU contains a scenario; leave --law out, or write --to c.")
+    if law and to not in TARGETS:
+        raise typer.BadParameter(f"--law: {to} contains a plant; leave --law out, or write --to c.")
+    if to == "mujoco" and tunable:
+        raise typer.BadParameter("--tunable: all parameters of an actuator can be changed; leave it out.")
     if law and tunable:
         raise typer.BadParameter("--tunable: all parameters of a law can be changed; leave it out.")
     if of_an_fmu and to != "fmu":
@@ -125,6 +143,21 @@ def _export_fmu(
     else:
         echo(f"FMI {fmi}.0, Model Exchange and Co-Simulation, sources without a binary: {written.remark}")
     echo(f"run: fmpy simulate {path}")
+
+
+def _export_mujoco(source: str, out: Path, name: str, muscle: str, json: bool) -> None:
+    """Write a MuJoCo plugin into a folder."""
+    made = write_mujoco_plugin(load_scenario(source).plant, out, name=name, muscle=muscle)
+    files = [str(path) for path in (made.source, made.library) if path is not None]
+    if json:
+        print_json({"files": files, "plugin": made.plugin_name, "remark": made.remark})
+        return
+    for file in files:
+        echo(f"file: {file}")
+    echo(f"plugin: {made.plugin_name}" + (f", source only: {made.remark}" if made.remark else ""))
+    low, high = made.control_range
+    size = f'actdim="{len(made.plant.states)}" dyntype="user" ctrlrange="{low:g} {high:g}"'
+    echo(f'MJCF: <plugin plugin="{made.plugin_name}" tendon="NAME" {size}/>')
 
 
 def _instruction(to: str, paths: tuple[Path, ...], law: bool, controller: bool) -> str:

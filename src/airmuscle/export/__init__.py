@@ -1,14 +1,16 @@
-"""Export of plants, laws and controllers as source text of other languages, and as FMUs."""
+"""Export of plants, laws and controllers as source text of other languages, as FMUs, and as MuJoCo plugins."""
 
 from .controller import write_controller
 from .fmu import WrittenFmu, write_fmu
 from .identifiers import make_identifiers
+from .mujoco_plugin import MuscleActuator, write_mujoco_plugin
 from .targets import C99, JavaScript, Octave, Target
 from .write import write_law, write_program
 
 __all__ = [
     "C99",
     "JavaScript",
+    "MuscleActuator",
     "Octave",
     "Target",
     "WrittenFmu",
@@ -16,5 +18,6 @@ __all__ = [
     "write_controller",
     "write_fmu",
     "write_law",
+    "write_mujoco_plugin",
     "write_program",
 ]
