@@ -1,4 +1,4 @@
-"""An arm with six pneumatic muscles in MuJoCo: the muscles with their valves are an engine plugin, MuJoCo carries the arm.
+"""An arm with six pneumatic muscles in MuJoCo: muscles and valves are an engine plugin, MuJoCo carries the arm.
 
 Needs mujoco>=3.17 (not 4.0.0) and a C compiler. The arm is that of mujoco_arm.xml; valves and commands are chosen.
 """

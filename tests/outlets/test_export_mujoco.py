@@ -6,6 +6,8 @@ With RK4 of the same step both programs evaluate the same formulas; against an a
 from __future__ import annotations
 
 import subprocess
+import sys
+import types
 from dataclasses import replace
 from pathlib import Path
 
@@ -172,8 +174,7 @@ def test_a_wrong_transmission_or_parameter_is_refused(options, message, mujoco, 
 
 @pytest.mark.parametrize("version", ["3.16.2", "2.3.7", "4.0.0"])
 def test_an_unsuitable_mujoco_is_refused_and_the_source_is_written(version, tmp_path, monkeypatch):
-    monkeypatch.setattr(mujoco_plugin.importlib.util, "find_spec", lambda name: name)
-    monkeypatch.setattr(mujoco_plugin.metadata, "version", lambda name: version if name == "mujoco" else "0")
+    monkeypatch.setitem(sys.modules, "mujoco", types.SimpleNamespace(__version__=version))
     with pytest.raises(ParameterError, match=rf"MuJoCo {version} is not supported.*install mujoco>=3\.17,!=4\.0\.0"):
         mujoco_plugin.check_mujoco()
     made = write_mujoco_plugin(PLANT, tmp_path, name="festo")
@@ -183,7 +184,7 @@ def test_an_unsuitable_mujoco_is_refused_and_the_source_is_written(version, tmp_
 
 
 def test_without_mujoco_the_remedy_is_stated(monkeypatch):
-    monkeypatch.setattr(mujoco_plugin.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(ParameterError, match=r"not installed; install mujoco>=3\.17"):
         mujoco_plugin.check_mujoco()
 

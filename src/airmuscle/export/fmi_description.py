@@ -23,7 +23,7 @@ CATEGORIES = ("logStatusWarning", "logStatusError")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Description:
+class FmuDescription:
     """What modelDescription.xml states of an FMU.
 
     name       identifier of the model

@@ -23,7 +23,7 @@ from ..simulation.integrators import Rodas4
 from .c_source import CSource
 from .c_text import c_array, c_number, c_string, c_strings
 from .compiler import compile_library
-from .fmi_description import Description
+from .fmi_description import FmuDescription
 from .fmi_variables import first_inputs, make_variables
 from .provenance import block_comment
 from .targets import ExportedRun
@@ -103,7 +103,7 @@ def fmu_files(program: ExportedRun, fmi: int) -> dict[str, bytes]:
     content = json.dumps([*source.values(), *map(repr, variables), fmi]).encode()
     token = f"{{{hashlib.sha256(content).hexdigest()[:32]}}}"
     title = program.provenance[0]
-    about = Description(program.name, title, token, program.system, program.run, variables, derivatives.places)
+    about = FmuDescription(program.name, title, token, program.system, program.run, variables, derivatives.places)
     places = {"provenance": block_comment(program.provenance), "file": program.name}
     if fmi == 3:
         places["adjoint"] = filled("adjoint.h", {}, program.name)

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import importlib
-import importlib.util
 import math
 import re
 from collections.abc import Mapping, Sequence
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -149,7 +146,7 @@ def write_mujoco_plugin(plant: Plant, folder: str | Path, *, name: str = "", mus
     controls = tuple(i for i in part.input_variables if i.name not in (SHORTENING, SHORTENING_SPEED))
     if len(controls) > 2 or (len(controls) == 2 and any(i.minimum != 0.0 for i in controls)):
         raise ParameterError(
-            "an actuator of MuJoCo has one control; a circuit with a single input, or with two valves that open from 0, "
+            "an actuator of MuJoCo has one control; a circuit with a single input, or two valves that open from 0, "
             f"can be exported, but the inputs are {', '.join(i.name for i in controls)}."
         )
     system = export_system(compile_system(part))
@@ -171,16 +168,18 @@ def write_mujoco_plugin(plant: Plant, folder: str | Path, *, name: str = "", mus
 
 def check_mujoco() -> Any:
     """The module mujoco. Raises ParameterError where it is missing, too old, or of a version that does not work."""
-    if importlib.util.find_spec("mujoco") is None:
-        raise ParameterError("the package mujoco is not installed; install mujoco>=3.17,!=4.0.0")
-    version = metadata.version("mujoco")
+    try:
+        import mujoco
+    except ImportError:
+        raise ParameterError("the package mujoco is not installed; install mujoco>=3.17,!=4.0.0") from None
+    version: str = mujoco.__version__
     numbers = tuple(int(n) for n in re.findall(r"\d+", version)[:2])
     if numbers < OLDEST or version in BROKEN:
         raise ParameterError(
             f"MuJoCo {version} is not supported, because its plugin actuators cannot have several states; install "
             "mujoco>=3.17,!=4.0.0"
         )
-    return importlib.import_module("mujoco")
+    return mujoco
 
 
 def _single(plant: Plant, muscle: str) -> Plant:
