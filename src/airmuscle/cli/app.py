@@ -46,6 +46,7 @@ COMMANDS = (
     CommandRow("inspect", "inspect", "inspect", "Inspect measurement files: columns, runs, sampling, outliers."),
     CommandRow("fit", "fit", "fit", "Fit a characteristic to measured points, or compare several."),
     CommandRow("convert", "convert", "convert", "Approximate one characteristic by another."),
+    CommandRow("convert-data", "convert_data", "convert_data", "Write measurement files as CSV, Parquet or HDF5."),
     CommandRow("hysteresis", "hysteresis", "hysteresis", "Fit friction models to hysteresis loops."),
     CommandRow("fit-dynamic", "fit_dynamic", "fit_dynamic", "Identify plant parameters from transient records."),
     CommandRow("campaign", "campaign", "campaign", "Identify a muscle from all files of a test rig."),
