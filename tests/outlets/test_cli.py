@@ -81,7 +81,7 @@ def assert_failed(result: Result, message: str) -> None:
 # Help and usage
 
 NAMES = (
-    "reproduce", "list", "show", "cite", "solve", "inspect", "fit", "convert", "hysteresis", "fit-dynamic", "campaign",
+    "reproduce", "list", "show", "cite", "solve", "inspect", "fit", "convert", "convert-data", "hysteresis", "fit-dynamic", "campaign",
     "fit-volume", "plan", "bench", "simulate", "sweep", "export", "schema",
 )  # fmt: skip
 
