@@ -24,10 +24,10 @@ from airmuscle.simulation import Problem, Rodas4
 
 STEPS = 1000
 TEXT = (
-    f"The runs of {DURATION:g} s with Rodas4(1e-6), with three, six, eight and ten states. `DoStep` of 1 ms is called from "
-    "C, an input being set and an output read in each, with a jump of the input every 50 steps. A run in C or JavaScript "
-    "writes no rows and is compared with the kernel of the library. The step in MuJoCo is RK4 of 1 ms of a hanging mass: "
-    "with the muscle, less that without."
+    f"The runs of {DURATION:g} s with Rodas4(1e-6), with three, six, eight and ten states. `DoStep` of 1 ms is called "
+    "from C, an input being set and an output read in each, with a jump of the input every 50 steps. A run in C or "
+    "JavaScript writes no rows but the last and is compared with the kernel of the library. The step in MuJoCo is RK4 "
+    "of 1 ms of a mass: with the muscle, less that without."
 )
 HEADER = ("program", "time", "relative to the kernel", "machine code")
 DO_STEP = """

@@ -62,7 +62,7 @@ def export(
     controller: ControllerOnly = False, tunable: Tunable = None, fmi: Fmi = None, sources_only: SourcesOnly = False,
     muscle: MuscleName = "", json: Json = False,
 ) -> None:  # fmt: skip
-    """Export a scenario, law or controller to C, JavaScript, MATLAB or FMU.
+    """Export to C, JavaScript, MATLAB, an FMU or MuJoCo.
 
     \b
     The program contains the equations of the plant, the integrator, and a run of the scenario that writes CSV. Nothing
