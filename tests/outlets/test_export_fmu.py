@@ -373,7 +373,7 @@ def test_a_start_without_equilibrium_is_named_and_nothing_is_written(tmp_path):
     [
         (("--to", "c", "--fmi", "2"), "--fmi and --sources-only belong to --to fmu"),
         (("--to", "fmu", "--law"), "fmu contains a plant"),
-        (("--to", "simulink"), "there are c, js, octave, fmu, mujoco"),
+        (("--to", "simulink"), "there are c, js, octave, fmu, mujoco, modelica"),
     ],
 )
 def test_options_that_do_not_fit_are_refused(options, message, tmp_path):

@@ -55,7 +55,7 @@ COMMANDS = (
     CommandRow("bench", "bench", "bench", "Fit a surface while rows arrive; name the next point."),
     CommandRow("simulate", "simulate", "simulate", "Simulate the plant of a scenario file."),
     CommandRow("sweep", "sweep", "sweep", "Run a parameter study of a scenario."),
-    CommandRow("export", "export", "export", "Export to C, JavaScript, MATLAB, an FMU or MuJoCo."),
+    CommandRow("export", "export", "export", "Export to C, JavaScript, MATLAB, FMU, MuJoCo or Modelica."),
     CommandRow("schema", "schema", "schema", "Print the JSON schema of scenario or muscle files."),
 )
 """All commands, in the order of use."""

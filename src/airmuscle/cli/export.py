@@ -15,6 +15,7 @@ from ..export import (
     write_controller,
     write_fmu,
     write_law,
+    write_modelica,
     write_mujoco_plugin,
     write_program,
 )
@@ -27,7 +28,7 @@ from .terminal import echo, print_json
 
 TARGETS: dict[str, Target] = {"c": C99(), "js": JavaScript(), "octave": Octave()}
 """Languages by the names of the option --to."""
-NAMES = (*TARGETS, "fmu", "mujoco")
+NAMES = (*TARGETS, "fmu", "mujoco", "modelica")
 """All values of the option --to."""
 DEFAULT_FOLDER = Path("export")
 
@@ -62,7 +63,7 @@ def export(
     controller: ControllerOnly = False, tunable: Tunable = None, fmi: Fmi = None, sources_only: SourcesOnly = False,
     muscle: MuscleName = "", json: Json = False,
 ) -> None:  # fmt: skip
-    """Export to C, JavaScript, MATLAB, an FMU or MuJoCo.
+    """Export to C, JavaScript, MATLAB, FMU, MuJoCo or Modelica.
 
     \b
     The program contains the equations of the plant, the integrator, and a run of the scenario that writes CSV. Nothing
@@ -87,6 +88,9 @@ def export(
     check_writable(out)
     if to == "mujoco":
         _export_mujoco(source, out, name, muscle, json)
+        return
+    if to == "modelica":
+        _export_modelica(source, out, name, tunable, json)
         return
     if law:
         entry = load_law(source)
@@ -158,6 +162,18 @@ def _export_mujoco(source: str, out: Path, name: str, muscle: str, json: bool) -
     low, high = made.control_range
     size = f'actdim="{len(made.plant.states)}" dyntype="user" ctrlrange="{low:g} {high:g}"'
     echo(f'MJCF: <plugin plugin="{made.plugin_name}" tendon="NAME" {size}/>')
+
+
+def _export_modelica(source: str, out: Path, name: str, tunable: list[str] | None, json: bool) -> None:
+    """Write a Modelica package into a folder."""
+    scenario = load_scenario(source)
+    paths = write_modelica(scenario.problem, out, name=name, title=scenario.title, tunable=tunable)
+    if json:
+        print_json({"files": [str(path) for path in paths]})
+        return
+    for path in paths:
+        echo(f"file: {path}")
+    echo(f'Modelica: loadFile("{paths[0]}"); block {name}.Plant')
 
 
 def _instruction(to: str, paths: tuple[Path, ...], law: bool, controller: bool) -> str:

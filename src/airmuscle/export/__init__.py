@@ -3,6 +3,7 @@
 from .controller import write_controller
 from .fmu import WrittenFmu, write_fmu
 from .identifiers import make_identifiers
+from .modelica import write_modelica
 from .mujoco_plugin import MuscleActuator, write_mujoco_plugin
 from .targets import C99, JavaScript, Octave, Target
 from .write import write_law, write_program
@@ -18,6 +19,7 @@ __all__ = [
     "write_controller",
     "write_fmu",
     "write_law",
+    "write_modelica",
     "write_mujoco_plugin",
     "write_program",
 ]
