@@ -30,6 +30,7 @@ import model_comparison
 import mujoco_peer
 import new_plant
 import ode8
+import outlets
 import peers
 import rodas4
 import sensitivities
@@ -57,6 +58,7 @@ SECTIONS: tuple[tuple[Callable[[int], Section], int], ...] = (
     (environments.section, 9),
     (bootstrap.section, 5),
     (model_comparison.section, 3),
+    (outlets.section, 1),
     (new_plant.section, 7),
     (startup.section, 7),
 )

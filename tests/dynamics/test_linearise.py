@@ -30,7 +30,7 @@ from airmuscle.pneumatics import (
     WithTubes,
 )
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal
-from airmuscle.simulation import simulate
+from airmuscle.simulation import Problem, simulate, solve
 from airmuscle.simulation.integrators import Rodas4
 
 VALVE = Valve(2.6e-9, 0.433)
@@ -187,3 +187,23 @@ def test_an_own_system_is_linearised_like_a_plant():
 def test_bad_input_is_refused(change, message):
     with pytest.raises(ParameterError, match=message):
         change(moving(HANGING))
+
+
+def test_python_control_receives_the_nonlinear_system():
+    """The response of python-control differs from `simulate` by the tolerances of its integrator."""
+    control = pytest.importorskip("control")
+    plant = HANGING
+    state = moving(plant) | {"speed": 0.0}
+    system = linearise(plant, state).to_control(nonlinear=True)
+    assert isinstance(system, control.NonlinearIOSystem)
+    assert system.state_labels == [s.name.replace(".", "_") for s in plant.states]
+    times = np.linspace(0.0, 0.5, 26)
+    inputs = np.array([np.full(times.size, 0.3 if name == plant.inputs[0] else 0.0) for name in plant.inputs])
+    found = control.input_output_response(
+        system, times, inputs, list(state.values()), solve_ivp_method="LSODA", solve_ivp_kwargs={"rtol": 1e-12, "atol": 1e-14},
+    )  # fmt: skip
+    held = Schedule({plant.inputs[0]: ((0.0, 0.3),)})
+    expected = solve(Problem(plant, held, 0.5, state, integrator=Rodas4(1e-11), output_times=times)).recording
+    for label, values in zip(system.output_labels, found.outputs, strict=True):
+        scale = np.abs(expected[label]).max()
+        assert np.abs(values - expected[label]).max() <= 1e-9 * (scale or 1.0), label

@@ -81,8 +81,8 @@ def assert_failed(result: Result, message: str) -> None:
 # Help and usage
 
 NAMES = (
-    "reproduce", "list", "show", "cite", "solve", "inspect", "fit", "convert", "hysteresis", "fit-dynamic", "campaign",
-    "fit-volume", "plan", "bench", "size", "simulate", "sweep", "tune", "compare", "export",
+    "reproduce", "list", "show", "cite", "solve", "inspect", "fit", "convert", "convert-data", "hysteresis",
+    "fit-dynamic", "campaign", "fit-volume", "plan", "bench", "size", "simulate", "sweep", "tune", "compare", "export",
     "studio", "schema",
 )  # fmt: skip
 

@@ -202,7 +202,7 @@ PID_TABLE = ('commanded = "fill"', 'commanded = {{ model = "SplitRange", positiv
         (SETPOINT, f'{SETPOINT}\ndrivers = {{ pressure = "SolenoidDriver" }}', ParameterError, r"a set point has no drivers; write \[input.drivers\]"),
         (SETPOINT, f'{SETPOINT}\ncontroller = 3', ParameterError, r"a controller is allowed only in a scenario"),
         (SETPOINT, 'file = "none.csv"', AirmuscleError, r"none.csv"),
-        ('model = "PID"', 'model = "Valve"', ParameterError, r"\[input.controller\]: Valve is not a controller; there are DeadZoneController, .*OnOffController, PID"),
+        ('model = "PID"', 'model = "Valve"', ParameterError, r"\[input.controller\]: Valve is not a controller; there are CoContraction, DeadZoneController, .*OnOffController, PID"),
         ('model = "PID"', 'model = "PDI"', UnknownNameError, r"no model 'PDI'"),
         ('model = "PID"\n', "", ParameterError, r"\[input.controller\]: the model is not named"),
         ("[input]\n", '[input]\nfill = [["0.1 s", 1]]\n', ParameterError, r"'fill' is commanded by the controller and by other_inputs"),
@@ -298,17 +298,19 @@ def test_what_the_schema_refuses_the_program_refuses(tmp_path: Path, was: str, b
 def test_the_schema_knows_every_controller():
     tables = scenario_schema()["properties"]["input"]["properties"]["controller"]["anyOf"]
     assert [table["properties"]["model"]["const"] for table in tables] == [
+        "CoContraction",
         "DeadZoneController",
         "Decentralised",
         "OnOffController",
         "PID",
         "SetpointCommand",
+        "SetpointLead",
         "SigmaDelta",
         "SlidingMode",
         "StaticFeedForward",
         "WithFeedForward",
     ]
-    assert tables[3]["properties"]["gain"]["description"] == "K [u/y]: proportional gain"
+    assert tables[4]["properties"]["gain"]["description"] == "K [u/y]: proportional gain"
 
 
 def test_the_report_shows_set_point_and_measurement_with_units():

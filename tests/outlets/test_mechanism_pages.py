@@ -37,7 +37,7 @@ def test_the_code_on_mechanisms_runs(capsys):
     found = run("mechanisms.md")
     assert found["run"]["angle"][-1] > 0.1
     assert found["pull"]["position"].max() == pytest.approx(0.03, abs=1e-9)
-    assert re.fullmatch(r"0\.\d{3} rad\n", capsys.readouterr().out)
+    assert re.fullmatch(r"0\.\d{3} rad\n\d+\.\d N\n", capsys.readouterr().out)
 
 
 def test_the_code_on_joints_runs(capsys):

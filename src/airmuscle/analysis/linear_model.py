@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..compile.jacobians import derivatives
-from ..compile.program import compile_system
+from ..compile.program import CompiledSystem, compile_system
 from ..core.arrays import Array
 from ..core.errors import AirmuscleError, ParameterError, suggestion
 from ..core.system import System
@@ -38,6 +38,7 @@ class LinearModel:
     units           unit of every name
     state, input_values, output_values    the operating point
     rates           (n,) rates of the states there: all zero at an equilibrium
+    system          the system that was linearised
     stiffness       of a Plant: its stiffness at constant pressure and with closed valves; None for another system
     """
 
@@ -54,6 +55,7 @@ class LinearModel:
     rates: Array
     stiffness: Stiffness | None = None
     output_values: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    system: System | None = None
 
     @property
     def poles(self) -> tuple[Pole, ...]:
@@ -102,8 +104,12 @@ class LinearModel:
 
         return StateSpace(self.A, self.B, self.C, self.D)
 
-    def to_control(self) -> Any:
-        """A control.StateSpace with the names of states, inputs and outputs. Needs the package `control`."""
+    def to_control(self, *, nonlinear: bool = False) -> Any:
+        """A control.StateSpace with the names of states, inputs and outputs. Needs the package `control`.
+
+        nonlinear  instead a control.NonlinearIOSystem of the system itself, with the same names: its states, inputs and
+                   outputs are absolute values, not deviations from the operating point
+        """
         try:
             import control
         except ImportError:
@@ -115,7 +121,12 @@ class LinearModel:
             kind: [name.replace(".", "_") for name in given]
             for kind, given in (("states", self.states), ("inputs", self.inputs), ("outputs", self.outputs))
         }
-        return control.StateSpace(self.A, self.B, self.C, self.D, **names)
+        if not nonlinear:
+            return control.StateSpace(self.A, self.B, self.C, self.D, **names)
+        if self.system is None:
+            raise ParameterError("to_control: this model has no system; use the result of linearise.")
+        response = _Response(compile_system(self.system), self.inputs, self.outputs, dict(self.input_values))
+        return control.NonlinearIOSystem(response.rates, response.outputs, name=type(self.system).__name__, **names)
 
     def __repr__(self) -> str:
         slow = ", ".join(f"{p.value:.4g}" for p in self.poles[:6])
@@ -124,6 +135,34 @@ class LinearModel:
             f"LinearModel({len(self.states)} states, inputs {', '.join(self.inputs) or 'none'}, {len(self.outputs)} "
             f"outputs; poles {slow}{more} 1/s)"
         )
+
+
+class _Response:
+    """Rates and outputs of a compiled system, as python-control calls them."""
+
+    def __init__(
+        self, compiled: CompiledSystem, inputs: Sequence[str], outputs: Sequence[str], values: Mapping[str, float]
+    ) -> None:
+        known = compiled.description
+        self._compiled, self._u = compiled, np.array([*values.values(), 0.0])
+        self._inputs = [known.input_names.index(name) for name in inputs]
+        self._outputs = [[*known.state_names, *known.output_names].index(name) for name in outputs]
+
+    def rates(self, t: float, x: npt.ArrayLike, u: npt.ArrayLike, params: object) -> Array:
+        """The rates (n,)."""
+        return self._call("rhs", self._compiled.sizes.states, x, u)
+
+    def outputs(self, t: float, x: npt.ArrayLike, u: npt.ArrayLike, params: object) -> Array:
+        """The chosen outputs (k,), of which the states are some."""
+        state = np.asarray(x, dtype=float)
+        return np.concatenate([state, self._call("outputs", self._compiled.sizes.outputs, x, u)])[self._outputs]
+
+    def _call(self, function: str, size: int, x: npt.ArrayLike, u: npt.ArrayLike) -> Array:
+        inputs, result = self._u.copy(), np.zeros(size + 1)
+        inputs[self._inputs] = np.atleast_1d(np.asarray(u, dtype=float))[: len(self._inputs)]
+        state = np.ascontiguousarray(x, dtype=float)
+        self._compiled.call(function, state, inputs, self._compiled.precomputed, result)
+        return result[:size]
 
 
 def linearise(plant: System, state: Mapping[str, float], inputs: Mapping[str, float] | None = None) -> LinearModel:
@@ -150,6 +189,7 @@ def linearise(plant: System, state: Mapping[str, float], inputs: Mapping[str, fl
         column_units(plant, compiled.output_names), dict(zip(names, x, strict=True)), values, at.rates,
         stiffness(plant, state) if plant.equilibrium_plant is plant else None,
         {**dict(zip(compiled.output_names, at.outputs.tolist(), strict=True)), **dict(zip(names, x, strict=True))},
+        plant,
     )  # fmt: skip
 
 

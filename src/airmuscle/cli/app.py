@@ -46,6 +46,7 @@ COMMANDS = (
     CommandRow("inspect", "inspect", "inspect", "Inspect measurement files: columns, runs, sampling, outliers."),
     CommandRow("fit", "fit", "fit", "Fit a characteristic to measured points, or compare several."),
     CommandRow("convert", "convert", "convert", "Approximate one characteristic by another."),
+    CommandRow("convert-data", "convert_data", "convert_data", "Write measurement files as CSV, Parquet or HDF5."),
     CommandRow("hysteresis", "hysteresis", "hysteresis", "Fit friction models to hysteresis loops."),
     CommandRow("fit-dynamic", "fit_dynamic", "fit_dynamic", "Identify plant parameters from transient records."),
     CommandRow("campaign", "campaign", "campaign", "Identify a muscle from all files of a test rig."),
@@ -57,7 +58,7 @@ COMMANDS = (
     CommandRow("sweep", "sweep", "sweep", "Run a parameter study of a scenario."),
     CommandRow("tune", "tune", "tune", "Tune the controller of a scenario for a family of plants."),
     CommandRow("compare", "compare", "compare", "Compare controllers of an antagonistic joint on common tasks."),
-    CommandRow("export", "export", "export", "Export a scenario, law or controller to C, JavaScript or MATLAB."),
+    CommandRow("export", "export", "export", "Export to C, JavaScript, MATLAB, FMU, MuJoCo or Modelica."),
     CommandRow("studio", "studio", "studio", "Show muscles and plants in the browser."),
     CommandRow("schema", "schema", "schema", "Print the JSON schema of scenario or muscle files."),
 )

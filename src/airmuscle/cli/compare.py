@@ -61,7 +61,7 @@ def compare(
     out: Folder = Path("compare"),
     json: Json = False,
 ) -> None:
-    """Compare controllers of an antagonistic joint.
+    """Compare controllers of an antagonistic joint on common tasks.
 
     \b
     Every controller is tuned by the same optimiser and budget for perturbed models, and judged on a plant of another

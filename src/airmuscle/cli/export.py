@@ -7,7 +7,18 @@ from typing import Annotated
 
 import typer
 
-from ..export import C99, JavaScript, Octave, Target, write_controller, write_law, write_program
+from ..export import (
+    C99,
+    JavaScript,
+    Octave,
+    Target,
+    write_controller,
+    write_fmu,
+    write_law,
+    write_modelica,
+    write_mujoco_plugin,
+    write_program,
+)
 from ..export.building import BuiltProgram, build_and_run
 from ..export.identifiers import make_identifier
 from ..library.law_file import load_law
@@ -17,8 +28,10 @@ from .options import Folder, Json
 from .terminal import echo, print_json
 
 TARGETS: dict[str, Target] = {"c": C99(), "js": JavaScript(), "octave": Octave()}
-"""Targets by the names of the option --to."""
-
+"""Languages by the names of the option --to."""
+NAMES = (*TARGETS, "fmu", "mujoco", "modelica")
+"""All values of the option --to."""
+DEFAULT_FOLDER = Path("export")
 
 Source = Annotated[
     str,
@@ -26,7 +39,7 @@ Source = Annotated[
         metavar="SOURCE", help="A scenario file or a plant of the library; with --law a library entry or a muscle file."
     ),
 ]
-To = Annotated[str, typer.Option("--to", metavar="TARGET", help=f"Language: {', '.join(TARGETS)}.")]
+To = Annotated[str, typer.Option("--to", metavar="TARGET", help=f"Target: {', '.join(NAMES)}.")]
 ProgramName = Annotated[
     str, typer.Option("--name", metavar="NAME", help="Name of the program; default: that of the source.")
 ]
@@ -44,13 +57,17 @@ Tunable = Annotated[
         help="A parameter that the program can change; repeatable. Default: all, of a controller none.",
     ),
 ]  # fmt: skip
+Fmi = Annotated[int | None, typer.Option("--fmi", metavar="2|3", help="Version of FMI for --to fmu. Default: 3.")]
+MuscleName = Annotated[str, typer.Option("--muscle", metavar="NAME", help="One muscle of the plant; --to mujoco.")]
+SourcesOnly = Annotated[bool, typer.Option("--sources-only", help="An FMU without a binary; --to fmu.")]
 
 
 def export(
-    source: Source, to: To, out: Folder = Path("export"), name: ProgramName = "", law: Law = False,
-    controller: ControllerOnly = False, build: Build = False, tunable: Tunable = None, json: Json = False,
+    source: Source, to: To, out: Folder = DEFAULT_FOLDER, name: ProgramName = "", law: Law = False,
+    controller: ControllerOnly = False, build: Build = False, tunable: Tunable = None, fmi: Fmi = None,
+    sources_only: SourcesOnly = False, muscle: MuscleName = "", json: Json = False,
 ) -> None:  # fmt: skip
-    """Export a scenario, law or controller to C, JavaScript or MATLAB.
+    """Export to C, JavaScript, MATLAB, FMU, MuJoCo or Modelica.
 
     \b
     The program contains the equations of the plant, the integrator, and a run of the scenario that writes CSV. Nothing
@@ -63,29 +80,23 @@ def export(
       airmuscle export examples/fill_discharge.toml --to octave --tunable mechanism.mass --out fill_m
       airmuscle export dmsp-20-300 --law --to js --out law_js
       airmuscle export examples/pressure_loop.toml --controller --to c --out controller
+      airmuscle export examples/fill_discharge.toml --to fmu --fmi 2 --out fill.fmu
     """
-    if to not in TARGETS:
-        raise typer.BadParameter(f"--to {to}: there are {', '.join(TARGETS)}.")
-    if controller and (law or to != "c"):
-        raise typer.BadParameter("--controller: a controller is exported to C, and without --law; write --to c.")
-    if build and (law or to != "c"):
-        raise typer.BadParameter("--build: there is a program to compile with --to c and without --law.")
-    if law and tunable:
-        raise typer.BadParameter("--tunable: all parameters of a law can be changed; leave it out.")
-    check_writable(out)
+    _check_options(to, law, controller, build, tunable, fmi is not None or sources_only)
     name = name or make_identifier(Path(source).stem)
-    if law:
-        entry = load_law(source)
-        paths = write_law(entry.characteristic, out, TARGETS[to], name=name, title=entry.title)
-    elif controller:
-        scenario = load_scenario(source)
-        paths = write_controller(scenario.problem, out, name=name, title=scenario.title, tunable=tunable or ())
-    else:
-        scenario = load_scenario(source)
-        paths = write_program(
-            scenario.problem, out, TARGETS[to], name=name, title=scenario.title, tunable=tunable,
-            columns=scenario.columns,
-        )  # fmt: skip
+    if to == "fmu":
+        _export_fmu(source, out, name, tunable, 3 if fmi is None else fmi, not sources_only, json)
+        return
+    if muscle and to != "mujoco":
+        raise typer.BadParameter("--muscle belongs to --to mujoco.")
+    check_writable(out)
+    if to == "mujoco":
+        _export_mujoco(source, out, name, muscle, json)
+        return
+    if to == "modelica":
+        _export_modelica(source, out, name, tunable, json)
+        return
+    paths = _write(source, out, to, name, law, controller, tunable)
     built = build_and_run(paths) if build else None
     if json:
         result = {} if built is None else {"output": built.output, "code_bytes": built.code_size}
@@ -98,6 +109,21 @@ def export(
     echo(f"run: {_instruction(to, paths, law, controller)}")
 
 
+def _write(
+    source: str, out: Path, to: str, name: str, law: bool, controller: bool, tunable: list[str] | None
+) -> tuple[Path, ...]:
+    """Write a law, a controller, or a plant with its run."""
+    if law:
+        entry = load_law(source)
+        return write_law(entry.characteristic, out, TARGETS[to], name=name, title=entry.title)
+    scenario = load_scenario(source)
+    if controller:
+        return write_controller(scenario.problem, out, name=name, title=scenario.title, tunable=tunable or ())
+    return write_program(
+        scenario.problem, out, TARGETS[to], name=name, title=scenario.title, tunable=tunable, columns=scenario.columns
+    )
+
+
 def _print_build(built: BuiltProgram, controller: bool) -> None:
     """What the program printed; of a run, whose output is CSV, the number of its rows."""
     text = (
@@ -105,6 +131,74 @@ def _print_build(built: BuiltProgram, controller: bool) -> None:
     )
     size = "unknown" if built.code_size is None else f"{built.code_size} bytes"
     echo(f"program: {text}; code {size}")
+
+
+def _check_options(
+    to: str, law: bool, controller: bool, build: bool, tunable: list[str] | None, of_an_fmu: bool
+) -> None:
+    """Raise BadParameter for options that do not fit together."""
+    if to not in NAMES:
+        raise typer.BadParameter(f"--to {to}: there are {', '.join(NAMES)}.")
+    if controller and (law or to != "c"):
+        raise typer.BadParameter("--controller: a controller is exported to C, and without --law; write --to c.")
+    if build and (law or to != "c"):
+        raise typer.BadParameter("--build: there is a program to compile with --to c and without --law.")
+    if law and to not in TARGETS:
+        raise typer.BadParameter(f"--law: {to} contains a plant; leave --law out, or write --to c.")
+    if to == "mujoco" and tunable:
+        raise typer.BadParameter("--tunable: all parameters of an actuator can be changed; leave it out.")
+    if law and tunable:
+        raise typer.BadParameter("--tunable: all parameters of a law can be changed; leave it out.")
+    if of_an_fmu and to != "fmu":
+        raise typer.BadParameter("--fmi and --sources-only belong to --to fmu.")
+
+
+def _export_fmu(
+    source: str, out: Path, name: str, tunable: list[str] | None, fmi: int, binary: bool, json: bool
+) -> None:
+    """Write an FMU into a folder, or to a file that ends in .fmu."""
+    path = out if out.suffix == ".fmu" else out / f"{name}.fmu"
+    check_writable(path.parent)
+    scenario = load_scenario(source)
+    written = write_fmu(
+        scenario.problem, path, fmi=fmi, name=name, title=scenario.title, tunable=tunable, binary=binary
+    )
+    if json:
+        print_json({"files": [str(path)], "platform": written.platform, "remark": written.remark})
+        return
+    echo(f"file: {path}")
+    if written.platform:
+        echo(f"FMI {fmi}.0, Model Exchange and Co-Simulation, with sources and a binary for {written.platform}")
+    else:
+        echo(f"FMI {fmi}.0, Model Exchange and Co-Simulation, sources without a binary: {written.remark}")
+    echo(f"run: fmpy simulate {path}")
+
+
+def _export_mujoco(source: str, out: Path, name: str, muscle: str, json: bool) -> None:
+    """Write a MuJoCo plugin into a folder."""
+    made = write_mujoco_plugin(load_scenario(source).plant, out, name=name, muscle=muscle)
+    files = [str(path) for path in (made.source, made.library) if path is not None]
+    if json:
+        print_json({"files": files, "plugin": made.plugin_name, "remark": made.remark})
+        return
+    for file in files:
+        echo(f"file: {file}")
+    echo(f"plugin: {made.plugin_name}" + (f", source only: {made.remark}" if made.remark else ""))
+    low, high = made.control_range
+    size = f'actdim="{len(made.plant.states)}" dyntype="user" ctrlrange="{low:g} {high:g}"'
+    echo(f'MJCF: <plugin plugin="{made.plugin_name}" tendon="NAME" {size}/>')
+
+
+def _export_modelica(source: str, out: Path, name: str, tunable: list[str] | None, json: bool) -> None:
+    """Write a Modelica package into a folder."""
+    scenario = load_scenario(source)
+    paths = write_modelica(scenario.problem, out, name=name, title=scenario.title, tunable=tunable)
+    if json:
+        print_json({"files": [str(path) for path in paths]})
+        return
+    for path in paths:
+        echo(f"file: {path}")
+    echo(f'Modelica: loadFile("{paths[0]}"); block {name}.Plant')
 
 
 def _instruction(to: str, paths: tuple[Path, ...], law: bool, controller: bool) -> str:

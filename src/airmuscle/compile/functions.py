@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from ..core import autodiff
@@ -132,7 +132,17 @@ class Printer:
         return "\n".join([self._language.preparation("prepare", [PARAMETERS], ["c"], self._prepare), *self.text])
 
 
-def implicit_module(t: TracedSystem, language: TargetLanguage = LLVM) -> tuple[str, ArraySizes]:
+Extension = Callable[[Printer], None]
+"""What adds further functions to a module; they share its `prepare`."""
+
+
+def _no_extension(printer: Printer) -> None:
+    """The functions of the module alone."""
+
+
+def implicit_module(
+    t: TracedSystem, language: TargetLanguage = LLVM, extend: Extension = _no_extension
+) -> tuple[str, ArraySizes]:
     """What an implicit method needs: rhs, jac, factor, solve, stage, df_dt and outputs.
 
     rhs(x, u, c, f)              f = rates
@@ -161,15 +171,19 @@ def implicit_module(t: TracedSystem, language: TargetLanguage = LLVM) -> tuple[s
     df_dt = casadi.densify(casadi.jtimes(t.f, t.u, t.w) if t.u.numel() else casadi.SX(size, 1))
     printer.add("df_dt", {**point, "w": t.w}, {"f": df_dt})
     printer.add("outputs", point, {"o": t.o})
+    extend(printer)
     sizes = ArraySizes(size, t.u.shape[0], t.p.shape[0], printer.held, lu.j.numel(), lu.values.numel(), t.o.shape[0])
     return printer.module(), sizes
 
 
-def rates_module(t: TracedSystem, language: TargetLanguage = LLVM) -> tuple[str, ArraySizes]:
+def rates_module(
+    t: TracedSystem, language: TargetLanguage = LLVM, extend: Extension = _no_extension
+) -> tuple[str, ArraySizes]:
     """What a caller with an integrator of its own needs: rhs and outputs, as in `implicit_module`."""
     printer, point = Printer(language), {"x": t.x, "u": t.u, PARAMETERS: t.p}
     printer.add("rhs", point, {"f": t.f})
     printer.add("outputs", point, {"o": t.o})
+    extend(printer)
     sizes = ArraySizes(t.x.numel(), t.u.numel(), t.p.numel(), printer.held, 0, 0, t.o.numel())
     return printer.module(), sizes
 

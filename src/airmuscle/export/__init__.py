@@ -1,17 +1,25 @@
-"""Export of plants, laws and controllers as source text of other languages: C99, JavaScript, MATLAB and Octave."""
+"""Export of plants, laws and controllers as source text of other languages, as FMUs, and as MuJoCo plugins."""
 
 from .controller import write_controller
+from .fmu import WrittenFmu, write_fmu
 from .identifiers import make_identifiers
+from .modelica import write_modelica
+from .mujoco_plugin import MuscleActuator, write_mujoco_plugin
 from .targets import C99, JavaScript, Octave, Target
 from .write import write_law, write_program
 
 __all__ = [
     "C99",
     "JavaScript",
+    "MuscleActuator",
     "Octave",
     "Target",
+    "WrittenFmu",
     "make_identifiers",
     "write_controller",
+    "write_fmu",
     "write_law",
+    "write_modelica",
+    "write_mujoco_plugin",
     "write_program",
 ]

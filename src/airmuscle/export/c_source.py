@@ -8,7 +8,7 @@ import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..compile.functions import ArraySizes
+from ..compile.functions import ArraySizes, Extension
 from ..compile.kernels import rodas4_coefficients
 from ..compile.text.c import CLanguage
 from ..recording.recording import column_heading
@@ -20,7 +20,7 @@ from .provenance import block_comment
 from .run_data import RunData, tableau_arrays
 from .templates import filled
 
-PUBLIC = frozenset({"prepare", "rhs", "outputs"})
+PUBLIC = frozenset({"prepare", "rhs", "outputs", "partials"})
 """Printed functions that other files may call."""
 COEFFICIENTS = {name: value for name, value in vars(rodas4_coefficients).items() if name.isupper()}
 """Coefficients of Rodas4 by name."""
@@ -37,11 +37,15 @@ class CSource:
     system: ExportedSystem
     integrator: Integrator
     provenance: Sequence[str]
+    extend: Extension | None = None
+    """Further functions; those named in PUBLIC can be called by other files."""
 
     def files(self) -> dict[str, str]:
         """Contents of the header and of the source, by file name."""
         language = CLanguage("double", f"{self.name}_", PUBLIC)
-        functions, sizes = self.system.printed(language, implicit=isinstance(self.integrator, Rodas4))
+        functions, sizes = self.system.printed(
+            language, implicit=isinstance(self.integrator, Rodas4), extend=self.extend
+        )
         common = {"provenance": block_comment(self.provenance), "file": self.name}
         header = {**common, **self._sizes(sizes), **self._steps(), "enumerations": self._enumerations()}
         source = {**common, "constants": self._constants(), "functions": functions, "solver": self._solver(sizes)}

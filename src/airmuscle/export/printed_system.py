@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..compile.functions import ArraySizes, TracedSystem, implicit_module, rates_module
+from ..compile.functions import ArraySizes, Extension, TracedSystem, implicit_module, rates_module
 from ..compile.ir.emission import TargetLanguage
 from ..compile.program import CompiledSystem
 from ..core.arrays import Array
@@ -61,9 +61,12 @@ class ExportedSystem:
         """The size of each state below which its relative error does not matter."""
         return self.compiled.nominal
 
-    def printed(self, language: TargetLanguage, *, implicit: bool = True) -> tuple[str, ArraySizes]:
+    def printed(
+        self, language: TargetLanguage, *, implicit: bool = True, extend: Extension | None = None
+    ) -> tuple[str, ArraySizes]:
         """The functions `prepare`, `rhs` and `outputs` of arrays; with `implicit` also those of a Rosenbrock step."""
-        return (implicit_module if implicit else rates_module)(self.traced, language)
+        module = implicit_module if implicit else rates_module
+        return module(self.traced, language, extend) if extend else module(self.traced, language)
 
 
 def export_system(compiled: CompiledSystem, tunable: Sequence[str] | None = None) -> ExportedSystem:

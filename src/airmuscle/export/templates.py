@@ -7,11 +7,15 @@ from collections.abc import Mapping
 from importlib import resources
 
 
-def filled(template: str, values: Mapping[str, str], prefix: str) -> str:
+def filled(name: str, values: Mapping[str, str], prefix: str) -> str:
     """A template with the values of its places `@name@`; `model_` and `MODEL_` become the prefix of the program.
 
     Values are inserted as they are: what stands in them is not replaced.
     """
-    text = resources.files(__package__).joinpath("templates", template).read_text(encoding="utf-8")
-    text = text.replace("model_", f"{prefix}_").replace("MODEL_", f"{prefix.upper()}_")
+    text = template(name).replace("model_", f"{prefix}_").replace("MODEL_", f"{prefix.upper()}_")
     return re.sub(r"@(\w+)@", lambda found: values[found.group(1)], text)
+
+
+def template(name: str) -> str:
+    """The text of a template, or of a header that is shipped with the program."""
+    return resources.files(__package__).joinpath("templates", *name.split("/")).read_text(encoding="utf-8")

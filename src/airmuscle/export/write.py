@@ -50,7 +50,7 @@ def write_program(
 
 def make_run(
     problem: Problem, *, name: str = "", title: str = "", tunable: Sequence[str] | None = None,
-    columns: Sequence[str] = (),
+    columns: Sequence[str] = (), notes: Sequence[str] = (NOTE,),
 ) -> ExportedRun:  # fmt: skip
     """A problem ready for any target; arguments and errors as for `write_program`."""
     check_open_loop(problem)
@@ -62,7 +62,7 @@ def make_run(
                 f"the run has no column '{column}'; there are {', '.join(system.columns)}."
                 f"{suggestion(column, system.columns)}"
             )
-    lines = provenance(title, problem.system, (run.integrator,), [NOTE])
+    lines = provenance(title, problem.system, (run.integrator,), notes)
     chosen = tuple(c for c in columns if c != "time") or system.columns
     return ExportedRun(checked_name(name) or program_name(title), system, run, lines, chosen)
 

@@ -19,6 +19,16 @@ MARGIN = 1e-3
 """Fraction of the contraction range of a geometry within which a muscle is at its limit (chosen)."""
 _TOLERANCE = 1e-9
 """Fraction of a range by which a column may exceed it through rounding."""
+_MEANINGS = {
+    DiagnosticCode.RATING: ("the range that its maker permits", "the muscle may be damaged there"),
+    DiagnosticCode.EXTRAPOLATION: ("the validity range of its characteristic", "values there are extrapolated"),
+    DiagnosticCode.FRICTION_EXTRAPOLATION: (
+        "the range of the data of its friction",
+        "the friction there is extrapolated",
+    ),
+    DiagnosticCode.GEOMETRY_LIMIT: ("the contraction range of its geometry", "such contractions are not physical"),
+}
+"""The range that a column has left, and what that means."""
 
 
 def describe_friction(muscles: Sequence[Muscle]) -> str:
@@ -81,23 +91,31 @@ def _excess(
     """The diagnostic of a column of pressure, speed or contraction that exceeds its limits."""
     low, high = bounds
     excess = np.maximum(low - values, values - high)
-    scale, unit = {"pressure": (1e3, "kPa"), "speed": (1.0, "m/s"), "force": (1.0, "N")}.get(quantity, (0.01, "%"))
+    scale, unit = _shown_unit(quantity)
     worst, rows = int(np.argmax(excess)), int(np.count_nonzero(excess > 0))
-    where, meaning = {
-        DiagnosticCode.RATING: ("the range that its maker permits", "the muscle may be damaged there"),
-        DiagnosticCode.EXTRAPOLATION: ("the validity range of its characteristic", "values there are extrapolated"),
-        DiagnosticCode.FRICTION_EXTRAPOLATION: (
-            "the range of the data of its friction",
-            "the friction there is extrapolated",
-        ),
-        DiagnosticCode.GEOMETRY_LIMIT: ("the contraction range of its geometry", "such contractions are not physical"),
-    }[code]
+    where, meaning = _MEANINGS[code]
     text = (
         f"{subject} was outside {where} in {quantity.replace('_', ' ')} ({_span(low / scale, high / scale)} "
         f"{unit}) in {rows / values.size:.0%} of the rows, by at most {excess[worst] / scale:.4g} {unit} at "
         f"{time[worst]:.4g} s; {meaning}"
     )
     return Diagnostic(code, subject, text, rows)
+
+
+def describe_limit(limit: ColumnLimit) -> str:
+    """Text that says which range a column has left; without the values of a run."""
+    scale, unit = _shown_unit(limit.quantity)
+    where, meaning = _MEANINGS[limit.code]
+    low, high = limit.bounds
+    return (
+        f"{limit.subject}: outside {where} in {limit.quantity.replace('_', ' ')} ({_span(low / scale, high / scale)} "
+        f"{unit}); {meaning}"
+    )
+
+
+def _shown_unit(quantity: str) -> tuple[float, str]:
+    """Factor and name of the unit in which a quantity is shown."""
+    return {"pressure": (1e3, "kPa"), "speed": (1.0, "m/s"), "force": (1.0, "N")}.get(quantity, (0.01, "%"))
 
 
 def _span(low: float, high: float) -> str:

@@ -3,11 +3,13 @@
 from .columns import QUANTITIES, Quantity
 from .csv_reader import read_csv
 from .csv_writer import write_csv
+from .data_frames import from_pandas, to_xarray
 from .downsampling import BlockMeans, Decimation
 from .mapping import ColumnMapping
 from .reader import read
 from .recording import Recording
 from .time_base import NoTime, RecordedTime, TimeBase, UniformTime
+from .writer import write
 
 __all__ = [
     "QUANTITIES",
@@ -20,7 +22,10 @@ __all__ = [
     "Recording",
     "TimeBase",
     "UniformTime",
+    "from_pandas",
     "read",
     "read_csv",
+    "to_xarray",
+    "write",
     "write_csv",
 ]

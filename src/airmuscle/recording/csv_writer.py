@@ -13,11 +13,13 @@ from .constants import CONSTANT_UNITS
 from .recording import Recording, column_heading
 
 
-def write_csv(recording: Recording, path: str | Path) -> Path:
+def write_csv(recording: Recording, path: str | Path, *, comments: bool = True) -> Path:
     """Write a recording in SI units and return the path.
 
-    The column headings state the units; comments above them state origin, constants and notes. The file is replaced
-    atomically: an existing file remains unchanged if writing fails. Raises FileError or ParameterError.
+    The column headings state the units; comments above them state origin, constants and notes. Without `comments` the
+    file has the headings and the rows alone, as other programs expect it (`pandas.read_csv(path)`); constants and notes
+    are then not in it. The file is replaced atomically: an existing file remains unchanged if writing fails. Raises
+    FileError or ParameterError.
     """
     if not isinstance(recording, Recording):
         raise ParameterError(
@@ -29,7 +31,9 @@ def write_csv(recording: Recording, path: str | Path) -> Path:
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         with temporary.open("w", encoding="utf-8", newline="") as file:
-            _write(recording, file)
+            if comments:
+                _write_comments(recording, file)
+            _write_table(recording, file)
         temporary.replace(path)
     except OSError as reason:
         raise FileError(
@@ -40,13 +44,16 @@ def write_csv(recording: Recording, path: str | Path) -> Path:
     return path
 
 
-def _write(recording: Recording, file: TextIO) -> None:
+def _write_comments(recording: Recording, file: TextIO) -> None:
     file.write(f"# {_one_line(recording.origin)}\n")
     for name, value in recording.constants.items():
         unit = f" [{CONSTANT_UNITS[name]}]" if name in CONSTANT_UNITS else ""
         file.write(f"# {name}{unit} = {json.dumps(value, ensure_ascii=False)}\n")
     for note in recording.notes:
         file.write(f"# Note: {_one_line(note)}\n")
+
+
+def _write_table(recording: Recording, file: TextIO) -> None:
     table = csv.writer(file, lineterminator="\n")
     table.writerow([column_heading(name) for name in recording])
     table.writerows(zip(*(recording[name].tolist() for name in recording), strict=True))

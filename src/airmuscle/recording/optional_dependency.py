@@ -29,8 +29,9 @@ def import_lab_package(name: str, path: Path) -> Any:
 
 
 def _missing_package(name: str, path: Path) -> FileError:
+    extra = "ros" if name.startswith("rosbags") else "lab"
     return FileError(
-        f"{path.name}: reading {path.suffix} files needs the package {name}. Install it: pip install airmuscle[lab]"
+        f"{path.name}: reading {path.suffix} files needs the package {name}. Install it: pip install airmuscle[{extra}]"
     )
 
 

@@ -17,6 +17,7 @@ from .raw_csv import read_csv_table
 from .raw_excel import read_excel_tables
 from .raw_mat import read_mat_tables
 from .raw_mdf import read_mdf_tables
+from .raw_rosbag import read_rosbag_tables
 from .raw_tdms import read_tdms_tables
 from .raw_workbook import read_workbook_tables
 from .recording import Recording
@@ -40,6 +41,9 @@ _BINARY_READERS: Mapping[str, Callable[[Path, ColumnMapping], Tables]] = {
     ".tdms": lambda path, m: read_tdms_tables(path, m.group),
     ".mf4": lambda path, m: read_mdf_tables(path, m.group),
     ".mdf": lambda path, m: read_mdf_tables(path, m.group),
+    ".bag": lambda path, m: read_rosbag_tables(path, m.group),
+    ".db3": lambda path, m: read_rosbag_tables(path, m.group),
+    ".mcap": lambda path, m: read_rosbag_tables(path, m.group),
 }
 EXTENSIONS = (*TEXT_EXTENSIONS, *_BINARY_READERS)
 """Extensions of the supported files."""

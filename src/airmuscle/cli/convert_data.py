@@ -1,0 +1,62 @@
+"""`airmuscle convert-data`: measurement files or recordings in another file format."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..core.errors import FileError
+from ..recording import Recording, read, write
+from ..recording.csv_writer import write_csv
+from ..recording.writer import EXTENSIONS
+from .options import Json
+from .terminal import echo, print_json
+
+Source = Annotated[str, typer.Argument(metavar="FILE", help="A file, folder or glob pattern, as for inspect.")]
+Target = Annotated[Path, typer.Argument(metavar="TARGET", help=f"The file to write: {', '.join(EXTENSIONS)}.")]
+MappingFile = Annotated[
+    Path | None, typer.Option("--mapping", metavar="FILE", help="TOML file with what the files do not state.")
+]
+Plain = Annotated[bool, typer.Option("--plain", help="CSV without comments, as pandas and spreadsheets expect it.")]
+
+
+def convert_data(
+    source: Source, target: Target, mapping: MappingFile = None, plain: Plain = False, json: Json = False
+) -> None:
+    """Write measurement files as CSV, Parquet or HDF5.
+
+    \b
+    Values are in SI units. One recording becomes TARGET; several become files with a number before the extension.
+
+    \b
+    Examples:
+      airmuscle convert-data bench.tdms bench.parquet
+      airmuscle convert-data "runs/*.csv" runs.h5 --mapping rig.toml
+      airmuscle convert-data run/recording.csv plain.csv --plain
+    """
+    if plain and target.suffix.lower() != ".csv":
+        raise typer.BadParameter("--plain belongs to a target that ends in .csv.")
+    if target.suffix.lower() not in EXTENSIONS:
+        raise FileError(f"{target}: the extension must be one of {', '.join(EXTENSIONS)}.")
+    recordings = read(source, mapping=mapping)
+    paths = [_path(target, i, len(recordings)) for i in range(len(recordings))]
+    for recording, path in zip(recordings, paths, strict=True):
+        _write(recording, path, plain)
+    if json:
+        print_json({"files": [{"file": str(p), "rows": len(r)} for r, p in zip(recordings, paths, strict=True)]})
+        return
+    for recording, path in zip(recordings, paths, strict=True):
+        echo(f"file: {path}: {len(recording)} rows of {', '.join(recording)}")
+
+
+def _path(target: Path, number: int, count: int) -> Path:
+    return target if count == 1 else target.with_name(f"{target.stem}_{number + 1:03d}{target.suffix}")
+
+
+def _write(recording: Recording, path: Path, plain: bool) -> None:
+    if plain:
+        write_csv(recording, path, comments=False)
+    else:
+        write(recording, path)

@@ -1,0 +1,50 @@
+"""C compiler of the machine, for shared libraries of exported sources."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from ..core.errors import FileError, ParameterError
+
+COMPILERS = ("gcc", "clang", "cc")
+OPTIONS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden", "-s")
+"""No contraction of products and sums: the numbers are those of the library on every processor."""
+TIME_LIMIT = 600.0
+"""Time [s] after which a compiler is stopped (chosen)."""
+
+
+def compile_library(sources: Mapping[str, bytes], units: Sequence[str], name: str, more: Sequence[str] = ()) -> bytes:
+    """The shared library `name` of the files `units` among `sources`, compiled in a fresh folder.
+
+    more  further arguments of the compiler
+
+    Raises ParameterError where there is no compiler, FileError where it fails.
+    """
+    compiler = find_compiler()
+    with tempfile.TemporaryDirectory(prefix="airmuscle-") as folder:
+        for file, text in sources.items():
+            (Path(folder) / file).write_bytes(text)
+        command = [compiler, *OPTIONS, *units, "-o", name, *more, "-lm"]
+        try:
+            done = subprocess.run(
+                command, cwd=folder, check=False, capture_output=True, text=True, timeout=TIME_LIMIT
+            )  # fmt: skip
+        except subprocess.TimeoutExpired:
+            raise FileError(f"{compiler} was stopped after {TIME_LIMIT:g} s.") from None
+        if done.returncode:
+            reason = " ".join((done.stderr or done.stdout).split())[:300]
+            raise FileError(f"{Path(compiler).name} failed with exit code {done.returncode}: {reason}")
+        return (Path(folder) / name).read_bytes()
+
+
+def find_compiler() -> str:
+    """The path of a C compiler. Raises ParameterError."""
+    for name in COMPILERS:
+        path = shutil.which(name)
+        if path:
+            return path
+    raise ParameterError(f"no C compiler ({', '.join(COMPILERS)}) was found; install the package gcc or clang")

@@ -1,0 +1,96 @@
+"""Variables of an FMU: time, states, rates, inputs, outputs, parameters and the tolerance, with their value references.
+
+The value references follow each other in this order, as in the template `instance.h`; time is 0.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+from ..compile.partials import Place
+from ..core.errors import ParameterError, printable
+from ..simulation.integrators import Rodas4
+from .printed_system import ExportedSystem
+from .run_data import RunData
+
+PARAMETERS, TOLERANCE = "parameters", "relative_tolerance"
+"""Beginning of the names of parameters, and name of the tolerance."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Variable:
+    """A variable with the attributes that both versions of FMI have."""
+
+    name: str
+    reference: int
+    causality: str
+    variability: str = "continuous"
+    initial: str = ""
+    start: float | None = None
+    unit: str = ""
+    description: str = ""
+    minimum: float = -math.inf
+    maximum: float = math.inf
+    derivative_of: int | None = None
+    """The value reference of the state whose derivative the variable is."""
+    nominal: float | None = None
+
+
+def make_variables(system: ExportedSystem, run: RunData) -> list[Variable]:
+    """The variables of an FMU, by increasing value reference. Raises ParameterError for two of one name."""
+    variables = [Variable("time", 0, "independent", unit="s", description="time")]
+    units, known = system.units, system.compiled.system
+
+    def add(name: str, causality: str, **attributes: object) -> None:
+        variables.append(Variable(name, len(variables), causality, **attributes))  # type: ignore[arg-type]
+
+    for state, start in zip(known.states, run.initial.tolist(), strict=True):
+        texts = {"unit": state.unit, "description": state.meaning}
+        add(state.name, "output", initial="exact", start=start, nominal=state.nominal, **texts)
+    for i, state in enumerate(known.states, 1):
+        unit = "1/s" if state.unit in ("", "1") else f"{state.unit}/s" if "/" not in state.unit else ""
+        about = f"derivative of {state.name}"
+        add(f"der({state.name})", "local", initial="calculated", unit=unit, derivative_of=i, description=about)
+    for given, start in zip(known.input_variables, first_inputs(run), strict=True):
+        limits = {"minimum": given.minimum, "maximum": given.maximum}
+        add(given.name, "input", start=start, unit=given.unit, description=given.meaning, **limits)
+    for name in system.output_names:
+        add(name, "output", initial="calculated", unit=units[name])
+    for leaf in system.tunable:
+        low, high = leaf.declared.bounds
+        about = f"{leaf.declared.symbol}: {leaf.declared.meaning}"
+        add(
+            f"{PARAMETERS}.{leaf.path}", "parameter", variability="tunable", initial="exact", start=float(leaf.value),
+            minimum=low, maximum=high, unit=leaf.declared.unit, description=about,
+        )  # fmt: skip
+    if isinstance(run.integrator, Rodas4):
+        about = "relative tolerance of the integrator in Co-Simulation"
+        start = run.integrator.rtol
+        add(TOLERANCE, "parameter", variability="tunable", initial="exact", start=start, description=about)
+    return _checked(variables)
+
+
+def first_inputs(run: RunData) -> list[float]:
+    """The inputs at the beginning of the run."""
+    values: list[float] = run.segments.values[0].tolist()
+    return values
+
+
+def references_of(system: ExportedSystem, place: Place) -> tuple[int, int]:
+    """The value references of the rate or output, and of the state or input, of a partial derivative."""
+    n, m = len(system.state_names), len(system.input_names)
+    row, column = place
+    unknown = 1 + n + row if row < n else 1 + 2 * n + m + row - n
+    return unknown, 1 + column if column < n else 1 + 2 * n + column - n
+
+
+def _checked(variables: list[Variable]) -> list[Variable]:
+    seen: set[str] = set()
+    for variable in variables:
+        if variable.name in seen:
+            raise ParameterError(
+                f"the FMU would have two variables '{variable.name}'; rename the muscle or signal of this name."
+            )
+        seen.add(variable.name)
+    return [dataclasses.replace(v, name=printable(v.name), description=printable(v.description)) for v in variables]

@@ -1,0 +1,201 @@
+/* One instance of the model, for the functions of FMI 2.0 and 3.0. */
+#include "@file@.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define MODEL_TOKEN "@token@"
+#define MODEL_PARTIALS @partials@
+#define MODEL_LIMITS @limits@
+#define MODEL_RTOL_START @rtol@
+
+/* Value references; 0 is time. The tolerance exists for an integrator that controls its error. */
+#define MODEL_FIRST_STATE 1u
+#define MODEL_FIRST_RATE (MODEL_FIRST_STATE + MODEL_STATES)
+#define MODEL_FIRST_INPUT (MODEL_FIRST_RATE + MODEL_STATES)
+#define MODEL_FIRST_OUTPUT (MODEL_FIRST_INPUT + MODEL_INPUTS)
+#define MODEL_FIRST_PARAMETER (MODEL_FIRST_OUTPUT + MODEL_OUTPUTS)
+#define MODEL_TOLERANCE (MODEL_FIRST_PARAMETER + MODEL_PARAMETERS)
+#define MODEL_ROWS (MODEL_STATES + MODEL_OUTPUTS)
+
+/* d(rates, outputs)/d(states, inputs): values of the non-zeros, whose places are in model_rows and model_columns. */
+void model_partials(const double *restrict x, const double *restrict u, const double *restrict c, double *restrict D);
+
+@constants@
+typedef struct {
+  model_solver s;
+  double u[MODEL_INPUTS + 1], w[MODEL_INPUTS + 1], p[MODEL_PARAMETERS + 1], c[MODEL_PRECOMPUTED + 1];
+  double f[MODEL_STATES], o[MODEL_OUTPUTS + 1];
+  int unprepared, unevaluated, jumped;
+  unsigned char told[MODEL_LIMITS + 1];
+} model_instance;
+
+typedef void (*model_report)(void *owner, int is_error, const char *text);
+
+static void model_reset(model_instance *m)
+{
+  memset(m, 0, sizeof *m);
+  model_begin(&m->s, @start@, model_start_states);
+  m->s.rtol = MODEL_RTOL_START;
+  memcpy(m->u, model_start_inputs, sizeof m->u);
+  memcpy(m->p, model_defaults, sizeof m->p);
+  m->unprepared = m->unevaluated = m->jumped = 1;
+}
+
+static void model_ready(model_instance *m)
+{
+  if (!m->unprepared) return;
+  model_prepare(m->p, m->c);
+  m->unprepared = 0;
+  m->unevaluated = m->jumped = 1;
+}
+
+static void model_evaluate(model_instance *m)
+{
+  model_ready(m);
+  if (!m->unevaluated) return;
+  model_rhs(m->s.x, m->u, m->c, m->f);
+  model_outputs(m->s.x, m->u, m->c, m->o);
+  m->unevaluated = 0;
+}
+
+/* The value of a variable; 1 for an unknown value reference. */
+static int model_get(model_instance *m, unsigned v, double *value)
+{
+  if (v >= MODEL_FIRST_RATE && (v < MODEL_FIRST_INPUT || (v >= MODEL_FIRST_OUTPUT && v < MODEL_FIRST_PARAMETER)))
+    model_evaluate(m);
+  if (v == 0) *value = m->s.t;
+  else if (v < MODEL_FIRST_RATE) *value = m->s.x[v - MODEL_FIRST_STATE];
+  else if (v < MODEL_FIRST_INPUT) *value = m->f[v - MODEL_FIRST_RATE];
+  else if (v < MODEL_FIRST_OUTPUT) *value = m->u[v - MODEL_FIRST_INPUT];
+  else if (v < MODEL_FIRST_PARAMETER) *value = m->o[v - MODEL_FIRST_OUTPUT];
+  else if (v < MODEL_TOLERANCE) *value = m->p[v - MODEL_FIRST_PARAMETER];
+  else if (v == MODEL_TOLERANCE && MODEL_RTOL_START > 0.0) *value = m->s.rtol;
+  else return 1;
+  return 0;
+}
+
+/* Set a state, an input, a parameter or the tolerance; 1 for any other variable, or a value that is not finite. */
+static int model_set(model_instance *m, unsigned v, double value)
+{
+  if (!isfinite(value)) return 1;
+  if (v >= MODEL_FIRST_STATE && v < MODEL_FIRST_RATE) {
+    m->s.x[v - MODEL_FIRST_STATE] = value;
+    m->jumped = 1;
+  } else if (v >= MODEL_FIRST_INPUT && v < MODEL_FIRST_OUTPUT) {
+    if (m->u[v - MODEL_FIRST_INPUT] != value) m->jumped = 1;
+    m->u[v - MODEL_FIRST_INPUT] = value;
+    m->w[v - MODEL_FIRST_INPUT] = 0.0;
+  } else if (v >= MODEL_FIRST_PARAMETER && v < MODEL_TOLERANCE) {
+    m->p[v - MODEL_FIRST_PARAMETER] = value;
+    m->unprepared = 1;
+  } else if (v == MODEL_TOLERANCE && MODEL_RTOL_START > 0.0 && value > 0.0 && value < 1.0) {
+    m->s.rtol = value;
+  } else {
+    return 1;
+  }
+  m->unevaluated = 1;
+  return 0;
+}
+
+static double model_column(const model_instance *m, int k)
+{
+  if (k < MODEL_STATES) return m->s.x[k];
+  if (k < MODEL_STATES + MODEL_INPUTS) return m->u[k - MODEL_STATES];
+  return m->o[k - MODEL_STATES - MODEL_INPUTS];
+}
+
+/* Report each limit once that a column exceeds; 1 if a column has no finite value, or a state is below its bound. */
+static int model_check(model_instance *m, model_report report, void *owner)
+{
+  char text[640];
+  int k;
+  model_evaluate(m);
+  for (k = 0; k < MODEL_STATES + MODEL_INPUTS + MODEL_OUTPUTS; k++) {
+    const double value = model_column(m, k);
+    if (isfinite(value) && value >= model_minimum[k]) continue;
+    snprintf(text, sizeof text, "%.200s is %.6g at %.6g s: not finite, or below its limit", model_names[k], value, m->s.t);
+    report(owner, 1, text);
+    return 1;
+  }
+  for (k = 0; k < MODEL_LIMITS; k++) {
+    const double value = model_column(m, model_limits[k].column);
+    if (m->told[k] || (value >= model_limits[k].low && value <= model_limits[k].high)) continue;
+    m->told[k] = 1;
+    snprintf(text, sizeof text, "%.500s (%.6g at %.6g s)", model_limits[k].text, value, m->s.t);
+    report(owner, 0, text);
+  }
+  return 0;
+}
+
+/* Advance from time t by h; inputs are linear in time within the step. 1 if it failed, which is reported. */
+static int model_do_step(model_instance *m, double t, double h, model_report report, void *owner)
+{
+  const double end = t + h;
+  int i, status = MODEL_DONE;
+  if (!(h > 0.0 && isfinite(end)) || fabs(t - m->s.t) > 1e-6 * h + 1e-12 * fabs(t)) {
+    report(owner, 1, "a step must begin where the last one ended, and have a positive, finite size");
+    return 1;
+  }
+  model_ready(m);
+  m->s.t = t;
+  model_set_segment(&m->s, end, m->u, m->w);
+  if (m->jumped) m->s.h = MODEL_FIRST_STEP;
+  m->jumped = 0;
+  while (m->s.t < end && status == MODEL_DONE) status = model_step(&m->s, m->c);
+  for (i = 0; i < MODEL_INPUTS; i++) m->u[i] += m->w[i] * h;
+  m->unevaluated = 1;
+  if (status != MODEL_DONE) {
+    report(owner, 1, status == MODEL_STEP_TOO_SMALL ? "the internal step became too small" : "a rate is not finite");
+    return 1;
+  }
+  return model_check(m, report, owner);
+}
+
+/* The row of a rate or output, or -1 - i for the state i; -1 - MODEL_STATES for anything else. */
+static int model_row(unsigned v)
+{
+  if (v >= MODEL_FIRST_STATE && v < MODEL_FIRST_RATE) return -1 - (int)(v - MODEL_FIRST_STATE);
+  if (v >= MODEL_FIRST_RATE && v < MODEL_FIRST_INPUT) return (int)(v - MODEL_FIRST_RATE);
+  if (v >= MODEL_FIRST_OUTPUT && v < MODEL_FIRST_PARAMETER) return (int)(v - MODEL_FIRST_OUTPUT) + MODEL_STATES;
+  return -1 - MODEL_STATES;
+}
+
+/* The column of a state or input, or -1. */
+static int model_variable(unsigned v)
+{
+  if (v >= MODEL_FIRST_STATE && v < MODEL_FIRST_RATE) return (int)(v - MODEL_FIRST_STATE);
+  if (v >= MODEL_FIRST_INPUT && v < MODEL_FIRST_OUTPUT) return (int)(v - MODEL_FIRST_INPUT) + MODEL_STATES;
+  return -1;
+}
+
+static int model_known(const unsigned *unknown, size_t unknowns, const unsigned *known, size_t knowns)
+{
+  size_t i;
+  for (i = 0; i < unknowns; i++)
+    if (model_row(unknown[i]) == -1 - MODEL_STATES) return 0;
+  for (i = 0; i < knowns; i++)
+    if (model_variable(known[i]) < 0) return 0;
+  return 1;
+}
+
+/* result = d(unknown)/d(known) seed; 1 if the variables are not rates, outputs or states by states or inputs. */
+static int model_forward(model_instance *m, const unsigned *unknown, size_t unknowns, const unsigned *known,
+                         size_t knowns, const double *seed, double *result)
+{
+  double v[MODEL_STATES + MODEL_INPUTS + 1] = {0.0}, rows[MODEL_ROWS + 1] = {0.0}, D[MODEL_PARTIALS + 1];
+  size_t i;
+  int k;
+  if (!model_known(unknown, unknowns, known, knowns)) return 1;
+  model_ready(m);
+  model_partials(m->s.x, m->u, m->c, D);
+  for (i = 0; i < knowns; i++) v[model_variable(known[i])] += seed[i];
+  for (k = 0; k < MODEL_PARTIALS; k++) rows[model_rows[k]] += D[k] * v[model_columns[k]];
+  for (i = 0; i < unknowns; i++) {
+    const int row = model_row(unknown[i]);
+    result[i] = row < 0 ? v[-1 - row] : rows[row];
+  }
+  return 0;
+}

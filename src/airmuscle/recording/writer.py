@@ -1,0 +1,80 @@
+"""Writer of recordings as CSV, Parquet and HDF5; the extension gives the format, and `read` reads them again."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..core.errors import AirmuscleError, FileError
+from .csv_writer import write_csv
+from .heading import split_unit
+from .optional_dependency import import_lab_package
+from .recording import Recording, column_heading
+
+
+def write(recording: Recording, path: str | Path) -> Path:
+    """Write a recording in SI units as .csv, .parquet, .h5 or .hdf5, and return the path.
+
+    Units are metadata of the columns, constants those of the file; the notes are in CSV only. The file is replaced
+    atomically. Raises FileError for another extension, a missing package, or a file that cannot be written.
+    """
+    path = Path(path)
+    if path.suffix.lower() == ".csv":
+        return write_csv(recording, path)
+    writer = _WRITERS.get(path.suffix.lower())
+    if writer is None:
+        raise FileError(f"{path}: a recording cannot be written as '{path.suffix}'; allowed: {', '.join(EXTENSIONS)}.")
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        writer(recording, temporary, path)
+        temporary.replace(path)
+    except AirmuscleError:
+        raise
+    except Exception as reason:  # each package raises its own exceptions
+        text = getattr(reason, "strerror", None) or " ".join(str(reason).split())[:120]
+        raise FileError(
+            f"{path}: cannot be written ({text}). Choose an existing folder with write permission."
+        ) from None
+    finally:
+        temporary.unlink(missing_ok=True)
+    return path
+
+
+def _columns(recording: Recording) -> list[tuple[str, str, Any]]:
+    """Name, unit and values of every column."""
+    found = []
+    for name in recording:
+        plain, unit = split_unit(column_heading(name))
+        found.append((plain if unit else name, unit or "", np.asarray(recording[name])))
+    return found
+
+
+def _write_parquet(recording: Recording, temporary: Path, path: Path) -> None:
+    arrow, parquet = import_lab_package("pyarrow", path), import_lab_package("pyarrow.parquet", path)
+    columns = _columns(recording)
+    fields = [arrow.field(name, arrow.float64(), metadata={"unit": unit}) for name, unit, _ in columns]
+    metadata = {name: str(value) for name, value in recording.constants.items()}
+    schema = arrow.schema(fields, metadata=metadata)
+    table = arrow.Table.from_arrays([arrow.array(values) for _, _, values in columns], schema=schema)
+    parquet.write_table(table, str(temporary))
+
+
+def _write_hdf5(recording: Recording, temporary: Path, path: Path) -> None:
+    h5py = import_lab_package("h5py", path)
+    with h5py.File(temporary, "w") as file:
+        file.attrs.update(dict(recording.constants))
+        for name, unit, values in _columns(recording):
+            file.create_dataset(name.replace("/", "_"), data=values).attrs["unit"] = unit
+
+
+_WRITERS: Mapping[str, Callable[[Recording, Path, Path], None]] = {
+    ".parquet": _write_parquet,
+    ".h5": _write_hdf5,
+    ".hdf5": _write_hdf5,
+}
+EXTENSIONS = (".csv", *_WRITERS)
+"""Extensions of the formats that can be written."""

@@ -1,0 +1,109 @@
+"""Exchange of recordings with other tools: pandas, xarray, Parquet, HDF5 and plain CSV keep every number and unit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from airmuscle.cli.app import app
+from airmuscle.core.errors import ColumnError, FileError, ParameterError
+from airmuscle.recording import Recording, from_pandas, read, read_csv, to_xarray, write, write_csv
+
+pd = pytest.importorskip("pandas", reason="needs the package pandas")
+RUN = Recording(
+    {
+        "time": np.linspace(0.0, 0.2, 5), "pressure": np.array([0.0, 1e5, 2e5 / 3, 3e5, 4e5]),
+        "contraction": np.linspace(0, 0.2, 5), "left.force": np.arange(5.0) / 7, "fill": np.array([0.0, 1, 1, 0, 0]),
+    },
+    "run", {"resting_length": 0.3, "specimen": "A"},
+)  # fmt: skip
+
+
+def check_equal(found, expected=RUN):
+    assert list(found) == list(expected)
+    for name in expected:
+        assert (found[name] == expected[name]).all()
+
+
+def test_a_data_frame_is_read_back_bit_by_bit():
+    check_equal(from_pandas(RUN.to_pandas(), constants=RUN.constants))
+    check_equal(from_pandas(RUN.to_pandas().set_index("time [s]")))
+
+
+def test_units_of_a_data_frame_are_converted():
+    frame = pd.DataFrame({"time [ms]": [0, 10], "pressure [bar]": [1.0, 2.0], "force": [3.0, 4.0]})
+    found = from_pandas(frame, units={"force": "kN"})
+    assert found["time"].tolist() == [0.0, 0.01]
+    assert found["pressure"].tolist() == [1e5, 2e5]
+    assert found["force"].tolist() == [3000.0, 4000.0]
+
+
+@pytest.mark.parametrize(
+    ("frame", "error", "message"),
+    [
+        ([1, 2], ParameterError, "list is not a pandas.DataFrame"),
+        (pd.DataFrame({}), ParameterError, "no columns or no rows"),
+        (pd.DataFrame({"pressure [bar]": []}), ParameterError, "no columns or no rows"),
+        (pd.DataFrame({"pressure [mm]": [1.0]}), Exception, "another quantity|pressure"),
+        (pd.DataFrame({"pressure [bar]": ["a", "b"]}), ColumnError, "pressure"),
+    ],
+)
+def test_what_is_no_frame_of_measurements_is_refused(frame, error, message):
+    with pytest.raises(error, match=message):
+        from_pandas(frame)
+
+
+def test_xarray_has_units_and_constants():
+    pytest.importorskip("xarray", reason="needs the package xarray")
+    found = to_xarray(RUN)
+    assert found["pressure"].attrs["units"] == "Pa"
+    assert found.sizes == {"time": 5}
+    assert (found["left.force"].values == RUN["left.force"]).all()
+    assert found.attrs["resting_length"] == 0.3
+
+
+def test_pandas_reads_plain_csv_as_it_is(tmp_path):
+    frame = pd.read_csv(write_csv(RUN, tmp_path / "run.csv", comments=False), float_precision="round_trip")
+    assert list(frame) == ["time [s]", "pressure [Pa]", "contraction [1]", "left.force [N]", "fill [1]"]
+    assert (frame["left.force [N]"].to_numpy() == RUN["left.force"]).all()
+    check_equal(read_csv(tmp_path / "run.csv"))
+
+
+@pytest.mark.parametrize("extension", [".csv", ".parquet", ".h5", ".hdf5"])
+def test_a_written_file_is_read_back_bit_by_bit(extension, tmp_path):
+    pytest.importorskip({".parquet": "pyarrow", ".csv": "csv"}.get(extension, "h5py"), reason="needs the extra lab")
+    (found,) = read(write(RUN, tmp_path / f"run{extension}"))
+    assert set(found) == set(RUN)
+    for name in RUN:
+        assert (found[name] == RUN[name]).all()
+    assert found.constants["resting_length"] == 0.3
+
+
+def test_an_unknown_extension_and_an_unwritable_folder_are_named(tmp_path):
+    with pytest.raises(FileError, match=r"cannot be written as '\.xyz'; allowed: \.csv, \.parquet, \.h5, \.hdf5"):
+        write(RUN, tmp_path / "run.xyz")
+    for extension in (".csv", ".parquet", ".h5"):
+        with pytest.raises(FileError, match="cannot be written"):
+            write(RUN, tmp_path / "no folder" / f"run{extension}")
+    assert list(tmp_path.iterdir()) == []
+
+
+def airmuscle(*arguments):
+    return CliRunner().invoke(app, [str(a) for a in arguments], env={"COLUMNS": "160"})
+
+
+def test_the_command_converts_one_file_and_several(tmp_path):
+    for k in range(2):
+        write_csv(RUN, tmp_path / f"run{k}.csv")
+    done = airmuscle("convert-data", tmp_path / "run0.csv", tmp_path / "out.parquet")
+    assert done.exit_code == 0, done.output
+    assert "5 rows of time, pressure" in done.output
+    done = airmuscle("convert-data", tmp_path / "run*.csv", tmp_path / "all.h5", "--json")
+    assert done.exit_code == 0, done.output
+    assert sorted(p.name for p in tmp_path.glob("all*")) == ["all_001.h5", "all_002.h5"]
+    done = airmuscle("convert-data", tmp_path / "run0.csv", tmp_path / "plain.csv", "--plain")
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "plain.csv").read_text().startswith("time [s],")
+    assert airmuscle("convert-data", tmp_path / "run0.csv", tmp_path / "a.h5", "--plain").exit_code == 2
+    assert airmuscle("convert-data", tmp_path / "run0.csv", tmp_path / "a.xyz").exit_code == 1

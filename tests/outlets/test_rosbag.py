@@ -1,0 +1,71 @@
+"""ROS bags: the numbers of all topics with the times of their messages."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+
+from airmuscle.core.errors import FileError
+from airmuscle.recording import read
+
+
+@pytest.fixture
+def bag(tmp_path):
+    """A ROS 2 bag with a pressure at 100 Hz and two joints at 50 Hz; the folder."""
+    rosbag2 = pytest.importorskip("rosbags.rosbag2", reason="needs the package rosbags")
+    typesys = pytest.importorskip("rosbags.typesys", reason="needs the package rosbags")
+    store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+    of = store.types
+    number, state = of["std_msgs/msg/Float64"], of["sensor_msgs/msg/JointState"]
+    header = of["std_msgs/msg/Header"](of["builtin_interfaces/msg/Time"](1, 0), "")
+    folder = tmp_path / "bag"
+    with rosbag2.Writer(folder, version=9) as writer:
+        pressure = writer.add_connection("/pressure", number.__msgtype__, typestore=store)
+        joints = writer.add_connection("/arm/joints", state.__msgtype__, typestore=store)
+        for k in range(21):
+            stamp = 5 * 10**9 + k * 10**7
+            writer.write(pressure, stamp, store.serialize_cdr(number(1000.0 * k), number.__msgtype__))
+            if k % 2 == 0:
+                angles = np.array([0.01 * k, -0.02 * k])
+                message = state(header, ["elbow", "wrist"], angles, np.array([]), np.array([]))
+                writer.write(joints, stamp, store.serialize_cdr(message, state.__msgtype__))
+    return folder
+
+
+def test_topics_become_columns_with_common_rows(bag):
+    (run,) = read(bag, units={"pressure": "Pa"})
+    assert run["time"] == pytest.approx(0.01 * np.arange(21), abs=1e-12)
+    assert run["pressure"].tolist() == [1000.0 * k for k in range(21)]
+    assert run["arm.joints.position.wrist"] == pytest.approx(-0.02 * np.arange(21), abs=1e-12)
+
+
+def test_one_topic_can_be_chosen(bag):
+    (run,) = read(bag, group="/arm/joints")
+    assert list(run) == ["time", "arm.joints.position.elbow", "arm.joints.position.wrist"]
+    assert len(run) == 11
+    with pytest.raises(FileError, match="there is no topic nothing"):
+        read(bag, group="nothing")
+
+
+def test_a_bag_without_its_metadata_is_refused(bag):
+    (bag / "metadata.yaml").unlink()
+    with pytest.raises(FileError, match=r"no metadata\.yaml beside it; copy the whole folder"):
+        read(bag)
+
+
+def test_a_damaged_bag_is_refused(bag):
+    file = next(bag.glob("*.db3"))
+    file.write_bytes(b"nothing")
+    with pytest.raises(FileError, match="cannot be read as ROS bag"):
+        read(bag)
+
+
+def test_without_rosbags_the_extra_is_named(tmp_path, monkeypatch):
+    for name in [n for n in sys.modules if n.startswith("rosbags")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "rosbags", None)
+    (tmp_path / "run.bag").write_bytes(b"#ROSBAG V2.0")
+    with pytest.raises(FileError, match=r"needs the package rosbags.highlevel.*pip install airmuscle\[ros\]"):
+        read(tmp_path / "run.bag")
