@@ -77,6 +77,10 @@ def test_fmpy_finds_no_error_and_reproduces_the_run(name, fmi, fmus):
     assert validation.validate_fmu(str(path)) == []
     expected = solve(problem).recording
     inputs = problem.system.inputs
+    if expected["time"][-1] < 0.5:  # the run of the library ends early, which the FMU reports as well
+        with pytest.raises(Exception, match=r"fmi[23]DoStep failed"):
+            fmpy.simulate_fmu(str(path), fmi_type="CoSimulation", stop_time=0.5, input=signal_of(inputs))
+        return
     columns = [c for c in expected if c not in ("time", *inputs)]
     clear = ~np.isin(np.round(expected["time"], 6), [t for t, _ in JUMPS])
     for kind, allowed in (("CoSimulation", 1e-7), ("ModelExchange", 1e-6)):
