@@ -503,7 +503,7 @@ def test_without_a_compiler_it_says_what_can_be_done(tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     done = airmuscle("export", EXAMPLES / "fill_discharge.toml", "--to", "c", "--out", tmp_path / "out", "--build")
     assert done.exit_code == 1
-    message = r"no C compiler \(cc, gcc, clang\) was found\. The sources are in .*out; install gcc or clang, or compile"
+    message = r"no C compiler \(gcc, clang, cc\) was found\. The sources are in .*out; install gcc or clang, or compile"
     assert re.search(message, done.stderr), done.stderr
     assert (tmp_path / "out" / "main.c").exists()
 

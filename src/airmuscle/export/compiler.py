@@ -1,4 +1,4 @@
-"""C compiler of the machine, for shared libraries of exported sources."""
+"""C compiler of the machine, for programs and shared libraries of exported sources."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ COMPILERS = ("gcc", "clang", "cc")
 OPTIONS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden", "-s")
 """No contraction of products and sums: the numbers are those of the library on every processor."""
 TIME_LIMIT = 600.0
-"""Time [s] after which a compiler is stopped (chosen)."""
+"""Time [s] after which a compiler or a program is stopped (chosen)."""
 
 
 def compile_library(sources: Mapping[str, bytes], units: Sequence[str], name: str, more: Sequence[str] = ()) -> bytes:
@@ -28,23 +28,27 @@ def compile_library(sources: Mapping[str, bytes], units: Sequence[str], name: st
     with tempfile.TemporaryDirectory(prefix="airmuscle-") as folder:
         for file, text in sources.items():
             (Path(folder) / file).write_bytes(text)
-        command = [compiler, *OPTIONS, *units, "-o", name, *more, "-lm"]
-        try:
-            done = subprocess.run(
-                command, cwd=folder, check=False, capture_output=True, text=True, timeout=TIME_LIMIT
-            )  # fmt: skip
-        except subprocess.TimeoutExpired:
-            raise FileError(f"{compiler} was stopped after {TIME_LIMIT:g} s.") from None
-        if done.returncode:
-            reason = " ".join((done.stderr or done.stdout).split())[:300]
-            raise FileError(f"{Path(compiler).name} failed with exit code {done.returncode}: {reason}")
+        run_command([compiler, *OPTIONS, *units, "-o", name, *more, "-lm"], folder)
         return (Path(folder) / name).read_bytes()
 
 
-def find_compiler() -> str:
-    """The path of a C compiler. Raises ParameterError."""
+def find_compiler(remedy: str = "; install the package gcc or clang") -> str:
+    """The path of a C compiler. Raises ParameterError, whose text ends with `remedy`."""
     for name in COMPILERS:
         path = shutil.which(name)
         if path:
             return path
-    raise ParameterError(f"no C compiler ({', '.join(COMPILERS)}) was found; install the package gcc or clang")
+    raise ParameterError(f"no C compiler ({', '.join(COMPILERS)}) was found{remedy}")
+
+
+def run_command(command: Sequence[str], folder: str | None = None) -> subprocess.CompletedProcess[str]:
+    """Run a compiler or a program in a folder. Raises FileError with its message if it fails or takes too long."""
+    name = Path(command[0]).name
+    try:
+        done = subprocess.run(command, cwd=folder, check=False, capture_output=True, text=True, timeout=TIME_LIMIT)
+    except subprocess.TimeoutExpired:
+        raise FileError(f"{name} was stopped after {TIME_LIMIT:g} s.") from None
+    if done.returncode:
+        reason = " ".join((done.stderr or done.stdout).split())[:300]
+        raise FileError(f"{name} failed with exit code {done.returncode}: {reason}")
+    return done
