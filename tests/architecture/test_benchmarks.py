@@ -91,6 +91,7 @@ def test_c_numpy_and_lanes_compute_the_same_batch(tmp_path):
         batch.check_final_states(final_states, "simulate_batch", runs()[3].nominal)
 
 
+@pytest.mark.slow
 def test_the_section_of_the_batch_has_its_rows_and_targets():
     section = batch.section(rounds=1, count=16, seconds=0.02)
     assert section.rows[0][:3] == ("simulate_batch (0.02 s simulated)", "16", "1")

@@ -93,6 +93,7 @@ def test_the_loosest_tolerance_is_sufficient_and_so_is_the_next():
 
 @pytest.mark.skipif(not ode8.compilers(), reason="no C compiler on the path")
 @pytest.mark.parametrize("muscles", [2, pytest.param(6, marks=pytest.mark.slow)])
+@pytest.mark.slow
 def test_the_c_code_for_several_muscles_computes_the_same_steps(tmp_path, muscles):
     run = lifting_run(muscles)
     start = run.system.state_at(pressure=tuple(5e5 + 4e4 * i for i in range(muscles)), position=0.05)
@@ -180,6 +181,7 @@ def test_a_tighter_tolerance_needs_more_steps_and_has_a_smaller_error():
     assert float(fine[6]) < 1e-2 * float(coarse[6])
 
 
+@pytest.mark.slow
 def test_peak_memory_does_not_decrease():
     section = memory.section()
     peaks = [float(row[1]) for row in section.rows]

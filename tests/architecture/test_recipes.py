@@ -100,6 +100,7 @@ def test_a_complete_model_is_built_evaluated_and_simulated(complete: Path):
 
 
 @pytest.mark.parametrize(("kind", "step"), [(kind, step) for kind, step in STEPS if step != "file"])
+@pytest.mark.slow
 def test_a_contract_test_names_a_missing_step(failures: str, kind: str, step: str):
     name = named(kind, step)
     pattern = MESSAGES[step].format(name=name, module=name.lower(), package=RECIPES[kind].package)

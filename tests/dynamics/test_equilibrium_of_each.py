@@ -313,6 +313,7 @@ def starts_of(plant, variations):
     return {s.name: batch[s.name][:, 0] for s in plant.states}, batch
 
 
+@pytest.mark.slow
 def test_a_batch_begins_at_rest_and_says_of_each_that_has_none_what_is_said_alone():
     plant = of(spring=LinearSpring(8000.0))
     masses = [4.0, 500.0, 5.0, 600.0]

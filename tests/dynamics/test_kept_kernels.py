@@ -257,6 +257,7 @@ def test_only_what_does_without_numba_is_made_machine_code():
         assert build(kernel, ("d1", "d1")) == b""
 
 
+@pytest.mark.slow
 def test_a_kernel_that_needs_numba_is_tried_once_on_a_machine(empty, monkeypatch):
     looked = []
     monkeypatch.setattr(Kernel, "numba", property(lambda self: allocates))

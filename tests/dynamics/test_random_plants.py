@@ -82,10 +82,10 @@ def energies_close(run, plant):
     return abs(found["air"]) < 1e-5 and (latched or found["mechanical"] < 1e-4)
 
 
-@pytest.mark.parametrize("part", [0, *(pytest.param(part, marks=pytest.mark.slow) for part in (1, 2, 3))])
+@pytest.mark.parametrize("part", [0, *(pytest.param(part, marks=pytest.mark.slow) for part in range(1, 8))])
 def test_a_plant_composed_at_random_runs_or_ends_with_a_reason_or_is_refused(part):
-    outcomes = collections.Counter(outcome(seed) for seed in range(10 * part, 10 * part + 10))
-    assert outcomes[Status.DONE] >= 2, outcomes
+    outcomes = collections.Counter(outcome(seed) for seed in range(5 * part, 5 * part + 5))
+    assert outcomes[Status.DONE] >= 1, outcomes
 
 
 @pytest.mark.slow

@@ -126,6 +126,7 @@ def test_what_the_simulation_used_is_found_within_the_stated_bands():
     assert all(e.stderr < 0.05 * e.value for e in fit.estimates[:7])
 
 
+@pytest.mark.slow
 def test_the_bands_hold_the_truth_as_often_as_they_say():
     """60 simulated records, three well-posed numbers: the 95 % bands hold 171 of 180 in the mean, 3 sigma is 8.8."""
     plant, free = rigid_plant(), ("circuit.fill.conductance", "circuit.fill.critical_ratio", "circuit.supply.pressure")

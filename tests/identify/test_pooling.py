@@ -166,6 +166,7 @@ def test_bands_of_a_new_muscle_contain_the_scatter_of_the_specimens():
     assert min(widths) > 3
 
 
+@pytest.mark.slow
 def test_standard_errors_of_the_population_contain_the_scatter():
     values, errors = [], []
     for seed in range(40, 70):
@@ -237,6 +238,7 @@ def test_scores_do_not_depend_on_the_number_of_processes():
     assert [m.candidate.name for m in one.ranking] == [m.candidate.name for m in two.ranking]
 
 
+@pytest.mark.slow
 def test_the_command_recommends_one_law_for_both_purposes_and_states_the_excess(tmp_path):
     for run in runs(rows=8)[:16]:
         columns = ("pressure", "contraction", "force")

@@ -60,6 +60,7 @@ def test_hunt_comes_back_from_a_start_far_away(steepness: float):
 
 
 @pytest.mark.parametrize("name", MAPS)
+@pytest.mark.slow
 def test_with_any_level_left_out_a_fit_settles_or_names_what_nothing_tells_apart(name: str):
     recording = read_csv(DATA / f"{name}.csv")
     candidates = [c for c in standard_candidates([recording]) if isinstance(c.law, Sarosi2012 | Hunt2017)]
@@ -98,6 +99,7 @@ def lengths(inner: ContractileSurface, dead_length: float, noise: float = 0.0) -
 
 
 @pytest.mark.parametrize("start", [(0.005, 0.0), (0.078, 0.0), (0.005, 0.02), (-0.1, 0.05)])
+@pytest.mark.slow
 def test_the_ends_of_a_family_of_degree_five_are_found_from_any_start(start: tuple[float, float]):
     random = np.random.default_rng(4)
     coefficients = random.normal(0, 20, 21)

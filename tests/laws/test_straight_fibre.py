@@ -257,6 +257,7 @@ def test_free_contraction_with_rings_and_of_a_slender_muscle():
 
 @UNHURRIED
 @given(contraction=st.floats(1e-3, 0.49), rings=st.integers(0, 2))
+@pytest.mark.slow
 def test_virtual_work_gives_the_tension_of_the_exact_outline(contraction, rings):
     """F/p = dV/deps / L0 to 1e-9, the volume differentiated numerically."""
     shape = PleatedTube(L0, D0, rings)

@@ -22,6 +22,8 @@ from airmuscle.library.uncertainty import ParameterUncertainty
 from airmuscle.recording import read
 from airmuscle.scenario.scenario import load_scenario
 
+pytestmark = pytest.mark.slow  # the whole campaign takes a minute
+
 
 def run(*words):
     return CliRunner().invoke(app, ["campaign", *map(str, words)])

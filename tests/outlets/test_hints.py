@@ -317,6 +317,7 @@ def _hung(law_of_contraction: Any) -> Recording:
     return Recording({"pressure": pressure, "force": force, "contraction": contraction}, "bench")
 
 
+@pytest.mark.slow
 def test_laws_that_are_left_out_of_a_ranking_name_options(tmp_path: Path):
     runs = [points(tmp_path / f"{i}.csv", 18 + 6 * i) for i in range(3)]
     reasons = [each.reason for each in compare(read(runs), leave_out=RunSplit()).excluded]

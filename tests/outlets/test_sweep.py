@@ -154,6 +154,7 @@ def started(folder: Path, chunks: int, *options: str) -> subprocess.Popen:
 # Bit-identical results
 
 
+@pytest.mark.slow
 def test_a_killed_study_is_resumed_with_bit_identical_results(folder: Path):
     edited(folder, "count = 22", "count = 200")
     process = started(folder, 3, "--workers", "2")
