@@ -445,6 +445,7 @@ def test_units_and_scales_change_nothing(force_scale: float, pressure_scale: flo
 
 @settings(max_examples=20, deadline=None)
 @given(st.floats(1e-3, 1e3))
+@pytest.mark.slow
 def test_the_iterating_solver_knows_no_unit_either(scale: float):
     recording = points(MUSCLE.force, noise=3.0, high=0.1, seed=2)
     start = [1e-4, 400.0, -50.0, -8e-3, 3e-3, -300.0]

@@ -255,6 +255,7 @@ def test_creep_with_none_one_or_two_time_constants_is_told_apart(parts):
     assert ("no creep", "one time constant", "two time constants")[len(parts[0])] in fit.verdict
 
 
+@pytest.mark.slow
 def test_creep_is_not_claimed_of_noise():
     """At most four of 100 holds of noise: 1 % by the F test, somewhat more because the time constant is searched."""
     time = np.arange(0.0, 20.0, 0.2)

@@ -100,6 +100,7 @@ def test_a_constant_friction_gets_no_scale():
     assert "The data justify no dependence of the friction on the pressure" in best.verdict
 
 
+@pytest.mark.slow
 def test_two_pressures_cannot_test_the_dependence_and_one_loop_is_no_joint_fit():
     fits = joint({1e5: 13.0, 6e5: 38.0})
     assert "Two pressures determine this dependence but cannot test it." in fits[0].verdict

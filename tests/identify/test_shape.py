@@ -53,6 +53,7 @@ def test_conditions_that_hold_anyway_change_nothing():
     assert found.rmse == pytest.approx(found.unconstrained_rmse, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_conditions_are_those_of_the_slopes():
     """Enough: where all hold, both slopes have their sign everywhere. Nearly necessary: a plain slope passes."""
     rows = shape_constraints(3, (5, 4))

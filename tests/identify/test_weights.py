@@ -75,6 +75,7 @@ def test_the_default_of_a_fit_is_the_sigma_of_the_sensors():
     assert not any("weighted by" in note for note in fit(SURFACE, runs[:4]).notes)
 
 
+@pytest.mark.slow
 def test_weights_by_sensor_come_nearer_to_the_truth_in_the_mean():
     grid = [g.ravel() for g in np.meshgrid(np.linspace(1e5, 5.2e5, 25), np.linspace(0.0, 0.19, 25))]
     true = MUSCLE.force(*grid)

@@ -272,6 +272,7 @@ def test_virtual_work_gives_the_tension_of_the_exact_outline(contraction, rings)
 
 @UNHURRIED
 @given(contraction=st.floats(1e-6, 0.49))
+@pytest.mark.slow
 def test_the_exact_half_shell_balances(contraction):
     """N sin(phi0) = pi p Int r dx with N/(pi p) = R^2/(2 mu): the pressure on a half shell is balanced at its ends."""
     shape = PleatedTube(L0, D0)

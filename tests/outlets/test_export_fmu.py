@@ -266,11 +266,13 @@ def test_the_sources_cause_no_warning_and_export_only_fmi_functions(fmus, tmp_pa
         assert set(re.findall(r"NEEDED.*\[(\w+)", needed)) <= {"libc", "libm"}
 
 
+@pytest.mark.slow
 def test_the_same_problem_gives_the_same_bytes(tmp_path):
     files = [write_fmu(problem_of(), tmp_path / f"{k}.fmu", name="plant").path.read_bytes() for k in range(2)]
     assert files[0] == files[1]
 
 
+@pytest.mark.slow
 def test_fixed_steps_are_exported(tmp_path):
     fmpy = pytest.importorskip("fmpy", reason="needs the package fmpy")
     printed.require("gcc")

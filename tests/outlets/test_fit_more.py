@@ -84,6 +84,7 @@ def test_weak_says_so_where_no_parameter_is(tmp_path):
     assert "profile: no parameter is weakly determined" in result.stdout
 
 
+@pytest.mark.slow
 def test_a_muscle_with_a_law_of_tied_parameters_has_them_profiled(tmp_path):
     result = airmuscle("fit", MUSCLE, "--characteristic", MUSCLE, "--profile", "weak", "--json", "--out", tmp_path)
     weak = weakly_determined(fit(load(MUSCLE).characteristic, load_data(MUSCLE), fixed=("wall_thickness",)))

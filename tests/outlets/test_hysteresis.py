@@ -115,6 +115,7 @@ def test_friction_that_grows_with_pressure_is_written_once_for_all_runs_and_runs
     assert "outside the range of the data of its friction in speed" in run.stdout
 
 
+@pytest.mark.slow
 def test_friction_that_does_not_hold_for_all_runs_is_not_written(tmp_path):
     files = [
         loop(tmp_path / f"{pressure}.csv", 3, MaxwellSlip((factor * 2e4, factor * 1e4), (3e-4, 1.2e-3)), TURNS[:3], 150,
