@@ -62,6 +62,7 @@ def test_lsoda_computes_the_same_solution():
 
 
 @pytest.mark.skipif(not ode8.compilers(), reason="no C compiler on the path")
+@pytest.mark.slow
 def test_the_c_code_computes_the_same_steps(tmp_path):
     """Over 0.2 s from a state beyond the validity range of the surface, with valve openings; equal to rounding."""
     case = runs()[3]

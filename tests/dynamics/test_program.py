@@ -176,6 +176,7 @@ def test_a_parameter_is_checked_when_a_model_is_made(value, message):
     assert "Bounded.size (s, a size)" in str(caught.value)
 
 
+@pytest.mark.slow
 def test_kernels_compile_once_per_machine_and_say_so(tmp_path):
     """Three processes in a row leave the cache folder with the same number of files; only the first says a word."""
     code = (

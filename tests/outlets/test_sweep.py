@@ -295,6 +295,7 @@ def local_dask():
 
 
 @pytest.mark.parametrize("place", [lambda: process_pool(3), threads, local_dask], ids=["processes", "threads", "dask"])
+@pytest.mark.slow
 def test_results_do_not_depend_on_the_executor(folder: Path, place):
     run(folder, "alone")
     with place() as executor:
