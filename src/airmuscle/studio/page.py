@@ -28,6 +28,13 @@ SCRIPTS = (
     "scripts/plant-drawing.js",
     "scripts/plant-traces.js",
     "scripts/plant-tab.js",
+    "scripts/joint-loop.js",
+    "scripts/joint-statics.js",
+    "scripts/joint-linear.js",
+    "scripts/joint-drawing.js",
+    "scripts/joint-charts.js",
+    "scripts/joint-gains.js",
+    "scripts/joint-tab.js",
     "scripts/main.js",
 )
 """Scripts in the order in which the page runs them."""
