@@ -6,12 +6,11 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import typer
 
 from ..core import leaves
-from ..friction import Friction
 from ..identify.hysteresis import (
     HysteresisFit,
     JointFit,
@@ -21,9 +20,9 @@ from ..identify.hysteresis import (
     fit_creep,
     fit_jointly,
     fit_loop,
-    identified_friction,
     loops_not_joined,
 )
+from ..identify.hysteresis.selection import SelectedFriction, select_friction
 from ..library.entry import Entry
 from ..library.law_file import load_law
 from ..library.write import part_toml, save
@@ -95,7 +94,7 @@ def hysteresis(
     fits = [_with_option_names(fit_loop(loop, elements=elements, progress=progress)) for loop in loops]
     joint = fit_jointly(fits, progress=progress)
     creep_results = _fit_creep(recordings) if creep else []
-    path = _write(hysteresis_chapters(fits, creep_results, joint), _select(fits, joint), entry, out)
+    path = _write(hysteresis_chapters(fits, creep_results, joint), select_friction(fits, joint), entry, out)
     if json:
         not_joined = list(loops_not_joined(fits)) if joint else []
         data = {
@@ -122,29 +121,6 @@ def _with_option_names(fit: LoopFit) -> LoopFit:
     return dataclasses.replace(fit, failed=failed)
 
 
-class _Selected(NamedTuple):
-    """The friction to write, with the range of its data, the file or files it is from, and its verdict."""
-
-    friction: Friction
-    origin: str
-    verdict: str
-
-
-def _select(fits: Sequence[LoopFit], joint: Sequence[JointFit]) -> _Selected | None:
-    """The friction to write: of all runs together or, if they are not several, of the only run a plant can use."""
-    if joint:
-        best = next((fit for fit in joint if fit.justified), None)
-        if best is None:
-            return None
-        origin = f"{len(best.series)} runs"
-        return _Selected(identified_friction(best.friction, best.series), origin, best.verdict)
-    usable = [fit.recommended for fit in fits if fit.recommended is not None and fit.usable_in_plant]
-    if not usable:
-        return None
-    only = max(usable, key=lambda fit: fit.effective_sample_size)
-    return _Selected(identified_friction(only.friction, (only.series,)), only.series.origin, only.verdict)
-
-
 def _fit_creep(recordings: Sequence[Recording]) -> list[str]:
     """The result of a creep fit to the longest hold phase of each recording, in one sentence."""
     results = []
@@ -162,7 +138,9 @@ def _fit_creep(recordings: Sequence[Recording]) -> list[str]:
     return results
 
 
-def _write(chapters: Sequence[Chapter], selected: _Selected | None, entry: Entry | None, out: Path) -> Path | None:
+def _write(
+    chapters: Sequence[Chapter], selected: SelectedFriction | None, entry: Entry | None, out: Path
+) -> Path | None:
     """Write the report and, for a selected friction, the muscle or friction file; returns the path of that file."""
     name = None if selected is None else "friction.toml" if entry is None else "muscle.toml"
     with atomic_folder(out) as folder:
@@ -175,7 +153,7 @@ def _write(chapters: Sequence[Chapter], selected: _Selected | None, entry: Entry
     return out / name if name else None
 
 
-def _with_friction(entry: Entry, selected: _Selected) -> Entry:
+def _with_friction(entry: Entry, selected: SelectedFriction) -> Entry:
     """The muscle with the friction; its checks are kept, because they apply to the characteristic alone."""
     note = f"{entry.note} Friction from {selected.origin}: {selected.verdict}".strip()
     return dataclasses.replace(entry, name="muscle", friction=selected.friction, note=note)
