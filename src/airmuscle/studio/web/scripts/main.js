@@ -3,7 +3,7 @@
 
 (() => {
   const { element, source, link, say, download } = airmuscle;
-  const TABS = [["muscle", "Muscle", airmuscle.MuscleTab], ["plant", "Plant", airmuscle.PlantTab]].filter((row) => row[2]);
+  const TABS = [["muscle", "Muscle", airmuscle.MuscleTab], ["plant", "Plant", airmuscle.PlantTab], ["fit", "Fit", airmuscle.FitTab]].filter((row) => row[2]);
   const tabs = {}, main = document.getElementById("main"), list = document.getElementById("tabs");
   let shown = TABS[0][0], writing = 0;
 
