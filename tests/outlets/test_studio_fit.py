@@ -110,7 +110,6 @@ WRONG = (
     ({"columns": {**COLUMNS, "Druck": {"quantity": "pressure", "unit": "mm"}}}, "column:Druck", "mm"),
     ({"columns": {**COLUMNS, "Zeit": {"quantity": "force", "unit": "N"}}}, "column:Zeit", "both read as force"),
     ({"columns": {**COLUMNS, "Kraft (N)": {"quantity": ""}}}, "columns", "no column is a force"),
-    ({"columns": {**COLUMNS, "Kontraktion (%)": {"quantity": "length", "unit": "mm"}}}, "resting_length", "300 mm"),
     ({"columns": COLUMNS, "sheet": "x", "rules": [{"ranges": {"pressure": [0, 1]}, "keep": True}]}, "rules", "no row"),
     ({"columns": COLUMNS, "rules": [{"ranges": {"volume": [0, 1]}}]}, "rules", "volume"),
     ({"columns": COLUMNS, "file_name": "run{nonsense}"}, "file_name", "nonsense"),
@@ -123,6 +122,17 @@ def test_a_problem_names_its_field(app, settings, field, text):
     answer = post(app, "read", set=name, settings=settings)
     found = problems(answer) if answer.status == 200 else {answer.json()["field"]: answer.json()["error"]}
     assert text in found[field]
+
+
+def test_a_length_needs_the_resting_length_and_a_pressure_is_gauge_unless_stated(app):
+    table = "p [bar];Länge [mm];F [N]\n1,0;300;50\n1,0;290;40\n2,0;300;90\n2,0;290;80\n"
+    name = upload(app, "a.csv", table.encode()).json()["set"]
+    assert "such as 300 mm" in problems(post(app, "read", set=name, settings={}))["resting_length"]
+    for settings in ({"resting_length": "300 mm"}, {"files": {"a.csv": {"resting_length": "30 cm"}}}):
+        (recording,) = post(app, "read", set=name, settings=settings).json()["recordings"]
+        assert recording["constants"] == {"resting_length": "300 mm"}
+        assert recording["points"]["contraction"] == pytest.approx([0, 1 / 30, 0, 1 / 30], rel=1e-6)
+        assert any("is read as gauge" in note for note in recording["notes"])
 
 
 REFUSED = (

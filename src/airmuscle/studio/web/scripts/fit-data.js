@@ -102,10 +102,10 @@
       this.unit.textContent = `${scaleOf(this.axes.x)[1]} (${this.axes.x})`;
       this.scatter.show({ x: labelOf(this.axes.x), y: labelOf(this.axes.y), points });
       const used = points.off.filter((off) => !off).length;
-      this.legend.replaceChildren(
+      this.legend.replaceChildren(...[
         ...(labels.length > 1 ? labels.slice(0, 6).map((label, g) => element("span.row", {}, element(`span.dot.${GROUP_COLOURS[g]}`), label)) : []),
         labels.length > 6 ? element("span", {}, `and ${labels.length - 6} more, in the same colours`) : null,
-        element("span", {}, `${used} of ${points.x.length} shown rows are used${this.sheet.step > 1 ? `; one row in ${this.sheet.step} is shown` : ""}.`));
+        element("span", {}, `${used} of ${points.x.length} shown rows are used${this.sheet.step > 1 ? `; one row in ${this.sheet.step} is shown` : ""}.`)].filter(Boolean));
       this.list.replaceChildren(...this.rules.map((rule, i) => element("li", {}, element("span", {}, ruleText(rule)),
         element("button", { type: "button", "aria-label": `Remove: ${ruleText(rule)}`, onclick: () => { this.rules.splice(i, 1); this.ruled(); } }, "×"))));
       if (this.rules.length > 1) this.list.append(element("li", {}, element("button", { type: "button", onclick: () => { this.rules = []; this.ruled(); } }, "Use all rows")));

@@ -22,7 +22,7 @@
 
   function table(headings, rows, numbers = []) {
     const cell = (tag, value, i) => element(`${tag}${numbers.includes(i) ? ".number" : ""}`, tag === "th" ? { scope: "col" } : {}, value);
-    return element("div.scroll", {}, element("table", {}, element("thead", {}, element("tr", {}, ...headings.map((text, i) => cell("th", text, i)))),
+    return element("div.scroll", { tabindex: "0", role: "group", "aria-label": `Table: ${headings.join(", ")}` }, element("table", {}, element("thead", {}, element("tr", {}, ...headings.map((text, i) => cell("th", text, i)))),
       element("tbody", {}, ...rows.map((row) => element(`tr${row.chosen ? ".chosen-row" : ""}`, {}, ...row.cells.map((value, i) => cell("td", value, i)))))));
   }
 
@@ -77,7 +77,7 @@
       parts.push(element("h3", {}, "Fitted curves with 95 % bands"), element("p.small.soft", {}, "Dark: confidence band of the curve. Light: prediction band of one further measurement. Both assume independent errors."), hosts[2],
         element("div.row.small", {}, ...curves.map((c, i) => element("span.row", {}, element(`span.swatch.${GROUP_COLOURS[i]}`), `${shortText(c.level * fc)} ${unit}`))));
       later.push(() => new Scatter(hosts[2], "Fitted curves with bands", 360).show({
-        x: labelOf(varying), y: labelOf(parity.quantity), points: { x: parity[varying].map((v) => v * fx), y: measured, group: measured.map(() => 0), off: measured.map(() => true) },
+        x: labelOf(varying), y: labelOf(parity.quantity), points: { x: parity[varying].map((v) => v * fx), y: measured, colour: "soft" },
         lines: curves.map((c, i) => ({ x: scaled(c.x, fx), y: cut(c.value, c), colour: GROUP_COLOURS[i], dash: GROUP_DASHES[i] })),
         bands: curves.flatMap((c, i) => [{ x: scaled(c.x, fx), low: cut(c.prediction_low, c), high: cut(c.prediction_high, c), colour: GROUP_COLOURS[i], light: true }, { x: scaled(c.x, fx), low: cut(c.low, c), high: cut(c.high, c), colour: GROUP_COLOURS[i] }]),
         ranges: { x: airmuscle.rangeOf(parity[varying].map((v) => v * fx)), y: airmuscle.rangeOf(measured, 0.08) },

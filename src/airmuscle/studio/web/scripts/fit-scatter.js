@@ -24,7 +24,7 @@
       this.chart = new Chart(host, { label, x: " ", y: " ", height, overlay: (...drawing) => this.draw(...drawing) });
     }
 
-    /* content: {x, y: labels, points: {x, y, group, off}, lines: [{x, y, colour, dash}], bands: [{x, low, high, colour, light}], ranges, rectangle} */
+    /* content: {x, y: labels, points: {x, y, group, off, colour}, lines: [{x, y, colour, dash}], bands: [{x, low, high, colour, light}], ranges, rectangle} */
     show(content) {
       this.content = content;
       const { points, lines = [], bands = [] } = content;
@@ -54,7 +54,7 @@
       ctx.strokeRect(x, y, width, height);
     }
 
-    drawPoints(chart, ctx, { x, y, group, off }) {
+    drawPoints(chart, ctx, { x, y, group, off, colour }) {
       const size = x.length > 2500 ? 1.4 : x.length > 600 ? 2 : 2.6;
       for (let g = -1; g < COLOURS.length; g++) {
         ctx.beginPath();
@@ -65,7 +65,7 @@
           if (left) { ctx.moveTo(px - 3, py - 3); ctx.lineTo(px + 3, py + 3); ctx.moveTo(px - 3, py + 3); ctx.lineTo(px + 3, py - 3); }
           else { ctx.moveTo(px + size, py); ctx.arc(px, py, size, 0, 2 * Math.PI); }
         }
-        if (g < 0) { ctx.lineWidth = 1; ctx.strokeStyle = chart.colours.soft; ctx.stroke(); } else { ctx.fillStyle = chart.colours[COLOURS[g]]; ctx.fill(); }
+        if (g < 0) { ctx.lineWidth = 1; ctx.strokeStyle = chart.colours.soft; ctx.stroke(); } else { ctx.fillStyle = chart.colours[colour ?? COLOURS[g]]; ctx.fill(); }
       }
     }
 
