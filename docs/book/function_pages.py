@@ -46,6 +46,8 @@ FACES = {
     "airmuscle.core": "Interfaces for models",
 }
 """Packages of the interface, in the order of the pages, with their titles."""
+MAX_LINE = 100
+"""Longest signature on one line."""
 
 
 def pages() -> Iterator[tuple[str, str]]:
@@ -94,7 +96,7 @@ def face_page(module: str) -> str:
 
 
 def signature(function: Any, name: str, *, method: bool = False) -> str:
-    """The signature as written in the code, without `self`."""
+    """The signature as written in the code, without `self`; one argument a line if it is long."""
     try:
         tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
     except (OSError, TypeError, SyntaxError):
@@ -105,31 +107,40 @@ def signature(function: Any, name: str, *, method: bool = False) -> str:
     if method and node.args.args:
         node.args.args.pop(0)
     returns = f" -> {ast.unparse(node.returns)}" if node.returns else ""
-    return f"{name}({ast.unparse(node.args)}){returns}"
+    line = f"{name}({', '.join(arguments(node.args))}){returns}"
+    if len(line) <= MAX_LINE:
+        return line
+    lines = "".join(f"    {argument},\n" for argument in arguments(node.args))
+    return f"{name}(\n{lines}){returns}"
+
+
+def arguments(args: ast.arguments) -> Iterator[str]:
+    """The arguments of a function as texts, with their annotations and defaults."""
+    positional = [*args.posonlyargs, *args.args]
+    missing = [None] * (len(positional) - len(args.defaults))
+    for arg, default in zip(positional, [*missing, *args.defaults], strict=True):
+        yield _argument(arg, default)
+    if args.vararg:
+        yield f"*{_argument(args.vararg, None)}"
+    elif args.kwonlyargs:
+        yield "*"
+    for arg, default in zip(args.kwonlyargs, args.kw_defaults, strict=True):
+        yield _argument(arg, default)
+    if args.kwarg:
+        yield f"**{_argument(args.kwarg, None)}"
+
+
+def _argument(arg: ast.arg, default: ast.expr | None) -> str:
+    text = ast.unparse(arg)
+    if default is None:
+        return text
+    return f"{text} = {ast.unparse(default)}" if arg.annotation else f"{text}={ast.unparse(default)}"
 
 
 def function_section(name: str, function: Any, level: int = 2) -> str:
     """Heading, signature and docstring of a function."""
     text = to_markdown(docstring(function))
-    return f"{'#' * level} {name}\n\n```python\n{_wrapped(signature(function, name))}\n```\n\n{text}"
-
-
-def _wrapped(text: str) -> str:
-    """A signature in lines of at most 100 characters: one argument a line if it is longer."""
-    if len(text) <= 100:
-        return text
-    head, _, rest = text.partition("(")
-    arguments, depth, lines = rest, 0, [""]
-    for index, character in enumerate(arguments):
-        depth += (character in "([{") - (character in ")]}")
-        if depth < 0:
-            return "\n".join(
-                [f"{head}(", *(f"    {line.strip()}" for line in lines if line.strip()), arguments[index:]]
-            )
-        lines[-1] += character
-        if character == "," and depth == 0:
-            lines.append("")
-    return text
+    return f"{'#' * level} {name}\n\n```python\n{signature(function, name)}\n```\n\n{text}"
 
 
 def class_section(name: str, cls: type[Any]) -> str:
@@ -145,5 +156,5 @@ def class_section(name: str, cls: type[Any]) -> str:
             parts.append(f"### {label}\n\n{to_markdown(inspect.cleandoc(text))}")
             continue
         shown = signature(function, label, method=not isinstance(member, staticmethod))
-        parts.append(f"### {label}\n\n```python\n{_wrapped(shown)}\n```\n\n{to_markdown(text)}")
+        parts.append(f"### {label}\n\n```python\n{shown}\n```\n\n{to_markdown(text)}")
     return "\n".join(parts)

@@ -35,6 +35,7 @@ def test_the_first_muscle(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     assert (tmp_path / "chart" / "isobars.png").stat().st_size > 0
 
 
+@pytest.mark.slow
 def test_from_bench_to_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
     check(run_page("tutorial-bench-to-report.md", tmp_path))
@@ -49,6 +50,7 @@ def test_the_first_joint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     assert abs(run.names["controlled"]["angle"][-1] - 0.3) < 0.01
 
 
+@pytest.mark.slow
 def test_the_controller_on_a_microcontroller(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
     run_page("tutorial-microcontroller.md", tmp_path)
