@@ -6,6 +6,7 @@ import dataclasses
 import functools
 import inspect
 import math
+import re
 from collections.abc import Iterable, Iterator
 from typing import Any
 
@@ -37,6 +38,7 @@ ROOMS = {
 DIRECTIONS = {"force": "tension", "contraction": "contraction", "pressure": "pressure"}
 
 
+@functools.cache
 def rooms() -> dict[str, list[type[Any]]]:
     """The model classes of each package, by name."""
     packages = {package.__name__.rpartition(".")[2]: package for package in PACKAGES}
@@ -164,7 +166,11 @@ def _default(field: dataclasses.Field[Any]) -> Any:
 
 
 def _linked(hint: Any) -> str:
-    return escape(describe(hint))
+    """An annotation in words, with links to the pages of models."""
+    places = {cls.__name__: room for room, classes in rooms().items() for cls in classes}
+    return re.sub(
+        r"\w+", lambda m: f"[{m[0]}](../{places[m[0]]}/{m[0]}.md)" if m[0] in places else m[0], escape(describe(hint))
+    )
 
 
 def property_section(cls: type[Any]) -> str:
@@ -224,7 +230,7 @@ def _validity(entry: Entry) -> str:
     if limits is None:
         return "–"
     (low, high), (first, last) = limits.pressure, limits.contraction
-    return f"{low / 1e3:.4g} to {high / 1e3:.4g} kPa, {100 * first:.3g} to {100 * last:.3g} %"
+    return f"{low / 1e3:.4g} to {high / 1e3:.4g} kPa, {100 * first:.3g} to {100 * last:.3g}\N{NO-BREAK SPACE}%"
 
 
 def _references(cls: type[Any]) -> tuple[Reference, ...]:
