@@ -19,6 +19,7 @@ source_suffix = {".md": "markdown"}
 myst_heading_anchors = 4
 myst_enable_extensions = ["attrs_inline"]
 highlight_language = "text"
+smartquotes = False
 nitpicky = True
 suppress_warnings = ["myst.xref_ambiguous"]
 exclude_patterns = ["build"]

@@ -16,7 +16,7 @@ HEADLINE = re.compile(r"(?P<name>[^=]*?[\w)]): (?P<formula>\S.*=.*)", re.DOTALL)
 FORMULA_FIRST = re.compile(r"[A-Za-z_^'(),0-9 -]{1,60}(?<![a-z]{4}) = ")
 """Beginning of a summary that is a formula itself, such as `u = K (r - y)`."""
 REMARK = re.compile(
-    r"[,;:.] +(?=(?P<word>[A-Za-z]+)(?![\w]* *[=(_^]))| (?=(?P<after>with|by|at|for|where|in|so|constant)\b)"
+    r"[,;:.] +(?=(?P<word>[A-Za-z]+)(?![\w]* *[=(_^']))| (?=(?P<after>with|by|at|for|where|in|so|constant)\b)"
 )
 """Beginning of the prose behind a formula: a word after punctuation, or a preposition."""
 ARGUMENT = re.compile(r"(?P<names>[a-z_]\w*(?:, [a-z_]\w*)*) {2,}(?P<meaning>\S.*)")
@@ -128,7 +128,7 @@ def joined_lines(text: str) -> list[str]:
         if lines and re.match(r"\s*(?:u_min <=|[+\-*/]\s)", line):
             lines[-1] += " " + line.strip()
         else:
-            lines.append(line.strip())
+            lines.append(re.sub(r" {2,}=", " =", line.strip()))
     return lines
 
 

@@ -20,7 +20,7 @@ from airmuscle.library.entry import Entry
 from airmuscle.library.models import PACKAGES, model_class, model_names
 
 from .docstrings import docstring, parts, symbol, to_markdown
-from .formulas_in_text import escape
+from .formulas_in_text import escape, markdown
 from .tables import table
 
 ROOMS = {
@@ -74,14 +74,15 @@ def overview() -> str:
 
 
 def first_sentence(cls: type[Any]) -> str:
-    """The summary of a model as one line of plain text, without its formula."""
-    text = " ".join(parts(docstring(cls)).summary.split()).replace("`", "")
-    return text if len(text) <= 160 else f"{text[:157].rsplit(' ', 1)[0]} …"
+    """The summary of a model in one line, with its formula if it is short."""
+    text = " ".join(parts(docstring(cls)).summary.split())
+    name = re.match(r"[^=]*?[\w)](?=: )", text)
+    return markdown(text) if len(text) <= 120 or name is None else f"{markdown(name[0])}."
 
 
 def room_page(room: str, classes: list[type[Any]]) -> str:
     """The index of the models of a package."""
-    rows = [(f"[{cls.__name__}]({cls.__name__}.md)", escape(first_sentence(cls))) for cls in classes]
+    rows = [(f"[{cls.__name__}]({cls.__name__}.md)", first_sentence(cls)) for cls in classes]
     tree = "\n".join(cls.__name__ for cls in classes)
     head = f"# {ROOMS[room]}\n\nModels of `airmuscle.{room}`.\n"
     return f"{head}\n{table(('model', 'definition'), rows)}\n```{{toctree}}\n:hidden:\n\n{tree}\n```\n"
