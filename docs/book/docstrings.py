@@ -116,9 +116,11 @@ def indented(block: str) -> str:
     """Indented lines of a docstring: formulas if all of them are, otherwise code."""
     text = textwrap.dedent(block)
     try:
-        return displayed(joined_lines(text))
+        if re.search(r"[=<>≤≥]", text):
+            return displayed(joined_lines(text))
     except FormulaError:
-        return f"```text\n{text}\n```"
+        pass  # not a formula
+    return f"```text\n{text}\n```"
 
 
 def joined_lines(text: str) -> list[str]:

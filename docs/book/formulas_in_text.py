@@ -144,7 +144,10 @@ def _is_mathematical(pieces: Pieces, index: int, symbols: Collection[str]) -> bo
     following = pieces[index + 1][1] if index + 1 < len(pieces) else ""
     if len(text) == 1:
         return text not in ARTICLES or following in ("_", "^", "/", ":") or _beside_sign(pieces, index)
-    if text in WORDS_OF_FORMULAS or following == "_" or re.fullmatch(r"[A-Za-z]\d+|rho\d", text):
+    indexed = following == "_" and len(text) <= 2
+    if following == "_" and text in FUNCTIONS:
+        return False  # a name of the code, such as min_angle
+    if text in WORDS_OF_FORMULAS or indexed or re.fullmatch(r"[A-Za-z]\d+|rho\d", text):
         return True
     before = pieces[index - 1][1] if index else ""
     if re.fullmatch(r"d(?:[A-Za-z]|eps|theta|phi)", text):

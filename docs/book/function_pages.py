@@ -35,7 +35,6 @@ FACES = {
     "airmuscle.simulation.batch": "Batch simulation",
     "airmuscle.analysis": "Analysis",
     "airmuscle.analysis.equilibrium": "Equilibria",
-    "airmuscle.library": "Library",
     "airmuscle.library.scaling": "Scaling of muscles",
     "airmuscle.sizing": "Sizing",
     "airmuscle.environments": "Learning environments",
@@ -43,6 +42,7 @@ FACES = {
     "airmuscle.study.tuning": "Tuning",
     "airmuscle.study.control_benchmark": "Control benchmark",
     "airmuscle.export": "Export",
+    "airmuscle.studio": "Studio",
     "airmuscle.core": "Interfaces for models",
 }
 """Packages of the interface, in the order of the pages, with their titles."""
@@ -52,20 +52,17 @@ MAX_LINE = 100
 
 def pages() -> Iterator[tuple[str, str]]:
     """(path without suffix, text) of all pages."""
-    present = [name for name in FACES if _names(name)]
-    yield "functions/index", overview(present)
-    for name in present:
+    yield "functions/index", overview(list(FACES))
+    for name in FACES:
         yield f"functions/{name}", face_page(name)
 
 
 def _names(module: str) -> list[str]:
-    """The functions and classes of a face that are not models, in alphabetical order."""
-    try:
-        face = importlib.import_module(module)
-    except ModuleNotFoundError:
-        return []
+    """The functions and classes of a face, or of a module without one, that are not models, in alphabetical order."""
+    face = importlib.import_module(module)
     models = frozenset(model_names())
-    things = ((name, getattr(face, name)) for name in getattr(face, "__all__", ()))
+    own = [name for name, thing in vars(face).items() if getattr(thing, "__module__", "") == module and name[0] != "_"]
+    things = ((name, getattr(face, name)) for name in getattr(face, "__all__", own))
     return sorted(
         name for name, thing in things if (inspect.isfunction(thing) or inspect.isclass(thing)) and name not in models
     )

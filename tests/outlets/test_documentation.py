@@ -116,6 +116,11 @@ def test_every_public_function_of_the_top_level_is_on_a_page():
     assert [name for name in functions if f"## {name}\n\n```python\n{name}(" not in text] == []
 
 
+def test_every_package_of_the_interface_has_names_on_its_page():
+    pages = dict(function_pages.pages())
+    assert [face for face in function_pages.FACES if "\n## " not in pages[f"functions/{face}"]] == []
+
+
 # Formulas
 
 
@@ -151,6 +156,11 @@ def test_prose_keeps_its_words_and_formulas_are_found_in_it():
     text = markdown("A muscle with k_max = 0.4 and a * b < c [Pa], see `code_x`.")
     assert text.startswith("A muscle with {math}`k_{\\text{max}} = 0.4` and")
     assert text.endswith("see `code_x`.")
+
+
+def test_names_of_the_code_in_prose_are_no_formulas():
+    assert markdown("with min_angle and initial_state") == "with min\\_angle and initial\\_state"
+    assert markdown("with eps_max and F_KE") == "with {math}`\\varepsilon _{\\text{max}}` and {math}`F_{\\text{KE}}`"
 
 
 def test_a_docstring_has_its_formula_displayed():
