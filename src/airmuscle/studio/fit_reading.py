@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -95,7 +96,8 @@ def _read_file(path: Path, settings: FitSettings, found: ReadSet) -> None:
         tables = _tables(path, settings)
         constants = _constants(path, settings)
     except AirmuscleError as error:
-        found.complain(error, field)
+        problem = as_field_error(error, field)
+        found.complain(FieldError(without_folder(problem.message, path.parent), problem.field))
         return
     for table in tables:
         columns = list(_columns(table, settings))[:MAX_COLUMNS]
@@ -118,6 +120,15 @@ def _read_file(path: Path, settings: FitSettings, found: ReadSet) -> None:
             continue
         found.recordings.append(recording)
         found.files.append(path.name)
+
+
+def without_folder(text: str, folder: Path) -> str:
+    """The text without the path of a folder, or its beginning, which a reader of another package may quote."""
+    path, least = str(folder), len("/tmp/")
+    text = text.replace(f"{path}{os.sep}", "")
+    for length in range(len(path), least, -1):
+        text = text.replace(path[:length], "…")
+    return text
 
 
 def _time_base(settings: FitSettings) -> TimeBase:
