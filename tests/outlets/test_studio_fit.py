@@ -135,6 +135,18 @@ def test_a_length_needs_the_resting_length_and_a_pressure_is_gauge_unless_stated
         assert any("is read as gauge" in note for note in recording["notes"])
 
 
+def test_a_column_may_state_the_resting_length(app):
+    """By its heading, or because the user selects it."""
+    table = "p [bar],L [mm],F [N],rest_length [cm],note [mm]\n1,300,50,30,310\n2,290,40,30,310\n3,280,40,30,310\n"
+    name = upload(app, "a.csv", table.encode()).json()["set"]
+    constant = {"note [mm]": {"quantity": "resting_length", "unit": "mm"}, "rest_length [cm]": {"quantity": ""}}
+    for settings, length, column in (({}, "300 mm", 3), ({"columns": constant}, "310 mm", 4)):
+        sheet = post(app, "read", set=name, settings=settings).json()
+        assert sheet["recordings"][0]["constants"]["resting_length"] == length
+        assert sheet["files"][0]["columns"][column]["quantity"] == "resting_length"
+        assert sheet["ready"]
+
+
 REFUSED = (
     ({"resting_length": "300"}, "resting_length"), ({"resting_length": "-3 mm"}, "resting_length"),
     ({"resting_length": "3 kg"}, "resting_length"), ({"resting_length": "nan m"}, "resting_length"),

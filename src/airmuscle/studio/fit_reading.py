@@ -11,6 +11,7 @@ from pathlib import Path
 from ..core.errors import AirmuscleError, AirmuscleWarning, ColumnError
 from ..core.units import AMBIENT_PRESSURE, quantity
 from ..recording import Decimation, Recording
+from ..recording.constants import parse_constant_name
 from ..recording.heading import Heading, parse_heading
 from ..recording.interpret import interpret, resolve_headings, unit_conversion
 from ..recording.mapping import apply_mapping
@@ -168,13 +169,23 @@ def _chosen(table: RawTable, settings: FitSettings) -> dict[str, str]:
 def _columns(table: RawTable, settings: FitSettings) -> Iterator[Column]:
     units = table.units or ("",) * len(table.headings)
     for key, heading, unit_row in zip(_keys(table), table.headings, units, strict=False):
-        own = parse_heading(heading)
         chosen = settings.columns.get(key)
-        read = own if not chosen else parse_heading(chosen)
-        stated = unit_row or own.unit or ""
-        unit = (read.unit if chosen and read.unit else stated) or ""
-        known = read.known or bool(chosen)
-        yield Column(key, heading, read.name if known else heading, unit, stated, known, chosen != "")
+        name, stated, known = _name_and_unit(heading)
+        stated = unit_row or stated
+        if chosen:
+            name, unit, known = _name_and_unit(chosen)
+        else:
+            unit = ""
+        yield Column(key, heading, name if known else heading, unit or stated, stated, known, chosen != "")
+
+
+def _name_and_unit(text: str) -> tuple[str, str, bool]:
+    """The quantity or constant of a heading, its unit, and whether it is a known one."""
+    constant = parse_constant_name(text)
+    if constant is not None:
+        return (*constant, True)
+    heading = parse_heading(text)
+    return heading.name, heading.unit or "", heading.known
 
 
 def _unit_problems(
