@@ -16,6 +16,7 @@ from ..core.errors import AirmuscleError
 from ..library.files import LAWS, list_laws, read_toml
 from .fit_routes import FitService
 from .fit_settings import FieldError
+from .joint_sheet import joint_names, sheet_of_joint
 from .page import self_contained_page, server_page, web_files
 from .requests import BadRequest, decoded, json_answer, limited_body
 from .security import COOKIE, Access, Application, given_token, secured
@@ -33,7 +34,9 @@ from .worker import LimitError, WorkerPool
 WORKERS = 2
 """Number of worker processes (chosen)."""
 TIME_LIMIT = 20.0
-"""Limit [s] of the computation of a sheet (chosen: those of the library take less than one second)."""
+"""Limit [s] of the computation of a sheet of a user (chosen)."""
+LIBRARY_LIMIT = 120.0
+"""The same of the library (chosen: a joint of muscles with an elaborate law takes some seconds)."""
 MAX_SHEETS = 100
 """Number of sheets that the server keeps (chosen)."""
 MAX_PAGE = 256 * 1024
@@ -61,7 +64,7 @@ class Sheets:
         key = (task.__name__, name)
         known = self.get(self._of_library.get(key, ""))
         if known is None:
-            known = self.of_text(task, name)
+            known = self.keep(self._pool.call(task, name, limit=LIBRARY_LIMIT))
             self._of_library[key] = known["id"]
         return known
 
@@ -83,7 +86,8 @@ def library_list() -> dict[str, Any]:
     """Names and titles of the laws and plants that the page offers."""
     laws = [{"name": name, **_texts(read_toml(LAWS / f"{name}.toml"))} for name in list_laws()]
     plants = [{"name": name, **plant_title(name)} for name in plant_names()]
-    return {"version": metadata.version("airmuscle"), "laws": laws, "plants": plants}
+    joints = [{"name": name, **plant_title(name)} for name in joint_names()]
+    return {"version": metadata.version("airmuscle"), "laws": laws, "plants": plants, "joints": joints}
 
 
 def _texts(tables: Mapping[str, Any]) -> dict[str, Any]:
@@ -110,6 +114,7 @@ def create_app(
         Route("/api/law", handlers.own_law, methods=["POST"]),
         Route("/api/plant/{name}", handlers.plant),
         Route("/api/plant", handlers.own_plant, methods=["POST"]),
+        Route("/api/joint/{name}", handlers.joint),
         Route("/api/page", handlers.save_page, methods=["POST"]),
         *(fits or FitService(pool)).routes(),
     ]
@@ -181,6 +186,13 @@ class Handlers:
         """The sheet of a scenario of a user."""
         text = decoded(await limited_body(request, MAX_TEXT))
         return await self._computed(self._sheets.of_text, sheet_of_scenario_text, text)
+
+    async def joint(self, request: Any) -> Any:
+        """The sheet of a joint of the library."""
+        name = request.path_params["name"]
+        if name not in joint_names():
+            raise BadRequest(f"the library has no joint '{name[:80]}'.", 404)
+        return await self._computed(self._sheets.of_library, sheet_of_joint, name)
 
     async def _computed(self, function: Callable[..., dict[str, Any]], *arguments: Any) -> Any:
         from starlette.concurrency import run_in_threadpool

@@ -33,7 +33,7 @@ NEEDED = ("pressure", "contraction", "force")
 
 
 @dataclasses.dataclass(frozen=True)
-class Column:
+class FileColumn:
     """A column of a file with its interpretation.
 
     key      the heading, or the number of a column whose heading occurs several times
@@ -54,7 +54,7 @@ class Column:
 class ReadSet:
     """The recordings of all files, complete and with the selected rows, the columns, and the problems."""
 
-    columns: dict[str, list[Column]] = dataclasses.field(default_factory=dict)
+    columns: dict[str, list[FileColumn]] = dataclasses.field(default_factory=dict)
     """Columns by the name of the file."""
     recordings: list[Recording] = dataclasses.field(default_factory=list)
     files: list[str] = dataclasses.field(default_factory=list)
@@ -166,7 +166,7 @@ def _chosen(table: RawTable, settings: FitSettings) -> dict[str, str]:
     return {key: settings.columns[key] for key in _keys(table) if key in settings.columns}
 
 
-def _columns(table: RawTable, settings: FitSettings) -> Iterator[Column]:
+def _columns(table: RawTable, settings: FitSettings) -> Iterator[FileColumn]:
     units = table.units or ("",) * len(table.headings)
     for key, heading, unit_row in zip(_keys(table), table.headings, units, strict=False):
         chosen = settings.columns.get(key)
@@ -176,7 +176,7 @@ def _columns(table: RawTable, settings: FitSettings) -> Iterator[Column]:
             name, unit, known = _name_and_unit(chosen)
         else:
             unit = ""
-        yield Column(key, heading, name if known else heading, unit or stated, stated, known, chosen != "")
+        yield FileColumn(key, heading, name if known else heading, unit or stated, stated, known, chosen != "")
 
 
 def _name_and_unit(text: str) -> tuple[str, str, bool]:
@@ -189,7 +189,7 @@ def _name_and_unit(text: str) -> tuple[str, str, bool]:
 
 
 def _unit_problems(
-    table: RawTable, columns: Sequence[Column], constants: dict[str, float | str]
+    table: RawTable, columns: Sequence[FileColumn], constants: dict[str, float | str]
 ) -> Iterator[FieldError]:
     """A problem for each column whose unit is missing or unknown, and for two columns of one quantity."""
     ambient = constants.get("ambient")
@@ -218,7 +218,7 @@ def _unit_problems(
             yield FieldError(_unit_text(column, heading, error), f"column:{column.key}")
 
 
-def _unit_text(column: Column, heading: Heading, error: AirmuscleError) -> str:
+def _unit_text(column: FileColumn, heading: Heading, error: AirmuscleError) -> str:
     if heading.unit is None:
         return f"the unit of '{column.key}' ({heading.name}) is not stated in the file; write it into the field Unit."
     return in_page_words(error.message).partition(": ")[2] or str(error.message)

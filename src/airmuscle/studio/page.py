@@ -34,6 +34,13 @@ SCRIPTS = (
     "scripts/fit-files.js",
     "scripts/fit-result.js",
     "scripts/fit-tab.js",
+    "scripts/joint-loop.js",
+    "scripts/joint-statics.js",
+    "scripts/joint-linear.js",
+    "scripts/joint-drawing.js",
+    "scripts/joint-charts.js",
+    "scripts/joint-gains.js",
+    "scripts/joint-tab.js",
     "scripts/main.js",
 )
 """Scripts in the order in which the page runs them."""
