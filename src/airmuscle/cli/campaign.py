@@ -16,9 +16,8 @@ from ..identify.campaign import Campaign, LeftOutStage, StaticStage, identify_ca
 from ..library.campaign_entry import campaign_entry
 from ..library.entry import Entry
 from ..library.write import save
-from ..recording import ColumnMapping, Recording, read
-from ..recording.reader import find_files
-from ..recording.unit_consistency import check_unit_consistency
+from ..recording import ColumnMapping, Recording
+from ..recording.reader import check_bench, find_files, read_file
 from ..report.campaign_chapters import UnreadFile, ValidationRow, campaign_chapters
 from ..report.output_folder import atomic_folder, check_writable
 from ..report.write import as_json, write_into
@@ -86,8 +85,8 @@ def campaign(
     kept_aside = {path.resolve() for path in validate or ()}
     files = [path for path in find_files(folder) if path.resolve() not in kept_aside]
     recordings, unread = _read_each(files, columns, units)
-    aside = read(validate, mapping=columns, units=units) if validate else ()
-    check_unit_consistency([*recordings, *aside])
+    aside = [recording for path in find_files(validate or ()) for recording in read_file(path, columns, units)]
+    check_bench([*recordings, *aside])
     geometry = None if size is None else braid_of_length(size, _one_length(recordings))
     check_writable(out)
     result = _identify(recordings, geometry, out)
@@ -109,7 +108,7 @@ def _read_each(
         for i, path in enumerate(files):
             show("files", i / len(files))
             try:
-                recordings += read(path, mapping=mapping, units=units)
+                recordings += read_file(path, mapping, units)
             except AirmuscleError as error:
                 unread.append(UnreadFile(path.name, in_options(error.message, "campaign")))
     if not recordings:
