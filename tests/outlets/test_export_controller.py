@@ -32,7 +32,7 @@ from airmuscle.control import (
 )
 from airmuscle.core.errors import ParameterError
 from airmuscle.export import write_controller
-from airmuscle.export.controller import print_controller
+from airmuscle.export.printed_controller import print_controller
 from airmuscle.simulation import Problem, solve
 from airmuscle.simulation.sampled_loop import prepare_loop
 

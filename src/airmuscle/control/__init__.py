@@ -19,6 +19,7 @@ from .inputs import ZERO_INPUT, InputSignal, Periodic, SampledSignal, Schedule
 from .iterative_learning import IterativeLearning
 from .linear_model_predictive import LinearModelPredictive
 from .on_off import OnOffController
+from .open_loop_law import OpenLoopLaw
 from .pid import PID
 from .piecewise_linear import PiecewiseLinear
 from .proportional_feedback import ProportionalFeedback
@@ -63,6 +64,7 @@ __all__ = [
     "LinearModelPredictive",
     "Measurement",
     "OnOffController",
+    "OpenLoopLaw",
     "Periodic",
     "PiecewiseLinear",
     "ProportionalFeedback",

@@ -41,6 +41,12 @@ def c_array(declaration: str, values: Any, padding: int = 0) -> str:
     return f"{declaration} = {{{_wrapped(texts)}}};\n"
 
 
+def c_integers(declaration: str, values: Sequence[Any]) -> str:
+    """An array of whole numbers, or a table of rows of them; of none, one zero, because C has no empty array."""
+    rows = [f"{{{', '.join(map(str, row))}}}" if isinstance(row, tuple) else str(row) for row in values]
+    return f"{declaration} = {{{_wrapped(rows or ['0'])}}};\n"
+
+
 def _wrapped(items: Sequence[str]) -> str:
     """The items with commas, in one line or in lines of at most WIDTH characters."""
     if sum(len(item) + 2 for item in items) < WIDTH - 60:

@@ -14,8 +14,11 @@ from typing import Any
 
 from ..core.errors import AirmuscleError
 from ..library.files import LAWS, list_laws, read_toml
+from .fit_routes import FitService
+from .fit_settings import FieldError
 from .joint_sheet import joint_names, sheet_of_joint
 from .page import self_contained_page, server_page, web_files
+from .requests import BadRequest, decoded, json_answer, limited_body
 from .security import COOKIE, Access, Application, given_token, secured
 from .size_sheet import size_sheet
 from .tasks import (
@@ -41,14 +44,6 @@ MAX_PAGE = 256 * 1024
 """Greatest size of a request for a self-contained page [bytes] (chosen)."""
 MAX_PAGE_SHEETS = 12
 """Greatest number of muscles and plants in a self-contained page (chosen)."""
-
-
-class BadRequest(AirmuscleError):
-    """A request that the server does not understand, with its status."""
-
-    def __init__(self, message: str, status: int = 400) -> None:
-        super().__init__(message)
-        self.status = status
 
 
 class Sheets:
@@ -101,13 +96,15 @@ def _texts(tables: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def create_app(
-    access: Access = Access(), pool: WorkerPool | None = None, opened: tuple[dict[str, Any], ...] = ()
-) -> Application:
+    access: Access = Access(), pool: WorkerPool | None = None, opened: tuple[dict[str, Any], ...] = (),
+    fits: FitService | None = None,
+) -> Application:  # fmt: skip
     """The ASGI application. `opened` are sheets with which the page begins. Raises ImportError without starlette."""
     from starlette.applications import Starlette
     from starlette.routing import Route
 
-    sheets = Sheets(pool or WorkerPool(WORKERS))
+    pool = pool or WorkerPool(WORKERS)
+    sheets = Sheets(pool)
     handlers = Handlers(sheets, access, opened)
     routes = [
         Route("/", handlers.page),
@@ -121,6 +118,7 @@ def create_app(
         Route("/api/joint/{name}", handlers.joint),
         Route("/api/size", handlers.size, methods=["POST"]),
         Route("/api/page", handlers.save_page, methods=["POST"]),
+        *(fits or FitService(pool)).routes(),
     ]
     errors: dict[Any, Any] = {AirmuscleError: _refused, 404: _missing, 405: _missing, 500: _failed}
     return secured(Starlette(routes=routes, exception_handlers=errors), access)
@@ -165,7 +163,7 @@ class Handlers:
 
     async def library(self, request: Any) -> Any:
         """Names of the library, and the sheets with which the page begins."""
-        return _json({**self._library, "opened": [_without_script(sheet) for sheet in self._opened]})
+        return json_answer({**self._library, "opened": [_without_script(sheet) for sheet in self._opened]})
 
     async def law(self, request: Any) -> Any:
         """The sheet of a law of the library."""
@@ -206,7 +204,7 @@ class Handlers:
     async def _computed(self, function: Callable[..., dict[str, Any]], *arguments: Any) -> Any:
         from starlette.concurrency import run_in_threadpool
 
-        return _json(_without_script(await run_in_threadpool(function, *arguments)))
+        return json_answer(_without_script(await run_in_threadpool(function, *arguments)))
 
     async def save_page(self, request: Any) -> Any:
         """One file of what is on the screen: the request names the sheets and the state of the page."""
@@ -221,7 +219,7 @@ class Handlers:
 
 
 def read_page_request(text: str) -> dict[str, Any]:
-    """The identifiers of sheets and the state in a request for a page. Raises BadRequest."""
+    """The identifiers of sheets and the state in a request for a page, without that of fits. Raises BadRequest."""
     try:
         wanted = json.loads(text)
     except (ValueError, RecursionError):
@@ -233,47 +231,23 @@ def read_page_request(text: str) -> dict[str, Any]:
         raise BadRequest("sheets must be a list of identifiers.")
     if not 1 <= len(names) <= MAX_PAGE_SHEETS:
         raise BadRequest(f"{len(names)} sheets are requested; allowed range: 1 to {MAX_PAGE_SHEETS}.")
-    return {"sheets": names, "state": wanted["state"]}
-
-
-async def limited_body(request: Any, limit: int) -> bytes:
-    """The body of a request. Raises BadRequest as soon as it exceeds the limit [bytes]."""
-    parts, size = [], 0
-    async for part in request.stream():
-        size += len(part)
-        if size > limit:
-            raise BadRequest(f"the text is larger than {limit // 1024} kB.", 413)
-        parts.append(part)
-    return b"".join(parts)
-
-
-def decoded(body: bytes) -> str:
-    """A body as text. Raises BadRequest unless it is UTF-8."""
-    try:
-        return body.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise BadRequest(f"the text is not UTF-8 (byte {error.start}).") from None
+    return {"sheets": names, "state": {name: state for name, state in wanted["state"].items() if name != "fit"}}
 
 
 def _without_script(sheet: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in sheet.items() if key != "script"}
 
 
-def _json(content: Any, status: int = 200) -> Any:
-    from starlette.responses import JSONResponse
-
-    return JSONResponse(content, status_code=status)
-
-
 async def _refused(request: Any, error: Exception) -> Any:
     assert isinstance(error, AirmuscleError)
     status = error.status if isinstance(error, BadRequest) else 503 if isinstance(error, LimitError) else 422
-    return _json({"error": str(error.message)}, status)
+    field = {"field": error.field} if isinstance(error, FieldError) else {}
+    return json_answer({"error": str(error.message), **field}, status)
 
 
 async def _missing(request: Any, error: Any) -> Any:
-    return _json({"error": "there is no such address."}, int(error.status_code))
+    return json_answer({"error": "there is no such address."}, int(error.status_code))
 
 
 async def _failed(request: Any, error: Exception) -> Any:
-    return _json({"error": "the server failed; its terminal states the reason."}, 500)
+    return json_answer({"error": "the server failed; its terminal states the reason."}, 500)
