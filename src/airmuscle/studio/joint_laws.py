@@ -81,14 +81,14 @@ class ValveSet:
     inner      pressure control; None for regulators
     switching  whether the valves are on/off valves
     offsets    commands at which the joint is linearised, by input; relative to the pressure [Pa] for regulators
-    highest    greatest set point of the pressures [Pa]
+    limits     range of the set points of the pressures [Pa] in which the offsets are possible
     """
 
     pressures: tuple[str, str]
     inner: ControlLaw | None
     switching: bool
     offsets: dict[str, float]
-    highest: float = math.inf
+    limits: tuple[float, float] = (0.0, math.inf)
 
 
 def valve_set(plant: Plant) -> ValveSet:
@@ -100,7 +100,8 @@ def valve_set(plant: Plant) -> ValveSet:
         pressures = (f"{first}.setpoint", f"{second}.setpoint")
         shift = OPENING * circuit.band
         offsets = {pressures[0]: shift, pressures[1]: -shift}
-        return ValveSet(pressures, None, False, offsets, min(each.inputs[0].maximum for each in plant.circuits))
+        highest = min(each.inputs[0].maximum for each in plant.circuits)
+        return ValveSet(pressures, None, False, offsets, (shift, highest - shift))
     pressures = (f"{first}.pressure", f"{second}.pressure")
     if kinds == {ProportionalValve} and isinstance(circuit, ProportionalValve):
         commands = (f"{first}.command", f"{second}.command")
@@ -120,9 +121,11 @@ def valve_set(plant: Plant) -> ValveSet:
 
 def statics_within_valves(plant: Plant) -> JointStatics:
     """The statics of a joint with pressures that its supply and its regulators can give. Raises ParameterError."""
-    statics, highest = joint_statics(plant), valve_set(plant).highest
-    low, high = statics.pressure_range
-    return statics if high <= highest else joint_statics(plant, (low, highest))
+    statics, (low, high) = joint_statics(plant), valve_set(plant).limits
+    least, greatest = statics.pressure_range
+    if low <= least and greatest <= high:
+        return statics
+    return joint_statics(plant, (max(low, least), min(high, greatest)))
 
 
 def joint_controllers(plant: Plant, statics: JointStatics) -> tuple[JointController, ...]:

@@ -108,8 +108,8 @@
       this.chosen = index;
       const choice = this.sheet.choices[index], { chart, row } = choice;
       this.rows.forEach((line, i) => { line.classList.toggle("active", i === index); line.querySelector("button").setAttribute("aria-pressed", String(i === index)); });
-      const [first, last] = chart.points, range = (a, b, factor, unit) => `${shortText(a * factor, 3)} to ${shortText(b * factor, 3)} ${unit}`;
-      this.caption.replaceChildren(element("strong", {}, `${row.number} × ${choice.name}, ${shortText(row["length [mm]"])} mm${row["radius [mm]"] ? `, pulley radius ${shortText(row["radius [mm]"])} mm` : ""}: `), `${this.sheet.title}. One muscle works at ${range(first.pressure, last.pressure, 1e-5, "bar")}, ${range(first.contraction, last.contraction, 100, "%")}, ${range(first.force + 0, last.force, 1, "N")}.`);
+      const [first, last] = chart.points, range = (a, b, factor, unit) => { const [from, to] = [a, b].map((v) => shortText(Math.abs(v) < 1e-6 ? 0 : v * factor, 3)); return from === to ? `${to} ${unit}` : `${from} to ${to} ${unit}`; };
+      this.caption.replaceChildren(element("strong", {}, `${row.number} × ${choice.name}, ${shortText(row["length [mm]"])} mm${row["radius [mm]"] ? `, pulley radius ${shortText(row["radius [mm]"])} mm` : ""}: `), `${this.sheet.title}. One muscle works at ${range(first.pressure, last.pressure, 1e-5, "bar")}, ${range(first.contraction, last.contraction, 100, "%")}, ${range(first.force, last.force, 1, "N")}.`);
       this.scenario.disabled = !choice.scenario;
       this.scenario.title = choice.reason;
       this.draw(chart);
@@ -132,19 +132,25 @@
       const { shown } = this;
       if (!shown) return;
       const line = (rows, factor, dash) => { ctx.setLineDash(dash); ctx.strokeStyle = chart.colours.c2; ctx.lineWidth = dash.length ? 1.6 : 2.6; ctx.beginPath(); rows.contractions.forEach((c, i) => ctx.lineTo(chart.px(100 * c), chart.py(factor * rows.forces[i]))); ctx.stroke(); ctx.setLineDash([]); };
+      const placed = [];
       shown.pressures.forEach((p, k) => {
         const values = this.curves[k].values, i = values.findIndex((f, n) => f !== null && f < 0.97 * chart.ranges.y[1] && f > 0 && 100 * shown.contractions[n] >= chart.ranges.x[0]);
-        if (i >= 0 && p > 0) chart.write(ctx, `${shortText(p / 1e5)} bar`, Math.max(box.left + 4, chart.px(100 * shown.contractions[i]) + 4), Math.max(box.top + 14, chart.py(values[i]) - 4), chart.colours.soft);
+        if (i < 0 || !(p > 0)) return;
+        const x = Math.max(box.left + 4, chart.px(100 * shown.contractions[i]) + 4), y = Math.max(box.top + 14, chart.py(values[i]) - 4);
+        if (placed.some((other) => Math.abs(other.x - x) < 46 && Math.abs(other.y - y) < 15)) return;
+        placed.push({ x, y });
+        chart.write(ctx, `${shortText(p / 1e5)} bar`, x, y, chart.colours.soft);
       });
       if (shown.load) { line(shown.load, 1, []); line(shown.load, shown.load.factor, [7, 5]); }
-      const { contractions, forces } = shown.capacity, near = Math.floor(0.55 * forces.length);
+      const { contractions, forces } = shown.capacity, near = Math.floor(0.25 * forces.length);
       chart.write(ctx, "capacity", chart.px(100 * contractions[near]) + 8, chart.py(forces[near]) - 8, chart.colours.ink);
       if (shown.load) { const { contractions: c, forces: f, factor } = shown.load; chart.write(ctx, "load", chart.px(100 * c[8]), chart.py(f[8]) + 18, chart.colours.ink); chart.write(ctx, `load × ${shortText(factor, 3)}`, chart.px(100 * c[8]), chart.py(factor * f[8]) - 8, chart.colours.ink); }
       shown.points.forEach((p, k) => {
         const x = chart.px(100 * p.contraction), y = chart.py(p.force), right = x > box.left + 0.7 * box.width;
         ctx.beginPath(); if (k) ctx.rect(x - 6, y - 6, 12, 12); else ctx.arc(x, y, 7, 0, 2 * Math.PI);
         ctx.fillStyle = chart.colours.card; ctx.fill(); ctx.lineWidth = 3; ctx.strokeStyle = chart.colours.c2; ctx.stroke();
-        chart.write(ctx, `${shown.load ? ["start", "end"][k] : ["extended", "contracted"][k]}: ${shortText(p.pressure / 1e5, 3)} bar, ${shortText(Math.abs(p.force) < 1e-6 ? 0 : p.force, 3)} N`, x + (right ? -12 : 12), y - 12, chart.colours.ink, right ? "right" : "left");
+        const name = shown.load ? ["start", "end"][k] : ["extended", "contracted"][k];
+        chart.write(ctx, box.width < 420 ? name : `${name}: ${shortText(p.pressure / 1e5, 3)} bar`, x + (right ? -12 : 12), y - 12, chart.colours.ink, right ? "right" : "left");
       });
     }
 
