@@ -40,7 +40,8 @@ def first_state(sheets: Sequence[dict[str, Any]]) -> dict[str, Any]:
 def export_page(names: Sequence[str], path: str | Path) -> Path:
     """Write a page without server and network that shows these muscles and plants; the file is complete or unchanged.
 
-    A joint of the library appears in the tab Joint as well. Raises the errors of the loaders, ParameterError without a name, FileError if the file cannot be written.
+    A joint of the library appears in the tab Joint as well. Raises the errors of the loaders, ParameterError without a
+    name, FileError if the file cannot be written.
     """
     if not names:
         raise ParameterError("no muscle or plant is named; give at least one name of the library or a file.")
