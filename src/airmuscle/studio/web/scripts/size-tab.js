@@ -22,7 +22,7 @@
       const field = ([name, label, value, hint]) => {
         const input = this.fields[name] = element("input", { type: "text", id: `size-${name}`, value, autocomplete: "off", "aria-describedby": hint ? `size-${name}-hint` : null });
         input.addEventListener("input", () => this.stateChanged());
-        return element("div.field", {}, element("label", { for: `size-${name}` }, label), input, hint ? element("span.small.soft", { id: `size-${name}-hint` }, hint) : null);
+        return element("div.quantity", {}, element("label", { for: `size-${name}` }, label), input, hint ? element("span.small.soft", { id: `size-${name}-hint` }, hint) : null);
       };
       this.kinds = ["lift", "joint"].map((kind) => element("button", { type: "button", onclick: () => this.setKind(kind) }, kind === "lift" ? "Lift" : "Joint"));
       this.groups = { lift: element("div.stack.tight", {}, ...FIELDS.lift.map(field)), joint: element("div.stack.tight", {}, ...FIELDS.joint.map(field)) };
@@ -30,7 +30,7 @@
       this.sort.addEventListener("change", () => this.stateChanged());
       this.message = element("p", { role: "alert" });
       this.go = element("button.primary", { type: "submit" }, "Find muscles");
-      this.form = element("form", { novalidate: true }, element("div.row", { role: "group", "aria-label": "Task" }, ...this.kinds), this.groups.lift, this.groups.joint, element("div.stack.tight", {}, ...FIELDS.all.map(field), element("div.field", {}, element("label", { for: "size-sort" }, "Rank by"), this.sort)), element("div.row", {}, this.go), this.message);
+      this.form = element("form", { novalidate: true }, element("div.row", { role: "group", "aria-label": "Task" }, ...this.kinds), this.groups.lift, this.groups.joint, element("div.stack.tight", {}, ...FIELDS.all.map(field), element("div.quantity", {}, element("label", { for: "size-sort" }, "Rank by"), this.sort)), element("div.row", {}, this.go), this.message);
       this.form.addEventListener("submit", (event) => { event.preventDefault(); this.find(); });
       this.table = element("div.scroll", { tabindex: 0, role: "region", "aria-label": "Choices, best first" });
       this.unsuitable = element("div");
