@@ -22,6 +22,7 @@ from ..export import (
 from ..export.building import BuiltProgram, build_and_run
 from ..export.identifiers import make_identifier
 from ..export.microcontroller import PROCESSORS, run_in_emulator
+from ..export.platforms import PLATFORMS, Platform, find_platform
 from ..library.law_file import load_law
 from ..report.output_folder import check_writable
 from ..scenario.scenario import load_scenario
@@ -76,11 +77,21 @@ MuscleName = Annotated[str, typer.Option("--muscle", metavar="NAME", help="One m
 SourcesOnly = Annotated[bool, typer.Option("--sources-only", help="An FMU without a binary; --to fmu.")]
 
 
+Platforms = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--platforms", metavar="NAME",
+        help=f"Binaries of an FMU for a platform, by the package ziglang; repeatable: {', '.join(PLATFORMS)}. Default: "
+        "this machine.",
+    ),
+]  # fmt: skip
+
+
 def export(
     source: Source, to: To, out: Folder = DEFAULT_FOLDER, name: ProgramName = "", law: Law = False,
     controller: ControllerOnly = False, build: Build = False, tunable: Tunable = None, fmi: Fmi = None,
-    sources_only: SourcesOnly = False, muscle: MuscleName = "", precision: PrecisionName = "double",
-    processor: ProcessorName = "", json: Json = False,
+    sources_only: SourcesOnly = False, platforms: Platforms = None, muscle: MuscleName = "",
+    precision: PrecisionName = "double", processor: ProcessorName = "", json: Json = False,
 ) -> None:  # fmt: skip
     """Export to C, JavaScript, MATLAB, FMU, MuJoCo or Modelica.
 
@@ -99,11 +110,14 @@ def export(
       airmuscle export examples/pressure_loop.toml --controller --to c --precision float --build --processor cortex-m4
       airmuscle export examples/fill_discharge.toml --to fmu --fmi 2 --out fill.fmu
     """
-    _check_options(to, law, controller, build, tunable, fmi is not None or sources_only)
+    _check_options(to, law, controller, build, tunable, fmi is not None or sources_only or bool(platforms))
     _check_controller_options(controller, build, precision, processor)
     name = name or make_identifier(Path(source).stem)
     if to == "fmu":
-        _export_fmu(source, out, name, tunable, 3 if fmi is None else fmi, not sources_only, json)
+        if sources_only and platforms:
+            raise typer.BadParameter("--sources-only and --platforms exclude each other.")
+        targets = [find_platform(each) for each in dict.fromkeys(platforms or ())]
+        _export_fmu(source, out, name, tunable, 3 if fmi is None else fmi, not sources_only, targets, json)
         return
     if muscle and to != "mujoco":
         raise typer.BadParameter("--muscle belongs to --to mujoco.")
@@ -190,25 +204,28 @@ def _check_options(
     if law and tunable:
         raise typer.BadParameter("--tunable: all parameters of a law can be changed; leave it out.")
     if of_an_fmu and to != "fmu":
-        raise typer.BadParameter("--fmi and --sources-only belong to --to fmu.")
+        raise typer.BadParameter("--fmi, --sources-only and --platforms belong to --to fmu.")
 
 
 def _export_fmu(
-    source: str, out: Path, name: str, tunable: list[str] | None, fmi: int, binary: bool, json: bool
-) -> None:
+    source: str, out: Path, name: str, tunable: list[str] | None, fmi: int, binary: bool, platforms: list[Platform],
+    json: bool,
+) -> None:  # fmt: skip
     """Write an FMU into a folder, or to a file that ends in .fmu."""
     path = out if out.suffix == ".fmu" else out / f"{name}.fmu"
     check_writable(path.parent)
     scenario = load_scenario(source)
     written = write_fmu(
-        scenario.problem, path, fmi=fmi, name=name, title=scenario.title, tunable=tunable, binary=binary
-    )
+        scenario.problem, path, fmi=fmi, name=name, title=scenario.title, tunable=tunable, binary=binary,
+        platforms=platforms,
+    )  # fmt: skip
     if json:
-        print_json({"files": [str(path)], "platform": written.platform, "remark": written.remark})
+        print_json({"files": [str(path)], "platforms": list(written.platforms), "remark": written.remark})
         return
     echo(f"file: {path}")
-    if written.platform:
-        echo(f"FMI {fmi}.0, Model Exchange and Co-Simulation, with sources and a binary for {written.platform}")
+    if written.platforms:
+        names = ", ".join(written.platforms)
+        echo(f"FMI {fmi}.0, Model Exchange and Co-Simulation, with sources and a binary for {names}")
     else:
         echo(f"FMI {fmi}.0, Model Exchange and Co-Simulation, sources without a binary: {written.remark}")
     echo(f"run: fmpy simulate {path}")
