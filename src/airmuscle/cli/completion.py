@@ -26,18 +26,18 @@ def print_completion_script(shell: str | None) -> None:
         raise typer.BadParameter(
             f"'{shell}' is not supported; allowed are {', '.join(SHELLS)}.{suggestion(shell, SHELLS)}"
         )
-    from typer import completion
+    from typer._completion_shared import get_completion_script
 
-    echo(completion.get_completion_script(prog_name=PROGRAM, complete_var=REQUEST, shell=shell))
+    echo(get_completion_script(prog_name=PROGRAM, complete_var=REQUEST, shell=shell))
     raise typer.Exit
 
 
 def install_completion_classes() -> None:
     """Prepare typer for the completion requests of these scripts, which arrive in environment variables."""
     if REQUEST in os.environ:
-        from typer import completion
+        from typer._completion_classes import completion_init
 
-        completion.completion_init()
+        completion_init()
 
 
 def _beginning_with(names: Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
