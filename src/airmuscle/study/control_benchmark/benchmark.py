@@ -13,6 +13,7 @@ from ...control.control_loop import ControlLoop
 from ...control.controller import Controller
 from ...control.stuck_valve import WithStuckValve
 from ...core.errors import AirmuscleError, ParameterError
+from ...core.short_repr import ShortRepr
 from ...recording import Recording
 from ...simulation.run import simulate
 from ..tuning import LoopCase, RootMeanSquareError, Tuning, tune
@@ -30,8 +31,8 @@ DEFAULT_BUDGET = 4800
 Progress = Callable[[str, int, int], None]
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class TunedContender:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class TunedContender(ShortRepr):
     """A contender with the law that commands the valves through the sensors; `tuning` is None if it was not tuned.
 
     identified  the gains that were identified on the truth, by path
@@ -47,8 +48,8 @@ class TunedContender:
         return self.contender.name
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class BenchmarkRun:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class BenchmarkRun(ShortRepr):
     """One task done by one contender: its metrics and recording, or the reason why the run ended early."""
 
     task: ControlTask
@@ -58,8 +59,8 @@ class BenchmarkRun:
     reason: str = ""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class BenchmarkResult:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class BenchmarkResult(ShortRepr):
     """The runs of all contenders on all tasks of a joint, by names (contender, task)."""
 
     joint: BenchmarkJoint

@@ -12,6 +12,7 @@ from ...control.iterative_learning import IterativeLearning
 from ...control.sensors import WithSensors
 from ...core.arrays import Array
 from ...core.errors import ParameterError
+from ...core.short_repr import ShortRepr
 from ...core.tree import leaves
 from ...plant.plant import Plant
 from ...simulation.run import simulate
@@ -27,8 +28,8 @@ STEP = 0.05e5
 """Step of the feed-forward signal [Pa] from which the impulse response of the model is computed (chosen)."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class LearningCurve:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class LearningCurve(ShortRepr):
     """The trials of a task: rms errors (J,) [degree] from the task's begin on, and the last signal (N,) [Pa].
 
     The first trial is that before any learning. `spread` is the range of the rms errors [degree] of the last signal,
