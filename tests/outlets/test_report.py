@@ -34,6 +34,7 @@ from airmuscle.report.output_folder import atomic_folder, check_writable
 from airmuscle.report.write import as_json, write_report
 from airmuscle.reproduce import run
 
+pytestmark = pytest.mark.drawn
 DATE = datetime.date(2024, 5, 17)
 KEYS = {
     "paper", "kind", "claim", "statement", "case", "published", "expected", "reproduced", "unit", "tolerance", "verdict",

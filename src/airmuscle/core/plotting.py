@@ -22,7 +22,7 @@ _STYLE: Any = {
     "ytick.labelsize": 8, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
     "grid.alpha": 0.25, "grid.linewidth": 0.5, "lines.linewidth": 1.4, "lines.markersize": 4,
     "legend.frameon": False, "figure.dpi": 110, "savefig.dpi": 200, "svg.hashsalt": "airmuscle",
-    "svg.fonttype": "path",
+    "svg.fonttype": "path", "figure.autolayout": False, "figure.constrained_layout.use": False,
 }  # fmt: skip
 
 
@@ -57,9 +57,9 @@ def rendered(figure: Any, formats: tuple[str, ...] = ("svg", "png")) -> dict[str
     files = {}
     layout = figure.get_layout_engine()
     with mpl.rc_context(_STYLE):
-        if layout is not None:  # `savefig` would compute it anew for each format
+        if layout is not None:  # with an engine, `savefig` would draw the figure once more for each format
             figure.draw_without_rendering()
-            figure.set_layout_engine("none")
+            figure.set_layout_engine(None)
         try:
             for name in formats:
                 buffer = io.BytesIO()
