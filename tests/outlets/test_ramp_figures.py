@@ -29,6 +29,7 @@ from airmuscle.report.isobar_plot import isobar_plot
 from airmuscle.report.levels import is_pressure_ramp, levels_of
 from airmuscle.report.ramp_plot import ramp_plot
 
+pytestmark = pytest.mark.drawn
 LENGTHS, CONTRACTIONS = (0.083, 0.182, 0.382), (0.0, 0.04, 0.08, 0.12)
 
 

@@ -24,7 +24,7 @@ _STYLE: Any = {
     "ytick.labelsize": 8, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
     "grid.alpha": 0.25, "grid.linewidth": 0.5, "lines.linewidth": 1.4, "lines.markersize": 4,
     "legend.frameon": False, "figure.dpi": 110, "savefig.dpi": 200, "svg.hashsalt": "airmuscle",
-    "svg.fonttype": "path",
+    "svg.fonttype": "path", "figure.autolayout": False, "figure.constrained_layout.use": False,
 }  # fmt: skip
 
 
@@ -65,9 +65,9 @@ def rendered(
     files = {}
     layout = figure.get_layout_engine()
     with mpl.rc_context(_STYLE):
-        if layout is not None and dots_per_inch is None:  # `savefig` would compute it anew for each format
+        if layout is not None and dots_per_inch is None:  # with an engine, `savefig` would draw the figure once more
             figure.draw_without_rendering()
-            figure.set_layout_engine("none")
+            figure.set_layout_engine(None)
         try:
             for name in formats:
                 buffer = io.BytesIO()
