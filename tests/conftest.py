@@ -2,11 +2,13 @@
 
 Ctrl-C interrupts here too, where a shell that runs the tests in the background has it ignored. `--hypothesis-profile
 thorough` draws 300 examples in place of 20. A figure whose axes, labels and curves are those of one that was drawn
-before gets the files of that one, except in tests with the marker `drawn`, which look at the files.
+before gets the files of that one, except in tests with the marker `drawn`, which look at the files. The configuration
+file of the user is not read.
 """
 
 from __future__ import annotations
 
+import os
 import re
 import signal
 from typing import Any
@@ -17,6 +19,7 @@ from hypothesis import settings
 from airmuscle.core import plotting
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
+os.environ["AIRMUSCLE_CONFIG_DIR"] = os.devnull
 settings.register_profile("few", settings(), max_examples=20, deadline=None)
 settings.register_profile("thorough", settings(), max_examples=300, deadline=None)
 settings.load_profile("few")
@@ -29,12 +32,12 @@ class OneOfAKind:
         self.draw, self.draws_all = plotting.rendered, False
         self.files: dict[Any, dict[str, bytes]] = {}
 
-    def __call__(self, figure: Any, formats: tuple[str, ...] = ("svg", "png")) -> dict[str, bytes]:
+    def __call__(self, figure: Any, *options: Any, **named: Any) -> dict[str, bytes]:
         if self.draws_all:
-            return self.draw(figure, formats)
-        kind = kind_of(figure), formats
+            return self.draw(figure, *options, **named)
+        kind = kind_of(figure), repr((options, sorted(named.items())))
         if kind not in self.files:
-            self.files[kind] = self.draw(figure, formats)
+            self.files[kind] = self.draw(figure, *options, **named)
         return self.files[kind]
 
 
