@@ -259,7 +259,11 @@ def test_the_chart_and_its_data_stand_in_the_folder(tmp_path: Path):
 
 
 @pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
-@pytest.mark.parametrize("name", list_laws())
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[pytest.mark.slow] * (name == "saga2007-exact")) for name in list_laws()],
+    ids=list_laws(),
+)
 def test_every_entry_has_a_chart(tmp_path: Path, name: str):
     entry = load(name)
     low, high = entry.validity_range.pressure if entry.validity_range else entry.characteristic.pressure_range
