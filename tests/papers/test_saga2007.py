@@ -653,6 +653,14 @@ def test_the_pair_is_in_balance_at_the_angle_that_a_model_reaches(line):
         assert tensions[0] == pytest.approx(tensions[1], rel=1e-3)
 
 
+@pytest.mark.parametrize("line", ["A", "B"])
+def test_an_angle_is_missing_only_where_both_pressures_are_below_those_of_a_taut_muscle(line):
+    for name in joining.models(LINES[line]):
+        slack = joining.slack_angles(name, line)
+        np.testing.assert_array_equal(np.isnan(joining.reached_angles(name, line)), slack)
+        assert slack.all() if name.startswith("printed") else not slack.any()
+
+
 def test_the_printed_model_leaves_both_muscles_slack_and_the_circular_one_is_accurate():
     verdicts = {c.case: (c.reproduced, c.verdict) for c in joining.feed_forward_comparisons()}
     assert len(verdicts) == 6

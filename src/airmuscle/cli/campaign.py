@@ -15,6 +15,7 @@ from ..geometry import Geometry
 from ..identify.campaign import STAGES, Campaign, LeftOutStage, StaticStage, identify_campaign
 from ..library.campaign_entry import campaign_entry
 from ..library.entry import Entry
+from ..library.initial_law import resting_lengths
 from ..library.write import save
 from ..recording import ColumnMapping, Recording
 from ..recording.reader import check_bench, find_files, read_file
@@ -25,7 +26,6 @@ from ..scenario.campaign import RecordScenario, campaign_scenarios
 from .campaign_output import campaign_to_dict, print_campaign, stage_to_dict
 from .campaign_stages import KeptStages
 from .fit_geometry import braid_of_length, check_one_length, parse_braid
-from .initial_law import resting_lengths
 from .option_hints import in_options
 from .options import Folder, Json
 from .progress import computation_progress, reading_progress

@@ -5,22 +5,20 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import typer
 
 from ..characteristic.base import ForceLaw
-from ..friction import Friction
 from ..identify.campaign import HeldCreep, fit_held_creep, free_of_creep
 from ..identify.hysteresis import (
-    JointFit,
     LoopFit,
     find_loops,
     fit_jointly,
     fit_loop,
-    identified_friction,
     loops_not_joined,
 )
+from ..identify.hysteresis.selection import SelectedFriction, select_friction
 from ..library.entry import Entry
 from ..library.law_file import load_law
 from ..library.uncertainty import without_parts
@@ -100,7 +98,7 @@ def hysteresis(
     fits = [_with_option_names(fit_loop(loop, elements=elements, progress=progress)) for loop in loops]
     joint = fit_jointly(fits, progress=progress)
     sentences = [] if held is None else [*held.sentences, held.verdict]
-    written = _write(hysteresis_chapters(fits, sentences, joint), _select(fits, joint), held, entry, out)
+    written = _write(hysteresis_chapters(fits, sentences, joint), select_friction(fits, joint), held, entry, out)
     if json:
         not_joined = list(loops_not_joined(fits)) if joint else []
         data = {
@@ -138,31 +136,12 @@ def _with_option_names(fit: LoopFit) -> LoopFit:
     return dataclasses.replace(fit, failed=failed)
 
 
-class _Selected(NamedTuple):
-    """The friction to write, with the range of its data, the file or files it is from, and its verdict."""
-
-    friction: Friction
-    origin: str
-    verdict: str
-
-
-def _select(fits: Sequence[LoopFit], joint: Sequence[JointFit]) -> _Selected | None:
-    """The friction to write: of all runs together or, if they are not several, of the only run a plant can use."""
-    if joint:
-        best = next((fit for fit in joint if fit.justified), None)
-        if best is None:
-            return None
-        origin = f"{len(best.series)} runs"
-        return _Selected(identified_friction(best.friction, best.series), origin, best.verdict)
-    usable = [fit.recommended for fit in fits if fit.recommended is not None and fit.usable_in_plant]
-    if not usable:
-        return None
-    only = max(usable, key=lambda fit: fit.effective_sample_size)
-    return _Selected(identified_friction(only.friction, (only.series,)), only.series.origin, only.verdict)
-
-
 def _write(
-    chapters: Sequence[Chapter], selected: _Selected | None, held: HeldCreep | None, entry: Entry | None, out: Path
+    chapters: Sequence[Chapter],
+    selected: SelectedFriction | None,
+    held: HeldCreep | None,
+    entry: Entry | None,
+    out: Path,
 ) -> dict[str, Path]:
     """Write the report and what was identified; returns the file of the friction and that of the creep elements."""
     parts = [
@@ -180,7 +159,7 @@ def _write(
     return {name: out / file for name, file in written.items()}
 
 
-def _completed(entry: Entry, selected: _Selected | None, held: HeldCreep | None) -> Entry:
+def _completed(entry: Entry, selected: SelectedFriction | None, held: HeldCreep | None) -> Entry:
     """The muscle with friction and creep elements; its checks apply to the characteristic alone and are kept."""
     note, changes = entry.note, dict[str, Any]()
     if selected is not None:

@@ -20,6 +20,7 @@ from .channels import Channel, merge_channels
 from .heading import parse_heading
 from .mat_objects import READABLE, MatlabObject, find_objects, read_objects
 from .optional_dependency import import_lab_package, run_reader
+from .raw_columnar import check_no_external_links, check_own_values
 from .separate_process import read_in_separate_process
 from .table import RawTable
 
@@ -46,6 +47,7 @@ def read_mat_tables(path: Path, group: str | None = None, columns: Sequence[str]
 def read_mat_tables_here(path: Path, group: str | None, columns: Sequence[str] = ()) -> tuple[RawTable, ...]:
     """As `read_mat_tables`, in this process."""
     pymatreader = import_lab_package("pymatreader", path)
+    _check_links(path)
 
     def read() -> Mapping[str, Any]:
         with warnings.catch_warnings():
@@ -89,6 +91,21 @@ def _remedy(unread: Sequence[MatlabObject]) -> str:
     readable = any(each.class_name in READABLE for each in unread)
     package = " Tables and timetables are also read with the package mat-io: pip install mat-io." if readable else ""
     return f"Export in MATLAB: {commands}.{package}"
+
+
+def _check_links(path: Path) -> None:
+    """Raise FileError if a file of version 7.3, which is HDF5, takes values from another file."""
+    with path.open("rb") as beginning:
+        if beginning.read(10) != b"MATLAB 7.3":
+            return
+    h5py = import_lab_package("h5py", path)
+
+    def check() -> None:
+        with h5py.File(path, "r") as file:
+            check_own_values(h5py, file, path)
+            check_no_external_links(h5py, file, path)
+
+    run_reader(path, "MATLAB", check)
 
 
 def _find_groups(name: str, fields: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:

@@ -11,6 +11,7 @@ import numpy as np
 from ...characteristic.base import ForceLaw
 from ...core.arrays import Array
 from ...core.errors import IdentificationError
+from ...core.short_repr import ShortRepr
 from ...friction import Friction, NoFriction
 from ...geometry import Geometry
 from ...muscle import CreepElements, LinearDamper, Muscle
@@ -45,8 +46,8 @@ class Prediction(NamedTuple):
     high: Array
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Campaign:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Campaign(ShortRepr):
     """The records of a rig with their use, the result of each stage, and the next experiments."""
 
     records: tuple[CampaignRecord, ...]
