@@ -109,6 +109,7 @@ ARGUMENTS = {
     "period": "period of a signal [s]",
     "sample_time": "sample time of a controller [s]",
     "setpoint": "reference signal of a controller",
+    "setpoints": "set points of a sample, by name",
     "statistics": "steps of the integrator",
     "status": "how a computation ended",
     "system": "system of ordinary differential equations",

@@ -20,6 +20,12 @@ from airmuscle.simulation.with_sensitivities import sensitivity
 DOCS = Path(__file__).parents[2] / "docs"
 
 
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """The code of a page writes to the folder in which it runs."""
+    monkeypatch.chdir(tmp_path)
+
+
 def blocks(page, language):
     text = (DOCS / page).read_text(encoding="utf-8")
     return re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)

@@ -27,6 +27,7 @@ from ..library.law_file import load_law
 from ..report.output_folder import check_writable
 from ..scenario.scenario import load_scenario
 from ..simulation.batch import Double, Precision, Single
+from .completion import complete_entry
 from .options import Folder, Json
 from .terminal import echo, print_json
 
@@ -41,7 +42,9 @@ DEFAULT_FOLDER = Path("export")
 Source = Annotated[
     str,
     typer.Argument(
-        metavar="SOURCE", help="A scenario file or a plant of the library; with --law a library entry or a muscle file."
+        metavar="SOURCE",
+        help="A scenario file or a plant of the library; with --law a library entry or a muscle file.",
+        autocompletion=complete_entry,
     ),
 ]
 To = Annotated[str, typer.Option("--to", metavar="TARGET", help=f"Target: {', '.join(NAMES)}.")]

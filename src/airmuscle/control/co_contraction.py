@@ -10,15 +10,14 @@ from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.reference import Reference
-from .control_law import ControlLaw
-from .controller import Measurement
+from .open_loop_law import OpenLoopLaw
 
 DIFFERENCE = "difference"
 """Name of the set point that an outer controller commands: half the difference of both pressures [Pa]."""
 
 
 @model
-class CoContraction(ControlLaw):
+class CoContraction(OpenLoopLaw):
     """p_1 = p_0 + d,   p_2 = p_0 - d.
 
     d half the pressure difference, which turns the joint: the set point `difference`; p_0 mean pressure, which stiffens
@@ -34,18 +33,12 @@ class CoContraction(ControlLaw):
     mean: float = parameter("Pa", "p_0", "mean gauge pressure where it is no set point", bounds=(0.0, 1e7), default=0.0)
     mean_setpoint: str = ""
 
-    initial_memory: ClassVar[Mapping[str, float]] = {}
-
     def check(self) -> None:
         if len(self.commanded) != 2:
             raise ParameterError(
                 f"CoContraction: {len(self.commanded)} commanded pressures; name two, such as ('left.pressure', "
                 "'right.pressure')."
             )
-
-    @property
-    def measured_columns(self) -> tuple[str, ...]:
-        return ()
 
     @property
     def setpoints(self) -> tuple[str, ...]:
@@ -55,10 +48,7 @@ class CoContraction(ControlLaw):
     def inputs(self) -> tuple[str, ...]:
         return self.commanded
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
-        wanted = measurement.setpoints
-        mean = wanted[self.mean_setpoint] if self.mean_setpoint else self.mean
+    def command(self, setpoints: Mapping[str, Value]) -> dict[str, Value]:
+        mean = setpoints[self.mean_setpoint] if self.mean_setpoint else self.mean
         first, second = self.commanded
-        return {first: mean + wanted[DIFFERENCE], second: mean - wanted[DIFFERENCE]}, {}
+        return {first: mean + setpoints[DIFFERENCE], second: mean - setpoints[DIFFERENCE]}

@@ -9,13 +9,12 @@ from ..core.declaration import model, parameter
 from ..core.ops import Value
 from ..core.reference import Reference
 from ..geometry.meridian import SAGA_2007
-from .control_law import ControlLaw
-from .controller import Measurement
+from .open_loop_law import OpenLoopLaw
 from .static_inverse import StaticInverse
 
 
 @model
-class StaticFeedForward(ControlLaw):
+class StaticFeedForward(OpenLoopLaw):
     """u = p(eps_0 + x_r/L_0, F_r + m a_r): the pressure of the static inverse for the wanted position and load.
 
     x_r set point of the position, F_r wanted load: a set point where `load_setpoint` names one, else the parameter
@@ -37,12 +36,6 @@ class StaticFeedForward(ControlLaw):
     load_setpoint: str = ""
     acceleration_setpoint: str = ""
 
-    initial_memory: ClassVar[Mapping[str, float]] = {}
-
-    @property
-    def measured_columns(self) -> tuple[str, ...]:
-        return ()
-
     @property
     def setpoints(self) -> tuple[str, ...]:
         return (self.position, *(name for name in (self.load_setpoint, self.acceleration_setpoint) if name))
@@ -51,12 +44,9 @@ class StaticFeedForward(ControlLaw):
     def inputs(self) -> tuple[str, ...]:
         return (self.commanded,)
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
-        wanted = measurement.setpoints
-        force = wanted[self.load_setpoint] if self.load_setpoint else self.load
+    def command(self, setpoints: Mapping[str, Value]) -> dict[str, Value]:
+        force = setpoints[self.load_setpoint] if self.load_setpoint else self.load
         if self.acceleration_setpoint:
-            force = force + self.mass * wanted[self.acceleration_setpoint]
-        contraction = self.offset + wanted[self.position] / self.resting_length
-        return {self.commanded: self.inverse.pressure(contraction, force)}, {}
+            force = force + self.mass * setpoints[self.acceleration_setpoint]
+        contraction = self.offset + setpoints[self.position] / self.resting_length
+        return {self.commanded: self.inverse.pressure(contraction, force)}

@@ -13,8 +13,10 @@ import numpy.typing as npt
 from ..core.arrays import Array
 from ..core.errors import AirmuscleError
 from ..core.reference import Reference
+from ..core.short_repr import ShortRepr
 from .condensed_problem import CondensedProblem
-from .controller import Controller, Measurement
+from .controller import Measurement
+from .multivariable import MultivariableController
 
 RAWLINGS2017 = Reference(
     key="rawlings-2017",
@@ -85,8 +87,8 @@ class TargetMap:
         return f"TargetMap({len(self.controlled)} set points, {len(self.columns)} limited columns)"
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class LinearModelPredictive(Controller):
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class LinearModelPredictive(ShortRepr, MultivariableController):
     """Linear model predictive control (MPC): the first input of the plan that minimises a quadratic cost.
 
         x^_k = x^-_k + L (y_k - y_0 - C x^-_k),   x^ = (x, d)                      observer with disturbances d
@@ -114,18 +116,6 @@ class LinearModelPredictive(Controller):
     target: TargetMap
     problem: CondensedProblem
     _solvers: list[Any] = dataclasses.field(init=False, repr=False, default_factory=list)
-
-    @property
-    def measured_columns(self) -> tuple[str, ...]:
-        return self.measured
-
-    @property
-    def setpoints(self) -> tuple[str, ...]:
-        return self.controlled
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        return self.commanded
 
     def __getstate__(self) -> dict[str, Any]:
         """The fields without the workspaces of the solver, which belong to one process."""

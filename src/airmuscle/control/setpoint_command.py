@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar
 
 from ..core.declaration import model
 from ..core.errors import ParameterError
 from ..core.ops import Value
-from .control_law import ControlLaw
-from .controller import Measurement
+from .open_loop_law import OpenLoopLaw
 
 
 @model
-class SetpointCommand(ControlLaw):
+class SetpointCommand(OpenLoopLaw):
     """u = r: the command of each input is a set point, such as a learned or precomputed feed-forward signal.
 
     setpoint_names and commanded have the same length and order; without setpoint_names they are the inputs' names.
@@ -21,8 +19,6 @@ class SetpointCommand(ControlLaw):
 
     commanded: tuple[str, ...]
     setpoint_names: tuple[str, ...] = ()
-
-    initial_memory: ClassVar[Mapping[str, float]] = {}
 
     def check(self) -> None:
         if self.setpoint_names and len(self.setpoint_names) != len(self.commanded):
@@ -32,10 +28,6 @@ class SetpointCommand(ControlLaw):
             )
 
     @property
-    def measured_columns(self) -> tuple[str, ...]:
-        return ()
-
-    @property
     def setpoints(self) -> tuple[str, ...]:
         return self.setpoint_names or self.commanded
 
@@ -43,8 +35,6 @@ class SetpointCommand(ControlLaw):
     def inputs(self) -> tuple[str, ...]:
         return self.commanded
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
+    def command(self, setpoints: Mapping[str, Value]) -> dict[str, Value]:
         names = zip(self.commanded, self.setpoints, strict=True)
-        return {name: measurement.setpoints[setpoint] for name, setpoint in names}, {}
+        return {name: setpoints[setpoint] for name, setpoint in names}

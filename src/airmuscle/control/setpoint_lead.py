@@ -8,13 +8,12 @@ from typing import ClassVar
 from ..core.declaration import model, parameter
 from ..core.ops import Value
 from ..core.reference import Reference
-from .control_law import ControlLaw
-from .controller import Measurement
+from .open_loop_law import OpenLoopLaw
 from .pid import ASTROM_HAGGLUND1995
 
 
 @model
-class SetpointLead(ControlLaw):
+class SetpointLead(OpenLoopLaw):
     """u = K_f (r + T r').
 
     r and r' set points of a feed-forward signal and of its rate, T lead time, which compensates to first order the dead
@@ -31,12 +30,6 @@ class SetpointLead(ControlLaw):
     lead_time: float = parameter("s", "T", "lead time", bounds=(0.0, 1e3), default=0.0)
     share: float = parameter("1", "K_f", "share of the signal", bounds=(0.0, 10.0), default=1.0)
 
-    initial_memory: ClassVar[Mapping[str, float]] = {}
-
-    @property
-    def measured_columns(self) -> tuple[str, ...]:
-        return ()
-
     @property
     def setpoints(self) -> tuple[str, ...]:
         return (self.signal, self.rate)
@@ -45,8 +38,5 @@ class SetpointLead(ControlLaw):
     def inputs(self) -> tuple[str, ...]:
         return (self.commanded,)
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
-        wanted = measurement.setpoints
-        return {self.commanded: self.share * (wanted[self.signal] + self.lead_time * wanted[self.rate])}, {}
+    def command(self, setpoints: Mapping[str, Value]) -> dict[str, Value]:
+        return {self.commanded: self.share * (setpoints[self.signal] + self.lead_time * setpoints[self.rate])}

@@ -13,6 +13,7 @@ from ..core.reference import Reference
 from ..core.variables import select_prefix, with_prefix
 from .control_law import ControlLaw
 from .controller import Measurement
+from .multivariable import MultivariableController
 
 FRANKLIN1998 = Reference(
     key="franklin-1998",
@@ -25,7 +26,7 @@ FRANKLIN1998 = Reference(
 
 
 @model
-class StateFeedback(ControlLaw):
+class StateFeedback(MultivariableController, ControlLaw):
     """u_k = u_0 - L x_k - L_I w_k,   x_k = x^-_k + K (y_k - y_0 - C x^-_k),   w_(k+1) = w_k + h (z_k - r_k).
 
     x deviation of the states from the operating point, y measured columns, z controlled ones, r their set points. The
@@ -66,18 +67,6 @@ class StateFeedback(ControlLaw):
                 raise ParameterError(
                     f"StateFeedback: '{name}' is controlled and not measured; measured are {', '.join(self.measured)}."
                 )
-
-    @property
-    def measured_columns(self) -> tuple[str, ...]:
-        return self.measured
-
-    @property
-    def setpoints(self) -> tuple[str, ...]:
-        return self.controlled
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        return self.commanded
 
     @property
     def initial_memory(self) -> dict[str, float]:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from ..core import tree
 from ..core.arrays import Array
 from ..core.errors import ParameterError, suggestion
+from ..core.short_repr import ShortRepr
 from ..library.uncertainty import ParameterUncertainty
 from .task import EnvironmentTask
 
@@ -40,46 +41,49 @@ class Randomisation(abc.ABC):
 
 
 @dataclasses.dataclass(frozen=True)
-class ValueRange(Randomisation):
+class UniformRange(Randomisation):
+    """One number, uniformly distributed from `low` to `high`, for all paths (base)."""
+
+    paths: tuple[str, ...]
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        name = type(self).__name__
+        if isinstance(self.paths, str) or not self.paths:
+            raise ParameterError(f"{name}: paths are {self.paths!r}; give a tuple of one path or more.")
+        if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low <= self.high):
+            raise ParameterError(
+                f"{name} of {self.paths[0]}: the range is {self.low} to {self.high}; it must be finite and rise."
+            )
+
+    @property
+    def dimension(self) -> int:
+        return 1
+
+    def _draw(self, uniform: Array) -> Array:
+        number: Array = self.low + (self.high - self.low) * uniform
+        return number
+
+
+@dataclasses.dataclass(frozen=True)
+class ValueRange(UniformRange):
     """A value [SI], uniformly distributed from `low` to `high`; all paths take the same value."""
 
-    paths: tuple[str, ...]
-    low: float
-    high: float
-
-    def __post_init__(self) -> None:
-        _check_range(self)
-
-    @property
-    def dimension(self) -> int:
-        return 1
-
     def values(self, nominal: Array, uniform: Array) -> Array:
-        return np.repeat(self.low + (self.high - self.low) * uniform, nominal.size, axis=1)
+        return np.repeat(self._draw(uniform), nominal.size, axis=1)
 
 
 @dataclasses.dataclass(frozen=True)
-class FactorRange(Randomisation):
+class FactorRange(UniformRange):
     """A factor of the nominal values, uniformly distributed from `low` to `high`; all paths take the same factor."""
 
-    paths: tuple[str, ...]
-    low: float
-    high: float
-
-    def __post_init__(self) -> None:
-        _check_range(self)
-
-    @property
-    def dimension(self) -> int:
-        return 1
-
     def values(self, nominal: Array, uniform: Array) -> Array:
-        factor: Array = nominal * (self.low + (self.high - self.low) * uniform)
-        return factor
+        return nominal * self._draw(uniform)
 
 
-@dataclasses.dataclass(frozen=True)
-class FitUncertainty(Randomisation):
+@dataclasses.dataclass(frozen=True, repr=False)
+class FitUncertainty(ShortRepr, Randomisation):
     """Normal distribution about the fitted values with the covariance of the fit, from a muscle file.
 
     uncertainty  standard errors and correlations of a muscle file: `am.load(PATH).uncertainty`
@@ -115,16 +119,6 @@ class FitUncertainty(Randomisation):
         draws = ndtri(np.clip(uniform, 1e-12, 1.0 - 1e-12)) @ root.T
         values: Array = nominal + np.tile(draws, len(self.muscles))
         return values
-
-
-def _check_range(given: ValueRange | FactorRange) -> None:
-    if isinstance(given.paths, str) or not given.paths:
-        raise ParameterError(f"{type(given).__name__}: paths are {given.paths!r}; give a tuple of one path or more.")
-    if not (math.isfinite(given.low) and math.isfinite(given.high) and given.low <= given.high):
-        raise ParameterError(
-            f"{type(given).__name__} of {given.paths[0]}: the range is {given.low} to {given.high}; it must be finite "
-            "and rise."
-        )
 
 
 class ParameterDraw:

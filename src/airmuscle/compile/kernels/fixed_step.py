@@ -13,7 +13,7 @@ import numpy as np
 
 from ...core.status import Status
 from .calls import invoke, pointer
-from .segments import PART, set_inputs, write_present
+from .segments import PART, set_inputs, set_slopes, write_present
 
 DONE, PAUSED, NOT_FINITE = Status.DONE.value, Status.PAUSED.value, Status.NOT_FINITE.value
 
@@ -65,8 +65,7 @@ def fixed_step(
     row = write_present(times, row, t, y, rows)
     while segment < ends.shape[0]:
         end = ends[segment]
-        for i in range(m):
-            w[i] = slopes[segment, i]
+        set_slopes(slopes, segment, w)
         total = int(np.ceil((end - start) / length - 1e-6))
         done = int(clock[1])
         while done < total:

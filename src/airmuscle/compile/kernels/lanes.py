@@ -127,6 +127,39 @@ def finish_single_steps(h: Any, other: Any, y: Any, done: Any, total: Any, start
 
 
 @PART
+def advance_lanes(
+    step: Any, at: Any, instant: Any, moving: Any, entered: Any, stop: Any, segment: Any, first: Any, last: Any,
+    ended: Any, total: Any, done: Any, start: Any, begin: Any, length: Any, ends: Any, values: Any, slopes: Any,
+    base: Any, w: Any, u: Any, h: Any, y: Any, other: Any,
+) -> Any:  # fmt: skip
+    """Take the steps of all lanes that end before an instant.
+
+    Returns DONE or INTERRUPTED, whether an input changes within a segment, and whether a lane begins another segment.
+    """
+    status = DONE
+    while True:
+        if stop[0] != 0:
+            status = INTERRUPTED
+            break
+        if entered:
+            moving = begin_segments(
+                segment, first, last, ended, total, start, begin, length, ends, values, slopes, base, w, u
+            )
+            entered = False
+        common = count_common_steps(ended, total, done, start, instant, length)
+        if common > 0.0:
+            take_common_steps(step, at, common, moving, base, w, u, h, length, done, y, other)
+            continue
+        if not choose_single_steps(ended, segment, ends, done, total, start, instant, length, h):
+            break
+        if moving:
+            set_inputs(base, w, done, 0, length, u)
+        invoke(step, at)
+        entered = finish_single_steps(h, other, y, done, total, start, ends, segment)
+    return status, moving, entered
+
+
+@PART
 def choose_steps_to_row(ended: Any, start: Any, done: Any, instant: Any, length: Any, h: Any) -> Any:
     """Set the step of each lane to the instant of a row; whether a lane needs one."""
     between = False
@@ -213,24 +246,12 @@ def lanes(
     for row in range(times.shape[0] + 1):
         end_of_all = row == times.shape[0]
         instant = np.inf if end_of_all else times[row]
-        while True:
-            if stop[0] != 0:
-                return INTERRUPTED
-            if entered:
-                moving = begin_segments(
-                    segment, first, last, ended, total, start, begin, length, ends, values, slopes, base, w, u
-                )
-                entered = False
-            common = count_common_steps(ended, total, done, start, instant, length)
-            if common > 0.0:
-                take_common_steps(step, at, common, moving, base, w, u, h, length, done, y, other)
-                continue
-            if not choose_single_steps(ended, segment, ends, done, total, start, instant, length, h):
-                break
-            if moving:
-                set_inputs(base, w, done, 0, length, u)
-            invoke(step, at)
-            entered = finish_single_steps(h, other, y, done, total, start, ends, segment)
+        status_of_all, moving, entered = advance_lanes(
+            step, at, instant, moving, entered, stop, segment, first, last, ended, total, done, start, begin, length,
+            ends, values, slopes, base, w, u, h, y, other,
+        )  # fmt: skip
+        if status_of_all != DONE:
+            return status_of_all
         if end_of_all:
             break
         between = choose_steps_to_row(ended, start, done, instant, length, h)

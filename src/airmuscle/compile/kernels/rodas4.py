@@ -91,6 +91,15 @@ def begin_segment(slopes: Any, segment: Any, w: Any, ft: Any) -> Any:
 
 
 @PART
+def differentiate(jac: Any, df_dt: Any, moving: Any, y: Any, at: Any, at_j: Any, w: Any, f0: Any, ft: Any) -> None:
+    """Rates and Jacobian at `y`, and their derivative with respect to time where an input changes."""
+    _, at_u, at_c, _, _ = at
+    invoke(jac, (pointer(y), at_u, at_c, pointer(f0), at_j))
+    if moving:
+        invoke(df_dt, (pointer(y), at_u, at_c, pointer(w), pointer(ft)))
+
+
+@PART
 def initial_step(y: Any, f0: Any, relative: Any, absolute: Any, left: Any) -> Any:
     """The first step of a segment, from the sizes of states and rates; at most `left`."""
     size = 0.0
@@ -173,10 +182,40 @@ def step_factor(error: Any) -> Any:
 
 
 @PART
-def write_rows(
+def accepted_step(
+    factor: Any, solve: Any, stage: Any, at: Any, at_k: Any, at_j: Any, k: Any, y: Any, x: Any, g: Any, f0: Any,
+    ft: Any, yn: Any, values: Any, segment: Any, w: Any, u: Any, t: Any, start: Any, end: Any, h: Any, moving: Any,
+    relative: Any, absolute: Any,
+) -> Any:  # fmt: skip
+    """Try steps, beginning with `h`, until one is accepted, which leads to the states `yn`.
+
+    Returns a status, the step, the ratio of the next step to it, whether it meets `end`, and the rejected steps.
+    """
+    status, rejections = DONE, 0
+    while True:
+        last = t + 1.000001 * h >= end
+        if last:
+            h = end - t
+        invoke(factor, (at_j, (1.0 / h) / GAMMA, at[3]))
+        compute_stages(solve, stage, at, at_k, k, y, x, g, f0, ft, values, segment, w, u, t, start, h, moving)
+        compute_last_stages(stage, at, at_k, k, y, x, g, h)
+        error = finish_step(y, x, k[5], relative, absolute, yn)
+        ratio = step_factor(error)
+        if error <= 1.0:
+            break
+        rejections += 1
+        h *= ratio
+        if h < 1e-14 * max(abs(t), end - start):
+            status = STEP_TOO_SMALL if error < 1e300 else NOT_FINITE
+            break
+    return status, h, ratio, last, rejections
+
+
+@PART
+def complete_step(
     times: Any, row: Any, reached: Any, t: Any, h: Any, y: Any, yn: Any, k: Any, x: Any, g: Any, rows: Any
 ) -> Any:
-    """Write the states at the output times up to `reached` by the dense output; the next row."""
+    """Write the states at the output times up to `reached` by the dense output, then copy `yn` to `y`; the next row."""
     k1, k2, k3, k4, k5, n = k[0], k[1], k[2], k[3], k[4], y.shape[0]
     if row < times.shape[0] and times[row] <= reached:
         for i in range(n):  # x and g are free by now: the two polynomials of the dense output
@@ -188,6 +227,8 @@ def write_rows(
         for i in range(n):
             rows[row, i] = y[i] * p + q * (yn[i] + p * (x[i] + q * g[i]))
         row += 1
+    for i in range(n):
+        y[i] = yn[i]
     return row
 
 
@@ -209,9 +250,7 @@ def rodas4(
     """
     n = y.shape[0]
     f0, ft, x, yn, g, k, u, w, jacobian, factors = workspace(work, n, values.shape[1], jacobian_size)
-    at_y, at_u, at_w, at_c = pointer(y), pointer(u), pointer(w), pointer(c)
-    at_f, at_ft, at_j, at_a = pointer(f0), pointer(ft), pointer(jacobian), pointer(factors)
-    at = (pointer(x), at_u, at_c, at_a, pointer(g))
+    at, at_j = (pointer(x), pointer(u), pointer(c), pointer(factors), pointer(g)), pointer(jacobian)
     at_k = (pointer(k[0]), pointer(k[1]), pointer(k[2]), pointer(k[3]), pointer(k[4]), pointer(k[5]))
     t, h, start = clock[0], clock[1], clock[2]
     segment, taken, status = count[0], 0, DONE
@@ -224,35 +263,18 @@ def rodas4(
                 status = PAUSED
                 break
             set_inputs(values, segment, t - start, w, u)
-            invoke(jac, (at_y, at_u, at_c, at_f, at_j))
-            if moving:
-                invoke(df_dt, (at_y, at_u, at_c, at_w, at_ft))
+            differentiate(jac, df_dt, moving, y, at, at_j, w, f0, ft)
             if h <= 0.0:
                 h = initial_step(y, f0, relative, absolute, end - t)
-            rejections = 0
-            while True:
-                last = t + 1.000001 * h >= end
-                if last:
-                    h = end - t
-                invoke(factor, (at_j, (1.0 / h) / GAMMA, at_a))
-                compute_stages(solve, stage, at, at_k, k, y, x, g, f0, ft, values, segment, w, u, t, start, h, moving)
-                compute_last_stages(stage, at, at_k, k, y, x, g, h)
-                error = finish_step(y, x, k[5], relative, absolute, yn)
-                ratio = step_factor(error)
-                if error <= 1.0:
-                    break
-                rejections += 1
-                h *= ratio
-                if h < 1e-14 * max(abs(t), end - start):
-                    status = STEP_TOO_SMALL if error < 1e300 else NOT_FINITE
-                    break
+            status, h, ratio, last, rejections = accepted_step(
+                factor, solve, stage, at, at_k, at_j, k, y, x, g, f0, ft, yn, values, segment, w, u,
+                t, start, end, h, moving, relative, absolute,
+            )  # fmt: skip
             count[3] += rejections
             if status != DONE:
                 break
             reached = end if last else t + h
-            row = write_rows(times, row, reached, t, h, y, yn, k, x, g, rows)
-            for i in range(n):
-                y[i] = yn[i]
+            row = complete_step(times, row, reached, t, h, y, yn, k, x, g, rows)
             t = reached
             taken += 1
             h *= min(ratio, 1.0) if rejections else ratio

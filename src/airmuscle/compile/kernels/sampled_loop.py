@@ -7,96 +7,17 @@ from typing import Any
 import numba
 
 from ...core.status import Status
-from ..kernel_layout import DriverKind, Progress
+from ..kernel_layout import Progress
 from .calls import call_kernel, invoke, pointer
-from .drivers import delayed_switch, pulse_width_modulation
+from .driven_inputs import drive_inputs, is_full
+from .drivers import PART
 
 DONE, PAUSED, NOT_FINITE = Status.DONE.value, Status.PAUSED.value, Status.NOT_FINITE.value
 NON_FINITE_COMMAND, BELOW_LIMIT = Status.NON_FINITE_COMMAND.value, Status.NEGATIVE_AIR_MASS.value
 LARGEST = 1.7976931348623157e308
-MODULATOR = DriverKind.MODULATOR.value
-PART = numba.njit(error_model="numpy", nogil=True, inline="always")
-"""Decorator of the parts of the kernel; numba copies them into it."""
 DRIVER_WIDTH = 4
 """Numbers of the settings and of the state of a driver."""
 INTERVAL, RUNNING, SEGMENTS, ROWS, SAMPLES, STEPS_BEFORE, FULL, FIRST_SEGMENT, FIRST_ROW = map(int, Progress)
-
-
-@PART
-def apply_drivers(
-    kinds: Any, settings: Any, states: Any, new: Any, columns: Any, counts: Any, scratch: Any, start: Any, ulp: Any
-) -> None:
-    """Pass the signals of inputs, columns (m, 3, capacity) with their counts (m,), through their drivers (D,).
-
-    kinds (D, 2)  input and kind of each driver, in the order of the signal; scratch (2, 3, capacity)
-    """
-    for d in range(kinds.shape[0]):
-        i = kinds[d, 0]
-        result = scratch[0]
-        if kinds[d, 1] == MODULATOR:
-            count = pulse_width_modulation(settings[d], states[d], new[d], columns[i], counts[i], start, ulp, result)
-        else:
-            count = delayed_switch(settings[d], states[d], new[d], columns[i], counts[i], start, scratch[1], result)
-        for part in range(3):
-            for k in range(count):
-                columns[i, part, k] = result[part, k]
-        counts[i] = count
-
-
-@PART
-def merge_columns(
-    columns: Any, counts: Any, at: Any, begins: Any, start: Any, ends: Any, values: Any, slopes: Any, first: Any
-) -> Any:
-    """Write the signals of all inputs as common segments from number `first` on; how many there are.
-
-    at (m,), begins (m,)  workspace: the present segment of each input and its start
-    """
-    inputs = columns.shape[0]
-    for i in range(inputs):
-        at[i], begins[i] = 0, start
-    end = columns[0, 0, counts[0] - 1]
-    time, segments = start, 0
-    while True:
-        following = end
-        row = first + segments
-        for i in range(inputs):
-            while at[i] < counts[i] - 1 and columns[i, 0, at[i]] <= time:
-                begins[i] = columns[i, 0, at[i]]
-                at[i] += 1
-            values[row, i] = columns[i, 1, at[i]] + (time - begins[i]) * columns[i, 2, at[i]]
-            slopes[row, i] = columns[i, 2, at[i]]
-            if at[i] < counts[i] - 1:
-                following = min(following, columns[i, 0, at[i]])
-        ends[row] = following
-        segments += 1
-        if not following < end:
-            return segments
-        time = following
-
-
-@PART
-def merge_times(
-    grid: Any, begin: Any, end: Any, instants: Any, first: Any, count: Any, close: Any, times: Any, row: Any
-) -> Any:
-    """Write the rows `begin` to `end` of a grid and the instants in rising order from `row` on; how many there are.
-
-    A row of the grid within `close` of an instant is replaced by it.
-    """
-    written, k = 0, begin
-    for i in range(first, first + count):
-        while k < end and grid[k] < instants[i] - close:
-            times[row + written] = grid[k]
-            written += 1
-            k += 1
-        times[row + written] = instants[i]
-        written += 1
-        while k < end and grid[k] <= instants[i] + close:
-            k += 1
-    while k < end:
-        times[row + written] = grid[k]
-        written += 1
-        k += 1
-    return written
 
 
 @PART
@@ -135,6 +56,26 @@ def limit_commands(command: Any, low: Any, high: Any) -> Any:
 
 
 @PART
+def take_sample(
+    outputs: Any, y: Any, applied: Any, c: Any, o: Any, measured_at: Any, sample: Any, setpoint: Any, low: Any,
+    high: Any, period: Any, parameters: Any, controlled: Any, memory: Any, measured: Any, command: Any,
+) -> Any:  # fmt: skip
+    """Copy the memory; where the interval is controlled: measure, call the controller, limit its commands; a status."""
+    for i in range(memory.shape[1]):
+        memory[1, i] = memory[0, i]
+    status = DONE
+    if controlled:
+        status = measure(outputs, y, applied, c, o, measured_at, measured)
+        if status == DONE:
+            invoke(sample, (
+                pointer(measured), pointer(setpoint), pointer(memory[0]), pointer(low), pointer(high),
+                pointer(period), pointer(parameters), pointer(command), pointer(memory[1]),
+            ))  # fmt: skip
+            status = limit_commands(command, low, high)
+    return status
+
+
+@PART
 def apply_sample(
     k: Any, measured: Any, samples: Any, command: Any, commands: Any, commanded_at: Any, first: Any, values: Any
 ) -> None:
@@ -148,22 +89,16 @@ def apply_sample(
 
 
 @PART
-def load_columns(ends: Any, values: Any, slopes: Any, first: Any, pieces: Any, columns: Any, counts: Any) -> None:
-    """Copy the segments of an interval to the signals of the inputs."""
-    for i in range(columns.shape[0]):
-        counts[0, i] = pieces
-        for row in range(pieces):
-            columns[i, 0, row] = ends[first + row]
-            columns[i, 1, row] = values[first + row, i]
-            columns[i, 2, row] = slopes[first + row, i]
-
-
-@PART
-def point_integrator(
-    slots: Any, places: Any, at_segment: Any, pieces: Any, at_row: Any, wanted: Any,
-    ends: Any, values: Any, slopes: Any, times: Any, rows: Any,
+def start_integrator(
+    slots: Any, places: Any, progress: Any, clock: Any, count: Any, begin: Any, at_segment: Any, pieces: Any,
+    at_row: Any, wanted: Any, ends: Any, values: Any, slopes: Any, times: Any, rows: Any,
 ) -> None:  # fmt: skip
-    """Give the integrator its segments, output times and rows."""
+    """Give the integrator the segments, output times and rows of an interval, and set its clock and counts."""
+    progress[FIRST_SEGMENT], progress[FIRST_ROW] = at_segment, at_row
+    progress[SEGMENTS], progress[ROWS] = at_segment + pieces, at_row
+    progress[STEPS_BEFORE], progress[RUNNING] = count[2], 1
+    clock[0], clock[1], clock[2] = begin, 0.0, begin
+    count[0] = count[1] = 0
     slots[places[0]], slots[places[1]] = pointer(ends[at_segment:]), pointer(values[at_segment:])
     slots[places[2]], slots[places[3]] = pointer(slopes[at_segment:]), pointer(times[at_row:])
     slots[places[4]] = pointer(rows[at_row:])
@@ -181,11 +116,14 @@ def is_below(y: Any, bounds: Any) -> Any:
 
 
 @PART
-def keep_state(
-    last: Any, start: Any, end: Any, values: Any, slopes: Any, applied: Any, kept_applied: Any,
+def end_interval(
+    progress: Any, begin: Any, end: Any, ends: Any, values: Any, slopes: Any, applied: Any, kept_applied: Any,
     y: Any, kept: Any, memory: Any, states: Any, kept_states: Any,
 ) -> None:  # fmt: skip
-    """Keep inputs, state, memory and drivers at the end of an interval, whose last segment is number `last`."""
+    """Keep inputs, state, memory and drivers at the end of an interval."""
+    progress[INTERVAL], progress[RUNNING] = progress[INTERVAL] + 1, 0
+    last = progress[SEGMENTS] - 1
+    start = ends[last - 1] if last > progress[FIRST_SEGMENT] else begin
     for i in range(applied.shape[0]):
         applied[i] = values[last, i] + slopes[last, i] * (end - start)
         kept_applied[i] = applied[i]
@@ -231,60 +169,38 @@ def sampled_loop(
         k = progress[INTERVAL]
         begin, end = edges[k], edges[k + 1]
         if progress[RUNNING] == 0:
-            if count[2] - steps_at_call >= budget:
-                return PAUSED
-            room = columns.shape[2] * values.shape[1] if driven else 0
             wanted = grid_row[k + 1] - grid_row[k]
-            if driven and (
-                progress[SEGMENTS] + room > new_ends.shape[0] or progress[ROWS] + room + wanted > times.shape[0]
-            ):
-                progress[FULL] = 1
+            progress[FULL] = 1 if driven and is_full(progress, columns, wanted, new_ends, times) else 0
+            if progress[FULL] == 1 or count[2] - steps_at_call >= budget:
                 return PAUSED
-            for i in range(memory.shape[1]):
-                memory[1, i] = memory[0, i]
-            if k >= first_sample:
-                status = measure(outputs, y, applied, c, o, measured_at, measured)
-                if status != DONE:
-                    return status
-                invoke(sample, (
-                    pointer(measured), pointer(setpoints[k]), pointer(memory[0]), pointer(low), pointer(high),
-                    pointer(period), pointer(parameters), pointer(command), pointer(memory[1]),
-                ))  # fmt: skip
-                status = limit_commands(command, low, high)
-                if status != DONE:
-                    return status
+            status = take_sample(
+                outputs, y, applied, c, o, measured_at, sample, setpoints[k], low, high, period, parameters,
+                k >= first_sample, memory, measured, command,
+            )  # fmt: skip
+            if status != DONE:
+                return status
             apply_sample(k, measured, samples, command, commands, commanded_at, first, values)
             progress[SAMPLES] = k + 1
             at_segment, at_row, pieces = first[k], grid_row[k], first[k + 1] - first[k]
             if driven:
-                load_columns(ends, values, slopes, first[k], pieces, columns, counts)
-                apply_drivers(kinds, settings, kept_states, states, columns, counts[0], scratch, begin, ulps[k + 1])
                 at_segment, at_row = progress[SEGMENTS], progress[ROWS]
-                pieces = merge_columns(
-                    columns, counts[0], counts[1], begins, begin, new_ends, new_values, new_slopes, at_segment
-                )
-                instants = pieces if pieces > 1 else 0
-                wanted = merge_times(
-                    grid, grid_row[k], grid_row[k + 1], new_ends, at_segment, instants, 1e-9 * period[0], times, at_row
-                )
-            progress[FIRST_SEGMENT], progress[FIRST_ROW] = at_segment, at_row
-            progress[SEGMENTS], progress[ROWS] = at_segment + pieces, at_row
-            point_integrator(
-                slots, places, at_segment, pieces, at_row, wanted, new_ends, new_values, new_slopes, times, rows
-            )
-            clock[0], clock[1], clock[2] = begin, 0.0, begin
-            count[0] = count[1] = 0
-            progress[STEPS_BEFORE], progress[RUNNING] = count[2], 1
+                pieces, wanted = drive_inputs(
+                    kinds, settings, kept_states, states, columns, counts, scratch, begins, begin, ulps[k + 1],
+                    ends, values, slopes, first[k], pieces, new_ends, new_values, new_slopes, at_segment,
+                    grid, grid_row[k], grid_row[k + 1], 1e-9 * period[0], times, at_row,
+                )  # fmt: skip
+            start_integrator(
+                slots, places, progress, clock, count, begin, at_segment, pieces, at_row, wanted,
+                new_ends, new_values, new_slopes, times, rows,
+            )  # fmt: skip
         status = call_kernel(integrate, pointer(slots))
         progress[ROWS] = progress[FIRST_ROW] + count[1]
         if status != DONE:
             return status
         if is_below(y, bounds):
             return BELOW_LIMIT
-        last = progress[SEGMENTS] - 1
-        start = new_ends[last - 1] if last > progress[FIRST_SEGMENT] else begin
-        keep_state(
-            last, start, end, new_values, new_slopes, applied, kept_applied, y, kept, memory, states, kept_states
-        )
-        progress[INTERVAL], progress[RUNNING] = k + 1, 0
+        end_interval(
+            progress, begin, end, new_ends, new_values, new_slopes, applied, kept_applied, y, kept, memory, states,
+            kept_states,
+        )  # fmt: skip
     return DONE

@@ -14,6 +14,13 @@ PART = numba.njit(error_model="numpy", fastmath={"contract", "reassoc"}, nogil=T
 
 
 @PART
+def set_slopes(slopes: Any, segment: Any, w: Any) -> None:
+    """The slopes `w` of the inputs in a segment."""
+    for i in range(w.shape[0]):
+        w[i] = slopes[segment, i]
+
+
+@PART
 def set_inputs(values: Any, segment: Any, elapsed: Any, w: Any, u: Any) -> None:
     """The inputs `u` so long after the start of a segment."""
     for i in range(u.shape[0]):

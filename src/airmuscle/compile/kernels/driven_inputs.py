@@ -1,0 +1,125 @@
+"""Parts of the kernel of a sampled loop: the segments of an interval's inputs, passed through their drivers.
+
+A signal of an input is an array (3, capacity): end, value at the start, and slope of each segment.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..kernel_layout import DriverKind, Progress
+from .drivers import PART, delayed_switch, pulse_width_modulation
+
+MODULATOR = DriverKind.MODULATOR.value
+SEGMENTS, ROWS = int(Progress.SEGMENTS), int(Progress.ROWS)
+
+
+@PART
+def is_full(progress: Any, columns: Any, wanted: Any, new_ends: Any, times: Any) -> Any:
+    """Whether the buffers have no room for the segments and rows that drivers may add in an interval."""
+    room = columns.shape[2] * columns.shape[0]
+    return progress[SEGMENTS] + room > new_ends.shape[0] or progress[ROWS] + room + wanted > times.shape[0]
+
+
+@PART
+def load_columns(ends: Any, values: Any, slopes: Any, first: Any, pieces: Any, columns: Any, counts: Any) -> None:
+    """Copy the segments of an interval to the signals of the inputs."""
+    for i in range(columns.shape[0]):
+        counts[0, i] = pieces
+        for row in range(pieces):
+            columns[i, 0, row] = ends[first + row]
+            columns[i, 1, row] = values[first + row, i]
+            columns[i, 2, row] = slopes[first + row, i]
+
+
+@PART
+def apply_drivers(
+    kinds: Any, settings: Any, states: Any, new: Any, columns: Any, counts: Any, scratch: Any, start: Any, ulp: Any
+) -> None:
+    """Pass the signals of inputs, columns (m, 3, capacity) with their counts (m,), through their drivers (D,).
+
+    kinds (D, 2)  input and kind of each driver, in the order of the signal; scratch (2, 3, capacity)
+    """
+    for d in range(kinds.shape[0]):
+        i = kinds[d, 0]
+        result = scratch[0]
+        if kinds[d, 1] == MODULATOR:
+            count = pulse_width_modulation(settings[d], states[d], new[d], columns[i], counts[i], start, ulp, result)
+        else:
+            count = delayed_switch(settings[d], states[d], new[d], columns[i], counts[i], start, scratch[1], result)
+        for part in range(3):
+            for k in range(count):
+                columns[i, part, k] = result[part, k]
+        counts[i] = count
+
+
+@PART
+def merge_columns(
+    columns: Any, counts: Any, at: Any, begins: Any, start: Any, ends: Any, values: Any, slopes: Any, first: Any
+) -> Any:
+    """Write the signals of all inputs as common segments from number `first` on; how many there are.
+
+    at (m,), begins (m,)  workspace: the present segment of each input and its start
+    """
+    inputs = columns.shape[0]
+    for i in range(inputs):
+        at[i], begins[i] = 0, start
+    end = columns[0, 0, counts[0] - 1]
+    time, segments = start, 0
+    while True:
+        following = end
+        row = first + segments
+        for i in range(inputs):
+            while at[i] < counts[i] - 1 and columns[i, 0, at[i]] <= time:
+                begins[i] = columns[i, 0, at[i]]
+                at[i] += 1
+            values[row, i] = columns[i, 1, at[i]] + (time - begins[i]) * columns[i, 2, at[i]]
+            slopes[row, i] = columns[i, 2, at[i]]
+            if at[i] < counts[i] - 1:
+                following = min(following, columns[i, 0, at[i]])
+        ends[row] = following
+        segments += 1
+        if not following < end:
+            return segments
+        time = following
+
+
+@PART
+def merge_times(
+    grid: Any, begin: Any, end: Any, instants: Any, first: Any, count: Any, close: Any, times: Any, row: Any
+) -> Any:
+    """Write the rows `begin` to `end` of a grid and the instants in rising order from `row` on; how many there are.
+
+    A row of the grid within `close` of an instant is replaced by it.
+    """
+    written, k = 0, begin
+    for i in range(first, first + count):
+        while k < end and grid[k] < instants[i] - close:
+            times[row + written] = grid[k]
+            written += 1
+            k += 1
+        times[row + written] = instants[i]
+        written += 1
+        while k < end and grid[k] <= instants[i] + close:
+            k += 1
+    while k < end:
+        times[row + written] = grid[k]
+        written += 1
+        k += 1
+    return written
+
+
+@PART
+def drive_inputs(
+    kinds: Any, settings: Any, kept_states: Any, states: Any, columns: Any, counts: Any, scratch: Any, begins: Any,
+    begin: Any, ulp: Any, ends: Any, values: Any, slopes: Any, first: Any, pieces: Any,
+    new_ends: Any, new_values: Any, new_slopes: Any, at_segment: Any,
+    grid: Any, grid_begin: Any, grid_end: Any, close: Any, times: Any, at_row: Any,
+) -> Any:  # fmt: skip
+    """Pass an interval's segments through the drivers; the numbers of segments and of output times that result."""
+    load_columns(ends, values, slopes, first, pieces, columns, counts)
+    apply_drivers(kinds, settings, kept_states, states, columns, counts[0], scratch, begin, ulp)
+    driven = merge_columns(columns, counts[0], counts[1], begins, begin, new_ends, new_values, new_slopes, at_segment)
+    instants = driven if driven > 1 else 0
+    wanted = merge_times(grid, grid_begin, grid_end, new_ends, at_segment, instants, close, times, at_row)
+    return driven, wanted

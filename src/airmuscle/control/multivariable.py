@@ -1,0 +1,25 @@
+"""MultivariableController (base): a controller of several columns by several inputs."""
+
+from __future__ import annotations
+
+from .controller import Controller
+
+
+class MultivariableController(Controller):
+    """A controller that leads the columns `controlled` to their set points, from the columns `measured`."""
+
+    measured: tuple[str, ...]
+    controlled: tuple[str, ...]
+    commanded: tuple[str, ...]
+
+    @property
+    def measured_columns(self) -> tuple[str, ...]:
+        return self.measured
+
+    @property
+    def setpoints(self) -> tuple[str, ...]:
+        return self.controlled
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        return self.commanded
