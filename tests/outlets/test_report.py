@@ -550,7 +550,8 @@ def test_the_page_explains_each_verdict_and_counts_each_kind_first(tmp_path: Pat
     overview = page.partition("Overview of the claims")[2].partition("</section>")[0]
     for verdict, meaning in MEANINGS.items():
         assert f"{MARKS[verdict]} {verdict}</span></dt><dd>{meaning}</dd>" in overview
-    assert ("1 claim of the papers" in overview) and ("1 check of the computation" in overview)
+    assert "1 claim of the papers" in overview
+    assert "1 check of the computation" in overview
 
 
 def test_the_tables_of_the_page_are_in_display_units_and_their_files_are_not(tmp_path: Path):
@@ -559,7 +560,12 @@ def test_the_tables_of_the_page_are_in_display_units_and_their_files_are_not(tmp
     with display("bar", "mm"):
         page = write_report([chapter], tmp_path / "chosen", date=DATE).read_text(encoding="utf-8")
     usual = write_report([chapter], tmp_path / "usual", date=DATE).read_text(encoding="utf-8")
-    assert ("pressure [bar]" in page) and (">300</td>" in page) and (">mm</td>" in page) and (">value</th>" in page)
-    assert ("pressure [MPa]" in usual) and (">0.3</td>" in usual) and (">value (SI)</th>" in usual)
+    assert "pressure [bar]" in page
+    assert ">300</td>" in page
+    assert ">mm</td>" in page
+    assert ">value</th>" in page
+    assert "pressure [MPa]" in usual
+    assert ">0.3</td>" in usual
+    assert ">value (SI)</th>" in usual
     files = [(tmp_path / name / "data" / "sizes.csv").read_bytes() for name in ("chosen", "usual")]
     assert files[0] == files[1]
