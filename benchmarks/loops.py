@@ -36,8 +36,8 @@ TEXT = (
     f"Loops of {DURATION:g} s with a sample time of {1e3 * SAMPLE_TIME:g} ms and different gains, with the columns "
     f"from which the tuning computes its metrics. {SIMULATED} loops are simulated and the wall time is scaled to "
     f"{COUNT}. The lifted load has three states and a cascade of two PID; the joint has four states, feed-forward, and "
-    "three PID. Difference: greatest difference of the controlled column to the default integrator. Loops run on one "
-    "core at a time, not in vector lanes. All numbers of the plants are chosen."
+    "three PID. Difference: greatest difference of the controlled column to the default integrator. Loops with "
+    "RungeKutta4 run in vector lanes, the others one by one. All numbers of the plants are chosen."
 )
 REASON = "other load: the CPU time of a loop, divided by the number of cores, is the wall time on an idle machine"
 

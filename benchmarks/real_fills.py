@@ -87,7 +87,9 @@ def make_model(name: str, gas: Gas, *, growing: bool = False, lagging: bool = Fa
     valves = "circuit.circuit." if line else "circuit."
     free = [f"{valves}fill.conductance", f"{valves}fill.critical_ratio"]
     free += ["circuit.tube.volume", "circuit.tube.orifice.conductance"] if line else []
-    free += [f"muscle.wall.{part}" for part in ("growth_volume", "middle", "breadth")] if growing else []
+    free += (
+        [f"muscle.wall.{part}" for part in ("growth_volume", "midpoint_pressure", "pressure_width")] if growing else []
+    )
     free += ["muscle.wall.time_constant"] if lagging else []
     start = make_plant(gas, REST_VOLUME if growing else 0.0, 0.2 if lagging else 0.005, line)
     return Model(name, start, tuple(free), "tube.pressure" if line else "pressure")
@@ -127,7 +129,7 @@ def fit_record(variant: Model, recording: Recording, starts: int) -> DynamicFit:
     """The variant fitted to one record; nuisance parameters are initial pressure, start time and supply pressure."""
     return fit_dynamic(
         variant.plant, [make_experiment(variant.plant, recording)], free=variant.free,
-        observed={variant.sensor: SENSOR}, bounds=variant.bounds(), own=variant.nuisances(False), starts=starts,
+        observed={variant.sensor: SENSOR}, bounds=variant.bounds(), per_record=variant.nuisances(False), starts=starts,
     )  # fmt: skip
 
 
@@ -136,7 +138,7 @@ def prediction_rms(fit: DynamicFit, variant: Model, recording: Recording, wall: 
     plant = fit.plant()
     assert isinstance(plant, Plant)
     prediction = fit_dynamic(
-        plant, [make_experiment(plant, recording, wall)], free=(), own=variant.nuisances(wall),
+        plant, [make_experiment(plant, recording, wall)], free=(), per_record=variant.nuisances(wall),
         observed={variant.sensor: SENSOR}, bounds={variant.supply: BOUNDS["supply.pressure"]},
     )  # fmt: skip
     return prediction.rms(variant.sensor)

@@ -17,15 +17,20 @@ from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
 from airmuscle.friction import MaxwellSlip
+from airmuscle.identify.campaign import fit_held_creep
+from airmuscle.identify.campaign.creep_stage import creep_force
 from airmuscle.identify.hysteresis import PressurePath, find_holds, find_loops, fit_loop
 from airmuscle.identify.hysteresis.plot import plot_loops
 from airmuscle.library.catalogue import load
 from airmuscle.library.location import Location
 from airmuscle.library.plant_file import build_muscle
+from airmuscle.library.write import save
+from airmuscle.muscle import CreepElements
 from airmuscle.recording import Recording, read
 from airmuscle.recording.csv_writer import write_csv
 from airmuscle.recording.segment import motion_direction
 from airmuscle.report.hysteresis_chapter import hysteresis_chapters
+from airmuscle.scenario.scenario import load_scenario
 
 SLIP = MaxwellSlip((2e4, 1e4, 3e3), (3e-4, 1.2e-3, 5e-3))
 TURNS = (0.02, 0.14, 0.08, 0.12, 0.05, 0.14, 0.02)
@@ -76,6 +81,82 @@ def test_the_friction_of_two_loops_enters_the_muscle_file(two, tmp_path):
     shown = airmuscle("show", tmp_path / "out" / "muscle.toml")
     assert "friction IdentifiedFriction" in shown.stdout
     assert "friction.inner.stiffnesses[0]" in shown.stdout
+
+
+MAXWELL = CreepElements((4e3,), (6.0,))
+
+
+def crept(folder: Path) -> list[Path]:
+    """A loop and a quick shortening by 5 % with a hold of 40 s, of a muscle with one Maxwell element."""
+    files, rng = [], np.random.default_rng(3)
+    strokes = {"loop": (np.array([0.02, 0.12, 0.02]), 120, 0.2), "hold": (np.array([0.04, 0.09]), 5, 0.1)}
+    for name, (turns, rows, step) in strokes.items():
+        moving = [np.linspace(a, b, rows, endpoint=False) for a, b in itertools.pairwise(turns)]
+        contraction = np.concatenate([np.full(20, turns[0]), *moving, np.full(400, turns[-1])])
+        time = step * np.arange(contraction.size)
+        run = Recording(
+            {"time": time, "pressure": np.full(time.size, 3e5), "contraction": contraction},
+            name,
+            {"resting_length": 0.3},
+        )
+        force = load(MUSCLE).characteristic.force(3e5, contraction) - creep_force(MAXWELL, run)
+        force = force - SLIP.force_along((contraction - contraction[0]) * 0.3) + 0.2 * rng.standard_normal(time.size)
+        files.append(folder / f"{name}.csv")
+        write_csv(run.with_columns(force=force), files[-1])
+    return files
+
+
+def test_creep_elements_of_a_hold_come_back_from_a_muscle_file(tmp_path):
+    recordings = read(crept(tmp_path), resting_length=0.3)
+    held = fit_held_creep(recordings)
+    assert "Maxwell elements of" in held.verdict
+    save(dataclasses.replace(load(MUSCLE), creep=held.elements), tmp_path / "muscle.toml")
+    found = load(tmp_path / "muscle.toml").muscle.creep
+    assert found.stiffnesses == pytest.approx(MAXWELL.stiffnesses, rel=0.05)
+    assert found.relaxation_times == pytest.approx(MAXWELL.relaxation_times, rel=0.05)
+
+
+@pytest.mark.slow
+def test_creep_of_holds_enters_the_muscle_file_and_its_simulation(tmp_path):
+    out = tmp_path / "out"
+    words = ("hysteresis", *crept(tmp_path), *LENGTH, "--muscle", MUSCLE, "--elements", 4, "--creep", "--out", out)
+    result = airmuscle(*words, "--json")
+    assert result.exit_code == 0, result.stderr
+    found = load(out / "muscle.toml")
+    assert found.creep.stiffnesses == pytest.approx(MAXWELL.stiffnesses, rel=0.05)
+    assert found.creep.relaxation_times == pytest.approx(MAXWELL.relaxation_times, rel=0.05)
+    assert json.loads(result.stdout)["creep_elements"]["stiffnesses"] == pytest.approx(found.creep.stiffnesses)
+    path = np.concatenate([np.linspace(a, b, 50) for a, b in itertools.pairwise((0.02, 0.12, 0.02))]) * 0.3
+    made, friction = (law.force_along(path - path[0]) for law in (SLIP, found.friction))
+    assert np.sqrt(np.mean((made - friction) ** 2)) < 0.05 * np.abs(made).max(), "the creep is no friction"
+    scenario = (EXAMPLES / "fill_discharge.toml").read_text(encoding="utf-8")
+    scenario = scenario.replace('library = "dmsp-20-300"', 'library = "out/muscle.toml"')
+    (tmp_path / "scenario.toml").write_text(scenario, encoding="utf-8")
+    simulated = load_scenario(tmp_path / "scenario.toml").simulate()
+    assert np.abs(simulated["creep1"]).max() > 0.0
+
+
+def made_hold(contraction: np.ndarray, force: np.ndarray, step: float = 0.1, length: float | None = 0.3) -> Recording:
+    columns = {"time": step * np.arange(force.size), "pressure": np.full(force.size, 3e5)}
+    constants = {} if length is None else {"resting_length": length}
+    return Recording({**columns, "contraction": contraction, "force": force}, "hold", constants)
+
+
+def test_a_hold_that_determines_no_stiffness_gives_none_and_the_reason():
+    seconds = 0.1 * np.arange(300)
+    relaxing = 300.0 - 20.0 * np.exp(-seconds / 5.0)
+    still = fit_held_creep([made_hold(np.full(300, 0.1), relaxing)])
+    assert not still.elements.stiffnesses
+    assert "the length does not change before the hold" in still.verdict
+    creeping = 0.1 + 0.01 * (1.0 - np.exp(-seconds / 5.0))
+    loaded = made_hold(np.concatenate([np.full(20, 0.04), creeping]), np.full(320, 200.0))
+    assert "needs the stiffness of the muscle" in fit_held_creep([loaded]).verdict
+    assert fit_held_creep([loaded], load(MUSCLE).characteristic).elements.stiffnesses[0] > 0.0
+    slow = made_hold(np.concatenate([np.full(20, 0.04), np.linspace(0.04, 0.1, 25), creeping]), np.full(345, 200.0))
+    assert "not short compared with the time constant" in fit_held_creep([slow], load(MUSCLE).characteristic).verdict
+    lengthless = made_hold(np.concatenate([np.full(20, 0.04), np.full(300, 0.1)]), np.r_[np.full(20, 400.0), relaxing],
+                           length=None)  # fmt: skip
+    assert "need the resting length" in fit_held_creep([lengthless]).verdict
 
 
 def test_without_a_muscle_the_friction_stands_in_a_table_that_a_plant_takes(two, tmp_path):

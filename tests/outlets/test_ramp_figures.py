@@ -17,7 +17,6 @@ from typer.testing import CliRunner
 from airmuscle import load
 from airmuscle.characteristic import ContractileSurface
 from airmuscle.cli.app import app
-from airmuscle.cli.fit_output import list_files
 from airmuscle.core.plotting import save
 from airmuscle.identify import Fit, fit
 from airmuscle.library.entry import Entry
@@ -25,6 +24,7 @@ from airmuscle.muscle.isobars import compute_isobars
 from airmuscle.recording import Recording
 from airmuscle.report.band_plot import band_plot
 from airmuscle.report.fit_chapter import fit_chapter
+from airmuscle.report.fit_files import list_files
 from airmuscle.report.isobar_plot import isobar_plot
 from airmuscle.report.levels import is_pressure_ramp, levels_of
 from airmuscle.report.ramp_plot import ramp_plot

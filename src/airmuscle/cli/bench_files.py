@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -12,7 +11,7 @@ import typer
 from ..core.errors import ParameterError
 from ..library.catalogue import load_data
 from ..recording import ColumnMapping, Recording, read
-from ..recording.segment import AT_REST, check_swept, estimate_sensors, find_runs
+from ..recording.segment import check_contents
 from .completion import complete_data
 from .progress import reading_progress
 from .reading_options import ReadingOptions
@@ -49,14 +48,5 @@ def read_recordings(files: list[Path], reading: ReadingOptions) -> list[Recordin
         )
     with reading_progress() as progress:
         recordings = read(paths, mapping=mapping, units=units, progress=progress) if paths else ()
-    _check_content(recordings)
+    check_contents(recordings)
     return [*recordings, *(load_data(str(name)) for name in names)]
-
-
-def _check_content(recordings: Sequence[Recording]) -> None:
-    """Raise where a recording contradicts its file, or where a single recording contains no variation."""
-    sensors = estimate_sensors(recordings) if recordings else {}
-    for recording in recordings:
-        runs = find_runs(recording, {name: s for name, s in sensors.items() if name in recording.columns})
-        if len(recordings) == 1 or all(run.kind is not AT_REST for run in runs):
-            check_swept(recording, runs)

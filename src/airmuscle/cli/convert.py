@@ -19,10 +19,10 @@ from ..identify import ModelConversion
 from ..identify import convert as convert_model
 from ..identify.conversion import GRID_POINTS, sample_on_grid
 from ..library.entry import Entry
+from ..library.initial_law import find_initial_law
 from ..library.law_file import load_law
 from ..library.write import save
 from .completion import complete_law
-from .initial_law import find_initial_law
 from .options import Json, Name
 from .terminal import echo, percent, print_json, print_table
 

@@ -9,14 +9,15 @@ import typer
 
 from ..identify import UNCENSORED
 from ..identify import fit as fit_model
+from ..library.initial_law import find_initial_law
 from ..recording import Recording
+from ..report.fit_files import fitted_entry, missing_geometry
 from ..report.output_folder import check_writable
 from .bench_files import Files, read_recordings
 from .fit_compare import compare_models
-from .fit_geometry import missing_geometry, parse_braid, with_braid
+from .fit_geometry import parse_braid, with_braid
 from .fit_options import FitOptions, FitRequest, loss_of
-from .fit_output import fit_to_dict, fitted_entry, print_results, with_option_names, write_results
-from .initial_law import find_initial_law
+from .fit_output import fit_to_dict, print_results, with_option_names, write_results
 from .options import Folder, Json
 from .reading_options import NO_OPTIONS, ReadingOptions, with_reading_options
 from .terminal import print_json

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -11,18 +10,17 @@ import typer
 
 from ..core.processes import available_cores
 from ..geometry import Geometry
-from ..identify import Candidate, Comparison, compare, select_for_both, standard_candidates
-from ..identify.candidate_scores import RankedModel
-from ..identify.candidates import MIN_POOLED
-from ..identify.cross_validation import specimen_name
+from ..identify import Candidate, Comparison, standard_candidates
+from ..identify.law_selection import LawSelection, select_law
 from ..library.entry import Entry
+from ..library.initial_law import InitialLaw, find_initial_law, resting_lengths
 from ..recording import Recording
 from ..report.compare_chapter import compare_chapter
+from ..report.fit_files import fitted_entry, missing_geometry
 from ..report.output_folder import check_writable
-from .fit_geometry import check_one_length, missing_geometry, with_braid
+from .fit_geometry import check_one_length, with_braid
 from .fit_options import FitRequest
-from .fit_output import fit_to_dict, fitted_entry, print_results, write_results
-from .initial_law import InitialLaw, find_initial_law, resting_lengths
+from .fit_output import fit_to_dict, print_results, write_results
 from .option_hints import in_options
 from .progress import computation_progress
 from .terminal import print_json
@@ -53,48 +51,32 @@ def compare_models(
     chapters = [compare_chapter(each, best, selection.reason) for each in selection.comparisons]
     write_results(best.fit, entry, recordings, request.out, [*chapters, *extras.chapters()])
     if request.json:
-        print_json(selection.to_dict() | {"notes": notes} | extras.to_dict())
+        print_json(_selection_to_dict(selection) | {"notes": notes} | extras.to_dict())
         return
     lines = [*map(str, selection.comparisons), *([selection.reason] if len(selection.comparisons) > 1 else [])]
     print_results([*lines, *extras.lines(), *(f"note: {note}" for note in notes)], request.out)
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Selection:
-    """The recommended law, with the comparison for one purpose or those for both."""
-
-    comparisons: tuple[Comparison, ...]
-    recommended: RankedModel
-    reason: str
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data, all numbers SI; with two purposes the ranking at the top is that for the first."""
-        data = _to_dict(self.comparisons[0])
-        if len(self.comparisons) == 1:
-            return data
-        purposes = [{**_to_dict(each), "fit": None} for each in self.comparisons]
-        name, fit = self.recommended.candidate.name, fit_to_dict(self.recommended.fit)
-        return data | {"recommended": name, "reason": self.reason, "fit": fit, "purposes": purposes}
-
-
-def _select(recordings: list[Recording], given: list[Candidate] | None, request: FitRequest) -> Selection:
-    """The law for the requested purpose, by default for both if specimens and runs can be left out."""
-    options, workers = request.options, available_cores()
-    both = options.purpose == "both" or (options.purpose is None and options.split is None and _serves_both(recordings))
+def _select(recordings: list[Recording], given: list[Candidate] | None, request: FitRequest) -> LawSelection:
+    """The law for the requested purpose, with reasons of exclusion that name options."""
+    options = request.options
+    both = True if options.purpose == "both" else None if options.purpose is None else False
     with computation_progress("comparison") as show:
-        arguments: dict[str, Any] = {"workers": workers, "progress": lambda name, fraction: show(fraction)}
-        if both:
-            joint = select_for_both(recordings, given, **arguments)
-            comparisons = tuple(map(_with_option_names, joint.comparisons))
-            return Selection(comparisons, joint.recommended[0], str(joint))
-        comparison = _with_option_names(compare(recordings, given, leave_out=options.split, **arguments))
-    return Selection((comparison,), comparison.recommended, comparison.reason)
+        selection = select_law(
+            recordings, given, leave_out=options.split, both=both, workers=available_cores(),
+            progress=lambda name, fraction: show(fraction),
+        )  # fmt: skip
+    return dataclasses.replace(selection, comparisons=tuple(map(_with_option_names, selection.comparisons)))
 
 
-def _serves_both(recordings: list[Recording]) -> bool:
-    """Whether there are three specimens or more, each with several runs."""
-    counts = Counter(specimen_name(run) for run in recordings)
-    return len(counts) >= MIN_POOLED and min(counts.values()) > 1
+def _selection_to_dict(selection: LawSelection) -> dict[str, Any]:
+    """Plain data, all numbers SI; with two purposes the ranking at the top is that for the first."""
+    data = _to_dict(selection.comparisons[0])
+    if len(selection.comparisons) == 1:
+        return data
+    purposes = [{**_to_dict(each), "fit": None} for each in selection.comparisons]
+    name, fit = selection.recommended.candidate.name, fit_to_dict(selection.recommended.fit)
+    return data | {"recommended": name, "reason": selection.reason, "fit": fit, "purposes": purposes}
 
 
 def _with_option_names(comparison: Comparison) -> Comparison:

@@ -1,4 +1,4 @@
-"""Geometry of a fitted muscle: the braid of --braid, that of the law, or a note that it is missing."""
+"""Geometry of a muscle to be fitted: the braid of --braid."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from ..core import tree
 from ..core.errors import ParameterError
 from ..core.units import quantity
 from ..geometry import Braid, Geometry
-from ..library.entry import MISSING_GEOMETRY, Entry
+from ..library.entry import Entry
+from ..library.initial_law import resting_lengths
 from ..recording import Recording
-from .initial_law import resting_lengths
 
 _UNITS = {"radius": "m", "angle": "rad"}
 
@@ -71,20 +71,6 @@ def check_one_length(lengths: Sequence[float]) -> None:
             f"--braid: a braid has exactly one resting length; the data state {found}. Give --resting-length, or files "
             "of one muscle."
         )
-
-
-def fitted_geometry(initial: Entry, law: object) -> Geometry | None:
-    """The geometry of a muscle after the fit of its law: that inside the law, unless the muscle has one of another
-    kind."""
-    inside = getattr(law, "geometry", None)
-    if isinstance(inside, Geometry) and (initial.geometry is None or type(initial.geometry) is type(inside)):
-        return inside
-    return initial.geometry
-
-
-def missing_geometry(entry: Entry) -> list[str]:
-    """The remark that the muscle has no geometry, how it is given and how it is measured; empty if it has one."""
-    return [] if entry.geometry is not None else [f"The muscle lacks {MISSING_GEOMETRY}."]
 
 
 def _lengths_of(law: object) -> tuple[float, ...]:

@@ -9,18 +9,12 @@ from typing import Any
 
 from ..identify import Fit
 from ..library.entry import Entry
-from ..library.write import save
 from ..recording import Recording
 from ..report.chapter import Chapter
-from ..report.fit_chapter import fit_chapter
+from ..report.fit_files import write_fit
 from ..report.output_folder import atomic_folder
-from ..report.write import write_into
-from .fit_geometry import fitted_geometry, missing_geometry
 from .option_hints import in_options
 from .terminal import echo
-
-MAX_NAMES, MAX_NAME = 3, 60
-"""Maximum number of file names in a title, and of characters of each (chosen)."""
 
 
 def print_results(lines: Sequence[str], out: Path) -> None:
@@ -31,31 +25,9 @@ def print_results(lines: Sequence[str], out: Path) -> None:
     echo(f"report: {out / 'report.html'}")
 
 
-def fitted_entry(result: Fit, initial: Entry, files: list[Path]) -> Entry:
-    """The initial entry with the fitted characteristic and a new provenance, without its checks."""
-    summary = dict(result.summary())
-    names = list_files([f.name for f in files])
-    note = f"Fitted to {names}: rms error {summary['rms error']}, maximum error {summary['maximum error']}."
-    geometry = fitted_geometry(initial, result.model)
-    title = f"{type(result.model).__name__} fitted to {list_files([f.stem for f in files])}"
-    entry = dataclasses.replace(
-        initial, name="muscle", title=title, provenance="fitted", note=note, warning="", characteristic=result.model,
-        geometry=geometry, validity_range=result.validity_range, checks=(),
-    )  # fmt: skip
-    return dataclasses.replace(entry, note=" ".join([note, *missing_geometry(entry)]))
-
-
 def with_option_names(result: Fit) -> Fit:
     """The fit whose notes name options of `airmuscle fit` instead of Python arguments."""
     return dataclasses.replace(result, notes=tuple(in_options(note, "fit") for note in result.notes))
-
-
-def list_files(names: Sequence[str]) -> str:
-    """The names of files for a title: up to three of them, else their number with the first and the last."""
-    short = [name if len(name) <= MAX_NAME else f"{name[: MAX_NAME // 2]}…{name[-MAX_NAME // 2 :]}" for name in names]
-    if len(short) <= MAX_NAMES:
-        return ", ".join(short)
-    return f"{len(short)} files, {short[0]} to {short[-1]}"
 
 
 def fit_to_dict(result: Fit) -> dict[str, Any]:
@@ -85,6 +57,4 @@ def write_results(
 ) -> None:
     """Write muscle file and report into one folder, completely or not at all; `chapters` precede that of the fit."""
     with atomic_folder(out) as folder:
-        save(entry, folder / "muscle.toml")
-        notes = tuple(dict.fromkeys(note for recording in recordings for note in recording.notes))
-        write_into(folder, [*chapters, fit_chapter(with_option_names(result), entry, notes)], title="Fit")
+        write_fit(folder, with_option_names(result), entry, recordings, chapters)

@@ -17,16 +17,16 @@ from ..core.errors import ParameterError, PhysicsError
 from ..core.units import quantity
 from ..identify.volume_fit import VolumeFit, fit_volume, volume_points
 from ..library.entry import Entry
+from ..library.initial_law import resting_lengths
 from ..library.law_file import load_law
 from ..library.write import part_toml, save
 from ..recording import Recording
+from ..report.fit_files import list_files
 from ..report.output_folder import atomic_folder, check_writable
 from ..report.volume_chapter import volume_chapter
 from ..report.write import write_into
 from .bench_files import Files, read_recordings
 from .fit_geometry import check_one_length
-from .fit_output import list_files
-from .initial_law import resting_lengths
 from .options import Folder, Json
 from .reading_options import NO_OPTIONS, ReadingOptions, with_reading_options
 from .terminal import echo, percent, print_json, print_table

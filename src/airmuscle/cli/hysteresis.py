@@ -3,40 +3,37 @@
 from __future__ import annotations
 
 import dataclasses
-import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import typer
 
-from ..core import leaves
-from ..friction import Friction
+from ..characteristic.base import ForceLaw
+from ..identify.campaign import HeldCreep, fit_held_creep, free_of_creep
 from ..identify.hysteresis import (
-    HysteresisFit,
-    JointFit,
     LoopFit,
-    find_holds,
     find_loops,
-    fit_creep,
     fit_jointly,
     fit_loop,
-    identified_friction,
     loops_not_joined,
 )
+from ..identify.hysteresis.selection import SelectedFriction, select_friction
 from ..library.entry import Entry
 from ..library.law_file import load_law
+from ..library.uncertainty import without_parts
 from ..library.write import part_toml, save
 from ..recording import Recording
 from ..report.chapter import Chapter
-from ..report.hysteresis_chapter import describe_row_counts, hysteresis_chapters
+from ..report.hysteresis_chapter import hysteresis_chapters
 from ..report.output_folder import atomic_folder, check_writable
 from ..report.write import write_into
 from .bench_files import Files, read_recordings
+from .hysteresis_output import creep_to_dict, joint_to_dict, loop_to_dict, print_creep, print_joint, print_loops
 from .option_hints import in_options
 from .options import Folder, Json
 from .reading_options import NO_OPTIONS, ReadingOptions, with_reading_options
-from .terminal import echo, print_json, print_table
+from .terminal import echo, print_json
 
 Muscle = Annotated[
     str | None,
@@ -54,7 +51,9 @@ AllRows = Annotated[bool, typer.Option("--all-rows", help="Include rows in which
 Elements = Annotated[
     int, typer.Option(min=1, max=30, metavar="N", help="Number of elements of MaxwellSlip and PrandtlIshlinskii.")
 ]
-Creep = Annotated[bool, typer.Option("--creep", help="Also fit creep to the longest hold phase of every file.")]
+Creep = Annotated[
+    bool, typer.Option("--creep", help="Fit creep to the longest hold of every file and write creep elements.")
+]
 
 
 @with_reading_options
@@ -76,8 +75,10 @@ def hysteresis(
     The type of a run (isobaric, isometric) is detected; a second run at the same level validates the first.
     Statistical tests decide whether the data justify a friction model. Runs at several pressures are also fitted
     together, with a friction that depends on the pressure; a model that does not hold for all of them is not written.
+    With --creep the holds after a motion give Maxwell elements, whose force is not taken for friction.
     Writes DIR/report.html. If a model that a plant can use is justified, it is written to DIR/muscle.toml (with
-    --muscle) or to DIR/friction.toml, with the range of pressure and speed of the data.
+    --muscle) or to DIR/friction.toml, with the range of pressure and speed of the data; creep elements are written to
+    the same DIR/muscle.toml, or to DIR/creep.toml.
 
     \b
     Examples:
@@ -89,30 +90,43 @@ def hysteresis(
     recordings = read_recordings(files, reading)
     entry = None if muscle is None else load_law(muscle)
     law = entry.characteristic if entry is not None and use_characteristic else None
-    loops = find_loops(recordings, characteristic=law, degree=degree, all_rows=all_rows)
+    held = _fit_creep(recordings, entry) if creep else None
+    freed = recordings if held is None else free_of_creep(recordings, held.elements)
+    loops = find_loops(freed, characteristic=law, degree=degree, all_rows=all_rows)
     check_writable(out)
     progress = None if json else lambda name: echo(f"  {name}", err=True)
     fits = [_with_option_names(fit_loop(loop, elements=elements, progress=progress)) for loop in loops]
     joint = fit_jointly(fits, progress=progress)
-    creep_results = _fit_creep(recordings) if creep else []
-    path = _write(hysteresis_chapters(fits, creep_results, joint), _select(fits, joint), entry, out)
+    sentences = [] if held is None else [*held.sentences, held.verdict]
+    written = _write(hysteresis_chapters(fits, sentences, joint), select_friction(fits, joint), held, entry, out)
     if json:
         not_joined = list(loops_not_joined(fits)) if joint else []
         data = {
-            "loops": [_to_dict(fit) for fit in fits],
-            "joint": [_joint_to_dict(fit) for fit in joint],
+            "loops": [loop_to_dict(fit) for fit in fits],
+            "joint": [joint_to_dict(fit) for fit in joint],
             "not_joined": not_joined,
         }
-        print_json({**data, "creep": creep_results, "written": str(path or "")})
+        print_json({**data, **creep_to_dict(held), "written": str(written.get("friction", ""))})
         return
-    _print(fits, creep_results)
-    _print_joint(joint, loops_not_joined(fits))
-    _print_files(path, out, of_all_runs=bool(joint))
+    print_loops(fits)
+    print_creep(held)
+    print_joint(joint, loops_not_joined(fits))
+    _print_files(written, out, creep=creep, of_all_runs=bool(joint))
 
 
-def _print_files(path: Path | None, out: Path, *, of_all_runs: bool) -> None:
+def _fit_creep(recordings: Sequence[Recording], entry: Entry | None) -> HeldCreep:
+    law = None if entry is None else entry.characteristic
+    return fit_held_creep(recordings, law if isinstance(law, ForceLaw) else None)
+
+
+def _print_files(written: Mapping[str, Path], out: Path, *, creep: bool, of_all_runs: bool) -> None:
     of_all = " for all runs together" if of_all_runs else ""
-    echo(f"{path.stem}: {path}" if path else f"no friction file: no model that a plant can use is justified{of_all}")
+    for path in dict.fromkeys(written.values()):
+        echo(f"{path.stem}: {path}")
+    if "friction" not in written:
+        echo(f"no friction file: no model that a plant can use is justified{of_all}")
+    if creep and "creep" not in written:
+        echo("no creep elements are written")
     echo(f"report: {out / 'report.html'}")
 
 
@@ -122,147 +136,37 @@ def _with_option_names(fit: LoopFit) -> LoopFit:
     return dataclasses.replace(fit, failed=failed)
 
 
-class _Selected(NamedTuple):
-    """The friction to write, with the range of its data, the file or files it is from, and its verdict."""
-
-    friction: Friction
-    origin: str
-    verdict: str
-
-
-def _select(fits: Sequence[LoopFit], joint: Sequence[JointFit]) -> _Selected | None:
-    """The friction to write: of all runs together or, if they are not several, of the only run a plant can use."""
-    if joint:
-        best = next((fit for fit in joint if fit.justified), None)
-        if best is None:
-            return None
-        origin = f"{len(best.series)} runs"
-        return _Selected(identified_friction(best.friction, best.series), origin, best.verdict)
-    usable = [fit.recommended for fit in fits if fit.recommended is not None and fit.usable_in_plant]
-    if not usable:
-        return None
-    only = max(usable, key=lambda fit: fit.effective_sample_size)
-    return _Selected(identified_friction(only.friction, (only.series,)), only.series.origin, only.verdict)
-
-
-def _fit_creep(recordings: Sequence[Recording]) -> list[str]:
-    """The result of a creep fit to the longest hold phase of each recording, in one sentence."""
-    results = []
-    for recording in recordings:
-        hold = max(find_holds(recording), key=lambda hold: len(hold.interval), default=None)
-        if hold is None:
-            results.append(
-                f"{recording.origin}: no hold phase of 12 rows or more, with constant pressure and constant force or "
-                "length."
-            )
-            continue
-        rows = f"{hold.interval.start + 1} to {hold.interval.stop}"
-        verdict = fit_creep(recording.rows(hold.interval.rows), hold.quantity).verdict
-        results.append(f"{recording.origin}, {hold.quantity} in rows {rows}: {verdict}")
-    return results
-
-
-def _write(chapters: Sequence[Chapter], selected: _Selected | None, entry: Entry | None, out: Path) -> Path | None:
-    """Write the report and, for a selected friction, the muscle or friction file; returns the path of that file."""
-    name = None if selected is None else "friction.toml" if entry is None else "muscle.toml"
+def _write(
+    chapters: Sequence[Chapter],
+    selected: SelectedFriction | None,
+    held: HeldCreep | None,
+    entry: Entry | None,
+    out: Path,
+) -> dict[str, Path]:
+    """Write the report and what was identified; returns the file of the friction and that of the creep elements."""
+    parts = [
+        *([("friction", selected.friction, selected.verdict)] if selected is not None else []),
+        *([("creep", held.elements, held.verdict)] if held is not None and held.elements.stiffnesses else []),
+    ]
+    written = {name: "muscle.toml" if entry is not None else f"{name}.toml" for name, _, _ in parts}
     with atomic_folder(out) as folder:
         write_into(folder, chapters, title="Friction")
-        if selected is not None and entry is not None:
-            save(_with_friction(entry, selected), folder / "muscle.toml")
-        elif selected is not None:
-            text = f"# {selected.verdict}\n{part_toml('friction', selected.friction)}"
-            (folder / "friction.toml").write_text(text, encoding="utf-8")
-    return out / name if name else None
+        if parts and entry is not None:
+            save(_completed(entry, selected, held), folder / "muscle.toml")
+        elif entry is None:
+            for name, part, verdict in parts:
+                (folder / f"{name}.toml").write_text(f"# {verdict}\n{part_toml(name, part)}", encoding="utf-8")
+    return {name: out / file for name, file in written.items()}
 
 
-def _with_friction(entry: Entry, selected: _Selected) -> Entry:
-    """The muscle with the friction; its checks are kept, because they apply to the characteristic alone."""
-    note = f"{entry.note} Friction from {selected.origin}: {selected.verdict}".strip()
-    return dataclasses.replace(entry, name="muscle", friction=selected.friction, note=note)
-
-
-def _print(fits: Sequence[LoopFit], creep: Sequence[str]) -> None:
-    for fit in fits:
-        echo(f"{fit.loop.recording.origin}: {fit.loop.description}. {describe_row_counts(fit.loop)}")
-        rows = [
-            (type(f.friction).__name__, f"{f.rmse_without_friction:.3g} to {f.rmse:.3g} N", _second_run_errors(f),
-             f"{0.0 - f.aicc_reduction:.4g}", _p_value(f.p_value), "yes" if f.justified else "no")
-            for f in fit.fits
-        ]  # fmt: skip
-        headers = ("model", "rms error", "on second run", "difference in AICc", "p-value (F test)", "justified")
-        print_table(headers, rows, right=headers[3:5])
-        best = fit.recommended
-        echo(str(best) if best is not None else "The data justify no friction model for this loop.")
-        if best is not None and not fit.usable_in_plant:
-            echo("note: friction driven by pressure describes isometric loops only; a plant cannot use it.")
-        for name, reason in fit.failed.items():
-            echo(f"note: {name} was not fitted: {reason}")
-        echo()
-    for text in creep:
-        echo(f"creep: {text}")
-
-
-def _print_joint(joint: Sequence[JointFit], not_joined: Sequence[str]) -> None:
-    if not joint:
-        return
-    echo("All runs together, each with its own static curve:")
-    rows = [
-        (fit.name, "no" if fit.law is fit.friction else "yes", f"{fit.rmse_without_friction:.3g} to {fit.rmse:.3g} N",
-         f"{0.0 - fit.aicc_reduction:.4g}", str(sum(run.disagrees for run in fit.agreement)),
-         "yes" if fit.justified else "no")
-        for fit in joint
-    ]  # fmt: skip
-    headers = ("model", "depends on pressure", "rms error", "difference in AICc", "runs that disagree", "justified")
-    print_table(headers, rows, right=headers[3:5])
-    best = next((fit for fit in joint if fit.justified), joint[0])
-    for sentence in (*map(str, best.agreement), *not_joined, str(best)):
-        echo(sentence)
-    echo()
-
-
-def _p_value(probability: float) -> str:
-    return "< 0.001" if probability < 0.001 else f"{probability:.2g}"
-
-
-def _second_run_errors(fit: HysteresisFit) -> str:
-    """The rms errors on the second run, without and with friction; empty without a second run."""
-    return (
-        f"{fit.repeat_rmse_without_friction:.3g} to {fit.repeat_rmse:.3g} N" if math.isfinite(fit.repeat_rmse) else ""
-    )
-
-
-def _to_dict(fit: LoopFit) -> dict[str, Any]:
-    """A loop with its fits as plain data, all numbers SI."""
-    return {
-        "origin": fit.loop.recording.origin,
-        "run": fit.loop.run.kind.name,
-        "first_row": fit.loop.run.interval.start + 1,
-        "last_row": fit.loop.run.interval.stop,
-        "constant": fit.loop.run.constant_column,
-        "value": fit.loop.run.constant_value,
-        "recommended": type(fit.recommended.friction).__name__ if fit.recommended else None,
-        "usable_in_plant": fit.usable_in_plant,
-        "models": [
-            {
-                "model": type(f.friction).__name__, "parameters": {p.path: p.value for p in leaves(f.friction)},
-                "rmse": f.rmse, "rmse_without": f.rmse_without_friction, "gap": f.residual_gap, "gap_without": f.gap,
-                "repeat_rmse": f.repeat_rmse, "repeat_rmse_without": f.repeat_rmse_without_friction,
-                "repeatability": f.repeatability, "aicc_difference": 0.0 - f.aicc_reduction, "p_value": f.p_value,
-                "justified": f.justified, "undetermined": list(f.undetermined),
-            }
-            for f in fit.fits
-        ],
-        "failed": dict(fit.failed),
-    }  # fmt: skip
-
-
-def _joint_to_dict(fit: JointFit) -> dict[str, Any]:
-    """A joint fit as plain data, all numbers SI."""
-    return {
-        "model": fit.name, "parameters": {p.path: p.value for p in leaves(fit.friction)}, "rmse": fit.rmse,
-        "rmse_without": fit.rmse_without_friction, "aicc_difference": 0.0 - fit.aicc_reduction, "p_value": fit.p_value,
-        "pressure_p_value": fit.scale_p_value, "repeat_rmse": fit.repeat_rmse,
-        "repeat_rmse_without": fit.repeat_rmse_without_friction, "justified": fit.justified,
-        "undetermined": list(fit.undetermined), "reservations": list(fit.reservations),
-        "runs": [{**dataclasses.asdict(run), "disagrees": run.disagrees} for run in fit.agreement],
-    }  # fmt: skip
+def _completed(entry: Entry, selected: SelectedFriction | None, held: HeldCreep | None) -> Entry:
+    """The muscle with friction and creep elements; its checks apply to the characteristic alone and are kept."""
+    note, changes = entry.note, dict[str, Any]()
+    if selected is not None:
+        changes["friction"] = selected.friction
+        note = f"{note} Friction from {selected.origin}: {selected.verdict}"
+    if held is not None and held.elements.stiffnesses:
+        changes["creep"] = held.elements
+        note = f"{note} Creep: {held.verdict}"
+    uncertainty = entry.uncertainty and without_parts(entry.uncertainty, changes)
+    return dataclasses.replace(entry, name="muscle", note=note.strip(), uncertainty=uncertainty, **changes)

@@ -36,7 +36,8 @@ def studio(
     """Show muscles and plants in the browser.
 
     \b
-    The page computes everything itself; the server reads files of the library and texts that are pasted into the page.
+    The page computes laws and plants itself; the server reads files of the library, texts that are pasted into the
+    page and measurement files that are dropped on it, and fits these.
     It answers this machine only, unless another --host is given. Ctrl-C ends it.
 
     \b

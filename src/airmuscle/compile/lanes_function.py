@@ -19,16 +19,16 @@ _ALIGNMENT = 64
 
 
 class LanesFunction:
-    """CasADi expressions of vectors, compiled for LANES points at once; `address` is that of f(inputs..., outputs...).
+    """CasADi expressions of vectors, compiled for several points at once; `address`: f(inputs..., outputs...).
 
-    Element i of an input or output is a row of LANES numbers, in arrays that `lanes_array` gives. The machine code
-    lives as long as this object.
+    Element i of an input or output is a row of `lanes` numbers, in arrays that `lanes_array` gives for LANES points.
+    The machine code lives as long as this object.
     """
 
-    def __init__(self, inputs: dict[str, Any], outputs: dict[str, Any]) -> None:
+    def __init__(self, inputs: dict[str, Any], outputs: dict[str, Any], lanes: int = LANES) -> None:
         import casadi
 
-        number = LlvmType(lanes=LANES)
+        number = LlvmType(lanes=lanes)
         printer = Printer(LlvmLanguage(number))
         printer.add("function", inputs, {name: casadi.densify(casadi.SX(value)) for name, value in outputs.items()})
         parts = [vector_math.definition(name, count, number) for name, count in printer.needed.items()]

@@ -2,7 +2,8 @@
 
 The state is x (n,) followed by S = dx/dtheta (n, K), row by row. All columns share the rates, their Jacobian J and
 the LU factors of d I - J; what differs from column to column is one vector operation. A Rosenbrock step also needs
-dJ = (dJ/dx) S + dJ/dtheta: without it the derivatives converge with order one.
+dJ = (dJ/dx) S + dJ/dtheta: without it the derivatives converge with order one. Inputs that depend on the columns have
+derivatives V = du/dtheta, further inputs (M, K), row by row; all of the above then has a term of V too.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ class TangentSystem:
     inner: TracedSystem
     groups: tuple[tuple[int, ...], ...]
     output_names: tuple[str, ...]
+    inputs: tuple[int, ...] = ()
 
     @property
     def size(self) -> int:
@@ -45,6 +47,11 @@ class TangentSystem:
         """The rows of S, which follow the states in an array."""
         return [loaded(block, array, self.size + i * self.lanes, self.lanes) for i in range(self.size)]
 
+    def input_rows(self, block: FunctionBody, array: str = "u") -> list[LlvmValue]:
+        """The rows of V, which follow the inputs in an array, or those of its slope in time."""
+        first = int(self.inner.u.numel())
+        return [loaded(block, array, first + j * self.lanes, self.lanes) for j in range(len(self.inputs))]
+
 
 def tangent_system(system: SensitivitySystem) -> TangentSystem:
     """The traced inner system of a differentiated one, with the observed quantities as its outputs."""
@@ -56,11 +63,13 @@ def tangent_system(system: SensitivitySystem) -> TangentSystem:
         **{n: inner.o[i] for i, n in enumerate(inner.output_names)},
     }
     observed = casadi.densify(casadi.vertcat(casadi.SX(0, 1), *(found[n] for n in system.observed_names)))
-    return TangentSystem(dataclasses.replace(inner, o=observed), system.parameter_indices, system.output_names)
+    traced = dataclasses.replace(inner, o=observed)
+    return TangentSystem(traced, system.parameter_indices, system.output_names, system.input_indices)
 
 
 class Values:
-    """Expressions of a point as instructions, and how they change along every column: dv = (dv/dx) S + dv/dtheta."""
+    """Expressions of a point as instructions, and how they change along every column:
+    dv = (dv/dx) S + (dv/du) V + dv/dtheta."""
 
     def __init__(self, t: TangentSystem, expressions: Any, further: Sequence[Any] = ()) -> None:
         code = recorded([*(getattr(t.inner, name) for name in POINT), *further], [expressions])
@@ -71,16 +80,18 @@ class Values:
     def along(self, results: Sequence[Operand]) -> DirectionalDerivative:
         """The derivatives of some operands of the tape."""
         states = [("in", POINT.index("x"), i) for i in range(self.t.size)]
+        inputs = [("in", POINT.index("u"), i) for i in self.t.inputs]
         leaves = {place: ("in", POINT.index(PARAMETERS), place) for group in self.t.groups for place in group}
-        by_state, by_column = [], []
-        for row in derivatives(self.tape, results, [*states, *leaves.values()]):
+        by_state, by_input, by_column = [], [], []
+        for row in derivatives(self.tape, results, [*states, *inputs, *leaves.values()]):
             by_state.append({j: row[x] for j, x in enumerate(states) if row.get(x, ZERO) != ZERO})
+            by_input.append({j: row[u] for j, u in enumerate(inputs) if row.get(u, ZERO) != ZERO})
             sums = dict.fromkeys(range(self.t.lanes), ZERO)
             for k, group in enumerate(self.t.groups):
                 for place in group:
                     sums[k] = self.tape.add(sums[k], row.get(leaves[place], ZERO))
             by_column.append({k: part for k, part in sums.items() if part != ZERO})
-        return DirectionalDerivative(tuple(by_state), tuple(by_column))
+        return DirectionalDerivative(tuple(by_state), tuple(by_input), tuple(by_column))
 
     def compute(
         self, printer: Printer, block: FunctionBody, wanted: Sequence[Operand], names: Sequence[str] = POINT,
@@ -95,25 +106,41 @@ class Values:
 
 @dataclasses.dataclass(frozen=True)
 class DirectionalDerivative:
-    """The non-zero derivatives of each of some operands, by state and by column."""
+    """The non-zero derivatives of each of some operands, by state, by input with derivatives, and by column."""
 
     by_state: tuple[dict[int, Operand], ...]
+    by_input: tuple[dict[int, Operand], ...]
     by_column: tuple[dict[int, Operand], ...]
 
     @property
     def parts(self) -> list[Operand]:
         """All of them."""
-        return [part for row in (*self.by_state, *self.by_column) for part in row.values()]
+        return [part for row in (*self.by_state, *self.by_input, *self.by_column) for part in row.values()]
 
-    def rows(self, values: Mapping[Operand, LlvmValue], s: Sequence[LlvmValue]) -> list[LlvmValue]:
-        """The change of each operand, a column, from the values of the parts and the rows of S."""
+    def rows(
+        self, values: Mapping[Operand, LlvmValue], s: Sequence[LlvmValue], v: Sequence[LlvmValue]
+    ) -> list[LlvmValue]:
+        """The change of each operand, a column, from the values of the parts and the rows of S and V."""
         found = []
-        for states, columns in zip(self.by_state, self.by_column, strict=True):
+        for states, inputs, columns in zip(self.by_state, self.by_input, self.by_column, strict=True):
             direct = {k: values[part].name for k, part in columns.items()}
             row = packed(s[0].block, direct, s[0].lanes)
             for j, part in states.items():
                 row = row + s[j] * values[part]
+            for j, part in inputs.items():
+                row = row + v[j] * values[part]
             found.append(row)
+        return found
+
+    def along_inputs(self, values: Mapping[Operand, LlvmValue], v: Sequence[LlvmValue]) -> list[LlvmValue | None]:
+        """The part of each change that is due to the inputs alone; None without one."""
+        found: list[LlvmValue | None] = []
+        for inputs in self.by_input:
+            total: LlvmValue | None = None
+            for j, part in inputs.items():
+                term = v[j] * values[part]
+                total = term if total is None else total + term
+            found.append(total)
         return found
 
 
@@ -139,14 +166,14 @@ def implicit_module(t: TangentSystem) -> tuple[str, ArraySizes]:
     step.print_solve(printer)
     step.print_stage(printer)
     df_dt = casadi.jtimes(inner.f, inner.u, inner.w) if inner.u.numel() else casadi.SX(t.size, 1)
-    _print_along(printer, "df_dt", Values(t, casadi.densify(df_dt), [inner.w]), [*POINT, "w"], "f")
+    _print_along(printer, "df_dt", Values(t, casadi.densify(df_dt), [inner.w]), [*POINT, "w"], "f", moving=step.rates)
     outputs = Values(t, inner.o)
     slope = Values(t, casadi.densify(casadi.jtimes(inner.o, inner.x, inner.f)))
     _print_along(printer, "outputs", outputs, POINT, "o", slope)
     further, count = len(step.moving) * t.lanes, inner.o.numel()
     return printer.module(), ArraySizes(
         states=t.size * (1 + t.lanes),
-        inputs=inner.u.numel(),
+        inputs=inner.u.numel() + len(t.inputs) * t.lanes,
         parameters=inner.p.numel() + t.lanes,  # a scale for each column comes last
         held=printer.held,
         jacobian=len(step.jacobian) + further,
@@ -156,15 +183,25 @@ def implicit_module(t: TangentSystem) -> tuple[str, ArraySizes]:
 
 
 def _print_along(
-    printer: Printer, name: str, values: Values, arguments: Sequence[str], target: str, last: Values | None = None
-) -> None:
-    """A function that writes values, their derivatives by every column, and the final values."""
-    block, along = FunctionBody(), values.along(values.results)
+    printer: Printer, name: str, values: Values, arguments: Sequence[str], target: str, last: Values | None = None,
+    moving: Values | None = None,
+) -> None:  # fmt: skip
+    """A function that writes values, their derivatives by every column, and the final values.
+
+    To the derivatives, those of `moving` along the slopes in time of V are added.
+    """
+    t, block, along = values.t, FunctionBody(), values.along(values.results)
     found = values.compute(printer, block, [*values.results, *along.parts], arguments)
-    rows = [found[v] for v in values.results] + along.rows(found, values.t.rows(block, "x"))
+    columns = along.rows(found, t.rows(block, "x"), t.input_rows(block))
+    if moving is not None and t.inputs:
+        further = moving.along(moving.results)
+        parts = moving.compute(printer, block, [part for row in further.by_input for part in row.values()], arguments)
+        added = further.along_inputs(parts, t.input_rows(block, "w"))
+        columns = [row if more is None else row + more for row, more in zip(columns, added, strict=True)]
+    rows = [found[v] for v in values.results] + columns
     if last is not None:
-        further = last.compute(printer, block, last.results)
-        rows += [further[v] for v in last.results]
+        final = last.compute(printer, block, last.results)
+        rows += [final[v] for v in last.results]
     stored(rows, target)
     printer.end(name, arguments, [target], block)
 
@@ -185,8 +222,8 @@ class _Step:
     @property
     def moving(self) -> list[int]:
         """Which of the distinct non-zeros of J change along a column."""
-        both = zip(self.bends.by_state, self.bends.by_column, strict=True)
-        return [q for q, rows in enumerate(both) if any(rows)]
+        all_rows = zip(self.bends.by_state, self.bends.by_input, self.bends.by_column, strict=True)
+        return [q for q, rows in enumerate(all_rows) if any(rows)]
 
     def _bends(self, block: FunctionBody, array: str, first: int) -> dict[int, LlvmValue]:
         """dJ by number of the distinct non-zero, from an array where they stand from `first` on."""
@@ -195,16 +232,16 @@ class _Step:
 
     def print_rates(self, printer: Printer) -> None:
         """rhs(x, u, c, f) and jac(x, u, c, f, J)."""
-        block, s = FunctionBody(), self.slopes
+        block, s, t = FunctionBody(), self.slopes, self.t
         rates = self.rates.compute(printer, block, [*self.rates.results, *s.parts])
-        rows = [rates[f] for f in self.rates.results] + s.rows(rates, self.t.rows(block, "x"))
-        stored(rows, "f")
+        columns = s.rows(rates, t.rows(block, "x"), t.input_rows(block))
+        stored([rates[f] for f in self.rates.results] + columns, "f")
         printer.end("rhs", POINT, ["f"], block)
         block = FunctionBody()
         wanted = [*self.rates.results, *s.parts, *self.bends.parts]
-        found, rows = self.rates.compute(printer, block, wanted), self.t.rows(block, "x")
-        stored([found[f] for f in self.rates.results] + s.rows(found, rows), "f")
-        bends = self.bends.rows(found, rows)
+        found, rows, v = self.rates.compute(printer, block, wanted), t.rows(block, "x"), t.input_rows(block)
+        stored([found[f] for f in self.rates.results] + s.rows(found, rows, v), "f")
+        bends = self.bends.rows(found, rows, v)
         stored([found[part] for part in self.jacobian] + [bends[q] for q in self.moving], "J")
         printer.end("jac", POINT, ["f", "J"], block)
 
@@ -228,7 +265,7 @@ class _Step:
         t, block = self.t, FunctionBody()
         found = self.rates.compute(printer, block, [*self.rates.results, *self.slopes.parts])
         right = [found[f] + loaded(block, "g", i) for i, f in enumerate(self.rates.results)]
-        slopes = self.slopes.rows(found, t.rows(block, "x"))
+        slopes = self.slopes.rows(found, t.rows(block, "x"), t.input_rows(block))
         columns = [d + more for d, more in zip(slopes, t.rows(block, "g"), strict=True)]
         stored(self._solved(block, right, columns), "k")
         printer.end("stage", [*POINT, "A", "g"], ["k"], block)

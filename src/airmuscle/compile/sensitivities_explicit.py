@@ -27,8 +27,9 @@ class _Stage:
         printer: Printer,
         block: FunctionBody,
         given: dict[Operand, str],
+        v: Sequence[LlvmValue],
     ) -> None:
-        self.rates, self.along, self.block, self.values = rates, along, block, given
+        self.rates, self.along, self.block, self.values, self.v = rates, along, block, given, v
         wanted = tuple((0, i, operand) for i, operand in enumerate([*rates.results, *along.parts]))
         code, self.held = printer.set_apart(finished(Code(tuple(rates.tape.body), wanted)), POINT)
         needed = set(rates.results)
@@ -67,7 +68,7 @@ class _Stage:
 
     def columns(self, s: Sequence[LlvmValue]) -> list[LlvmValue]:
         """The derivatives of the rates along the columns, from the rows of S."""
-        return self.along.rows({operand: self._value(operand) for operand in self.along.parts}, s)
+        return self.along.rows({operand: self._value(operand) for operand in self.along.parts}, s, self.v)
 
 
 def _after(
@@ -79,6 +80,12 @@ def _after(
         if weight:
             found = [value + d * _times(h, weight) for value, d in zip(found, slope, strict=True)]
     return found
+
+
+def _input_rows(t: TangentSystem, block: FunctionBody, h: LlvmValue, node: float) -> list[LlvmValue]:
+    """The rows of V at a stage."""
+    slopes = zip(t.input_rows(block), t.input_rows(block, "w"), strict=True)
+    return [v + w * _times(h, node) for v, w in slopes]
 
 
 def _times(h: LlvmValue, weight: float) -> LlvmValue:
@@ -99,7 +106,7 @@ def explicit_module(t: TangentSystem, a: Sequence[Sequence[float]], b: Sequence[
         for i in range(t.inner.u.numel()):
             u = loaded(block, "u", i) + loaded(block, "w", i) * _times(h, sum(row))
             given["in", POINT.index("u"), i] = u.name
-        stage = _Stage(rates, along, printer, block, given)
+        stage = _Stage(rates, along, printer, block, given, _input_rows(t, block, h, sum(row)))
         stage.print_rates(before)
         slopes.append(stage.slopes())
         if before is not None:

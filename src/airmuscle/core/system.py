@@ -113,6 +113,14 @@ class SensitivitySystem(System):
         """For every column the indices of the inner parameters that vary together."""
 
     @property
+    def input_indices(self) -> tuple[int, ...]:
+        """The indices of the inner inputs that depend on the columns; none by default.
+
+        Their derivatives by every column, input by input, are further inputs behind those of the inner system.
+        """
+        return ()
+
+    @property
     @abc.abstractmethod
     def observed_names(self) -> tuple[str, ...]:
         """Inner states and outputs that are returned as outputs."""

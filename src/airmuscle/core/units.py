@@ -91,8 +91,9 @@ def _registry() -> Any:
 
 
 def _to_pint_syntax(unit: str) -> str:
-    """Return a unit in the syntax of pint: `m3/(s Pa)` becomes `m**3/(s*Pa)`."""
-    powers = re.sub(r"([A-Za-z])\^?(\d)", r"\1**\2", unit.replace("³", "3").replace("²", "2"))
+    """Return a unit in the syntax of pint: `m3/(s Pa)` becomes `m**3/(s*Pa)`; the kilopond kp is kgf."""
+    unit = re.sub(r"\bkp\b", "kgf", unit.replace("³", "3").replace("²", "2"))
+    powers = re.sub(r"([A-Za-z])\^?(\d)", r"\1**\2", unit)
     return re.sub(r"(?<=[\w)])\s+(?=[\w(])", "*", powers).replace("%", "percent").replace("°C", "degC")
 
 

@@ -1,194 +1,45 @@
-"""Printed controller: a control law as a C99 function of its memory, with a program that replays a recorded run."""
+"""Controller on a microcontroller: a control law as a C99 function, with a program that replays a recorded run."""
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from ..compile.functions import Printer
-from ..compile.ir import emission
-from ..compile.ir.instructions import Code, instructions
-from ..compile.ir.interpreter import InterpretedBody
-from ..compile.text.c import CLanguage
-from ..control.control_law import ControlLaw
-from ..control.control_loop import MEASURED, ControlLoop
-from ..core.arrays import Array
-from ..core.errors import ParameterError
-from ..core.tree import Leaf, leaves
+from ..control.control_loop import MEASURED
 from ..simulation import Problem, solve
-from ..simulation.compiled_law import trace_sample
-from ..simulation.sampled_loop import SampledLoop, prepare_loop
-from .c_text import c_array, c_number, c_strings
-from .identifiers import make_identifiers
-from .printed_system import find_leaf
-from .provenance import block_comment, provenance
+from ..simulation.batch.precision import Double, Precision, Single
+from ..simulation.sampled_loop import prepare_loop
+from .printed_controller import check_control_law, check_single_precision, print_controller
 from .targets import program_name
-from .templates import filled
 from .write import checked_name, write_files
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class PrintedController:
-    """A control law as expressions of measurement, set point, memory and tunable parameters."""
-
-    name: str
-    law: ControlLaw
-    inputs: dict[str, Any]
-    outputs: dict[str, Any]
-    tunable: tuple[Leaf, ...]
-    provenance: Sequence[str]
-
-    @property
-    def code(self) -> Code:
-        """The instructions of a sample."""
-        return instructions(list(self.inputs.values()), list(self.outputs.values()))
-
-    def files(self, samples: ReplayedSamples) -> dict[str, str]:
-        """Header, source and the program that replays samples, by file name."""
-        printer = Printer(CLanguage("double", f"{self.name}_"))
-        printer.add_code("sample", list(self.inputs), self.code, list(self.outputs))
-        upper, law = self.name.upper(), self.law
-        counts = {
-            "memory": len(law.initial_memory), "measurements": len(law.measured_columns),
-            "setpoints": len(law.setpoints), "commands": len(law.inputs), "parameters": len(self.tunable),
-        }  # fmt: skip
-        places = {key: str(count) for key, count in counts.items()}
-        places |= {
-            "provenance": block_comment(self.provenance), "file": self.name, "enumerations": self._enumerations(),
-            "functions": printer.text[-1], "samples": str(len(samples.measured)), "constants": self._constants(),
-            "tables": "".join((
-                c_array(f"static const double measured[SAMPLES][{upper}_MEASUREMENTS + 1]", samples.measured, 1),
-                c_array(f"static const double setpoints[SAMPLES][{upper}_SETPOINTS + 1]", samples.setpoints, 1),
-                c_array(f"static const double commands[SAMPLES][{upper}_COMMANDS + 1]", samples.commands, 1),
-            )),
-        }  # fmt: skip
-        return {
-            f"{self.name}.h": filled("controller.h", places, self.name),
-            f"{self.name}.c": filled("controller.c", places, self.name),
-            "main.c": filled("replay.c", places, self.name),
-        }
-
-    def _constants(self) -> str:
-        upper, memory = self.name.upper(), np.array([float(v) for v in self.law.initial_memory.values()])
-        defaults = np.array([leaf.value for leaf in self.tunable], dtype=float)
-        names = [leaf.path for leaf in self.tunable]
-        return "".join((
-            c_array(f"const double {self.name}_initial_memory[{upper}_MEMORY + 1]", memory, 1),
-            c_array(f"double {self.name}_parameters[{upper}_PARAMETERS + 1]", defaults, 1),
-            c_strings(f"const char *const {self.name}_parameter_names[{upper}_PARAMETERS + 1]", names),
-        ))  # fmt: skip
-
-    def _enumerations(self) -> str:
-        kinds = {
-            "MEMORY": tuple(self.law.initial_memory), "MEASUREMENT": self.law.measured_columns,
-            "SETPOINT": self.law.setpoints, "COMMAND": self.law.inputs,
-            "PARAMETER": tuple(leaf.path for leaf in self.tunable),
-        }  # fmt: skip
-        text = ""
-        for kind, names in kinds.items():
-            words = [f"{self.name.upper()}_{kind}_{word.upper()}" for word in make_identifiers(names)]
-            text += f"enum {{ {', '.join(f'{word} = {i}' for i, word in enumerate(words))} }};\n" if words else ""
-        return text
-
-    def replay(self, measured: Array, setpoints: Array) -> ReplayedSamples:
-        """The commands to measurements (K, m) and set points (K, s), from the printed instructions themselves."""
-        memory: list[float] = [float(value) for value in self.law.initial_memory.values()]
-        parameters = [float(leaf.value) for leaf in self.tunable]
-        rows, names, code = [], list(self.inputs), self.code
-        for measurement, setpoint in zip(measured.tolist(), setpoints.tolist(), strict=True):
-            given = {"measurement": measurement, "setpoint": setpoint, "memory": memory, "parameters": parameters}
-            body = InterpretedBody(given)
-            values = emission.computed(body, code, names, {}, {})
-            for (output, index), value in values.items():
-                body.store(list(self.outputs)[output], index, value)
-            rows.append([body.stored["command", i] for i in range(len(self.law.inputs))])
-            memory = [body.stored["later", i] for i in range(len(memory))]
-        return ReplayedSamples(measured, setpoints, np.array(rows))
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class ReplayedSamples:
-    """Measurements (K, m), set points (K, s) and commands (K, c) of a run."""
-
-    measured: Array
-    setpoints: Array
-    commands: Array
-
-
 def write_controller(
-    problem: Problem, folder: str | Path, *, name: str = "", title: str = "", tunable: Sequence[str] = ()
-) -> tuple[Path, ...]:
+    problem: Problem, folder: str | Path, *, name: str = "", title: str = "", tunable: Sequence[str] = (),
+    precision: Precision = Double(),
+) -> tuple[Path, ...]:  # fmt: skip
     """Write the control law of a problem as C99 for a microcontroller; returns the paths of its files.
 
     problem  a plant with a ControlLoop; the run is simulated, and its measurements are the data of the replay
     tunable  paths of the parameters that remain variables; none by default: all are constants of the program
+    precision  Double(), or Single() for a processor that computes with floats alone
 
     The function is `NAME_step(memory, measurement, setpoint, command)`. Sample time and ranges of the commands are
-    constants. The program `main.c` replays the measurements of the run and compares the commands bit by bit with those
-    of the same operations in IEEE 754 double precision. Raises ParameterError for a problem without a controller or a
-    controller that is not a ControlLaw, SimulationError if the run fails, and FileError.
+    constants. The program `main.c` replays the measurements of the run. In double precision it compares the commands
+    bit by bit with those of the same operations in IEEE 754; in single precision they differ from these by at most 1e-4
+    of the range of the command. Raises ParameterError for a problem without a controller, a controller that is not a
+    ControlLaw, and one that single precision changes by more; SimulationError if the run fails, and FileError.
     """
     loop = check_control_law(problem)
     prepared = prepare_loop(problem, loop.init(problem.start_time))
     printed = print_controller(prepared, checked_name(name) or program_name(title or type(loop.controller).__name__),
-                               title, tunable)  # fmt: skip
+                               title, tunable, "float" if precision == Single() else "double")  # fmt: skip
     recording = solve(problem).raise_if_incomplete().recording
     rows = np.searchsorted(recording["time"], prepared.instants[:-1] - 1e-9 * loop.sample_time)
     measured = np.column_stack([recording[f"{MEASURED}{column}"][rows] for column in loop.controller.measured_columns])
-    return write_files(printed.files(printed.replay(measured, prepared.setpoint_values)), folder)
-
-
-def check_control_law(problem: Problem) -> ControlLoop:
-    """The control loop of a problem. Raises ParameterError where its controller cannot be printed, by its name."""
-    loop = problem.input
-    if not isinstance(loop, ControlLoop):
-        raise ParameterError("the problem has no controller to export; its input is a signal. Give it a ControlLoop.")
-    if not isinstance(loop.controller, ControlLaw):
-        raise ParameterError(
-            f"{type(loop.controller).__name__} is a controller in Python and cannot be exported; derive it from "
-            "ControlLaw and write its step over airmuscle.core.ops."
-        )
-    return loop
-
-
-def print_controller(
-    prepared: SampledLoop, name: str, title: str = "", tunable: Sequence[str] = ()
-) -> PrintedController:
-    """The control law of a prepared loop, with its sample time, ranges and fixed parameters as constants."""
-    import casadi
-
-    loop = prepared.loop
-    law = loop.controller
-    assert isinstance(law, ControlLaw)
-    sample, known = trace_sample(law), list(leaves(law))
-    chosen = [find_leaf(law, known, path) for path in dict.fromkeys(tunable)]
-    p = casadi.SX.sym("parameters", len(chosen))
-    parameters = [p[chosen.index(i)] if i in chosen else casadi.SX(leaf.value) for i, leaf in enumerate(known)]
-    low, high = ([prepared.ranges[n][k] for n in law.inputs] for k in (0, 1))
-    old = [sample.sample_time, sample.minimum, sample.maximum, sample.parameters]
-    values: list[list[Any]] = [[loop.sample_time], low, high, parameters]
-    new = [casadi.vertcat(casadi.SX(0, 1), *each) for each in values]
-    commands, later = casadi.substitute([sample.commands, sample.later], old, new)
-    limited = [_limited(commands[i], *prepared.ranges[n]) for i, n in enumerate(law.inputs)]
-    inputs = {"measurement": sample.measured, "setpoint": sample.setpoints, "memory": sample.memory, "parameters": p}
-    outputs = {"command": casadi.densify(casadi.vertcat(*limited)), "later": casadi.densify(later)}
-    notes = [f"Sample time {c_number(loop.sample_time)} s; set points {', '.join(law.setpoints) or 'none'}; measured "
-             f"{', '.join(law.measured_columns)}; commanded {', '.join(law.inputs)}, limited to "
-             f"{', '.join(f'{a!r} to {b!r}' for a, b in zip(low, high, strict=True))}."]  # fmt: skip
-    if loop.drivers:
-        kinds = ", ".join(f"{key}: {value}" for key, value in loop.drivers.items())
-        notes.append(f"Not part of this program: the drivers between commands and openings ({kinds}).")
-    lines = provenance(title or type(law).__name__, law, notes=notes)
-    return PrintedController(name, law, inputs, outputs, tuple(known[i] for i in chosen), lines)
-
-
-def _limited(command: Any, low: float, high: float) -> Any:
-    """A command within its range."""
-    import casadi
-
-    raised = casadi.if_else(command < low, low, command) if np.isfinite(low) else command
-    return casadi.if_else(raised > high, high, raised) if np.isfinite(high) else raised
+    samples = printed.replay(measured, prepared.setpoint_values)
+    if precision == Single():
+        check_single_precision(printed, samples, loop.sample_time)
+    return write_files(printed.files(samples), folder)

@@ -12,6 +12,7 @@ import numpy as np
 from ..compile.text.javascript import JavaScriptLanguage
 from ..simulation.integrators import ExplicitRungeKutta, Rodas4
 from .c_source import COEFFICIENTS, csv_header
+from .exported_loop import ExportedLoop
 from .printed_system import ExportedSystem
 from .provenance import block_comment
 from .run_data import RunData, tableau_arrays
@@ -26,6 +27,7 @@ class JavaScriptModule:
     system: ExportedSystem
     run: RunData
     provenance: Sequence[str]
+    loop: ExportedLoop | None = None
 
     def files(self, columns: Sequence[str]) -> dict[str, str]:
         """Contents of the module, and of a program that writes these columns, after time, as CSV, by file name."""
@@ -40,7 +42,13 @@ class JavaScriptModule:
         text += "".join(f"const {name} = {to_json(value)};\n" for name, value in constants.items())
         comment = block_comment(self.provenance)
         solver = filled("rodas4.mjs" if implicit else "explicit.mjs", {}, self.name)
-        places = {"provenance": comment, "constants": text, "functions": functions, "solver": solver}
+        if self.loop is not None:
+            text += f"export const loop = {to_json(self._loop_data(self.loop))};\n"
+            functions += f"\n{self.loop.controller.javascript()}"
+        places = {
+            "provenance": comment, "constants": text, "functions": functions, "solver": solver,
+            "simulate": self._simulation(),
+        }  # fmt: skip
         run = {
             "provenance": comment, "file": self.name, "columns": to_json(["time", *columns]),
             "header": to_json(csv_header(columns)),
@@ -72,6 +80,41 @@ class JavaScriptModule:
                 "times": run.times,
             },
         }  # fmt: skip
+
+    def _simulation(self) -> str:
+        """The function `simulate`."""
+        if self.loop is None:
+            return filled("simulate.mjs", {}, self.name)
+        driven = len(self.loop.drivers.kinds)
+        apply = "for (const driver of drivers) signals[driver.input] = driven(driver, signals[driver.input], begin);"
+        places = {
+            "drivers": filled("drivers.mjs", {}, self.name) if driven else "",
+            "apply_drivers": f"      {apply}\n" if driven else "",
+        }
+        return filled("loop.mjs", places, self.name)
+
+    def _loop_data(self, loop: ExportedLoop) -> dict[str, Any]:
+        """The constants of a control loop."""
+        law, signal, table = loop.controller.law, loop.prepared.setpoint_signal, loop.drivers
+        drivers = zip(table.kinds.tolist(), table.settings.tolist(), loop.driver_states.tolist(), strict=True)
+        return {
+            "sampleTime": loop.sample_time,
+            "samples": loop.samples,
+            "finish": float(loop.prepared.instants[-1]),
+            "near": loop.near,
+            "columns": loop.added_columns,
+            "setpoints": law.setpoints,
+            "measuredAt": loop.measured_at(self.system),
+            "commanded": loop.prepared.commanded,
+            "initialMemory": [float(value) for value in law.initial_memory.values()],
+            "parameters": [leaf.path for leaf in loop.controller.tunable],
+            "parameterDefaults": [float(leaf.value) for leaf in loop.controller.tunable],
+            "setpoint": {"ends": signal.ends, "values": signal.values, "slopes": signal.slopes},
+            "drivers": [
+                {"input": i, "kind": kind, "settings": settings, "state": state}
+                for (i, kind), settings, state in drivers
+            ],
+        }
 
     def _method(self) -> dict[str, Any]:
         integrator = self.run.integrator

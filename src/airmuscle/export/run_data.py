@@ -16,7 +16,8 @@ from ..simulation.integrators import ExplicitRungeKutta, Integrator, Rodas4
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class RunData:
-    """An open-loop run: `initial` (n,), the segments of the inputs, `times` (N,) of the rows, from `start` [s] on."""
+    """A run: `initial` (n,), the segments of the inputs, in a control loop of those that are not commanded, and `times`
+    (N,) of the rows, from `start` [s] on."""
 
     initial: Array
     segments: PiecewiseLinear
@@ -37,6 +38,13 @@ def run_data(problem: Problem) -> RunData:
     )
 
 
+def loop_data(problem: Problem, others: PiecewiseLinear, times: Array) -> RunData:
+    """The run of a problem with a control loop: the inputs that are not commanded, and the output times."""
+    assert problem.integrator is not None
+    start, integrator = problem.start_time, check_integrator(problem.integrator)
+    return RunData(problem.initial_vector, others, times, start, integrator)
+
+
 def check_integrator(integrator: Integrator) -> Integrator:
     """The integrator. Raises ParameterError for one that has no printed form."""
     if not isinstance(integrator, Rodas4 | ExplicitRungeKutta):
@@ -52,7 +60,7 @@ def check_open_loop(problem: Problem) -> None:
     if isinstance(problem.input, ControlLoop):
         raise ParameterError(
             f"the controller {type(problem.input.controller).__name__} cannot be exported to this target; export the "
-            "plant with input signals, or the loop to C."
+            "plant with input signals, or the loop to C or JavaScript."
         )
 
 

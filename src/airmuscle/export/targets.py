@@ -5,8 +5,11 @@ from __future__ import annotations
 import abc
 import dataclasses
 from collections.abc import Sequence
+from typing import ClassVar
 
+from .c_loop import loop_main
 from .c_source import CSource
+from .exported_loop import ExportedLoop
 from .identifiers import make_identifier
 from .javascript_module import JavaScriptModule
 from .law import PrintedLaw
@@ -24,10 +27,14 @@ class ExportedRun:
     run: RunData
     provenance: Sequence[str]
     columns: Sequence[str]
+    loop: ExportedLoop | None = None
 
 
 class Target(abc.ABC):
     """A language that plants and laws are exported to."""
+
+    has_loops: ClassVar[bool] = False
+    """Whether a plant can be exported together with its controller."""
 
     @abc.abstractmethod
     def run_files(self, program: ExportedRun) -> dict[str, str]:
@@ -40,11 +47,19 @@ class Target(abc.ABC):
 
 @dataclasses.dataclass(frozen=True)
 class C99(Target):
-    """C99 without memory allocation: header, source, and a main program that runs the scenario."""
+    """C99 without memory allocation: header, source, and a main program that runs the scenario.
+
+    A controller has a header and a source of its own.
+    """
+
+    has_loops: ClassVar[bool] = True
 
     def run_files(self, program: ExportedRun) -> dict[str, str]:
         source = CSource(program.name, program.system, program.run.integrator, program.provenance)
-        return {**source.files(), "main.c": source.main(program.run, program.columns)}
+        if program.loop is None:
+            return {**source.files(), "main.c": source.main(program.run, program.columns)}
+        main = loop_main(program.name, program.system, program.run, program.loop, program.columns, program.provenance)
+        return {**source.files(), **program.loop.controller.source_files(), "main.c": main}
 
     def law_files(self, law: PrintedLaw) -> dict[str, str]:
         return law.c_files()
@@ -54,8 +69,10 @@ class C99(Target):
 class JavaScript(Target):
     """An ECMAScript module for browsers and Node, and a program for Node that runs the scenario."""
 
+    has_loops: ClassVar[bool] = True
+
     def run_files(self, program: ExportedRun) -> dict[str, str]:
-        module = JavaScriptModule(program.name, program.system, program.run, program.provenance)
+        module = JavaScriptModule(program.name, program.system, program.run, program.provenance, program.loop)
         return module.files(program.columns)
 
     def law_files(self, law: PrintedLaw) -> dict[str, str]:

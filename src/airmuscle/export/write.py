@@ -6,14 +6,16 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from ..characteristic import Characteristic
+from ..control.control_loop import ControlLoop
 from ..core.errors import ParameterError, suggestion
 from ..report.output_folder import atomic_folder
 from ..simulation import Problem
+from .exported_loop import CONTROLLER, export_loop
 from .identifiers import make_identifier
 from .law import print_law
 from .printed_system import export_system
 from .provenance import provenance
-from .run_data import check_open_loop, run_data
+from .run_data import check_open_loop, loop_data, run_data
 from .targets import C99, ExportedRun, Target, program_name
 
 NOTE = (
@@ -35,36 +37,56 @@ def write_program(
 ) -> tuple[Path, ...]:
     """Write a system and its run as a program in another language; returns the paths of its files.
 
-    problem  a system with its input signals, initial state, output times and integrator
+    problem  a system with its input signals or, for C99 and JavaScript, a control loop; initial state, output times and
+             integrator
     target   C99(), JavaScript() or Octave()
     name     name of the files, and beginning of the names in them; by default the title
-    tunable  paths of the parameters that the program can change; all by default, the others become constants
-    columns  states, inputs and outputs that the run writes after time; all by default
+    tunable  paths of the parameters that the program can change, those of a controller with `controller.` before them;
+             all by default, the others become constants
+    columns  states, inputs, outputs and columns of a controller that the run writes after time; all by default
 
     The files depend on the arguments and the version of airmuscle alone. Raises ParameterError for what cannot be
     exported, which it names, and FileError.
     """
-    program = make_run(problem, name=name, title=title, tunable=tunable, columns=columns)
+    program = make_run(
+        problem, name=name, title=title, tunable=tunable, columns=columns, with_loop=target.has_loops
+    )  # fmt: skip
     return write_files(target.run_files(program), folder)
 
 
 def make_run(
     problem: Problem, *, name: str = "", title: str = "", tunable: Sequence[str] | None = None,
-    columns: Sequence[str] = (), notes: Sequence[str] = (NOTE,),
+    columns: Sequence[str] = (), notes: Sequence[str] = (NOTE,), with_loop: bool = False,
 ) -> ExportedRun:  # fmt: skip
-    """A problem ready for any target; arguments and errors as for `write_program`."""
-    check_open_loop(problem)
-    run, title = run_data(problem), title or type(problem.system).__name__
-    system = export_system(problem.compiled, tunable)
+    """A problem ready for any target, with its control loop if the target has one; else as for `write_program`."""
+    title = title or type(problem.system).__name__
+    name = checked_name(name) or program_name(title)
+    loop, plant_parameters = None, tunable
+    if with_loop and isinstance(problem.input, ControlLoop):
+        plant_parameters, of_controller = _divided(tunable)
+        loop = export_loop(problem, f"{name}_controller", title, of_controller)
+        run = loop_data(problem, loop.others, loop.prepared.times)
+    else:
+        check_open_loop(problem)
+        run = run_data(problem)
+    system = export_system(problem.compiled, plant_parameters)
+    known = (*system.columns, *(loop.added_columns if loop else ()))
     for column in columns:
-        if column not in system.columns:
+        if column not in known:
             raise ParameterError(
-                f"the run has no column '{column}'; there are {', '.join(system.columns)}."
-                f"{suggestion(column, system.columns)}"
+                f"the run has no column '{column}'; there are {', '.join(known)}.{suggestion(column, known)}"
             )
     lines = provenance(title, problem.system, (run.integrator,), notes)
-    chosen = tuple(c for c in columns if c != "time") or system.columns
-    return ExportedRun(checked_name(name) or program_name(title), system, run, lines, chosen)
+    chosen = tuple(c for c in columns if c != "time") or known
+    return ExportedRun(name, system, run, lines, chosen, loop)
+
+
+def _divided(tunable: Sequence[str] | None) -> tuple[list[str] | None, list[str] | None]:
+    """The tunable parameters of the plant, and those of the controller without the beginning of their paths."""
+    if tunable is None:
+        return None, None
+    plant = [path for path in tunable if not path.startswith(CONTROLLER)]
+    return plant, [path.removeprefix(CONTROLLER) for path in tunable if path.startswith(CONTROLLER)]
 
 
 def write_law(

@@ -72,12 +72,12 @@ def _branch_differences(run: Recording, residuals: Array) -> Array:
     if not direction.any():
         return np.zeros(0)
     values = residuals[known]
-    measured = np.isfinite(values)
-    groups = (
-        [values[measured & (bins == number) & (direction == sign)] for sign in (1, -1)]
-        for number in range(PRESSURE_BINS)
-    )
-    return np.array([float(up.mean() - down.mean()) for up, down in groups if up.size and down.size])
+    used = np.isfinite(values) & (direction != 0)
+    cell = 2 * bins[used] + (direction[used] > 0)
+    counts = np.bincount(cell, minlength=2 * PRESSURE_BINS).reshape(PRESSURE_BINS, 2)
+    sums = np.bincount(cell, values[used], minlength=2 * PRESSURE_BINS).reshape(PRESSURE_BINS, 2)
+    down, up = (sums / np.maximum(counts, 1)).T
+    return np.asarray((up - down)[(counts > 0).all(axis=1)])
 
 
 def _branch_bins(run: Recording) -> _BranchBins:

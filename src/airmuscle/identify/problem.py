@@ -199,12 +199,13 @@ class FitProblem:
                     for length, _, x in self._points
                 ]
             )
-        return self._finite_differences(values)[:, list(which)]
+        return self._finite_differences(values, which)
 
-    def _finite_differences(self, values: Array) -> Array:
+    def _finite_differences(self, values: Array, which: Sequence[int]) -> Array:
         low, high = self.bounds
         columns = []
-        for i, value in enumerate(values):
+        for i in which:
+            value = values[i]
             step = np.cbrt(np.finfo(float).eps) * max(abs(value), abs(self.initial_values[i]), 1e-8)
             up, down = values.copy(), values.copy()
             up[i], down[i] = min(value + step, high[i]), max(value - step, low[i])

@@ -2,7 +2,10 @@
 
 For given values of the nonlinear parameters the linear ones follow by linear least squares. The search therefore runs
 over the nonlinear parameters alone, from several initial guesses (multi-start).
-Reference: Golub and Pereyra, SIAM Journal on Numerical Analysis 10:413 (1973).
+The Jacobian of the projected residuals is that of the law in the nonlinear parameters, projected onto the complement of
+the linear columns.
+References: Golub and Pereyra, SIAM Journal on Numerical Analysis 10:413 (1973); Kaufman, BIT Numerical Mathematics
+15:49 (1975).
 """
 
 from __future__ import annotations
@@ -79,20 +82,38 @@ class _Projection:
         self._bounds = tuple(bound[~linear] for bound in problem.bounds)
         initial = problem.initial_values[~linear]
         self._scale = np.where(initial != 0, np.abs(initial), 1.0)
+        self._last: tuple[bytes, tuple[Array, Array, Array]] | None = None
 
     def complete(self, nonlinear: Array) -> Array:
         """All free parameters for these nonlinear ones; NaN for the linear ones where the law is not finite."""
-        values = np.zeros(self._linear.size)
-        values[~self._linear] = nonlinear
-        constant = self._problem.predict(values)
-        jacobian = self._problem.partial_jacobian(values, self._linear_indices)
-        finite = np.isfinite(jacobian).all() and np.isfinite(constant).all()
-        values[self._linear] = solve_censored_least_squares(self._problem, jacobian, constant) if finite else np.nan
-        return values
+        return self._solve(nonlinear)[0]
+
+    def _solve(self, nonlinear: Array) -> tuple[Array, Array, Array]:
+        """All free parameters (P,), the fitted quantity (N,) and the columns of the linear parameters; kept for the
+        Jacobian at the same point."""
+        key = nonlinear.tobytes()
+        if self._last is None or self._last[0] != key:
+            values = np.zeros(self._linear.size)
+            values[~self._linear] = nonlinear
+            constant = self._problem.predict(values)
+            columns = self._problem.partial_jacobian(values, self._linear_indices)
+            finite = np.isfinite(columns).all() and np.isfinite(constant).all()
+            values[self._linear] = solve_censored_least_squares(self._problem, columns, constant) if finite else np.nan
+            self._last = key, (values, columns @ values[self._linear] + constant, columns)
+        return self._last[1]
 
     def residuals(self, nonlinear: Array) -> Array:
         """Weighted residuals with the optimal linear parameters, shape (N,)."""
-        return self._problem.residuals(self._problem.predict(self.complete(nonlinear)))
+        return self._problem.residuals(self._solve(nonlinear)[1])
+
+    def jacobian(self, nonlinear: Array) -> Array:
+        """Derivatives of the residuals with respect to the nonlinear parameters, after Kaufman; shape (N, K)."""
+        values, modelled, columns = self._solve(nonlinear)
+        row_weights = (self._problem.weights * self._problem.active_rows(modelled))[:, None]
+        slopes = row_weights * self._problem.partial_jacobian(values, np.flatnonzero(~self._linear).tolist())
+        norms = np.linalg.norm(columns, axis=0)
+        linear = row_weights * (columns / np.where(norms > 0, norms, 1.0))
+        return np.asarray(slopes - linear @ np.linalg.lstsq(linear, slopes, rcond=None)[0])
 
     def sum_of_squares(self, nonlinear: Array) -> float:
         """Sum of the squared residuals; infinite where one is not finite."""
@@ -108,9 +129,10 @@ class _Projection:
         inside = np.clip(start / self._scale, low + 1e-9, high - 1e-9)
         try:
             result = least_squares(
-                lambda x: self.residuals(x * self._scale), inside, bounds=(low, high), x_scale="jac", max_nfev=60
-            )
-        except ValueError:  # the law is not finite at a trial point
+                lambda x: self.residuals(x * self._scale), inside, bounds=(low, high), x_scale="jac", max_nfev=60,
+                jac=lambda x: self.jacobian(x * self._scale) * self._scale,
+            )  # fmt: skip
+        except (ValueError, np.linalg.LinAlgError):  # the law is not finite at a trial point
             return start
         return np.asarray(result.x * self._scale)
 

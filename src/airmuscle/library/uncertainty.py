@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -76,3 +76,16 @@ def read_uncertainty(table: Any, location: Location) -> ParameterUncertainty:
 def uncertainty_table(uncertainty: ParameterUncertainty) -> dict[str, Any]:
     """The table [uncertainty] of a muscle file."""
     return {key: getattr(uncertainty, key) for key in KEYS}
+
+
+def without_parts(uncertainty: ParameterUncertainty, parts: Collection[str]) -> ParameterUncertainty | None:
+    """The uncertainty without the parameters of these tables, such as `friction`; None if no parameter remains."""
+    names = uncertainty.parameters
+    kept = [i for i, name in enumerate(names) if name.partition(".")[0] not in parts]
+    if not kept:
+        return None
+    return ParameterUncertainty(
+        tuple(names[i] for i in kept),
+        tuple(uncertainty.standard_errors[i] for i in kept),
+        tuple(tuple(uncertainty.correlations[i][k] for k in kept) for i in kept),
+    )

@@ -63,6 +63,7 @@ def read_hdf5_tables_here(path: Path, group: str | None) -> tuple[RawTable, ...]
 
     def read() -> dict[str, tuple[list[Channel], dict[str, float | str]]]:
         with h5py.File(path, "r") as file:
+            check_own_values(h5py, file, path)
             return {name: content for name, content in _groups(h5py, file) if content[0]}
 
     contents = run_reader(path, "HDF5", read)
@@ -78,6 +79,28 @@ def read_hdf5_tables_here(path: Path, group: str | None) -> tuple[RawTable, ...]
         merge_channels(f"{path.name}, group '{name}'" if several else path.name, channels, constants)
         for name, (channels, constants) in selected.items()
     )
+
+
+def check_own_values(h5py: Any, file: Any, path: Path) -> None:
+    """Raise FileError if the values of a dataset are in another file, which might be any file of this machine."""
+
+    def is_outside(name: str, item: Any) -> bool | None:
+        return True if isinstance(item, h5py.Dataset) and (item.external or item.is_virtual) else None
+
+    if file.visititems(is_outside):
+        raise FileError(
+            f"{path.name}: the values of a dataset are in another file, which is not read. Store them in this file."
+        )
+
+
+def check_no_external_links(h5py: Any, group: Any, path: Path) -> None:
+    """Raise FileError if a group, or one inside it, has a link to another file."""
+    for name in group:
+        link = group.get(name, getlink=True)
+        if isinstance(link, h5py.ExternalLink):
+            raise FileError(f"{path.name}: '{name}' is a link to another file, which is not read. Store the values.")
+        if isinstance(link, h5py.HardLink) and isinstance(group[name], h5py.Group):
+            check_no_external_links(h5py, group[name], path)
 
 
 def _groups(h5py: Any, group: Any) -> Iterator[tuple[str, tuple[list[Channel], dict[str, float | str]]]]:

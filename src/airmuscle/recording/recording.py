@@ -73,11 +73,14 @@ class Recording(NotebookDisplay):
             if name == "length" and "contraction" in self.columns:
                 return resting_length * (1.0 - self.columns["contraction"])
         known = list(self.columns)
-        remedy = (
-            " Specify the resting length to convert the length to a contraction."
-            if name == "contraction" and "length" in known
-            else ""
-        )
+        remedy = ""
+        if name == "contraction" and "length" in known:
+            remedy = " Specify the resting length to convert the length to a contraction."
+        elif name == "contraction" and "position" in known:
+            remedy = (
+                " A displacement has no stated zero and direction: if it is the shortening from the resting length L0, "
+                "write the length L0 minus the displacement, or the contraction, displacement/L0."
+            )
         raise ColumnError(
             f"{self.origin}: no column '{name}'; the columns are {', '.join(known)}.{suggestion(name, known)}{remedy}"
         )

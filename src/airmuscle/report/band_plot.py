@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..core import plotting
+from ..core.arrays import Array
 from ..core.errors import IdentificationError
-from ..identify import Fit, confidence_band
+from ..identify import Band, Fit, confidence_band
 from ..recording import Recording
 from .chapter import Plot
 from .levels import is_pressure_ramp, levels_of
@@ -20,7 +22,7 @@ POINTS = 121
 _DISPLAY_UNITS = {"pressure": (1e-3, "kPa"), "contraction": (100.0, "%"), "force": (1.0, "N")}
 
 
-class _CurveAxes(NamedTuple):
+class CurveAxes(NamedTuple):
     """The quantity that is constant on a curve, and the one that varies along it."""
 
     constant: str
@@ -28,9 +30,9 @@ class _CurveAxes(NamedTuple):
 
 
 _CURVE_AXES = {
-    "force": _CurveAxes("pressure", "contraction"),
-    "contraction": _CurveAxes("pressure", "force"),
-    "pressure": _CurveAxes("contraction", "force"),
+    "force": CurveAxes("pressure", "contraction"),
+    "contraction": CurveAxes("pressure", "force"),
+    "pressure": CurveAxes("contraction", "force"),
 }
 
 _CAPTION = (
@@ -40,23 +42,45 @@ _CAPTION = (
 )
 
 
-def band_plot(fit: Fit, name: str = "bands") -> Plot | None:
-    """Return the fitted curves with 95 % bands and the half width of the bands; None if no band can be computed."""
-    quantity, curve = fit.fitted_quantity.name, _curve_axes(fit)
-    levels = levels_of(fit.recording[curve.constant], MAX_CURVES)
-    figure, (left, right) = plotting.new_figure(1, 2, width=7.4, height=3.7)
-    (factor, unit), (x_factor, x_unit) = _DISPLAY_UNITS[quantity], _DISPLAY_UNITS[curve.varying]
-    for i, level in enumerate(levels):
+@dataclasses.dataclass(frozen=True, eq=False)
+class BandCurve:
+    """A fitted curve at one level of the held quantity, with both 95 % bands; SI, shape (N,) each."""
+
+    level: float
+    points: Array
+    """Values of the quantity along the curve."""
+    confidence: Band
+    prediction: Band
+
+
+def band_curves(fit: Fit) -> tuple[CurveAxes, tuple[BandCurve, ...]] | None:
+    """Return the fitted curves at measured levels with their bands; None if no band can be computed."""
+    curve, found = _curve_axes(fit), []
+    for level in levels_of(fit.recording[curve.constant], MAX_CURVES):
         points = _curve_points(fit, curve, float(level))
         try:
-            confidence, prediction = (confidence_band(fit, points, level=LEVEL, prediction=r) for r in (False, True))
+            bands = [confidence_band(fit, points, level=LEVEL, prediction=further) for further in (False, True)]
         except IdentificationError:
             return None
+        found.append(BandCurve(float(level), points[curve.varying], *bands))
+    return curve, tuple(found)
+
+
+def band_plot(fit: Fit, name: str = "bands") -> Plot | None:
+    """Return the fitted curves with 95 % bands and the half width of the bands; None if no band can be computed."""
+    computed, quantity = band_curves(fit), fit.fitted_quantity.name
+    if computed is None:
+        return None
+    curve, curves = computed
+    figure, (left, right) = plotting.new_figure(1, 2, width=7.4, height=3.7)
+    (factor, unit), (x_factor, x_unit) = _DISPLAY_UNITS[quantity], _DISPLAY_UNITS[curve.varying]
+    for i, each in enumerate(curves):
+        confidence, prediction = each.confidence, each.prediction
         colour = plotting.LINES[i % len(plotting.LINES)]
-        x = x_factor * np.where(confidence.value < 0 if quantity == "force" else False, np.nan, points[curve.varying])
+        x = x_factor * np.where(confidence.value < 0 if quantity == "force" else False, np.nan, each.points)
         scale, level_unit = _DISPLAY_UNITS[curve.constant]
         style = {"color": colour, "linestyle": plotting.DASHES[i % 5]}
-        left.plot(x, factor * confidence.value, label=f"{scale * level:.4g} {level_unit}", **style)
+        left.plot(x, factor * confidence.value, label=f"{scale * each.level:.4g} {level_unit}", **style)
         left.fill_between(x, factor * prediction.low, factor * prediction.high, color=colour, alpha=0.15, linewidth=0)
         left.fill_between(x, factor * confidence.low, factor * confidence.high, color=colour, alpha=0.35, linewidth=0)
         right.plot(x, factor * (confidence.high - confidence.value), **style)
@@ -68,14 +92,14 @@ def band_plot(fit: Fit, name: str = "bands") -> Plot | None:
     return Plot(name, _CAPTION, figure)
 
 
-def _curve_axes(fit: Fit) -> _CurveAxes:
+def _curve_axes(fit: Fit) -> CurveAxes:
     """Return the quantities of the curves; over the pressure if it was swept at held contractions."""
     data, quantity = fit.recording, fit.fitted_quantity.name
     ramp = quantity == "force" and is_pressure_ramp(data["pressure"], data["contraction"])
-    return _CurveAxes("contraction", "pressure") if ramp else _CURVE_AXES[quantity]
+    return CurveAxes("contraction", "pressure") if ramp else _CURVE_AXES[quantity]
 
 
-def _curve_points(fit: Fit, curve: _CurveAxes, level: float) -> Recording:
+def _curve_points(fit: Fit, curve: CurveAxes, level: float) -> Recording:
     """Return points over the range of the data at one level, for the median resting length."""
     low, high = fit.data_ranges[curve.varying]
     columns = {curve.varying: np.linspace(low, high, POINTS), curve.constant: np.full(POINTS, level)}
@@ -84,7 +108,7 @@ def _curve_points(fit: Fit, curve: _CurveAxes, level: float) -> Recording:
     return Recording(columns, fit.recording.origin, constants)
 
 
-def _draw_measured(axes: Any, fit: Fit, curve: _CurveAxes, factor: float, x_factor: float) -> None:
+def _draw_measured(axes: Any, fit: Fit, curve: CurveAxes, factor: float, x_factor: float) -> None:
     measured = fit.recording.rows(fit.censoring == 0)
     style = {"marker": ".", "linestyle": "none", "markersize": 2, "color": plotting.BLACK, "alpha": 0.35}
     axes.plot(

@@ -47,11 +47,11 @@ def _remove_abandoned(target: Path) -> None:
     """Remove the temporary folders of processes of this machine that were killed."""
     for folder in target.glob(f"{_UNFINISHED}*"):
         process = folder.name.removeprefix(_UNFINISHED).partition("-")[0]
-        if process.isdecimal() and not folder.is_symlink() and not _is_running(int(process)):
+        if process.isdecimal() and not folder.is_symlink() and not is_running(int(process)):
             shutil.rmtree(folder, ignore_errors=True)
 
 
-def _is_running(process: int) -> bool:
+def is_running(process: int) -> bool:
     """Whether a process of this number exists; true where this cannot be determined."""
     if not hasattr(os, "getuid"):  # on Windows, os.kill would end the process
         return True

@@ -1,6 +1,13 @@
 """Simulation: problems and their solutions, integrators, open-loop and closed-loop runs, forward sensitivities."""
 
 from .integrators import DormandPrince8, ExplicitRungeKutta, Integrator, Rodas4, RungeKutta4
+from .law_with_sensitivities import LawWithSensitivities
+from .loop_sensitivities import (
+    LoopWithSensitivities,
+    TrackingSensitivity,
+    differentiate_loop,
+    tracking_sensitivity,
+)
 from .problem import Problem
 from .run import advance, simulate, solve
 from .solution import Solution, Statistics
@@ -11,6 +18,8 @@ __all__ = [
     "DormandPrince8",
     "ExplicitRungeKutta",
     "Integrator",
+    "LawWithSensitivities",
+    "LoopWithSensitivities",
     "Problem",
     "Rodas4",
     "RungeKutta4",
@@ -18,9 +27,12 @@ __all__ = [
     "Solution",
     "Statistics",
     "Stepper",
+    "TrackingSensitivity",
     "WithSensitivities",
     "advance",
+    "differentiate_loop",
     "sensitivity",
     "simulate",
     "solve",
+    "tracking_sensitivity",
 ]

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..compile.function import Function
+from ..compile.lanes_function import LanesFunction
 from ..control.control_law import ControlLaw
 from ..control.controller import Measurement
 from ..core import autodiff, tree
@@ -16,6 +17,7 @@ from ..core.errors import TraceError
 
 _ARGUMENTS = ("measured", "setpoints", "memory", "minimum", "maximum", "sample_time", "parameters")
 _functions: dict[tree.Structure, Function] = {}
+_lanes: dict[tuple[tree.Structure, int], LanesFunction] = {}
 
 
 def compiled_sample(law: ControlLaw) -> Function:
@@ -25,8 +27,16 @@ def compiled_sample(law: ControlLaw) -> Function:
     """
     structure = tree.structure(law)
     if structure not in _functions:
-        _functions[structure] = _trace(law)
+        _functions[structure] = Function(*_arguments(law))
     return _functions[structure]
+
+
+def sample_in_lanes(law: ControlLaw, lanes: int) -> LanesFunction:
+    """The same function for so many loops at once, one a lane. Raises TraceError if the law cannot be traced."""
+    key = tree.structure(law), lanes
+    if key not in _lanes:
+        _lanes[key] = LanesFunction(*_arguments(law), lanes)
+    return _lanes[key]
 
 
 def parameters_of(law: ControlLaw) -> Array:
@@ -50,10 +60,11 @@ class TracedSample:
     later: Any
 
 
-def _trace(law: ControlLaw) -> Function:
+def _arguments(law: ControlLaw) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Inputs and outputs of the function of a sample, as expressions."""
     sample = trace_sample(law)
     inputs = {name: getattr(sample, name) for name in _ARGUMENTS}
-    return Function(inputs, {"commands": sample.commands, "later": sample.later})
+    return inputs, {"commands": sample.commands, "later": sample.later}
 
 
 def trace_sample(law: ControlLaw) -> TracedSample:

@@ -19,13 +19,14 @@ MAX_CAPACITY = 1_000_000
 """Segments of an input within an interval up to which a kernel computes them."""
 WIDTH = 4
 """Numbers of the settings and of the state of a driver."""
-_KINDS: dict[type, DriverKind] = {PWM: DriverKind.MODULATOR, SolenoidDriver: DriverKind.SWITCH}
+KINDS: dict[type, DriverKind] = {PWM: DriverKind.MODULATOR, SolenoidDriver: DriverKind.SWITCH}
+"""The drivers that kernels and exported programs implement."""
 _STATES: dict[type, Any] = {PWM: PwmState, SolenoidDriver: SolenoidState}
 
 
 def are_known(loop: ControlLoop) -> bool:
     """Whether the kernel implements all drivers of a loop."""
-    return all(type(driver) in _KINDS for chain in _chains(loop).values() for driver in chain)
+    return all(type(driver) in KINDS for chain in _chains(loop).values() for driver in chain)
 
 
 def greatest_capacity(prepared: SampledLoop) -> int:
@@ -51,7 +52,7 @@ class DriverTable:
             if name not in loop.controller.inputs:
                 check_command_range(name, inputs.column(names.index(name)), float(prepared.instants[0]))
         m = inputs.values.shape[1]
-        self.kinds = np.array([(names.index(n), _KINDS[type(d)]) for n, d in self._order], np.int64).reshape(-1, 2)
+        self.kinds = np.array([(names.index(n), KINDS[type(d)]) for n, d in self._order], np.int64).reshape(-1, 2)
         self.settings = _table([_settings(driver) for _, driver in self._order])
         self.kept = _table([tuple(one) for name in chains for one in state.drivers[name]])
         self.states, self._first = self.kept.copy(), self.kept.copy()

@@ -22,7 +22,7 @@ from .problem import Problem
 
 MAX_SAMPLES = 10_000_000
 """Samples of one run that fit a usual memory."""
-_CLOSE = 1e-9
+CLOSE = 1e-9
 """Part of a sample time within which two instants are one: rounding separates 3 * 0.1 from 0.3."""
 
 
@@ -89,15 +89,15 @@ def prepare_loop(problem: Problem, state: ControlLoopState) -> SampledLoop:
     known, duration = compiled.description, problem.duration
     names = known.input_names
     edges, sampled = _edges(loop.sample_time, state, start, problem.end_time)
-    close = _CLOSE * loop.sample_time
-    others = _snap(loop.other_inputs, names, edges, close)
+    close = CLOSE * loop.sample_time
+    others = snapped(loop.other_inputs, names, edges, close)
     starts = np.unique(np.concatenate([edges[:-1], others.starts(start)]))
     inputs = others.split_at(starts, start).as_floats()
     commanded = [names.index(name) for name in loop.controller.inputs]
     inputs.values[:, commanded] = inputs.slopes[:, commanded] = 0.0
     first_segments = np.append(np.searchsorted(starts, edges[:-1]), starts.size)
     times = output_times(problem.output_times, start, duration, np.append(start, inputs.ends))
-    setpoint = _snap(loop.setpoint, loop.controller.setpoints, edges, close)
+    setpoint = snapped(loop.setpoint, loop.controller.setpoints, edges, close)
     bounds = known.lower_bounds.tolist()
     return SampledLoop(
         loop, edges, sampled, inputs, first_segments, commanded, setpoint, setpoint.inputs_at(edges[:-1], start), times,
@@ -122,7 +122,7 @@ def _ranges(compiled: CompiledSystem, loop: ControlLoop) -> dict[str, tuple[floa
 
 def _edges(sample_time: float, state: ControlLoopState, start: float, end: float) -> tuple[Array, bool]:
     """Start, the sampling instants after it, and end of a run [s]; whether the start is a sampling instant itself."""
-    count, close = (end - state.origin) / sample_time - state.sample_count, _CLOSE * sample_time
+    count, close = (end - state.origin) / sample_time - state.sample_count, CLOSE * sample_time
     if count > MAX_SAMPLES:
         raise ParameterError(
             f"a sample time of {sample_time:g} s makes {count:.3g} samples; {MAX_SAMPLES} are allowed. Lengthen it, or "
@@ -138,7 +138,7 @@ def _edges(sample_time: float, state: ControlLoopState, start: float, end: float
     return np.concatenate([[start], within, [end]]), bool(instants[0] <= start + close)
 
 
-def _snap(signal: InputSignal, names: tuple[str, ...], edges: Array, close: float) -> PiecewiseLinear:
+def snapped(signal: InputSignal, names: tuple[str, ...], edges: Array, close: float) -> PiecewiseLinear:
     """The segments of a signal; an end that is close to a sampling instant is moved to it."""
     start = float(edges[0])
     segments = signal.segments(names, start, float(edges[-1]) - start)

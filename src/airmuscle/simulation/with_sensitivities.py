@@ -21,13 +21,16 @@ while the states rest, and at 1 the steps double."""
 class WithSensitivities(SensitivitySystem):
     """A system with s_k = dx/dtheta_k for every column k as further states, and its outputs' derivatives.
 
-        s_k' = (df/dx) s_k + df/dtheta_k,    dy/dtheta_k = (dy/dx) s_k + dy/dtheta_k,    y' = (dy/dx) f
+        s_k' = (df/dx) s_k + (df/du) v_k + df/dtheta_k,    dy/dtheta_k = (dy/dx) s_k + (dy/du) v_k + dy/dtheta_k,
+        y' = (dy/dx) f
 
     A column is a group of leaf paths that share one value (`("circuit.fill.conductance",
     "circuit.discharge.conductance")`), or an empty group for something that acts on the start alone. A step of this
     system is exactly the derivative of the same step of the inner system, because it uses the Jacobian of the whole.
     Columns steer the step ten times less than states do. Inputs that move are held in y'. `observed` names the states
-    and outputs y; all of them unless named.
+    and outputs y; all of them unless named. v_k = du/dtheta_k are further inputs, `sensitivity("fill", k)`, of the
+    inputs that `dependent_inputs` names: those of a controller whose measurements or parameters depend on theta_k
+    (`differentiate_loop`). All other inputs are independent of the columns.
 
     `rates` and `outputs` are the law; what runs is printed from the inner system, all columns in one vector.
     """
@@ -38,6 +41,7 @@ class WithSensitivities(SensitivitySystem):
     columns: tuple[tuple[str, ...], ...]
     scales: tuple[float, ...] = parameter("1", "theta_k", "size of a change of each column", fitted=False)
     observed: tuple[str, ...] = ()
+    dependent_inputs: tuple[str, ...] = ()
 
     def check(self) -> None:
         if not self.columns or len(self.scales) != len(self.columns):
@@ -52,6 +56,12 @@ class WithSensitivities(SensitivitySystem):
                     f"{type(self.inner).__name__} has no parameter '{path}'; there are {', '.join(known)}."
                     f"{suggestion(path, known)}"
                 )
+        for name in self.dependent_inputs:
+            if name not in self.inner.inputs:
+                raise ParameterError(
+                    f"{type(self.inner).__name__} has no input '{name}'; there are {', '.join(self.inner.inputs)}."
+                    f"{suggestion(name, self.inner.inputs)}"
+                )
         values = _Symbols(self.inner).call("outputs") if self.observed else {}
         for name in self.observed:
             if name not in values:
@@ -65,6 +75,11 @@ class WithSensitivities(SensitivitySystem):
         """For every column the places of its paths among the inner leaves."""
         place = {leaf.path: i for i, leaf in enumerate(tree.leaves(self.inner))}
         return tuple(tuple(place[path] for path in group) for group in self.columns)
+
+    @property
+    def input_indices(self) -> tuple[int, ...]:
+        """The places of the dependent inputs among the inner inputs."""
+        return tuple(self.inner.inputs.index(name) for name in self.dependent_inputs)
 
     @property
     def observed_names(self) -> tuple[str, ...]:
@@ -93,13 +108,21 @@ class WithSensitivities(SensitivitySystem):
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """The inner system's inputs."""
-        return self.inner.inputs
+        """The inner system's inputs, then for each dependent one its derivatives by every column."""
+        return (*self.inner.inputs, *(name for name, _ in self._input_sensitivities()))
 
     @property
     def input_variables(self) -> tuple[Input, ...]:
-        """The inner system's inputs."""
-        return self.inner.input_variables
+        """The inner system's inputs, then the derivatives of the dependent ones, without bounds."""
+        further = (
+            Input(name, "", -float("inf"), float("inf"), f"derivative of {of}")
+            for name, of in self._input_sensitivities()
+        )
+        return (*self.inner.input_variables, *further)
+
+    def _input_sensitivities(self) -> list[tuple[str, str]]:
+        """Names of the derivatives of inputs, and of the input of each."""
+        return [(sensitivity(name, k), name) for name in self.dependent_inputs for k in range(len(self.columns))]
 
     @property
     def state_lower_bounds(self) -> Sequence[float]:
@@ -131,9 +154,13 @@ class WithSensitivities(SensitivitySystem):
         values = traced.call(method)
         vector = casadi.vertcat(*(casadi.SX(v) for v in values.values()))
         by_state, by_leaf = casadi.jacobian(vector, traced.x), casadi.jacobian(vector, traced.p)
+        by_input = casadi.jacobian(vector, traced.u)[:, list(self.input_indices)]
         place = {leaf.path: i for i, leaf in enumerate(tree.leaves(self.inner))}
         directions = [
             casadi.mtimes(by_state, casadi.vertcat(*(state[sensitivity(n, k)] for n in traced.names)))
+            + casadi.mtimes(
+                by_input, casadi.vertcat(casadi.SX(0, 1), *(inputs[sensitivity(n, k)] for n in self.dependent_inputs))
+            )
             + sum((by_leaf[:, place[path]] for path in group), casadi.SX(vector.numel(), 1))
             for k, group in enumerate(self.columns)
         ]

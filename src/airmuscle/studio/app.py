@@ -14,8 +14,13 @@ from typing import Any
 
 from ..core.errors import AirmuscleError
 from ..library.files import LAWS, list_laws, read_toml
+from .fit_routes import FitService
+from .fit_settings import FieldError
+from .joint_sheet import joint_names, sheet_of_joint
 from .page import self_contained_page, server_page, web_files
+from .requests import BadRequest, decoded, json_answer, limited_body
 from .security import COOKIE, Access, Application, given_token, secured
+from .size_sheet import size_sheet
 from .tasks import (
     plant_names,
     plant_title,
@@ -30,21 +35,15 @@ from .worker import LimitError, WorkerPool
 WORKERS = 2
 """Number of worker processes (chosen)."""
 TIME_LIMIT = 20.0
-"""Limit [s] of the computation of a sheet (chosen: those of the library take less than one second)."""
+"""Limit [s] of the computation of a sheet of a user (chosen)."""
+LIBRARY_LIMIT = 120.0
+"""The same of the library, and of a sizing (chosen: a joint with an elaborate law takes some seconds)."""
 MAX_SHEETS = 100
 """Number of sheets that the server keeps (chosen)."""
 MAX_PAGE = 256 * 1024
 """Greatest size of a request for a self-contained page [bytes] (chosen)."""
 MAX_PAGE_SHEETS = 12
 """Greatest number of muscles and plants in a self-contained page (chosen)."""
-
-
-class BadRequest(AirmuscleError):
-    """A request that the server does not understand, with its status."""
-
-    def __init__(self, message: str, status: int = 400) -> None:
-        super().__init__(message)
-        self.status = status
 
 
 class Sheets:
@@ -66,13 +65,13 @@ class Sheets:
         key = (task.__name__, name)
         known = self.get(self._of_library.get(key, ""))
         if known is None:
-            known = self.of_text(task, name)
+            known = self.of_text(task, name, LIBRARY_LIMIT)
             self._of_library[key] = known["id"]
         return known
 
-    def of_text(self, task: Callable[[str], dict[str, Any]], text: str) -> dict[str, Any]:
-        """The sheet that a task makes of a text."""
-        return self.keep(self._pool.call(task, text, limit=TIME_LIMIT))
+    def of_text(self, task: Callable[[str], dict[str, Any]], text: str, limit: float = TIME_LIMIT) -> dict[str, Any]:
+        """The sheet that a task makes of a text, within a limit of time [s]."""
+        return self.keep(self._pool.call(task, text, limit=limit))
 
     def keep(self, sheet: dict[str, Any]) -> dict[str, Any]:
         """The sheet, which is kept."""
@@ -88,7 +87,8 @@ def library_list() -> dict[str, Any]:
     """Names and titles of the laws and plants that the page offers."""
     laws = [{"name": name, **_texts(read_toml(LAWS / f"{name}.toml"))} for name in list_laws()]
     plants = [{"name": name, **plant_title(name)} for name in plant_names()]
-    return {"version": metadata.version("airmuscle"), "laws": laws, "plants": plants}
+    joints = [{"name": name, **plant_title(name)} for name in joint_names()]
+    return {"version": metadata.version("airmuscle"), "laws": laws, "plants": plants, "joints": joints}
 
 
 def _texts(tables: Mapping[str, Any]) -> dict[str, Any]:
@@ -96,13 +96,15 @@ def _texts(tables: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def create_app(
-    access: Access = Access(), pool: WorkerPool | None = None, opened: tuple[dict[str, Any], ...] = ()
-) -> Application:
+    access: Access = Access(), pool: WorkerPool | None = None, opened: tuple[dict[str, Any], ...] = (),
+    fits: FitService | None = None,
+) -> Application:  # fmt: skip
     """The ASGI application. `opened` are sheets with which the page begins. Raises ImportError without starlette."""
     from starlette.applications import Starlette
     from starlette.routing import Route
 
-    sheets = Sheets(pool or WorkerPool(WORKERS))
+    pool = pool or WorkerPool(WORKERS)
+    sheets = Sheets(pool)
     handlers = Handlers(sheets, access, opened)
     routes = [
         Route("/", handlers.page),
@@ -113,7 +115,10 @@ def create_app(
         Route("/api/law", handlers.own_law, methods=["POST"]),
         Route("/api/plant/{name}", handlers.plant),
         Route("/api/plant", handlers.own_plant, methods=["POST"]),
+        Route("/api/joint/{name}", handlers.joint),
+        Route("/api/size", handlers.size, methods=["POST"]),
         Route("/api/page", handlers.save_page, methods=["POST"]),
+        *(fits or FitService(pool)).routes(),
     ]
     errors: dict[Any, Any] = {AirmuscleError: _refused, 404: _missing, 405: _missing, 500: _failed}
     return secured(Starlette(routes=routes, exception_handlers=errors), access)
@@ -158,7 +163,7 @@ class Handlers:
 
     async def library(self, request: Any) -> Any:
         """Names of the library, and the sheets with which the page begins."""
-        return _json({**self._library, "opened": [_without_script(sheet) for sheet in self._opened]})
+        return json_answer({**self._library, "opened": [_without_script(sheet) for sheet in self._opened]})
 
     async def law(self, request: Any) -> Any:
         """The sheet of a law of the library."""
@@ -184,10 +189,22 @@ class Handlers:
         text = decoded(await limited_body(request, MAX_TEXT))
         return await self._computed(self._sheets.of_text, sheet_of_scenario_text, text)
 
+    async def joint(self, request: Any) -> Any:
+        """The sheet of a joint of the library."""
+        name = request.path_params["name"]
+        if name not in joint_names():
+            raise BadRequest(f"the library has no joint '{name[:80]}'.", 404)
+        return await self._computed(self._sheets.of_library, sheet_of_joint, name)
+
+    async def size(self, request: Any) -> Any:
+        """The sheet of a sizing."""
+        text = decoded(await limited_body(request, MAX_TEXT))
+        return await self._computed(self._sheets.of_text, size_sheet, text, LIBRARY_LIMIT)
+
     async def _computed(self, function: Callable[..., dict[str, Any]], *arguments: Any) -> Any:
         from starlette.concurrency import run_in_threadpool
 
-        return _json(_without_script(await run_in_threadpool(function, *arguments)))
+        return json_answer(_without_script(await run_in_threadpool(function, *arguments)))
 
     async def save_page(self, request: Any) -> Any:
         """One file of what is on the screen: the request names the sheets and the state of the page."""
@@ -202,7 +219,7 @@ class Handlers:
 
 
 def read_page_request(text: str) -> dict[str, Any]:
-    """The identifiers of sheets and the state in a request for a page. Raises BadRequest."""
+    """The identifiers of sheets and the state in a request for a page, without that of fits. Raises BadRequest."""
     try:
         wanted = json.loads(text)
     except (ValueError, RecursionError):
@@ -214,47 +231,23 @@ def read_page_request(text: str) -> dict[str, Any]:
         raise BadRequest("sheets must be a list of identifiers.")
     if not 1 <= len(names) <= MAX_PAGE_SHEETS:
         raise BadRequest(f"{len(names)} sheets are requested; allowed range: 1 to {MAX_PAGE_SHEETS}.")
-    return {"sheets": names, "state": wanted["state"]}
-
-
-async def limited_body(request: Any, limit: int) -> bytes:
-    """The body of a request. Raises BadRequest as soon as it exceeds the limit [bytes]."""
-    parts, size = [], 0
-    async for part in request.stream():
-        size += len(part)
-        if size > limit:
-            raise BadRequest(f"the text is larger than {limit // 1024} kB.", 413)
-        parts.append(part)
-    return b"".join(parts)
-
-
-def decoded(body: bytes) -> str:
-    """A body as text. Raises BadRequest unless it is UTF-8."""
-    try:
-        return body.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise BadRequest(f"the text is not UTF-8 (byte {error.start}).") from None
+    return {"sheets": names, "state": {name: state for name, state in wanted["state"].items() if name != "fit"}}
 
 
 def _without_script(sheet: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in sheet.items() if key != "script"}
 
 
-def _json(content: Any, status: int = 200) -> Any:
-    from starlette.responses import JSONResponse
-
-    return JSONResponse(content, status_code=status)
-
-
 async def _refused(request: Any, error: Exception) -> Any:
     assert isinstance(error, AirmuscleError)
     status = error.status if isinstance(error, BadRequest) else 503 if isinstance(error, LimitError) else 422
-    return _json({"error": str(error.message)}, status)
+    field = {"field": error.field} if isinstance(error, FieldError) else {}
+    return json_answer({"error": str(error.message), **field}, status)
 
 
 async def _missing(request: Any, error: Any) -> Any:
-    return _json({"error": "there is no such address."}, int(error.status_code))
+    return json_answer({"error": "there is no such address."}, int(error.status_code))
 
 
 async def _failed(request: Any, error: Exception) -> Any:
-    return _json({"error": "the server failed; its terminal states the reason."}, 500)
+    return json_answer({"error": "the server failed; its terminal states the reason."}, 500)

@@ -28,10 +28,26 @@ SCRIPTS = (
     "scripts/plant-drawing.js",
     "scripts/plant-traces.js",
     "scripts/plant-tab.js",
+    "scripts/fit-source.js",
+    "scripts/fit-scatter.js",
+    "scripts/fit-data.js",
+    "scripts/fit-files.js",
+    "scripts/fit-result.js",
+    "scripts/fit-tab.js",
+    "scripts/joint-loop.js",
+    "scripts/joint-statics.js",
+    "scripts/joint-linear.js",
+    "scripts/joint-drawing.js",
+    "scripts/joint-charts.js",
+    "scripts/joint-gains.js",
+    "scripts/joint-tab.js",
+    "scripts/size-tab.js",
     "scripts/main.js",
 )
 """Scripts in the order in which the page runs them."""
-STYLES = ("vendor/uPlot.min.css", "style.css")
+STYLES = ("vendor/uPlot.min.css", "style.css", "fit.css")
+SERVER_ONLY = ("scripts/fit-", "fit.css")
+"""Beginnings of the names of files that need a server, which a self-contained page does not contain."""
 LICENCE = "vendor/uPlot.LICENSE"
 TYPES = {".js": "text/javascript", ".css": "text/css", ".LICENSE": "text/plain"}
 
@@ -63,10 +79,10 @@ def self_contained_page(sheets: Sequence[Mapping[str, Any]], state: Mapping[str,
     """
     data = {"state": state, "sheets": [{k: v for k, v in s.items() if k != "script"} for s in sheets]}
     embedded = json.dumps(data).replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
-    scripts = [web_file(name) for name in SCRIPTS[:-1]]
+    scripts = [web_file(name) for name in SCRIPTS[:-1] if not name.startswith(SERVER_ONLY)]
     scripts += [sheet["script"] for sheet in sheets] + [web_file(SCRIPTS[-1])]
     scripts = [_inside_page(text) for text in scripts]
-    styles = [web_file(name) for name in STYLES]
+    styles = [web_file(name) for name in STYLES if not name.startswith(SERVER_ONLY)]
     policy = (
         f"default-src 'none'; script-src {' '.join(map(_digest, scripts))}; "
         f"style-src {' '.join(map(_digest, styles))}; img-src data: blob:; base-uri 'none'; form-action 'none'"

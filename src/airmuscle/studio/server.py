@@ -10,6 +10,7 @@ from typing import Any
 
 from ..core.errors import InputError
 from .app import WORKERS, create_app
+from .fit_routes import FitService
 from .security import Access, is_loopback
 from .worker import WorkerPool
 
@@ -70,10 +71,12 @@ def serve(host: str, port: int, opened: tuple[dict[str, Any], ...], started: Cal
         "log_level": "warning", "access_log": False, "limit_concurrency": MAX_CONNECTIONS, "timeout_keep_alive": 5,
         "server_header": False, "lifespan": "off", "ws": "none",
     }  # fmt: skip
-    server = uvicorn.Server(uvicorn.Config(create_app(access, pool, opened), **settings))
+    fits = FitService(pool)
+    server = uvicorn.Server(uvicorn.Config(create_app(access, pool, opened, fits), **settings))
     try:
         started(address_of(listening, host, access))
         server.run(sockets=[listening])
     finally:
+        fits.stop()
         pool.stop()
         listening.close()

@@ -23,6 +23,8 @@ from ..core.errors import AirmuscleError, InputError, printable
 
 MEMORY = 4 * 2**30
 """Greatest data memory of a worker [bytes] (chosen); it is not limited on Windows and macOS."""
+Report = Callable[[float, str], None]
+"""Receives the progress of a task: the completed fraction and what is being done."""
 _START = 60.0
 """Limit [s] of the start of a process with its imports (chosen)."""
 
@@ -38,17 +40,28 @@ class Worker:
         self._process: Any = None
         self._pipe: Connection | None = None
 
-    def call(self, task: Callable[..., Any], arguments: tuple[Any, ...], limit: float) -> Any:
-        """The result of `task(*arguments)`. Raises what the task raises, LimitError after `limit` [s]."""
+    def call(
+        self, task: Callable[..., Any], arguments: tuple[Any, ...], limit: float, report: Report | None = None
+    ) -> Any:
+        """The result of `task(*arguments)`. Raises what the task raises, LimitError after `limit` [s].
+
+        With `report`, the task receives as last argument a function for its progress, and `report` what it is told.
+        """
         if self._process is None or not self._process.is_alive():
             self._start()
         assert self._pipe is not None
+        end = time.monotonic() + limit
         try:
-            self._pipe.send((task, arguments))
-            if not self._pipe.poll(limit):
-                self.stop()
-                raise LimitError(f"the computation takes more than {limit:g} s; give a smaller model or file.")
-            result, error = self._pipe.recv()
+            self._pipe.send((task, arguments, report is not None))
+            progress, content = True, (None, None)
+            while progress:
+                if not self._pipe.poll(max(0.0, end - time.monotonic())):
+                    self.stop()
+                    raise LimitError(f"the computation takes more than {limit:g} s; give a smaller model or file.")
+                progress, content = self._pipe.recv()
+                if progress and report is not None:
+                    report(*content)
+            result, error = content
         except (EOFError, OSError):
             self.stop()
             raise LimitError(
@@ -70,6 +83,12 @@ class Worker:
             raise LimitError("no process could be started for the computation.")
         self._pipe.recv()
 
+    def kill(self) -> None:
+        """End the process from another thread; the call that waits for it raises LimitError."""
+        process = self._process
+        if process is not None:
+            process.kill()
+
     def stop(self) -> None:
         """End the process."""
         if self._process is not None:
@@ -84,14 +103,25 @@ class Worker:
 def serve_tasks(pipe: Connection) -> None:
     """Run the tasks that arrive through a pipe until it is closed, in a process of its own."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends it to all processes; the parent ends this one
+    threading.Thread(target=_exit_with_parent, name="parent watchdog", daemon=True).start()
     _limit_memory()
     warnings.simplefilter("ignore")
     with contextlib.suppress(EOFError, OSError):
         pipe.send("ready")
         while True:
-            task, arguments = pipe.recv()
-            pipe.send(_outcome(task, arguments))
+            task, arguments, reports = pipe.recv()
+            if reports:
+                arguments = (*arguments, lambda fraction, text: pipe.send((True, (fraction, text))))
+            pipe.send((False, _outcome(task, arguments)))
     os._exit(0)
+
+
+def _exit_with_parent() -> None:
+    """End this process as soon as the server has ended, also during a task."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _outcome(task: Callable[..., Any], arguments: tuple[Any, ...]) -> tuple[Any, Exception | None]:

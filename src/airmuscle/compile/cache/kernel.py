@@ -165,4 +165,4 @@ rodas4, fixed_step, lanes = Kernel("rodas4"), Kernel("fixed_step"), Kernel("lane
 evaluate, evaluate_rates, record = Kernel("evaluate"), Kernel("evaluate_rates", "rates"), Kernel("record")
 newton, sampled_loop = Kernel("newton"), Kernel("sampled_loop")
 begin_step, end_step = Kernel("begin_step", "bounds"), Kernel("end_step", "bounds")
-lane_blocks = Kernel("lane_blocks")
+lane_blocks, loop_lanes = Kernel("lane_blocks"), Kernel("loop_lanes")

@@ -5,6 +5,7 @@ from .creep_stage import CreepStage
 from .error_band import ErrorBand
 from .fill_stage import FillStage, valve_commands
 from .friction_stage import FrictionStage
+from .held_creep import HeldCreep, fit_held_creep, free_of_creep
 from .next_experiment import NextExperiment
 from .record import CampaignRecord, RecordKind, classify_records
 from .release_stage import ReleaseStage
@@ -19,6 +20,7 @@ __all__ = [
     "ErrorBand",
     "FillStage",
     "FrictionStage",
+    "HeldCreep",
     "LeftOutStage",
     "NextExperiment",
     "Prediction",
@@ -26,6 +28,8 @@ __all__ = [
     "ReleaseStage",
     "StaticStage",
     "classify_records",
+    "fit_held_creep",
+    "free_of_creep",
     "identify_campaign",
     "valve_commands",
 ]

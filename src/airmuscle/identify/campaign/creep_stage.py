@@ -71,18 +71,22 @@ def fit_creep_stage(records: Sequence[CampaignRecord]) -> CreepStage | LeftOutSt
             "move the muscle by a few per cent of its length within a second at constant pressure, hold the length for "
             "two minutes or more, and record the force",
         )
+    return fit_held_rows([(record.origin, HeldRows.from_record(record)) for record in records])
+
+
+def fit_held_rows(named_holds: Sequence[tuple[str, HeldRows]]) -> CreepStage | LeftOutStage:
+    """Fit Maxwell elements to named holds, as `fit_creep_stage`."""
+    holds = [hold for _, hold in named_holds]
     try:
-        holds = [_HeldRows.from_record(record) for record in records]
         fits = [fit_creep(hold.recording, "force") for hold in holds]
     except AirmuscleError as error:
         return LeftOutStage(NAME, str(error.message), "record holds of 12 rows or more with increasing time")
     count = max(len(fit.creep.amplitudes) for fit in fits)
-    names = tuple((record.origin, fit) for record, fit in zip(records, fits, strict=True))
-    return _fit_elements(holds, count, names)
+    return _fit_elements(holds, count, tuple((name, fit) for (name, _), fit in zip(named_holds, fits, strict=True)))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class _HeldRows:
+class HeldRows:
     """The held rows of a record, and the path of its displacement from the first row."""
 
     recording: Recording
@@ -91,11 +95,16 @@ class _HeldRows:
     held: Array
 
     @classmethod
-    def from_record(cls, record: CampaignRecord) -> _HeldRows:
-        whole = record.recording
-        motion = find_motion(whole)
+    def from_record(cls, record: CampaignRecord) -> HeldRows:
+        """The rows after the single motion of a record."""
+        motion = find_motion(record.recording)
         assert motion is not None
-        start = int(np.argmax(whole["time"] > motion.end + DEADTIME))
+        return cls.after(record.recording, motion.end)
+
+    @classmethod
+    def after(cls, whole: Recording, end_of_motion: float) -> HeldRows:
+        """The rows after a dead time from the end of the motion [s] to the end of the recording."""
+        start = int(np.argmax(whole["time"] > end_of_motion + DEADTIME))
         rows = np.arange(start, len(whole))
         kept = rows[np.unique(np.linspace(0, rows.size - 1, min(FIT_ROWS, rows.size)).round().astype(int))]
         path = displacement(whole)
@@ -129,7 +138,7 @@ def creep_force(elements: CreepElements, recording: Recording) -> Array:
 
 
 def _fit_elements(
-    holds: Sequence[_HeldRows], count: int, fits: tuple[tuple[str, CreepFit], ...]
+    holds: Sequence[HeldRows], count: int, fits: tuple[tuple[str, CreepFit], ...]
 ) -> CreepStage | LeftOutStage:
     from scipy.optimize import least_squares
 
@@ -160,7 +169,7 @@ def _fit_elements(
     return _build(holds, elements, _standard_errors(holds, times, coefficients, rest), fits, modelled)
 
 
-def _matrices(holds: Sequence[_HeldRows], times: Array) -> list[Array]:
+def _matrices(holds: Sequence[HeldRows], times: Array) -> list[Array]:
     """Columns of each hold: minus the stretches, then the initial force of each hold."""
     matrices = []
     for i, hold in enumerate(holds):
@@ -170,18 +179,18 @@ def _matrices(holds: Sequence[_HeldRows], times: Array) -> list[Array]:
     return matrices
 
 
-def _linear_part(holds: Sequence[_HeldRows], times: Array) -> tuple[Array, Array]:
+def _linear_part(holds: Sequence[HeldRows], times: Array) -> tuple[Array, Array]:
     matrix = np.vstack(_matrices(holds, times))
     target = np.concatenate([hold.recording["force"] for hold in holds])
     coefficients = np.linalg.lstsq(matrix, target, rcond=None)[0]
     return coefficients, matrix @ coefficients - target
 
 
-def _modelled(holds: Sequence[_HeldRows], times: Array, coefficients: Array) -> list[Array]:
+def _modelled(holds: Sequence[HeldRows], times: Array, coefficients: Array) -> list[Array]:
     return [matrix @ coefficients for matrix in _matrices(holds, times)]
 
 
-def _standard_errors(holds: Sequence[_HeldRows], times: Array, coefficients: Array, residuals: Array) -> Array:
+def _standard_errors(holds: Sequence[HeldRows], times: Array, coefficients: Array, residuals: Array) -> Array:
     """Standard errors of the stiffnesses and the relaxation times from the Jacobian at the solution."""
     base = np.vstack(_matrices(holds, times))
     slopes = []
@@ -196,7 +205,7 @@ def _standard_errors(holds: Sequence[_HeldRows], times: Array, coefficients: Arr
 
 
 def _build(
-    holds: Sequence[_HeldRows],
+    holds: Sequence[HeldRows],
     elements: CreepElements,
     standard_errors: Array,
     fits: tuple[tuple[str, CreepFit], ...],

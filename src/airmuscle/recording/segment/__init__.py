@@ -2,7 +2,7 @@
 
 from .branches import Branch, branch_directions, find_branches, motion_direction
 from .findings import Finding, check_swept
-from .inspection import Inspection, inspect, inspect_all
+from .inspection import Inspection, check_contents, inspect, inspect_all
 from .interval import Interval
 from .outliers import Outlier, find_outliers
 from .plateaus import Plateau, find_plateaus, plateau_points
@@ -28,6 +28,7 @@ __all__ = [
     "Sensor",
     "analyse_sampling",
     "branch_directions",
+    "check_contents",
     "check_swept",
     "estimate_sensors",
     "find_branches",

@@ -9,12 +9,12 @@ from typing import Any
 from ...core.short_repr import ShortRepr
 from ..recording import Recording
 from .branches import Branch, branch_column_agreement, find_branches
-from .findings import Finding, collect_findings
+from .findings import Finding, check_swept, collect_findings
 from .outliers import Outlier, find_outliers
 from .plateaus import Plateau, find_plateaus
 from .plot import plot_segments
 from .quasi_static import quasi_static_rows
-from .runs import Run, find_runs
+from .runs import AT_REST, Run, find_runs
 from .sampling import Sampling, analyse_sampling
 from .sensor import Sensor, estimate_sensors
 
@@ -67,3 +67,12 @@ def inspect_all(recordings: Sequence[Recording]) -> tuple[Inspection, ...]:
     """Inspect recordings from one test rig, whose sensors are estimated jointly."""
     sensors = estimate_sensors(recordings)
     return tuple(inspect(recording, sensors) for recording in recordings)
+
+
+def check_contents(recordings: Sequence[Recording]) -> None:
+    """Raise ColumnError where a recording contradicts its file, or where a single recording contains no variation."""
+    sensors = estimate_sensors(recordings) if recordings else {}
+    for recording in recordings:
+        runs = find_runs(recording, {name: s for name, s in sensors.items() if name in recording.columns})
+        if len(recordings) == 1 or all(run.kind is not AT_REST for run in runs):
+            check_swept(recording, runs)

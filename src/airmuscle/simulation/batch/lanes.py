@@ -112,10 +112,10 @@ def _run(
         below |= np.any(rows[: plants.size] < bounds[i], axis=1)
     for index, negative in zip(plants, below, strict=True):
         if negative or job.status[index]:
-            _explain(job, int(index), block.dtype, Status.NEGATIVE_AIR_MASS if negative else Status.NOT_FINITE)
+            retry_alone(job, int(index), block.dtype, Status.NEGATIVE_AIR_MASS if negative else Status.NOT_FINITE)
 
 
-def _explain(job: BatchJob, index: int, dtype: Any, status: Status) -> None:
+def retry_alone(job: BatchJob, index: int, dtype: Any, status: Status) -> None:
     """Simulate a plant that failed in its lane again, alone: for its rows, the time of failure and the reason."""
     job.run_single(index)
     if job.status[index] == Status.DONE:

@@ -68,9 +68,38 @@ class LoopBatch:
         )
         return tuple(f"{prefix}{name}" for prefix, names in kinds for name in names)
 
+    def loop_of(self, index: int) -> ControlLoop:
+        """The loop of one plant."""
+        return self.loops[index if len(self.loops) > 1 else 0]
+
+    def prepared(self, loop: ControlLoop) -> SampledLoop:
+        """A loop prepared for runs with rows at the times of the batch."""
+        ready = self._loop(loop)
+        return ready.prepared if isinstance(ready, CompiledLoop) else ready
+
+    def place_of(self, column: str) -> tuple[int, int]:
+        """Whether a column that loops add is a set point (0), measurement (1) or command (2), and its number."""
+        prefix, name = column.split(".", 1)
+        kind = (SETPOINT, MEASURED, COMMAND).index(f"{prefix}.")
+        controller = self.loops[0].controller
+        names = (controller.setpoints, controller.measured_columns, controller.inputs)[kind]
+        return kind, names.index(name)
+
+    def setpoints_of(self, loop: ControlLoop) -> Array:
+        """Set points (T, s) of a loop at the rows."""
+        return self._rows_of(loop, self.prepared(loop))[1]
+
+    def _rows_of(self, loop: ControlLoop, prepared: SampledLoop) -> tuple[npt.NDArray[np.intp], Array]:
+        """The interval of each row (T,), and the set points (T, s) there."""
+        key = id(loop)  # a loop that is called is prepared anew for each run
+        if key not in self._at_rows:
+            at = np.maximum(np.searchsorted(prepared.instants, self.times, side="right") - 1, 0)
+            self._at_rows[key] = at, prepared.setpoint_signal.inputs_at(self.times, self.template.start_time)
+        return self._at_rows[key]
+
     def run(self, index: int, plants: Variations, compiled: CompiledSystem, state: Array) -> CompiledRun | CalledRun:
         """The loop of one plant, integrated from its initial state (n,)."""
-        loop = self.loops[index if len(self.loops) > 1 else 0]
+        loop = self.loop_of(index)
         prepared = self._loop(loop)
         start = loop.init(self.template.start_time)
         integrator = self.template.integrator
@@ -133,11 +162,7 @@ class LoopBatch:
     def columns(self, wanted: Collection[str], run: CompiledRun | CalledRun, count: int) -> dict[str, Array]:
         """The wanted ones of set points, measurements and commands at the first rows (R,) of one plant."""
         prepared, controller = run.prepared, self.loops[0].controller
-        key = id(prepared.loop)  # a loop that is called is prepared anew for each run
-        if key not in self._at_rows:
-            at = np.maximum(np.searchsorted(prepared.instants, self.times, side="right") - 1, 0)
-            self._at_rows[key] = at, prepared.setpoint_signal.inputs_at(self.times, self.template.start_time)
-        intervals, setpoints = self._at_rows[key]
+        intervals, setpoints = self._rows_of(prepared.loop, prepared)
         intervals = np.minimum(intervals[:count], max(len(run.measured) - 1, 0))
         columns: dict[str, Array] = {}
         for values, rows, prefix, names in (

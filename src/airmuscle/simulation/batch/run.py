@@ -25,6 +25,7 @@ from ..problem import check_input_range
 from .initial_states import check_states, count_of_states, default_states, given_states
 from .job import NOT_RUN, BatchJob
 from .lanes import check_precision, lane_workers
+from .loop_lanes import loop_lane_workers, run_in_lanes
 from .loops import LoopBatch, loops_of, vary
 from .precision import Double, Precision
 from .solution import BatchSolution
@@ -58,8 +59,8 @@ def simulate_batch(
     initial_states  by state a number for all or a column (N,); by default each Plant's equilibrium at ambient pressure
     output_times    as in `simulate`; with one input for all its instants are among the rows
     integrator      Rodas4(rtol=1e-6) by default: each plant chooses its own steps, exactly as in `simulate`. With an
-                    integrator of fixed step, RungeKutta4(1e-3), and without a loop sixteen plants are computed
-                    together, much faster
+                    integrator of fixed step, RungeKutta4(1e-3), sixteen plants are computed together, much faster;
+                    so are loops of control laws without drivers whose sampling instants are the same
     keep            columns to be kept (N, T): states, outputs, inputs, those of a loop such as `command.fill`; all
                     unless given, () for final states alone
     into            folder for the columns, one .npy file each; without it they are held in memory
@@ -222,7 +223,9 @@ def _run(job: BatchJob, precision: Precision, cores: int) -> None:
     active = np.flatnonzero(np.isfinite(job.initial_states).all(axis=1))
     if not active.size:
         return
-    if isinstance(job.integrator, ExplicitRungeKutta) and job.loops is None:
+    if job.loops is not None and run_in_lanes(job, active):
+        queue, workers, each = loop_lane_workers(job, job.loops, active, cores)
+    elif isinstance(job.integrator, ExplicitRungeKutta) and job.loops is None:
         queue, workers, each = lane_workers(job, precision, active, cores)
     else:
         job.run_single(int(active[0]))  # what compiles, compiles here, before threads need it at once

@@ -59,16 +59,16 @@ def learn(
     filter and `change_weight` are chosen. Raises ParameterError for a contender without the set points `feed_forward`
     and `feed_forward_rate`, or fewer than two trials.
     """
-    if not {SIGNAL, RATE} <= set(contender.law.setpoints):
+    law = contender.law
+    if not {SIGNAL, RATE} <= set(law.setpoints) or not isinstance(law, WithSensors):
         raise ParameterError(
-            f"learn: contender '{contender.name}' has no set points '{SIGNAL}' and '{RATE}', which are learned."
+            f"learn: contender '{contender.name}' has no set points '{SIGNAL}' and '{RATE}', which are learned, or is "
+            "no ControlLaw."
         )
     if trials < 2:
         raise ParameterError(f"learn: {trials} trials; give at least 2.")
     signals = task_signals(joint, task)
     count = round(task.duration / joint.sample_time)
-    law = contender.law
-    assert isinstance(law, WithSensors)
     signal = _present_signal(contender, signals)[:count]
     learning = _learning(joint, law, task, signals, count, cutoff, change_weight)
     start, wanted = joint.start(joint.truth), signals.angle[1 : count + 1]

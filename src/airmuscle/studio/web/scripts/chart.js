@@ -5,7 +5,7 @@
   const FONT = "13px 'Source Sans 3','Segoe UI','Helvetica Neue','Liberation Sans',Arial,sans-serif";
 
   class Chart {
-    /* host: element; options: {label, x, y, height, overlay(chart, context), time} */
+    /* host: element; options: {label, x, y, height, overlay(chart, context), xSplits, xText, ySplits} */
     constructor(host, options) {
       this.host = host;
       this.options = options;
@@ -42,7 +42,9 @@
       const axis = (label, side) => ({
         ...(label ? { label } : {}), stroke: colours.ink, font: FONT, labelFont: FONT, labelSize: 24, size: side === 3 ? 58 : 40, side,
         grid: { stroke: colours.line, width: 1 }, ticks: { stroke: colours.line, width: 1 },
-        values: (u, values) => values.map((v) => (v === null ? "" : airmuscle.shortText(v, 6))),
+        values: (u, values) => values.map((v) => (v === null ? "" : (side === 2 && this.options.xText ? this.options.xText(v) : airmuscle.shortText(v, 6)))),
+        ...(side === 2 && this.options.xSplits ? { splits: () => this.options.xSplits.filter((v) => v >= this.ranges.x[0] - 1e-9 && v <= this.ranges.x[1] + 1e-9) } : {}),
+        ...(side === 3 && this.options.ySplits ? { splits: () => this.options.ySplits } : {}),
       });
       const series = this.curves.map((curve) => ({
         label: curve.label, stroke: colours[curve.colour], width: curve.width || 1.6, dash: curve.dash || [], points: { show: false }, pxAlign: 0, spanGaps: Boolean(curve.spanned),

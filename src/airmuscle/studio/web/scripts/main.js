@@ -3,7 +3,10 @@
 
 (() => {
   const { element, source, link, say, download } = airmuscle;
-  const TABS = [["muscle", "Muscle", airmuscle.MuscleTab], ["plant", "Plant", airmuscle.PlantTab]].filter((row) => row[2]);
+  const TABS = [
+    ["muscle", "Muscle", airmuscle.MuscleTab], ["fit", "Fit", airmuscle.FitTab], ["plant", "Plant", airmuscle.PlantTab],
+    ["joint", "Joint", airmuscle.JointTab], ["size", "Size", airmuscle.SizeTab],
+  ].filter((row) => row[2]);
   const tabs = {}, main = document.getElementById("main"), list = document.getElementById("tabs");
   let shown = TABS[0][0], writing = 0;
 

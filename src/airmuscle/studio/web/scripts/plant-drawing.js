@@ -78,5 +78,5 @@
     }
   }
 
-  Object.assign(airmuscle, { PlantDrawing });
+  Object.assign(airmuscle, { PlantDrawing, halfOutline, bodyPath });
 })();

@@ -5,6 +5,9 @@
   const place = document.getElementById("embedded");
   const embedded = place ? JSON.parse(place.textContent) : null;
 
+  /* "law", "plant", or the tab to which a sheet belongs */
+  const kindOf = (sheet) => sheet.tab ?? (sheet.plant ? "plant" : "law");
+
   async function request(address, options) {
     let answer;
     try { answer = await fetch(address, options); } catch { throw new Error("The server does not answer. Start airmuscle studio again."); }
@@ -31,25 +34,27 @@
 
     async library() {
       if (!embedded) return (await request("api/library")).json();
-      const rows = (kind) => embedded.sheets.filter((s) => Boolean(s.plant) === kind).map((s) => ({ name: s.name, title: s.title, provenance: s.provenance }));
-      return { laws: rows(false), plants: rows(true), opened: [] };
+      const rows = (kind) => embedded.sheets.filter((s) => kindOf(s) === kind).map((s) => ({ name: s.name, title: s.title, provenance: s.provenance }));
+      return { laws: rows("law"), plants: rows("plant"), joints: rows("joint"), opened: [] };
     },
 
     async named(kind, name) {
       if (!embedded) return loadProgram(await (await request(`api/${kind}/${encodeURIComponent(name)}`)).json());
-      const sheet = embedded.sheets.find((s) => s.name === name && Boolean(s.plant) === (kind === "plant"));
+      const sheet = embedded.sheets.find((s) => s.name === name && kindOf(s) === kind);
       if (!sheet) throw new Error(`This page does not contain ${name}.`);
       return sheet;
     },
 
     async ownText(kind, text) {
       if (!embedded) return loadProgram(await (await post(`api/${kind}`, text)).json());
-      const sheet = embedded.sheets.find((s) => s.own_text === text);
+      const sheet = embedded.sheets.find((s) => s.own_text === text && kindOf(s) === kind);
       if (!sheet) throw new Error("A saved page has no server that could read a file; start airmuscle studio.");
       return sheet;
     },
 
     loadProgram,
+
+    async sizing(text) { return (await post("api/size", text)).json(); },
 
     async page(sheets, state) { return (await post("api/page", JSON.stringify({ sheets, state }))).blob(); },
   };

@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 from ..core.errors import ParameterError
 from ..identify import standard_candidates
-from ..library.entry import Entry
-from ..library.law_file import load_law
-from ..library.length_scaling import scale_to_length
-from ..library.models import model_class, model_names
 from ..recording import Recording
+from .entry import Entry
+from .law_file import load_law
+from .length_scaling import scale_to_length
+from .models import model_class, model_names
 
 
 class InitialLaw(NamedTuple):

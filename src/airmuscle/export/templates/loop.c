@@ -1,0 +1,188 @@
+@provenance@
+/* Run of the control loop: the plant, its controller and the drivers of its inputs, from one sampling instant to the
+   next; writes CSV to the file that is named, or to the standard output. */
+#include "@file@.h"
+#include "@file@_controller.h"
+
+#include <math.h>
+#include <stdio.h>
+
+#define ROWS @rows@
+#define SAMPLES @samples@
+#define SEGMENTS @segments@
+#define PIECES @pieces@
+#define COLUMNS @columns@
+#define DRIVERS @drivers@
+#define CAPACITY @capacity@
+#define SETPOINTS MODEL_CONTROLLER_SETPOINTS
+#define MEASUREMENTS MODEL_CONTROLLER_MEASUREMENTS
+#define COMMANDS MODEL_CONTROLLER_COMMANDS
+#define NOT_COMMANDED 4
+
+@constants@
+/* The run: solver, parameters in the form that the functions need, memory and arrays of the controller, inputs just
+   before a sample, and the next row, segment of the other inputs and segment of the set points. */
+static model_solver s;
+static double c[MODEL_PRECOMPUTED + 1], memory[MODEL_CONTROLLER_MEMORY + 1];
+static double measured[MEASUREMENTS + 1], setpoint[SETPOINTS + 1], command[COMMANDS + 1], applied[MODEL_INPUTS + 1];
+static int row, segment, piece;
+static double segment_start, piece_start;
+/* Each input between two samples: ends, values at the starts, and slopes of its segments. */
+static double signals[MODEL_INPUTS][3][CAPACITY];
+static int counts[MODEL_INPUTS];
+
+static double instant_of(long sample)
+{
+  return sample == 0 ? start : sample < SAMPLES ? start + SAMPLE_TIME * (double)sample : finish;
+}
+
+static void setpoints_at(double time, double *result)
+{
+  int i;
+  while (piece < PIECES - 1 && setpoint_ends[piece] <= time) piece_start = setpoint_ends[piece++];
+  for (i = 0; i < SETPOINTS; i++) result[i] = setpoint_values[piece][i] + (time - piece_start) * setpoint_slopes[piece][i];
+}
+
+@drivers_source@
+static int write_row(FILE *out, double time, const double *x, const double *u)
+{
+  double o[MODEL_OUTPUTS + 1], r[SETPOINTS + 1];
+  const double *const arrays[] = {x, u, o, r, measured, command};
+  int i, finite = 1;
+  model_outputs(x, u, c, o);
+  setpoints_at(time, r);
+  fprintf(out, "%.17g", time);
+  for (i = 0; i < COLUMNS; i++) fprintf(out, ",%.17g", arrays[columns[i][0]][columns[i][1]]);
+  fputc('\n', out);
+  for (i = 0; i < MODEL_STATES; i++)
+    if (!isfinite(x[i]) || x[i] < model_state_minimum[i]) finite = 0;
+  for (i = 0; i < MODEL_OUTPUTS; i++)
+    if (!isfinite(o[i])) finite = 0;
+  return finite;
+}
+
+static int write_at(FILE *out, double time)
+{
+  double x[MODEL_STATES], u[MODEL_INPUTS + 1];
+  model_state_at(&s, c, time, x);
+  model_inputs_at(&s, time, u);
+  return write_row(out, time, x, u);
+}
+
+/* One segment, in which the inputs are linear; `instant`: it begins between two samples, where a row is written. */
+static int run_segment(FILE *out, double end, int instant, double margin, const double *u, const double *w)
+{
+  const double begin = s.t, close = MODEL_CLOSE;
+  int status = MODEL_DONE;
+  model_set_segment(&s, end, u, w);
+  s.h = MODEL_FIRST_STEP;
+  if (instant) {
+    if (!write_at(out, begin)) return MODEL_NOT_FINITE;
+    while (row < ROWS && times[row] <= begin + NEAR) row++;
+  }
+  while (row < ROWS && times[row] <= begin + close)
+    if (!write_at(out, times[row++])) return MODEL_NOT_FINITE;
+  while (s.t < end && status == MODEL_DONE) {
+    status = model_step(&s, c);
+    while (status == MODEL_DONE && row < ROWS && times[row] < fmin(s.t + close, end - margin))
+      if (!write_at(out, times[row++])) status = MODEL_NOT_FINITE;
+  }
+  while (row < ROWS && margin > close && times[row] < end) row++; /* rows close to the instant `end` */
+  return status;
+}
+
+/* Measure, command, and give each input its segments until the next sample. */
+static int sample(double begin, double end)
+{
+  double o[MODEL_OUTPUTS + 1], time = begin;
+  const double *const arrays[] = {s.x, o};
+  int i, k = 0;
+  model_outputs(s.x, applied, c, o);
+  for (i = 0; i < MEASUREMENTS; i++) measured[i] = arrays[measured_at[i][0]][measured_at[i][1]];
+  setpoints_at(begin, setpoint);
+  if (model_controller_step(memory, measured, setpoint, command) != 0) return NOT_COMMANDED;
+  while (time < end) {
+    double following = end;
+    while (segment < SEGMENTS - 1 && ends[segment] <= time) segment_start = ends[segment++];
+    if (segment < SEGMENTS - 1) following = fmin(end, ends[segment]);
+    for (i = 0; i < MODEL_INPUTS; i++) {
+      signals[i][0][k] = following;
+      signals[i][1][k] = values[segment][i] + (time - segment_start) * slopes[segment][i];
+      signals[i][2][k] = slopes[segment][i];
+    }
+    for (i = 0; i < COMMANDS; i++) {
+      signals[commanded[i]][1][k] = command[i];
+      signals[commanded[i]][2][k] = 0.0;
+    }
+    k++;
+    time = following;
+  }
+  for (i = 0; i < MODEL_INPUTS; i++) counts[i] = k;
+@apply_drivers@  return MODEL_DONE;
+}
+
+/* From one sample to the next, in the common segments of all inputs. */
+static int run_interval(FILE *out, double begin, double end)
+{
+  double u[MODEL_INPUTS + 1], w[MODEL_INPUTS + 1], begins[MODEL_INPUTS], time = begin;
+  int i, at[MODEL_INPUTS], status = MODEL_DONE;
+  for (i = 0; i < MODEL_INPUTS; i++) {
+    at[i] = 0;
+    begins[i] = begin;
+  }
+  while (time < end && status == MODEL_DONE) {
+    double following = end;
+    for (i = 0; i < MODEL_INPUTS; i++) {
+      while (at[i] < counts[i] - 1 && signals[i][0][at[i]] <= time) begins[i] = signals[i][0][at[i]++];
+      u[i] = signals[i][1][at[i]] + (time - begins[i]) * signals[i][2][at[i]];
+      w[i] = signals[i][2][at[i]];
+      if (at[i] < counts[i] - 1) following = fmin(following, signals[i][0][at[i]]);
+    }
+    status = run_segment(out, following, time > begin, following < end ? NEAR : MODEL_CLOSE, u, w);
+    time = following;
+  }
+  model_inputs_at(&s, end, applied);
+  for (i = 0; i < MODEL_STATES; i++)
+    if (s.x[i] < model_state_minimum[i] && status == MODEL_DONE) status = MODEL_NOT_FINITE;
+  return status;
+}
+
+static int run(FILE *out)
+{
+  int i, status = MODEL_DONE;
+  long k;
+  model_prepare(model_defaults, c);
+  model_begin(&s, start, initial);
+  for (i = 0; i < MODEL_CONTROLLER_MEMORY; i++) memory[i] = model_controller_initial_memory[i];
+  for (i = 0; i < MODEL_INPUTS; i++) applied[i] = values[0][i];
+  segment_start = piece_start = start;
+  for (k = 0; k < SAMPLES && status == MODEL_DONE; k++) {
+    status = sample(instant_of(k), instant_of(k + 1));
+    if (status == MODEL_DONE) status = run_interval(out, instant_of(k), instant_of(k + 1));
+  }
+  while (status == MODEL_DONE && row < ROWS)
+    if (!write_at(out, times[row++])) status = MODEL_NOT_FINITE;
+  fprintf(stderr, "%ld samples, %ld steps, %ld rejected, time %.9g s\n", k, s.steps, s.rejected, s.t);
+  return status;
+}
+
+int main(int argc, char **argv)
+{
+  FILE *out = argc > 1 ? fopen(argv[1], "w") : stdout;
+  int status;
+  if (!out) {
+    perror(argv[1]);
+    return 1;
+  }
+  fputs(header, out);
+  status = run(out);
+  if (out != stdout && fclose(out) != 0) {
+    perror(argv[1]);
+    return 1;
+  }
+  if (status != MODEL_DONE)
+    fputs(status == MODEL_STEP_TOO_SMALL ? "the step became too small\n"
+          : status == NOT_COMMANDED      ? "a measurement or a command is not finite\n"
+                                         : "a state or an output is not finite, or below its limit\n", stderr);
+  return status;
+}

@@ -1,0 +1,109 @@
+/** The set points at a time. */
+const setpointsAt = (signal, time, start, result) => {
+  let piece = 0, begin = start;
+  while (piece < signal.ends.length - 1 && signal.ends[piece] <= time) begin = signal.ends[piece++];
+  for (let i = 0; i < result.length; i++)
+    result[i] = signal.values[piece][i] + (time - begin) * signal.slopes[piece][i];
+};
+
+/** The segments {end, value, slope} of every input from `begin` to `end`: a command is held, others are those of the run. */
+function segmentsOf({ends, values, slopes}, begin, end, start, command) {
+  const signals = inputs.map(() => []);
+  let k = 0, time = begin, segmentStart = start;
+  while (time < end) {
+    while (k < ends.length - 1 && ends[k] <= time) segmentStart = ends[k++];
+    const following = k < ends.length - 1 ? Math.min(end, ends[k]) : end;
+    for (let i = 0; i < inputs.length; i++)
+      signals[i].push({end: following, value: values[k][i] + (time - segmentStart) * slopes[k][i], slope: slopes[k][i]});
+    time = following;
+  }
+  loop.commanded.forEach((i, j) => signals[i].forEach((part) => {
+    part.value = command[j];
+    part.slope = 0;
+  }));
+  return signals;
+}
+
+@drivers@
+/**
+ * Run of the control loop. Every argument is optional: by default the exported run. `controllerParameters` are those of
+ * the control law, `setpoint` {ends, values, slopes} its set points, `segments` the inputs that it does not command.
+ * Returns {columns: {time, ...}, status, time, steps, rejected, samples}.
+ */
+export function simulate(changes = {}) {
+  const given = {parameters: defaults, controllerParameters: loop.parameterDefaults, setpoint: loop.setpoint, ...run, ...changes};
+  const {parameters, controllerParameters, setpoint, initial, start, segments, times} = given;
+  const names = ["time", ...states, ...inputs, ...outputs, ...loop.columns];
+  const columns = Object.fromEntries(names.map((name) => [name, []]));
+  const c = new Float64Array(SIZES.held), x = new Float64Array(states.length);
+  const u = new Float64Array(inputs.length), o = new Float64Array(outputs.length);
+  const measured = new Float64Array(loop.measuredAt.length), wanted = new Float64Array(loop.setpoints.length);
+  const shown = new Float64Array(loop.setpoints.length), command = new Float64Array(loop.commanded.length);
+  const memory = Float64Array.from(loop.initialMemory), later = new Float64Array(memory.length);
+  const drivers = loop.drivers.map((driver) => ({...driver, state: [...driver.state]}));
+  prepare(parameters, c);
+  const s = new Solver(c, start, initial);
+  let row = 0, result = status.done, samples = 0;
+  const applied = Float64Array.from(segments.values[0]);
+  const write = (time) => {
+    s.stateAt(time, x);
+    s.inputsAt(time, u);
+    outputsOf(x, u, c, o);
+    setpointsAt(setpoint, time, start, shown);
+    [time, ...x, ...u, ...o, ...shown, ...measured, ...command].forEach((value, i) => columns[names[i]].push(value));
+  };
+  const runSegment = (end, instant, margin, values, slopes) => {
+    const begin = s.t;
+    let found = status.done;
+    s.setSegment(end, values, slopes);
+    s.h = FIRST_STEP;
+    if (instant) {
+      write(begin);
+      while (row < times.length && times[row] <= begin + loop.near) row++;
+    }
+    while (row < times.length && times[row] <= begin + CLOSE) write(times[row++]);
+    while (s.t < end && found === status.done) {
+      found = s.step();
+      while (found === status.done && row < times.length && times[row] < Math.min(s.t + CLOSE, end - margin))
+        write(times[row++]);
+    }
+    while (row < times.length && margin > CLOSE && times[row] < end) row++; // rows close to the instant `end`
+    return found;
+  };
+  const runInterval = (begin, end, signals) => {
+    const at = inputs.map(() => 0), begins = inputs.map(() => begin);
+    const values = new Float64Array(inputs.length), slopes = new Float64Array(inputs.length);
+    let time = begin, found = status.done;
+    while (time < end && found === status.done) {
+      let following = end;
+      signals.forEach((signal, i) => {
+        while (at[i] < signal.length - 1 && signal[at[i]].end <= time) begins[i] = signal[at[i]++].end;
+        const part = signal[at[i]];
+        values[i] = part.value + (time - begins[i]) * part.slope;
+        slopes[i] = part.slope;
+        if (at[i] < signal.length - 1) following = Math.min(following, part.end);
+      });
+      found = runSegment(following, time > begin, following < end ? loop.near : CLOSE, values, slopes);
+      time = following;
+    }
+    s.inputsAt(end, applied);
+    return found;
+  };
+  const instantOf = (k) => (k === 0 ? start : k < loop.samples ? start + loop.sampleTime * k : loop.finish);
+  for (let k = 0; k < loop.samples && result === status.done; k++) {
+    const begin = instantOf(k), end = instantOf(k + 1);
+    outputsOf(s.x, applied, c, o);
+    loop.measuredAt.forEach(([kind, i], j) => (measured[j] = kind === 0 ? s.x[i] : o[i]));
+    setpointsAt(setpoint, begin, start, wanted);
+    control_sample(measured, wanted, memory, controllerParameters, command, later);
+    if (![...measured, ...command].every(Number.isFinite)) result = status.notFinite;
+    else {
+      memory.set(later);
+      samples++;
+      const signals = segmentsOf(segments, begin, end, start, command);
+@apply_drivers@      result = runInterval(begin, end, signals);
+    }
+  }
+  while (result === status.done && row < times.length) write(times[row++]);
+  return {columns, status: result, time: s.t, steps: s.steps, rejected: s.rejected, samples};
+}

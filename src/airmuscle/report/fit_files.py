@@ -1,0 +1,64 @@
+"""Files of a static fit: the entry of the fitted muscle, its file and its report."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..geometry import Geometry
+from ..identify import Fit
+from ..library.entry import MISSING_GEOMETRY, Entry
+from ..library.write import save
+from ..recording import Recording
+from .chapter import Chapter
+from .fit_chapter import fit_chapter
+from .write import write_into
+
+MAX_NAMES, MAX_NAME = 3, 60
+"""Maximum number of file names in a title, and of characters of each (chosen)."""
+
+
+def fitted_entry(result: Fit, initial: Entry, files: Sequence[Path]) -> Entry:
+    """The initial entry with the fitted characteristic and a new provenance, without its checks."""
+    summary = dict(result.summary())
+    names = list_files([f.name for f in files])
+    note = f"Fitted to {names}: rms error {summary['rms error']}, maximum error {summary['maximum error']}."
+    geometry = fitted_geometry(initial, result.model)
+    title = f"{type(result.model).__name__} fitted to {list_files([f.stem for f in files])}"
+    entry = dataclasses.replace(
+        initial, name="muscle", title=title, provenance="fitted", note=note, warning="", characteristic=result.model,
+        geometry=geometry, validity_range=result.validity_range, checks=(),
+    )  # fmt: skip
+    return dataclasses.replace(entry, note=" ".join([note, *missing_geometry(entry)]))
+
+
+def list_files(names: Sequence[str]) -> str:
+    """The names of files for a title: up to three of them, else their number with the first and the last."""
+    short = [name if len(name) <= MAX_NAME else f"{name[: MAX_NAME // 2]}…{name[-MAX_NAME // 2 :]}" for name in names]
+    if len(short) <= MAX_NAMES:
+        return ", ".join(short)
+    return f"{len(short)} files, {short[0]} to {short[-1]}"
+
+
+def fitted_geometry(initial: Entry, law: object) -> Geometry | None:
+    """The geometry of a muscle after the fit of its law: that inside the law, unless the muscle has one of another
+    kind."""
+    inside = getattr(law, "geometry", None)
+    if isinstance(inside, Geometry) and (initial.geometry is None or type(initial.geometry) is type(inside)):
+        return inside
+    return initial.geometry
+
+
+def missing_geometry(entry: Entry) -> list[str]:
+    """The remark that the muscle has no geometry, how it is given and how it is measured; empty if it has one."""
+    return [] if entry.geometry is not None else [f"The muscle lacks {MISSING_GEOMETRY}."]
+
+
+def write_fit(
+    folder: Path, result: Fit, entry: Entry, recordings: Sequence[Recording], chapters: Sequence[Chapter] = ()
+) -> None:
+    """Write muscle.toml and the report into a folder made by `atomic_folder`; `chapters` precede that of the fit."""
+    save(entry, folder / "muscle.toml")
+    notes = tuple(dict.fromkeys(note for recording in recordings for note in recording.notes))
+    write_into(folder, [*chapters, fit_chapter(result, entry, notes)], title="Fit")

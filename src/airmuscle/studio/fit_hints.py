@@ -1,0 +1,43 @@
+"""Remedies of the page: the hints of messages in the words of the fields of the tab Fit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from ..core.errors import AirmuscleError
+from ..core.hints import Hint, HintedText
+from .fit_settings import FieldError
+
+_INSTRUCTIONS: Mapping[str, tuple[str, Callable[[Hint], str]]] = {
+    "units": ("columns", lambda hint: f"select it in the table Columns, row {', '.join(map(str, hint.value))}"),
+    "columns": ("columns", lambda hint: "select the quantity of each column in the table Columns"),
+    "constants": ("files", lambda hint: "write it into the row of the file, in the table Files"),
+    "file_name": ("file_name", lambda hint: f"write {hint.value} into the field 'Values in file names'"),
+    "time_base": ("time", lambda hint: "select another time base"),
+    "ordered": ("time", lambda hint: "select the time base 'unordered'"),
+    "decimal": ("decimal", lambda hint: "select the decimal mark"),
+    "resting_length": ("resting_length", lambda hint: "write it into the field 'Resting length'"),
+    "by": ("leave_out", lambda hint: f"select {hint.value.quantity} in the field 'Left out in turn'"),
+    "leave_out": ("leave_out", lambda hint: f"select {hint.value.quantity} in the field 'Left out in turn'"),
+    "identify.hysteresis.fit_hysteresis": ("hysteresis", lambda hint: "mark 'Friction from both branches'"),
+}
+"""Field and instruction by the argument of a hint, or by its function."""
+
+
+def in_page_words(text: str) -> str:
+    """The text with hints that name fields of the page; a hint for which the page has no field is left out."""
+    if not isinstance(text, HintedText):
+        return text
+
+    def sentence(hint: Hint) -> str:
+        known = _INSTRUCTIONS.get(hint.argument or hint.function)
+        return f"{hint.purpose}, {known[1](hint)}." if known else ""
+
+    return text.written(sentence)
+
+
+def as_field_error(error: AirmuscleError, field: str = "") -> FieldError:
+    """The error with its field: its own, that of its hint, or else `field`."""
+    own = getattr(error, "field", "")
+    hinted = next((found[0] for hint in error.message.hints if (found := _INSTRUCTIONS.get(hint.argument))), "")
+    return FieldError(in_page_words(error.message), own or hinted or field)

@@ -1,0 +1,238 @@
+/* Tab Fit: from measurement files to a muscle. The server reads and fits; the page may be closed meanwhile. */
+"use strict";
+
+(() => {
+  const { element, source, fitSource, say, problemOf } = airmuscle;
+  const PAUSE = 800;
+  const TEXTS = ["resting_length", "file_name", "ambient", "decimal", "delimiter", "time", "sheet", "group"];
+  const SPLITS = [["", "by the data"], ["run", "runs"], ["specimen", "specimens"], ["contraction", "levels of contraction"], ["pressure", "levels of pressure"], ["block", "blocks within each run"]];
+  const empty = () => ({ columns: {}, files: {}, rules: [], entry: "", leave_out: "", hysteresis: false, ...Object.fromEntries(TEXTS.map((name) => [name, ""])) });
+
+  class FitTab {
+    constructor(host, stateChanged) {
+      Object.assign(this, { host, stateChanged, set: "", names: [], sheet: null, task: "", settings: empty(), problems: new Map() });
+      this.fields = {};
+      this.places = {};
+    }
+
+    text(name, label, attributes = {}) {
+      const made = element("input", { type: "text", id: `fit-${name}`, autocomplete: "off", ...attributes });
+      made.addEventListener("change", () => { this.settings[name] = made.value.trim(); this.read(); });
+      return this.labelled(name, label, made);
+    }
+
+    choice(name, label, options) {
+      const made = element("select", { id: `fit-${name}` }, ...options.map(([value, text]) => element("option", { value }, text)));
+      made.addEventListener("change", () => { this.settings[name] = made.value; this.read(); });
+      return this.labelled(name, label, made);
+    }
+
+    labelled(name, label, made) {
+      this.fields[name] = made;
+      this.places[name] = element("div", { role: "alert" });
+      return element("div.field", {}, element("label", { for: made.id }, label), made, this.places[name]);
+    }
+
+    build(library) {
+      const card = (title, ...children) => element("section.card", {}, element("h2", {}, title), ...children);
+      const hosts = { files: element("ul.files"), columns: element("div"), data: element("div") };
+      this.message = element("div", { role: "alert" });
+      this.places.files = element("div", { role: "alert" });
+      this.places.fit = element("div", { role: "alert" });
+      this.fields.hysteresis = element("input", { type: "checkbox", id: "fit-hysteresis" });
+      this.fields.hysteresis.addEventListener("change", () => { this.settings.hysteresis = this.fields.hysteresis.checked; this.stateChanged(); });
+      this.startButton = element("button.primary", { type: "button", disabled: true, onclick: () => this.start_() }, "Fit and compare all laws");
+      this.cancelButton = element("button", { type: "button", hidden: true, onclick: () => this.cancel() }, "Cancel");
+      this.bar = element("progress", { max: 1, value: 0, hidden: true, "aria-label": "Progress of the fit" });
+      this.progressText = element("p.small", { role: "status" });
+      const laws = [["", "none"], ...library.laws.map((law) => [law.name, `${law.name} – ${law.title}`])];
+      this.dataCard = card("Measured rows", hosts.data);
+      this.columnsCard = card("Columns", element("p.small.soft", {}, "What each column was read as. Correct the quantity or the unit where it is wrong."), hosts.columns);
+      this.resultHost = element("div.stack");
+      this.further = element("details", {}, element("summary", {}, "More on the files"),
+        this.text("file_name", "Values in file names", { placeholder: "cut{specimen}_held{length [mm]}mm" }), this.text("ambient", "Ambient pressure (for absolute pressures)", { placeholder: "98 kPa" }),
+        this.choice("time", "Time base", [["", "as recorded"], ["uniform", "uniform, for rounded stamps"], ["unordered", "unordered"], ["none", "none"]]),
+        this.choice("decimal", "Decimal mark of text files", [["", "detected"], [",", "comma"], [".", "point"]]), this.choice("delimiter", "Column delimiter of text files", [["", "detected"], [";", "semicolon"], [",", "comma"], ["\t", "tab"], [" ", "blank"]]),
+        this.text("sheet", "Worksheet of Excel files"), this.text("group", "Group or struct of TDMS, MDF, HDF5 and MAT files"));
+      this.host.append(element("div.columns", {},
+        element("div.stack", {},
+          card("Files", airmuscle.dropArea((files) => this.upload(files)), this.message, this.places.files, hosts.files),
+          card("Muscle", this.text("resting_length", "Resting length, without pressure and load", { placeholder: "300 mm" }), this.choice("entry", "Also compare an entry of the library", laws), this.further),
+          card("Fit", this.choice("leave_out", "Left out in turn for the ranking", SPLITS), element("label.row", { for: "fit-hysteresis" }, this.fields.hysteresis, "Friction from both branches (takes longer)"),
+            this.places.fit, element("div.row", {}, this.startButton, this.cancelButton), this.bar, this.progressText)),
+        element("div.stack", {}, this.columnsCard, this.dataCard, this.resultHost)));
+      this.list = new airmuscle.FileList(hosts.files, { remove: (name) => this.remove(name), stated: (name, key, value) => { this.settings.files[name] = { ...this.settings.files[name], [key]: value }; this.read(); } });
+      this.columns = new airmuscle.ColumnTable(hosts.columns, (key, value) => { if (value) this.settings.columns[key] = value; else delete this.settings.columns[key]; this.read(); });
+      this.data = new airmuscle.FitData(hosts.data, () => { this.settings.rules = this.data.rules; this.read(300); });
+      this.places.rules = this.data.problem;
+      this.columnsCard.hidden = this.dataCard.hidden = true;
+    }
+
+    async start(library, state) {
+      this.build(library);
+      if (state && typeof state === "object" && typeof state.set === "string" && state.set) {
+        this.restore(state);
+        await this.read(0);
+        if (this.task) this.follow();
+      }
+      this.host.dataset.shown = "ready";
+    }
+
+    restore(state) {
+      const given = state.settings ?? {}, table = (value) => (value && typeof value === "object" && !Array.isArray(value) ? value : {});
+      const rules = (Array.isArray(given.rules) ? given.rules : []).filter((rule) => Array.isArray(rule?.recordings) && (Array.isArray(rule.rows) || (rule.ranges && typeof rule.ranges === "object")));
+      this.settings = { ...empty(), columns: table(given.columns), files: table(given.files), rules, hysteresis: given.hysteresis === true };
+      for (const name of [...TEXTS, "entry", "leave_out"]) if (typeof given[name] === "string") this.settings[name] = given[name];
+      Object.assign(this, { set: state.set, task: typeof state.task === "string" ? state.task : "", names: [] });
+      for (const name of [...TEXTS, "entry", "leave_out"]) this.fields[name].value = this.settings[name];
+      this.fields.hysteresis.checked = this.settings.hysteresis;
+      this.further.open = TEXTS.some((name) => name !== "resting_length" && this.settings[name]);
+      this.data.rules = this.settings.rules;
+    }
+
+    state() { return this.set ? { set: this.set, task: this.task, settings: this.settings } : {}; }
+    sheets() { return []; }
+
+    complain(text) { this.message.replaceChildren(...(text ? [element("p.message.error", {}, text)] : [])); }
+
+    async upload(files) {
+      this.complain("");
+      const failed = [];
+      for (const file of files) {
+        const known = this.names.includes(file.name);
+        this.host.setAttribute("aria-busy", "true");
+        try {
+          const answer = await fitSource.upload(this.set, file);
+          this.set = answer.set;
+          this.names = answer.files;
+          if (known) say(`${file.name} was replaced.`);
+        } catch (error) {
+          failed.push(error.message);
+          if (error.status === 404) { this.set = ""; this.names = []; }
+        }
+      }
+      this.host.removeAttribute("aria-busy");
+      this.complain(failed.join(" "));
+      if (this.set) await this.read(0);
+    }
+
+    async remove(name) {
+      try { this.names = (await fitSource.remove(this.set, name)).files; } catch (error) { this.complain(error.message); return; }
+      delete this.settings.files[name];
+      await this.read(0);
+    }
+
+    /* What was understood, after a pause; of several requests only the last one takes effect. */
+    read(pause = 0) {
+      this.stateChanged();
+      clearTimeout(this.reading);
+      const request = this.request = {};
+      return new Promise((resolve) => { this.reading = setTimeout(() => this.readNow(request).then(resolve), pause); });
+    }
+
+    async readNow(request) {
+      if (!this.set) return;
+      this.host.setAttribute("aria-busy", "true");
+      this.startButton.disabled = true;
+      let sheet = null, problems = [];
+      try {
+        sheet = await fitSource.read(this.set, this.settings);
+        problems = sheet.problems;
+      } catch (error) {
+        problems = [{ field: error.field ?? "", text: error.message }];
+        if (error.status === 404) this.forget();
+      }
+      if (request !== this.request) return;
+      this.host.removeAttribute("aria-busy");
+      if (sheet) { this.sheet = sheet; this.names = sheet.files.map((file) => file.name); }
+      this.showProblems(problems);
+      this.list.show(this.names, this.sheet, this.settings.files, this.problems);
+      const known = Boolean(this.sheet?.files.some((file) => file.columns.length));
+      this.columnsCard.hidden = !known;
+      this.dataCard.hidden = !this.sheet?.recordings.length;
+      if (known) this.columns.show(this.sheet, this.settings.columns, this.problems);
+      if (this.sheet?.recordings.length) this.data.show(this.sheet);
+      this.ready = Boolean(sheet?.ready);
+      this.startButton.disabled = !this.ready || this.running;
+      this.host.dataset.read = String(Number(this.host.dataset.read ?? 0) + 1);
+    }
+
+    forget() { Object.assign(this, { set: "", names: [], sheet: null, task: "" }); this.stateChanged(); }
+
+    /* Each problem at its field; those of no field are shown at the top. */
+    showProblems(problems) {
+      this.problems = new Map();
+      for (const { field, text } of problems) this.problems.set(field, [...(this.problems.get(field) ?? []), text]);
+      for (const [name, place] of Object.entries(this.places)) {
+        const made = problemOf(this.problems.get(name));
+        place.replaceChildren(...(made ? [made] : []));
+        this.fields[name]?.setAttribute("aria-invalid", String(Boolean(made)));
+        if (made && this.further.contains(place)) this.further.open = true;
+      }
+      const own = (field) => field in this.places || field === "columns" || field.startsWith("column:") || (field.startsWith("file:") && this.names.includes(field.slice(5)));
+      const rest = problems.filter(({ field }) => !own(field)), lost = (this.sheet ? [] : problems.filter(({ field }) => field.startsWith("column")));
+      if (rest.length || lost.length) this.complain([...rest, ...lost].map(({ text }) => text).join(" "));
+    }
+
+    async start_() {
+      this.showProblems([]);
+      this.startButton.disabled = true;
+      try { this.task = (await fitSource.start(this.set, this.settings)).task; } catch (error) {
+        this.showProblems([{ field: error.field || "fit", text: error.message }]);
+        this.startButton.disabled = false;
+        return;
+      }
+      this.resultHost.replaceChildren();
+      this.stateChanged();
+      await this.follow();
+    }
+
+    async cancel() {
+      try { await fitSource.cancel(this.task); } catch (error) { say(error.message); }
+    }
+
+    /* Progress of the task until it has ended. */
+    async follow() {
+      const task = this.task;
+      let lost = 0;
+      this.running = true;
+      this.startButton.disabled = true;
+      this.cancelButton.hidden = this.bar.hidden = false;
+      delete this.host.dataset.task;
+      while (task === this.task) {
+        let status;
+        try { status = await fitSource.status(task); lost = 0; } catch (error) {
+          if (error.status !== 0 || (lost += 1) > 5) { this.ended(error.message, "", error.status === 404 ? "lost" : "failed"); if (error.status === 404) this.task = ""; this.stateChanged(); return; }
+          status = null;
+        }
+        if (status && !["waiting", "running"].includes(status.state)) { await this.finish(task, status); return; }
+        if (status) {
+          if (status.state === "running") this.bar.value = status.fraction; else this.bar.removeAttribute("value");
+          this.progressText.textContent = status.state === "waiting" ? (status.before ? `waiting; ${status.before} other fit${status.before > 1 ? "s" : ""} before this one` : "waiting for a free process") : `${Math.round(100 * status.fraction)} %: ${status.text || "start"}. The page may be closed; its address leads back here.`;
+        }
+        await new Promise((resolve) => { setTimeout(resolve, PAUSE); });
+      }
+    }
+
+    async finish(task, status) {
+      if (status.state === "cancelled") { this.ended("", "The fit was cancelled.", "cancelled"); return; }
+      if (status.state === "failed") { this.ended(status.error, "", "failed", status.field); return; }
+      try {
+        const result = await fitSource.result(task);
+        airmuscle.showResult(this.resultHost, task, result);
+        this.ended("", "The fit is complete.", "done");
+      } catch (error) { this.ended(error.message, "", "failed"); }
+    }
+
+    ended(error, text, state, field) {
+      this.running = false;
+      this.cancelButton.hidden = this.bar.hidden = true;
+      this.progressText.textContent = text;
+      this.startButton.disabled = !this.ready;
+      this.host.dataset.task = state;
+      if (error) this.showProblems([{ field: field || "fit", text: error }]);
+    }
+  }
+
+  if (!source.embedded) Object.assign(airmuscle, { FitTab });
+})();

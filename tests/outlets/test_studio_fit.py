@@ -1,0 +1,533 @@
+"""Tab Fit of the studio, its server: it reads files of users within limits, and fits as the library does."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import time
+import zipfile
+from io import BytesIO
+from urllib.parse import urlencode
+
+import numpy as np
+import pytest
+from studio_pages import InThisProcess, request
+from studio_tasks import WorkerHere, fail, write_slowly
+
+pytest.importorskip("starlette", reason="needs starlette")
+
+import airmuscle as am
+from airmuscle.identify import LevelSplit, compare, model_selection, standard_candidates
+from airmuscle.recording import read
+from airmuscle.studio import fit_uploads
+from airmuscle.studio.app import create_app
+from airmuscle.studio.fit_queue import FIT_WORKERS, MAX_WAITING, FitQueue
+from airmuscle.studio.fit_routes import MAX_SETTINGS, FitService
+from airmuscle.studio.fit_task import run_fit
+from airmuscle.studio.fit_uploads import UploadStore, check_file_name
+from airmuscle.studio.page import self_contained_page
+from airmuscle.studio.requests import BadRequest
+from airmuscle.studio.worker import Worker
+
+LAW = am.load("dmsp-20-300").characteristic
+COLUMNS = {"Zeit": {"quantity": "time", "unit": "s"}, "Druck": {"quantity": "pressure", "unit": "bar"}}
+HEADINGS = {"Zeit": "time [s]", "Druck": "pressure [bar]"}
+
+
+def german_table(levels=(1.0, 2.5, 4.0), rows=9, step=7.0):
+    """A CSV file of a German logger: two units are not stated; the branches differ by twice `step` [N]."""
+    lines, time_ = ["Zeit;Druck;Kontraktion (%);Kraft (N);Kommentar"], 0.0
+    there = np.linspace(0.0, 0.16, rows)
+    for level in levels:
+        for sign, contraction in [(1, c) for c in there] + [(-1, c) for c in there[::-1]]:
+            force = max(float(LAW.force(level * 1e5, contraction)), 0.0) - sign * step + 0.5 * np.sin(37 * time_)
+            lines.append(f"{time_:.1f};{level:.3f};{100 * contraction:.3f};{force:.2f};ok".replace(".", ","))
+            time_ += 0.5
+    return "\n".join(lines).encode("latin-1")
+
+
+@pytest.fixture
+def app(tmp_path):
+    """The application, which fits in this process."""
+    return make_app(tmp_path)
+
+
+def make_app(folder, task=run_fit, **options):
+    queue = FitQueue(task, make_worker=WorkerHere, **options)
+    return create_app(pool=InThisProcess(), fits=FitService(InThisProcess(), UploadStore(folder), queue))
+
+
+def upload(app, name, content, known=""):
+    query = {"name": name, **({"set": known} if known else {})}
+    return request(app, "POST", "/api/fit/file", content, query=urlencode(query).encode())
+
+
+def post(app, address, **content):
+    return request(app, "POST", f"/api/fit/{address}", json.dumps(content).encode())
+
+
+def finished(app, task):
+    for _ in range(6000):
+        status = request(app, "GET", f"/api/fit/task/{task}").json()
+        if status["state"] not in ("waiting", "running"):
+            return status
+        time.sleep(0.02)
+    raise AssertionError("the fit has not ended")
+
+
+def problems(answer):
+    return {row["field"]: row["text"] for row in answer.json()["problems"]}
+
+
+# What was understood
+
+
+def test_columns_with_units_are_recognised_and_the_others_are_asked_for(app):
+    """A problem names the field of the column; a correction removes it."""
+    name = upload(app, "Messung.csv", german_table()).json()["set"]
+    first = post(app, "read", set=name, settings={})
+    assert set(problems(first)) == {"column:Zeit", "column:Druck"}
+    assert "unit of 'Druck' (pressure) is not stated" in problems(first)["column:Druck"]
+    sheet = post(app, "read", set=name, settings={"columns": COLUMNS}).json()
+    (columns,) = (file["columns"] for file in sheet["files"])
+    assert [(c["quantity"], c["unit"]) for c in columns] == [
+        ("time", "s"), ("pressure", "bar"), ("contraction", "%"), ("force", "N"), ("", ""),
+    ]  # fmt: skip
+    (recording,) = sheet["recordings"]
+    assert sheet["ready"]
+    assert [(run["kind"], run["level"]) for run in recording["runs"]] == [
+        ("isobaric", "pressure 100 kPa"), ("isobaric", "pressure 250 kPa"), ("isobaric", "pressure 400 kPa"),
+    ]  # fmt: skip
+    assert recording["branches"] == 6
+    assert recording["points"]["pressure"][0] == 1e5
+
+
+WRONG = (
+    ({"columns": {**COLUMNS, "Druck": {"quantity": "pressure", "unit": "barr"}}}, "column:Druck", "barr"),
+    ({"columns": {**COLUMNS, "Druck": {"quantity": "pressure", "unit": "mm"}}}, "column:Druck", "mm"),
+    ({"columns": {**COLUMNS, "Zeit": {"quantity": "force", "unit": "N"}}}, "column:Zeit", "both read as force"),
+    ({"columns": {**COLUMNS, "Kraft (N)": {"quantity": ""}}}, "columns", "no column is a force"),
+    ({"columns": COLUMNS, "sheet": "x", "rules": [{"ranges": {"pressure": [0, 1]}, "keep": True}]}, "rules", "no row"),
+    ({"columns": COLUMNS, "rules": [{"ranges": {"volume": [0, 1]}}]}, "rules", "volume"),
+    ({"columns": COLUMNS, "file_name": "run{nonsense}"}, "file_name", "nonsense"),
+)
+
+
+@pytest.mark.parametrize(("settings", "field", "text"), WRONG, ids=[row[1] + row[2] for row in WRONG])
+def test_a_problem_names_its_field(app, settings, field, text):
+    name = upload(app, "Messung.csv", german_table()).json()["set"]
+    answer = post(app, "read", set=name, settings=settings)
+    found = problems(answer) if answer.status == 200 else {answer.json()["field"]: answer.json()["error"]}
+    assert text in found[field]
+
+
+def test_a_length_needs_the_resting_length_and_a_pressure_is_gauge_unless_stated(app):
+    table = "p [bar];Länge [mm];F [N]\n1,0;300;50\n1,0;290;40\n2,0;300;90\n2,0;290;80\n"
+    name = upload(app, "a.csv", table.encode()).json()["set"]
+    assert "such as 300 mm" in problems(post(app, "read", set=name, settings={}))["resting_length"]
+    for settings in ({"resting_length": "300 mm"}, {"files": {"a.csv": {"resting_length": "30 cm"}}}):
+        (recording,) = post(app, "read", set=name, settings=settings).json()["recordings"]
+        assert recording["constants"] == {"resting_length": "300 mm"}
+        assert recording["points"]["contraction"] == pytest.approx([0, 1 / 30, 0, 1 / 30], rel=1e-6)
+        assert any("is read as gauge" in note for note in recording["notes"])
+
+
+def test_a_column_may_state_the_resting_length(app):
+    """By its heading, or because the user selects it."""
+    table = "p [bar],L [mm],F [N],rest_length [cm],note [mm]\n1,300,50,30,310\n2,290,40,30,310\n3,280,40,30,310\n"
+    name = upload(app, "a.csv", table.encode()).json()["set"]
+    constant = {"note [mm]": {"quantity": "resting_length", "unit": "mm"}, "rest_length [cm]": {"quantity": ""}}
+    for settings, length, column in (({}, "300 mm", 3), ({"columns": constant}, "310 mm", 4)):
+        sheet = post(app, "read", set=name, settings=settings).json()
+        assert sheet["recordings"][0]["constants"]["resting_length"] == length
+        assert sheet["files"][0]["columns"][column]["quantity"] == "resting_length"
+        assert sheet["ready"]
+
+
+REFUSED = (
+    ({"resting_length": "300"}, "resting_length"), ({"resting_length": "-3 mm"}, "resting_length"),
+    ({"resting_length": "3 kg"}, "resting_length"), ({"resting_length": "nan m"}, "resting_length"),
+    ({"resting_length": "x" * 300}, "resting_length"), ({"resting_length": 3}, "resting_length"),
+    ({"ambient": "0 bar"}, "ambient"), ({"entry": "../../etc/passwd"}, "entry"), ({"leave_out": "rows"}, "leave_out"),
+    ({"decimal": ";"}, "decimal"), ({"delimiter": "x"}, "delimiter"), ({"time": "yesterday"}, "time"),
+    ({"columns": []}, "columns"), ({"columns": {"p": "bar"}}, "column:p"),
+    ({"columns": {"p": {"quantity": "os.system"}}}, "column:p"),
+    ({"columns": {"p": {"quantity": "force", "unit": "N" * 50}}}, "column:p"),
+    ({"files": {"a.csv": {"length": "3"}}}, "file:a.csv"), ({"files": {"a.csv": {"owner": "x"}}}, "file:a.csv"),
+    ({"files": {"a.csv": 1}}, "file:a.csv"), ({"rules": {}}, "rules"), ({"rules": [1]}, "rules"), ({"rules": [{}]}, "rules"),
+    ({"rules": [{"rows": [-1, 2]}]}, "rules"), ({"rules": [{"rows": [0.5, 2]}]}, "rules"),
+    ({"rules": [{"ranges": {"force": [2, 1]}}]}, "rules"), ({"rules": [{"ranges": {"force": ["a", 1]}}]}, "rules"),
+    ({"rules": [{"rows": [0, 1]}] * 201}, "rules"), ({"rules": [{"recordings": [1], "rows": [0, 1]}]}, "rules"),
+)  # fmt: skip
+
+
+def test_settings_that_are_not_possible_are_refused_with_their_field(app):
+    name = upload(app, "Messung.csv", german_table()).json()["set"]
+    for settings, field in REFUSED:
+        answer = post(app, "read", set=name, settings=settings)
+        assert (answer.status, answer.json().get("field")) == (422, field), settings
+        assert "Traceback" not in answer.text
+    for body in (
+        b"",
+        b"[",
+        b"[]",
+        b"null",
+        b"\xff",
+        b"[" * 100000,
+        b'{"set": 1}',
+        b'{"set": "x"}',
+        b'{"set": "../.."}',
+    ):
+        assert request(app, "POST", "/api/fit/read", body).status in (400, 404)
+    assert request(app, "POST", "/api/fit/read", b" " * (MAX_SETTINGS + 1)).status == 413
+
+
+# Uploads
+
+NAMES = (
+    "", "a", "a.exe", "../a.csv", "/etc/passwd.csv", "..\\a.csv", "a/b.csv", ".a.csv", "a\0.csv", "a\n.csv", " a.csv",
+    "C:a.csv", "a.csv/..", "\u202ea.csv", "a*.csv", "<script>.csv", "a" * 130 + ".csv", "\ud800.csv",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", NAMES, ids=range(len(NAMES)))
+def test_the_name_of_a_file_is_no_path(name):
+    with pytest.raises(BadRequest) as error:
+        check_file_name(name)
+    assert len(str(error.value)) < 600
+
+
+def test_names_of_laboratories_are_accepted():
+    for name in ("Messung 1 (Länge).csv", "run_2,5bar.xlsx", "log#3.MAT", "測定.tdms"):
+        assert check_file_name(name) == name
+
+
+BAD_FILES = (
+    ("a.csv", b"", 400), ("a.csv", b"\x00\x01\x02" * 99, 200), ("a.csv", b"PK\x03\x04xxxx", 200), ("a.csv", b"1,2\n", 200),
+    ("a.csv", b"p,F\n1,2\n", 200), ("a.csv", b"p [bar],F [N]\n1,x\n", 200), ("a.csv", b"p [bar],F [N]\n1\n", 200),
+    ("a.csv", b"p [bar],F [N]\nnan,inf\n", 200), ("a.csv", b"\xff\xfe\x00", 200), ("a.csv", b"," * 5000 + b"\n1\n", 200),
+    ("a.xlsx", b"PK\x03\x04" + b"x" * 99, 200), ("a.tdms", b"TDSm" + b"\xff" * 99, 200), ("a.parquet", b"PAR1xxPAR1", 200),
+    ("a.csv", b"t [s],p [bar],eps [%],F [N]\n0,1,1,1\n", 200),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("file", "content", "status"), BAD_FILES, ids=range(len(BAD_FILES)))
+def test_a_file_that_is_no_measurement_is_named_with_the_reason(app, file, content, status):
+    answer = upload(app, file, content)
+    assert answer.status == status
+    if status != 200:
+        return
+    sheet = post(app, "read", set=answer.json()["set"], settings={})
+    assert sheet.status == 200
+    assert not sheet.json()["ready"]
+    assert sheet.json()["problems"]
+    for row in sheet.json()["problems"]:
+        assert 10 < len(row["text"]) < 3000
+        assert not re.search(r"Traceback|/src/|/tmp/|airmuscle-studio", row["text"])
+
+
+def test_large_and_many_files_are_refused_and_leave_nothing(app, tmp_path, monkeypatch):
+    monkeypatch.setattr(fit_uploads, "MAX_FILE", 10_000)
+    monkeypatch.setattr(fit_uploads, "MAX_SET", 15_000)
+    monkeypatch.setattr(fit_uploads, "MAX_FILES", 3)
+    large = upload(app, "a.csv", b"x" * 100_000)
+    assert large.status == 413
+    assert large.unread > 5
+    name = upload(app, "b.csv", b"x" * 9_000).json()["set"]
+    assert upload(app, "c.csv", b"x" * 9_000, name).status == 413
+    assert upload(app, "c.csv", b"x" * 4_000, name).json()["files"] == ["b.csv", "c.csv"]
+    assert upload(app, "b.csv", b"x" * 100, name).status == 200
+    assert upload(app, "d.csv", b"x" * 100, name).status == 200
+    assert "at most 3 files" in upload(app, "e.csv", b"x", name).json()["error"]
+    assert {path.name for path in tmp_path.rglob("*") if path.is_file()} == {"b.csv", "c.csv", "d.csv"}
+
+
+def test_the_number_of_sets_is_bounded_and_those_in_use_are_kept(tmp_path, monkeypatch):
+    monkeypatch.setattr(fit_uploads, "MAX_SETS", 2)
+    store = UploadStore(tmp_path)
+    first, second = (store.new_set(lambda name: False) for _ in range(2))
+    with pytest.raises(BadRequest, match="all are in use"):
+        store.new_set(lambda name: False)
+    monkeypatch.setattr(fit_uploads, "MAX_IDLE", -1.0)
+    store.new_set(lambda name: name == first)
+    assert store.folder(first).is_dir()
+    with pytest.raises(BadRequest, match="drop them again"):
+        store.folder(second)
+
+
+def test_the_files_of_a_killed_server_are_removed_by_the_next_one(tmp_path):
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    abandoned, other = tmp_path / f"airmuscle-studio-{ended.pid}-x", tmp_path / f"airmuscle-studio-{os.getpid()}-x"
+    for folder in (abandoned, other):
+        (folder / "files").mkdir(parents=True)
+    store = UploadStore(tmp_path)
+    store.new_set(lambda name: False)
+    assert not abandoned.exists()
+    assert other.exists()
+    store.stop()
+    assert list(tmp_path.iterdir()) == [other]
+
+
+def test_values_in_another_file_are_not_read(app, tmp_path):
+    """An HDF5 file may name any file of the server as the place of its values."""
+    h5py = pytest.importorskip("h5py", reason="needs h5py")
+    secret = tmp_path / "secret.bin"
+    secret.write_bytes(np.arange(64.0).tobytes())
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.create_dataset("force", (64,), dtype="f8", external=[(str(secret), 0, 512)])
+    name = upload(app, "a.h5", (tmp_path / "a.h5").read_bytes()).json()["set"]
+    assert "values of a dataset are in another file" in problems(post(app, "read", set=name, settings={}))["file:a.h5"]
+
+
+# Fits
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory):
+    """A fit of the page, its task, and the comparison of the library on the same file; of three laws, to be short."""
+    folder = tmp_path_factory.mktemp("studio")
+    app = make_app(folder)
+    rules = [{"recordings": ["Messung.csv"], "rows": [0, 2]}, {"ranges": {"contraction": [0.159, 0.2]}}]
+    settings = {"columns": COLUMNS, "rules": rules, "leave_out": "contraction"}
+    (folder / "Messung.csv").write_bytes(german_table())
+    (recording,) = read(folder / "Messung.csv", columns=HEADINGS)
+    kept = (np.arange(len(recording)) >= 2) & (recording["contraction"] < 0.159)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(model_selection, "standard_candidates", lambda runs: standard_candidates(runs)[1:4])
+        task = fit_of(app, settings)
+        return app, task, compare(recording.rows(kept), leave_out=LevelSplit("contraction"))
+
+
+def fit_of(app, settings):
+    """The identifier of a fit that is complete."""
+    name = upload(app, "Messung.csv", german_table()).json()["set"]
+    task = post(app, "start", set=name, settings=settings).json()["task"]
+    status = finished(app, task)
+    assert status["state"] == "done", status
+    return task
+
+
+def fetched(result, name):
+    app, task, _ = result
+    return request(app, "GET", f"/api/fit/task/{task}/{name}")
+
+
+def test_the_numbers_are_those_of_the_library(result):
+    shown, comparison = fetched(result, "result.json").json(), result[2]
+    (ranking,) = (each["ranking"] for each in shown["comparisons"])
+    assert [(row["law"], row["in_sample"], row["left_out"], row["aicc"]) for row in ranking] == [
+        (m.candidate.name, m.in_sample_rmse, m.cross_validated_rmse, m.aicc) for m in comparison.ranking
+    ]
+    best = comparison.recommended.fit
+    assert shown["recommended"] == comparison.recommended.candidate.name
+    assert shown["reason"] == comparison.reason
+    assert [row["value"] for row in shown["fit"]["estimates"]] == list(best.values)
+    assert [row["standard_error"] for row in shown["fit"]["estimates"]] == list(best.standard_errors)
+    assert shown["parity"]["residual"] == list(best.residuals)
+    excluded = {row["law"]: row["cause"] for row in shown["comparisons"][0]["excluded"]}
+    assert excluded == {e.name: e.cause for e in (*comparison.excluded, *comparison.unavailable)}
+
+
+def test_bands_and_equation_are_shown(result):
+    shown = fetched(result, "result.json").json()
+    curve = shown["bands"]["curves"][0]
+    assert all(a <= b <= c for a, b, c in zip(curve["low"], curve["value"], curve["high"], strict=True))
+    assert all(a <= b for a, b in zip(curve["prediction_low"], curve["low"], strict=True))
+    assert shown["equations"][0]["lines"][0].startswith("<math")
+    assert "Excel" in " ".join(shown["equations"][0]["sources"])
+
+
+def test_report_and_muscle_are_downloaded(result, tmp_path):
+    (tmp_path / "muscle.toml").write_bytes(fetched(result, "muscle.toml").body)
+    muscle = am.load(tmp_path / "muscle.toml")
+    assert muscle.characteristic == result[2].recommended.fit.model
+    assert "Fitted to Messung.csv" in muscle.note
+    report = fetched(result, "report.html")
+    assert "attachment" in report.headers["content-disposition"]
+    assert "Messung.csv: 8 of 54 rows are left out, as specified by the user." in " ".join(report.text.split())
+    names = zipfile.ZipFile(BytesIO(fetched(result, "report.zip").body)).namelist()
+    assert {"muscle.toml", "report.html", "data/ranking.csv"} <= set(names)
+    assert not [name for name in names if name.startswith(("/", ".."))]
+
+
+@pytest.mark.parametrize("name", ["..", "../result.json", "data/ranking.csv", "x", "report.html/..", "settings"])
+def test_a_result_has_no_other_files(result, name):
+    assert fetched(result, name).status == 404
+
+
+@pytest.mark.slow
+def test_a_complete_fit_is_that_of_the_command_line(tmp_path):
+    """All laws and the friction, with the same texts. The command computes in processes with one thread of linear
+    algebra, which rounds differently: where an iteration ends differs by 1e-7 of a number."""
+    app = make_app(tmp_path)
+    task = fit_of(app, {"columns": COLUMNS, "resting_length": "300 mm", "hysteresis": True})
+    shown = request(app, "GET", f"/api/fit/task/{task}/result.json").json()
+    (tmp_path / "Messung.csv").write_bytes(german_table())
+    options = [f"--column={key}={text}" for key, text in HEADINGS.items()]
+    command = ["fit", "Messung.csv", "--compare", "--json", "--resting-length", "300 mm", *options]
+    done = subprocess.run([sys.executable, "-m", "airmuscle", *command], capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    printed = json.loads(done.stdout)
+    assert [row["law"] for row in shown["comparisons"][0]["ranking"]] == [row["law"] for row in printed["ranking"]]
+    for mine, other in zip(shown["comparisons"][0]["ranking"], printed["ranking"], strict=True):
+        assert mine["left_out"] == pytest.approx(other["cross_validated"], rel=1e-6)
+    muscle = request(app, "GET", f"/api/fit/task/{task}/muscle.toml").text
+    written = (tmp_path / "fit" / "muscle.toml").read_text(encoding="utf-8")
+    digits = re.compile(r"-?\d+\.\d+(?:e[-+]?\d+)?")
+    assert digits.sub("#", muscle) == digits.sub("#", written)
+    numbers = [[float(number) for number in digits.findall(text)] for text in (muscle, written)]
+    assert numbers[0] == pytest.approx(numbers[1], rel=1e-5)
+    assert len(shown["hysteresis"]["loops"]) == 3
+    assert shown["hysteresis"]["loops"][0]["models"][0]["gap_without"] == pytest.approx(14.0, abs=3.0)
+    assert "friction.html" in shown["files"]
+
+
+def test_a_task_is_known_to_its_page_only(result):
+    """There is no list of tasks or files, and an identifier cannot be guessed."""
+    app, task, _ = result
+    assert len(task) == 22
+    for other in ("", "x", task[:-1], task[:-1] + ("A" if task[-1] != "A" else "B"), f"../{task}", "*"):
+        for address in (f"/api/fit/task/{other}", f"/api/fit/task/{other}/result.json"):
+            assert request(app, "GET", address).status == 404
+        assert request(app, "POST", f"/api/fit/task/{other}/cancel").status == 404
+    for address in ("/api/fit", "/api/fit/task", "/api/fit/task/", "/api/fit/file", "/api/fit/read", "/api/fit/start"):
+        assert request(app, "GET", address).status in (404, 405)
+    mine, theirs = (upload(app, "a.csv", text).json() for text in (b"p [bar]\n1\n", b"p [bar]\n2\n"))
+    assert mine["set"] != theirs["set"]
+    assert post(app, "read", set=mine["set"], settings={}).json()["recordings"][0]["ranges"]["pressure"] == [100, 100]
+
+
+def test_other_pages_cannot_upload_or_start(app):
+    for address in ("file", "read", "start", "remove", "task/x/cancel"):
+        for headers in ({"x-airmuscle": None}, {"origin": "http://evil.example"}, {"sec-fetch-site": "cross-site"}):
+            assert request(app, "POST", f"/api/fit/{address}", b"", headers=headers).status == 403
+
+
+def test_a_fit_without_enough_data_fails_with_a_reason_in_words_of_the_page(app):
+    name = upload(app, "a.csv", german_table(levels=(2.0,), rows=3)).json()["set"]
+    task = post(app, "start", set=name, settings={"columns": COLUMNS}).json()["task"]
+    status = finished(app, task)
+    assert status["state"] == "failed"
+    assert len(status["error"]) > 20
+    assert not re.search(r"--\w|leave_out=|Traceback", status["error"])
+    assert request(app, "GET", f"/api/fit/task/{task}/result.json").status == 404
+
+
+# Queue
+
+
+def test_ten_users_are_served_in_turn_and_further_ones_are_refused(tmp_path):
+    running, most, order = [], [], []
+
+    def task(folder, out, user, report):
+        running.append(user)
+        most.append(len(running))
+        order.append(user)
+        time.sleep(0.02)
+        running.remove(user)
+
+    queue = FitQueue(task, make_worker=WorkerHere)
+    tasks = [queue.submit("set", tmp_path, user) for user in range(10)]
+    end = time.monotonic() + 60
+    while any(queue.status(each)["state"] != "done" for each in tasks) and time.monotonic() < end:
+        time.sleep(0.01)
+    queue.stop()
+    assert sorted(order) == list(range(10))
+    assert max(most) <= FIT_WORKERS
+    assert not queue.is_needed("set")
+
+
+def test_a_bounded_number_of_fits_waits(tmp_path):
+    queue = FitQueue(write_slowly, count=1)
+    queue._count = 0  # no process takes a task
+    tasks = [queue.submit("set", tmp_path, 0.0) for _ in range(MAX_WAITING)]
+    with pytest.raises(BadRequest, match="fits wait already"):
+        queue.submit("set", tmp_path, 0.0)
+    assert queue.status(tasks[3])["before"] == 3
+    queue.cancel(tasks[0])
+    assert queue.status(tasks[0])["state"] == "cancelled"
+    assert queue.status(tasks[3])["before"] == 2
+    assert queue.is_needed("set")
+
+
+def test_a_fit_that_is_cancelled_writes_nothing_and_the_next_one_runs(tmp_path):
+    """In a process of its own, which tells its progress."""
+    queue = FitQueue(write_slowly, count=1)
+    try:
+        slow, quick = queue.submit("set", tmp_path, 600.0), queue.submit("set", tmp_path, 0.0)
+        wait_until(lambda: queue.status(slow)["fraction"] == 0.5)
+        assert queue.status(slow)["text"] == "half of it"
+        assert queue.status(quick)["state"] == "waiting"
+        queue.cancel(slow)
+        wait_until(lambda: queue.status(quick)["state"] == "done")
+        assert queue.status(slow)["state"] == "cancelled"
+        assert not [
+            path
+            for path in queue.find(slow).folder.rglob("*")
+            if path.name == "result.json" and path.parent == queue.find(slow).folder
+        ]
+        assert (queue.find(quick).folder / "complete").exists()
+    finally:
+        queue.stop()
+
+
+def test_an_error_of_a_task_keeps_its_field(tmp_path):
+    queue = FitQueue(fail, count=1, make_worker=WorkerHere)
+    tasks = [queue.submit("set", tmp_path, field) for field in ("resting_length", "")]
+    wait_until(lambda: all(queue.status(each)["state"] == "failed" for each in tasks))
+    assert [queue.status(each)["field"] for each in tasks] == ["resting_length", ""]
+    assert queue.status(tasks[0])["error"] == "this is wrong."
+    queue.stop()
+
+
+def test_a_worker_ends_with_its_server(tmp_path):
+    """Also during a task, so that a killed server leaves no process and no result."""
+    script = (
+        "import sys, pathlib; from airmuscle.studio.fit_queue import FitQueue; from studio_tasks import write_slowly\n"
+        "if __name__ == '__main__':\n"
+        "    queue = FitQueue(write_slowly, count=1); task = queue.submit('set', pathlib.Path(sys.argv[1]), 600.0)\n"
+        "    while queue.status(task)['fraction'] != 0.5: pass\n"
+        "    print([worker._process.pid for worker in queue._running.values()][0], flush=True); input()\n"
+    )
+    (tmp_path / "server.py").write_text(script, encoding="utf-8")
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, str(tmp_path / "server.py"), str(tmp_path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stdin=subprocess.PIPE, env=environment, text=True) as server:
+        worker = int(server.stdout.readline())
+        server.kill()
+    wait_until(lambda: not is_alive(worker))
+    assert [path for path in tmp_path.rglob("result.json") if ".unfinished" not in str(path.parent)] == []
+
+
+def is_alive(process):
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    state = subprocess.run(["ps", "-o", "stat=", "-p", str(process)], capture_output=True, text=True).stdout.strip()
+    return bool(state) and not state.startswith("Z")
+
+
+def wait_until(holds, seconds=120.0):
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, "not within the time"
+        time.sleep(0.02)
+
+
+def test_a_worker_reports_nothing_unless_asked():
+    worker = Worker()
+    try:
+        assert worker.call(sum, ([1, 2],), 60.0) == 3
+    finally:
+        worker.stop()
+
+
+def test_a_saved_page_contains_no_fit():
+    page = self_contained_page([], {})
+    assert "fitSource" not in page
+    assert "MuscleTab" in page
