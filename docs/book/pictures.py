@@ -20,8 +20,9 @@ from airmuscle.friction import Friction
 from airmuscle.geometry import Geometry
 from airmuscle.identify.hysteresis.plot import plot_loops
 from airmuscle.mechanism import PulleyProfile
+from airmuscle.muscle.isobars import compute_isobars
 from airmuscle.pneumatics import Orifice
-from airmuscle.report.isobar_plot import compute_isobars, isobar_plot
+from airmuscle.report.isobar_plot import isobar_plot
 
 from .model_pages import components, entries_of, rooms
 
