@@ -14,6 +14,7 @@ WORDS = Path(__file__).with_name("words.toml")
 """Main nouns and verbs of the program."""
 
 ARGUMENTS = {
+    "ax": "Matplotlib Axes into which a plot is drawn, or a sequence of them",
     "acceleration_setpoint": "name of the set point of an acceleration",
     "load_setpoint": "name of the set point of a load",
     "mean_setpoint": "name of the set point of the mean pressure of two muscles",
