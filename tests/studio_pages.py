@@ -38,7 +38,7 @@ def request(app, method, path, body=b"", *, headers=None, query=b"", chunk=8192,
     usual = {"host": HOST, "x-airmuscle": "1" if method == "POST" else None}
     given = {**usual, **(headers or {})}
     scope = {
-        "type": "http", "asgi": {"version": "3.0"}, "http_version": "1.1", "method": method, "scheme": "http",
+        "type": "http", "asgi": {"version": "3.0", "spec_version": "2.4"}, "http_version": "1.1", "method": method, "scheme": "http",
         "path": path, "raw_path": raw or path.encode(), "query_string": query, "root_path": "",
         "server": ("127.0.0.1", 8765), "client": ("127.0.0.1", 1),
         "headers": [(n.encode(), v.encode("latin-1")) for n, v in given.items() if v is not None],

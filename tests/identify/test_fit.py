@@ -348,7 +348,6 @@ def test_slack_points_bound_laws_in_contraction_and_pressure_too():
         assert any("20 rows at zero force or below are treated as measured values" in note for note in unbound.notes)
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.integers(0, 10_000), st.integers(1, 3), st.sampled_from([LeastSquares(), Huber(0.5)]))
 def test_no_other_coefficients_are_better(seed: int, degree: int, loss: Loss):
     """At the least of a convex sum its gradient vanishes, however wild the data and however many rows are cut off."""
@@ -388,9 +387,14 @@ def test_a_robust_fit_forgets_gross_errors():
     assert any("Huber(scale=3.0), in N" in note for note in robust.notes)
 
 
-@pytest.mark.parametrize("scale", [1000.0, 10.0, 1.0, 0.1, 0.01])
+@pytest.mark.parametrize(
+    "scale", [1000.0, pytest.param(10.0, marks=pytest.mark.slow), 1.0, pytest.param(0.1, marks=pytest.mark.slow), 0.01]
+)
 @pytest.mark.parametrize("kind", [Huber, SoftL1])
-@pytest.mark.parametrize(("name", "degree"), [("dmsp-20-300", 5), ("festo-tool-dmsp-40", 5), ("festo-tool-dmsp-20", 2)])
+@pytest.mark.parametrize(
+    ("name", "degree"),
+    [("dmsp-20-300", 5), pytest.param("festo-tool-dmsp-40", 5, marks=pytest.mark.slow), ("festo-tool-dmsp-20", 2)],
+)
 def test_a_robust_loss_of_any_scale_settles_where_no_change_helps(name: str, degree: int, kind, scale: float):
     """Maps with slack rows, of which the shortest length of the DMSP-20-300 has nothing else."""
     recording = read_csv(DATA / f"{name}.csv")
@@ -424,7 +428,6 @@ def test_a_loss_narrower_than_the_noise_is_noted():
 # Units and scales
 
 
-@settings(max_examples=30, deadline=None)
 @given(st.floats(1e-3, 1e3), st.floats(1e-6, 1e3), st.floats(-1e5, 1e5), st.floats(0.1, 10.0))
 def test_units_and_scales_change_nothing(force_scale: float, pressure_scale: float, shift: float, stretch: float):
     recording = points(surface(3).force, n=60, noise=3.0)

@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenario_files import BRAID, CIRCUIT
 from typer.testing import CliRunner, Result
 
 import airmuscle as airmuscle_package
@@ -36,19 +37,15 @@ from airmuscle.report.chapter import Chapter, Claim, Equal
 from airmuscle.reproduce import run
 
 MUSCLE = "dmsp-20-300"
-SCENARIO = """
+SCENARIO = f"""
 title = "Fill and discharge"
 [plant.muscle.contractile]
 model = "ChouHannaford1996"
-geometry = { model = "Braid", radius = "10 mm", braid_angle = "25 deg", resting_length = "300 mm" }
+geometry = {BRAID}
 [plant.muscle]
-geometry = { model = "Braid", radius = "10 mm", braid_angle = "25 deg", resting_length = "300 mm" }
-damper = { model = "LinearDamper", damping = 100.0 }
-[plant.circuit]
-model = "FillDischarge"
-supply = { model = "Supply", pressure = "5 bar" }
-fill = { model = "Valve", conductance = 3e-9, critical_ratio = 0.3 }
-discharge = { model = "Valve", conductance = 3e-9, critical_ratio = 0.3 }
+geometry = {BRAID}
+damper = {{ model = "LinearDamper", damping = 100.0 }}
+{CIRCUIT}
 [plant.mechanism]
 model = "HangingMass"
 mass = "5 kg"
@@ -56,7 +53,7 @@ mass = "5 kg"
 fill = [["0.1 s", 1], ["0.3 s", 0]]
 [run]
 duration = "0.5 s"
-initial_state = { pressure = "1 bar" }
+initial_state = {{ pressure = "1 bar" }}
 """
 
 
@@ -262,7 +259,11 @@ def test_the_chart_and_its_data_stand_in_the_folder(tmp_path: Path):
 
 
 @pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
-@pytest.mark.parametrize("name", list_laws())
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[pytest.mark.slow] * (name == "saga2007-exact")) for name in list_laws()],
+    ids=list_laws(),
+)
 def test_every_entry_has_a_chart(tmp_path: Path, name: str):
     entry = load(name)
     low, high = entry.validity_range.pressure if entry.validity_range else entry.characteristic.pressure_range
@@ -605,8 +606,14 @@ main()
 
 
 @pytest.mark.skipif(os.name == "nt", reason="SIGINT cannot be sent to one process")
-@pytest.mark.parametrize("kind", ["module", "extension", "exception discarded", "discarded by a destructor"])
-@pytest.mark.parametrize("module", ["typer", "airmuscle.cli.app", "airmuscle.cli.solve", "rich.table"])
+@pytest.mark.parametrize(
+    ("module", "kind"),
+    [
+        pytest.param(module, kind, marks=[] if (i - k) % 4 == 0 else pytest.mark.slow)
+        for i, module in enumerate(("typer", "airmuscle.cli.app", "airmuscle.cli.solve", "rich.table"))
+        for k, kind in enumerate(("module", "extension", "exception discarded", "discarded by a destructor"))
+    ],
+)
 def test_an_interrupted_import_is_one_line_and_exit_code_130(module: str, kind: str):
     assert_interrupted(module, kind)
 
@@ -682,7 +689,9 @@ def test_control_characters_of_arguments_are_escaped(arguments: list[str]):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="arguments are bytes on POSIX only")
-@pytest.mark.parametrize("command", [[b"show"], [b"simulate"], [b"list"]])
+@pytest.mark.parametrize(
+    "command", [[b"show"], *(pytest.param([name], marks=pytest.mark.slow) for name in (b"simulate", b"list"))]
+)
 def test_an_argument_that_cannot_be_decoded_is_shown_with_its_bytes(command: list[bytes]):
     done = subprocess.run([sys.executable, "-m", "airmuscle", *command, b"no\xffname"], capture_output=True, timeout=60)
     assert done.returncode in (1, 2)

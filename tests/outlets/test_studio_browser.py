@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import shutil
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
@@ -18,53 +14,15 @@ from airmuscle.library.write import to_toml
 from airmuscle.scenario.scenario import build_scenario
 
 pytest.importorskip("starlette", reason="needs starlette")
-playwright = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
-CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
+pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
+from studio_browser import CHROMIUM, WAIT, address, browser, opened
+
+__all__ = ["address", "browser"]
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(CHROMIUM is None, reason="needs chromium"),
     pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning"),
 ]
-OPTIONS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update", "--disable-sync"]  # fmt: skip
-WAIT = 60_000
-REFUSED = "status of 422"
-"""Message of the browser on a text that the server refused."""
-
-
-@pytest.fixture(scope="module")
-def address():
-    """The address of a server on a free port."""
-    command = [sys.executable, "-u", "-m", "airmuscle", "studio", "--no-browser", "--port", "0"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
-        try:
-            yield server.stdout.readline().split()[1]
-        finally:
-            server.terminate()
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with playwright.sync_playwright() as p:
-        running = p.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
-        yield running
-        running.close()
-
-
-@contextlib.contextmanager
-def opened(browser, address, *, width=1280, height=900, scheme="light", offline=False):
-    """The page; it must report no error and request nothing from elsewhere."""
-    context = browser.new_context(viewport={"width": width, "height": height}, color_scheme=scheme, offline=offline)
-    page, errors = context.new_page(), []
-    page.on(
-        "console", lambda m: errors.append(m.text) if m.type in ("error", "warning") and REFUSED not in m.text else None
-    )
-    page.on("pageerror", lambda e: errors.append(str(e)))
-    page.on("request", lambda r: None if r.url.startswith((address, "data:", "blob:")) else errors.append(r.url))
-    page.goto(address)
-    page.wait_for_selector("html[data-ready]", timeout=WAIT)
-    yield page
-    context.close()
-    assert errors == []
 
 
 def wait_for(page, tab, name):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 from ..core.errors import AirmuscleError, AirmuscleWarning, ColumnError
 from ..core.units import AMBIENT_PRESSURE, quantity
 from ..recording import Decimation, Recording
+from ..recording.constants import parse_constant_name
 from ..recording.heading import Heading, parse_heading
 from ..recording.interpret import interpret, resolve_headings, unit_conversion
 from ..recording.mapping import apply_mapping
@@ -95,7 +97,8 @@ def _read_file(path: Path, settings: FitSettings, found: ReadSet) -> None:
         tables = _tables(path, settings)
         constants = _constants(path, settings)
     except AirmuscleError as error:
-        found.complain(error, field)
+        problem = as_field_error(error, field)
+        found.complain(FieldError(without_folder(problem.message, path.parent), problem.field))
         return
     for table in tables:
         columns = list(_columns(table, settings))[:MAX_COLUMNS]
@@ -118,6 +121,15 @@ def _read_file(path: Path, settings: FitSettings, found: ReadSet) -> None:
             continue
         found.recordings.append(recording)
         found.files.append(path.name)
+
+
+def without_folder(text: str, folder: Path) -> str:
+    """The text without the path of a folder, or its beginning, which a reader of another package may quote."""
+    path, least = str(folder), len("/tmp/")
+    text = text.replace(f"{path}{os.sep}", "")
+    for length in range(len(path), least, -1):
+        text = text.replace(path[:length], "…")
+    return text
 
 
 def _time_base(settings: FitSettings) -> TimeBase:
@@ -157,13 +169,23 @@ def _chosen(table: RawTable, settings: FitSettings) -> dict[str, str]:
 def _columns(table: RawTable, settings: FitSettings) -> Iterator[FileColumn]:
     units = table.units or ("",) * len(table.headings)
     for key, heading, unit_row in zip(_keys(table), table.headings, units, strict=False):
-        own = parse_heading(heading)
         chosen = settings.columns.get(key)
-        read = own if not chosen else parse_heading(chosen)
-        stated = unit_row or own.unit or ""
-        unit = (read.unit if chosen and read.unit else stated) or ""
-        known = read.known or bool(chosen)
-        yield FileColumn(key, heading, read.name if known else heading, unit, stated, known, chosen != "")
+        name, stated, known = _name_and_unit(heading)
+        stated = unit_row or stated
+        if chosen:
+            name, unit, known = _name_and_unit(chosen)
+        else:
+            unit = ""
+        yield FileColumn(key, heading, name if known else heading, unit or stated, stated, known, chosen != "")
+
+
+def _name_and_unit(text: str) -> tuple[str, str, bool]:
+    """The quantity or constant of a heading, its unit, and whether it is a known one."""
+    constant = parse_constant_name(text)
+    if constant is not None:
+        return (*constant, True)
+    heading = parse_heading(text)
+    return heading.name, heading.unit or "", heading.known
 
 
 def _unit_problems(

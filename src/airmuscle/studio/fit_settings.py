@@ -81,7 +81,9 @@ class FitSettings:
             name: texts.pop(name) for name in ("resting_length", "ambient") if name in texts
         }
         try:
-            return ColumnMapping(self.columns if columns is None else columns, constants, **texts)
+            mapping = ColumnMapping(self.columns if columns is None else columns, constants, **texts)
+            _ = mapping.text_format  # checks delimiter and decimal mark
+            return mapping
         except AirmuscleError as error:
             field = next((name for name in TEXTS if name.split("_")[0] in error.message[:40]), "columns")
             raise FieldError(error.message, field) from None

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.arrays import Array
+from ...core.short_repr import ShortRepr
 from ...recording import Recording
 from ...recording.segment import (
     AT_REST,
@@ -61,8 +62,8 @@ class RecordKind(enum.Enum):
 _KINDS = {ISOBARIC: RecordKind.ISOBARIC, ISOMETRIC: RecordKind.ISOMETRIC, ISOTONIC: RecordKind.ISOTONIC}
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class CampaignRecord:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class CampaignRecord(ShortRepr):
     """A recording of a campaign, its kind, and the reason of this kind as a phrase."""
 
     recording: Recording
@@ -173,7 +174,10 @@ def _unusable(recording: Recording) -> str:
     if "pressure" not in recording:
         return "no pressure column"
     if "contraction" not in recording and "force" not in recording:
-        return "neither force nor length, and a length needs the resting length"
+        return (
+            "only the pressure is recorded; a fill also needs the held length and the resting length, in the file or "
+            "as constants length and resting_length"
+        )
     if "contraction" not in recording:
         return "the contraction is not known: a length column and the resting length are needed"
     if len(recording) < MIN_ROWS:

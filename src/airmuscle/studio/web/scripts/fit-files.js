@@ -67,6 +67,7 @@
       row.files += 1;
       for (const recording of sheet.recordings.filter((r) => r.file === file.name)) {
         const range = recording.ranges[column.quantity || column.heading];
+        row.constant ??= recording.constants[column.quantity];
         if (range) { row.low = Math.min(row.low, range[0]); row.high = Math.max(row.high, range[1]); }
       }
       found.set(column.key, row);
@@ -82,14 +83,14 @@
       const body = columns.flatMap((column) => {
         const texts = problems.get(`column:${column.key}`), label = column.heading || `column ${column.key}`;
         const select = element("select", { "aria-label": `Quantity of ${label}`, "data-column": `${column.key} quantity`, "aria-invalid": texts ? "true" : null });
-        const known = column.used ? column.quantity : "-", options = [["", "not known (kept)"], ["-", "not used"], ...QUANTITIES.map((q) => [q, SPECIAL[q] ?? q])];
+        const known = column.used ? column.quantity : "-", options = [["", "no known quantity"], ["-", "not used"], ...QUANTITIES.map((q) => [q, SPECIAL[q] ?? q])];
         if (known && !options.some(([value]) => value === known)) options.push([known, known]);
         select.replaceChildren(...options.map(([value, text]) => element("option", { value, selected: value === known }, text)));
         const unit = element("input", { type: "text", value: column.used ? column.unit : "", size: 7, disabled: !column.used || !column.quantity, "aria-label": `Unit of ${label}`, "data-column": `${column.key} unit`, "aria-invalid": texts ? "true" : null, autocomplete: "off" });
         const changed = () => this.corrected(column.key, select.value === "" ? null : { quantity: select.value === "-" ? "" : select.value, unit: unit.value.trim() });
         select.addEventListener("change", () => { if (select.value !== column.quantity) unit.value = ""; changed(); });
         unit.addEventListener("change", changed);
-        const range = Number.isFinite(column.low) ? `${shortText(column.low)} to ${shortText(column.high)} ${column.shown_unit}` : "–";
+        const range = Number.isFinite(column.low) ? `${shortText(column.low)} to ${shortText(column.high)} ${column.shown_unit}` : column.constant ?? "–";
         const heading = element("td", {}, element("strong", {}, label), count > 1 && column.files < count ? element("span.soft", {}, ` in ${column.files} of ${count} files`) : null,
           column.key in corrections ? element("button.link", { type: "button", onclick: () => this.corrected(column.key, null) }, "as in the file") : null);
         return [element("tr", {}, heading, element("td", {}, select), element("td", {}, unit), element("td.number", {}, range)), texts ? element("tr", {}, element("td", { colspan: 4 }, problemOf(texts))) : null].filter(Boolean);
