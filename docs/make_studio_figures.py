@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 IMAGES = Path(__file__).with_name("images")
-COLOURS = 128
+COLOURS = 255
 
 
 def save(page: Any, name: str) -> None:
@@ -65,14 +65,17 @@ def main(address: str) -> None:
 
 def draw_joint_and_sizing(browser: Any, address: str) -> None:
     """The figures of the tabs Joint and Size."""
-    wide = {"viewport": {"width": 1200, "height": 1210}}
+    wide = {"viewport": {"width": 1200, "height": 1275}}
     page = opened(browser, address, "Joint", "joint-dmsp-20-proportional", **wide)
     panel = page.locator("#panel-joint")
     panel.get_by_label("Task").select_option("minimum jerk")
     panel.get_by_label("Instant of the run").fill("240")
-    page.wait_for_timeout(1000)
+    gain = panel.get_by_label("proportional gain, K")
+    for key in ("ArrowRight", "ArrowLeft") * 10:  # the browser compiles the programs meanwhile
+        gain.press(key)
+        page.wait_for_timeout(50)
     save(page, "joint")
-    wide = {"viewport": {"width": 1200, "height": 1240}}
+    wide = {"viewport": {"width": 1280, "height": 1290}}
     page = opened(browser, address, "Size", "196.1 N over 40 mm, air", color_scheme="dark", **wide)
     page.locator("#panel-size .choices button").nth(1).click()
     page.wait_for_timeout(1000)

@@ -86,13 +86,33 @@
       return { table: table(D, f.length, wide), inputs: row.inputs.map((name) => sheet.inputs.findIndex((input) => input.name === name)), measured: row.measured.map((name) => columns.indexOf(name)), count };
     }
 
+    /* The linearised plant in balanced coordinates; it is kept while working point and parameters remain. */
+    plant(point) {
+      const key = JSON.stringify([point.angle, point.first, point.second, Array.from(this.run.values)]);
+      if (this.plantKey !== key) {
+        const operating = this.operatingPoint(point), { A, B, C } = this.matrices(operating.state, operating.inputs);
+        this.plantKey = key;
+        this.kept = { operating, B, C, ...balance(A) };
+        this.stepKey = "";
+      }
+      return this.kept;
+    }
+
+    /* exp([A B; 0 0] T) of the plant with held inputs */
+    heldStep(a, d, B, inputs, sampleTime) {
+      const key = `${inputs} ${sampleTime}`, n = a.length, block = make(n + inputs.length, n + inputs.length);
+      if (this.stepKey === key) return this.step;
+      for (let i = 0; i < n; i++) { for (let j = 0; j < n; j++) block[i][j] = a[i][j] * sampleTime; inputs.forEach((u, j) => { block[i][n + j] = B[i][u] / d[i] * sampleTime; }); }
+      this.stepKey = key;
+      return (this.step = exponential(block));
+    }
+
     /* The open loop from the measured angle to the angle, negated, as matrices of a sampled system:
        z' = F z + G e, angle = H z, all other measurements fed back. */
     openLoop(law, point, sampleTime) {
-      const operating = this.operatingPoint(point), { A, B, C } = this.matrices(operating.state, operating.inputs), k = this.lawMatrices(law, point, operating, sampleTime);
-      const n = A.length, inputs = k.inputs.length, { a, d } = balance(A), block = make(n + inputs, n + inputs);
-      for (let i = 0; i < n; i++) { for (let j = 0; j < n; j++) block[i][j] = a[i][j] * sampleTime; k.inputs.forEach((u, j) => { block[i][n + j] = B[i][u] / d[i] * sampleTime; }); }
-      const step = exponential(block), size = n + k.count, angle = k.measured.findIndex((at) => this.run.sheet.measured[at] === "angle");
+      const { operating, a, d, B, C } = this.plant(point), k = this.lawMatrices(law, point, operating, sampleTime);
+      const n = a.length, inputs = k.inputs.length, step = this.heldStep(a, d, B, k.inputs, sampleTime);
+      const size = n + k.count, angle = k.measured.findIndex((at) => this.run.sheet.measured[at] === "angle");
       const F = make(size, size), G = new Float64Array(size), H = new Float64Array(size), rows = k.measured.map((at) => C[at].map((v, j) => v * d[j]));
       for (let j = 0; j < n; j++) H[j] = rows[angle][j];
       for (let i = 0; i < size; i++) {
