@@ -1,4 +1,4 @@
-"""Latency of the studio: time from a key to the painted page, with ten isobars of 1000 points.
+"""Latency of the studio: time from a key to the painted page, with ten isobars of 1000 points and with a joint.
 
 Run python benchmarks/studio_latency.py with the package playwright and Chromium; prints median and 95th percentile
 [ms], and the time of the page's scripts and of its whole main thread for each key [ms], as thread CPU time.
@@ -53,7 +53,7 @@ def measured(page: Any, control: Any, keys: tuple[str, str]) -> str:
 
 
 def main() -> None:
-    """Start a server and a browser, and print both lines."""
+    """Start a server and a browser, and print the lines."""
     from playwright.sync_api import sync_playwright
 
     command = [sys.executable, "-u", "-m", "airmuscle", "studio", "--no-browser", "--port", "0"]
@@ -72,6 +72,10 @@ def main() -> None:
         slider = page.locator("#panel-muscle input[type=range]").first
         print("slider, ten isobars of 1000 points:", measured(page, slider, ("ArrowRight", "ArrowLeft")))
         print("working point:", measured(page, page.locator("#panel-muscle .chart"), ("ArrowUp", "ArrowDown")))
+        page.get_by_role("tab", name="Joint").click()
+        page.wait_for_selector("#panel-joint[data-shown]", timeout=120_000)
+        gain = page.get_by_label("proportional gain, K")
+        print("gain of a joint, step of 2.2 s:", measured(page, gain, ("ArrowRight", "ArrowLeft")))
         browser.close()
         server.terminate()
 

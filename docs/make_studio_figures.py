@@ -26,7 +26,7 @@ def save(page: Any, name: str) -> None:
 
 
 def opened(browser: Any, address: str, tab: str, name: str, **options: Any) -> Any:
-    """The page with a tab, as soon as it shows a muscle or a plant."""
+    """The page with a tab, as soon as it shows a muscle, a plant or a sizing."""
     page = browser.new_context(**options).new_page()
     page.goto(address)
     page.wait_for_selector("html[data-ready]")
@@ -95,6 +95,23 @@ def main(address: str) -> None:
         page.get_by_label("Instant of the run").fill("300")
         page.wait_for_timeout(300)
         save(page, "phone")
+        draw_joint_and_sizing(browser, address)
+
+
+def draw_joint_and_sizing(browser: Any, address: str) -> None:
+    """The figures of the tabs Joint and Size."""
+    wide = {"viewport": {"width": 1200, "height": 1210}}
+    page = opened(browser, address, "Joint", "joint-dmsp-20-proportional", **wide)
+    panel = page.locator("#panel-joint")
+    panel.get_by_label("Task").select_option("minimum jerk")
+    panel.get_by_label("Instant of the run").fill("240")
+    page.wait_for_timeout(1000)
+    save(page, "joint")
+    wide = {"viewport": {"width": 1200, "height": 1240}}
+    page = opened(browser, address, "Size", "196.1 N over 40 mm, air", color_scheme="dark", **wide)
+    page.locator("#panel-size .choices button").nth(1).click()
+    page.wait_for_timeout(1000)
+    save(page, "size")
 
 
 if __name__ == "__main__":

@@ -1,5 +1,63 @@
-"""Ctrl-C interrupts here too, where a shell that runs the tests in the background has it ignored."""
+"""Settings of all tests: Ctrl-C interrupts, random examples are few, figures of one kind are drawn once.
 
+Ctrl-C interrupts here too, where a shell that runs the tests in the background has it ignored. `--hypothesis-profile
+thorough` draws 300 examples in place of 20. A figure whose axes, labels and curves are those of one that was drawn
+before gets the files of that one, except in tests with the marker `drawn`, which look at the files. The configuration
+file of the user is not read.
+"""
+
+from __future__ import annotations
+
+import os
+import re
 import signal
+from typing import Any
+
+import pytest
+from hypothesis import settings
+
+from airmuscle.core import plotting
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
+os.environ["AIRMUSCLE_CONFIG_DIR"] = os.devnull
+settings.register_profile("few", settings(), max_examples=20, deadline=None)
+settings.register_profile("thorough", settings(), max_examples=300, deadline=None)
+settings.load_profile("few")
+
+
+class OneOfAKind:
+    """`plotting.rendered`, which draws one figure of each kind."""
+
+    def __init__(self) -> None:
+        self.draw, self.draws_all = plotting.rendered, False
+        self.files: dict[Any, dict[str, bytes]] = {}
+
+    def __call__(self, figure: Any, *options: Any, **named: Any) -> dict[str, bytes]:
+        if self.draws_all:
+            return self.draw(figure, *options, **named)
+        kind = kind_of(figure), repr((options, sorted(named.items())))
+        if kind not in self.files:
+            self.files[kind] = self.draw(figure, *options, **named)
+        return self.files[kind]
+
+
+def kind_of(figure: Any) -> Any:
+    """Size, texts without their numbers, and the curves and areas of all axes of a figure."""
+    axes = [
+        (
+            [re.sub(r"[-\d.,]+", "0", text) for text in (a.get_title(), a.get_xlabel(), a.get_ylabel())],
+            [type(child).__name__ for child in a.get_children()],
+            (a.get_xscale(), a.get_yscale()),
+        )
+        for a in figure.axes
+    ]
+    return repr((tuple(figure.get_size_inches()), [type(child).__name__ for child in figure.get_children()], axes))
+
+
+ONE_OF_A_KIND = OneOfAKind()
+plotting.rendered = ONE_OF_A_KIND
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    ONE_OF_A_KIND.draws_all = item.get_closest_marker("drawn") is not None

@@ -17,7 +17,8 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 LOCKS = {name: (ROOT / name).read_text(encoding="utf-8") for name in ("requirements.lock", "requirements-dev.lock")}
-both = pytest.mark.parametrize("lock", LOCKS.values(), ids=LOCKS)
+DOCS_LOCK = (ROOT / "requirements-docs.lock").read_text(encoding="utf-8")
+both = pytest.mark.parametrize("lock", [*LOCKS.values(), DOCS_LOCK], ids=[*LOCKS, "requirements-docs.lock"])
 
 
 # The lock
@@ -55,6 +56,18 @@ def test_the_program_is_installed_without_the_packages_of_the_checks():
     assert not {"pytest", "mypy", "ruff", "hypothesis", "dask"} & {entry.split("==")[0] for entry in program}
 
 
+def test_the_packages_of_the_site_do_not_change_those_of_the_program():
+    others = dict(pinned for lock in LOCKS.values() for pinned in pins(lock))
+    changed = {name for name, version in pins(DOCS_LOCK) if others.get(name, version) != version}
+    assert changed == set()
+
+
+def pins(lock: str) -> list[tuple[str, str]]:
+    """(name with its condition, version) of each requirement of a lock."""
+    found = [re.match(r"([a-z0-9-]+)==(\S+)((?: ;[^\\]*)?)", entry) for entry in requirements(lock)]
+    return [(f"{match[1]}{match[3].rstrip()}", match[2]) for match in found if match]
+
+
 def test_the_citation_and_the_package_state_the_same_version():
     version = PROJECT["project"]["version"]
     assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
@@ -72,7 +85,7 @@ def checkout(tmp_path: Path) -> Path:
     """A copy of `run` and of the files that it reads, with an environment that appears complete."""
     folder = tmp_path / "a folder with spaces"
     (folder / ".venv" / "bin").mkdir(parents=True)
-    for name in ("run", "pyproject.toml", *LOCKS):
+    for name in ("run", "pyproject.toml", "requirements-docs.lock", *LOCKS):
         (folder / name).write_bytes((ROOT / name).read_bytes())
     (folder / ".venv" / "bin" / "python").symlink_to(sys.executable)
     (folder / ".venv" / "airmuscle.stamp").write_bytes(b"".join(load_run(folder).stamp()))
@@ -144,6 +157,18 @@ def test_an_installation_uses_the_locks_that_the_command_needs(
     locks = ["requirements.lock", "requirements-dev.lock"] if everything else ["requirements.lock"]
     assert [Path(name).name for name in called[1:-1]] == locks
     assert run.installed(everything)
+
+
+@needs_posix
+def test_the_site_adds_its_packages_once_and_keeps_the_stamp_of_the_program(
+    checkout: Path, monkeypatch: pytest.MonkeyPatch
+):
+    run, called = load_run(checkout), []
+    monkeypatch.setattr(subprocess, "call", lambda command, **settings: called.append(command[-1]))
+    assert run.install_docs() is None
+    assert run.install_docs() is None
+    assert [Path(name).name for name in called] == ["requirements-docs.lock"]
+    assert run.installed(everything=True)
 
 
 @needs_posix

@@ -599,3 +599,17 @@ def test_a_bar_is_drawn_on_a_terminal_once_it_takes_long(monkeypatch, capsys):
     with thread_pool.progress("simulating", 10) as advanced:
         advanced(5)
     assert "simulating" in capsys.readouterr().err
+
+
+def test_rows_that_go_together_are_checked_at_once(monkeypatch):
+    """No row is checked by itself, which for 10 000 plants would take longer than their simulation."""
+    plant = paper()
+    paths = [leaf.path for leaf in tree.leaves(plant) if leaf.value != 0.0]
+    columns = {leaf.path: leaf.value * np.linspace(0.98, 0.99, 4) for leaf in tree.leaves(plant) if leaf.path in paths}
+    monkeypatch.setattr(variations, "_check_row", lambda row, part: pytest.fail(f"row {row} is checked by itself"))
+    assert variations.variations_of(plant, columns, None).values.shape == (4, len(paths))
+
+
+def test_a_limit_of_the_validity_range_beyond_its_bounds_names_the_row():
+    with pytest.raises(ParameterError, match=r"row 2.*min_pressure.*allowed range: -101325 to 1e\+08 Pa"):
+        variations.variations_of(paper(), {"muscle.contractile.min_pressure": [0.0, 0.0, -2e5]}, None)

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from called_controller import Called
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from joints import chosen_muscle
 
@@ -86,7 +86,6 @@ def test_a_kept_recorder_gives_what_a_new_one_gives(monkeypatch):
 # Times
 
 
-@settings(max_examples=300)
 @given(st.lists(TICKS, unique=True, max_size=30), st.lists(TICKS, min_size=1, max_size=8), st.sampled_from([0, 1e-12]))
 def test_few_rows_and_instants_are_merged_as_many_are(grid, instants, shift):
     grid, instants = np.sort(np.array(grid, dtype=float)), np.sort(instants) + shift
@@ -103,7 +102,6 @@ def test_few_rows_and_instants_are_merged_as_many_are(grid, instants, shift):
 # Input
 
 
-@settings(max_examples=100)
 @given(st.integers(1, 60), st.integers(0, 2**32 - 1))
 def test_an_input_beyond_its_range_is_found_among_few_and_many_numbers(count, seed):
     rng = np.random.default_rng(seed)
@@ -175,7 +173,6 @@ def test_an_initial_state_is_checked_again_where_it_differs_from_the_last_one():
 # Drivers
 
 
-@settings(max_examples=300)
 @given(st.integers(0, 64), st.integers(1, 40), st.floats(0, 1), st.one_of(st.just(-np.inf), st.just(np.inf), TICKS))
 def test_an_interval_without_a_new_period_continues_the_pulse(start, length, duty, pulse_end):
     """The rest of a pulse in one interval is what a longer interval, in which a period begins, has up to there."""

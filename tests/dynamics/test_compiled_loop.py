@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from called_controller import Called
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from plants import chosen_muscle
 
@@ -133,7 +133,6 @@ drivers = st.one_of(
     st.lists(st.floats(0.0, 1.0), min_size=1, max_size=12),
     st.floats(2e-3, 0.05),
 )
-@settings(max_examples=60, deadline=None)
 def test_any_driver_is_the_same_to_the_last_bit(chain, commands, sample_time):
     """The set point is the command: what drivers make of it does not depend on the plant."""
     knots = tuple((i * 3 * sample_time, value) for i, value in enumerate(commands))

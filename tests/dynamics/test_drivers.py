@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from airmuscle import (
@@ -90,7 +90,6 @@ def by_ticks(driver: SolenoidDriver, instants: list[int]) -> np.ndarray:
     return np.array(found)
 
 
-@settings(max_examples=300, deadline=None)
 @given(drivers, switchings)
 def test_on_off_does_what_its_law_says_tick_by_tick(driver: SolenoidDriver, instants: list[int]):
     course = WithDrivers(alternating(instants), {"fill": driver}).segments(INPUTS, 0.0, END * TICK)
@@ -119,7 +118,6 @@ def test_a_gap_no_longer_than_the_closing_delay_does_not_shut():
         assert fill_at(course, np.arange(0.15, 0.3, 1e-4)).min() == least
 
 
-@settings(max_examples=100, deadline=None)
 @given(switchings)
 def test_without_delay_and_ramp_a_switch_comes_out_as_it_went_in(instants: list[int]):
     command = alternating(instants)
@@ -130,7 +128,6 @@ def test_without_delay_and_ramp_a_switch_comes_out_as_it_went_in(instants: list[
     assert np.array_equal(fill_at(told, times), fill_at(done, times))
 
 
-@settings(max_examples=100, deadline=None)
 @given(signals)
 def test_a_coil_switches_where_the_command_crosses_a_half(points: list[tuple[int, float]]):
     signal = polyline(points)
@@ -144,7 +141,6 @@ def test_a_coil_switches_where_the_command_crosses_a_half(points: list[tuple[int
 # Pulses
 
 
-@settings(max_examples=200, deadline=None)
 @given(modulators, signals)
 def test_the_mean_of_a_period_is_the_command_at_its_beginning(driver: PWM, points: list[tuple[int, float]]):
     signal, period = polyline(points), 1 / driver.frequency
@@ -161,7 +157,6 @@ def test_the_mean_of_a_period_is_the_command_at_its_beginning(driver: PWM, point
     assert means[kept] == pytest.approx(wanted[kept], abs=1e-6), "what needs no change has the mean exactly"
 
 
-@settings(max_examples=200, deadline=None)
 @given(modulators, signals)
 def test_no_pulse_and_no_gap_is_shorter_than_the_smallest(driver: PWM, points: list[tuple[int, float]]):
     course = WithDrivers(polyline(points), {"fill": driver}).segments(("fill",), 0.0, END * TICK)
@@ -187,7 +182,6 @@ def test_the_carrier_begins_with_the_run():
 chains = st.one_of(drivers, modulators, st.tuples(modulators, drivers))
 
 
-@settings(max_examples=200, deadline=None)
 @given(chains, signals, st.lists(st.integers(1, END - 1), unique=True, max_size=8).map(sorted))
 def test_a_run_cut_anywhere_is_the_run_in_one(chain, points: list[tuple[int, float]], cuts: list[int]):
     command, edges = WithDrivers(polyline(points), {"fill": chain}), np.array([0, *cuts, END]) * TICK
@@ -205,7 +199,6 @@ def test_a_run_cut_anywhere_is_the_run_in_one(chain, points: list[tuple[int, flo
         assert mine == pytest.approx(due, abs=1e-9)
 
 
-@settings(max_examples=200, deadline=None)
 @given(chains, signals, signals, st.integers(1, END - 1))
 def test_what_is_commanded_later_changes_nothing_before(chain, points, others, now: int):
     early = [p for p in points if p[0] <= now] or [(0, 0.3)]
@@ -223,7 +216,6 @@ def early_value(points: list[tuple[int, float]]) -> float:
     return sorted(points)[-1][1]
 
 
-@settings(max_examples=200, deadline=None)
 @given(chains, signals)
 def test_an_opening_stays_within_shut_and_open(chain, points: list[tuple[int, float]]):
     course = WithDrivers(polyline(points), {"fill": chain}).segments(INPUTS, 0.0, END * TICK)

@@ -11,7 +11,7 @@ import sys
 import casadi
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from airmuscle.compile.program import compile_system
@@ -58,7 +58,6 @@ numbers = st.floats(-3, 3, allow_subnormal=False)
 
 
 @pytest.mark.parametrize("name", FORMULAS)
-@settings(deadline=None, max_examples=60)
 @given(x=numbers, y=numbers)
 def test_an_operation_means_the_same_everywhere(name, x, y):
     formula = FORMULAS[name]

@@ -24,6 +24,7 @@ from airmuscle.identify.campaign import (
     identify_campaign,
 )
 from airmuscle.identify.campaign.creep_stage import creep_stretches, fit_creep_stage
+from airmuscle.identify.campaign.transient import count_pulses
 from airmuscle.identify.campaign.volume import VolumeChange, relate_volumes
 from airmuscle.recording import Recording, read
 
@@ -249,3 +250,25 @@ def test_a_file_written_in_german_is_read_as_it_was_made(tmp_path):
     (run,) = read(tmp_path / "isobar.csv")
     np.testing.assert_allclose(run["pressure"], columns["pressure"], atol=10.0)
     np.testing.assert_allclose(run["contraction"], (0.3 - columns["length"]) / 0.3, atol=1e-6)
+
+
+@pytest.mark.parametrize("pulses", [0, 8, 15])
+def test_the_pulses_of_a_valve_are_counted_in_a_ramp_that_approaches_its_end(pulses):
+    """A ramp by pulses looks like a fill, but its valve is open for a moment only; the last pulses are too small."""
+    time = np.linspace(0.0, 5.0, 1500)
+    rise = 1.0 - np.exp(-time / 2.0)
+    if pulses:
+        held = np.floor(time / 5.0 * pulses) * 5.0 / pulses
+        opened = held + np.minimum(8.0 * (time - held), 5.0 / pulses)
+        rise = 1.0 - np.exp(-opened / 2.0)
+    noisy = rise + 1e-3 * np.random.default_rng(1).standard_normal(1500)
+    assert pulses / 2 <= count_pulses(time, noisy) <= pulses
+
+
+def test_a_pulsed_ramp_at_a_held_length_is_an_isometric_run_and_no_fill():
+    time = np.arange(0.0, 40.0, 0.05)
+    held = np.floor(np.minimum(time, 40.0 - time) / 0.8) * 0.8
+    pressure = 6e5 * (1.0 - np.exp(-held / 6.0)) + 200.0 * np.random.default_rng(2).standard_normal(time.size)
+    columns = {"time": time, "pressure": pressure, "contraction": np.full(time.size, 0.05), "force": 2e-3 * pressure}
+    (record,) = classify_records([Recording(columns, "ramp", {"resting_length": 0.3})])
+    assert record.kind is RecordKind.ISOMETRIC

@@ -348,7 +348,6 @@ def test_slack_points_bound_laws_in_contraction_and_pressure_too():
         assert any("20 rows at zero force or below are treated as measured values" in note for note in unbound.notes)
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.integers(0, 10_000), st.integers(1, 3), st.sampled_from([LeastSquares(), Huber(0.5)]))
 def test_no_other_coefficients_are_better(seed: int, degree: int, loss: Loss):
     """At the least of a convex sum its gradient vanishes, however wild the data and however many rows are cut off."""
@@ -424,7 +423,6 @@ def test_a_loss_narrower_than_the_noise_is_noted():
 # Units and scales
 
 
-@settings(max_examples=30, deadline=None)
 @given(st.floats(1e-3, 1e3), st.floats(1e-6, 1e3), st.floats(-1e5, 1e5), st.floats(0.1, 10.0))
 def test_units_and_scales_change_nothing(force_scale: float, pressure_scale: float, shift: float, stretch: float):
     recording = points(surface(3).force, n=60, noise=3.0)

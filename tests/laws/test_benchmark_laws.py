@@ -13,10 +13,12 @@ from airmuscle.control import (
     PID,
     CoContraction,
     ColumnSensor,
+    FrictionFeedForward,
     ProportionalFeedback,
     SetpointLead,
     SplitRange,
     WithSensors,
+    WithSetpointDelay,
     WithStuckValve,
 )
 from airmuscle.control.controller import Measurement
@@ -58,6 +60,45 @@ def test_a_set_point_is_advanced_by_the_lead_time():
     law = SetpointLead("r", "r_rate", "u", lead_time=0.02, share=0.5)
     told, _ = stepped(law, {"r": 4.0, "r_rate": 10.0})
     assert told == {"u": 0.5 * (4.0 + 0.02 * 10.0)}
+
+
+def test_a_law_sees_the_set_point_of_the_instant_that_a_delayed_sensor_measured():
+    """A set point that moves like the measurement leaves no error, whatever the speed."""
+    inner = PID("y", "u", 2.0)
+    sensed = WithSensors(WithSetpointDelay(inner, 3), (ColumnSensor("y", delay=3),))
+    memory, told = None, []
+    for k in range(8):
+        commands, memory = stepped(sensed, {"y": 0.1 * k}, {"y": 0.1 * k}, {"u": (-9.0, 9.0)}, memory)
+        told.append(commands["u"])
+    assert told == [0.0] * 8
+    plain, memory = WithSetpointDelay(inner, 2), None
+    told = []
+    for value in (1.0, 2.0, 3.0, 4.0):
+        commands, memory = stepped(plain, {"y": value}, {"y": 0.0}, {"u": (-9.0, 9.0)}, memory)
+        told.append(commands["u"])
+    assert told == [2.0, 2.0, 2.0, 4.0], "the first set point until the delay is over"
+
+
+@pytest.mark.parametrize(
+    ("samples", "message"),
+    [
+        (-1, "allowed range: 0 to 1000"),
+        (1001, "allowed range: 0 to 1000"),
+        (1.5, "must be an integer"),
+        (True, "must be an integer"),
+    ],
+)
+def test_a_set_point_is_delayed_by_whole_samples(samples, message):
+    with pytest.raises(ParameterError, match=f"samples .*{message}"):
+        WithSetpointDelay(PID("y", "u", 2.0), samples)
+
+
+def test_friction_is_balanced_along_the_wanted_motion():
+    law = FrictionFeedForward("r_rate", "u", amplitude=3.0, boundary_speed=0.1)
+    told = [stepped(law, {"r_rate": rate})[0]["u"] for rate in (-5.0, -0.05, 0.0, 0.1, 2.0)]
+    assert told == pytest.approx([-3.0, -1.5, 0.0, 3.0, 3.0])
+    with pytest.raises(ParameterError, match="boundary_speed"):
+        FrictionFeedForward("r_rate", "u", amplitude=3.0, boundary_speed=0.0)
 
 
 @pytest.mark.parametrize(("stuck_time", "samples"), [(0.0, 0), (0.03, 3), (0.035, 4)])

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from airmuscle.characteristic import ContractileSurface
@@ -28,7 +28,6 @@ def test_a_polynomial_of_total_degree_n_has_its_powers_and_no_others(degree):
     assert {i + j for i, j in exponents(degree)} == set(range(degree + 1))
 
 
-@settings(max_examples=50)
 @given(st.integers(0, 99), st.floats(*BOX[0]), st.floats(*BOX[1]))
 def test_inside_the_validity_range_it_is_the_sum_of_its_powers(seed, pressure, contraction):
     law = surface(seed)
@@ -40,7 +39,6 @@ def test_inside_the_validity_range_it_is_the_sum_of_its_powers(seed, pressure, c
     assert exported == pytest.approx(expected, abs=1e-6)
 
 
-@settings(max_examples=60)
 @given(st.integers(0, 99), st.floats(-1e5, 9e5), st.floats(-0.05, 0.4))
 def test_outside_the_validity_range_it_neither_increases_with_contraction_nor_decreases_with_pressure(
     seed, pressure, contraction
@@ -55,7 +53,6 @@ def test_outside_the_validity_range_it_neither_increases_with_contraction_nor_de
         assert law.force(max(out, pressure), contraction) >= law.force(min(out, pressure), contraction) - 1e-9
 
 
-@settings(max_examples=30)
 @given(st.integers(0, 99), st.floats(*BOX[0]))
 def test_it_is_continuous_at_the_edge_of_the_validity_range(seed, pressure):
     law = surface(seed)

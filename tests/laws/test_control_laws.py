@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from airmuscle.control import (
@@ -177,7 +177,6 @@ def test_the_derivative_of_the_sliding_variable_is_that_of_the_error():
 
 
 @given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=200))
-@settings(max_examples=60, deadline=None)
 def test_the_sum_of_positions_follows_the_sum_of_commands_within_one_half(values):
     law = SigmaDelta(SetpointCommand(("u",)))
     told = [c["u"] for c in commanded(law, {"u": np.array(values)}, {}, {"u": (0.0, 1.0)})]

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
@@ -48,7 +48,6 @@ courses = st.lists(st.tuples(numbers, numbers), min_size=2, max_size=40)
     st.floats(0.0, 1.0),
     st.floats(0.0, 1.0),
 )
-@settings(max_examples=60, deadline=None)
 def test_pid_is_its_discrete_transfer_functions(course, k, t_i, t_d, n, b, c):
     """P, I = K h/T_i/(z - 1) and D = K T_d N (1 - 1/z)/(T_d + N h - T_d/z), each by a filter of its own."""
     r, y = np.array(course).T

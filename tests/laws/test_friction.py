@@ -142,7 +142,6 @@ def test_lugre_slides_along_the_stribeck_curve(speed):
 
 
 @pytest.mark.parametrize("law", ALL, ids=name)
-@settings(max_examples=60, deadline=None)
 @given(ends=turns)
 def test_friction_is_passive(law, ends):
     """The work done against friction from rest is not negative; on a closed path it is dissipated or stored in bristles."""
@@ -164,7 +163,6 @@ def test_a_repeated_loop_closes_and_dissipates_work(law):
 
 
 @pytest.mark.parametrize("law", RATE_INDEPENDENT, ids=name)
-@settings(max_examples=30, deadline=None)
 @given(bend=st.floats(-1.0, 1.0), speed=st.floats(-1.0, 1.0), factor=st.floats(0.01, 100.0))
 def test_the_rates_are_proportional_to_speed(law, bend, speed, factor):
     bristles = {s.name: bend * s.nominal for s in law.states}
@@ -186,7 +184,6 @@ def test_rows_between_two_turning_points_have_no_effect(law):
     )
 
 
-@settings(max_examples=100, deadline=None)
 @given(ends=turns)
 def test_a_stop_operator_satisfies_its_definition(ends):
     """|z| <= r and (dx - dz)(z - phi) >= 0 for every |phi| <= r; with the play operator P, x = E + P."""
@@ -228,7 +225,6 @@ def test_a_single_bristle_does_not_close_inner_loops():
         assert abs(ends[0] - ends[1]) > 0.1
 
 
-@settings(max_examples=60, deadline=None)
 @given(ends=st.lists(st.floats(-3e-3, 3e-3), min_size=1, max_size=6), reach=st.floats(3e-3, 6e-3))
 def test_a_larger_extremum_wipes_out_the_memory(ends, reach):
     for law in EXACT_STOPS:

@@ -11,7 +11,7 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from airmuscle.core.errors import ColumnError
@@ -75,7 +75,6 @@ def test_a_stepped_ramp_with_overshoots_has_one_reversal_at_the_last_row_of_the_
     assert (down.direction, down.name, down.interval.stop) == (-1, "deflating", len(recording))
 
 
-@settings(max_examples=60, deadline=None)
 @given(
     turns=st.lists(st.floats(0.2, 1.0), min_size=1, max_size=6),
     rows=st.integers(15, 60),
@@ -99,7 +98,6 @@ def test_every_reversal_of_a_random_history_is_found(turns, rows, rest, first, s
     assert differing <= len(turns) * slack
 
 
-@settings(max_examples=30, deadline=None)
 @given(scale=st.floats(1e-2, 1e2), shift=st.floats(-5e4, 1e6), stretch=st.floats(0.5, 2.0))
 def test_branches_do_not_depend_on_unit_or_zero_of_the_pressure(scale: float, shift: float, stretch: float):
     recording, _ = bench()
@@ -153,7 +151,6 @@ def test_a_branch_column_is_compared_but_not_used():
 # Sensors
 
 
-@settings(max_examples=60, deadline=None)
 @given(
     step=st.floats(1e-3, 1e3),
     noise=st.floats(0.4, 3.0),
@@ -170,7 +167,6 @@ def test_the_resolution_is_found_in_spite_of_a_varying_last_digit(step, noise, o
     assert estimate_resolution(values) == pytest.approx(step, rel=0.01)
 
 
-@settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 999), size=st.integers(30, 2000))
 def test_continuous_readings_have_no_resolution(seed: int, size: int):
     values = RANDOM(seed).normal(0, 1, size).cumsum()
@@ -183,7 +179,6 @@ def test_a_few_set_points_of_a_test_are_not_a_resolution():
     assert estimate_resolution(np.full(50, 3.0)) == 0.0
 
 
-@settings(max_examples=30, deadline=None)
 @given(sigma=st.floats(1e-3, 1e3), seed=st.integers(0, 99))
 def test_the_noise_is_separated_from_the_signal(sigma: float, seed: int):
     course = 1e3 * sigma * np.sin(np.linspace(0, 6, 2000))
@@ -279,7 +274,6 @@ def test_points_without_time_are_steady_states():
 # Glitches
 
 
-@settings(max_examples=60, deadline=None)
 @given(rows=st.sets(st.integers(1, 44), min_size=1, max_size=5), sign=st.sampled_from([1, -1]), seed=st.integers(0, 9))
 def test_synthetic_outliers_are_listed_and_not_removed(rows: set[int], sign: int, seed: int):
     recording, _ = bench(seed)
@@ -390,7 +384,6 @@ def test_a_record_shorter_than_its_dynamics_is_reported():
     assert not any("may be shorter" in f.text for f in slow_sweep)
 
 
-@settings(max_examples=60, deadline=None)
 @given(values=st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=40), with_time=st.booleans())
 def test_any_recording_can_be_inspected(values: list[float], with_time: bool):
     columns = {"pressure": np.array(values), "force": np.array(values[::-1])}

@@ -10,7 +10,7 @@ import dataclasses
 import numpy as np
 import pytest
 from control_plants import INVERSE, JOINT, MECHANISM, MUSCLES
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import airmuscle as am
@@ -93,7 +93,6 @@ def untraceable() -> ForceLaw:
 
 
 @given(st.floats(-0.5, 0.5), st.floats(1.0e5, 4e5), st.floats(1.0e5, 4e5))
-@settings(max_examples=60, deadline=None)
 def test_torque_and_stiffness_of_two_pressures_give_these_pressures(angle, first, second):
     torque, stiffness = (float(getattr(INVERSE, name)(first, second, angle)) for name in ("torque", "stiffness"))
     found = INVERSE.pressures(angle, torque, stiffness)

@@ -6,7 +6,7 @@ forms independently of this code. dV/deps is exact, and the tension of the ideal
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
@@ -21,7 +21,6 @@ from airmuscle.geometry.pleated import PleatedTube
 from airmuscle.geometry.straight_fibre import StraightFibre
 from airmuscle.geometry.stumpff import stumpff
 
-UNHURRIED = settings(deadline=None, max_examples=40)  # a law is traced at its first call
 L0, D0 = 0.072, 0.012
 CIRCLE, CATENARY, TRUE_ARC, PARABOLA = CircularArc(), Catenary(), TrueArcParabola(), Parabola()
 MERIDIANS = (CIRCLE, CATENARY, TRUE_ARC, PARABOLA)
@@ -157,7 +156,6 @@ def _true_arc(u, contraction):
 
 
 @pytest.mark.parametrize("meridian", MERIDIANS, ids=lambda m: type(m).__name__)
-@UNHURRIED
 @given(contraction=st.floats(1e-4, 0.44))
 def test_the_volume_derivative_is_exact_with_unrolled_newton_steps(meridian, contraction):
     shape = tube(meridian)
@@ -255,7 +253,6 @@ def test_free_contraction_with_rings_and_of_a_slender_muscle():
     assert np.round(ends, 4).tolist() == [32.0365, 18.3115, 13.7465]
 
 
-@UNHURRIED
 @given(contraction=st.floats(1e-3, 0.49), rings=st.integers(0, 2))
 @pytest.mark.slow
 def test_virtual_work_gives_the_tension_of_the_exact_outline(contraction, rings):
@@ -270,7 +267,6 @@ def test_virtual_work_gives_the_tension_of_the_exact_outline(contraction, rings)
     assert shape.volume_derivative(contraction) == pytest.approx(growth, rel=1e-9, abs=1e-8 * scale * L0)
 
 
-@UNHURRIED
 @given(contraction=st.floats(1e-6, 0.49))
 @pytest.mark.slow
 def test_the_exact_half_shell_balances(contraction):
@@ -314,7 +310,6 @@ def test_small_contraction_of_the_exact_outline_follows_its_limit():
     assert [f"{s:.1e}" for s in surplus] == ["2.6e-04", "2.6e-03", "2.7e-02"]
 
 
-@UNHURRIED
 @given(contraction=st.floats(0.02, 0.44), rings=st.integers(1, 4))
 def test_rings_are_segments_in_series(contraction, rings):
     whole, part = tube(CIRCLE, rings), StraightFibre(L0 / (rings + 1), D0, 0, CIRCLE)

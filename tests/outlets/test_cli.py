@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenario_files import BRAID, CIRCUIT
 from typer.testing import CliRunner, Result
 
 import airmuscle as airmuscle_package
@@ -36,19 +37,15 @@ from airmuscle.report.chapter import Chapter, Claim, Equal
 from airmuscle.reproduce import run
 
 MUSCLE = "dmsp-20-300"
-SCENARIO = """
+SCENARIO = f"""
 title = "Fill and discharge"
 [plant.muscle.contractile]
 model = "ChouHannaford1996"
-geometry = { model = "Braid", radius = "10 mm", braid_angle = "25 deg", resting_length = "300 mm" }
+geometry = {BRAID}
 [plant.muscle]
-geometry = { model = "Braid", radius = "10 mm", braid_angle = "25 deg", resting_length = "300 mm" }
-damper = { model = "LinearDamper", damping = 100.0 }
-[plant.circuit]
-model = "FillDischarge"
-supply = { model = "Supply", pressure = "5 bar" }
-fill = { model = "Valve", conductance = 3e-9, critical_ratio = 0.3 }
-discharge = { model = "Valve", conductance = 3e-9, critical_ratio = 0.3 }
+geometry = {BRAID}
+damper = {{ model = "LinearDamper", damping = 100.0 }}
+{CIRCUIT}
 [plant.mechanism]
 model = "HangingMass"
 mass = "5 kg"
@@ -56,7 +53,7 @@ mass = "5 kg"
 fill = [["0.1 s", 1], ["0.3 s", 0]]
 [run]
 duration = "0.5 s"
-initial_state = { pressure = "1 bar" }
+initial_state = {{ pressure = "1 bar" }}
 """
 
 

@@ -424,7 +424,7 @@ def test_a_controller_is_refused_by_name(tmp_path):
     loop = ControlLoop(PID("pressure", "fill", 1e-5), 0.01, Schedule({"pressure": ((0.0, 2e5),)}))
     problem = Problem(plant, loop, 0.1, plant.state_at(pressure=1e5))
     with pytest.raises(ParameterError, match="the controller PID cannot be exported to this target"):
-        write_program(problem, tmp_path, JavaScript())
+        write_program(problem, tmp_path, Octave())
 
 
 @pytest.mark.parametrize(

@@ -30,10 +30,12 @@ from airmuscle.control import (
     SuperTwisting,
     WithSensors,
 )
-from airmuscle.core.errors import ParameterError
+from airmuscle.core.errors import FileError, ParameterError
 from airmuscle.export import write_controller
+from airmuscle.export.microcontroller import COMPILER, EMULATOR, PROCESSORS, run_in_emulator
 from airmuscle.export.printed_controller import print_controller
 from airmuscle.simulation import Problem, solve
+from airmuscle.simulation.batch import Double, Single
 from airmuscle.simulation.sampled_loop import prepare_loop
 
 SENSED = (ColumnSensor("position", resolution=5e-5, delay=2, lag=3e-3), ColumnSensor("pressure", noise=500.0, delay=1))
@@ -104,6 +106,78 @@ def test_the_replayed_commands_are_those_of_the_recorded_run(name):
     recorded = np.column_stack([recording[f"command.{n}"][rows] for n in law.inputs])
     assert np.ptp(recorded) > 0
     np.testing.assert_allclose(samples.commands, recorded, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_in_single_precision_the_commands_stay_within_the_stated_tolerance(name, tmp_path):
+    """All laws but that with random numbers, which are whole numbers beyond single precision."""
+    law, setpoint = CASES[name]
+    if name == "sensors with noise":
+        with pytest.raises(
+            ParameterError, match=r"single precision: the command '\w+' differs by .* 0\.0001 is allowed"
+        ):
+            write_controller(problem_of(law, setpoint), tmp_path, name="law", precision=Single())
+        assert list(tmp_path.iterdir()) == []
+        return
+    write_controller(problem_of(law, setpoint), tmp_path, name="law", precision=Single())
+    assert "double" not in (tmp_path / "law.c").read_text().split("*/", 1)[1]
+    done = replay(tmp_path, "-O0")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert re.match(r"100 samples, 0 commands differ by more than 0\.0001 of their range", done.stdout)
+
+
+@pytest.mark.parametrize("processor", PROCESSORS)
+@pytest.mark.parametrize("precision", [Double(), Single()], ids=lambda precision: type(precision).__name__)
+def test_on_a_cortex_m_the_commands_are_the_same(precision, processor, tmp_path):
+    """In double precision bit by bit as on this machine."""
+    for program in (COMPILER, EMULATOR):
+        printed.require(program)
+    law, setpoint = CASES["cascade"]
+    paths = write_controller(problem_of(law, setpoint), tmp_path, name="law", precision=precision)
+    built = run_in_emulator(paths, PROCESSORS[processor])
+    assert built.output.startswith("100 samples, 0 commands differ")
+    assert 100 < built.code_size < 8000
+    assert 0 < built.stack_size < 2000
+
+
+def test_a_replay_that_differs_fails_on_a_cortex_m(tmp_path):
+    for program in (COMPILER, EMULATOR):
+        printed.require(program)
+    paths = write_controller(problem_of(PRESSURE), tmp_path, name="law", tunable=["gain"])
+    source = tmp_path / "law.c"
+    source.write_text(
+        source.read_text().replace(
+            "double law_parameters[LAW_PARAMETERS + 1] = {", "double law_parameters[LAW_PARAMETERS + 1] = {0.0 * "
+        )
+    )
+    with pytest.raises(FileError, match=r"qemu-system-arm failed with exit code 1: 100 samples, \d+ commands differ"):
+        run_in_emulator(paths, PROCESSORS["cortex-m4"])
+
+
+def test_without_a_compiler_for_the_processor_the_packages_are_named(tmp_path, monkeypatch):
+    paths = write_controller(problem_of(PRESSURE), tmp_path, name="law")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(
+        ParameterError, match=r"arm-none-eabi-gcc was not found\..*install the packages gcc-arm-none-eabi"
+    ):
+        run_in_emulator(paths, PROCESSORS["cortex-m4"])
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--controller", "--precision", "half"), "--precision half: there are double, float"),
+        (("--precision", "float"), "--precision belongs to --controller"),
+        (("--controller", "--build", "--processor", "avr"), "--processor avr: there are cortex-m4, cortex-m7"),
+        (("--controller", "--processor", "cortex-m4"), "--processor belongs to --controller --build"),
+    ],
+)
+def test_options_of_a_controller_that_do_not_fit_are_refused(options, message, tmp_path):
+    scenario = Path(__file__).parents[2] / "examples" / "pressure_loop.toml"
+    done = CliRunner().invoke(app, ["export", str(scenario), "--to", "c", "--out", str(tmp_path / "out"), *options])
+    assert done.exit_code == 2
+    assert message in " ".join(done.output.replace("\u2502", " ").split())
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_tunable_gain_is_a_variable_and_the_others_are_constants(tmp_path):

@@ -292,7 +292,7 @@ def test_fixed_steps_are_exported(tmp_path):
 def test_without_a_compiler_the_fmu_contains_sources_and_says_so(tmp_path, monkeypatch):
     monkeypatch.setattr(compiler.shutil, "which", lambda name: None)
     written = write_fmu(problem_of(), tmp_path / "a.fmu", name="plant")
-    assert written.platform == ""
+    assert written.platforms == ()
     assert "no C compiler (gcc, clang, cc) was found; install the package gcc or clang" in written.remark
     with zipfile.ZipFile(written.path) as archive:
         names = archive.namelist()
@@ -379,7 +379,7 @@ def test_a_start_without_equilibrium_is_named_and_nothing_is_written(tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--to", "c", "--fmi", "2"), "--fmi and --sources-only belong to --to fmu"),
+        (("--to", "c", "--fmi", "2"), "--fmi, --sources-only and --platforms belong"),
         (("--to", "fmu", "--law"), "fmu contains a plant"),
         (("--to", "simulink"), "there are c, js, octave, fmu, mujoco, modelica"),
     ],

@@ -107,6 +107,7 @@ def test_a_long_list_is_truncated_with_a_count(tmp_path: Path):
     assert "sampling:" not in text
 
 
+@pytest.mark.drawn
 def test_the_figures_are_written_to_the_folder_and_reproducible(tmp_path: Path):
     bench(tmp_path / "a.csv")
     bench(tmp_path / "b.csv", glitch=None)

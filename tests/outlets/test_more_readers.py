@@ -162,13 +162,3 @@ def test_a_damaged_file_and_a_missing_package_are_one_error_each(
     assert "No such file or directory" in refusal(FileError, tmp_path / f"none{ending}")
     monkeypatch.setitem(sys.modules, package, None)
     assert f"needs the package {package}. Install it: pip install airmuscle[lab]" in refusal(FileError, path)
-
-
-def test_a_mat_file_with_objects_alone_states_the_export(tmp_path: Path):
-    pytest.importorskip("pymatreader")
-    from scipy.io import savemat
-
-    savemat(tmp_path / "table.mat", {"note": "an object stands here"})
-    said = refusal(FileError, tmp_path / "table.mat")
-    assert "S = table2struct(T, 'ToScalar', true); save('data.mat', 'S')" in said
-    assert "S = struct('time', ts.Time, 'force', ts.Data)" in said

@@ -20,14 +20,16 @@ from airmuscle.cli.app import app
 from airmuscle.core.plotting import save
 from airmuscle.identify import Fit, fit
 from airmuscle.library.entry import Entry
+from airmuscle.muscle.isobars import compute_isobars
 from airmuscle.recording import Recording
 from airmuscle.report.band_plot import band_plot
 from airmuscle.report.fit_chapter import fit_chapter
 from airmuscle.report.fit_files import list_files
-from airmuscle.report.isobar_plot import compute_isobars, isobar_plot
+from airmuscle.report.isobar_plot import isobar_plot
 from airmuscle.report.levels import is_pressure_ramp, levels_of
 from airmuscle.report.ramp_plot import ramp_plot
 
+pytestmark = pytest.mark.drawn
 LENGTHS, CONTRACTIONS = (0.083, 0.182, 0.382), (0.0, 0.04, 0.08, 0.12)
 
 

@@ -287,7 +287,7 @@ def test_no_known_column_at_all(bench):
 
 @pytest.mark.parametrize("headings", ["pressure [kPa],p [bar]", "force [N],Load [N]", "valve,valve,force [N]"])
 def test_two_columns_of_one_quantity(bench, headings: str):
-    said = refusal(bench(f"{headings}\n{','.join('1' * len(headings.split(',')))}\n"), ColumnError)
+    said = refusal(bench(f"{headings}\n{','.join('123'[: len(headings.split(','))])}\n"), ColumnError)
     assert "both contain the" in said
     assert "Rename or delete one" in said
 

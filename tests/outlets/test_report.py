@@ -24,16 +24,18 @@ import numpy as np
 import pytest
 
 from airmuscle.core import plotting
+from airmuscle.core.display import display
 from airmuscle.core.errors import FileError, SolveError, UnknownNameError
 from airmuscle.core.reference import Reference
 from airmuscle.report.chapter import AtLeast, AtMost, Chapter, Claim, Equal, Kind, Plot, Table, statements
-from airmuscle.report.formatting import count_verdicts, format_number, format_published
+from airmuscle.report.formatting import MARKS, MEANINGS, count_verdicts, format_number, format_published
 from airmuscle.report.formula import to_mathtext, to_plain
 from airmuscle.report.html import MAX_SVG_BYTES, render_cell, render_header
 from airmuscle.report.output_folder import atomic_folder, check_writable
 from airmuscle.report.write import as_json, write_report
 from airmuscle.reproduce import run
 
+pytestmark = pytest.mark.drawn
 DATE = datetime.date(2024, 5, 17)
 KEYS = {
     "paper", "kind", "claim", "statement", "case", "published", "expected", "reproduced", "unit", "tolerance", "verdict",
@@ -533,3 +535,38 @@ def test_checks_and_comparisons_are_listed_and_counted_apart(tmp_path: Path):
     assert ">± depends</span>" in page.partition("Claims of the paper")[2].partition("Comparisons of this")[0]
     kinds = [record["kind"] for record in json.loads((tmp_path / "claims.json").read_text(encoding="utf-8"))]
     assert kinds == ["claim", "claim", "check", "comparison"]
+
+
+def test_the_readings_of_a_claim_are_folded_beneath_it_and_counted(tmp_path: Path):
+    claims = (*cases(2.0, 3.0, 0.5), Claim("paper", "single", AtLeast(1.0), 2.0, "1"))
+    page = write_report([Chapter("paper", "t", "s", claims)], tmp_path, date=DATE).read_text(encoding="utf-8")
+    assert "<summary>3 readings: 2 hold, 1 differs</summary>" in page
+    assert page.count("<details") == 1
+    assert page.count(">strong") == 1, "the claim stands once"
+
+
+def test_the_page_explains_each_verdict_and_counts_each_kind_first(tmp_path: Path):
+    claims = (*cases(2.0, 0.5), *cases(1.0, kind=Kind.CHECK), *cases(0.0, kind=Kind.FINDING))
+    page = write_report([Chapter("paper", "t", "s", claims)], tmp_path, date=DATE).read_text(encoding="utf-8")
+    overview = page.partition("Overview of the claims")[2].partition("</section>")[0]
+    for verdict, meaning in MEANINGS.items():
+        assert f"{MARKS[verdict]} {verdict}</span></dt><dd>{meaning}</dd>" in overview
+    assert "1 claim of the papers" in overview
+    assert "1 check of the computation" in overview
+
+
+def test_the_tables_of_the_page_are_in_display_units_and_their_files_are_not(tmp_path: Path):
+    columns = {"pressure [MPa]": [0.1, 0.2], "value (SI)": [0.3, 2.0], "unit": ["m", "1"]}
+    chapter = Chapter("paper", "t", "s", tables=(Table("sizes", "Sizes", columns),))
+    with display("bar", "mm"):
+        page = write_report([chapter], tmp_path / "chosen", date=DATE).read_text(encoding="utf-8")
+    usual = write_report([chapter], tmp_path / "usual", date=DATE).read_text(encoding="utf-8")
+    assert "pressure [bar]" in page
+    assert ">300</td>" in page
+    assert ">mm</td>" in page
+    assert ">value</th>" in page
+    assert "pressure [MPa]" in usual
+    assert ">0.3</td>" in usual
+    assert ">value (SI)</th>" in usual
+    files = [(tmp_path / name / "data" / "sizes.csv").read_bytes() for name in ("chosen", "usual")]
+    assert files[0] == files[1]

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from studio_pages import run_script, scripts
 
-from airmuscle.analysis import joint_statics, linearise
+from airmuscle.analysis import linearise
 from airmuscle.control import ControlLoop, SampledSignal, Schedule
 from airmuscle.core.tree import with_parameters
 from airmuscle.library.plant_file import plant_tables
 from airmuscle.scenario.scenario import build_scenario
 from airmuscle.simulation import Problem, solve
-from airmuscle.studio.joint_laws import joint_controllers
-from airmuscle.studio.joint_sheet import SPARE, joint_tables, sheet_of_joint
+from airmuscle.studio.joint_laws import joint_controllers, statics_within_valves
+from airmuscle.studio.joint_sheet import joint_tables, sheet_of_joint
 from airmuscle.study.control_benchmark import STANDARD_TASKS
 
 pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
@@ -72,9 +72,7 @@ def short(name, duration):
 
 
 def laws_of(plant):
-    low, high = joint_statics(plant).pressure_range
-    spare = SPARE * (high - low)
-    return {each.key: each for each in joint_controllers(plant, (low + spare, high - spare))}
+    return {each.key: each for each in joint_controllers(plant, statics_within_valves(plant))}
 
 
 def run_of(plant, law, case, page):
@@ -142,7 +140,7 @@ console.log(JSON.stringify(cases.map(([angle, share]) => {
 def test_working_points_are_those_of_the_statics_of_the_library(name, tmp_path):
     """Pressures, both stiffnesses and the state at rest; a point beyond the region is moved into it."""
     plant = joint(name)[2]
-    statics, cases = joint_statics(plant), [(0.0, 0.5), (0.2, 0.3), (-0.3, 0.7)]
+    statics, cases = statics_within_valves(plant), [(0.0, 0.5), (0.2, 0.3), (-0.3, 0.7)]
     for (angle, _), page in zip(cases, in_page(name, STATICS, cases, tmp_path), strict=True):
         point = page["point"]
         found = statics.pressures(angle, point["stiffness"])

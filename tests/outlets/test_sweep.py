@@ -23,6 +23,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenario_files import CIRCUIT, MUSCLE_FILE
 from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
@@ -38,26 +39,10 @@ from airmuscle.study.distributions import VARIATIONS
 from airmuscle.study.metrics import METRICS
 
 ROOT = Path(__file__).parents[2]
-MUSCLE = """
-title = "A braid"
-provenance = "example"
-[characteristic]
-model = "ChouHannaford1996"
-geometry = { model = "Braid", radius = "10 mm", braid_angle = "25 deg", resting_length = "300 mm" }
-[geometry]
-model = "Braid"
-radius = "10 mm"
-braid_angle = "25 deg"
-resting_length = "300 mm"
-"""
-SCENARIO = """
+SCENARIO = f"""
 [plant]
 muscle = "muscle.toml"
-[plant.circuit]
-model = "FillDischarge"
-supply = { model = "Supply", pressure = "5 bar" }
-fill = { model = "Valve", conductance = 3e-9, critical_ratio = 0.3 }
-discharge = { model = "Valve", conductance = 3e-9, critical_ratio = 0.3 }
+{CIRCUIT}
 [plant.mechanism]
 model = "Isometric"
 contraction = 0.05
@@ -66,7 +51,7 @@ fill = [["0.1 s", 1], ["0.3 s", 0]]
 [run]
 duration = "0.5 s"
 output_times = "5 ms"
-initial_state = { pressure = "0.5 bar" }
+initial_state = {{ pressure = "0.5 bar" }}
 """
 STUDY = """
 title = "Two valves"
@@ -88,7 +73,7 @@ course = { model = "TimeSeries", column = "force", sample_time = "0.05 s" }
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    for name, content in (("muscle", MUSCLE), ("scenario", SCENARIO), ("study", STUDY)):
+    for name, content in (("muscle", MUSCLE_FILE), ("scenario", SCENARIO), ("study", STUDY)):
         (tmp_path / f"{name}.toml").write_text(content, encoding="utf-8")
     return tmp_path
 
@@ -154,6 +139,7 @@ def started(folder: Path, chunks: int, *options: str) -> subprocess.Popen:
 # Bit-identical results
 
 
+@pytest.mark.drawn
 @pytest.mark.slow
 def test_a_killed_study_is_resumed_with_bit_identical_results(folder: Path):
     edited(folder, "count = 22", "count = 200")

@@ -12,6 +12,7 @@ import re
 from pathlib import Path
 
 import pytest
+from scenario_files import CIRCUIT, MUSCLE_FILE
 from typer.testing import CliRunner
 
 from airmuscle.cli import tune as command
@@ -20,17 +21,7 @@ from airmuscle.core.errors import AirmuscleError, FileError, ParameterError
 from airmuscle.scenario.scenario import load_scenario
 from airmuscle.study import Perturbations, load_scenario_loop, tune
 
-MUSCLE = """
-title = "A braid"
-provenance = "example"
-[characteristic]
-model = "ChouHannaford1996"
-geometry = { model = "Braid", radius = "10 mm", braid_angle = "25 deg", resting_length = "300 mm" }
-[geometry]
-model = "Braid"
-radius = "10 mm"
-braid_angle = "25 deg"
-resting_length = "300 mm"
+MUSCLE = f"""{MUSCLE_FILE}
 [damper]
 model = "LinearDamper"
 damping = "200 N s/m"
@@ -39,15 +30,11 @@ parameters = ["damper.damping"]
 standard_errors = [10.0]
 correlations = [[1.0]]
 """
-SCENARIO = """# A comment at the top
+SCENARIO = f"""# A comment at the top
 title = "Pressure of a lifted load"
 [plant]
 muscle = "muscle.toml"
-[plant.circuit]
-model = "FillDischarge"
-supply = { model = "Supply", pressure = "5 bar" }
-fill = { model = "Valve", conductance = 3e-9, critical_ratio = 0.3 }
-discharge = { model = "Valve", conductance = 3e-9, critical_ratio = 0.3 }
+{CIRCUIT}
 [plant.mechanism]
 model = "HangingMass"
 mass = "5 kg"   # the load
@@ -55,7 +42,7 @@ mass = "5 kg"   # the load
 [input.controller]
 model = "PID"
 measured = "pressure"
-commanded = { model = "SplitRange", positive = "fill", negative = "discharge" }
+commanded = {{ model = "SplitRange", positive = "fill", negative = "discharge" }}
 gain = "1.5 1/bar"          # a careful gain
 integral_time = 0.6
 sample_time = "10 ms"
@@ -64,7 +51,7 @@ sample_time = "10 ms"
 pressure = [["0 s", "1 bar"], ["0.1 s", "2 bar"]]
 [run]
 duration = "0.3 s"
-initial_state = { pressure = "1 bar" }
+initial_state = {{ pressure = "1 bar" }}
 """
 FEW = ["--budget", "64", "--draws", "1"]
 """Eight sets of gains in seven cases."""

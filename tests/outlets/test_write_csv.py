@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from airmuscle.core.errors import FileError
@@ -41,7 +41,6 @@ def test_a_written_recording_is_read_back_bit_identical(tmp_path: Path):
     assert back.constants == written.constants
 
 
-@settings(max_examples=50, deadline=None)
 @given(
     force=st.lists(st.floats(-1e15, 1e15), min_size=1, max_size=5),
     rest=st.floats(1e-3, 20.0),

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.optimize import brentq
@@ -41,7 +41,6 @@ from airmuscle.reproduce.saga2007_muscle import (
 from airmuscle.reproduce.saga2007_previous import Ferraresi2001, previous_model_claims
 from airmuscle.reproduce.saga2007_tables import virtual_work
 
-UNHURRIED = settings(deadline=None)  # a law is traced at its first call
 LINES = {"A": LINE_A, "B": LINE_B}
 AT = np.array([0.001, 0.01, 0.05, 0.10, 0.20, 0.35])
 # w, q, line, load N: MPa at AT
@@ -91,7 +90,6 @@ def test_pressures_of_every_reading(w, q, name, force):
     assert np.round(found, 4).tolist() == list(PRINTED[w, q, name, force])
 
 
-@UNHURRIED
 @given(law=READINGS, contraction=st.floats(1e-4, 0.41), force=st.floats(0, 300))
 def test_it_is_equation_19_letter_for_letter(law, contraction, force):
     expected = letter_for_letter(law, contraction, force)
@@ -121,14 +119,12 @@ def test_the_exact_mechanics_reading_agrees_with_its_reference():
     assert np.round(found, 6).tolist() == [0.095430, 0.096585, 0.101415, 0.115607, 0.136510, 0.168392]
 
 
-@UNHURRIED
 @given(law=READINGS, contraction=st.floats(1e-3, 0.40), force=st.floats(0, 300))
 def test_force_and_pressure_are_each_others_inverse(law, contraction, force):
     pressure = law.equilibrium_pressure(contraction, force)
     assert law.force(pressure, contraction) == pytest.approx(force, rel=1e-10, abs=1e-9)
 
 
-@UNHURRIED
 @given(
     contraction=st.floats(1e-3, 0.40),
     force=st.floats(0, 150),
@@ -142,7 +138,6 @@ def test_line_b_always_rises_so_that_contraction_returns(contraction, force, q, 
     assert autodiff.derivative(law, "equilibrium_pressure", contraction, force) > 0
 
 
-@UNHURRIED
 @given(law=READINGS, contraction=st.floats(1e-3, 0.40), force=st.floats(0, 300))
 def test_the_two_fibre_tensions_agree_in_balance(law, contraction, force):
     """(8) from the end section, (18) from the half shell with the minus that (9) and (19) demand."""
@@ -213,7 +208,6 @@ def test_equilibria_that_the_reference_lists():
     assert round(100 * other.contraction, 3) == 36.511
 
 
-@UNHURRIED
 @given(law=READINGS, pressure=st.floats(0.02e6, 0.4e6), force=st.floats(0, 200))
 @example(law=interpretation(LINE_B, 1.0, 1.0), pressure=0.1e6, force=0.0)  # its leading coefficient is zero
 def test_the_quintic_holds_every_root_that_a_search_finds(law, pressure, force):
@@ -288,7 +282,6 @@ def test_what_cannot_be_is_refused():
         exact_mechanics(LINE_A).equilibria(1e5, 0.0)
 
 
-@UNHURRIED
 @given(law=READINGS, contraction=st.floats(5e-3, 0.40), pressure=st.floats(1e4, 3e5))
 def test_slopes_are_exact(law, contraction, pressure):
     slopes = law.slopes(pressure, contraction)
@@ -302,7 +295,6 @@ def test_slopes_are_exact(law, contraction, pressure):
     )
 
 
-@UNHURRIED
 @given(law=READINGS, contraction=st.floats(0.01, 0.4))
 def test_rings_are_muscles_in_series(law, contraction):
     part = replace(law, geometry=StraightFibre(law.geometry.fibre_length, 0.012, 0, Parabola()))

@@ -26,7 +26,7 @@ _predict = Kernel("predict_extended", "kalman_filter")
 _correct = Kernel("correct_extended", "kalman_filter")
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class ExtendedKalmanFilter(StateEstimator):
     """Extended Kalman filter of a plant; its fields are those of StateEstimator.
 

@@ -16,6 +16,7 @@ from ..control.controller import Controller, Measurement
 from ..core.arrays import Array
 from ..core.errors import ParameterError, SolveError
 from ..core.reference import Reference
+from ..core.short_repr import ShortRepr
 from ..core.status import Status
 from .design_checks import check_known, check_numbers
 from .state_estimator import StateEstimate, StateEstimator
@@ -53,8 +54,8 @@ class BoundSearch(NamedTuple):
     run: Any
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class FiniteControlSet(Controller):
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class FiniteControlSet(ShortRepr, Controller):
     """Finite control set model predictive control: the mode of the valves from the best of all short sequences.
 
         min over m_1 ... m_N   sum_k  sum_i ((y_i(k) - r_i)/d_i)^2  +  c s(m_(k-1), m_k)

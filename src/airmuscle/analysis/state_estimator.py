@@ -16,6 +16,7 @@ from ..control.control_loop import COMMAND
 from ..core import tree
 from ..core.arrays import Array
 from ..core.errors import ParameterError, SolveError
+from ..core.short_repr import ShortRepr
 from ..core.status import Status
 from ..core.system import System
 from ..plant.state import check_system, state_vector
@@ -65,8 +66,8 @@ class BoundFilter(NamedTuple):
     output_values: Array
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class StateEstimator(abc.ABC):
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class StateEstimator(ShortRepr, abc.ABC):
     """Interface of the filters that estimate a plant's states from columns that are measured every `sample_time` [s].
 
     measured           columns of the plant, such as ("left.pressure", "right.pressure")

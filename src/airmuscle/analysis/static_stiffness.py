@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from ..core import autodiff
 from ..core.ops import Value
+from ..core.short_repr import ShortRepr
 from ..muscle import ElasticSeriesElement, Muscle
 from ..plant.muscle_state import MuscleState
 from ..plant.plant import Plant
@@ -22,8 +23,8 @@ class StiffnessPair(NamedTuple):
     shut_valves: float
 
 
-@dataclasses.dataclass(frozen=True)
-class Stiffness:
+@dataclasses.dataclass(frozen=True, repr=False)
+class Stiffness(ShortRepr):
     """Stiffnesses of a plant at one state.
 
     muscles      of every muscle by name, -dF/deps [N]

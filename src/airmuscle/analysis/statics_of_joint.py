@@ -9,6 +9,7 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.errors import ParameterError, SolveError
+from ..core.short_repr import ShortRepr
 from ..plant.plant import Plant
 from ..pneumatics.gas import gauge_pressure
 from ..recording import Recording
@@ -19,8 +20,8 @@ from .joint_torque import TorqueFunction, TracedRow, check_joint, load_function,
 RESULTS = ("torque", "stiffness", "tension", "shut_valves")
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class JointPoints:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class JointPoints(ShortRepr):
     """Static states of a joint, arrays (N, S): S solutions for each of N points, NaN where there are fewer.
 
     angle              joint angle [rad]
@@ -46,8 +47,8 @@ class JointPoints:
         return np.asarray(np.isfinite(self.angle).sum(axis=1))
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class JointStatics:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class JointStatics(ShortRepr):
     """Statics of a plant with one angle and two muscles; made by `joint_statics`.
 
     The muscles carry the load and the torque dV/dtheta of the weights, springs and end stops of the mechanism, friction

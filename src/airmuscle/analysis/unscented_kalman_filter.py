@@ -34,7 +34,7 @@ _predict = Kernel("predict_unscented", "unscented_kalman_filter")
 _correct = Kernel("correct_unscented", "unscented_kalman_filter")
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class UnscentedKalmanFilter(StateEstimator):
     """Unscented Kalman filter of a plant; its first fields are those of StateEstimator.
 

@@ -16,6 +16,7 @@ import typer
 from typer.core import TyperGroup
 
 from ..core.errors import AirmuscleError, AirmuscleWarning, printable, suggestion
+from .completion import install_completion_classes, print_completion_script
 from .interruption import INTERRUPTED, check_interrupted, deferred_sigint
 from .option_hints import in_options
 from .terminal import echo
@@ -143,6 +144,7 @@ def _show_warning(
         show_other(message, category, *location, **options)
 
 
+install_completion_classes()
 app = typer.Typer(cls=LazyCommands, name="airmuscle", no_args_is_help=True, **SETTINGS)
 
 
@@ -159,6 +161,15 @@ def airmuscle(
     version: Annotated[
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
     ] = False,
+    completion: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SHELL",
+            callback=print_completion_script,
+            is_eager=True,
+            help="Print the completion script of bash, zsh or fish and exit.",
+        ),
+    ] = None,
 ) -> None:
     """Models, identification and simulation of pneumatic artificial muscles.
 

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from ..characteristic import ValidityRange
+from ..core.display import quantity_text
 from ..core.errors import ColumnError, IdentificationError
 from ..core.units import quantity
 from ..identify.experiment_design import BenchLimits
@@ -117,7 +118,7 @@ def _report(fit: RecursiveFit, json: bool) -> None:
         return
     echo(
         f"{fit.samples} samples, rms residual {fit.rmse:.4g} N, force determined on {fit.determined:.0%} of the range; "
-        f"next: {point.pressure / 1e3:.4g} kPa, {percent(point.contraction)} (expected "
+        f"next: {quantity_text(point.pressure, 'Pa', 'kPa')}, {percent(point.contraction)} (expected "
         f"{point.force:.4g} ± {2 * point.standard_error:.2g} N)"
     )
 

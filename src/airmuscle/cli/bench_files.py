@@ -12,13 +12,16 @@ from ..core.errors import ParameterError
 from ..library.catalogue import load_data
 from ..recording import ColumnMapping, Recording, read
 from ..recording.segment import check_contents
+from .completion import complete_data
 from .progress import reading_progress
 from .reading_options import ReadingOptions
 
 Files = Annotated[
     list[Path],
     typer.Argument(
-        metavar="FILES", help="CSV, Excel, MAT, TDMS or MDF files with pressure, contraction or length, and force."
+        metavar="FILES",
+        help="CSV, Excel, MAT, TDMS or MDF files with pressure, contraction or length, and force.",
+        autocompletion=complete_data,
     ),
 ]
 _SINGULAR = {"units": "unit", "columns": "column", "constants": "constant"}

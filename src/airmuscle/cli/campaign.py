@@ -12,25 +12,25 @@ import typer
 
 from ..core.errors import AirmuscleError, ColumnError, FileError, IdentificationError
 from ..geometry import Geometry
-from ..identify.campaign import Campaign, LeftOutStage, StaticStage, identify_campaign
+from ..identify.campaign import STAGES, Campaign, LeftOutStage, StaticStage, identify_campaign
 from ..library.campaign_entry import campaign_entry
 from ..library.entry import Entry
 from ..library.initial_law import resting_lengths
 from ..library.write import save
-from ..recording import ColumnMapping, Recording, read
-from ..recording.reader import find_files
-from ..recording.unit_consistency import check_unit_consistency
+from ..recording import ColumnMapping, Recording
+from ..recording.reader import check_bench, find_files, read_file
 from ..report.campaign_chapters import UnreadFile, ValidationRow, campaign_chapters
 from ..report.output_folder import atomic_folder, check_writable
 from ..report.write import as_json, write_into
 from ..scenario.campaign import RecordScenario, campaign_scenarios
 from .campaign_output import campaign_to_dict, print_campaign, stage_to_dict
+from .campaign_stages import KeptStages
 from .fit_geometry import braid_of_length, check_one_length, parse_braid
 from .option_hints import in_options
 from .options import Folder, Json
 from .progress import computation_progress, reading_progress
 from .reading_options import NO_OPTIONS, ReadingOptions, with_reading_options
-from .terminal import print_json
+from .terminal import echo, print_json
 
 STAGES_FILE = "stages.json"
 """File of the finished stages, which is replaced at the end of each stage."""
@@ -72,7 +72,7 @@ def campaign(
     hysteresis, static characteristic, valve and volume, and damping are identified in this order; a stage that the
     records do not allow is left out, and the report states what to measure.
     Writes DIR/report.html, DIR/muscle.toml with standard errors and correlations, and DIR/scenarios/*.toml, which
-    reproduce the records. Finished stages are kept in DIR/stages.json if the command is interrupted.
+    reproduce the records. The same command after an interruption does not fit the finished stages again.
 
     \b
     Examples:
@@ -86,8 +86,8 @@ def campaign(
     kept_aside = {path.resolve() for path in validate or ()}
     files = [path for path in find_files(folder) if path.resolve() not in kept_aside]
     recordings, unread = _read_each(files, columns, units)
-    aside = read(validate, mapping=columns, units=units) if validate else ()
-    check_unit_consistency([*recordings, *aside])
+    aside = [recording for path in find_files(validate or ()) for recording in read_file(path, columns, units)]
+    check_bench([*recordings, *aside])
     geometry = None if size is None else braid_of_length(size, _one_length(recordings))
     check_writable(out)
     result = _identify(recordings, geometry, out)
@@ -109,7 +109,7 @@ def _read_each(
         for i, path in enumerate(files):
             show("files", i / len(files))
             try:
-                recordings += read(path, mapping=mapping, units=units)
+                recordings += read_file(path, mapping, units)
             except AirmuscleError as error:
                 unread.append(UnreadFile(path.name, in_options(error.message, "campaign")))
     if not recordings:
@@ -125,18 +125,24 @@ def _one_length(recordings: Sequence[Recording]) -> float:
 
 
 def _identify(recordings: Sequence[Recording], geometry: Geometry | None, out: Path) -> Campaign:
-    """The campaign; each finished stage is written to the folder as it ends."""
-    stages: list[dict[str, Any]] = []
+    """The campaign, continued from an interrupted one; each finished stage is kept and written to the folder."""
+    kept, stages, names = KeptStages(recordings, geometry), list[dict[str, Any]](), STAGES[1:-1]
+    known = kept.load(names)
+    if known:
+        echo(f"  continued after: {', '.join(known)} (finished before the interruption)", err=True)
 
     def keep(stage: str, result: object) -> None:
         stages.append(stage_to_dict(stage, result))
+        if stage in names and stage not in known:
+            kept.save(stage, result)
         with atomic_folder(out) as folder:
             (folder / STAGES_FILE).write_text(as_json(stages), encoding="utf-8")
 
     with computation_progress("campaign") as show:
         result = identify_campaign(
-            recordings, geometry=geometry, progress=lambda _, fraction: show(fraction), finished=keep
+            recordings, geometry=geometry, progress=lambda _, fraction: show(fraction), finished=keep, known=known
         )
+    kept.remove(names)
     return _with_option_names(result)
 
 

@@ -22,6 +22,7 @@ from ..library.entry import Entry
 from ..library.initial_law import find_initial_law
 from ..library.law_file import load_law
 from ..library.write import save
+from .completion import complete_law
 from .options import Json, Name
 from .terminal import echo, percent, print_json, print_table
 
@@ -31,7 +32,11 @@ LIMIT_UNITS = {"min_pressure": "Pa", "max_pressure": "Pa", "min_contraction": "1
 
 Model = Annotated[
     str,
-    typer.Argument(metavar="MODEL", help="The other model: ContractileSurface, Sarosi2012, or a library entry of it."),
+    typer.Argument(
+        metavar="MODEL",
+        help="The other model: ContractileSurface, Sarosi2012, or a library entry of it.",
+        autocompletion=complete_law,
+    ),
 ]
 Out = Annotated[
     Path | None, typer.Option("--out", metavar="FILE", help="Muscle file to write, with the other characteristic.")

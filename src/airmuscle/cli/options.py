@@ -7,9 +7,15 @@ from typing import Annotated
 
 import typer
 
+from .completion import complete_entry
+
 Name = Annotated[
     str,
-    typer.Argument(metavar="NAME", help="A library entry, a unique prefix of its name, or a muscle file (TOML)."),
+    typer.Argument(
+        metavar="NAME",
+        help="A library entry, a unique prefix of its name, or a muscle file (TOML).",
+        autocompletion=complete_entry,
+    ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON in SI units instead of a table.")]
 RestingLength = Annotated[

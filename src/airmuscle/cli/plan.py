@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from ..characteristic import ValidityRange
+from ..core.display import quantity_text
 from ..core.units import quantity
 from ..identify.experiment_design import BenchLimits, ExperimentPlan, PlannedRun, optimal_design
 from ..library.law_file import load_law
@@ -78,7 +79,7 @@ def _write(design: ExperimentPlan, out: Path) -> None:
 
 
 def _format(name: str, value: float) -> str:
-    return f"{value / 1e3:.4g} kPa" if name == "pressure" else percent(value)
+    return quantity_text(value, "Pa", "kPa") if name == "pressure" else percent(value)
 
 
 def _row(number: int, run: PlannedRun) -> tuple[str, ...]:

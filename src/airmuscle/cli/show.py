@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from ..core import cite, leaves
+from ..core.display import in_display_unit
 from ..library.catalogue import load
 from ..library.entry import Entry
 from ..library.files import entries_of_product
@@ -107,7 +108,7 @@ def _print(entry: dict[str, Any]) -> None:
     echo("components: " + ", ".join(f"{part} {model}" for part, model in entry["models"].items()) + "\n")
     rows = [
         (p["name"], p["symbol"], format_number(p["value"]), _unit(p["unit"]), p["meaning"], _bounds(p["bounds"]))
-        for p in _shorten(entry["parameters"])
+        for p in map(_displayed, _shorten(entry["parameters"]))
     ]
     print_table(("parameter", "symbol", "value", "unit", "meaning", "bounds"), rows, right=("value",))
     if "laws" in entry:
@@ -144,6 +145,16 @@ def _shorten(parameters: list[dict[str, Any]]) -> list[dict[str, Any]]:
         elif position == 2:
             rows.append({**parameter, "name": f"... {count - 3} more", "value": "", "meaning": ""})
     return rows
+
+
+def _displayed(parameter: dict[str, Any]) -> dict[str, Any]:
+    """A parameter with value and bounds in the unit chosen for display."""
+    factor, unit = in_display_unit(1.0, parameter["unit"])
+    if factor == 1.0:
+        return parameter
+    value = parameter["value"] * factor if parameter["value"] != "" else ""
+    bounds = [None if bound is None else bound * factor for bound in parameter["bounds"]]
+    return {**parameter, "value": value, "unit": unit, "bounds": bounds}
 
 
 def _unit(unit: str) -> str:

@@ -15,6 +15,7 @@ from ..report.output_folder import atomic_folder, check_writable
 from ..report.run_chapter import run_chapter
 from ..report.write import write_into
 from ..scenario.scenario import Scenario, load_scenario
+from .completion import complete_plant
 from .options import Folder, Json
 from .terminal import echo, print_json, print_table
 
@@ -25,6 +26,7 @@ def simulate(
         typer.Argument(
             metavar="SCENARIO.toml",
             help="A file with [plant], [input] and [run], or the name of a plant of the library.",
+            autocompletion=complete_plant,
         ),
     ],
     out: Folder = Path("run"),

@@ -12,6 +12,7 @@ import typer
 from ..characteristic import Characteristic, ForceLaw, ValidityRange
 from ..characteristic.validity_range import validity_range_of
 from ..core import leaves
+from ..core.display import quantity_text
 from ..core.errors import AirmuscleWarning, GeometryLimitError, PhysicsError, RatingError, SolveError
 from ..core.plotting import save
 from ..core.units import quantity
@@ -19,15 +20,10 @@ from ..library.entry import Entry
 from ..library.law_file import load_law
 from ..library.scaling import scale_entry
 from ..muscle import Ratings
+from ..muscle.isobars import WorkingPoint, compute_isobars
 from ..pneumatics import Ambient
 from ..pneumatics.gas import check_above_vacuum
-from ..report.isobar_plot import (
-    WorkingPoint,
-    compute_isobars,
-    describe_point,
-    isobar_plot,
-    isobar_table,
-)
+from ..report.isobar_plot import describe_point, isobar_plot, isobar_table
 from ..report.output_folder import atomic_folder
 from ..report.write import save_table
 from .options import Diameter, Json, Name, OptionalFolder, RestingLength
@@ -109,7 +105,7 @@ def _check_contraction(characteristic: Characteristic, contraction: float) -> No
         hint = f" For a percentage, write '{contraction:g} %'." if as_percentage else ""
         raise GeometryLimitError(
             f"--contraction: {100 * contraction:.6g} % is outside the range of {type(characteristic).__name__}, "
-            f"{100 * low:.4g} to {percent(high)}.{hint}"
+            f"{100 * low:.4g} to {100 * high:.4g} %.{hint}"
         )
 
 
@@ -157,14 +153,16 @@ def _resting_length(entry: Entry) -> float | None:
 
 def _rows(entry: Entry, point: WorkingPoint, unknown: str) -> list[tuple[str, str, str]]:
     values = {
-        "pressure": f"{point.pressure / 1e3:.6g} kPa",
+        "pressure": quantity_text(point.pressure, "Pa", "kPa", 6),
         "contraction": percent(point.contraction),
-        "force": f"{point.force:.6g} N",
+        "force": quantity_text(point.force, "N", "N", 6),
     }
     remarks = {"pressure": "gauge"}
     length = _resting_length(entry)
     if length:
-        remarks["contraction"] = f"{1e3 * length * point.contraction:.4g} mm of {1e3 * length:.6g} mm"
+        remarks["contraction"] = (
+            f"{quantity_text(length * point.contraction, 'm', 'mm')} of {quantity_text(length, 'm', 'mm', 6)}"
+        )
     rows = [
         (name, value, "; ".join(filter(None, (remarks.get(name, ""), "solved" if name == unknown else ""))))
         for name, value in values.items()

@@ -10,13 +10,18 @@ import typer
 
 from ..studio import export_page, serve
 from ..studio.single_file import open_sheets
+from .completion import complete_law
 from .terminal import echo
 
 
 def studio(
     names: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[NAME]...", help="Muscles or laws to open: library entries or muscle files (TOML)."),
+        typer.Argument(
+            metavar="[NAME]...",
+            help="Muscles or laws to open: library entries or muscle files (TOML).",
+            autocompletion=complete_law,
+        ),
     ] = None,
     port: Annotated[int, typer.Option(help="Port of the server; 0 stands for any free one.")] = 8765,
     host: Annotated[

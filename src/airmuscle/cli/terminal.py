@@ -10,6 +10,7 @@ from typing import Any
 
 import typer
 
+from ..core.display import chosen_scale, heading_scale, scaled_numbers
 from ..core.errors import printable
 from ..report.write import as_json
 
@@ -35,13 +36,21 @@ def print_table(headers: Sequence[str], rows: Iterable[Sequence[Any]], *, right:
     from rich.table import Table
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, header_style="bold")
+    scales = [heading_scale(header) for header in headers]  # the units chosen for display
     for i, header in enumerate(headers):  # the first column is not wrapped, so that its names can be copied
         justify: Any = "right" if header in right else "left"
-        table.add_column(without_markup(header), justify=justify, overflow="fold", no_wrap=i == 0)
+        table.add_column(without_markup(scales[i][1]), justify=justify, overflow="fold", no_wrap=i == 0)
     for row in rows:
-        table.add_row(*(cell if hasattr(cell, "plain") else without_markup(str(cell)) for cell in row))
+        table.add_row(*(_cell(cell, factor) for cell, (factor, _) in zip(row, scales, strict=True)))
     width = None if sys.stdout.isatty() or "COLUMNS" in os.environ else WIDE
     Console(width=width, highlight=False, emoji=False).print(table)
+
+
+def _cell(cell: Any, factor: float) -> Any:
+    """A cell for rich; the numbers of a text are multiplied by a factor other than 1."""
+    if hasattr(cell, "plain"):
+        return cell
+    return without_markup(str(cell) if factor == 1.0 else scaled_numbers(str(cell), factor))
 
 
 def without_markup(text: str) -> str:
@@ -52,5 +61,6 @@ def without_markup(text: str) -> str:
 
 
 def percent(ratio: float) -> str:
-    """A ratio as a percentage with four significant digits: `12.5 %`."""
-    return f"{100 * ratio:.4g} %"
+    """A contraction with four significant digits: `12.5 %`, or in the unit chosen for display."""
+    factor, unit = chosen_scale("1", 100.0, "%")
+    return f"{factor * ratio:.4g} {'' if unit == '1' else unit}".rstrip()

@@ -12,6 +12,7 @@ from .dead_zone import DeadZoneController
 from .decentralised import Decentralised
 from .driver import PWM, Driver, SolenoidDriver
 from .feed_forward import StaticFeedForward
+from .friction_feed_forward import FrictionFeedForward
 from .gain_schedule import GainSchedule
 from .hysteresis_compensation import HysteresisCompensation
 from .hysteresis_operator import HysteresisOperator, InverseHysteresisOperator
@@ -25,6 +26,7 @@ from .piecewise_linear import PiecewiseLinear
 from .proportional_feedback import ProportionalFeedback
 from .sensors import ColumnSensor, WithSensors
 from .setpoint_command import SetpointCommand
+from .setpoint_delay import WithSetpointDelay
 from .setpoint_lead import SetpointLead
 from .sigma_delta import SigmaDelta
 from .siso import SisoController
@@ -55,6 +57,7 @@ __all__ = [
     "DeadZoneController",
     "Decentralised",
     "Driver",
+    "FrictionFeedForward",
     "GainSchedule",
     "HysteresisCompensation",
     "HysteresisOperator",
@@ -85,6 +88,7 @@ __all__ = [
     "WithDrivers",
     "WithFeedForward",
     "WithSensors",
+    "WithSetpointDelay",
     "WithStuckValve",
     "spline_trajectory",
 ]

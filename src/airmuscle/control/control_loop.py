@@ -12,6 +12,7 @@ import numpy as np
 
 from ..core.annotation import abridged
 from ..core.errors import ParameterError, suggestion
+from ..core.short_repr import ShortRepr
 from ..recording.recording import Recording
 from .controller import Controller
 from .driver import Driver
@@ -44,8 +45,8 @@ class ControlLoopState(NamedTuple):
     drivers: Mapping[str, tuple[Any, ...]]
 
 
-@dataclasses.dataclass(frozen=True)
-class ControlLoop:
+@dataclasses.dataclass(frozen=True, repr=False)
+class ControlLoop(ShortRepr):
     """A sampled control loop: every `sample_time` [s], from the start of a run, the controller measures and commands.
 
     setpoint      an InputSignal whose names are the controller's set points,

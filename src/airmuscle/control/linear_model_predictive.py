@@ -13,6 +13,7 @@ import numpy.typing as npt
 from ..core.arrays import Array
 from ..core.errors import AirmuscleError
 from ..core.reference import Reference
+from ..core.short_repr import ShortRepr
 from .condensed_problem import CondensedProblem
 from .controller import Measurement
 from .multivariable import MultivariableController
@@ -86,8 +87,8 @@ class TargetMap:
         return f"TargetMap({len(self.controlled)} set points, {len(self.columns)} limited columns)"
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class LinearModelPredictive(MultivariableController):
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class LinearModelPredictive(ShortRepr, MultivariableController):
     """Linear model predictive control (MPC): the first input of the plan that minimises a quadratic cost.
 
         x^_k = x^-_k + L (y_k - y_0 - C x^-_k),   x^ = (x, d)                      observer with disturbances d

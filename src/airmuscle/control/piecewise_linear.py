@@ -10,13 +10,14 @@ import numpy as np
 
 from ..core.arrays import FEW, Array, all_finite
 from ..core.errors import ParameterError
+from ..core.short_repr import ShortRepr
 
 Segment = tuple[float, float, float]
 """A segment of a single input: its end [s], the value at its start, the slope [1/s]."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class PiecewiseLinear:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class PiecewiseLinear(ShortRepr):
     """Inputs in time: ends (S,) of the segments, inputs at the start of each (S, m), and their slopes [1/s] (S, m)."""
 
     ends: Array

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import ParameterError
+from ..core.short_repr import ShortRepr
 from .driver import Driver
 from .inputs import InputSignal, check_input_names, check_input_signal
 from .piecewise_linear import PiecewiseLinear, Segment, merge_columns
@@ -18,8 +19,8 @@ _ROUNDING = 1e-9
 _FULL = 1 + _ROUNDING
 
 
-@dataclasses.dataclass(frozen=True)
-class WithDrivers(InputSignal):
+@dataclasses.dataclass(frozen=True, repr=False)
+class WithDrivers(ShortRepr, InputSignal):
     """An input signal whose inputs, some or all, pass through drivers: one each, or several in the order of the signal.
 
     `WithDrivers(SampledSignal({"fill": ...}), {"fill": (PWM(50), SolenoidDriver(opening_delay=5e-3))})`. Inputs without

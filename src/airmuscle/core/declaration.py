@@ -15,6 +15,7 @@ import numpy as np
 
 from .annotation import abridged, conforms, describe, type_hints
 from .errors import AirmuscleWarning, ParameterError, suggestion
+from .short_repr import ShortRepr
 from .units import is_known_unit, quantity, usual_unit
 
 T = TypeVar("T")
@@ -81,7 +82,7 @@ def model(cls: type[T]) -> type[T]:
         cls.from_file = True  # type: ignore[attr-defined]
     if "__post_init__" not in cls.__dict__:
         cls.__post_init__ = _validate  # type: ignore[attr-defined]
-    return dataclasses.dataclass(frozen=True)(cls)
+    return dataclasses.dataclass(frozen=True, repr=not issubclass(cls, ShortRepr))(cls)
 
 
 def parameters(obj: Any) -> tuple[Parameter, ...]:

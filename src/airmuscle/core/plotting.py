@@ -5,6 +5,8 @@ from __future__ import annotations
 import io
 from typing import Any
 
+from .axes import relabel_in_display_units
+
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, RED, PURPLE = (
     "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7",
 )  # fmt: skip
@@ -22,7 +24,7 @@ _STYLE: Any = {
     "ytick.labelsize": 8, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
     "grid.alpha": 0.25, "grid.linewidth": 0.5, "lines.linewidth": 1.4, "lines.markersize": 4,
     "legend.frameon": False, "figure.dpi": 110, "savefig.dpi": 200, "svg.hashsalt": "airmuscle",
-    "svg.fonttype": "path",
+    "svg.fonttype": "path", "figure.autolayout": False, "figure.constrained_layout.use": False,
 }  # fmt: skip
 
 
@@ -49,24 +51,31 @@ def save(figure: Any, path: Any) -> None:
         file.write(rendered(figure, (suffix,))[suffix])
 
 
-def rendered(figure: Any, formats: tuple[str, ...] = ("svg", "png")) -> dict[str, bytes]:
-    """A figure in several formats, by format, with one layout; equal content gives identical bytes."""
+def rendered(
+    figure: Any, formats: tuple[str, ...] = ("svg", "png"), dots_per_inch: float | None = None
+) -> dict[str, bytes]:
+    """A figure in several formats, by format, with one layout; equal content gives identical bytes.
+
+    `dots_per_inch` is the resolution of an image, that of a report if None.
+    """
     import matplotlib as mpl
 
+    relabel_in_display_units(figure.axes)
     _apply_text_style(figure)
     files = {}
     layout = figure.get_layout_engine()
     with mpl.rc_context(_STYLE):
-        if layout is not None:  # `savefig` would compute it anew for each format
+        if layout is not None and dots_per_inch is None:  # with an engine, `savefig` would draw the figure once more
             figure.draw_without_rendering()
-            figure.set_layout_engine("none")
+            figure.set_layout_engine(None)
         try:
             for name in formats:
                 buffer = io.BytesIO()
-                figure.savefig(buffer, format=name, metadata={"Date": None} if name == "svg" else None)
+                options = {"dpi": dots_per_inch} if dots_per_inch else {}
+                figure.savefig(buffer, format=name, metadata={"Date": None} if name == "svg" else None, **options)
                 files[name] = buffer.getvalue()
         finally:
-            if layout is not None:
+            if layout is not None and dots_per_inch is None:
                 figure.set_layout_engine(layout)
     return files
 

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from typing import Any
 
+from .display import current_units, display
 from .errors import InputError
 
 _stop_event: Any = None
@@ -39,7 +40,8 @@ def process_pool(workers: int, *, one_thread_each: bool = False, terminate: bool
         return
     context = multiprocessing.get_context("spawn")  # a forked copy of a process with threads may deadlock
     stop_event = context.Event()
-    executor = _ProcessPool(workers, mp_context=context, initializer=_initialise_worker, initargs=(stop_event,))
+    executor = _ProcessPool(workers, mp_context=context, initializer=_initialise_worker,
+                            initargs=(stop_event, current_units()))  # fmt: skip
     try:
         with _one_thread_each() if one_thread_each else contextlib.nullcontext():
             executor.submit(os.getpid)  # starts the workers
@@ -95,8 +97,10 @@ def _sigint_blocked() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _initialise_worker(stop_event: Any) -> None:
-    """Make a worker ignore SIGINT, which its parent handles, and exit together with its parent."""
+def _initialise_worker(stop_event: Any, units: tuple[str, ...] | None) -> None:
+    """Make a worker ignore SIGINT, which its parent handles, exit with its parent, and have its display units."""
+    if units is not None:
+        display(*units)
     global _stop_event  # noqa: PLW0603  set once, at the start of the worker
     _stop_event = stop_event
     threading.Thread(target=_exit_with_parent, name="parent watchdog", daemon=True).start()

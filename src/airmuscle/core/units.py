@@ -40,7 +40,10 @@ _FACTORS: dict[str, tuple[float, str]] = {
     "N/m": (1.0, "N/m"), "N/mm": (1e3, "N/m"), "J": (J, "J"), "m3/(s Pa)": (1.0, "m3/(s Pa)"),
     "dm3/(s bar)": (1e-8, "m3/(s Pa)"), "m3/s": (1.0, "m3/s"), "l/min": (1e-3 / 60.0, "m3/s"),
     "cm3": (1e-6, "m3"), "cm^3": (1e-6, "m3"), "N/bar": (1e-5, "N/Pa"), "MPa/m": (1e6, "Pa/m"),
-    "GPa/m^2": (1e9, "Pa/m^2"), "MPa/m^3": (1e6, "Pa/m^3"),
+    "GPa/m^2": (1e9, "Pa/m^2"), "MPa/m^3": (1e6, "Pa/m^3"), "mm/s": (1e-3, "m/s"), "deg/s": (degree, "rad/s"),
+    "g/s": (1e-3, "kg/s"), "dm3": (1e-3, "m3"), "l": (1e-3, "m3"), "N m": (1.0, "N m"), "Nm": (1.0, "N m"),
+    "rad/s": (1.0, "rad/s"), "m/s^2": (1.0, "m/s^2"), "mm/s^2": (1e-3, "m/s^2"), "rad/s^2": (1.0, "rad/s^2"),
+    "N m/rad": (1.0, "N m/rad"),
 }  # fmt: skip
 """Factors of common units, tested against pint, whose registry takes 0.4 s to load."""
 
@@ -58,6 +61,11 @@ _GAUGE_OR_ABSOLUTE = re.compile(
     re.IGNORECASE,
 )
 _SPELLING = {"pa": "Pa", "hpa": "hPa", "kpa": "kPa", "mpa": "MPa"}
+
+
+def known_factor(unit: str, default: Any = math.nan) -> Any:
+    """Factor of a common unit to SI, `default` if the unit is not among them."""
+    return _FACTORS[unit][0] if unit in _FACTORS else default
 
 
 @dataclasses.dataclass(frozen=True)
@@ -83,8 +91,9 @@ def _registry() -> Any:
 
 
 def _to_pint_syntax(unit: str) -> str:
-    """Return a unit in the syntax of pint: `m3/(s Pa)` becomes `m**3/(s*Pa)`."""
-    powers = re.sub(r"([A-Za-z])\^?(\d)", r"\1**\2", unit.replace("³", "3").replace("²", "2"))
+    """Return a unit in the syntax of pint: `m3/(s Pa)` becomes `m**3/(s*Pa)`; the kilopond kp is kgf."""
+    unit = re.sub(r"\bkp\b", "kgf", unit.replace("³", "3").replace("²", "2"))
+    powers = re.sub(r"([A-Za-z])\^?(\d)", r"\1**\2", unit)
     return re.sub(r"(?<=[\w)])\s+(?=[\w(])", "*", powers).replace("%", "percent").replace("°C", "degC")
 
 

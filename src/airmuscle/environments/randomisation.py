@@ -14,6 +14,7 @@ import numpy.typing as npt
 from ..core import tree
 from ..core.arrays import Array
 from ..core.errors import ParameterError, suggestion
+from ..core.short_repr import ShortRepr
 from ..library.uncertainty import ParameterUncertainty
 from .task import EnvironmentTask
 
@@ -81,8 +82,8 @@ class FactorRange(UniformRange):
         return nominal * self._draw(uniform)
 
 
-@dataclasses.dataclass(frozen=True)
-class FitUncertainty(Randomisation):
+@dataclasses.dataclass(frozen=True, repr=False)
+class FitUncertainty(ShortRepr, Randomisation):
     """Normal distribution about the fitted values with the covariance of the fit, from a muscle file.
 
     uncertainty  standard errors and correlations of a muscle file: `am.load(PATH).uncertainty`

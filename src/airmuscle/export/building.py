@@ -1,4 +1,4 @@
-"""Building of exported C with the compiler of the machine: a program, its output, and the size of its code."""
+"""Building of exported C with a compiler of the machine: a program, its output, and the size of its code and stack."""
 
 from __future__ import annotations
 
@@ -14,16 +14,20 @@ from .compiler import find_compiler, run_command
 
 @dataclasses.dataclass(frozen=True)
 class BuiltProgram:
-    """Output of an exported program, and the bytes of its machine code and constants with optimisation for size.
+    """Output of an exported program, and the bytes of its code and stack with optimisation for size.
 
-    output     standard output
-    messages   standard error
-    code_size  [bytes] of the source without `main.c`; None where the program `size` is missing
+    output      standard output
+    messages    standard error
+    code_size   [bytes] machine code and constants of the sources without `main.c`; None where the program `size` is
+                missing
+    stack_size  [bytes] of the functions of the sources without `main.c` together, without those of the C library; None
+                where it is not known
     """
 
     output: str
     messages: str
     code_size: int | None
+    stack_size: int | None = None
 
 
 def build_and_run(sources: Sequence[Path]) -> BuiltProgram:
@@ -36,18 +40,33 @@ def build_and_run(sources: Sequence[Path]) -> BuiltProgram:
         f". The sources are in {sources[0].parent}; install gcc or clang, or compile them elsewhere: cc -O2 {files} "
         "-lm -o program. JavaScript and Octave need no compiler."
     )
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory(prefix="airmuscle-") as folder:
         program, units = Path(folder) / "program", [str(p) for p in sources if p.suffix == ".c"]
         run_command([compiler, "-std=c99", "-O2", "-ffp-contract=off", *units, "-o", str(program), "-lm"])
         done = run_command([str(program)])
-        return BuiltProgram(done.stdout, done.stderr, _code_size(compiler, sources, Path(folder)))
+        code, _ = measure_sizes([compiler], shutil.which("size"), sources, Path(folder))
+        return BuiltProgram(done.stdout, done.stderr, code)
 
 
-def _code_size(compiler: str, sources: Sequence[Path], folder: Path) -> int | None:
-    size, target = shutil.which("size"), folder / "program.o"
-    source = next((p for p in sources if p.suffix == ".c" and p.name != "main.c"), None)
-    if size is None or source is None:
-        return None
-    run_command([compiler, "-std=c99", "-Os", "-ffp-contract=off", "-c", str(source), "-o", str(target)])
-    numbers = re.search(r"^\s*(\d+)", run_command([size, str(target)]).stdout, re.MULTILINE)
-    return int(numbers.group(1)) if numbers else None
+def measure_sizes(
+    command: Sequence[str], size: str | None, sources: Sequence[Path], folder: Path
+) -> tuple[int | None, int | None]:
+    """The bytes of machine code and constants, and of the stack, of sources without `main.c`, optimised for size.
+
+    command  compiler and its options
+    size     the program `size` of the compiler
+    """
+    units = [p for p in sources if p.suffix == ".c" and p.name != "main.c"]
+    if not units:
+        return None, None
+    code, stack = 0, 0
+    options = ["-std=c99", "-Os", "-ffp-contract=off", "-fstack-usage", "-c"]
+    for unit in units:
+        target = folder / f"{unit.stem}.o"
+        run_command([*command, *options, str(unit), "-o", str(target)])
+        numbers = re.search(r"^\s*(\d+)", run_command([size, str(target)]).stdout, re.MULTILINE) if size else None
+        code += int(numbers.group(1)) if numbers else 0
+        usage = target.with_suffix(".su")
+        text = usage.read_text() if usage.exists() else ""
+        stack += sum(int(n) for n in re.findall(r"\t(\d+)\t", text))
+    return code or None, stack or None

@@ -11,12 +11,12 @@ from ..compile.text.c import CBody
 
 WIDTH = 116
 _PLAIN = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 _.,:;[](){}<>+-*/=^%!'|~#$@&")
-_BODY = CBody()
+_BODIES = {number: CBody(number=number) for number in ("double", "float")}
 
 
-def c_number(value: float) -> str:
-    """A double; it is read back bit by bit."""
-    return _BODY.constant(float(value)).strip("()")
+def c_number(value: float, number: str = "double") -> str:
+    """A double, which is read back bit by bit, or the nearest float."""
+    return _BODIES[number].constant(float(value)).strip("()")
 
 
 def c_string(text: str) -> str:
@@ -30,15 +30,17 @@ def c_strings(declaration: str, texts: Iterable[str]) -> str:
     return f"{declaration} = {{{_wrapped([*map(c_string, texts), c_string('')])}}};\n"
 
 
-def c_array(declaration: str, values: Any, padding: int = 0) -> str:
-    """An array (N,) or a table (N, m) of numbers, each row with so many zeros at its end."""
+def c_array(declaration: str, values: Any, padding: int = 0, number: str = "double") -> str:
+    """An array (N,) or a table (N, m) of a type of numbers, each row with so many zeros at its end."""
     table = np.asarray(values, dtype=float)
-    rows: Sequence[Any] = table.tolist()
-    zeros = ["0.0"] * padding
     if table.ndim == 1:
-        return f"{declaration} = {{{_wrapped([*map(c_number, rows), *zeros])}}};\n"
-    texts = [f"{{{', '.join([*map(c_number, row), *zeros])}}}" for row in rows]
+        return f"{declaration} = {{{_wrapped(_numbers(table.tolist(), padding, number))}}};\n"
+    texts = [f"{{{', '.join(_numbers(row, padding, number))}}}" for row in table.tolist()]
     return f"{declaration} = {{{_wrapped(texts)}}};\n"
+
+
+def _numbers(values: Sequence[float], padding: int, number: str) -> list[str]:
+    return [c_number(value, number) for value in (*values, *[0.0] * padding)]
 
 
 def c_integers(declaration: str, values: Sequence[Any]) -> str:

@@ -24,11 +24,17 @@ def compile_library(sources: Mapping[str, bytes], units: Sequence[str], name: st
 
     Raises ParameterError where there is no compiler, FileError where it fails.
     """
-    compiler = find_compiler()
+    return compile_with([find_compiler()], sources, units, name, more)
+
+
+def compile_with(
+    command: Sequence[str], sources: Mapping[str, bytes], units: Sequence[str], name: str, more: Sequence[str] = ()
+) -> bytes:
+    """The same with a compiler and its first arguments."""
     with tempfile.TemporaryDirectory(prefix="airmuscle-") as folder:
         for file, text in sources.items():
             (Path(folder) / file).write_bytes(text)
-        run_command([compiler, *OPTIONS, *units, "-o", name, *more, "-lm"], folder)
+        run_command([*command, *OPTIONS, *units, "-o", name, *more, "-lm"], folder)
         return (Path(folder) / name).read_bytes()
 
 

@@ -9,30 +9,37 @@ import numpy as np
 
 from ..control.control_loop import MEASURED
 from ..simulation import Problem, solve
+from ..simulation.batch.precision import Double, Precision, Single
 from ..simulation.sampled_loop import prepare_loop
-from .printed_controller import check_control_law, print_controller
+from .printed_controller import check_control_law, check_single_precision, print_controller
 from .targets import program_name
 from .write import checked_name, write_files
 
 
 def write_controller(
-    problem: Problem, folder: str | Path, *, name: str = "", title: str = "", tunable: Sequence[str] = ()
-) -> tuple[Path, ...]:
+    problem: Problem, folder: str | Path, *, name: str = "", title: str = "", tunable: Sequence[str] = (),
+    precision: Precision = Double(),
+) -> tuple[Path, ...]:  # fmt: skip
     """Write the control law of a problem as C99 for a microcontroller; returns the paths of its files.
 
     problem  a plant with a ControlLoop; the run is simulated, and its measurements are the data of the replay
     tunable  paths of the parameters that remain variables; none by default: all are constants of the program
+    precision  Double(), or Single() for a processor that computes with floats alone
 
     The function is `NAME_step(memory, measurement, setpoint, command)`. Sample time and ranges of the commands are
-    constants. The program `main.c` replays the measurements of the run and compares the commands bit by bit with those
-    of the same operations in IEEE 754 double precision. Raises ParameterError for a problem without a controller or a
-    controller that is not a ControlLaw, SimulationError if the run fails, and FileError.
+    constants. The program `main.c` replays the measurements of the run. In double precision it compares the commands
+    bit by bit with those of the same operations in IEEE 754; in single precision they differ from these by at most 1e-4
+    of the range of the command. Raises ParameterError for a problem without a controller, a controller that is not a
+    ControlLaw, and one that single precision changes by more; SimulationError if the run fails, and FileError.
     """
     loop = check_control_law(problem)
     prepared = prepare_loop(problem, loop.init(problem.start_time))
     printed = print_controller(prepared, checked_name(name) or program_name(title or type(loop.controller).__name__),
-                               title, tunable)  # fmt: skip
+                               title, tunable, "float" if precision == Single() else "double")  # fmt: skip
     recording = solve(problem).raise_if_incomplete().recording
     rows = np.searchsorted(recording["time"], prepared.instants[:-1] - 1e-9 * loop.sample_time)
     measured = np.column_stack([recording[f"{MEASURED}{column}"][rows] for column in loop.controller.measured_columns])
-    return write_files(printed.files(printed.replay(measured, prepared.setpoint_values)), folder)
+    samples = printed.replay(measured, prepared.setpoint_values)
+    if precision == Single():
+        check_single_precision(printed, samples, loop.sample_time)
+    return write_files(printed.files(samples), folder)

@@ -7,8 +7,6 @@ import hashlib
 import html
 import io
 import json
-import platform
-import sys
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -22,9 +20,9 @@ from ..simulation import Problem
 from ..simulation.integrators import Rodas4
 from .c_source import CSource
 from .c_text import c_array, c_number, c_string, c_strings
-from .compiler import compile_library
 from .fmi_description import FmuDescription
 from .fmi_variables import first_inputs, make_variables
+from .platforms import Platform, this_platform
 from .provenance import block_comment
 from .targets import ExportedRun
 from .templates import filled, template
@@ -53,18 +51,18 @@ NOTE = (
 class WrittenFmu:
     """An FMU that has been written.
 
-    platform  the folder of its binary, such as `linux64`; empty for an FMU that contains sources only
-    remark    why there is no binary; empty if there is one
+    platforms  the folders of its binaries, such as `linux64`; none for an FMU that contains sources only
+    remark     why there is no binary; empty if there is one
     """
 
     path: Path
-    platform: str
+    platforms: tuple[str, ...]
     remark: str
 
 
 def write_fmu(
     problem: Problem, path: str | Path, *, fmi: int = 3, name: str = "", title: str = "",
-    tunable: Sequence[str] | None = None, binary: bool = True,
+    tunable: Sequence[str] | None = None, binary: bool = True, platforms: Sequence[Platform] = (),
 ) -> WrittenFmu:  # fmt: skip
     """Write a system as an FMU, with its sources and a binary for this machine.
 
@@ -73,6 +71,7 @@ def write_fmu(
     name     identifier of the model; by default the title
     tunable  paths of the parameters that are variables of the FMU; all by default, the others become constants
     binary   False: sources only. Without a C compiler the FMU contains sources only, which `remark` states
+    platforms  instead of this machine, platforms for which zig compiles the binaries; it needs the package ziglang
 
     The FMU contains no Python. The same arguments and version give the same file on one machine and compiler. Raises
     ParameterError for what cannot be exported, which it names, and FileError.
@@ -84,13 +83,13 @@ def write_fmu(
         raise ParameterError(f"write_fmu: '{target.name[:80]}' must end in .fmu, as importers expect.")
     program = make_run(problem, name=name, title=title, tunable=tunable, notes=[NOTE])
     files = fmu_files(program, fmi)
-    folder, remark = "", "none was requested"
+    folders, remark = list[str](), "none was requested"
     if binary:
-        folder, library, remark = _binary(program.name, fmi, files)
-        files |= library
+        folders, libraries, remark = _binaries(program.name, fmi, files, platforms)
+        files |= libraries
     with atomic_folder(target.parent) as staging:
         (staging / target.name).write_bytes(_archive(files))
-    return WrittenFmu(target, folder, remark)
+    return WrittenFmu(target, tuple(folders), remark)
 
 
 def fmu_files(program: ExportedRun, fmi: int) -> dict[str, bytes]:
@@ -181,25 +180,22 @@ def _limits(system: object, columns: Sequence[str]) -> list[tuple[int, float, fl
     return found
 
 
-def _binary(name: str, fmi: int, files: Mapping[str, bytes]) -> tuple[str, dict[str, bytes], str]:
-    """Folder and file of the binary for this machine, or empty ones and the reason."""
+def _binaries(
+    name: str, fmi: int, files: Mapping[str, bytes], platforms: Sequence[Platform]
+) -> tuple[list[str], dict[str, bytes], str]:
+    """Folders and files of the binaries; without platforms that of this machine, or none and the reason."""
     sources = {file.removeprefix("sources/"): text for file, text in files.items() if file.startswith("sources/")}
-    folder, suffix = binary_platform(fmi)
-    try:
-        library = compile_library(sources, [f"fmi{fmi}.c", f"{name}.c"], f"{name}{suffix}")
-    except ParameterError as reason:
-        return "", {}, str(reason)
-    return folder, {f"binaries/{folder}/{name}{suffix}": library}, ""
-
-
-def binary_platform(fmi: int) -> tuple[str, str]:
-    """Name of the folder for binaries of this machine in FMI 2 or 3, and the suffix of its shared libraries."""
-    system = {"win32": "windows", "darwin": "darwin"}.get(sys.platform, "linux")
-    suffix = {"windows": ".dll", "darwin": ".dylib", "linux": ".so"}[system]
-    machine = {"AMD64": "x86_64", "arm64": "aarch64"}.get(platform.machine(), platform.machine())
-    if fmi == 2 and (machine == "x86_64" or system == "darwin"):
-        return {"windows": "win64", "darwin": "darwin64", "linux": "linux64"}[system], suffix
-    return f"{machine}-{system}", suffix
+    units, folders, libraries = [f"fmi{fmi}.c", f"{name}.c"], list[str](), dict[str, bytes]()
+    for target in platforms or [this_platform()]:
+        try:
+            library = target.compile(sources, units, name)
+        except ParameterError as reason:
+            if platforms:
+                raise
+            return [], {}, str(reason)
+        folders.append(target.folder(fmi))
+        libraries[f"binaries/{folders[-1]}/{name}{target.suffix}"] = library
+    return folders, libraries, ""
 
 
 def _archive(files: Mapping[str, bytes]) -> bytes:

@@ -14,6 +14,7 @@ from ..compile.program import compile_system
 from ..compile.text.c import CLanguage
 from ..core.arrays import Array
 from ..core.errors import ParameterError
+from ..core.short_repr import ShortRepr
 from ..core.tree import leaves, with_parameters
 from ..core.variables import Input
 from ..mechanism import ExternalLoad
@@ -38,8 +39,8 @@ NOTE = (
 )
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class MuscleActuator:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class MuscleActuator(ShortRepr):
     """A muscle with its valves that can be added to MuJoCo models.
 
     plant    the muscle with its circuit, and shortening and speed as inputs

@@ -28,6 +28,9 @@ from .printed_system import find_leaf
 from .provenance import block_comment, provenance
 from .templates import filled
 
+SINGLE_TOLERANCE = 1e-4
+"""Part of its range by which a command in single precision may differ from that in double precision (chosen)."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class PrintedController:
@@ -37,8 +40,11 @@ class PrintedController:
     law: ControlLaw
     inputs: dict[str, Any]
     outputs: dict[str, Any]
+    ranges: Sequence[tuple[float, float]]
     tunable: tuple[Leaf, ...]
     provenance: Sequence[str]
+    number: str = "double"
+    """Type of all numbers in C, double or float."""
 
     @property
     def code(self) -> Code:
@@ -47,7 +53,7 @@ class PrintedController:
 
     def source_files(self) -> dict[str, str]:
         """Header and source, by file name."""
-        printer = Printer(CLanguage("double", f"{self.name}_"))
+        printer = Printer(CLanguage(self.number, f"{self.name}_"))
         printer.add_code("sample", list(self.inputs), self.code, list(self.outputs))
         law = self.law
         counts = {
@@ -57,7 +63,7 @@ class PrintedController:
         places = {key: str(count) for key, count in counts.items()}
         places |= {
             "provenance": block_comment(self.provenance), "file": self.name, "enumerations": self._enumerations(),
-            "functions": printer.text[-1], "constants": self._constants(),
+            "functions": printer.text[-1], "constants": self._constants(), "number": self.number,
         }  # fmt: skip
         return {
             f"{self.name}.h": filled("controller.h", places, self.name),
@@ -72,24 +78,34 @@ class PrintedController:
 
     def files(self, samples: ReplayedSamples) -> dict[str, str]:
         """Header, source and the program that replays samples, by file name."""
-        upper = self.name.upper()
+        upper, number = self.name.upper(), self.number
+        tables = (
+            c_array(f"static const {number} measured[SAMPLES][{upper}_MEASUREMENTS + 1]", samples.measured, 1, number),
+            c_array(f"static const {number} setpoints[SAMPLES][{upper}_SETPOINTS + 1]", samples.setpoints, 1, number),
+            c_array(f"static const double commands[SAMPLES][{upper}_COMMANDS + 1]", samples.commands, 1),
+        )
         places = {
             "provenance": block_comment(self.provenance), "file": self.name, "samples": str(len(samples.measured)),
-            "tables": "".join((
-                c_array(f"static const double measured[SAMPLES][{upper}_MEASUREMENTS + 1]", samples.measured, 1),
-                c_array(f"static const double setpoints[SAMPLES][{upper}_SETPOINTS + 1]", samples.setpoints, 1),
-                c_array(f"static const double commands[SAMPLES][{upper}_COMMANDS + 1]", samples.commands, 1),
-            )),
+            "tables": "".join(tables), "tolerance": c_number(SINGLE_TOLERANCE),
+            "ranges": c_array(f"static const double ranges[{upper}_COMMANDS + 1]", self.ranges_of(samples), 1),
         }  # fmt: skip
-        return {**self.source_files(), "main.c": filled("replay.c", places, self.name)}
+        main = "replay.c" if number == "double" else "replay_single.c"
+        return {**self.source_files(), "main.c": filled(main, places, self.name)}
+
+    def ranges_of(self, samples: ReplayedSamples) -> Array:
+        """The width of the range of each command (c,); of one without limits its greatest size in the run."""
+        largest = np.abs(samples.commands).max(axis=0, initial=0.0)
+        width = np.array([high - low for low, high in self.ranges], dtype=float)
+        return np.where(np.isfinite(width), width, np.where(largest > 0.0, largest, 1.0))
 
     def _constants(self) -> str:
-        upper, memory = self.name.upper(), np.array([float(v) for v in self.law.initial_memory.values()])
+        upper, number = self.name.upper(), self.number
+        memory = np.array([float(v) for v in self.law.initial_memory.values()])
         defaults = np.array([leaf.value for leaf in self.tunable], dtype=float)
         names = [leaf.path for leaf in self.tunable]
         return "".join((
-            c_array(f"const double {self.name}_initial_memory[{upper}_MEMORY + 1]", memory, 1),
-            c_array(f"double {self.name}_parameters[{upper}_PARAMETERS + 1]", defaults, 1),
+            c_array(f"const {number} {self.name}_initial_memory[{upper}_MEMORY + 1]", memory, 1, number),
+            c_array(f"{number} {self.name}_parameters[{upper}_PARAMETERS + 1]", defaults, 1, number),
             c_strings(f"const char *const {self.name}_parameter_names[{upper}_PARAMETERS + 1]", names),
         ))  # fmt: skip
 
@@ -105,14 +121,17 @@ class PrintedController:
             text += f"enum {{ {', '.join(f'{word} = {i}' for i, word in enumerate(words))} }};\n" if words else ""
         return text
 
-    def replay(self, measured: Array, setpoints: Array) -> ReplayedSamples:
-        """The commands to measurements (K, m) and set points (K, s), from the printed instructions themselves."""
+    def replay(self, measured: Array, setpoints: Array, *, single: bool = False) -> ReplayedSamples:
+        """The commands to measurements (K, m) and set points (K, s), from the printed instructions themselves.
+
+        single  every number is rounded to single precision
+        """
         memory: list[float] = [float(value) for value in self.law.initial_memory.values()]
         parameters = [float(leaf.value) for leaf in self.tunable]
         rows, names, code = [], list(self.inputs), self.code
         for measurement, setpoint in zip(measured.tolist(), setpoints.tolist(), strict=True):
             given = {"measurement": measurement, "setpoint": setpoint, "memory": memory, "parameters": parameters}
-            body = InterpretedBody(given)
+            body = InterpretedBody(given, single)
             values = emission.computed(body, code, names, {}, {})
             for (output, index), value in values.items():
                 body.store(list(self.outputs)[output], index, value)
@@ -130,6 +149,20 @@ class ReplayedSamples:
     commands: Array
 
 
+def check_single_precision(printed: PrintedController, samples: ReplayedSamples, sample_time: float) -> None:
+    """Raise ParameterError where single precision changes a command of a run by more than SINGLE_TOLERANCE."""
+    single = printed.replay(samples.measured, samples.setpoints, single=True)
+    deviations = np.abs(single.commands - samples.commands) / printed.ranges_of(samples)
+    wrong = np.argwhere(~(deviations <= SINGLE_TOLERANCE))
+    if wrong.size:
+        k, i = map(int, wrong[0])
+        raise ParameterError(
+            f"{type(printed.law).__name__} in single precision: the command '{printed.law.inputs[i]}' differs by "
+            f"{deviations[k, i]:.2g} of its range from that in double precision, {k * sample_time:.4g} s after the "
+            f"start of the run; {SINGLE_TOLERANCE:g} is allowed. Export it in double precision."
+        )
+
+
 def check_control_law(problem: Problem) -> ControlLoop:
     """The control loop of a problem. Raises ParameterError where its controller cannot be printed, by its name."""
     loop = problem.input
@@ -144,7 +177,7 @@ def check_control_law(problem: Problem) -> ControlLoop:
 
 
 def print_controller(
-    prepared: SampledLoop, name: str, title: str = "", tunable: Sequence[str] | None = ()
+    prepared: SampledLoop, name: str, title: str = "", tunable: Sequence[str] | None = (), number: str = "double"
 ) -> PrintedController:
     """The control law of a prepared loop, with its sample time, ranges and fixed parameters as constants.
 
@@ -175,7 +208,8 @@ def print_controller(
         kinds = ", ".join(f"{key}: {value}" for key, value in loop.drivers.items())
         notes.append(f"Not part of this program: the drivers between commands and openings ({kinds}).")
     lines = provenance(title or type(law).__name__, law, notes=notes)
-    return PrintedController(name, law, inputs, outputs, tuple(known[i] for i in chosen), lines)
+    ranges = [prepared.ranges[n] for n in law.inputs]
+    return PrintedController(name, law, inputs, outputs, ranges, tuple(known[i] for i in chosen), lines, number)
 
 
 def _limited(command: Any, low: float, high: float) -> Any:

@@ -14,6 +14,7 @@ from ..core import tree
 from ..core.arrays import Array
 from ..core.errors import IdentificationError
 from ..core.hints import Hint
+from ..core.short_repr import ShortRepr
 from ..recording import Recording
 from .cross_validation import GroupSplit, LevelSplit, default_split
 from .group_refits import GroupRefits, RowIndices
@@ -26,8 +27,8 @@ _MIN_EIGENVALUE = 1e-10
 """Minimum eigenvalue of the normal matrix of a refit, in the basis in which that of all rows is 1 (chosen)."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Bootstrap:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Bootstrap(ShortRepr):
     """Parameters of every refit, shape (refits, P); a row of NaN where the drawn groups do not determine them."""
 
     fit: Fit

@@ -23,6 +23,7 @@ from ..characteristic import (
     TonduLopez2000,
 )
 from ..characteristic.base import Characteristic
+from ..core.short_repr import ShortRepr
 from ..geometry.braid import Braid
 from ..recording import Recording
 from .cross_validation import specimen_name
@@ -35,8 +36,8 @@ _INITIAL_BRAID_ANGLE = 0.45
 """Initial braid angle [rad]; the angles of fluidic muscles lie within 0.15 of it."""
 
 
-@dataclasses.dataclass(frozen=True)
-class Candidate:
+@dataclasses.dataclass(frozen=True, repr=False)
+class Candidate(ShortRepr):
     """A law to be compared: its structure and initial values, and the names of the parameters that are not fitted."""
 
     name: str

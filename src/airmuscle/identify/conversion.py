@@ -11,6 +11,7 @@ from ..characteristic.base import Characteristic
 from ..characteristic.validity_range import ValidityRange
 from ..core.arrays import Array
 from ..core.errors import IdentificationError, SolveError
+from ..core.short_repr import ShortRepr
 from ..recording import Recording
 from .censoring import UNCENSORED
 from .static_fit import fit
@@ -19,8 +20,8 @@ GRID_POINTS = 24
 """Grid points in pressure and in contraction for the fit; the error is evaluated on a grid with one more of each."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class ModelConversion:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class ModelConversion(ShortRepr):
     """The fitted target model, and its error in force over the validity range."""
 
     model: Characteristic

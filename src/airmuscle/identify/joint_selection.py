@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 
 from ..core.errors import IdentificationError
+from ..core.short_repr import ShortRepr
 from ..recording import Recording
 from .candidate_scores import RankedModel
 from .candidates import Candidate
@@ -18,8 +19,8 @@ MAX_EXCESS = 0.05
 """Maximum excess of the error of a simpler law over the lowest one, for each purpose (chosen)."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class JointSelection:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class JointSelection(ShortRepr):
     """One law for two purposes, with its errors relative to the lowest ones; `print` it."""
 
     comparisons: tuple[Comparison, ...]

@@ -15,6 +15,7 @@ import numpy as np
 from ..characteristic.base import Characteristic
 from ..core.arrays import Array
 from ..core.errors import IdentificationError, ParameterError
+from ..core.short_repr import ShortRepr
 from ..recording import Recording
 from .candidates import blank_surface
 from .cross_validation import specimen_name
@@ -41,8 +42,8 @@ _STEP = 1e-4
 _ITERATIONS = 6
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class LengthError:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class LengthError(ShortRepr):
     """The estimated error of the resting length of one specimen; all SI."""
 
     specimen: str

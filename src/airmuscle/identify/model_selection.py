@@ -9,6 +9,7 @@ import numpy as np
 
 from ..core.errors import IdentificationError
 from ..core.hints import HintedText
+from ..core.short_repr import ShortRepr
 from ..recording import Recording
 from .candidate_scores import ExcludedModel, RankedModel, Score, points_of_splits
 from .candidates import Candidate, standard_candidates, unavailable_candidates
@@ -18,8 +19,8 @@ from .loss import LeastSquares, Loss
 from .parallel_scores import score_candidates
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Comparison:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Comparison(ShortRepr):
     """The ranked models, lowest cross-validated error first, and the excluded candidates; `print` it."""
 
     ranking: tuple[RankedModel, ...]

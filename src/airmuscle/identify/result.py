@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import html
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,7 +12,9 @@ import numpy.typing as npt
 from ..characteristic.base import Characteristic
 from ..characteristic.validity_range import ValidityRange
 from ..core.arrays import Array
+from ..core.display import contraction_text, in_display_unit, quantity_text
 from ..core.errors import ParameterError, suggestion
+from ..core.notebook import Card, NotebookDisplay
 from ..recording import Recording
 from .correlation_index import CorrelationIndex
 from .loss import Loss
@@ -56,8 +57,8 @@ class WorstPoint:
     force: float
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Fit:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Fit(NotebookDisplay):
     """A fitted characteristic with its data and statistics; `print` it, or `.plot()` it.
 
     Residuals are in the fitted quantity. `rmse`, `correlation_index` and `sigma` are over the uncensored rows,
@@ -158,10 +159,14 @@ class Fit:
         ranges = self.data_ranges
         return ValidityRange(*ranges["pressure"], *ranges["contraction"])
 
-    def plot(self) -> Any:
-        """Modelled against measured values, and the residuals; a Matplotlib figure."""
+    def plot(self, *, ax: Any = None) -> Any:
+        """Plot the modelled against the measured values, and the residuals.
+
+        `ax` is an Axes for the values, or a sequence of two, also for the residuals, and is returned; without it a new
+        figure is returned. Raises ParameterError for another `ax`.
+        """
         quantity = self.fitted_quantity.name
-        return plot_fit(quantity, self.recording[quantity], self.modelled, self.censoring != 0, self._title)
+        return plot_fit(quantity, self.recording[quantity], self.modelled, self.censoring != 0, self._title, ax=ax)
 
     @property
     def _title(self) -> str:
@@ -175,12 +180,13 @@ class Fit:
     def summary(self) -> list[tuple[str, str]]:
         """The goodness of fit as pairs of a name and a text with units."""
         worst = self.max_error
-        point = f"at {worst.pressure / 1e3:.4g} kPa, {worst.contraction:.2%}, {worst.force:.4g} N"
+        point = f"at {_point_text(worst.pressure, worst.contraction, worst.force)}"
         undefined = "undefined, because the measured values do not vary"
         index = undefined if self.correlation_index is None else str(self.correlation_index)
         r2 = undefined if self.r2 is None else f"{self.r2:.6f}"
         ranges = self.data_ranges
-        (p0, p1), (c0, c1), (f0, f1) = ranges["pressure"], ranges["contraction"], ranges["force"]
+        (p0, p1), (f0, f1) = ranges["pressure"], ranges["force"]
+        contractions = " to ".join(contraction_text(c) for c in ranges["contraction"])
         return [
             ("rows", f"{self.rows_used} used, {self.rows_censored} of them censored; {self.rows_dropped} dropped"),
             ("rms error", self.format_residual(self.rmse)),
@@ -189,32 +195,46 @@ class Fit:
             ("R2", r2),
             ("correlation index", index),
             ("rank, condition", f"{self.rank} of {len(self.estimates)}, {self.condition:.3g}"),
-            ("data range", f"{p0 / 1e3:.4g} to {p1 / 1e3:.4g} kPa, {c0:.2%} to {c1:.2%}, {f0:.4g} to {f1:.4g} N"),
+            ("data range", f"{_range_text(p0, p1, 'Pa', 'kPa')}, {contractions}, {_range_text(f0, f1, 'N', 'N')}"),
         ]
 
     def format_residual(self, residual: float) -> str:
         """A residual [SI] as text in the usual unit of the fitted quantity."""
         if self.fitted_quantity is FORCE:
-            return f"{residual:.4g} N"
-        return f"{residual:.4%}" if self.fitted_quantity is CONTRACTION else f"{residual / 1e3:.4g} kPa"
+            return quantity_text(residual, "N", "N")
+        if self.fitted_quantity is CONTRACTION:
+            return contraction_text(residual, ".4%")
+        return quantity_text(residual, "Pa", "kPa")
 
-    def _repr_html_(self) -> str:
-        cells = "".join(
-            f"<tr><td>{html.escape(e.name)}</td><td>{html.escape(e.label)}</td>"
-            f"<td>{e.value:.6g} &plusmn; {e.format_interval()}</td>"
-            f"<td>{html.escape(e.display_unit)}</td><td>{html.escape(e.meaning)}</td></tr>"
-            for e in self.estimates
+    def _card(self) -> Card:
+        lines = [f"{name}: {text}" for name, text in self.summary()]
+        return Card(
+            self._title, estimate_rows(self.estimates), self.plot, ["; ".join(lines[:4]), *lines[4:], *self.notes]
         )
-        lines = "<br>".join(f"{name}: {html.escape(text)}" for name, text in self.summary())
-        notes = "".join(f"<br>{html.escape(note)}" for note in self.notes)
-        head = f"<b>{html.escape(self._title)}</b>"
-        titles = "<tr><th>parameter</th><th></th><th>value &plusmn; 2 SE</th><th>unit</th><th>meaning</th></tr>"
-        return f"{head}<table>{titles}{cells}</table>{lines}{notes}"
+
+
+def _point_text(pressure: float, contraction: float, force: float) -> str:
+    texts = (quantity_text(pressure, "Pa", "kPa"), contraction_text(contraction), quantity_text(force, "N", "N"))
+    return ", ".join(texts)
+
+
+def _range_text(low: float, high: float, si_unit: str, default: str) -> str:
+    """A range as text with its unit behind the upper limit."""
+    return f"{quantity_text(low, si_unit, default).partition(' ')[0]} to {quantity_text(high, si_unit, default)}"
+
+
+def estimate_rows(estimates: Sequence[Estimate]) -> list[tuple[str, ...]]:
+    """The rows of a table of estimates in display units, with its header; SE is the standard error."""
+    rows: list[tuple[str, ...]] = [("parameter", "", "value", "2 SE", "unit", "meaning")]
+    for e in estimates:
+        value, unit = in_display_unit(e.value, e.unit)
+        shown = dataclasses.replace(e, value=value, stderr=in_display_unit(e.stderr, e.unit)[0], unit=unit)
+        rows.append((e.name, e.label, f"{value:.6g}", shown.format_interval(), shown.display_unit, e.meaning))
+    return rows
 
 
 def estimate_table(estimates: Sequence[Estimate]) -> list[str]:
     """The lines of a text table of estimates; SE is the standard error."""
-    rows = [("parameter", "", "value", "2 SE", "unit", "meaning")]
-    rows += [(e.name, e.label, f"{e.value:.6g}", e.format_interval(), e.display_unit, e.meaning) for e in estimates]
+    rows = estimate_rows(estimates)
     widths = [max(len(row[i]) for row in rows) for i in range(5)]
     return ["  ".join([*(c.ljust(w) for c, w in zip(row, widths, strict=False)), row[5]]).rstrip() for row in rows]

@@ -35,8 +35,8 @@ from .valve_entry import ValveEntry
 
 
 def load(name_or_path: str | Path) -> Entry | ValveEntry | PlantEntry | ProductEntry:
-    """A library entry (muscle, law, valve, plant or product) by its name or a unique beginning of it, or a file by its
-    path.
+    """A library entry (muscle, law, valve, plant or product) by its name or a unique beginning of it, in any case, or a
+    file by its path.
 
     In a plant, write `.muscle` of an Entry, and `.valve` or `.exhaust` of a ValveEntry; a PlantEntry contains a
     `.plant`. Raises UnknownNameError,

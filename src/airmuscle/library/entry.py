@@ -12,6 +12,7 @@ from ..core.reference import Reference
 from ..friction.base import Friction
 from ..geometry.base import Geometry
 from ..muscle import CreepElements, Damper, Muscle, Ratings, SeriesElement, Spring, Stop, Wall
+from .entry_display import EntryDisplay
 from .uncertainty import ParameterUncertainty
 
 OPTIONAL_PARTS = ("spring", "damper", "friction", "wall", "series", "stop", "creep")
@@ -36,8 +37,8 @@ class Check:
     source: str
 
 
-@dataclasses.dataclass(frozen=True)
-class Entry:
+@dataclasses.dataclass(frozen=True, repr=False)
+class Entry(EntryDisplay):
     """Library entry of a muscle or a law, all numbers SI; `muscle` is the Muscle for use in a plant.
 
     `provenance` is the origin of the numbers (printed, measured, secondary source, fitted, chosen), `warning` a

@@ -58,16 +58,35 @@ def list_data() -> tuple[str, ...]:
 
 
 def complete_name(name: str, known: Iterable[str], kind: str) -> str:
-    """The known name that equals or uniquely begins with `name`. Raises UnknownNameError, listing the known names."""
+    """The known name that equals or uniquely begins with `name`, in any case and with blanks or "_" for "-".
+
+    Raises UnknownNameError, listing the known names and suggesting a similar one, or those that contain `name`.
+    """
     known = tuple(known)
     if name in known:
         return name
-    matches = [candidate for candidate in known if name and candidate.startswith(name)]
+    folded = _folded(name)
+    if folded in known:
+        return folded
+    matches = [candidate for candidate in known if folded and candidate.lower().startswith(folded)]
     if len(matches) > 1:
         raise UnknownNameError(f"'{name}' is ambiguous: {', '.join(matches)}. Write more of the name.")
     if not matches:
-        raise UnknownNameError(f"no {kind} '{name}'; there are {', '.join(known)}.{suggestion(name, known)}")
+        hint = suggestion(folded, known) or _names_with(folded, known)
+        raise UnknownNameError(f"no {kind} '{name}'; there are {', '.join(known)}.{hint}")
     return matches[0]
+
+
+def _folded(name: str) -> str:
+    """A name in the spelling of the library: lower case, with hyphens."""
+    return "-".join(name.lower().replace("_", " ").split())
+
+
+def _names_with(part: str, known: Iterable[str]) -> str:
+    """A sentence with up to three names that contain `part` or one of its words; empty if there are none."""
+    words = [word for word in (part, *part.split("-")) if len(word) > 2]
+    found = list(dict.fromkeys(name for word in words for name in known if word in name.lower()))[:3]
+    return f" Did you mean {' or '.join(repr(name) for name in found)}?" if found else ""
 
 
 def is_path(name_or_path: str | Path) -> bool:

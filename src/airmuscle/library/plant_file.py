@@ -26,6 +26,7 @@ from ..muscle import Muscle
 from ..plant.plant import Plant
 from .build import TEXT_KEYS, build, read_entry_texts
 from .entry import MISSING_GEOMETRY, Entry, issue_warning
+from .entry_display import EntryDisplay
 from .files import PLANTS, complete_name, list_plants, read_toml
 from .law_file import load_law
 from .location import Location, check_keys, check_type, located_errors, read_finite_number, read_text
@@ -42,8 +43,8 @@ SIZES = ("resting_length", "diameter")
 """Sizes to which a table that names a library entry may scale its muscle."""
 
 
-@dataclasses.dataclass(frozen=True)
-class PlantEntry:
+@dataclasses.dataclass(frozen=True, repr=False)
+class PlantEntry(EntryDisplay):
     """Plant of the library, all numbers SI.
 
     `sources` are pairs of a path in the file, such as mechanism.radius, and the source of the numbers under it:
@@ -58,6 +59,12 @@ class PlantEntry:
     warning: str = ""
     sources: tuple[tuple[str, str], ...] = ()
     references: tuple[Reference, ...] = ()
+
+    def _table(self) -> list[tuple[str, ...]]:
+        return [tuple(row) for row in self.plant._card().table]
+
+    def _chart(self) -> Any:
+        return self.plant._card().draw
 
 
 def build_plant_entry(tables: Mapping[str, Any], name: str, file: Path, folder: Path) -> PlantEntry:

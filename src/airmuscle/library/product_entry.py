@@ -21,13 +21,14 @@ from ..core.errors import ParameterError
 from ..core.reference import Reference
 from ..muscle import Ratings
 from .build import TEXT_KEYS, build, read_entry_texts
+from .entry_display import EntryDisplay
 from .files import PRODUCTS, complete_name, list_products, read_toml
 from .location import Location, check_keys, check_type, located_errors, read_text
 from .references import read_references
 
 
-@dataclasses.dataclass(frozen=True)
-class ProductEntry:
+@dataclasses.dataclass(frozen=True, repr=False)
+class ProductEntry(EntryDisplay):
     """Library entry of a commercial muscle: permitted values in SI units, with provenance, note and sources.
 
     It has no characteristic; the entries of muscles and laws that were measured on this product refer to it.
@@ -40,6 +41,9 @@ class ProductEntry:
     note: str = ""
     warning: str = ""
     references: tuple[Reference, ...] = ()
+
+    def _table(self) -> list[tuple[str, ...]]:
+        return [("permitted", "range"), *((row.quantity, str(row)) for row in self.ratings.ranges())]
 
 
 def load_product(name: str) -> ProductEntry:

@@ -10,6 +10,7 @@ from ..core.reference import Reference
 from ..pneumatics.gas import REFERENCE_DENSITY, REFERENCE_TEMPERATURE
 from ..pneumatics.orifice import Orifice
 from .entry import Check
+from .entry_display import EntryDisplay
 
 PATHS = ("valve", "exhaust")
 """Flow paths through a valve that a file may describe; the first is the default."""
@@ -23,8 +24,8 @@ class SwitchingTimes:
     closing_delay: float = parameter("s", "t_off", "time from the command to close until closed", bounds=(0.0, 1.0))
 
 
-@dataclasses.dataclass(frozen=True)
-class ValveEntry:
+@dataclasses.dataclass(frozen=True, repr=False)
+class ValveEntry(EntryDisplay):
     """Library entry of a valve, all numbers SI; `valve` and `exhaust` are the orifices for use in a circuit.
 
     `provenance` is the origin of the numbers, `note` states what was published and how it was converted. A check is a

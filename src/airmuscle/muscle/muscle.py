@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from ..characteristic.base import Characteristic, ForceLaw
 from ..characteristic.contractile_surface import HOSOVSKY_HILL
@@ -14,6 +14,7 @@ from ..core import autodiff, ops
 from ..core.annotation import abridged
 from ..core.declaration import model
 from ..core.errors import ParameterError
+from ..core.notebook import Card, NotebookDisplay
 from ..core.ops import Value
 from ..core.reference import Reference
 from ..core.variables import StateVariable
@@ -21,6 +22,7 @@ from ..friction.base import Friction, NoFriction
 from ..geometry.base import Geometry
 from .creep import CreepElements
 from .damper import Damper, LinearDamper
+from .display import component_rows, plot_isobars
 from .ratings import Ratings
 from .series import ElasticSeriesElement, RigidSeriesElement, SeriesElement
 from .series_equilibrium import solve_inner_contraction, without_derivative
@@ -43,7 +45,7 @@ class MuscleForce(NamedTuple):
 
 
 @model
-class Muscle:
+class Muscle(NotebookDisplay):
     """Hill-type muscle with a pneumatic port (p, V) and a mechanical port (F, v).
 
         F = max(0, F_KE(p, eps) - F_PP(p, eps) - F_TL(p, eps, v) - F_R - F_C) - F_S
@@ -79,6 +81,17 @@ class Muscle:
     def ideal(cls, geometry: Geometry, name: str = "muscle") -> Muscle:
         """An energy-conserving muscle: its tension follows from its volume by the principle of virtual work."""
         return cls(VirtualWork(geometry), geometry, name=name)
+
+    def plot(self, pressures: Any = None, *, ax: Any = None) -> Any:
+        """Plot the tension of the contractile element over the contraction at gauge pressures [Pa], or at round ones.
+
+        `ax` is a Matplotlib Axes and is returned; without it a new figure is returned. Raises ParameterError.
+        """
+        title = f"{self.name}: {type(self.contractile).__name__}"
+        return plot_isobars(self.contractile, title, self.validity_range, pressures=pressures, ax=ax)
+
+    def _card(self) -> Card:
+        return Card(f"Muscle {self.name}", [("component", "value"), *component_rows(self)], self.plot)
 
     def check(self) -> None:
         kinds = {"contractile": Characteristic, "geometry": Geometry, "spring": Spring, "damper": Damper, "wall": Wall,

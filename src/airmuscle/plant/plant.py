@@ -22,6 +22,7 @@ from ..pneumatics.ports import key_by_muscle, key_by_port
 from ..recording import Recording
 from . import diagnostics
 from .animation import Animation
+from .display import PlantDisplay
 from .drawing import scene_of
 from .evaluation import PlantEvaluation
 from .muscle_state import MuscleState, air_states, muscle_outputs, muscle_state, states_of_muscle
@@ -34,7 +35,7 @@ _ROUNDING = 1e-3
 
 
 @model
-class Plant(System):
+class Plant(PlantDisplay, System):
     """Ordinary differential equations of muscles, valves and load. Air mass [kg] is the state, pressure an output.
 
     `muscle` is one or a tuple. `circuit` is a tuple with one for each muscle, or a single one that feeds them all.

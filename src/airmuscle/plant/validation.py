@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from ..core.declaration import check_structure
+import numpy as np
+
+from ..characteristic.validity_range import ValidityRange
+from ..core.declaration import check_structure, parameters
 from ..core.errors import ParameterError, TraceError
 from ..mechanism import Mechanism
 from ..muscle import Muscle
@@ -25,7 +28,8 @@ def check_parts(
     for field, part, kind in parts:
         _check_kind(field, part, kind)
     _check_closed_form(muscles)
-    _check_validity_ranges(muscles)
+    for muscle in muscles:
+        _check_validity_limits(muscle.contractile)
     check_structure((tuple(muscles), tuple(circuits), mechanism))
     for each in circuits:
         check_not_shared(f"Plant: its {type(each).__name__}", each.supply)
@@ -33,10 +37,19 @@ def check_parts(
     _check_counts(muscles, circuit, circuits, mechanism)
 
 
-def _check_validity_ranges(muscles: Sequence[Muscle]) -> None:
-    """Raise ParameterError for a law whose validity range is impossible, which a run would need for its notes."""
-    for muscle in muscles:
-        getattr(muscle.contractile, "validity_range", None)
+def _check_validity_limits(characteristic: Any) -> None:
+    """Raise ParameterError if a limit of a law's validity range is beyond its bounds; a limit may be a column (N,)."""
+    for declared in parameters(ValidityRange):
+        limit = getattr(characteristic, declared.name, None)
+        if limit is None:
+            return
+        (low, high), smallest, largest = declared.bounds, float(np.min(limit)), float(np.max(limit))
+        if not low <= smallest <= largest <= high:
+            unit = "" if declared.unit == "1" else f" {declared.unit}"
+            raise ParameterError(
+                f"{type(characteristic).__name__}.{declared.name} ({declared.symbol}, {declared.meaning}) is "
+                f"{smallest if smallest < low else largest:g}{unit}; allowed range: {low:g} to {high:g}{unit}."
+            )
 
 
 def check_unique(names: Sequence[str]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ..core.display import chosen_scale
 from .columns import quantity_of
 
 _DISPLAY_UNITS = {
@@ -12,8 +13,15 @@ _DISPLAY_UNITS = {
 
 
 def display_scale(name: str) -> tuple[float, str]:
-    """Factor and unit in which a column is displayed; the unit is empty for an unknown quantity."""
+    """Factor and unit in which a column is displayed, chosen or usual; the unit is empty for an unknown quantity.
+
+    Raises FileError or UnitError for an invalid configuration file.
+    """
     quantity = quantity_of(name)
     if quantity is None:
         return 1.0, ""
-    return _DISPLAY_UNITS.get(name.rpartition(".")[2], (1.0, "-" if quantity.unit == "1" else quantity.unit))
+    usual = _DISPLAY_UNITS.get(name.rpartition(".")[2], (1.0, "-" if quantity.unit == "1" else quantity.unit))
+    if quantity.unit == "1" and usual[1] != "%":  # an opening is not a contraction
+        return usual
+    factor, unit = chosen_scale(quantity.unit, *usual)
+    return factor, "-" if unit == "1" else unit

@@ -21,6 +21,7 @@ from .constants import collect_constants, constant_from_column, parse_constant_n
 from .heading import UNIT_SPELLINGS, Heading, find_quantity_name, parse_heading
 from .plausibility import check_plausible
 from .recording import Recording
+from .repeated_columns import check_unique, without_repeated_columns
 from .table import Cells, RawTable
 from .time_base import RecordedTime, TimeBase
 
@@ -34,6 +35,7 @@ def interpret(
     A constant that is the name of a quantity, `length`, gives a column with this value in every row.
     Raises ColumnError or UnitError; the message names file, row, value and remedy.
     """
+    table = without_repeated_columns(table)
     held = {name: value for name, value in constants.items() if _is_quantity(name)}
     run_constants = collect_constants(table, {n: value for n, value in constants.items() if n not in held})
     headings = resolve_headings(table, units)
@@ -107,7 +109,7 @@ def resolve_headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]
         Heading(h.text, h.name, user_units.get(h.name, user_units.get(h.text)) or below or h.unit, h.known)
         for h, below in zip(parsed, [*row, *[""] * (len(parsed) - len(row))], strict=False)
     ]
-    _check_unique(table, headings)
+    check_unique(table, headings)
     if not any(heading.known for heading in headings):
         raise _no_known_column(table, headings)
     return headings
@@ -122,18 +124,6 @@ def _override_notes(table: RawTable, headings: list[Heading]) -> list[str]:
         for h, unit in zip(headings, own, strict=True)
         if unit and h.unit and unit != h.unit
     ]
-
-
-def _check_unique(table: RawTable, headings: list[Heading]) -> None:
-    texts: dict[str, str] = {}
-    for heading in headings:
-        if heading.name in texts and heading.text:
-            raise ColumnError(
-                f"{table.origin}: columns '{texts[heading.name]}' and '{heading.text}' both contain the "
-                f"{heading.name}. Rename or delete one of them; for several muscles, write 'left.{heading.name}' and "
-                f"'right.{heading.name}'."
-            )
-        texts[heading.name] = heading.text
 
 
 def _no_known_column(table: RawTable, headings: list[Heading]) -> ColumnError:

@@ -14,9 +14,14 @@ from .file_kind import check_regular_file
 Result = TypeVar("Result")
 
 
+def is_installed(name: str) -> bool:
+    """Whether a package is installed; it is not imported."""
+    return importlib.util.find_spec(name) is not None
+
+
 def check_lab_package(name: str, path: Path) -> None:
     """Raise FileError with the install command if a package is missing; the package is not imported."""
-    if importlib.util.find_spec(name) is None:
+    if not is_installed(name):
         raise _missing_package(name, path)
 
 

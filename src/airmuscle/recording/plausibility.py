@@ -56,7 +56,7 @@ def _check_ordered(table: RawTable, time: Array) -> None:
     not_increasing = np.diff(time) <= 0
     if not_increasing.any():
         row = int(np.argmax(not_increasing)) + 1
-        hints = () if (np.diff(time) < 0).any() else (UNIFORM, AS_RECORDED, WITHOUT_TIME)
+        hints = (WITHOUT_TIME,) if (np.diff(time) < 0).any() else (UNIFORM, AS_RECORDED, WITHOUT_TIME)
         relation = "repeats the time" if time[row] == time[row - 1] else "is less than the time"
         message = (
             f"{table.location(row)}: time {time[row]:.9g} s {relation} of the previous row ({time[row - 1]:.9g} s). "

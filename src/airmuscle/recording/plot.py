@@ -1,29 +1,119 @@
-"""Plot of the columns of a recording over time, one axis each."""
+"""Plot of the columns of a recording over time, one panel for each physical quantity."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import textwrap
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from ..core.arrays import Array
-from ..core.plotting import LINES, new_figure
+from ..core.axes import given_axes
+from ..core.display import chosen_scale
+from ..core.plotting import BLACK, DASHES, LINES, legend_outside, new_figure
 from .display_units import display_scale
+from .panels import Curve, Panel, panels_of
+
+PANELS_IN_A_COLUMN = 7
+"""Maximum number of panels below each other; more are plotted in two columns."""
+MAX_LEGEND = 6
+"""Maximum number of curves that a legend names one by one; of more it names the colours and the line styles."""
+_SUPERSCRIPTS = {ord("^"): None, ord("2"): "²", ord("3"): "³"}
 
 
-def plot_columns(columns: Mapping[str, Array], time: Array | None, title: str) -> Any:
-    """A Matplotlib figure of columns (N,) over `time` (N,) [s], or over the row number if there is no time."""
-    count = max(len(columns), 1)
-    figure, axes = new_figure(count, 1, height=0.7 + 1.15 * count, sharex=True, squeeze=False)
-    style = {"linestyle": "-"} if time is not None else {"linestyle": "none", "marker": "o", "markersize": 2.5}
-    for i, (name, values) in enumerate(columns.items()):
-        axis = axes[i, 0]
-        factor, unit = display_scale(name)
-        abscissa = time if time is not None else np.arange(1, len(values) + 1)
-        axis.plot(abscissa, values * factor, color=LINES[i % len(LINES)], **style)
-        axis.set_ylabel(f"{name}\n[{unit}]" if unit else name)
-    axes[-1, 0].set_xlabel("time [s]" if time is not None else "row")
+def plot_columns(
+    columns: Mapping[str, Array],
+    time: Array | None,
+    title: str,
+    *,
+    ax: Any = None,
+    units: Mapping[str, str] | None = None,
+    ordered: bool = True,
+    limit: int | None = None,
+) -> Any:
+    """Plot columns (N,) over `time` (N,) [s], or over the row number if there is no time.
+
+    ax       Axes for the panels: one, or a sequence; None makes a figure
+    units    SI units of columns that are no known quantity, by name
+    ordered  whether the panels are in the usual order of the quantities
+    limit    maximum number of panels
+
+    Returns `ax`, or the Matplotlib figure. Raises ParameterError if `ax` contains too few Axes.
+    """
+    panels = panels_of(columns, units or {}, ordered=ordered)[:limit]
+    if ax is not None:
+        _draw(panels, columns, time, given_axes(ax, len(panels), f"plot of {title}"))
+        return ax
+    rows = len(panels) if len(panels) <= PANELS_IN_A_COLUMN else -(-len(panels) // 2)
+    sides = 1 if rows == len(panels) else 2
+    size = {"width": 6.9 if sides == 1 else 12.0, "height": 0.7 + 1.25 * max(rows, 1)}
+    figure, axes = new_figure(max(rows, 1), max(sides, 1), sharex=True, squeeze=False, **size)
+    below = list(axes.T.ravel())  # the panels go down the columns
+    _draw(panels, columns, time, below)
+    for unused in below[max(len(panels), 1) :]:
+        unused.remove()
+        below[rows - 1].set_xlabel(below[len(panels) - 1].get_xlabel())
     figure.align_ylabels()
-    figure.suptitle(title, fontsize=9)
+    figure.suptitle(textwrap.shorten(title, 110, placeholder=" …"), fontsize=9)
     return figure
+
+
+def _draw(panels: Sequence[Panel], columns: Mapping[str, Array], time: Array | None, axes: Sequence[Any]) -> None:
+    """Draw each panel into its axes; the lowest axes of each column have the label of the abscissa."""
+    parts = list(dict.fromkeys(curve.part for panel in panels for curve in panel.curves))
+    for panel, axis in zip(panels, axes, strict=False):
+        factor, unit = _scale(panel)
+        for curve in panel.curves:
+            values = columns[curve.name]
+            abscissa = time if time is not None else np.arange(1, len(values) + 1)
+            axis.plot(abscissa, values * factor, label=curve.label, **_style(curve, parts, time is not None))
+        axis.set_ylabel(f"{panel.title}\n[{unit.translate(_SUPERSCRIPTS)}]" if unit else panel.title)
+        if len(panel.curves) > 1:
+            handles = axis.get_lines()[-len(panel.curves) :] if len(panel.curves) <= MAX_LEGEND else _key(panel, parts)
+            legend_outside(axis, handles=handles, fontsize=7, handlelength=1.6, labelspacing=0.25)
+        subplot = axis.get_subplotspec()
+        if subplot is None or subplot.is_last_row() or axis is axes[len(panels) - 1]:
+            axis.set_xlabel("time [s]" if time is not None else "row")
+
+
+def _key(panel: Panel, parts: Sequence[str]) -> list[Any]:
+    """Handles of a legend of many curves: the colour of each part, and the line style of each kind of curve."""
+    from matplotlib.lines import Line2D
+
+    colours = {
+        c.part: Line2D([], [], label=(c.part or "plant").replace("_", " "), color=_colour(c, parts))
+        for c in panel.curves
+    }
+    styles: dict[str, Any] = {}
+    for curve in panel.curves:
+        name = curve.role or curve.name.rpartition(".")[2].replace("_", " ")
+        styles.setdefault(name, Line2D([], [], label=name, **{**_style(curve, parts, True), "color": BLACK}))
+    return [*colours.values(), *(styles.values() if len(styles) > 1 else ())]
+
+
+def _colour(curve: Curve, parts: Sequence[str]) -> str:
+    return LINES[parts.index(curve.part) % len(LINES)]
+
+
+def _scale(panel: Panel) -> tuple[float, str]:
+    """Factor and display unit of a panel."""
+    factor, unit = display_scale(panel.quantity)
+    if unit or not panel.unit:
+        return factor, unit
+    usual = {"Pa": (1e-3, "kPa"), "1": (1.0, "-")}
+    return chosen_scale(panel.unit, *usual.get(panel.unit, (1.0, panel.unit))) if panel.unit != "1" else usual["1"]
+
+
+def _style(curve: Curve, parts: Sequence[str], has_time: bool) -> dict[str, Any]:
+    """Line style: one colour for each part; a set point is dashed, a measurement and a command are thin."""
+    colour = _colour(curve, parts)
+    if not has_time:
+        return {"linestyle": "none", "marker": "o", "markersize": 2.5, "color": colour}
+    if curve.role == "lagged set point":
+        return {"color": colour, "linestyle": ":", "linewidth": 1.0}
+    if curve.role == "set point":
+        return {"color": BLACK if len(parts) == 1 else colour, "linestyle": (0, (4, 2)), "linewidth": 1.0}
+    if curve.role:
+        return {"color": colour, "linewidth": 0.7, "alpha": 0.6, "linestyle": DASHES[curve.variant % len(DASHES)]}
+    return {"color": colour, "linestyle": DASHES[curve.variant % len(DASHES)], "linewidth": 1.4}

@@ -1,7 +1,7 @@
 """Reader of MATLAB files, v5 to v7.3: one table for the vectors of each struct, and for those outside any struct.
 
 Also supported: a matrix next to a list of column names (`importdata` writes `data` and `colheaders`), and the
-structure with time that Simulink saves.
+structure with time that Simulink saves; tables and timetables with the package mat-io.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from ..core.errors import ColumnError, FileError, suggestion
 from ..core.hints import Hint
 from .channels import Channel, merge_channels
 from .heading import parse_heading
+from .mat_objects import READABLE, MatlabObject, find_objects, read_objects
 from .optional_dependency import import_lab_package, run_reader
 from .raw_columnar import check_no_external_links, check_own_values
 from .separate_process import read_in_separate_process
@@ -25,6 +26,8 @@ from .table import RawTable
 
 _INTERNAL_PREFIXES = ("__", "#")
 """Beginnings of names that no MATLAB variable has: header, function workspace, references, subsystem."""
+_UNNAMED = "None"
+"""Name that SciPy gives to objects."""
 
 
 def read_mat_tables(path: Path, group: str | None = None, columns: Sequence[str] = ()) -> tuple[RawTable, ...]:
@@ -52,7 +55,15 @@ def read_mat_tables_here(path: Path, group: str | None, columns: Sequence[str] =
             return dict(pymatreader.read_mat(str(path)))
 
     contents = run_reader(path, "MATLAB", read)
-    variables = {name: value for name, value in contents.items() if not name.startswith(_INTERNAL_PREFIXES)}
+    objects = find_objects(path)
+    tables = run_reader(path, "MATLAB", lambda: read_objects(path, objects))
+    unread = [each for each in objects if each.name not in tables]
+    opaque = {each.name for each in objects}
+    variables = {
+        name: value
+        for name, value in contents.items()
+        if not name.startswith(_INTERNAL_PREFIXES) and name not in opaque and name != _UNNAMED
+    } | tables
     groups = dict(_find_groups("", variables))
     if group is not None and group not in groups:
         names = ", ".join(name or "(no struct)" for name in groups)
@@ -62,13 +73,24 @@ def read_mat_tables_here(path: Path, group: str | None, columns: Sequence[str] =
     selected = groups if group is None else {group: groups[group]}
     if not selected:
         raise FileError(
-            f"{path.name}: no vector of numbers (the file contains {', '.join(variables) or 'no variables'}). Objects "
-            "of MATLAB cannot be read. Save a table T by S = table2struct(T, 'ToScalar', true); save('data.mat', 'S'), "
-            "a timeseries ts by S = struct('time', ts.Time, 'force', ts.Data); save('data.mat', 'S')."
+            f"{path.name}: no vector of numbers (the file contains "
+            f"{', '.join([*variables, *map(str, unread)]) or 'no variables'}). {_remedy(unread)}"
         )
     constants = _scalar_fields(variables)
     several = len(groups) > 1
-    return tuple(_make_table(path, name, fields, constants, several, columns) for name, fields in selected.items())
+    made = [_make_table(path, name, fields, constants, several, columns) for name, fields in selected.items()]
+    notes = tuple(f"Not read: {each}. {_remedy([each])}" for each in unread)
+    return tuple(dataclasses.replace(table, notes=(*table.notes, *notes)) for table in made)
+
+
+def _remedy(unread: Sequence[MatlabObject]) -> str:
+    """The commands of MATLAB that export the objects, and the package that reads tables."""
+    if not unread:
+        return "Save the measured columns as vectors, or as a struct with vectors."
+    commands = "; ".join(f"{each.name}: {each.export}" for each in unread)
+    readable = any(each.class_name in READABLE for each in unread)
+    package = " Tables and timetables are also read with the package mat-io: pip install mat-io." if readable else ""
+    return f"Export in MATLAB: {commands}.{package}"
 
 
 def _check_links(path: Path) -> None:

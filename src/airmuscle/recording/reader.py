@@ -21,6 +21,7 @@ from .raw_rosbag import read_rosbag_tables
 from .raw_tdms import read_tdms_tables
 from .raw_workbook import read_workbook_tables
 from .recording import Recording
+from .suspicious_values import warn_of_suspicious_values
 from .table import RawTable
 from .time_base import RecordedTime, TimeBase
 from .unit_consistency import check_unit_consistency
@@ -94,18 +95,36 @@ def read(
         columns=columns, resting_length=resting_length, ambient=ambient, specimen=specimen, delimiter=delimiter,
         decimal=decimal, sheet=sheet, group=group, constants=constants or {}, file_name=file_name,
     )  # fmt: skip
+    chosen = time_base or (column_mapping.time_base if column_mapping.time else RecordedTime(ordered))
     recordings = [
-        interpret(
-            apply_mapping(table, column_mapping),
-            units=units or {},
-            constants=column_mapping.constants_of(path),
-            time_base=time_base or (column_mapping.time_base if column_mapping.time else RecordedTime(ordered)),
-        )
+        recording
         for path in find_files(source)
-        for table in read_tables(path, column_mapping, downsampling, progress)
+        for recording in read_file(path, column_mapping, units or {}, downsampling, chosen, progress)
     ]
-    check_unit_consistency(recordings)
+    check_bench(recordings)
     return tuple(recordings)
+
+
+def read_file(
+    path: Path,
+    mapping: ColumnMapping,
+    units: Mapping[str, str],
+    downsampling: Downsampling = Decimation(),
+    time_base: TimeBase | None = None,
+    progress: Progress | None = None,
+) -> list[Recording]:
+    """The recordings in one file, as `read`; the checks across the files of a bench are those of `check_bench`."""
+    chosen = time_base or (mapping.time_base if mapping.time else RecordedTime())
+    return [
+        interpret(apply_mapping(table, mapping), units=units, constants=mapping.constants_of(path), time_base=chosen)
+        for table in read_tables(path, mapping, downsampling, progress)
+    ]
+
+
+def check_bench(recordings: list[Recording]) -> None:
+    """Check the recordings of one bench together: units (UnitError), and suspicious values (AirmuscleWarning)."""
+    check_unit_consistency(recordings)
+    warn_of_suspicious_values(recordings)
 
 
 def find_files(source: Source) -> list[Path]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import textwrap
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -10,17 +11,22 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.errors import ColumnError, ParameterError, suggestion
+from ..core.notebook import Card, NotebookDisplay
 from ..core.units import conversion
 from .columns import quantity_of
 from .heading import split_unit
 from .plot import plot_columns
+from .recording_card import recording_card
 
 if TYPE_CHECKING:
     import pandas as pd
 
+MAX_REPR = 400
+"""Maximum number of characters of the names of the columns in a representation."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Recording:
+class Recording(NotebookDisplay):
     """Columns in SI units, each of shape (N,), with common rows.
 
     columns    values by column name
@@ -67,11 +73,14 @@ class Recording:
             if name == "length" and "contraction" in self.columns:
                 return resting_length * (1.0 - self.columns["contraction"])
         known = list(self.columns)
-        remedy = (
-            " Specify the resting length to convert the length to a contraction."
-            if name == "contraction" and "length" in known
-            else ""
-        )
+        remedy = ""
+        if name == "contraction" and "length" in known:
+            remedy = " Specify the resting length to convert the length to a contraction."
+        elif name == "contraction" and "position" in known:
+            remedy = (
+                " A displacement has no stated zero and direction: if it is the shortening from the resting length L0, "
+                "write the length L0 minus the displacement, or the contraction, displacement/L0."
+            )
         raise ColumnError(
             f"{self.origin}: no column '{name}'; the columns are {', '.join(known)}.{suggestion(name, known)}{remedy}"
         )
@@ -121,11 +130,15 @@ class Recording:
 
         return pd.DataFrame({column_heading(name): values for name, values in self.columns.items()})
 
-    def plot(self, *names: str) -> Any:
-        """A Matplotlib figure of the named columns, or of all, over time, or over the row number without time."""
+    def plot(self, *names: str, ax: Any = None) -> Any:
+        """Plot the named columns, or all, over time, or over the row number without time: one panel for each quantity,
+        with set points and measurements together.
+
+        `ax` is a Matplotlib Axes, or a sequence of one for each panel; it is returned. Without it, a new figure is
+        returned. Raises ColumnError for an unknown column, ParameterError if `ax` contains too few Axes.
+        """
         columns = {name: self[name] for name in (names or self) if name != "time"}
-        time = self.columns.get("time")
-        return plot_columns(columns, time, self.origin)
+        return plot_columns(columns, self.columns.get("time"), self.origin, ax=ax, ordered=not names)
 
     def animate(self, plant: Any, speed: float = 1.0) -> Any:
         """An animation of this run of a plant: a joint of two muscles, or a load on one muscle.
@@ -140,11 +153,11 @@ class Recording:
         return plant.animate(self, speed)
 
     def __repr__(self) -> str:
-        return f"Recording({self.origin}: {len(self)} rows of {', '.join(self.columns)})"
+        shown = textwrap.shorten(", ".join(self.columns), MAX_REPR, placeholder=f" ... ({len(self.columns)} columns)")
+        return f"Recording({self.origin}: {len(self)} rows of {shown})"
 
-    def _repr_html_(self) -> str:
-        note = "".join(f"<br>{n}" for n in self.notes)
-        return f"<b>{self.origin}</b>{note}{self.to_pandas().describe().to_html(float_format='%.6g')}"
+    def _card(self) -> Card:
+        return recording_card(self, {})
 
 
 def column_heading(name: str) -> str:

@@ -31,7 +31,17 @@ class Kind(enum.Enum):
         """Description of the kind for the report."""
         return _DESCRIPTIONS[self]
 
+    def headline(self, count: int) -> str:
+        """Name of the kind behind the number of its statements."""
+        name, rest = _HEADLINES[self]
+        return f"{name}{'s' * (count != 1)} {rest}"
 
+
+_HEADLINES = {
+    Kind.CLAIM: ("claim", "of the papers"),
+    Kind.FINDING: ("comparison", "of this report"),
+    Kind.CHECK: ("check", "of the computation"),
+}
 _DESCRIPTIONS = {
     Kind.CLAIM: "claims of the paper",
     Kind.FINDING: "comparisons of this report, which the paper does not make",

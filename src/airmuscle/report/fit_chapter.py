@@ -10,10 +10,11 @@ from ..core.reference import cite
 from ..identify import Fit
 from ..identify.surface.shape import shape_violations_of_fit
 from ..library.entry import Entry
+from ..muscle.isobars import compute_isobars
 from .band_plot import band_plot
 from .chapter import Chapter, Plot, Table
 from .equation_section import equation_section
-from .isobar_plot import compute_isobars, isobar_plot
+from .isobar_plot import isobar_plot
 from .levels import is_pressure_ramp, levels_of
 from .ramp_plot import ramp_plot
 from .shape_chapter import violation_table

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.display import heading_scale, in_display_unit, scaled_numbers
 from .chapter import (
     DEPENDS,
     DIFFERS,
@@ -20,12 +21,22 @@ from .chapter import (
     AtMost,
     Claim,
     Kind,
+    Statement,
     Table,
     statements,
 )
 
 MARKS = {HOLDS: "✓", DIFFERS: "✗", DEPENDS: "±", NOT_TESTABLE: "?", NOT_PRINTED: "–"}
 """A sign next to each verdict, so that it does not depend on colour."""
+
+MEANINGS = {
+    HOLDS: "The reproduced value agrees with the expected one within the tolerance, in every reading.",
+    DIFFERS: "The reproduced value does not agree with the expected one, in any reading.",
+    DEPENDS: "It agrees in some readings of the paper and not in others.",
+    NOT_TESTABLE: "The paper compares with measurements that are lost.",
+    NOT_PRINTED: "The paper gives no value to compare with, or no value can be computed.",
+}
+"""Meaning of each verdict."""
 
 MISSING = "–"
 DIGITS = 4
@@ -34,6 +45,8 @@ P_VALUE = "p-value"
 """Header of a column of p-values."""
 SMALLEST_P = 1e-3
 """Below it a p-value is shown as a bound."""
+_VALUES = ("value (SI)", "standard error (SI)", "2 standard errors (SI)")
+"""Headers of columns whose numbers have the unit of the row."""
 _RELATIONS = {AtLeast: "≥ ", AtMost: "≤ "}
 _NUMBER = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?")
 _EXPONENT = re.compile(r"(?:\b1|(\d(?:\.\d+)?))e([-+]?)0*(\d+)\b")
@@ -125,6 +138,43 @@ def count_verdicts(claims: Iterable[Claim], kind: Kind = Kind.CLAIM) -> dict[str
     """Return the number of statements of one kind with each verdict; the cases of a statement count once."""
     verdicts = [statement.verdict for statement in statements(claims, kind)]
     return {verdict: verdicts.count(verdict) for verdict in MARKS}
+
+
+def format_verdicts(count: int, verdict: str) -> str:
+    """A number of statements or readings with their verdict: `1 holds`, `4 hold`."""
+    plural = {HOLDS: "hold", DIFFERS: "differ", DEPENDS: "depend"}
+    return f"{count} {verdict if count == 1 else plural.get(verdict, verdict)}"
+
+
+def count_readings(statement: Statement) -> str:
+    """The number of cases of a statement with each verdict: `7 readings: 4 hold, 3 differ`."""
+    verdicts = [case.verdict for case in statement.cases]
+    counts = {verdict: verdicts.count(verdict) for verdict in MARKS if verdict in verdicts}
+    texts = [format_verdicts(n, verdict) for verdict, n in counts.items()]
+    return f"{len(verdicts)} readings: {', '.join(texts)}"
+
+
+def displayed_columns(table: Table) -> dict[str, list[Any]]:
+    """The columns of a table for the page, in the units chosen for display; its file keeps the declared units."""
+    columns: dict[str, list[Any]] = {}
+    for header, values in table.columns.items():
+        factor, shown = heading_scale(header)
+        columns[shown] = [_times(value, factor) for value in np.atleast_1d(np.asarray(values, dtype=object))]
+    numbers = [name for name in columns if name in _VALUES]
+    scales = [in_display_unit(1.0, unit) for unit in columns.get("unit", [])]
+    if not numbers or all(factor == 1.0 for factor, _ in scales):
+        return columns
+    for name in numbers:
+        columns[name] = [_times(value, factor) for value, (factor, _) in zip(columns[name], scales, strict=True)]
+    columns["unit"] = [unit for _, unit in scales]
+    return {name.removesuffix(" (SI)"): values for name, values in columns.items()}
+
+
+def _times(value: Any, factor: float) -> Any:
+    """A cell of a table, or the numbers of its text, times a factor."""
+    if factor == 1.0 or value is None:
+        return value
+    return scaled_numbers(value, factor) if isinstance(value, str) else value * factor
 
 
 def table_rows(table: Table) -> list[tuple[Any, ...]]:

@@ -13,14 +13,17 @@ from typing import Any
 from .chapter import Chapter, Kind, statements
 from .formatting import (
     MARKS,
+    MEANINGS,
     P_VALUE,
+    count_readings,
     count_verdicts,
+    displayed_columns,
     format_cell,
     format_p_value,
     format_published,
     format_unit,
+    format_verdicts,
     is_number_text,
-    table_rows,
     typographic,
 )
 from .formula import symbol_formula, to_display_mathml, to_mathml, to_plain
@@ -53,7 +56,9 @@ def render_page(chapters: Sequence[Chapter], figures: Path, *, title: str, date:
         unit=format_unit,
         anchor=anchor,
         paragraphs=paragraphs,
-        rows=table_rows,
+        readings=count_readings,
+        verdicts=format_verdicts,
+        displayed=displayed_columns,
         is_numeric=is_numeric,
         is_short=is_short,
     )
@@ -68,6 +73,7 @@ def render_page(chapters: Sequence[Chapter], figures: Path, *, title: str, date:
         statements=statements,
         count_verdicts=count_verdicts,
         marks=MARKS,
+        meanings=MEANINGS,
         versions=versions(),
         zip=zip,
         image=lambda plot: image_data_uri(figures / plot.name),

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import dataclasses
 import textwrap
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from ..characteristic.base import Characteristic, ContractionLaw
+from ..characteristic.base import Characteristic
 from ..characteristic.validity_range import ValidityRange
 from ..core import plotting
-from ..core.arrays import Array
-from ..core.errors import PhysicsError
+from ..core.display import contraction_text, quantity_text
+from ..muscle.isobars import Isobars, WorkingPoint, force_axis_limit, forces_along, mask_slack
 from ..recording import Recording
 from .chapter import Plot, Table
 
@@ -23,45 +21,6 @@ PRESSURE_TOLERANCE = 0.005
 """Maximum difference between a measured point and its isobar, as a fraction of the maximum pressure (chosen)."""
 MAX_TITLE_LINES = 3
 """Maximum number of lines of a title; the rest is left out."""
-MAX_FORCE_RATIO = 8.0
-"""Maximum of the force axis as a multiple of the median force, for laws that diverge (chosen)."""
-POINTS, COARSE_POINTS = 241, 61
-"""Points of an isobar; points for a law that is slow to evaluate, and for the search of the contraction range."""
-
-
-class WorkingPoint(NamedTuple):
-    """A working point: gauge pressure [Pa], contraction [1], tension [N]."""
-
-    pressure: float
-    contraction: float
-    force: float
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Isobars:
-    """Tensions, shape (P, N) [N], at gauge pressures (P,) [Pa] and contractions (N,) [1]; NaN where undefined."""
-
-    pressures: Array
-    contractions: Array
-    forces: Array
-
-
-def compute_isobars(
-    characteristic: Characteristic,
-    validity_range: ValidityRange | None = None,
-    point: WorkingPoint | None = None,
-    pressures: Array | None = None,
-) -> Isobars:
-    """Return isobars at the given pressures [Pa].
-
-    None stands for round pressures over the validity range, or over the law's pressure range if it has none.
-    """
-    if pressures is None:
-        pressures = _isobar_pressures(characteristic, validity_range, point)
-    low, high = _contraction_axis(characteristic, validity_range, point, pressures)
-    contractions = np.linspace(low, high, POINTS if characteristic.traceable else COARSE_POINTS)
-    forces = [_forces(characteristic, float(pressure), contractions) for pressure in pressures]
-    return Isobars(pressures, contractions, np.array(forces))
 
 
 def isobar_table(curves: Isobars, name: str = "isobars") -> Table:
@@ -106,8 +65,9 @@ def isobar_plot(
 
 
 def describe_point(point: WorkingPoint) -> str:
-    """Return a working point as text in kPa, % and N."""
-    return f"{point.pressure / 1e3:.4g} kPa, {point.contraction:.2%}, {point.force:.4g} N"
+    """Return a working point as text in display units."""
+    texts = (quantity_text(point.pressure, "Pa", "kPa"), contraction_text(point.contraction))
+    return f"{', '.join(texts)}, {quantity_text(point.force, 'N', 'N')}"
 
 
 def _draw_isobars(axes: Any, curves: Isobars, point: WorkingPoint | None, measured: Recording | None) -> None:
@@ -119,7 +79,7 @@ def _draw_isobars(axes: Any, curves: Isobars, point: WorkingPoint | None, measur
         pressure, forces = curves.pressures[i], curves.forces[i]
         if (point is not None and np.isclose(pressure, point.pressure, atol=1.0)) or not (forces > 0).any():
             continue
-        style: dict[str, Any] = {"color": shades[i], "label": f"{pressure / 1e3:.4g} kPa"}
+        style: dict[str, Any] = {"color": shades[i], "label": quantity_text(pressure, "Pa", "kPa")}
         dashes: Any = DASHES[i % len(DASHES)]
         if measured is not None:
             rows = np.abs(measured["pressure"] - pressure) <= PRESSURE_TOLERANCE * curves.pressures.max()
@@ -128,14 +88,7 @@ def _draw_isobars(axes: Any, curves: Isobars, point: WorkingPoint | None, measur
             axes.plot(100 * measured["contraction"][rows], measured["force"][rows], **marker, **points)
             axes.plot([], [], linestyle="-", linewidth=1.4, **marker, **style)  # line and marker in the legend
             style["label"], dashes = "_nolegend_", "-"
-        axes.plot(100 * curves.contractions, _mask_slack(forces), linestyle=dashes, linewidth=1.4, **style)
-
-
-def _mask_slack(forces: Array) -> Array:
-    """Return the forces with NaN beyond the point where the muscle becomes slack, where a clamped law is zero."""
-    slack = np.flatnonzero(forces == 0.0)
-    after = np.arange(forces.size) > (slack[0] if slack.size else forces.size)
-    return np.where(after & (forces == 0.0), np.nan, forces)
+        axes.plot(100 * curves.contractions, mask_slack(forces), linestyle=dashes, linewidth=1.4, **style)
 
 
 def _shade_extrapolation(axes: Any, validity_range: ValidityRange, curves: Isobars) -> None:
@@ -150,21 +103,19 @@ def _shade_extrapolation(axes: Any, validity_range: ValidityRange, curves: Isoba
 
 def _force_axis_limit(curves: Isobars, point: WorkingPoint | None, measured: Recording | None) -> float:
     """Return the maximum of the force axis [N]: all curves unless a law diverges, and all points."""
-    pulling = curves.forces[curves.forces > 0]
-    limit = MAX_FORCE_RATIO * float(np.median(pulling)) if pulling.size else 1.0
     points = [point.force] if point is not None else []
     points += [float(np.nanmax(measured["force"]))] if measured is not None else []
-    return max(1e-9, min(limit, float(pulling.max(initial=0.0))), *points)
+    return max(force_axis_limit(curves), *points, 0.0)
 
 
 def _draw_working_point(axes: Any, characteristic: Characteristic, curves: Isobars, point: WorkingPoint) -> None:
-    forces = _forces(characteristic, point.pressure, curves.contractions)
+    forces = forces_along(characteristic, point.pressure, curves.contractions)
     axes.plot(
         100 * curves.contractions,
-        _mask_slack(forces),
+        mask_slack(forces),
         color=plotting.RED,
         linewidth=2.0,
-        label=f"{point.pressure / 1e3:.6g} kPa (working point)",
+        label=f"{quantity_text(point.pressure, 'Pa', 'kPa', 6)} (working point)",
         zorder=3,
     )
     axes.plot(
@@ -176,86 +127,7 @@ def _draw_working_point(axes: Any, characteristic: Characteristic, curves: Isoba
         markeredgecolor=plotting.RED,
         markeredgewidth=1.8,
         linestyle="none",
-        label=f"working point\n{point.contraction:.2%}, {point.force:.4g} N",
+        label=f"working point\n{contraction_text(point.contraction)}, {quantity_text(point.force, 'N', 'N')}",
         zorder=4,
         clip_on=point.force < 0,
     )
-
-
-def _isobar_pressures(
-    characteristic: Characteristic, validity_range: ValidityRange | None, point: WorkingPoint | None
-) -> Array:
-    """Return round pressures [Pa] over the validity range.
-
-    Without one they extend to twice the pressure of the working point, or over the law's pressure range.
-    """
-    if validity_range is not None:
-        return _round_pressures(*validity_range.pressure)
-    low, high = characteristic.pressure_range
-    upper = 2.0 * point.pressure if point is not None and point.pressure > low else high
-    return _round_pressures(low, min(upper, high))
-
-
-def _round_pressures(low: float, high: float) -> Array:
-    """Return about seven round pressures from low to high, including the ends if they are round."""
-    from matplotlib.ticker import MaxNLocator
-
-    ticks = np.asarray(MaxNLocator(nbins=7, steps=[1, 2, 5, 10]).tick_values(low, high), dtype=float)
-    margin = 1e-9 * (high - low)
-    inside: Array = ticks[(ticks >= low - margin) & (ticks <= high + margin)]
-    return inside if inside.size > 1 else np.array([low, high])
-
-
-def _contraction_axis(
-    characteristic: Characteristic, validity_range: ValidityRange | None, point: WorkingPoint | None, pressures: Array
-) -> tuple[float, float]:
-    """Return the limits of the contraction axis [1].
-
-    They exceed the validity range by a tenth; without one they include all contractions with a positive force.
-    """
-    if validity_range is not None:
-        low, high = validity_range.contraction
-        low, high = low - 0.1 * (high - low), high + 0.1 * (high - low)
-    else:
-        low, high = characteristic.contraction_range
-        grid = np.linspace(low, high, COARSE_POINTS)
-        forces = np.array([_forces(characteristic, float(pressure), grid) for pressure in pressures])
-        pulling = np.flatnonzero((np.nan_to_num(forces) > 0).any(axis=0))
-        if pulling.size:
-            low, high = float(grid[pulling[0]]), float(grid[min(pulling[-1] + 2, COARSE_POINTS - 1)])
-    lower_limit, upper_limit = characteristic.contraction_range
-    low, high = max(low, lower_limit), min(high, upper_limit)
-    return (min(low, point.contraction), max(high, point.contraction)) if point else (low, high)
-
-
-def _forces(characteristic: Characteristic, pressure: float, contractions: Array) -> Array:
-    """Return the tension along an isobar; NaN where the law is undefined or the tension negative."""
-    if isinstance(characteristic, ContractionLaw):
-        return _invert_contraction_law(characteristic, pressure, contractions)
-    forces = _evaluate_where_defined(lambda c: np.asarray(characteristic.force(pressure, c)) + 0.0 * c, contractions)
-    return np.where(np.isfinite(forces) & (forces >= 0), forces, np.nan)
-
-
-def _invert_contraction_law(characteristic: ContractionLaw, pressure: float, contractions: Array) -> Array:
-    """Return the tension of a contraction law along an isobar, by interpolation of its inverse without a search."""
-    forces = np.linspace(*characteristic.force_range, 4 * POINTS)
-    values = _evaluate_where_defined(lambda force: np.asarray(characteristic.contraction(pressure, force)), forces)
-    finite = np.isfinite(values)
-    values, forces = values[finite], forces[finite]
-    falling = np.append(True, np.diff(np.minimum.accumulate(values)) < 0)[: values.size]
-    if falling.sum() < 2:
-        return np.full(contractions.shape, np.nan)
-    inverse: Array = np.interp(contractions, values[falling][::-1], forces[falling][::-1], left=np.nan, right=np.nan)
-    return inverse
-
-
-def _evaluate_where_defined(law: Callable[[Array], Array], arguments: Array) -> Array:
-    """Return the values of a law, NaN where it raises PhysicsError; bisection isolates these arguments."""
-    try:
-        with np.errstate(all="ignore"):  # a law may be singular at the end of its range
-            return np.asarray(law(arguments), dtype=float)
-    except PhysicsError:
-        if arguments.size == 1:
-            return np.array([np.nan])
-    halves = np.array_split(arguments, [arguments.size // 2])
-    return np.concatenate([_evaluate_where_defined(law, half) for half in halves])

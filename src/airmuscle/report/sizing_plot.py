@@ -8,9 +8,10 @@ import numpy as np
 
 from ..characteristic.validity_range import validity_range_of
 from ..core import plotting
+from ..muscle.isobars import compute_isobars
 from ..sizing import LiftRequirement, MuscleChoice
 from .chapter import Plot
-from .isobar_plot import compute_isobars, isobar_plot
+from .isobar_plot import isobar_plot
 
 POINTS = 121
 """Points of the curve of the capacity."""

@@ -20,6 +20,7 @@ from ..control.with_drivers import WithDrivers
 from ..core.arrays import FEW, Array
 from ..core.declaration import as_float
 from ..core.errors import ParameterError
+from ..core.short_repr import ShortRepr
 from ..core.system import System
 from ..plant.state import check_system, state_vector
 from .integrators import Integrator, default_integrator
@@ -31,8 +32,8 @@ LARGEST = sys.float_info.max
 """The largest finite number."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Problem:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Problem(ShortRepr):
     """An initial value problem: a system under an input for `duration` [s].
 
     system         any System: a Plant, or a user-defined one

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..control.control_loop import ControlLoopState
 from ..core.diagnostics import Diagnostic
 from ..core.errors import SimulationError
+from ..core.notebook import Card, NotebookDisplay
 from ..core.reference import Reference, cite
 from ..core.status import Status
+from ..plant.units import column_units
 from ..recording import Recording
+from ..recording.plot import plot_columns
+from ..recording.recording_card import recording_card
 from .problem import Problem
 
 if TYPE_CHECKING:
@@ -26,7 +30,7 @@ class Statistics(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Solution:
+class Solution(NotebookDisplay):
     """The solution of a Problem, as far as it was computed.
 
     recording      states, outputs and inputs at the output times; its notes are the diagnostics
@@ -82,6 +86,19 @@ class Solution:
     def to_pandas(self) -> pd.DataFrame:
         """The recording as a data frame."""
         return self.recording.to_pandas()
+
+    def plot(self, *names: str, ax: Any = None) -> Any:
+        """Plot the named columns, or all, over time, as `Recording.plot`, with the units of the system."""
+        units = column_units(self.problem.system, [])
+        columns = {name: self.recording[name] for name in (names or self.recording) if name != "time"}
+        options: dict[str, Any] = {"ax": ax, "units": units, "ordered": not names}
+        return plot_columns(columns, self.recording["time"], self.recording.origin, **options)
+
+    def _card(self) -> Card:
+        card = recording_card(self.recording, column_units(self.problem.system, []))
+        text = f"{self.status.name}, {self.statistics.steps} steps, {self.statistics.rejected_steps} rejected"
+        notes = [f"{text}, final time {self.final_time:.4g} s", *(each.message for each in self.diagnostics)]
+        return dataclasses.replace(card, title=f"Solution: {card.title}", notes=notes)
 
     def __repr__(self) -> str:
         return f"Solution({self.status.name}, {self.statistics.steps} steps, {self.recording!r})"

@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable
 
 from ..core.errors import ParameterError
+from ..core.short_repr import ShortRepr
 from ..library.entry import Entry
 from ..pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, Ambient, Isothermal, absolute_pressure
 from .requirement import JointRequirement, LiftRequirement, SizingConditions
@@ -15,8 +16,8 @@ from .static_muscle import EndPoint, StaticMuscle
 Requirement = LiftRequirement | JointRequirement
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class MuscleDesign:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class MuscleDesign(ShortRepr):
     """Design of one requirement: end points of a muscle, pulley radius and force reserve.
 
     extended    end point at which the muscle is long: start of the lift, stretched muscle of the joint
@@ -33,8 +34,8 @@ class MuscleDesign:
     radii: tuple[float, float] | None = None
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class MuscleChoice:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class MuscleChoice(ShortRepr):
     """A muscle type that meets a requirement, at its shortest length.
 
     muscle  the entry at this length and its working range

@@ -117,6 +117,7 @@ def _joint_text(choice: MuscleChoice) -> str:
             "greatest number of 1."
         )
     design, half = choice.design, 0.5 * requirement.angle
+    fill, discharge = scenario_valves(choice)  # raises for a choice without a geometry
     assert design.radius is not None
     inertia = requirement.inertia or requirement.torque * (JOINT_MASS_TIME * cycle) ** 2 / requirement.angle
     stiffness = 2.0 * _stiffness(choice) * design.radius**2
@@ -126,7 +127,6 @@ def _joint_text(choice: MuscleChoice) -> str:
         design.radius, inertia, weight_torque=weight, min_angle=-1.5 * half, max_angle=1.5 * half,
         offset=0.5 * (design.extended.contraction + design.contracted.contraction),
     )  # fmt: skip
-    fill, discharge = scenario_valves(choice)
     regulator = ProportionalRegulator(
         Supply(choice.conditions.supply), fill, discharge, LAG, BAND, max_setpoint=choice.conditions.supply
     )

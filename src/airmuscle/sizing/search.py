@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from ..core.errors import AirmuscleError, AirmuscleWarning, ParameterError, SolveError
+from ..core.short_repr import ShortRepr
 from ..library.entry import Entry
 from ..library.files import LAWS, list_laws, list_products, read_toml
 from ..library.law_file import load_law
@@ -27,8 +28,8 @@ BISECTIONS = 7
 Search = LiftSearch | JointSearch
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class SizingResult:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class SizingResult(ShortRepr):
     """Choices of muscles for a requirement, best first, and the muscles that do not meet it, with reasons."""
 
     requirement: Requirement

@@ -15,6 +15,7 @@ from ..characteristic.validity_range import validity_range_of
 from ..core import leaves
 from ..core.arrays import Array
 from ..core.errors import ParameterError, SolveError
+from ..core.short_repr import ShortRepr
 from ..library.entry import Entry
 from ..library.scaling import scale_entry
 from ..muscle import ElasticSeriesElement, Muscle
@@ -44,8 +45,8 @@ class EndPoint(NamedTuple):
     capacity: float
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class StaticMuscle:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class StaticMuscle(ShortRepr):
     """Static force of an entry, and its working range of gauge pressure [Pa] and contraction [1]."""
 
     entry: Entry

@@ -20,6 +20,7 @@ from .joint_sheet import joint_names, sheet_of_joint
 from .page import self_contained_page, server_page, web_files
 from .requests import BadRequest, decoded, json_answer, limited_body
 from .security import COOKIE, Access, Application, given_token, secured
+from .size_sheet import size_sheet
 from .tasks import (
     plant_names,
     plant_title,
@@ -36,7 +37,7 @@ WORKERS = 2
 TIME_LIMIT = 20.0
 """Limit [s] of the computation of a sheet of a user (chosen)."""
 LIBRARY_LIMIT = 120.0
-"""The same of the library (chosen: a joint of muscles with an elaborate law takes some seconds)."""
+"""The same of the library, and of a sizing (chosen: a joint with an elaborate law takes some seconds)."""
 MAX_SHEETS = 100
 """Number of sheets that the server keeps (chosen)."""
 MAX_PAGE = 256 * 1024
@@ -64,13 +65,13 @@ class Sheets:
         key = (task.__name__, name)
         known = self.get(self._of_library.get(key, ""))
         if known is None:
-            known = self.keep(self._pool.call(task, name, limit=LIBRARY_LIMIT))
+            known = self.of_text(task, name, LIBRARY_LIMIT)
             self._of_library[key] = known["id"]
         return known
 
-    def of_text(self, task: Callable[[str], dict[str, Any]], text: str) -> dict[str, Any]:
-        """The sheet that a task makes of a text."""
-        return self.keep(self._pool.call(task, text, limit=TIME_LIMIT))
+    def of_text(self, task: Callable[[str], dict[str, Any]], text: str, limit: float = TIME_LIMIT) -> dict[str, Any]:
+        """The sheet that a task makes of a text, within a limit of time [s]."""
+        return self.keep(self._pool.call(task, text, limit=limit))
 
     def keep(self, sheet: dict[str, Any]) -> dict[str, Any]:
         """The sheet, which is kept."""
@@ -115,6 +116,7 @@ def create_app(
         Route("/api/plant/{name}", handlers.plant),
         Route("/api/plant", handlers.own_plant, methods=["POST"]),
         Route("/api/joint/{name}", handlers.joint),
+        Route("/api/size", handlers.size, methods=["POST"]),
         Route("/api/page", handlers.save_page, methods=["POST"]),
         *(fits or FitService(pool)).routes(),
     ]
@@ -193,6 +195,11 @@ class Handlers:
         if name not in joint_names():
             raise BadRequest(f"the library has no joint '{name[:80]}'.", 404)
         return await self._computed(self._sheets.of_library, sheet_of_joint, name)
+
+    async def size(self, request: Any) -> Any:
+        """The sheet of a sizing."""
+        text = decoded(await limited_body(request, MAX_TEXT))
+        return await self._computed(self._sheets.of_text, size_sheet, text, LIBRARY_LIMIT)
 
     async def _computed(self, function: Callable[..., dict[str, Any]], *arguments: Any) -> Any:
         from starlette.concurrency import run_in_threadpool

@@ -7,9 +7,10 @@ proportional control of the pressures, on/off valves through sigma-delta modulat
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Sequence
 
-from ..analysis.joint_torque import torque_functions
+from ..analysis import JointStatics, joint_statics
 from ..control import (
     PID,
     AngleAndStiffness,
@@ -28,6 +29,8 @@ from ..plant.plant import Plant
 from ..pneumatics import FillDischarge, ProportionalRegulator, ProportionalValve
 
 BAR = 1e5
+SPARE = 0.02
+"""Part of the pressure range that the control laws leave at each of its ends (chosen)."""
 DIFFERENCE = "difference"
 AHEAD = ("first_ahead", "second_ahead")
 """Set points of the feed-forward pressures, which the page computes from the statics of the joint."""
@@ -78,12 +81,14 @@ class ValveSet:
     inner      pressure control; None for regulators
     switching  whether the valves are on/off valves
     offsets    commands at which the joint is linearised, by input; relative to the pressure [Pa] for regulators
+    limits     range of the set points of the pressures [Pa] in which the offsets are possible
     """
 
     pressures: tuple[str, str]
     inner: ControlLaw | None
     switching: bool
     offsets: dict[str, float]
+    limits: tuple[float, float] = (0.0, math.inf)
 
 
 def valve_set(plant: Plant) -> ValveSet:
@@ -94,7 +99,9 @@ def valve_set(plant: Plant) -> ValveSet:
     if kinds == {ProportionalRegulator} and isinstance(circuit, ProportionalRegulator):
         pressures = (f"{first}.setpoint", f"{second}.setpoint")
         shift = OPENING * circuit.band
-        return ValveSet(pressures, None, False, {pressures[0]: shift, pressures[1]: -shift})
+        offsets = {pressures[0]: shift, pressures[1]: -shift}
+        highest = min(each.inputs[0].maximum for each in plant.circuits)
+        return ValveSet(pressures, None, False, offsets, (shift, highest - shift))
     pressures = (f"{first}.pressure", f"{second}.pressure")
     if kinds == {ProportionalValve} and isinstance(circuit, ProportionalValve):
         commands = (f"{first}.command", f"{second}.command")
@@ -112,10 +119,20 @@ def valve_set(plant: Plant) -> ValveSet:
     )
 
 
-def joint_controllers(plant: Plant, pressure_range: tuple[float, float]) -> tuple[JointController, ...]:
-    """The controllers of a joint whose pressures are within a range [Pa]. Raises ParameterError."""
-    valves = valve_set(plant)
-    affine = all(function.affine for function in torque_functions(plant, limited=False))
+def statics_within_valves(plant: Plant) -> JointStatics:
+    """The statics of a joint with pressures that its supply and its regulators can give. Raises ParameterError."""
+    statics, (low, high) = joint_statics(plant), valve_set(plant).limits
+    least, greatest = statics.pressure_range
+    if low <= least and greatest <= high:
+        return statics
+    return joint_statics(plant, (max(low, least), min(high, greatest)))
+
+
+def joint_controllers(plant: Plant, statics: JointStatics) -> tuple[JointController, ...]:
+    """The controllers of a joint, whose pressures are within the range of its statics less a part at both ends."""
+    valves, (low, high) = valve_set(plant), statics.pressure_range
+    pressure_range = (low + SPARE * (high - low), high - SPARE * (high - low))
+    affine = all(function.affine for function in statics.unlimited)
     steps = 1 if affine else INVERSE_STEPS
     inverse = AntagonisticInverse(plant.muscles, plant.mechanism, *pressure_range, steps=steps)
     ahead = SetpointCommand(valves.pressures, AHEAD)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis import JointStatics, joint_statics
+from ..analysis import JointStatics
 from ..compile.program import compile_system
 from ..core.tree import leaves
 from ..library.files import list_plants
@@ -18,7 +18,7 @@ from ..library.plant_file import plant_tables
 from ..plant.plant import Plant
 from ..scenario.scenario import TABLES, build_scenario
 from ..study.control_benchmark import STANDARD_TASKS, ControlTask
-from .joint_laws import JointController, joint_controllers, valve_set
+from .joint_laws import JointController, joint_controllers, statics_within_valves, valve_set
 from .joint_program import PAIR, law_program, linear_program, pair_program
 from .plant_sheet import sheet_of_tables
 
@@ -26,8 +26,6 @@ DURATION = 1.0
 """Duration of the printed run [s], which the tab does not use."""
 REGION_ANGLES = 61
 """Angles of the limits of the reachable region (chosen)."""
-SPARE = 0.02
-"""Part of the pressure range that the control laws leave at its ends (chosen)."""
 
 
 def joint_names() -> tuple[str, ...]:
@@ -41,9 +39,8 @@ def sheet_of_joint(name: str) -> dict[str, Any]:
     given = joint_tables(tables)
     sheet = sheet_of_tables(given, location, name, tables.get("sources", {}))
     plant = build_scenario(given, location).plant
-    statics = joint_statics(plant)
-    low, high = statics.pressure_range
-    controllers = joint_controllers(plant, (low + SPARE * (high - low), high - SPARE * (high - low)))
+    statics = statics_within_valves(plant)
+    controllers = joint_controllers(plant, statics)
     measured = tuple(dict.fromkeys(column for each in controllers for column in each.law.measured_columns))
     programs = _programs(plant, controllers, measured)
     script = _extended(sheet.pop("script"), programs)
@@ -53,7 +50,7 @@ def sheet_of_joint(name: str) -> dict[str, Any]:
         **{key: str(tables.get(key, "")) for key in ("provenance", "note", "warning")},
         "parameters": [{**row, "path": row["path"].replace(".inner.", ".")} for row in sheet["parameters"]],
         "measured": list(measured),
-        "pressure_range": [low, high],
+        "pressure_range": list(statics.pressure_range),
         "controllers": [_controller_row(each) for each in controllers],
         "region": reachable_region(statics),
         "pair": list(PAIR),

@@ -41,6 +41,7 @@ SCRIPTS = (
     "scripts/joint-charts.js",
     "scripts/joint-gains.js",
     "scripts/joint-tab.js",
+    "scripts/size-tab.js",
     "scripts/main.js",
 )
 """Scripts in the order in which the page runs them."""

@@ -9,6 +9,7 @@ from typing import Any
 
 from ..core.errors import FileError, ParameterError
 from .app import MAX_PAGE_SHEETS
+from .joint_sheet import joint_names, sheet_of_joint
 from .page import self_contained_page
 from .tasks import sheet_of_any
 
@@ -39,12 +40,16 @@ def first_state(sheets: Sequence[dict[str, Any]]) -> dict[str, Any]:
 def export_page(names: Sequence[str], path: str | Path) -> Path:
     """Write a page without server and network that shows these muscles and plants; the file is complete or unchanged.
 
-    Raises the errors of the loaders, ParameterError without a name, FileError if the file cannot be written.
+    A joint of the library appears in the tab Joint as well. Raises the errors of the loaders, ParameterError without a
+    name, FileError if the file cannot be written.
     """
     if not names:
         raise ParameterError("no muscle or plant is named; give at least one name of the library or a file.")
     sheets = open_sheets(names)
-    text = self_contained_page(sheets, first_state(sheets))
+    shown = {sheet["name"]: None for sheet in sheets if "plant" in sheet and not sheet["own_text"]}
+    joints = tuple(sheet_of_joint(name) for name in shown if name in joint_names())
+    state = first_state(sheets) | ({"joint": {"name": joints[0]["name"]}} if joints else {})
+    text = self_contained_page((*sheets, *joints), state)
     path = Path(path)
     unfinished = path.with_name(f"{path.name}.part")
     try:

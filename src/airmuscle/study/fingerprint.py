@@ -44,13 +44,12 @@ def _to_json(value: Any) -> Any:
 
 
 @functools.cache
-def program_fingerprint() -> str:
-    """The fingerprint of the program: its version, its source files, and the versions of the numerical packages."""
-    files = [p for p in sorted(PACKAGE_ROOT.rglob("*.py")) if _is_relevant(p)]
+def program_fingerprint(excluded: tuple[str, ...] = EXCLUDED_PACKAGES) -> str:
+    """The fingerprint of the program: its version, its source files, and the versions of the numerical packages.
+
+    excluded  packages of the program that do not affect the results; by default those of a simulation
+    """
+    files = [p for p in sorted(PACKAGE_ROOT.rglob("*.py")) if p.relative_to(PACKAGE_ROOT).parts[0] not in excluded]
     contents = [(p.relative_to(PACKAGE_ROOT).as_posix(), hashlib.sha256(p.read_bytes()).hexdigest()) for p in files]
     versions = [(name, metadata.version(name)) for name in NUMERICAL_PACKAGES]
     return fingerprint(metadata.version("airmuscle"), contents, versions)
-
-
-def _is_relevant(path: Path) -> bool:
-    return path.relative_to(PACKAGE_ROOT).parts[0] not in EXCLUDED_PACKAGES

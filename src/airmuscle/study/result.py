@@ -11,14 +11,15 @@ import numpy.typing as npt
 
 from ..core.arrays import Array
 from ..core.errors import ColumnError, suggestion
+from ..core.short_repr import ShortRepr
 from ..report.chapter import Table
 from .design import Saltelli
 from .sensitivity import SobolIndices, sobol_indices
 from .study import Study
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class StudyResult:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class StudyResult(ShortRepr):
     """The results of all runs of a study.
 
     scalars          scalar metrics (N, k), in the order of `study.scalars`; NaN if a run does not have the metric

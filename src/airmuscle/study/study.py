@@ -28,6 +28,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core.errors import ParameterError, suggestion
+from ..core.short_repr import ShortRepr
 from ..library.build import build
 from ..library.files import read_toml
 from ..library.location import Location, check_keys, located_errors, read_text
@@ -44,8 +45,8 @@ CHUNK_SIZE = 32
 """Default number of runs that are saved together (chosen)."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Study:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Study(ShortRepr):
     """A parameter study: many runs of one scenario.
 
     parameters  the d varied parameters

@@ -36,7 +36,7 @@ def load(name: str, kinds: Sequence[str]) -> bytes | None:
     if folder is None:
         return None
     path = folder / _file_name(name, kinds)
-    content = _read(path)
+    content = read_private(path)
     if content is None:
         return None
     with contextlib.suppress(OSError):  # the time of its last use, for `_remove_oldest`
@@ -93,7 +93,7 @@ def _chosen_folder() -> pathlib.Path:
     return pathlib.Path(root).expanduser() / "airmuscle" / "kernels"
 
 
-def _read(path: pathlib.Path) -> bytes | None:
+def read_private(path: pathlib.Path) -> bytes | None:
     """The contents of a regular file that belongs to the user and that nobody else may write to."""
     try:
         with open(os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)), "rb") as file:

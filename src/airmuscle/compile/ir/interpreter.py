@@ -1,4 +1,4 @@
-"""Interpreter of instructions in IEEE 754 double precision, one operation after the other as they are printed.
+"""Interpreter of instructions in IEEE 754 double or single precision, operation by operation as they are printed.
 
 The numbers are those of printed C that is compiled without fused operations, bit by bit, with the functions of the C
 library that Python uses.
@@ -7,6 +7,7 @@ library that Python uses.
 from __future__ import annotations
 
 import math
+import struct
 from collections.abc import Callable, Mapping, Sequence
 
 from .emission import FunctionBlock, unknown_operation
@@ -57,11 +58,23 @@ _OPERATIONS: dict[Operation, Function] = {
 }
 
 
-class InterpretedBody(FunctionBlock):
-    """A function that is evaluated while it is emitted; its arrays are `arrays`, its results stand in `stored`."""
+def _to_single(value: float) -> float:
+    try:
+        single: float = struct.unpack("<f", struct.pack("<f", value))[0]
+    except OverflowError:
+        return math.copysign(math.inf, value)
+    return single
 
-    def __init__(self, arrays: Mapping[str, Sequence[float]]) -> None:
+
+class InterpretedBody(FunctionBlock):
+    """A function that is evaluated while it is emitted; its arrays are `arrays`, its results stand in `stored`.
+
+    single  every number is rounded to single precision
+    """
+
+    def __init__(self, arrays: Mapping[str, Sequence[float]], single: bool = False) -> None:
         super().__init__()
+        self._single = single
         self.stored: dict[tuple[str, int], float] = {}
         self._arrays, self._values = arrays, dict[str, float]()
 
@@ -70,7 +83,7 @@ class InterpretedBody(FunctionBlock):
 
     def _result(self, value: float) -> str:
         name = self.new_name()
-        self._values[name] = value
+        self._values[name] = _to_single(value) if self._single else value
         return name
 
     def constant(self, value: float) -> str:

@@ -5,9 +5,9 @@
 
 @constants@
 @functions@
-int model_step(double *memory, const double *measurement, const double *setpoint, double *command)
+int model_step(@number@ *memory, const @number@ *measurement, const @number@ *setpoint, @number@ *command)
 {
-  double later[MODEL_MEMORY + 1], wanted[MODEL_COMMANDS + 1];
+  @number@ later[MODEL_MEMORY + 1], wanted[MODEL_COMMANDS + 1];
   int i;
   for (i = 0; i < MODEL_MEASUREMENTS; i++) {
     if (!isfinite(measurement[i])) return 1;

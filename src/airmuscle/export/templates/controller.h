@@ -15,15 +15,15 @@ extern "C" {
 /* Indices in the arrays. */
 @enumerations@
 /* The memory before the first sample. */
-extern const double model_initial_memory[MODEL_MEMORY + 1];
+extern const @number@ model_initial_memory[MODEL_MEMORY + 1];
 /* Parameters that can be changed; all others are constants. */
-extern double model_parameters[MODEL_PARAMETERS + 1];
+extern @number@ model_parameters[MODEL_PARAMETERS + 1];
 extern const char *const model_parameter_names[MODEL_PARAMETERS + 1];
 
 /* One sample, SI units: from memory[MODEL_MEMORY + 1], measurement and setpoint to command, and to the memory of the
    next sample. Returns 0; or 1 if a measurement, a set point or a command is not finite: then memory and command are
    unchanged. No recursion, no memory allocation, no loop without a constant bound. */
-int model_step(double *memory, const double *measurement, const double *setpoint, double *command);
+int model_step(@number@ *memory, const @number@ *measurement, const @number@ *setpoint, @number@ *command);
 
 #ifdef __cplusplus
 }

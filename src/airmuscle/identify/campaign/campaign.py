@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
-from typing import NamedTuple, TypeVar
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from ...characteristic.base import ForceLaw
 from ...core.arrays import Array
 from ...core.errors import IdentificationError
+from ...core.short_repr import ShortRepr
 from ...friction import Friction, NoFriction
 from ...geometry import Geometry
 from ...muscle import CreepElements, LinearDamper, Muscle
@@ -45,8 +46,8 @@ class Prediction(NamedTuple):
     high: Array
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Campaign:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Campaign(ShortRepr):
     """The records of a rig with their use, the result of each stage, and the next experiments."""
 
     records: tuple[CampaignRecord, ...]
@@ -154,6 +155,7 @@ def identify_campaign(
     geometry: Geometry | None = None,
     progress: Callable[[str, float], None] | None = None,
     finished: Callable[[str, object], None] | None = None,
+    known: Mapping[str, Any] | None = None,
 ) -> Campaign:
     """Identify one muscle from all recordings of a rig.
 
@@ -164,25 +166,25 @@ def identify_campaign(
     geometry  the geometry of the muscle; by default the volume follows from the static law and fills at several lengths
     progress  called with the name of the stage and the completed fraction of the campaign
     finished  called with the name and the result of each stage as it ends
+    known     results of finished stages by name, from an interrupted call with the same recordings and geometry
 
     Raises IdentificationError where no record can be used.
     """
-    steps = _Steps(progress, finished)
+    steps = _Steps(progress, finished, known or {})
     records = classify_records(named(recordings))
     _check_usable(records)
     check_one_rig(records)
     steps.end("records", records)
-    creep = steps.end("creep", fit_creep_stage(_of_kind(records, RecordKind.CREEP)))
+    creep = steps.fit("creep", lambda _: fit_creep_stage(_of_kind(records, RecordKind.CREEP)))
     elements = creep.elements if isinstance(creep, CreepStage) else CreepElements()
-    hysteresis = steps.end("hysteresis", fit_friction_stage(records, elements, steps.within("hysteresis")))
+    hysteresis = steps.fit("hysteresis", lambda show: fit_friction_stage(records, elements, show))
     friction = hysteresis.friction if isinstance(hysteresis, FrictionStage) else NoFriction()
-    name = "static characteristic"
-    static = steps.end(name, fit_static_stage(records, friction, elements, steps.within(name)))
-    fills = _fit_fills(records, static, geometry, steps)
+    static = steps.fit("static characteristic", lambda show: fit_static_stage(records, friction, elements, show))
+    fills = steps.fit("fills and volume", lambda show: _fit_fills(records, static, geometry, show))
     partial = Campaign(records, creep, hysteresis, static, fills, LeftOutStage("release", "", ""), ())
     releases = _of_kind(records, RecordKind.RELEASE)
     muscle = partial.muscle(releases[0].resting_length) if releases else None
-    release = steps.end("release", fit_release_stage(releases, muscle))
+    release = steps.fit("release", lambda _: fit_release_stage(releases, muscle))
     complete = dataclasses.replace(partial, release=release)
     planned = plan_next([stage for _, stage in complete.stages], static, records)
     steps.end("plan", planned)
@@ -190,11 +192,13 @@ def identify_campaign(
 
 
 def _fit_fills(
-    records: Sequence[CampaignRecord], static: StaticStage | LeftOutStage, geometry: Geometry | None, steps: _Steps
+    records: Sequence[CampaignRecord],
+    static: StaticStage | LeftOutStage,
+    geometry: Geometry | None,
+    progress: Callable[[float], None],
 ) -> FillStage | LeftOutStage:
     fills = _of_kind(records, RecordKind.FILL)
     lengths = sorted({r.resting_length for r in fills if r.resting_length is not None})
-    name = "fills and volume"
     if len(lengths) > 1:
         main = _main_length(records)
         fills = [r for r in fills if r.resting_length == main]
@@ -203,7 +207,7 @@ def _fit_fills(
         law, ranges = law_of_length(static.fit.model, _main_length(records)), static.fit.data_ranges
         if isinstance(law, ForceLaw):
             change = volume_change(law, _main_length(records) or 0.0, ranges["pressure"], ranges["contraction"])
-    return steps.end(name, fit_fill_stage(fills, geometry, change, steps.within(name)))
+    return fit_fill_stage(fills, geometry, change, progress)
 
 
 def _of_kind(records: Sequence[CampaignRecord], kind: RecordKind) -> list[CampaignRecord]:
@@ -224,9 +228,12 @@ class _Steps:
     """Progress over the stages."""
 
     def __init__(
-        self, progress: Callable[[str, float], None] | None, finished: Callable[[str, object], None] | None
+        self,
+        progress: Callable[[str, float], None] | None,
+        finished: Callable[[str, object], None] | None,
+        known: Mapping[str, Any],
     ) -> None:
-        self._progress, self._finished = progress, finished
+        self._progress, self._finished, self._known = progress, finished, known
         self._total = sum(_WEIGHTS)
 
     def within(self, stage: str) -> Callable[[float], None]:
@@ -239,6 +246,11 @@ class _Steps:
                 self._progress(stage, (before + own * fraction) / self._total)
 
         return show
+
+    def fit(self, stage: str, task: Callable[[Callable[[float], None]], T]) -> T:
+        """The result of a stage: the known one, or that of the task, which is called with the progress."""
+        result: T = self._known[stage] if stage in self._known else task(self.within(stage))
+        return self.end(stage, result)
 
     def end(self, stage: str, result: T) -> T:
         """Report the end of a stage with its result."""

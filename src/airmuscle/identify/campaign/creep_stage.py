@@ -9,6 +9,7 @@ import numpy as np
 
 from ...core.arrays import Array
 from ...core.errors import AirmuscleError
+from ...core.short_repr import ShortRepr
 from ...muscle import CreepElements
 from ...recording import Recording
 from ..hysteresis import fit_creep
@@ -25,8 +26,8 @@ DEADTIME = 0.2
 """Time after the end of the motion that is not fitted [s] (chosen): the load cell and the frame settle."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class CreepStage:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class CreepStage(ShortRepr):
     """Maxwell elements fitted to the force of all holds together, with the result for each hold alone."""
 
     elements: CreepElements

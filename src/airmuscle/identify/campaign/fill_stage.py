@@ -10,6 +10,7 @@ import numpy as np
 from ...control.inputs import Schedule
 from ...core.arrays import Array
 from ...core.errors import AirmuscleError
+from ...core.short_repr import ShortRepr
 from ...geometry import Geometry, Vessel
 from ...mechanism import Isometric
 from ...muscle import Muscle
@@ -39,8 +40,8 @@ REMEDY = (
 )
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class FillStage:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class FillStage(ShortRepr):
     """The joint fit of all fills with common valves and one volume curve, and the prediction of each from the others.
 
     `estimate` is None where the geometry was given.

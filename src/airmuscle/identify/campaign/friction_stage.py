@@ -9,6 +9,7 @@ import numpy as np
 
 from ...core.arrays import Array
 from ...core.errors import AirmuscleError
+from ...core.short_repr import ShortRepr
 from ...friction import Friction, NoFriction
 from ...muscle import CreepElements
 from ...recording import Recording
@@ -25,8 +26,8 @@ MAX_LOOPS = 6
 """Maximum number of loops that are fitted; of more, those at evenly spaced pressures (chosen)."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class FrictionStage:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class FrictionStage(ShortRepr):
     """The friction of all loops, and the fits of the single loops and of all laws."""
 
     friction: Friction

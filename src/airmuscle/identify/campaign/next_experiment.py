@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from ...characteristic.validity_range import ValidityRange
 from ...core.errors import AirmuscleError
+from ...core.short_repr import ShortRepr
 from ..experiment_design import BenchLimits, ExperimentPlan, optimal_design
 from .creep_stage import CreepStage
 from .fill_stage import FillStage
@@ -20,8 +21,8 @@ MIN_LENGTHS = 3
 """Number of resting lengths from which the error for other lengths can be judged."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class NextExperiment:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class NextExperiment(ShortRepr):
     """An experiment that would improve the muscle: what to measure, and why; `plan` has the runs of a static one."""
 
     measure: str

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.arrays import Array
+from ...core.short_repr import ShortRepr
 from ...recording import Recording
 from ...recording.segment import (
     AT_REST,
@@ -61,8 +62,8 @@ class RecordKind(enum.Enum):
 _KINDS = {ISOBARIC: RecordKind.ISOBARIC, ISOMETRIC: RecordKind.ISOMETRIC, ISOTONIC: RecordKind.ISOTONIC}
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class CampaignRecord:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class CampaignRecord(ShortRepr):
     """A recording of a campaign, its kind, and the reason of this kind as a phrase."""
 
     recording: Recording

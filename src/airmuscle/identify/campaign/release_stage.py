@@ -10,6 +10,7 @@ import numpy as np
 from ...control.inputs import Schedule
 from ...core.constants import STANDARD_GRAVITY
 from ...core.errors import AirmuscleError
+from ...core.short_repr import ShortRepr
 from ...mechanism import HangingMass, WithLatch
 from ...muscle import LinearDamper, Muscle
 from ...plant.plant import Plant
@@ -37,8 +38,8 @@ REMEDY = (
 )
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class ReleaseStage:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class ReleaseStage(ShortRepr):
     """The damping and the polytropic exponent from all releases together."""
 
     fit: DynamicFit

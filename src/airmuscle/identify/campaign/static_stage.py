@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Callable, Sequence
 
 from ...core.errors import AirmuscleError
+from ...core.short_repr import ShortRepr
 from ...friction import Friction
 from ...muscle import CreepElements
 from ...recording import Recording
@@ -23,8 +24,8 @@ FIT_ROWS, MIN_FIT_ROWS = 1000, 25
 """Maximum number of rows of all records in the static fits, and minimum number of each (chosen)."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class StaticStage:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class StaticStage(ShortRepr):
     """The model selection, the rows of the fits, and the bands of the errors of the recommended law."""
 
     comparison: Comparison

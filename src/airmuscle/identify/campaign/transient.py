@@ -20,6 +20,10 @@ MAX_MIDDLE = 0.47
 """Maximum time of half the change of a step, as a fraction of the time from 5 % to 95 %; 0.5 is a ramp (chosen)."""
 MIN_TRANSIENT = 0.5
 """Minimum fraction of the rows of a step that are not quasi-static (chosen)."""
+MAX_PULSES = 2
+"""Maximum number of rises after a rest within a step (chosen); more are the pulses of a valve that makes a ramp."""
+PULSE_POINTS, PULSE_WINDOW = 200, 4
+"""Number of points of a step, and of those of a moving difference, by which pulses are counted (chosen)."""
 MAX_RELEASE = 2.0
 """Maximum duration of the motion of a release [s] (chosen)."""
 MEDIAN_ROWS = 5
@@ -109,10 +113,23 @@ def _measure(time: Array, fraction: Array, transient: Mask, rising: bool) -> tup
     half = float(time[later[0]] - time[begin])
     if later[1] <= begin or transient[begin : later[1] + 1].mean() < MIN_TRANSIENT or half > MAX_MIDDLE * duration:
         return None
+    step_rows = slice(begin, later[1] + 1)
+    if count_pulses(time[step_rows], values[step_rows]) > MAX_PULSES:
+        return None
     slope = (values[later[0]] - values[begin]) / max(half, 1e-9)
     start = float(time[begin]) - float(values[begin] - first) / max(float(slope), 1e-9)
     ends = (first, last) if rising else (1.0 - first, 1.0 - last)
     return max(start, float(time[0])), duration, *ends
+
+
+def count_pulses(time: Array, values: Array) -> int:
+    """Number of rises above the mean rate after a rest, in a rising signal; a fill through an open valve has none."""
+    even = np.interp(np.linspace(time[0], time[-1], PULSE_POINTS), time, values)
+    mean = PULSE_WINDOW * float(even[-1] - even[0]) / PULSE_POINTS
+    changes = even[PULSE_WINDOW:] - even[:-PULSE_WINDOW]
+    marked = np.where(changes > 1.5 * mean, 1, np.where(changes < 0.3 * mean, -1, 0))
+    known = marked[marked != 0]
+    return int(np.count_nonzero(np.diff(known) > 0))
 
 
 def find_motion(recording: Recording) -> Motion | None:

@@ -12,13 +12,14 @@ from ...control.inputs import InputSignal, check_input_signal
 from ...core import tree
 from ...core.errors import ParameterError, suggestion
 from ...core.hints import Hint
+from ...core.short_repr import ShortRepr
 from ...recording import Recording
 from ...recording.recording import column_heading
 from .initial_conditions import InitialConditions
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Experiment:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Experiment(ShortRepr):
     """One record: the recording, the command that was applied, and the initial conditions.
 
     `command` counts from the start of the run, which is at `start_time` [s] on the clock of the recording; rows before

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 
@@ -10,17 +11,19 @@ from ...compile import System
 from ...core import tree
 from ...core.arrays import Array
 from ...core.errors import ParameterError, suggestion
+from ...core.notebook import Card, NotebookDisplay
 from ...recording import Recording
 from ..identifiability import Identifiability
-from ..result import Estimate, estimate_table
+from ..result import Estimate, estimate_rows, estimate_table
 from .experiment import Unknown
+from .plot import plot_record
 from .problem import DynamicFitProblem
 from .profile import DynamicProfile, compute_profile
 from .reliability import Optimum, searches_at_lowest
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class DynamicFit:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class DynamicFit(NotebookDisplay):
     """Plant parameters estimated from transient records; `print` it."""
 
     problem: DynamicFitProblem
@@ -90,6 +93,17 @@ class DynamicFit:
         index = [e.name for e in self.estimates].index(self[name].name)
         variance = max(self.residual_std, 1e-300) ** 2
         return compute_profile(self.problem, self.estimates, index, self.costs[0], variance, points)
+
+    def plot(self, record: int = 0, *, ax: Any = None) -> Any:
+        """Plot the observed quantities of one record, measured and modelled.
+
+        `ax` is an Axes, or a sequence of one for each quantity, and is returned; without it a figure is returned.
+        """
+        model = self.problem.record_models[record]
+        return plot_record(model.experiment.recording, self.modelled(record), model.names, ax)
+
+    def _card(self) -> Card:
+        return Card("Dynamic fit", estimate_rows(self.estimates), self.plot, [*self._summary_lines(), *self.notes])
 
     def __str__(self) -> str:
         notes = (f"note: {note}" for note in self.notes)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ...core.notebook import Card, NotebookDisplay
 from ...core.tree import leaves
 from ...friction import Friction, PressureScaledFriction
 from ..identifiability import UndeterminedCombination
@@ -19,8 +20,8 @@ from .result import SIGNIFICANCE_LEVEL
 from .series import LoopSeries
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class JointFit:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class JointFit(NotebookDisplay):
     """A friction law fitted to several runs together, each with its own static curve; forces in N.
 
     `friction` is a `PressureScaledFriction` if the runs justify a dependence on pressure; `scale_p_value` is that of
@@ -118,9 +119,20 @@ class JointFit:
         text = " ".join([text, *(str(each) for each in self.weak_combinations)])
         return f"{text} The data {'justify' if self.justified else 'do not justify'} this friction for all runs."
 
-    def plot(self) -> Any:
-        """Amplitude of the friction over the pressure, of each run and of the joint fit; a Matplotlib figure."""
-        return plot_amplitudes(self.agreement, self.friction, self.name)
+    def plot(self, *, ax: Any = None) -> Any:
+        """Plot the amplitude of the friction over the pressure, of each run and of the joint fit.
+
+        `ax` is an Axes and is returned; without it a new figure is returned. Raises ParameterError for another `ax`.
+        """
+        return plot_amplitudes(self.agreement, self.friction, self.name, ax=ax)
+
+    def _card(self) -> Card:
+        rows = [
+            (leaf.path, leaf.declared.symbol, f"{leaf.value:.4g}", leaf.declared.unit, leaf.declared.meaning)
+            for leaf in leaves(self.friction)
+        ]
+        table = [("parameter", "symbol", "value", "unit", "meaning"), *rows]
+        return Card(f"{self.name} fitted to {len(self.series)} runs", table, self.plot, [self.verdict])
 
     def __str__(self) -> str:
         lines = [

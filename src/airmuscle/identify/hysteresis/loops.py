@@ -11,6 +11,7 @@ import numpy as np
 from ...characteristic.base import Characteristic
 from ...core.errors import AirmuscleWarning, IdentificationError
 from ...core.hints import Hint, HintedText
+from ...core.short_repr import ShortRepr
 from ...recording import Recording
 from ...recording.segment import (
     ISOBARIC,
@@ -39,8 +40,8 @@ from .limits import speed_reservation
 from .result import HysteresisFit
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class HysteresisLoop:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class HysteresisLoop(ShortRepr):
     """One run with a rising and a falling branch, the path of the friction, the static curve and the fitted rows."""
 
     recording: Recording
@@ -63,8 +64,8 @@ class HysteresisLoop:
         return f"{self.run.kind.name} at {levels.get(self.run.constant_column, f'{self.run.constant_value:.4g} m')}"
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class LoopFit:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class LoopFit(ShortRepr):
     """The friction laws fitted to one loop, lowest AICc first, and the reasons why others could not be fitted."""
 
     loop: HysteresisLoop

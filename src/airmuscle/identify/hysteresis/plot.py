@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...core.arrays import Array
+from ...core.axes import given_axes, relabel_in_display_units
 from ...core.plotting import DASHES, LINES, legend_below, new_figure
 from ...friction import Friction
 from .axis import MILLIMETRES, Axis
@@ -53,22 +54,33 @@ def plot_loops(friction: Friction, axis: Axis = MILLIMETRES) -> Any:
     return figure
 
 
-def plot_hysteresis(series: LoopSeries, friction: Friction, coefficients: Array, title: str) -> Any:
+def plot_hysteresis(series: LoopSeries, friction: Friction, coefficients: Array, title: str, *, ax: Any = None) -> Any:
     """Measured force minus static curve over the path, with the friction force; and the residuals below.
 
-    `coefficients` are those of the static curve. Returns a Matplotlib figure.
+    `coefficients` are those of the static curve. `ax` is an Axes, or a sequence of two, also for the residuals.
+    Returns `ax`, or a new Matplotlib figure if it is None. Raises ParameterError for another `ax`.
     """
     measured = series.target - series.design_matrix @ coefficients
-    figure, (upper, lower) = new_figure(2, 1, width=6.0, height=5.6, sharex=True)
+    if ax is None:
+        figure, axes = new_figure(2, 1, width=6.0, height=5.6, sharex=True)
+    else:
+        figure, axes = None, given_axes(ax, 1, "plot of a loop")
+    upper, lower = axes[0], axes[1] if len(axes) > 1 else None
     path, rows = series.path * series.axis.factor, series.fitted_rows
     force = -series.friction_force(friction)
     points: dict[str, Any] = {"marker": "o", "markersize": 3, "linestyle": "none", "color": LINES[0], "alpha": 0.5}
     upper.plot(path[rows], measured[rows], **points, label="measured - static curve")
     upper.plot(path, force, color=LINES[1], label=f"{type(friction).__name__}, whole path")
     upper.set_ylabel("force [N]")
-    lower.plot(path[rows], (measured - force)[rows], **points)
-    lower.axhline(0.0, color=LINES[1])
-    lower.set(xlabel=series.axis.label, ylabel="residual (measured - model) [N]")
+    if lower is not None:
+        lower.plot(path[rows], (measured - force)[rows], **points)
+        lower.axhline(0.0, color=LINES[1])
+        lower.set_ylabel("residual (measured - model) [N]")
+    (upper if lower is None else lower).set_xlabel(series.axis.label)
+    relabel_in_display_units([upper] if lower is None else [upper, lower])
+    if figure is None:
+        upper.legend(loc="best", frameon=False, fontsize=8)
+        return ax
     upper.set_title(title)
     legend_below(figure, upper, 2)
     return figure

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...core.arrays import Array
+from ...core.notebook import Card, NotebookDisplay
 from ...core.tree import leaves
 from ...friction import Friction
 from ..identifiability import UndeterminedCombination
@@ -27,8 +28,8 @@ MIN_BRANCH_RATIO = 0.1
 """Minimum ratio of the rows of the two branches for a friction to be justified (chosen)."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class HysteresisFit:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class HysteresisFit(NotebookDisplay):
     """A friction law fitted to a loop, compared with the same static curve without friction; forces in N.
 
     `gap` is the rms difference of the falling and the rising branch, `residual_gap` the part that the friction does not
@@ -139,11 +140,21 @@ class HysteresisFit:
             for leaf in leaves(self.friction)
         )  # fmt: skip
 
-    def plot(self) -> Any:
-        """The loop, the friction force and the residuals; a Matplotlib figure."""
+    def plot(self, *, ax: Any = None) -> Any:
+        """Plot the loop with the friction force, and the residuals.
+
+        `ax` is an Axes for the loop, or a sequence of two, also for the residuals, and is returned; without it a new
+        figure is returned. Raises ParameterError for another `ax`.
+        """
         rms = f"{self.rmse_without_friction:.3g} N without, {self.rmse:.3g} N with friction"
         title = f"{self.series.origin}: rms error {rms}"
-        return plot_hysteresis(self.series, self.friction, self.coefficients, title)
+        return plot_hysteresis(self.series, self.friction, self.coefficients, title, ax=ax)
+
+    def _card(self) -> Card:
+        rows = [(path, symbol, f"{value:.4g}", unit, meaning) for path, symbol, value, unit, meaning in
+                self.displayed_parameters]  # fmt: skip
+        title = f"{type(self.friction).__name__} fitted to {self.series.origin}"
+        return Card(title, [("parameter", "symbol", "value", "unit", "meaning"), *rows], self.plot, [self.verdict])
 
     def __str__(self) -> str:
         lines = [

@@ -18,6 +18,7 @@ from ...characteristic.contractile_surface import ContractileSurface, exponents
 from ...characteristic.validity_range import ValidityRange
 from ...core.arrays import Array
 from ...core.errors import IdentificationError
+from ...core.short_repr import ShortRepr
 from ...recording import Recording
 from ..result import Fit
 from ..static_fit import fit
@@ -51,8 +52,8 @@ def shape_violations_of_fit(fit: Fit, *, points: int = 101) -> tuple[Monotonicit
     return find_shape_violations(law, fit.validity_range, points=points)
 
 
-@dataclasses.dataclass(frozen=True)
-class ShapeConstrainedFit:
+@dataclasses.dataclass(frozen=True, repr=False)
+class ShapeConstrainedFit(ShortRepr):
     """A shape-constrained surface and its error, with the error and the violations of the unconstrained surface."""
 
     model: ContractileSurface

@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ...core.short_repr import ShortRepr
 from ..recording import Recording
 from .branches import Branch, branch_column_agreement, find_branches
 from .findings import Finding, check_swept, collect_findings
@@ -18,8 +19,8 @@ from .sampling import Sampling, analyse_sampling
 from .sensor import Sensor, estimate_sensors
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Inspection:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Inspection(ShortRepr):
     """Result of the inspection of a recording: sampling, sensors, segments, suspected outliers and findings."""
 
     recording: Recording

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 
 from ...characteristic.base import Characteristic
+from ...core.short_repr import ShortRepr
 from ...core.tree import Leaf, leaves
 from .expression import ADD, COMPARISONS, NEGATIVE, PRODUCT, QUOTIENT, WHERE, Expressions, Node, in_order
 from .intervals import Bounds, within
@@ -53,8 +54,8 @@ _MIXED_PART_NAMES, _SUM_NAMES = "zwv", "uvs"
 """Symbols of other shared parts, and of long sums."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class LawEquation:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class LawEquation(ShortRepr):
     """A law as an equation within a validity range; symbols stand under their names in the expressions."""
 
     title: str

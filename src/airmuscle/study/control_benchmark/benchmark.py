@@ -10,12 +10,16 @@ import numpy as np
 
 from ...control.control_law import ControlLaw
 from ...control.control_loop import ControlLoop
+from ...control.controller import Controller
 from ...control.stuck_valve import WithStuckValve
 from ...core.errors import AirmuscleError, ParameterError
+from ...core.short_repr import ShortRepr
 from ...recording import Recording
 from ...simulation.run import simulate
 from ..tuning import LoopCase, RootMeanSquareError, Tuning, tune
 from ..tuning.case import with_gains
+from .called_contender import SensedController
+from .commissioning import identify_gains
 from .contenders import CompleteLaw, Contender, complete
 from .joints import BenchmarkJoint
 from .task_signals import disturbance, task_signals
@@ -27,21 +31,25 @@ DEFAULT_BUDGET = 4800
 Progress = Callable[[str, int, int], None]
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class TunedContender:
-    """A contender with the law that commands the valves through the sensors; `tuning` is None if it was not tuned."""
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class TunedContender(ShortRepr):
+    """A contender with the law that commands the valves through the sensors; `tuning` is None if it was not tuned.
+
+    identified  the gains that were identified on the truth, by path
+    """
 
     contender: Contender
-    law: ControlLaw
+    law: Controller
     tuning: Tuning | None
+    identified: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
     @property
     def name(self) -> str:
         return self.contender.name
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class BenchmarkRun:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class BenchmarkRun(ShortRepr):
     """One task done by one contender: its metrics and recording, or the reason why the run ended early."""
 
     task: ControlTask
@@ -51,8 +59,8 @@ class BenchmarkRun:
     reason: str = ""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class BenchmarkResult:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class BenchmarkResult(ShortRepr):
     """The runs of all contenders on all tasks of a joint, by names (contender, task)."""
 
     joint: BenchmarkJoint
@@ -122,7 +130,7 @@ def tune_contender(
     joint: BenchmarkJoint, contender: Contender, law: CompleteLaw, *, budget: int, seed: int, progress: Progress
 ) -> TunedContender:
     """A contender with the gains that are best for the tuning tasks in the joint's family of models."""
-    if not law.bounds or not budget:
+    if not law.bounds or not budget or not isinstance(law.law, ControlLaw):
         return TunedContender(contender, law.law, None)
     cases = []
     for task in TUNING_TASKS:
@@ -135,14 +143,23 @@ def tune_contender(
         objective=joint.objective, budget=budget, seed=seed,
         progress=lambda done, total: progress(f"tuning {contender.name}", done, total),
     )  # fmt: skip
-    return TunedContender(contender, with_gains(law.law, tuning.gains), tuning)
+    tuned = with_gains(law.law, tuning.gains)
+    if not contender.identified:
+        return TunedContender(contender, tuned, tuning)
+    progress(f"identifying gains of {contender.name}", 0, 1)
+    bounds = {path: contender.bounds[path] for path in contender.identified}
+    gains, _ = identify_gains(joint, tuned, bounds, TUNING_TASKS[0])
+    return TunedContender(contender, with_gains(tuned, gains), tuning, gains)
 
 
-def loop_of(joint: BenchmarkJoint, law: ControlLaw, task: ControlTask, *, truth: bool) -> ControlLoop:
+def loop_of(joint: BenchmarkJoint, law: Controller, task: ControlTask, *, truth: bool) -> ControlLoop:
     """The control loop of a task, with the drivers of the truth or those of the model."""
     signals = task_signals(joint, task)
     plant, drivers = (joint.truth, joint.truth_drivers) if truth else (joint.model, joint.model_drivers)
-    if task.stuck is not None:
+    if task.stuck is not None and isinstance(law, SensedController):
+        law = dataclasses.replace(law, stuck=task.stuck)
+    elif task.stuck is not None:
+        assert isinstance(law, ControlLaw)
         law = WithStuckValve(law, task.stuck.input, task.stuck.time, task.stuck.opening)
     setpoint = signals.setpoint(law.setpoints)
     return ControlLoop(law, joint.sample_time, setpoint, disturbance(task, plant.inputs), drivers)

@@ -11,9 +11,13 @@ from ...control.antagonistic_inverse import AntagonisticInverse
 from ...control.cascade import Cascade
 from ...control.co_contraction import DIFFERENCE, CoContraction
 from ...control.control_law import ControlLaw
+from ...control.controller import Controller
+from ...control.friction_feed_forward import FrictionFeedForward
 from ...control.pid import PID
 from ...control.proportional_feedback import ProportionalFeedback
 from ...control.sensors import WithSensors
+from ...control.setpoint_command import SetpointCommand
+from ...control.setpoint_delay import WithSetpointDelay
 from ...control.setpoint_lead import SetpointLead
 from ...control.sigma_delta import SigmaDelta
 from ...control.sliding_mode import SlidingMode
@@ -21,6 +25,7 @@ from ...control.split_range import SplitRange
 from ...control.super_twisting import SuperTwisting
 from ...control.with_feed_forward import WithFeedForward
 from ...core.errors import ParameterError
+from .called_contender import COMMANDED, SensedController, sensed
 from .joints import SIDES, BenchmarkJoint
 
 BAR = 1e5
@@ -34,30 +39,45 @@ class Contender:
     """A controller that takes part in the benchmark.
 
     name     for tables
-    law      commands half the pressure difference (`difference`), both pressures (`left.pressure`, `right.pressure`) or
-             the valves. It may measure the angle, the angular speed and both pressures. Its set points are names of
+    law      a ControlLaw, which is compiled with the plant, or another Controller, which is called at each sample and
+             not tuned. It commands half the pressure difference (`difference`), both pressures (`left.pressure`,
+             `right.pressure`) or the valves. It may measure the angle, the angular speed and both pressures. Its set
+             points are names of
              TaskSignals: `angle`, `angular_speed`, `angular_acceleration`, `mean_pressure`, `stiffness`,
              `feed_forward`, `feed_forward_rate`
     bounds   minimum and maximum [SI] of the gains of the law that are tuned, by path. Without bounds, and with a law
              that commands the valves, nothing is tuned
+    identified  paths of those of these gains that are identified after the tuning, by runs on the truth with its
+             sensors; none unless given
     """
 
     name: str
-    law: ControlLaw
+    law: Controller
     bounds: Bounds = dataclasses.field(default_factory=dict)
+    identified: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if not isinstance(self.law, ControlLaw):
+        if not isinstance(self.law, Controller):
             raise ParameterError(
-                f"contender '{self.name}': its law is a {type(self.law).__name__}; give a ControlLaw, so that the "
-                "sensors of the benchmark can be put in front of it."
+                f"contender '{self.name}': its law is a {type(self.law).__name__}; give a ControlLaw or another "
+                "Controller."
+            )
+        if unknown := [path for path in self.identified if path not in self.bounds]:
+            raise ParameterError(
+                f"contender '{self.name}': there are no bounds of '{unknown[0]}', which is to be identified; "
+                f"there are bounds of {', '.join(self.bounds) or 'nothing'}."
+            )
+        if self.bounds and not isinstance(self.law, ControlLaw):
+            raise ParameterError(
+                f"contender '{self.name}': {type(self.law).__name__} is no ControlLaw, its gains cannot be tuned in a "
+                "batch. Omit the bounds, and give a controller that is designed already."
             )
 
 
 class CompleteLaw(NamedTuple):
     """A law that commands the valves of a joint through its sensors, and the ranges of all gains that are tuned."""
 
-    law: WithSensors
+    law: WithSensors | SensedController
     bounds: dict[str, tuple[float, float]]
 
 
@@ -66,7 +86,34 @@ def complete(joint: BenchmarkJoint, contender: Contender, seed: int = 1) -> Comp
 
     Raises ParameterError for a law that commands other inputs, or measures a column without a sensor.
     """
-    law, bounds = contender.law, dict(contender.bounds)
+    _check_columns(joint, contender)
+    if isinstance(contender.law, ControlLaw):
+        law, bounds = _actuated(joint, contender.law, dict(contender.bounds), contender.name)
+        known = {sensor.column: sensor for sensor in joint.sensors}
+        sensors = tuple(known[name] for name in law.measured_columns)
+        return CompleteLaw(WithSensors(law, sensors, float(seed)), _within("law.", bounds))
+    inputs = contender.law.inputs
+    stand_in = SetpointCommand(inputs, tuple(f"{COMMANDED}{name}" for name in inputs))
+    law, _ = _actuated(joint, stand_in, {}, contender.name)
+    span = joint.pressure_span
+    limits = dict.fromkeys(joint.pressures, (joint.min_pressure, joint.max_pressure)) | {DIFFERENCE: (-span, span)}
+    ranges = {name: limits[name] for name in inputs if name in limits}
+    return CompleteLaw(sensed(contender.law, law, ranges, joint.sensors, seed), {})
+
+
+def _check_columns(joint: BenchmarkJoint, contender: Contender) -> None:
+    """Raise ParameterError where a law measures a column without a sensor."""
+    known = [sensor.column for sensor in joint.sensors]
+    if without := [name for name in contender.law.measured_columns if name not in known]:
+        raise ParameterError(
+            f"contender '{contender.name}' measures '{without[0]}'; the joint has sensors of {', '.join(known)}."
+        )
+
+
+def _actuated(
+    joint: BenchmarkJoint, law: ControlLaw, bounds: dict[str, tuple[float, float]], name: str
+) -> tuple[ControlLaw, dict[str, tuple[float, float]]]:
+    """A law with the parts from its commands to the valves, and its ranges."""
     if law.inputs == (DIFFERENCE,):
         span = (joint.pressure_span,)
         law = Cascade(law, CoContraction(joint.pressures, 0.0, "mean_pressure"), (-span[0],), span)
@@ -75,16 +122,10 @@ def complete(joint: BenchmarkJoint, contender: Contender, seed: int = 1) -> Comp
         law, bounds = _with_pressure_control(joint, law, bounds)
     if set(law.inputs) != set(joint.model.inputs) - {"external_torque"}:
         raise ParameterError(
-            f"contender '{contender.name}' commands {', '.join(law.inputs)}; allowed are '{DIFFERENCE}', the pressures "
+            f"contender '{name}' commands {', '.join(law.inputs)}; allowed are '{DIFFERENCE}', the pressures "
             f"{', '.join(joint.pressures)}, or all valves."
         )
-    known = {sensor.column: sensor for sensor in joint.sensors}
-    if without := [name for name in law.measured_columns if name not in known]:
-        raise ParameterError(
-            f"contender '{contender.name}' measures '{without[0]}'; the joint has sensors of {', '.join(known)}."
-        )
-    sensors = tuple(known[name] for name in law.measured_columns)
-    return CompleteLaw(WithSensors(law, sensors, float(seed)), _within("law.", bounds))
+    return law, bounds
 
 
 def _with_pressure_control(
@@ -106,6 +147,7 @@ def _within(prefix: str, bounds: Bounds) -> dict[str, tuple[float, float]]:
 
 
 _GAIN, _INTEGRAL, _DERIVATIVE, _LEAD = (2e4, 2e6), (0.02, 3.0), (1e-3, 0.2), (1e-3, 0.1)
+_FRICTION = (10.0, 5e4)
 PID_BOUNDS: Bounds = {"gain": _GAIN, "integral_time": _INTEGRAL, "derivative_time": _DERIVATIVE}
 
 
@@ -132,6 +174,24 @@ def feed_forward_contender() -> Contender:
     """Feed-forward by the static inverse of the model, and PID."""
     bounds = {"feed_forward.lead_time": _LEAD, **_within("feedback.", PID_BOUNDS)}
     return Contender("feed-forward + PID", WithFeedForward(_feed_forward(), _pid()), bounds)
+
+
+def compensated_contender(joint: BenchmarkJoint) -> Contender:
+    """Feed-forward with compensation of friction, and PID whose set point has the dead time of the encoder.
+
+    The PID differentiates the error. The dead time is that of the data sheet of the sensors, the same for model and
+    truth.
+    """
+    delay = next(sensor.delay for sensor in joint.sensors if sensor.column == "angle")
+    feedback = WithSetpointDelay(dataclasses.replace(_pid(), derivative_weight=1.0), delay)
+    friction = FrictionFeedForward("angular_speed", DIFFERENCE, 1e3, boundary_speed=0.1)
+    law = WithFeedForward(_feed_forward(), WithFeedForward(friction, feedback))
+    bounds = {
+        "feed_forward.lead_time": _LEAD, "feedback.feed_forward.amplitude": _FRICTION,
+        **_within("feedback.feedback.law.", PID_BOUNDS),
+    }  # fmt: skip
+    identified = "feed_forward.lead_time", "feedback.feed_forward.amplitude"
+    return Contender("feed-forward + PID, compensated", law, bounds, identified)
 
 
 def sliding_mode_contender() -> Contender:
@@ -170,6 +230,6 @@ def angle_and_stiffness_contender(joint: BenchmarkJoint) -> Contender:
 def standard_contenders(joint: BenchmarkJoint) -> tuple[Contender, ...]:
     """The contenders of the package for a joint; all ranges of gains are chosen."""
     return (
-        pid_contender(), open_loop_contender(), feed_forward_contender(), sliding_mode_contender(),
-        super_twisting_contender(), angle_and_stiffness_contender(joint),
+        pid_contender(), open_loop_contender(), feed_forward_contender(), compensated_contender(joint),
+        sliding_mode_contender(), super_twisting_contender(), angle_and_stiffness_contender(joint),
     )  # fmt: skip

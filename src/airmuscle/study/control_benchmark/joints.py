@@ -12,6 +12,7 @@ from ...analysis.equilibrium import find_equilibrium
 from ...control.driver import Driver, SolenoidDriver
 from ...control.sensors import ColumnSensor
 from ...core.errors import ParameterError
+from ...core.short_repr import ShortRepr
 from ...friction import Dahl, Friction, LuGre
 from ...library.law_file import load_law
 from ...mechanism import AntagonisticJoint, JointWithExternalTorque
@@ -38,8 +39,8 @@ DEAD_TIME = 6e-3
 PROPORTIONAL_CONDUCTANCE, MATRIX_CONDUCTANCE = 1e-8, 2.6167e-9
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class BenchmarkJoint:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class BenchmarkJoint(ShortRepr):
     """An antagonistic joint of the benchmark.
 
     model           the plant as the controllers know it: feed-forward, inverse, tuning

@@ -12,6 +12,7 @@ from ...control.iterative_learning import IterativeLearning
 from ...control.sensors import WithSensors
 from ...core.arrays import Array
 from ...core.errors import ParameterError
+from ...core.short_repr import ShortRepr
 from ...core.tree import leaves
 from ...plant.plant import Plant
 from ...simulation.run import simulate
@@ -27,8 +28,8 @@ STEP = 0.05e5
 """Step of the feed-forward signal [Pa] from which the impulse response of the model is computed (chosen)."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class LearningCurve:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class LearningCurve(ShortRepr):
     """The trials of a task: rms errors (J,) [degree] from the task's begin on, and the last signal (N,) [Pa].
 
     The first trial is that before any learning. `spread` is the range of the rms errors [degree] of the last signal,
@@ -58,16 +59,16 @@ def learn(
     filter and `change_weight` are chosen. Raises ParameterError for a contender without the set points `feed_forward`
     and `feed_forward_rate`, or fewer than two trials.
     """
-    if not {SIGNAL, RATE} <= set(contender.law.setpoints):
+    law = contender.law
+    if not {SIGNAL, RATE} <= set(law.setpoints) or not isinstance(law, WithSensors):
         raise ParameterError(
-            f"learn: contender '{contender.name}' has no set points '{SIGNAL}' and '{RATE}', which are learned."
+            f"learn: contender '{contender.name}' has no set points '{SIGNAL}' and '{RATE}', which are learned, or is "
+            "no ControlLaw."
         )
     if trials < 2:
         raise ParameterError(f"learn: {trials} trials; give at least 2.")
     signals = task_signals(joint, task)
     count = round(task.duration / joint.sample_time)
-    law = contender.law
-    assert isinstance(law, WithSensors)
     signal = _present_signal(contender, signals)[:count]
     learning = _learning(joint, law, task, signals, count, cutoff, change_weight)
     start, wanted = joint.start(joint.truth), signals.angle[1 : count + 1]

@@ -11,12 +11,13 @@ from ...control.control_loop import ControlLoop
 from ...control.controller import Controller
 from ...core.annotation import abridged
 from ...core.errors import ParameterError, PhysicsError
+from ...core.short_repr import ShortRepr
 from ...core.tree import leaves, structure, with_parameters
 from ...plant.plant import Plant
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class LoopCase:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class LoopCase(ShortRepr):
     """A plant with its control loop and initial state, one of the family for which gains are tuned.
 
     name             for tables and messages: "nominal", "load x 2"

@@ -11,10 +11,11 @@ import numpy.typing as npt
 
 from ...core.arrays import Array
 from ...core.errors import ParameterError
+from ...core.short_repr import ShortRepr
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class CaseMetrics:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class CaseMetrics(ShortRepr):
     """Metrics (E, M) of E sets of gains in M cases.
 
     index        tracking index; infinite where a run failed

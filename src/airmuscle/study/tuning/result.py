@@ -12,6 +12,7 @@ from ...control.control_loop import ControlLoop
 from ...core.arrays import Array
 from ...core.errors import ColumnError, suggestion
 from ...core.reference import Reference, cite
+from ...core.short_repr import ShortRepr
 from .case import LoopCase, loop_with_gains
 from .gain_ranges import GainRange
 from .objective import CaseMetrics, Objective
@@ -26,8 +27,8 @@ STORN_PRICE1997 = Reference(
 )
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class TuningHistory:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class TuningHistory(ShortRepr):
     """Every set of gains that was simulated, in order: gains (E, D) [SI], objective (E,) and metrics (E, M)."""
 
     paths: tuple[str, ...]
@@ -61,8 +62,8 @@ class TuningHistory:
         return np.asarray(order[cost[order] < lowest], dtype=np.intp)
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Tuning:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Tuning(ShortRepr):
     """The result of tuning: the gains with the smallest objective.
 
     cases, ranges    for which and within which the gains were sought

@@ -15,6 +15,7 @@ from typing import Any
 from ...control.control_loop import ControlLoop
 from ...control.controller import relative_unit
 from ...core.errors import AirmuscleWarning, FileError, ParameterError, suggestion
+from ...core.short_repr import ShortRepr
 from ...core.tree import Leaf, leaves
 from ...core.units import quantity
 from ...library.files import is_path, list_plants, read_toml
@@ -35,8 +36,8 @@ CONTROLLER_KEYS = ("input", "controller")
 """Keys of the controller in a scenario."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class ScenarioLoop:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class ScenarioLoop(ShortRepr):
     """A scenario file with a control loop whose gains are tuned: its path, text, tables and scenario."""
 
     path: Path

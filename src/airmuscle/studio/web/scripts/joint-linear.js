@@ -137,13 +137,14 @@
     return [outR, outI];
   }
 
-  /* Magnitude [dB], unwrapped phase [degree], and the margins of an open loop. */
+  /* Magnitude [dB], unwrapped phase [degree], and the smallest margins of an open loop. */
   function bode(frequencies, values) {
     const magnitude = values.map(([a, b]) => 20 * Math.log10(Math.hypot(a, b))), phase = [];
     values.forEach(([a, b], i) => { let p = Math.atan2(b, a) * 180 / Math.PI; if (!i) { if (p > 0) p -= 360; } else p += 360 * Math.round((phase[i - 1] - p) / 360); phase.push(p); });
-    const crossing = (level, rows, falls) => { for (let i = 1; i < rows.length; i++) if ((rows[i - 1] - level) * (rows[i] - level) <= 0 && rows[i - 1] !== rows[i] && (!falls || rows[i] < rows[i - 1])) return [i, (level - rows[i - 1]) / (rows[i] - rows[i - 1])]; return null; };
+    const crossings = (level, rows) => rows.flatMap((v, i) => (i && v !== rows[i - 1] && (rows[i - 1] - level) * (v - level) <= 0 ? [[i, (level - rows[i - 1]) / (v - rows[i - 1])]] : []));
     const at = (rows, [i, t]) => rows[i - 1] + t * (rows[i] - rows[i - 1]), frequencyAt = ([i, t]) => Math.exp(Math.log(frequencies[i - 1]) + t * Math.log(frequencies[i] / frequencies[i - 1]));
-    const gain = crossing(0, magnitude, true), half = crossing(-180, phase, true);
+    const smallest = (found, margin) => found.sort((a, b) => margin(a) - margin(b))[0];
+    const gain = smallest(crossings(0, magnitude), (c) => 180 + at(phase, c)), half = smallest(crossings(-180, phase), (c) => -at(magnitude, c));
     return {
       magnitude, phase,
       crossover: gain ? frequencyAt(gain) : NaN, phaseMargin: gain ? 180 + at(phase, gain) : NaN,

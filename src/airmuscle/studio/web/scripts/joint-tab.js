@@ -170,8 +170,7 @@
     compute() {
       const { law, task, point, statics, run, sampleTime } = this, begin = performance.now();
       if (law.row.bias) law.set(law.row.bias, 0.5 * (point.first - point.second));
-      const times = airmuscle.loopInstants(0, task.duration, sampleTime), { state } = statics.rest(point.angle, point.first, point.second);
-      const setpoints = airmuscle.taskSignals(statics, task, point, this.share, times.slice(0, -1), { ahead: this.ahead, pressures: law.row.setpoints.includes("first_ahead") });
+      const { state } = statics.rest(point.angle, point.first, point.second), setpoints = this.signals(law.row.setpoints.includes("first_ahead"));
       const torque = task.torque.map(([t, value]) => [t, this.share * value]);
       this.result = airmuscle.runLoop(run, law, { duration: task.duration, sampleTime, state, setpoints, torque, torqueInput: "external_torque" });
       const { columns, status, time } = this.result, [one, two] = this.sheet.muscles;
@@ -187,6 +186,17 @@
       this.showPoint();
       this.showInstant();
       this.host.dataset.runs = String(Number(this.host.dataset.runs ?? 0) + 1);
+    }
+
+    /* Set points of the task; they do not depend on the gains. */
+    signals(pressures) {
+      const { task, point, share, sampleTime, ahead, statics } = this, key = JSON.stringify([this.sheet.id, task.name, point, share, sampleTime, ahead, pressures]);
+      if (this.signalKey !== key) {
+        const times = airmuscle.loopInstants(0, task.duration, sampleTime);
+        this.signalKey = key;
+        this.kept = airmuscle.taskSignals(statics, task, point, share, times.slice(0, -1), { ahead, pressures });
+      }
+      return this.kept;
     }
 
     showBode() {

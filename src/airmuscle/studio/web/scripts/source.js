@@ -54,6 +54,8 @@
 
     loadProgram,
 
+    async sizing(text) { return (await post("api/size", text)).json(); },
+
     async page(sheets, state) { return (await post("api/page", JSON.stringify({ sheets, state }))).blob(); },
   };
 

@@ -1,0 +1,236 @@
+"""Display units: units of a user's choice for plots, tables, texts and notebooks; files keep their declared units.
+
+The choice is, in this order: that of the innermost `with display(...)` block, that of the last call of `display(...)`
+in this process, that of the file config.toml in the user's configuration folder, or else the default of each output.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import os
+import pathlib
+import re
+import threading
+import tomllib
+from contextvars import ContextVar
+from typing import Any, Self
+
+from .annotation import abridged
+from .errors import AirmuscleError, FileError, UnitError
+from .units import conversion, known_factor
+
+SI_UNITS = ("Pa", "m", "rad", "1", "N", "kg", "s", "m3", "m/s", "m/s^2", "rad/s", "rad/s^2", "kg/s", "m3/s",
+            "m3/(s Pa)", "N/m", "N m", "N m/rad")  # fmt: skip
+"""SI units of the quantities whose display unit can be chosen; "1" is that of the contraction."""
+CONFIG_FILE = "config.toml"
+"""Name of the configuration file."""
+
+_SUPERSCRIPTS = str.maketrans({"³": "3", "²": "2"})
+_HEADING = re.compile(r"(?P<name>.*)\[(?P<unit>[^\]]+)\]\s*$", re.DOTALL)
+_NUMBER = re.compile(r"(?<![\w.])[-−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.])")
+
+
+class DisplayUnits:
+    """A choice of display units, which is in force in this process, or in a `with` block only.
+
+    units  the texts of the units, such as ("bar", "mm"); a quantity without one keeps the default of the output
+    """
+
+    def __init__(self, units: tuple[str, ...], where: str = "display", before: DisplayUnits | None = None) -> None:
+        self.units = units
+        self.before = before
+        self.is_block = False
+        self._by_si = _factors_by_si_unit(units, where)
+
+    def __enter__(self) -> Self:
+        """Restrict the choice to a block in this thread: the choice of the process is the earlier one again."""
+        with _lock:
+            self.is_block = True
+            _process[0] = _last_of_process(_process[0])
+        _blocks.set((*_blocks.get(), self))
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        _blocks.set(_blocks.get()[:-1])
+
+    def __repr__(self) -> str:
+        return f"DisplayUnits({', '.join(self.units) or 'default units'})"
+
+    def scale(self, si_unit: str) -> tuple[float, str] | None:
+        """Factor from SI and text of the unit chosen for the quantities of an SI unit; None if none is chosen."""
+        return self._by_si.get(si_unit)
+
+
+_lock = threading.Lock()
+_process: list[DisplayUnits | None] = [None]
+_blocks: ContextVar[tuple[DisplayUnits, ...]] = ContextVar("display units", default=())
+
+
+def _last_of_process(choice: DisplayUnits | None) -> DisplayUnits | None:
+    """The last choice that was not made for a block."""
+    while choice is not None and choice.is_block:
+        choice = choice.before
+    return choice
+
+
+def display(*units: str) -> DisplayUnits:
+    """Show quantities in these units from now on: `display("bar", "mm", "deg")`; without units, in the default ones.
+
+    A call replaces the previous choice. `with display("bar"):` limits it to a block and to the thread of the block. It
+    changes plots, tables, reports, texts and notebooks; values, arguments and files (CSV, TOML, JSON) are not affected.
+    Raises UnitError for an unknown unit, for two units of one quantity, and for an absolute pressure.
+    """
+    with _lock:
+        _process[0] = choice = DisplayUnits(units, before=_last_of_process(_process[0]))
+    return choice
+
+
+def current_units() -> tuple[str, ...] | None:
+    """The units chosen in this process or block, for a worker process; None if only the configuration file counts."""
+    choice = _choice_here()
+    return None if choice is None else choice.units
+
+
+def _choice_here() -> DisplayUnits | None:
+    blocks = _blocks.get()
+    return blocks[-1] if blocks else _process[0]
+
+
+def chosen_scale(si_unit: str, factor: float, label: str) -> tuple[float, str]:
+    """Factor from SI and unit in which a quantity is displayed; `factor` and `label` are the default.
+
+    Raises FileError or UnitError for an invalid configuration file.
+    """
+    choice = _choice_here() or _configured(str(config_folder() / CONFIG_FILE))
+    return choice.scale(si_unit) or (factor, label)
+
+
+def quantity_text(value: Any, si_unit: str, default: str, digits: int = 4) -> str:
+    """A value in SI as text with its display unit, `300 kPa`, to a number of significant digits."""
+    factor, unit = chosen_scale(si_unit, 1.0 / known_factor(default), default)
+    return f"{value * factor:.{digits}g} {'' if unit == '1' else unit}".rstrip()
+
+
+def contraction_text(value: Any, default: str = ".2%", digits: int = 4) -> str:
+    """A contraction as text: in the format `default`, or to significant digits in the chosen unit."""
+    choice = chosen_scale("1", 0.0, "")
+    if not choice[1]:
+        return f"{value:{default}}"
+    return f"{value * choice[0]:.{digits}g} {'' if choice[1] == '1' else choice[1]}".rstrip()
+
+
+def in_display_unit(value: Any, unit: str) -> tuple[Any, str]:
+    """A value in a declared SI unit, with that unit; in the chosen display unit if there is one.
+
+    A ratio stays a ratio: not each one is a contraction.
+    """
+    factor, shown = (1.0, unit) if unit == "1" else chosen_scale(unit, 1.0, unit)
+    return (value if factor == 1.0 else value * factor), shown
+
+
+def heading_scale(heading: str) -> tuple[float, str]:
+    """Factor and heading of a column or axis whose heading ends with its unit: 'pressure [kPa]' in the chosen unit.
+
+    The factor is 1 if no other unit is chosen. A ratio is converted only if it is a contraction.
+    """
+    match = _HEADING.fullmatch(heading)
+    if match is None or (found := _known(match["unit"])) is None:
+        return 1.0, heading
+    si_unit, factor = found
+    if si_unit == "1" and "contraction" not in match["name"].lower():
+        return 1.0, heading
+    scale, unit = chosen_scale(si_unit, 1.0 / factor, match["unit"])
+    if unit == match["unit"]:
+        return 1.0, heading
+    return factor * scale, f"{match['name']}[{'-' if unit == '1' else unit}]"
+
+
+def scaled_numbers(text: str, factor: float, digits: int = 4) -> str:
+    """A text with its numbers multiplied by a factor: '1 to 2' becomes '0.01 to 0.02' for 0.01."""
+    return _NUMBER.sub(lambda match: f"{float(match[0].replace('−', '-')) * factor:.{digits}g}", text)
+
+
+@functools.cache
+def _known(unit: str) -> tuple[str, float] | None:
+    """SI unit and factor of a unit of which a display unit can be chosen, else None."""
+    plain = unit.translate(_SUPERSCRIPTS)
+    if plain in SI_UNITS:
+        return plain, 1.0
+    found = known_factor(plain, None)
+    return None if found is None else next(((si, found) for si in SI_UNITS if _converts(plain, si)), None)
+
+
+def _converts(unit: str, si_unit: str) -> bool:
+    try:
+        return conversion(unit, si_unit).offset == 0.0
+    except UnitError:
+        return False
+
+
+def _factors_by_si_unit(units: tuple[str, ...], where: str) -> dict[str, tuple[float, str]]:
+    """Factor from SI and text of each unit, by SI unit. Raises UnitError."""
+    chosen: dict[str, tuple[float, str]] = {}
+    for unit in units:
+        if not isinstance(unit, str) or not unit.strip():
+            raise UnitError(f"{where}: {abridged(unit)} is not a unit; write texts, such as 'bar', 'mm', 'deg'.")
+        si_unit, factor = _si_unit_and_factor(unit.strip(), where)
+        if si_unit in chosen:
+            raise UnitError(
+                f"{where}: '{chosen[si_unit][1]}' and '{unit.strip()}' are units of the same quantity; choose one."
+            )
+        chosen[si_unit] = (1.0 / factor, unit.strip())
+    return chosen
+
+
+def _si_unit_and_factor(unit: str, where: str) -> tuple[str, float]:
+    """SI unit and factor of a unit. Raises UnitError if it is unknown, has an offset, or cannot be chosen."""
+    reason = ""
+    for si_unit in SI_UNITS:
+        try:
+            found = conversion(unit, si_unit)
+        except UnitError as error:
+            reason = reason or ("" if "measures another" in error.message else f" {error.message}")
+            continue
+        if re.search(r"a$|\(a\)|abs", unit) and si_unit == "Pa" and found.offset:
+            raise UnitError(f"{where}: '{unit}' is absolute, but displayed pressures are gauge pressures; write 'bar'.")
+        if math.isfinite(found.factor) and found.factor > 0.0 and not found.offset:
+            return si_unit, found.factor
+    raise UnitError(
+        f"{where}: '{unit}' cannot be chosen.{reason} Allowed are units of {', '.join(SI_UNITS)}, such as 'bar' "
+        "or 'mm'."
+    )
+
+
+def config_folder() -> pathlib.Path:
+    """The folder of the configuration file: AIRMUSCLE_CONFIG_DIR, or airmuscle in the user's configuration folder."""
+    named = os.environ.get("AIRMUSCLE_CONFIG_DIR")
+    if named:
+        return pathlib.Path(named)
+    import platformdirs
+
+    return pathlib.Path(platformdirs.user_config_dir("airmuscle", appauthor=False))
+
+
+@functools.cache
+def _configured(file: str) -> DisplayUnits:
+    """The choice of a configuration file, [display] units = [...], read once. Raises FileError or UnitError."""
+    try:
+        tables = tomllib.loads(pathlib.Path(file).read_text(encoding="utf-8-sig"))
+    except (FileNotFoundError, NotADirectoryError):
+        return DisplayUnits(())
+    except OSError as error:
+        raise FileError(f"{file}: cannot be read ({error.strerror}).") from None
+    except (ValueError, RecursionError) as error:  # not TOML, or not UTF-8
+        raise FileError(f"{file}: is not valid TOML: {error}.") from None
+    table = tables.get("display", {})
+    units = table.get("units", []) if isinstance(table, dict) else None
+    unknown = [key for key in tables if key != "display"]
+    unknown += [key for key in table if key != "units"] if isinstance(table, dict) else []
+    if unknown or not isinstance(units, list):
+        what = f"unknown key '{unknown[0]}'" if unknown else "units must be a list of texts"
+        raise FileError(f'{file}: {what}; write [display] and under it units = ["bar", "mm", "deg"].')
+    try:
+        return DisplayUnits(tuple(units), "[display] units")
+    except AirmuscleError as error:
+        raise error.located(file) from None

@@ -1,0 +1,60 @@
+"""Short representation of results: class, fields with values, and the shapes of arrays, on at most ten lines."""
+
+from __future__ import annotations
+
+import dataclasses
+import textwrap
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+MAX_LINES = 10
+"""Maximum number of lines of a representation (chosen)."""
+MAX_VALUE = 60
+"""Maximum number of characters of a value."""
+WIDTH = 100
+"""Characters of a line."""
+
+
+class ShortRepr:
+    """Base of results whose complete content would fill pages: their `repr` names each field on at most ten lines."""
+
+    def __repr__(self) -> str:
+        return short_repr(self)
+
+
+def short_repr(thing: Any) -> str:
+    """Class and fields of a dataclass on at most ten lines; arrays and collections by their size."""
+    fields = [f.name for f in dataclasses.fields(thing) if f.repr]
+    items = [f"{name}={_value(getattr(thing, name))}" for name in fields]
+    text = f"{type(thing).__name__}({', '.join(items)})"
+    lines = textwrap.wrap(text, WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
+    return "\n".join(lines if len(lines) <= MAX_LINES else [*lines[: MAX_LINES - 1], "    ...)"])
+
+
+def _value(value: Any) -> str:
+    """A value in one line of at most `MAX_VALUE` characters."""
+    if isinstance(value, np.ndarray):
+        return f"array of shape {value.shape}"
+    if isinstance(value, float | np.floating):
+        return f"{float(value):.6g}"
+    if isinstance(value, bool | int | str | None):
+        return textwrap.shorten(repr(value), MAX_VALUE, placeholder=" ...'")
+    if isinstance(value, Mapping):
+        return f"{{{textwrap.shorten(', '.join(map(str, value)), MAX_VALUE, placeholder=' ...')}}}"
+    if isinstance(value, tuple | list):
+        return _sequence(value)
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return f"{type(value).__name__}(...)" if dataclasses.fields(value) else f"{type(value).__name__}()"
+    return textwrap.shorten(" ".join(repr(value).split()), MAX_VALUE, placeholder=" ...")
+
+
+def _sequence(value: tuple[Any, ...] | list[Any]) -> str:
+    """A short sequence of numbers or texts, otherwise the number of its items and their class."""
+    if all(isinstance(item, float | int | str) for item in value):
+        text = f"({', '.join(_value(item) for item in value)})"
+        if len(text) <= MAX_VALUE:
+            return text
+    classes = list(dict.fromkeys(type(item).__name__ for item in value))
+    return f"({len(value)} of {' and '.join(classes[:2])}{' ...' if len(classes) > 2 else ''})"

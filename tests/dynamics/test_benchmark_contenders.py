@@ -1,0 +1,90 @@
+"""Contenders of the control benchmark that are called from Python, and a gain that is identified on the truth.
+
+A controller that is no control law meets the same sensors and the same actuation as one that is compiled. A gain is
+identified by runs of a motion on the truth, judged by the encoder alone.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from called_controller import Called
+
+from airmuscle.control import ControlLaw
+from airmuscle.core import model, parameter
+from airmuscle.core.errors import ParameterError
+from airmuscle.study.control_benchmark import (
+    Contender,
+    ControlTask,
+    SineMotion,
+    StuckValve,
+    compare_controllers,
+    proportional_joint,
+    standard_contenders,
+)
+from airmuscle.study.control_benchmark.called_contender import Readings
+from airmuscle.study.control_benchmark.commissioning import identify_gains, tracking_error
+from airmuscle.study.control_benchmark.contenders import complete
+from airmuscle.study.tuning.case import with_gains
+
+JOINT = proportional_joint()
+SHORT = ControlTask("short sine", SineMotion(math.radians(10.0), 2.0), 1.0, begin=0.5)
+
+
+@model
+class AngleLaw(ControlLaw):
+    """A user's law: proportional, from the angle to half the pressure difference."""
+
+    gain: float = parameter("Pa/rad", "K", "gain", bounds=(0.0, 1e7))
+    measured_columns = ("angle",)
+    setpoints = ("angle",)
+    inputs = ("difference",)
+    initial_memory: ClassVar = {}
+
+    def step(self, memory, measurement, dt):
+        return {"difference": self.gain * (measurement.setpoints["angle"] - measurement.columns["angle"])}, {}
+
+
+MINE = Contender("mine", AngleLaw(2e5), {"gain": (1e5, 5e5)})
+
+
+def test_a_controller_that_is_called_meets_the_same_sensors_and_the_same_actuation():
+    """The same law, called from Python at each sample: the same run, also with a valve that sticks."""
+    called = Contender("called", Called(MINE.law))
+    again = compare_controllers(JOINT, [called], [SHORT], budget=10)
+    assert again.contenders[0].tuning is None
+    found = again.metric("called", "short sine", "rmse")
+    mine = compare_controllers(JOINT, [MINE], [SHORT], budget=0)
+    assert found == pytest.approx(mine.metric("mine", "short sine", "rmse"), rel=1e-3)
+    stuck = replace(SHORT, name="stuck", stuck=StuckValve("left.discharge", 0.4, 0.1))
+    record = compare_controllers(JOINT, [called], [stuck], budget=0).runs["called", "stuck"].recording
+    assert np.unique(record["left.discharge"][record["time"] > 0.401]) == pytest.approx([0.1])
+    with pytest.raises(ParameterError, match="Called is no ControlLaw, its gains cannot be tuned in a batch"):
+        replace(called, bounds={"gain": (1e5, 5e5)})
+    with pytest.raises(ParameterError, match="commands angle; allowed are 'difference'"):
+        complete(JOINT, Contender("wrong", Called(Readings(("angle",)))))
+    with pytest.raises(ParameterError, match=r"measures 'left\.force'; the joint has sensors of"):
+        complete(JOINT, Contender("wrong", Called(Readings(("left.force",)))))
+
+
+def test_the_gains_that_are_identified_follow_the_truth_better_than_the_ends_of_their_ranges():
+    contender = next(each for each in standard_contenders(JOINT) if "compensated" in each.name)
+    law = complete(JOINT, contender).law
+    task = replace(SHORT, begin=0.0, duration=1.2)
+    bounds = {"lead_time": (0.001, 0.1), "amplitude": (10.0, 5e4)}
+    gains, runs = identify_gains(JOINT, law, bounds, task)
+    assert [path.rsplit(".", 1)[1] for path in gains] == list(bounds)
+    assert 4 < runs <= 48
+    best = tracking_error(JOINT, with_gains(law, gains), task)
+    for path, (low, high) in zip(gains, bounds.values(), strict=True):
+        assert low < gains[path] < high
+        ends = [tracking_error(JOINT, with_gains(law, {**gains, path: value}), task) for value in (low, high)]
+        assert best < min(ends), path
+    with pytest.raises(ParameterError, match="no bounds of 'lag', which is to be identified; there are bounds of gain"):
+        replace(MINE, identified=("lag",))
+    with pytest.raises(ParameterError, match="0 gains end with 'lead'; give the end of exactly one path"):
+        identify_gains(JOINT, law, {"lead": (0.0, 1.0)}, task)

@@ -1,0 +1,57 @@
+"""The tutorials and explanations are true: their code runs from an empty folder, and shows the printed output."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from page_code import PageRun, run_page
+
+
+def is_shown(expected: str, found: str) -> bool:
+    """Whether every line of a shown output is in what was printed, in order; an ellipsis stands for other lines."""
+    lines = iter(line.strip() for line in found.splitlines())
+    return all(any(line.strip() == each for each in lines) for line in expected.splitlines() if line.strip() != "...")
+
+
+def check(run: PageRun) -> None:
+    assert run.outputs
+    for expected, found in run.outputs:
+        assert is_shown(expected, found), f"the page shows\n{expected}\nand the code prints\n{found}"
+
+
+@pytest.mark.parametrize("page", ["air-mass.md", "stiffness.md", "where-papers-err.md"])
+def test_an_explanation_shows_the_numbers_that_its_code_prints(
+    page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    check(run_page(page, tmp_path))
+
+
+def test_the_first_muscle(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    run = run_page("tutorial-first-muscle.md", tmp_path)
+    check(run)
+    assert (tmp_path / "chart" / "isobars.png").stat().st_size > 0
+
+
+@pytest.mark.slow
+def test_from_bench_to_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    check(run_page("tutorial-bench-to-report.md", tmp_path))
+    assert (tmp_path / "fit" / "report.html").stat().st_size > 0
+    assert (tmp_path / "lift" / "recording.csv").stat().st_size > 0
+
+
+def test_the_first_joint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    run = run_page("tutorial-joint.md", tmp_path)
+    check(run)
+    assert abs(run.names["controlled"]["angle"][-1] - 0.3) < 0.01
+
+
+@pytest.mark.slow
+def test_the_controller_on_a_microcontroller(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    run_page("tutorial-microcontroller.md", tmp_path)
+    assert (tmp_path / "controller" / "pressure.h").stat().st_size > 0
