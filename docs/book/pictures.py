@@ -20,8 +20,9 @@ from airmuscle.friction import Friction
 from airmuscle.geometry import Geometry
 from airmuscle.identify.hysteresis.plot import plot_loops
 from airmuscle.mechanism import PulleyProfile
+from airmuscle.muscle.isobars import compute_isobars
 from airmuscle.pneumatics import Orifice
-from airmuscle.report.isobar_plot import compute_isobars, isobar_plot
+from airmuscle.report.isobar_plot import isobar_plot
 
 from .model_pages import components, entries_of, rooms
 
@@ -103,7 +104,8 @@ def _outline(shape: Geometry, title: str) -> Any:
     for contraction, colour, dash in zip(contractions, plotting.LINES, plotting.DASHES, strict=False):
         x, radius = shape.outline(float(contraction))
         left.plot(1e3 * x, 1e3 * radius, color=colour, linestyle=dash, label=f"{100 * contraction:.0f} %")
-    left.set(xlabel="axial position [mm]", ylabel="radius [mm]", ylim=(0.0, None), title=title)
+    figure.suptitle(title, fontsize=9)
+    left.set(xlabel="axial position [mm]", ylabel="radius [mm]", ylim=(0.0, None))
     left.legend(title="contraction")
     grid = np.linspace(contractions[0], contractions[-1], 81)
     right.plot(100 * grid, 1e6 * np.array([float(shape.volume(float(c))) for c in grid]), color=plotting.BLUE)

@@ -94,6 +94,7 @@ def test_the_contract_tests_find_a_complete_model_and_pass(complete: Path):
     assert int(re.search(r"(\d+) passed", done.stdout)[1]) >= 20
 
 
+@pytest.mark.slow
 def test_a_complete_model_is_built_evaluated_and_simulated(complete: Path):
     done = run(complete, "-c", "import sys; sys.path[:0] = ['tests', 'benchmarks']\n" + CHECK)
     assert done.returncode == 0, done.stderr[-2000:]

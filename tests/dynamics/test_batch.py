@@ -79,11 +79,22 @@ def greatest_difference(found: BatchSolution, index, run):
     return worst
 
 
-@pytest.mark.parametrize("method", [RungeKutta4(1e-4), DormandPrince8(5e-5)], ids=["RK4", "ode8"])
-@pytest.mark.parametrize("name", CASES)
+FEW = (("third paper", "ode8"), ("six states", "RK4"))
+METHODS = {"RK4": RungeKutta4(1e-4), "ode8": DormandPrince8(5e-5)}
+
+
+@pytest.mark.parametrize(
+    ("name", "method"),
+    [
+        pytest.param(name, method, marks=[] if (name, method) in FEW else pytest.mark.slow)
+        for name in CASES
+        for method in METHODS
+    ],
+)
 def test_a_lane_agrees_with_the_plant_alone(name, method):
     """To 1e-12 of the size of each column after thousands of steps, in 19 lanes, which is not a multiple of a block."""
     plant, varied, start, command = CASES[name]
+    method = METHODS[method]
     found = simulate_batch(
         plant, around(varied, 19), command, duration=0.5, initial_states=start, integrator=method, output_times=0.0037
     )

@@ -70,7 +70,7 @@ def scipy_solution(plant, start, command, duration, rtol=1e-10):
     return np.concatenate(times), np.concatenate(rows)
 
 
-@pytest.mark.parametrize("size", CASES)
+@pytest.mark.parametrize("size", [3, 6, pytest.param(10, marks=pytest.mark.slow)])
 def test_plants_of_every_size_agree_with_scipy(size):
     plant, start, command, duration = CASES[size]
     assert len(plant.states) == size

@@ -189,7 +189,10 @@ def assert_the_law(system, state, inputs, relative):
         assert outputs[name] == pytest.approx(value, rel=relative, abs=1e-12 * abs(value) + 1e-280), name
 
 
-@pytest.mark.parametrize(("states", "columns"), [(3, 1), (3, 3), (6, 5), (6, 8), (10, 11)])
+@pytest.mark.parametrize(
+    ("states", "columns"),
+    [(3, 3), (6, 5), *(pytest.param(*sizes, marks=pytest.mark.slow) for sizes in ((3, 1), (6, 8), (10, 11)))],
+)
 def test_printed_columns_are_the_law(states, columns):
     """At random points with any valve open, any number of columns, whatever the registers hold."""
     run, rng = runs()[states], np.random.default_rng(states)
@@ -266,16 +269,17 @@ def difference(system, path, start, relative):
     return (up - down) / (2 * relative * value)
 
 
-def test_a_plant_against_differences():
+@pytest.mark.parametrize("paths", [PATHS[::3], pytest.param(PATHS, marks=pytest.mark.slow)], ids=["few", "all"])
+def test_a_plant_against_differences(paths):
     """Rodas4 at rtol 1e-10 is within 5e-7 of each derivative's greatest.
 
     No one step of the differences serves all: 1e-4 has a truncation error of 1e-6 for a valve, 1e-5 a rounding error
     of 1e-6 for a damper.
     """
     system, start = plant_case()
-    exact = rows(sensitive(system, PATHS), [*start, *[0.0] * 3 * len(PATHS)], TIMES, COMMAND, Rodas4(1e-10))
-    for k, path in enumerate(PATHS):
-        found = exact[:, 3 + k :: len(PATHS)]
+    exact = rows(sensitive(system, paths), [*start, *[0.0] * 3 * len(paths)], TIMES, COMMAND, Rodas4(1e-10))
+    for k, path in enumerate(paths):
+        found = exact[:, 3 + k :: len(paths)]
         size, errors = np.abs(found).max(axis=0), []
         for relative in (1e-3, 1e-4, 1e-5):
             errors.append((np.abs(found - difference(system, path, start, relative)) / size).max())

@@ -124,7 +124,7 @@ def computed(items: Any, leaves: dict[Operand, float]) -> tuple[Values, int]:
     return values, count
 
 
-@pytest.mark.parametrize("graphs", [GRAPHS // 5, pytest.param(GRAPHS, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("graphs", [GRAPHS // 20, pytest.param(GRAPHS, marks=pytest.mark.slow)])
 def test_random_code_gives_the_same_with_branches(monkeypatch: pytest.MonkeyPatch, graphs: int) -> None:
     """However little a branch saves; with part of the results early, as the rates of a stage are, or none."""
     monkeypatch.setattr("airmuscle.compile.ir.branches.WORTH", 1)

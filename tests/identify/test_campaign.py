@@ -24,8 +24,10 @@ from airmuscle.identify.campaign import (
     identify_campaign,
 )
 from airmuscle.identify.campaign.creep_stage import creep_stretches, fit_creep_stage
+from airmuscle.identify.campaign.next_experiment import _levels
 from airmuscle.identify.campaign.transient import count_pulses
 from airmuscle.identify.campaign.volume import VolumeChange, relate_volumes
+from airmuscle.identify.experiment_design import PlannedRun
 from airmuscle.recording import Recording, read
 
 RANDOM = np.random.default_rng(3)
@@ -272,3 +274,16 @@ def test_a_pulsed_ramp_at_a_held_length_is_an_isometric_run_and_no_fill():
     columns = {"time": time, "pressure": pressure, "contraction": np.full(time.size, 0.05), "force": 2e-3 * pressure}
     (record,) = classify_records([Recording(columns, "ramp", {"resting_length": 0.3})])
     assert record.kind is RecordKind.ISOMETRIC
+
+
+def test_a_fill_without_a_length_is_named_with_what_it_needs():
+    time = np.linspace(0.0, 3.0, 200)
+    fill = Recording({"time": time, "pressure": 6e5 * (1.0 - np.exp(-time))}, "fill")
+    (record,) = classify_records([fill])
+    assert record.kind is RecordKind.UNUSED
+    assert "as constants length and resting_length" in record.reason
+
+
+def test_a_planned_run_is_described_by_its_levels():
+    run = PlannedRun("pressure", np.full(5, 2.5e5), np.linspace(0.0, 0.2, 5), np.zeros(5))
+    assert _levels(run) == "pressure 250 kPa, contraction 0 % to 20 %"

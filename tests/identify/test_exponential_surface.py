@@ -176,7 +176,7 @@ def test_a_box_without_a_break_has_none():
     assert find_monotonicity_violations(EXACT, LoadRange(1e5, 3e5, 45.0, 180.0)) == ()
 
 
-@pytest.mark.parametrize("degrees", [(4, 2), (6, 3)])
+@pytest.mark.parametrize("degrees", [(4, 2), pytest.param((6, 3), marks=pytest.mark.slow)])
 def test_the_monotone_fit_holds_between_its_cells(degrees):
     data = CURVES if degrees == (4, 2) else other_muscle()
     saturation = 0.40 if degrees == (4, 2) else 0.3

@@ -387,9 +387,14 @@ def test_a_robust_fit_forgets_gross_errors():
     assert any("Huber(scale=3.0), in N" in note for note in robust.notes)
 
 
-@pytest.mark.parametrize("scale", [1000.0, 10.0, 1.0, 0.1, 0.01])
+@pytest.mark.parametrize(
+    "scale", [1000.0, pytest.param(10.0, marks=pytest.mark.slow), 1.0, pytest.param(0.1, marks=pytest.mark.slow), 0.01]
+)
 @pytest.mark.parametrize("kind", [Huber, SoftL1])
-@pytest.mark.parametrize(("name", "degree"), [("dmsp-20-300", 5), ("festo-tool-dmsp-40", 5), ("festo-tool-dmsp-20", 2)])
+@pytest.mark.parametrize(
+    ("name", "degree"),
+    [("dmsp-20-300", 5), pytest.param("festo-tool-dmsp-40", 5, marks=pytest.mark.slow), ("festo-tool-dmsp-20", 2)],
+)
 def test_a_robust_loss_of_any_scale_settles_where_no_change_helps(name: str, degree: int, kind, scale: float):
     """Maps with slack rows, of which the shortest length of the DMSP-20-300 has nothing else."""
     recording = read_csv(DATA / f"{name}.csv")

@@ -277,3 +277,8 @@ def test_unequal_lengths_and_active_dead_zones_are_errors():
     with pytest.raises(ParameterError, match=r"weight -0.9 at 12 N the force would decrease.*must not be less than -1"):
         PrandtlIshlinskii((1.0,), (1e-3,), (5.0, 12.0), (-0.2, -0.9))
     PrandtlIshlinskii((1.0,), (1e-3,), (5.0, -12.0), (-0.2, -0.9))
+
+
+def test_the_force_of_maxwell_slip_is_the_sum_of_its_springs():
+    law = MaxwellSlip((2e4, 1e4), (3e-4, 1.2e-3))
+    assert law.force({"bristle1": 3e-4, "bristle2": -1e-3}, 0.0) == pytest.approx(6.0 - 10.0, rel=1e-14)

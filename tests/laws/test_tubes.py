@@ -198,7 +198,14 @@ def shock_tube(tube, gas, duration):
     )
 
 
-@pytest.mark.parametrize(("length", "gas"), [(1.0, Isothermal()), (3.0, Isothermal()), (3.0, EnergyBalance(0.0))])
+@pytest.mark.parametrize(
+    ("length", "gas"),
+    [
+        (1.0, Isothermal()),
+        pytest.param(3.0, Isothermal(), marks=pytest.mark.slow),
+        pytest.param(3.0, EnergyBalance(0.0), marks=pytest.mark.slow),
+    ],
+)
 def test_a_step_arrives_after_the_length_over_the_speed_of_sound(gas, length):
     tube = DistributedTube(length, 4e-3, 40, gas)
     delay = length / gas.sound_speed(Air(3e5, WARM))
@@ -209,7 +216,7 @@ def test_a_step_arrives_after_the_length_over_the_speed_of_sound(gas, length):
     assert np.abs(flow[run["time"] < 0.7 * delay]).max() < 0.01 * flow.max()
 
 
-@pytest.mark.parametrize("diameter", [2e-3, 1e-3])
+@pytest.mark.parametrize("diameter", [pytest.param(2e-3, marks=pytest.mark.slow), 1e-3])
 def test_the_front_fades_with_the_way_that_it_runs(diameter):
     """exp(-f L/(2 c)): the flow behind a front that has run L, by that at the valve when it set out."""
     length, gas = 2.0, Isothermal()
@@ -240,7 +247,11 @@ def test_a_lumped_tube_knows_no_delay_and_both_agree_once_the_waves_are_gone():
 
 
 @pytest.mark.parametrize(
-    ("length", "conductance", "per_cent"), [(1.0, 2.6167e-9, 0.3), (8.0, 2.6167e-9, 1.2), (0.25, 1e-8, 0.7)]
+    ("length", "conductance", "per_cent"),
+    [
+        (1.0, 2.6167e-9, 0.3),
+        *(pytest.param(*row, marks=pytest.mark.slow) for row in ((8.0, 2.6167e-9, 1.2), (0.25, 1e-8, 0.7))),
+    ],
 )
 def test_the_page_states_the_error_of_lumped_tubes(length, conductance, per_cent):
     script = Path(__file__).parents[2] / "docs" / "make_tubes_figure.py"

@@ -259,7 +259,11 @@ def test_the_chart_and_its_data_stand_in_the_folder(tmp_path: Path):
 
 
 @pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
-@pytest.mark.parametrize("name", list_laws())
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=[pytest.mark.slow] * (name == "saga2007-exact")) for name in list_laws()],
+    ids=list_laws(),
+)
 def test_every_entry_has_a_chart(tmp_path: Path, name: str):
     entry = load(name)
     low, high = entry.validity_range.pressure if entry.validity_range else entry.characteristic.pressure_range
@@ -602,8 +606,14 @@ main()
 
 
 @pytest.mark.skipif(os.name == "nt", reason="SIGINT cannot be sent to one process")
-@pytest.mark.parametrize("kind", ["module", "extension", "exception discarded", "discarded by a destructor"])
-@pytest.mark.parametrize("module", ["typer", "airmuscle.cli.app", "airmuscle.cli.solve", "rich.table"])
+@pytest.mark.parametrize(
+    ("module", "kind"),
+    [
+        pytest.param(module, kind, marks=[] if (i - k) % 4 == 0 else pytest.mark.slow)
+        for i, module in enumerate(("typer", "airmuscle.cli.app", "airmuscle.cli.solve", "rich.table"))
+        for k, kind in enumerate(("module", "extension", "exception discarded", "discarded by a destructor"))
+    ],
+)
 def test_an_interrupted_import_is_one_line_and_exit_code_130(module: str, kind: str):
     assert_interrupted(module, kind)
 
@@ -679,7 +689,9 @@ def test_control_characters_of_arguments_are_escaped(arguments: list[str]):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="arguments are bytes on POSIX only")
-@pytest.mark.parametrize("command", [[b"show"], [b"simulate"], [b"list"]])
+@pytest.mark.parametrize(
+    "command", [[b"show"], *(pytest.param([name], marks=pytest.mark.slow) for name in (b"simulate", b"list"))]
+)
 def test_an_argument_that_cannot_be_decoded_is_shown_with_its_bytes(command: list[bytes]):
     done = subprocess.run([sys.executable, "-m", "airmuscle", *command, b"no\xffname"], capture_output=True, timeout=60)
     assert done.returncode in (1, 2)

@@ -368,6 +368,7 @@ def test_the_program_runs_the_example(tmp_path: Path):
     assert {"measured.pressure [Pa]", "command.discharge [1]"} <= set(heading)
 
 
+@pytest.mark.slow  # `./run test` runs all examples
 def test_the_program_of_the_example_runs(tmp_path: Path):
     done = subprocess.run(
         [sys.executable, str(ROOT / "examples" / "A4_control.py")], cwd=tmp_path, capture_output=True, text=True

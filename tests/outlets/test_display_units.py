@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import threading
 from pathlib import Path
 
@@ -197,3 +198,11 @@ def test_files_keep_their_declared_units(tmp_path: Path):
     text = am.write_csv(run(), tmp_path / "run.csv").read_text(encoding="utf-8")
     assert "pressure [Pa]" in text
     assert "bar" not in text
+
+
+def test_the_code_of_the_page_runs():
+    page = (Path(__file__).resolve().parents[2] / "docs" / "display.md").read_text(encoding="utf-8")
+    names: dict[str, object] = {}
+    for block in re.findall(r"```python\n(.*?)```", page, re.DOTALL):
+        exec(block, names)
+    assert current_units() == ()

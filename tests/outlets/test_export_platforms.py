@@ -1,4 +1,7 @@
-"""Binaries of FMUs for other platforms: each is a shared library of its format and processor that exports FMI functions."""
+"""Binaries of FMUs for other platforms: each is a shared library of its format and processor that exports FMI functions.
+
+The same cross compiler makes WebAssembly of printed C.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +9,20 @@ import importlib.util
 import zipfile
 from pathlib import Path
 
+import numpy as np
 import plants
+import printed
 import pytest
 from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
 from airmuscle.control import Schedule
 from airmuscle.core.errors import ParameterError
-from airmuscle.export import platforms, write_fmu
-from airmuscle.export.platforms import PLATFORMS, find_platform, this_platform
+from airmuscle.core.tree import leaves
+from airmuscle.export import C99, platforms, write_fmu, write_law
+from airmuscle.export.compiler import run_command
+from airmuscle.export.platforms import PLATFORMS, find_cross_compiler, find_platform, this_platform
+from airmuscle.library.law_file import load_law
 from airmuscle.simulation import Problem, RungeKutta4
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "fill_discharge.toml"
@@ -94,3 +102,36 @@ def test_the_command_refuses_options_that_exclude_each_other(tmp_path):
     )
     assert done.exit_code == 2
     assert "--sources-only and --platforms exclude each other" in " ".join(done.output.replace("\u2502", " ").split())
+
+
+WEBASSEMBLY = """
+import {readFileSync} from "fs";
+const {p, points} = JSON.parse(readFileSync("data.json"));
+const {instance: {exports: law}} = await WebAssembly.instantiate(readFileSync("law.wasm"));
+const base = law.memory.buffer.byteLength;
+law.memory.grow(1);
+const at = (offset, length) => new Float64Array(law.memory.buffer, base + 8 * offset, length);
+at(0, p.length).set(p);
+law.law_prepare(base, base + 8 * 1000);
+console.log(JSON.stringify(points.map(([pressure, contraction]) => {
+  law.law_evaluate(pressure, contraction, base + 8 * 1000, base + 8 * 2000);
+  return [...at(2000, 3)];
+})));
+"""
+
+
+@pytest.mark.slow
+def test_printed_c_runs_as_webassembly(tmp_path):
+    """As the guide states: compiled by zig, called in Node."""
+    if importlib.util.find_spec("ziglang") is None:
+        pytest.skip("needs the package ziglang")
+    printed.require("node")
+    law = load_law("dmsp-20-300").characteristic
+    write_law(law, tmp_path, C99(), name="law")
+    exported = [f"-Wl,--export=law_{name}" for name in ("prepare", "evaluate")]
+    target = ["-target", "wasm32-wasi", "-mexec-model=reactor", "-std=c99", "-O2", "-ffp-contract=off", "-s"]
+    run_command([*find_cross_compiler(), *target, "law.c", "-o", "law.wasm", *exported, "-lm"], str(tmp_path))
+    points = [(2e5, 0.0), (3e5, 0.1), (5e5, 0.2)]
+    data = {"p": [leaf.value for leaf in leaves(law)], "points": points}
+    found = np.array(printed.run_node(WEBASSEMBLY, data, tmp_path))
+    np.testing.assert_allclose(found[:, 0], [law.force(*point) for point in points], rtol=1e-12)

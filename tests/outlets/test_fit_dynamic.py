@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
 from airmuscle.core.tree import leaves
-from airmuscle.identify.dynamic import InitialValue, StartTime
+from airmuscle.identify.dynamic import CrossPrediction, InitialValue, StartTime, describe_cross_predictions
 from airmuscle.mechanism import HangingMass
 from airmuscle.recording import Recording, read_csv
 from airmuscle.recording.csv_writer import write_csv
@@ -109,7 +109,10 @@ def test_what_the_records_were_made_with_is_found_written_and_simulated(folder, 
     value, deviation = found["gas.exponent"]
     assert (low, high) == pytest.approx((value - 1.96 * deviation, value + 1.96 * deviation), abs=0.15 * deviation)
     assert [r["rms"]["position"] for r in said["records"]] == pytest.approx([5e-5, 5e-5], rel=0.15)
+    assert [each["record"] for each in said["cross_predictions"]] == ["run1.csv", "run2.csv"]
+    assert all(each["rms"]["pressure"] < 2.0 * each["fitted"]["pressure"] for each in said["cross_predictions"])
     page = (out / "report.html").read_text(encoding="utf-8").replace("\u00a0", " ")
+    assert "The records predict each other" in page
     assert all(
         word in page for word in ("Record 2: run2.csv", "Profile likelihood", "may be shorter than the dynamics")
     )
@@ -125,6 +128,18 @@ def test_what_the_records_were_made_with_is_found_written_and_simulated(folder, 
     measured = read_csv(folder / "run1.csv")
     height = np.interp(measured["time"] - found["start time of record 1"][0], run["time"], run["position"])
     assert np.sqrt(np.mean((height - measured["height"]) ** 2)) == pytest.approx(5e-5, rel=0.2)
+
+
+def prediction(ratio: float) -> CrossPrediction:
+    return CrossPrediction("run1.csv", {"pressure": 500.0 * ratio}, {"pressure": 500.0})
+
+
+def test_cross_predictions_say_whether_the_plant_is_identified():
+    assert describe_cross_predictions(()) == ""
+    assert "The records predict each other" in describe_cross_predictions([prediction(1.1)])
+    said = describe_cross_predictions([prediction(1.1), prediction(4.0)])
+    assert "run1.csv is 4 times the residual of the joint fit" in said
+    assert "do not identify the plant" in said
 
 
 def test_what_cannot_be_told_apart_is_printed_with_its_experiment(folder, tmp_path):

@@ -529,7 +529,7 @@ def peak_memory(path: Path, rows: int) -> int:
 
 def test_memory_depends_on_the_kept_rows_not_on_the_file(tmp_path: Path, monkeypatch):
     monkeypatch.setattr(large_csv, "LARGE_FILE_BYTES", 10_000)
-    peaks = [peak_memory(tmp_path / "long.csv", rows) for rows in (200_000, 1_000_000)]
+    peaks = [peak_memory(tmp_path / "long.csv", rows) for rows in (200_000, 500_000)]
     assert peaks[1] < 1.1 * peaks[0]
 
 

@@ -37,7 +37,11 @@ def commands():
     return [line for line in lines if line.startswith("./run airmuscle") and line != served]
 
 
-@pytest.mark.parametrize("command", commands())
+@pytest.mark.parametrize(
+    "command",
+    [pytest.param(each, marks=[pytest.mark.slow] * (" sweep " in each)) for each in commands()],
+    ids=lambda words: words,
+)
 def test_the_commands_run(command, tmp_path, monkeypatch):
     words = shlex.split(command)[2:]
     words = [str(ROOT / word) if word.startswith("examples/") else word for word in words]

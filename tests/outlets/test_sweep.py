@@ -199,7 +199,7 @@ def test_only_a_resumed_study_is_reported_as_resumed(folder: Path):
     assert second.stdout == first.stdout
 
 
-@pytest.mark.parametrize("workers", ["1", "2"])
+@pytest.mark.parametrize("workers", [pytest.param("1", marks=pytest.mark.slow), "2"])
 def test_ctrl_c_saves_completed_runs_and_says_how_to_resume(folder: Path, workers: str):
     edited(folder, "count = 22", "count = 2000")
     process = started(folder, 3, "--workers", workers)

@@ -46,7 +46,7 @@ def test_the_indices_of_ishigami():
     assert (np.ptp(found.first_interval, axis=0) < 0.1).all()
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=6)
 @given(st.lists(st.floats(0.3, 3.0), min_size=2, max_size=5), st.floats(-1e6, 1e6))
 def test_the_indices_of_a_linear_model(weights, offset):
     c = np.array(weights)
@@ -70,6 +70,7 @@ def test_the_estimators_agree_with_scipy():
     )
 
 
+@pytest.mark.slow
 def test_the_indices_agree_with_an_independent_estimate_by_scipy():
     """For the same function, with the design and the random generator of SciPy."""
     cube = [stats.uniform(-np.pi, 2 * np.pi)] * 3
@@ -79,6 +80,7 @@ def test_the_indices_agree_with_an_independent_estimate_by_scipy():
     assert ours.total == pytest.approx(theirs.total_order, abs=0.005)
 
 
+@pytest.mark.slow
 def test_the_intervals_have_their_nominal_coverage():
     """With random base points, which satisfy the independence assumption of the bootstrap."""
     first, _ = of_ishigami()

@@ -242,8 +242,12 @@ def test_more_heat_transfer_turns_what_the_report_says(effects):
     assert abs(heat.largest("pressure", FILLING)) < abs(spring.largest("pressure", FILLING))
 
 
-def test_every_chosen_number_stands_in_the_chapter_with_its_range():
-    chapter = hosovsky.chapter()
+@pytest.fixture(scope="module")
+def chapter():
+    return hosovsky.chapter()
+
+
+def test_every_chosen_number_stands_in_the_chapter_with_its_range(chapter):
     behind = (NUMBERS, causing.SuspectedCauses())
     assert {what for what, _, _ in chapter.chosen} == {
         getattr(numbers, f.name).meaning for numbers in behind for f in dataclasses.fields(numbers)
@@ -334,8 +338,8 @@ def test_the_step_lies_in_the_range_of_the_sensor_only_as_absolute_pressure():
     assert (gauge.verdict, hysteresis.verdict) == (DIFFERS, NOT_TESTABLE)
 
 
-def test_own_checks_and_derived_numbers_stand_apart_from_the_claims():
-    claims = hosovsky.chapter().claims
+def test_own_checks_and_derived_numbers_stand_apart_from_the_claims(chapter):
+    claims = chapter.claims
     checks = {s.claim for s in statements(claims, Kind.CHECK)}
     assert len(checks) == 9
     assert any("number of steps" in text for text in checks)

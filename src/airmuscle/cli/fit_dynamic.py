@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ..identify.dynamic import DynamicFit
+from ..identify.dynamic import CrossPrediction, DynamicFit, describe_cross_predictions
 from ..identify.dynamic.profile import DynamicProfile
 from ..recording.segment import inspect
 from ..report.dynamic_chapter import dynamic_chapters
@@ -53,7 +53,8 @@ def fit_dynamic(
 
     \b
     Parameters of valves, gas, volume, damping, friction and mass are estimated from records of filling, discharge and
-    release. Reports parameter combinations that the records do not determine, and the experiment that would.
+    release. Several records are cross-predicted: each by the common parameters of the others, which the output states
+    first. Reports parameter combinations that the records do not determine, and the experiment that would.
     Writes DIR/report.html and the identified plant as a scenario, DIR/scenario.toml (DIR/scenario-1.toml and so on
     for several records).
 
@@ -71,11 +72,17 @@ def fit_dynamic(
     if not json:
         echo(f"  {len(loaded.experiments)} records, {loaded.starts} starts", err=True)
     fit = loaded.fit()
+    cross = loaded.cross_predictions(fit)
     profiles = [fit.profile(name, points) for name in _profiled_names(fit, profile or [])]
-    scenarios = _write(loaded, fit, profiles, findings, out)
+    scenarios = _write(loaded, fit, profiles, findings, cross, out)
     if json:
-        print_json(_to_dict(fit, profiles, findings))
+        print_json(_to_dict(fit, profiles, findings, cross))
         return
+    for prediction in cross:
+        echo(str(prediction))
+    if cross:
+        echo(describe_cross_predictions(cross))
+        echo()
     echo(str(fit))
     for finding in findings:
         echo(f"note: {finding}")
@@ -103,7 +110,12 @@ def _profiled_names(fit: DynamicFit, names: Sequence[str]) -> list[str]:
 
 
 def _write(
-    study: DynamicFitSetup, fit: DynamicFit, profiles: Sequence[DynamicProfile], findings: Sequence[str], out: Path
+    study: DynamicFitSetup,
+    fit: DynamicFit,
+    profiles: Sequence[DynamicProfile],
+    findings: Sequence[str],
+    cross: Sequence[CrossPrediction],
+    out: Path,
 ) -> list[Path]:
     """Write the report and one scenario per record; returns the paths of the scenarios."""
     names = []
@@ -112,11 +124,13 @@ def _write(
             suffix = f"-{i + 1}" if len(study.experiments) > 1 else ""
             names.append(f"scenario{suffix}.toml")
             (folder / names[-1]).write_text(study.scenario(fit, i), encoding="utf-8")
-        write_into(folder, dynamic_chapters(fit, study.title, profiles, findings), title="Dynamic fit")
+        write_into(folder, dynamic_chapters(fit, study.title, profiles, findings, cross), title="Dynamic fit")
     return [out / name for name in names]
 
 
-def _to_dict(fit: DynamicFit, profiles: Sequence[DynamicProfile], findings: Sequence[str]) -> dict[str, Any]:
+def _to_dict(
+    fit: DynamicFit, profiles: Sequence[DynamicProfile], findings: Sequence[str], cross: Sequence[CrossPrediction]
+) -> dict[str, Any]:
     """A dynamic fit as plain data, all numbers SI."""
     return {
         "parameters": [dataclasses.asdict(estimate) for estimate in fit.estimates],
@@ -124,6 +138,7 @@ def _to_dict(fit: DynamicFit, profiles: Sequence[DynamicProfile], findings: Sequ
             {"origin": record.experiment.recording.origin, "rms": {n: fit.rms(n, i) for n in record.names}}
             for i, record in enumerate(fit.problem.record_models)
         ],
+        "cross_predictions": [dataclasses.asdict(each) for each in cross],
         "residual_std": fit.residual_std,
         "rank": fit.identifiability.rank,
         "starts_at_optimum": fit.starts_at_optimum,

@@ -16,6 +16,7 @@ from ..core import tree
 from ..core.arrays import Array
 from ..core.system import SensitivitySystem, System
 from . import functions, sensitivities, sensitivities_explicit
+from .cache.kernel import address_of
 from .cache.module import load_module
 from .functions import ArraySizes, TracedSystem
 from .functions_simd import lanes_module
@@ -210,8 +211,12 @@ class CompiledSystem:
         """The compiled rates at a state vector (n,) under inputs (m,)."""
         x, u = np.array(state, dtype=float), np.array(inputs, dtype=float)
         f = np.empty(self.sizes.states)
-        self.call("rhs", x, u, self.precomputed, f)
+        self._rhs(*map(address_of, (x, u, self.precomputed, f)))
         return f
+
+    @functools.cached_property
+    def _rhs(self) -> Any:
+        return ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4)(self.address["rhs"])
 
 
 def compile_system(system: System) -> CompiledSystem:

@@ -17,13 +17,15 @@ Value = Any
 """A float, a NumPy array, a CasADi symbol or a JAX array."""
 
 pi = math.pi
+_PLAIN = frozenset({float, int, bool})
+"""Types of plain numbers, which need no library; a controller calls these functions dozens of times for each sample."""
 
 
 def _library(*operands: Value) -> ModuleType | None:
     """Return the module that handles these operands; None for plain numbers."""
     library = None
     for operand in operands:
-        if isinstance(operand, float | int):
+        if type(operand) in _PLAIN or isinstance(operand, float | int):
             continue
         root = type(operand).__module__.partition(".")[0]
         if root == "casadi":
@@ -41,6 +43,8 @@ def is_symbol(*operands: Value) -> bool:
 
 def where(condition: Value, when_true: Value, when_false: Value) -> Value:
     """`when_true` where the condition is true, else `when_false`; arrays evaluate both."""
+    if type(condition) in _PLAIN and type(when_true) in _PLAIN and type(when_false) in _PLAIN:
+        return when_true if condition else when_false
     library = _library(condition, when_true, when_false)
     if library is None:
         return when_true if condition else when_false
@@ -50,11 +54,15 @@ def where(condition: Value, when_true: Value, when_false: Value) -> Value:
 
 def maximum(a: Value, b: Value) -> Value:
     """The larger of two values; traced as a comparison whose derivative at equality is that of `a`."""
+    if type(a) in _PLAIN and type(b) in _PLAIN:
+        return a if a >= b else b
     return np.maximum(a, b) if _library(a, b) is np else where(a >= b, a, b)
 
 
 def minimum(a: Value, b: Value) -> Value:
     """The smaller of two values; traced as a comparison whose derivative at equality is that of `b`."""
+    if type(a) in _PLAIN and type(b) in _PLAIN:
+        return b if a >= b else a
     return np.minimum(a, b) if _library(a, b) is np else where(a >= b, b, a)
 
 
@@ -92,6 +100,8 @@ def _on_float(result: Value, x: Value) -> Value:
 
 def sqrt(x: Value) -> Value:
     """Square root; NaN below zero."""
+    if type(x) is float and x >= 0.0:
+        return math.sqrt(x)
     return _on_float(_unary("sqrt", x), x)
 
 

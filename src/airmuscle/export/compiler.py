@@ -49,7 +49,7 @@ def find_compiler(remedy: str = "; install the package gcc or clang") -> str:
 
 def run_command(command: Sequence[str], folder: str | None = None) -> subprocess.CompletedProcess[str]:
     """Run a compiler or a program in a folder. Raises FileError with its message if it fails or takes too long."""
-    name = Path(command[0]).name
+    name = command[3] if list(command[1:3]) == ["-P", "-m"] else Path(command[0]).name  # a program that is a package
     try:
         done = subprocess.run(command, cwd=folder, check=False, capture_output=True, text=True, timeout=TIME_LIMIT)
     except subprocess.TimeoutExpired:

@@ -91,7 +91,11 @@ class Muscle(NotebookDisplay):
         return plot_isobars(self.contractile, title, self.validity_range, pressures=pressures, ax=ax)
 
     def _card(self) -> Card:
-        return Card(f"Muscle {self.name}", [("component", "value"), *component_rows(self)], self.plot)
+        return Card(
+            "Muscle" if self.name == "muscle" else f"Muscle {self.name}",
+            [("component", "value"), *component_rows(self)],
+            self.plot,
+        )
 
     def check(self) -> None:
         kinds = {"contractile": Characteristic, "geometry": Geometry, "spring": Spring, "damper": Damper, "wall": Wall,

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core.plotting import BLACK, BLUE, RED, legend_below, new_figure
 from ..core.reference import cite
-from ..identify.dynamic import DynamicFit
+from ..identify.dynamic import CrossPrediction, DynamicFit, describe_cross_predictions
 from ..identify.dynamic.profile import DynamicProfile
 from ..recording.display_units import display_scale
 from ..recording.recording import column_heading
@@ -21,21 +21,26 @@ MAX_OPTIMA = 8
 
 
 def dynamic_chapters(
-    fit: DynamicFit, title: str, profiles: Sequence[DynamicProfile] = (), remarks: Sequence[str] = ()
+    fit: DynamicFit,
+    title: str,
+    profiles: Sequence[DynamicProfile] = (),
+    remarks: Sequence[str] = (),
+    cross: Sequence[CrossPrediction] = (),
 ) -> list[Chapter]:
     """Return the chapters of a dynamic fit: estimates and identifiability, profiles, and one chapter per record.
 
-    `remarks` are sentences about the records.
+    `remarks` are sentences about the records, `cross` the predictions of each record by the others, which stand first.
     """
-    chapters = [_estimates(fit, title, remarks)]
+    chapters = [_estimates(fit, title, remarks, cross)]
     if profiles:
         chapters.append(_profiles(profiles))
     return [*chapters, *(_record(fit, i) for i in range(len(fit.problem.record_models)))]
 
 
-def _estimates(fit: DynamicFit, title: str, remarks: Sequence[str]) -> Chapter:
+def _estimates(fit: DynamicFit, title: str, remarks: Sequence[str], cross: Sequence[CrossPrediction]) -> Chapter:
     identifiability = fit.identifiability
     sentences = [
+        *([describe_cross_predictions(cross)] if cross else []),
         f"Standard deviation of the residuals: {fit.residual_std:.3g} sensor standard deviations. Identifiable: "
         f"{identifiability.rank} of {identifiability.singular_values.size} unknowns that are not on a bound. "
         f"{fit.starts_at_optimum} of {fit.costs.size} initial points converged to this optimum.",
@@ -50,6 +55,7 @@ def _estimates(fit: DynamicFit, title: str, remarks: Sequence[str]) -> Chapter:
         ],
     }
     tables = [
+        *_cross_table(cross),
         _estimate_table(fit),
         *_undetermined_table(fit),
         *_optima_table(fit),
@@ -63,6 +69,19 @@ def _estimates(fit: DynamicFit, title: str, remarks: Sequence[str]) -> Chapter:
         tables=tuple(tables),
         references=tuple(cite(fit.plant())),
     )
+
+
+def _cross_table(cross: Sequence[CrossPrediction]) -> list[Table]:
+    if not cross:
+        return []
+    pairs = [(each, name) for each in cross for name in each.rms]
+    columns: dict[str, Any] = {
+        "record": [each.record for each, _ in pairs],
+        "quantity": [name for _, name in pairs],
+        "rms error, predicted by the others": [_with_unit(each.rms[name], name) for each, name in pairs],
+        "rms residual of the joint fit": [_with_unit(each.fitted[name], name) for each, name in pairs],
+    }
+    return [Table("cross", "Each record predicted by the parameters of the others", columns)]
 
 
 def _with_unit(value: float, name: str) -> str:

@@ -31,13 +31,21 @@ mapping = "rig.toml"                        optional, and resting_length: inform
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from ..core import tree
 from ..core.errors import ParameterError
-from ..identify.dynamic import DynamicFit, Experiment, InitialValue, StartTime, fit_dynamic
+from ..identify.dynamic import (
+    CrossPrediction,
+    DynamicFit,
+    Experiment,
+    InitialValue,
+    StartTime,
+    cross_predict,
+    fit_dynamic,
+)
 from ..identify.dynamic.experiment import ParameterPaths, RecordUnknown
 from ..library.build import build
 from ..library.files import read_toml
@@ -75,6 +83,17 @@ class DynamicFitSetup:
             self.plant, self.experiments, free=self.free, observed=self.observed, per_record=self.own,
             bounds=self.bounds, starts=self.starts, seed=self.seed, method=self.method,
         )  # fmt: skip
+
+    def cross_predictions(self, fit: DynamicFit) -> tuple[CrossPrediction, ...]:
+        """Each record predicted by the common parameters of a fit to the others, searched from the joint fit."""
+
+        def refit(records: Sequence[int]) -> DynamicFit:
+            chosen = tuple(dataclasses.replace(self.experiments[i], plant=fit.plant(i)) for i in records)
+            plant = chosen[0].plant
+            assert isinstance(plant, Plant)
+            return dataclasses.replace(self, plant=plant, experiments=chosen, starts=1).fit()
+
+        return cross_predict(fit, refit)
 
     def scenario(self, fit: DynamicFit, record: int = 0) -> str:
         """Text of a scenario with the fitted plant, the input, the initial state and the duration of a record."""

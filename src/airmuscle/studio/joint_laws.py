@@ -141,11 +141,10 @@ def joint_controllers(plant: Plant, statics: JointStatics) -> tuple[JointControl
         ("pid", _pid(), PID_GAINS, ""),
         ("cascade", _speed_cascade(), SPEED_GAINS, "inner."),
     ):
-        span = (0.5 * (pressure_range[1] - pressure_range[0]),)
-        low = (-span[0],)
-        alone = Cascade(outer, CoContraction(valves.pressures, 0.0, "mean_pressure"), low, span)
+        half = 0.5 * (pressure_range[1] - pressure_range[0])
+        alone = Cascade(outer, CoContraction(valves.pressures, 0.0, "mean_pressure"), (-half,), (half,))
         found.append(_with_valves(valves, pressure_range, key, alone, "outer.", inside, gains))
-        added = WithFeedForward(ahead, Cascade(outer, CoContraction(valves.pressures, 0.0), low, span))
+        added = WithFeedForward(ahead, Cascade(outer, CoContraction(valves.pressures, 0.0), (-half,), (half,)))
         found.append(_with_valves(valves, pressure_range, f"{key}-ahead", added, "feedback.outer.", inside, gains))
     law = AngleAndStiffness(
         inverse, valves.pressures, 15.0, 0.3, 0.5, speed_column="angular_speed",

@@ -13,7 +13,7 @@ from ..characteristic.validity_range import validity_range_of
 from ..core.arrays import Array
 from ..core.errors import AirmuscleError, ParameterError, UnitError
 from ..core.units import quantity
-from ..report.isobar_plot import compute_isobars
+from ..muscle.isobars import compute_isobars
 from ..report.sizing_chapter import choice_row
 from ..sizing import (
     JointRequirement,

@@ -10,6 +10,7 @@ import numpy as np
 from ...characteristic.base import ForceLaw
 from ...core.arrays import Array
 from ...core.errors import AirmuscleError, IdentificationError
+from ...core.short_repr import ShortRepr
 from ...muscle import CreepElements
 from ...recording import Recording
 from ...recording.segment.runs import CONTRACTION_BAND
@@ -22,8 +23,8 @@ MAX_MOTION = 0.3
 """Maximum duration of the motion before a hold under a load, by its shortest time constant (chosen)."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class HeldCreep:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class HeldCreep(ShortRepr):
     """The creep of the longest hold of each recording as sentences, and the elements of the muscle."""
 
     sentences: tuple[str, ...]

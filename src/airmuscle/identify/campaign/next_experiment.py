@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from ...characteristic.validity_range import ValidityRange
 from ...core.errors import AirmuscleError
 from ...core.short_repr import ShortRepr
-from ..experiment_design import BenchLimits, ExperimentPlan, optimal_design
+from ..experiment_design import BenchLimits, ExperimentPlan, PlannedRun, optimal_design
 from .creep_stage import CreepStage
 from .fill_stage import FillStage
 from .record import CampaignRecord
@@ -75,6 +75,17 @@ def _lengths(static: StaticStage | LeftOutStage, records: Sequence[CampaignRecor
     ]
 
 
+def _levels(run: PlannedRun) -> str:
+    """A planned run as a phrase: its constant quantity and the sweep of the other."""
+
+    def text(name: str, value: float) -> str:
+        value = 0.0 if abs(value) < 5e-5 else value
+        return f"{value / 1e3:.3g} kPa" if name == "pressure" else f"{100 * value:.3g} %"
+
+    ends = " to ".join(text(run.swept, end) for end in run.sweep_limits)
+    return f"{run.constant} {text(run.constant, run.level)}, {run.swept} {ends}"
+
+
 def _static_runs(static: StaticStage | LeftOutStage) -> list[NextExperiment]:
     if isinstance(static, LeftOutStage):
         return []
@@ -94,7 +105,7 @@ def _static_runs(static: StaticStage | LeftOutStage) -> list[NextExperiment]:
         return []  # the law has no derivative at a corner of the range; the other experiments remain
     return [
         NextExperiment(
-            f"Measure {len(plan.runs)} further static runs at the levels of the table below.",
+            f"Measure {len(plan.runs)} further static runs: {'; '.join(map(_levels, plan.runs))}.",
             "static characteristic: the D-optimal runs within the range of the records",
             plan,
         )

@@ -174,7 +174,10 @@ def _unusable(recording: Recording) -> str:
     if "pressure" not in recording:
         return "no pressure column"
     if "contraction" not in recording and "force" not in recording:
-        return "neither force nor length, and a length needs the resting length"
+        return (
+            "only the pressure is recorded; a fill also needs the held length and the resting length, in the file or "
+            "as constants length and resting_length"
+        )
     if "contraction" not in recording:
         return "the contraction is not known: a length column and the resting length are needed"
     if len(recording) < MIN_ROWS:

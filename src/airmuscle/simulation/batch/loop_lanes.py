@@ -22,12 +22,15 @@ from .precision import Double
 from .thread_pool import Queue
 
 NUMBER = Double().number
+MAX_SAMPLES = 200_000
+"""Samples of a run up to which the set points, samples and commands of a block fit in memory (chosen)."""
 
 
 def run_in_lanes(job: BatchJob, plants: npt.NDArray[np.intp]) -> bool:
     """Whether the loops of these plants can be computed in lanes.
 
-    That is with a fixed step, control laws of one structure, no drivers, and common sampling instants and segments.
+    That is with a fixed step, control laws of one structure, no drivers, common sampling instants and segments, and at
+    most MAX_SAMPLES samples.
     """
     loops = job.loops
     if loops is None or not isinstance(job.integrator, ExplicitRungeKutta):
@@ -38,7 +41,10 @@ def run_in_lanes(job: BatchJob, plants: npt.NDArray[np.intp]) -> bool:
     structure, sample_time = tree.structure(loops.loops[0].controller), loops.loops[0].sample_time
     if any(tree.structure(o.controller) is not structure or o.sample_time != sample_time for o in distinct):
         return False
-    ends = loops.prepared(loops.loop_of(int(plants[0]))).inputs.ends
+    first = loops.prepared(loops.loop_of(int(plants[0])))
+    if first.instants.size > MAX_SAMPLES:
+        return False
+    ends = first.inputs.ends
     return all(np.array_equal(loops.prepared(loop).inputs.ends, ends) for loop in distinct)
 
 

@@ -1,0 +1,88 @@
+"""Completion: the shell completes commands, options and library names; names are found in any spelling."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import airmuscle as am
+from airmuscle.cli.app import app
+from airmuscle.cli.completion import SHELLS, complete_data, complete_entry, complete_plant
+from airmuscle.core.errors import UnknownNameError
+
+
+def completed(words: str, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The completions that bash receives for the last of some words."""
+    from typer._completion_classes import completion_init
+
+    completion_init()
+    items = words.split(" ")
+    monkeypatch.setenv("COMP_WORDS", words)
+    monkeypatch.setenv("COMP_CWORD", str(len(items) - 1))
+    monkeypatch.setenv("_AIRMUSCLE_COMPLETE", "complete_bash")
+    return CliRunner().invoke(app, [], prog_name="airmuscle").stdout.split()
+
+
+@pytest.mark.parametrize("shell", SHELLS)
+def test_the_script_of_each_shell_asks_this_program(shell: str):
+    script = CliRunner().invoke(app, ["--completion", shell])
+    assert script.exit_code == 0
+    assert f"_AIRMUSCLE_COMPLETE=complete_{shell}" in script.stdout
+
+
+def test_the_script_for_bash_is_valid(tmp_path: Path):
+    bash = shutil.which("bash")
+    if bash is None:
+        pytest.skip("bash is not installed")
+    script = tmp_path / "completion.sh"
+    script.write_text(CliRunner().invoke(app, ["--completion", "bash"]).stdout, encoding="utf-8")
+    assert subprocess.run([bash, "-n", str(script)]).returncode == 0
+
+
+def test_another_shell_is_refused_with_those_that_are_supported():
+    failed = CliRunner().invoke(app, ["--completion", "tcsh"])
+    assert failed.exit_code == 2
+    assert "'tcsh' is not supported; allowed are bash, zsh, fish" in " ".join(failed.stderr.split())
+
+
+def test_commands_options_and_names_of_the_library_are_completed(monkeypatch: pytest.MonkeyPatch):
+    assert {"fit", "fit-dynamic", "fit-volume"} == set(completed("airmuscle fit", monkeypatch))
+    assert "--pressure" in completed("airmuscle solve --pre", monkeypatch)
+    assert completed("airmuscle show matr", monkeypatch) == ["matrix-821"]
+    assert completed("airmuscle simulate arm", monkeypatch) == ["arm-lilly-quesada"]
+    assert "dmsp-20-300" in completed("airmuscle fit dmsp", monkeypatch)
+
+
+def test_each_kind_of_argument_offers_its_own_names():
+    assert "matrix-821" in complete_entry("MAT")
+    assert "matrix-821" not in complete_plant("")
+    assert set(complete_data("dmsp-20")) == {"dmsp-20-300"}
+
+
+@pytest.mark.parametrize("name", ["DMSP-20-300", "Dmsp_20_300", "dmsp 20 300", "DMSP-20"])
+def test_names_are_found_in_any_case_and_spelling(name: str):
+    assert am.load(name).name == "dmsp-20-300"
+
+
+def test_everything_that_is_listed_can_be_loaded_in_upper_case():
+    for name in am.list_library():
+        if name.startswith(("matrix", "smc-sy5", "festo-dmsp-1", "joint-sam", "tondu")):
+            assert am.load(name.upper()).name == name
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("dsmp-20-300", "Did you mean 'dmsp-20-300'"),
+        ("sy5000", "Did you mean 'smc-sy5000'"),
+        ("the lilly arm", "Did you mean 'arm-lilly-quesada'"),
+        ("zzz", r"tondu-lopez\.$"),
+    ],
+)
+def test_near_misses_are_suggested(name: str, said: str):
+    with pytest.raises(UnknownNameError, match=said):
+        am.load(name)
