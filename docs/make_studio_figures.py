@@ -35,6 +35,40 @@ def opened(browser: Any, address: str, tab: str, name: str, **options: Any) -> A
     return page
 
 
+def bench_table() -> bytes:
+    """A recording that is computed: isobars of dmsp-20-300 with friction of 12 N, noise of 2 N (both chosen)."""
+    import numpy as np
+
+    import airmuscle as am
+
+    law, noise = am.load("dmsp-20-300").characteristic, np.random.default_rng(1)
+    lines, there = ["time [s],pressure [bar],contraction [%],force [N]"], np.linspace(0.0, 0.2, 25)
+    for level in range(1, 6):
+        for sign, contraction in [(1, c) for c in there] + [(-1, c) for c in there[::-1]]:
+            force = float(law.force(level * 1e5, contraction)) - 6.0 * sign + noise.normal(0.0, 2.0)
+            if force > 0:
+                lines.append(f"{0.5 * len(lines):.1f},{level},{100 * contraction:.2f},{force:.1f}")
+    return "\n".join(lines).encode()
+
+
+def save_fit(page: Any) -> None:
+    """Write the figure of the tab Fit: measured rows with a selection, and the result."""
+    file = {"name": "bench.csv", "mimeType": "text/csv", "buffer": bench_table()}
+    page.get_by_label("Measurement files").set_input_files(file)
+    page.wait_for_selector("#panel-fit[data-read='1']")
+    page.get_by_label("Selection from").fill("18.5")
+    page.get_by_label("Selection to").fill("21")
+    page.get_by_role("button", name="Apply").click()
+    page.wait_for_selector("#panel-fit[data-read='2']")
+    page.get_by_role("button", name="Fit and compare all laws").click()
+    page.wait_for_selector("#panel-fit[data-task=done]", timeout=1_200_000)
+    page.mouse.move(0, 0)
+    page.locator("#panel-fit h2", has_text="Measured rows").scroll_into_view_if_needed()
+    page.evaluate("document.querySelector('#panel-fit .chart').scrollIntoView({ block: 'start' }); scrollBy(0, -100)")
+    page.wait_for_timeout(300)
+    save(page, "fit")
+
+
 def main(address: str) -> None:
     """Write the figures of the tabs, in light, dark and on a phone."""
     from playwright.sync_api import sync_playwright
@@ -50,6 +84,7 @@ def main(address: str) -> None:
         page.get_by_label("Force [N]").fill("250")
         page.wait_for_timeout(300)
         save(page, "muscle")
+        save_fit(opened(browser, address, "Fit", "ready", viewport={"width": 1200, "height": 1250}))
         page = opened(browser, address, "Plant", "lift", color_scheme="dark", **wide)
         page.get_by_label("Plant of the library").select_option("joint-dmsp-20-proportional")
         page.wait_for_selector('#panel-plant[data-shown="joint-dmsp-20-proportional"]')

@@ -22,7 +22,7 @@ pytest.importorskip("starlette", reason="needs starlette")
 import airmuscle as am
 from airmuscle.identify import LevelSplit, compare, model_selection, standard_candidates
 from airmuscle.recording import read
-from airmuscle.studio import fit_uploads
+from airmuscle.studio import fit_queue, fit_uploads
 from airmuscle.studio.app import create_app
 from airmuscle.studio.fit_queue import FIT_WORKERS, MAX_WAITING, FitQueue
 from airmuscle.studio.fit_routes import MAX_SETTINGS, FitService
@@ -441,6 +441,16 @@ def test_ten_users_are_served_in_turn_and_further_ones_are_refused(tmp_path):
     assert not queue.is_needed("set")
 
 
+def test_results_that_are_forgotten_leave_no_files(tmp_path, monkeypatch):
+    monkeypatch.setattr(fit_queue, "MAX_TASKS", 2)
+    queue = FitQueue(write_slowly, count=1, make_worker=WorkerHere)
+    for count in range(5):
+        task = queue.submit("set", tmp_path, 0.0)
+        wait_until(lambda task=task: queue.status(task)["state"] == "done")
+        assert len(list(tmp_path.rglob("result.json"))) == min(count + 1, 2)
+    queue.stop()
+
+
 def test_a_bounded_number_of_fits_waits(tmp_path):
     queue = FitQueue(write_slowly, count=1)
     queue._count = 0  # no process takes a task
@@ -465,11 +475,7 @@ def test_a_fit_that_is_cancelled_writes_nothing_and_the_next_one_runs(tmp_path):
         queue.cancel(slow)
         wait_until(lambda: queue.status(quick)["state"] == "done")
         assert queue.status(slow)["state"] == "cancelled"
-        assert not [
-            path
-            for path in queue.find(slow).folder.rglob("*")
-            if path.name == "result.json" and path.parent == queue.find(slow).folder
-        ]
+        wait_until(lambda: not queue.find(slow).folder.exists())
         assert (queue.find(quick).folder / "complete").exists()
     finally:
         queue.stop()

@@ -8,6 +8,7 @@ from __future__ import annotations
 import collections
 import dataclasses
 import secrets
+import shutil
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -25,7 +26,7 @@ TIME_LIMIT = 1800.0
 MAX_WAITING = 20
 """Greatest number of fits that wait (chosen)."""
 MAX_TASKS = 200
-"""Number of tasks whose state the server keeps (chosen)."""
+"""Number of tasks whose state and result the server keeps (chosen)."""
 WAITING, RUNNING, DONE, FAILED, CANCELLED = "waiting", "running", "done", "failed", "cancelled"
 
 
@@ -82,7 +83,7 @@ class FitQueue:
     def _forget_old(self) -> None:
         ended = [name for name, task in self._tasks.items() if task.state not in (WAITING, RUNNING)]
         for name in ended[: max(0, len(self._tasks) - MAX_TASKS)]:
-            del self._tasks[name]
+            shutil.rmtree(self._tasks.pop(name).folder, ignore_errors=True)
 
     def find(self, identifier: str) -> FitTask:
         """A task. Raises BadRequest if it is not kept."""
@@ -112,8 +113,8 @@ class FitQueue:
             if task.state in (WAITING, RUNNING):
                 task.state = CANCELLED
             worker = self._running.get(identifier)
-        if worker is not None:
-            worker.kill()
+            if worker is not None:  # the worker takes no other task until this lock is free
+                worker.kill()
 
     def stop(self) -> None:
         """End all tasks and processes."""
@@ -162,6 +163,8 @@ class FitQueue:
             field = reason.field if isinstance(reason, FieldError) else ""
         except Exception as reason:
             state, error = FAILED, f"the fit ended without a result ({type(reason).__name__})."
+        if state != DONE:  # what a process that was ended has left
+            shutil.rmtree(task.folder, ignore_errors=True)
         with self._changed:
             task.error, task.field = error, field
             if task.state == RUNNING:

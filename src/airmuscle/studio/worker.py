@@ -25,6 +25,8 @@ MEMORY = 4 * 2**30
 """Greatest data memory of a worker [bytes] (chosen); it is not limited on Windows and macOS."""
 Report = Callable[[float, str], None]
 """Receives the progress of a task: the completed fraction and what is being done."""
+_END = 5.0
+"""Limit [s] of the end of a process that was killed (chosen)."""
 _START = 60.0
 """Limit [s] of the start of a process with its imports (chosen)."""
 
@@ -88,6 +90,7 @@ class Worker:
         process = self._process
         if process is not None:
             process.kill()
+            process.join(_END)
 
     def stop(self) -> None:
         """End the process."""

@@ -90,7 +90,7 @@
         const changed = () => this.corrected(column.key, select.value === "" ? null : { quantity: select.value === "-" ? "" : select.value, unit: unit.value.trim() });
         select.addEventListener("change", () => { if (select.value !== column.quantity) unit.value = ""; changed(); });
         unit.addEventListener("change", changed);
-        const range = Number.isFinite(column.low) ? `${shortText(column.low)} to ${shortText(column.high)} ${column.shown_unit}` : column.constant ?? "–";
+        const range = Number.isFinite(column.low) ? `${shortText(column.low)} to ${shortText(column.high)} ${column.shown_unit === "-" ? "" : column.shown_unit}` : column.constant ?? "–";
         const heading = element("td", {}, element("strong", {}, label), count > 1 && column.files < count ? element("span.soft", {}, ` in ${column.files} of ${count} files`) : null,
           column.key in corrections ? element("button.link", { type: "button", onclick: () => this.corrected(column.key, null) }, "as in the file") : null);
         return [element("tr", {}, heading, element("td", {}, select), element("td", {}, unit), element("td.number", {}, range)), texts ? element("tr", {}, element("td", { colspan: 4 }, problemOf(texts))) : null].filter(Boolean);

@@ -32,7 +32,7 @@
   function rankingCard(result) {
     const parts = result.comparisons.flatMap((comparison) => [
       result.comparisons.length > 1 ? element("h3", {}, `For ${comparison.purpose}`) : element("p.small.soft", {}, `Each ${comparison.group} is left out in turn; the ranking is for ${comparison.purpose}. Errors are root mean squares of the force.`),
-      table(["Law", "Parameters", "Rows of the fit [N]", `${comparison.group} left out [N]`, "AICc"], comparison.ranking.map((row) => ({
+      table(["Law", "Parameters", "Rows of the fit [N]", `Left-out ${comparison.group} [N]`, "AICc"], comparison.ranking.map((row) => ({
         chosen: row.law === result.recommended, cells: [row.law === result.recommended ? `${row.law} (recommended)` : row.law, String(row.parameters), shortText(row.in_sample), shortText(row.left_out), shortText(row.aicc)],
       })), [1, 2, 3, 4]),
       ...comparison.ranking.flatMap((row) => row.notes.map((text) => element("p.small", {}, `${row.law}: ${text}`))),

@@ -152,6 +152,8 @@
       this.dataCard.hidden = !this.sheet?.recordings.length;
       if (known) this.columns.show(this.sheet, this.settings.columns, this.problems);
       if (this.sheet?.recordings.length) this.data.show(this.sheet);
+      const lengths = [...new Set((this.sheet?.recordings ?? []).map((r) => r.constants.resting_length).filter(Boolean))];
+      this.fields.resting_length.placeholder = lengths.length ? `${lengths.slice(0, 3).join(", ")} (stated in the files)` : "300 mm";
       this.ready = Boolean(sheet?.ready);
       this.startButton.disabled = !this.ready || this.running;
       this.host.dataset.read = String(Number(this.host.dataset.read ?? 0) + 1);
