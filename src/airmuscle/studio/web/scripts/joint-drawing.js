@@ -20,7 +20,7 @@
         const length = muscle.length_index === null ? muscle.length : values[muscle.length_index], contraction = at(`${muscle.prefix}contraction`);
         return { name: muscle.name, contraction, points: airmuscle.halfOutline(muscle, contraction, length), length, now: length * (1 - contraction), pressure: at(`${muscle.prefix}pressure`), tension: at(`${muscle.prefix}force`) };
       });
-      const angle = at(sheet.mechanism.coordinates[0]), longest = Math.max(...muscles.map((m) => m.length)), scale = (BOTTOM - TOP - 20) / (1.06 * longest + 0 * radius), x = WIDTH / 2, r = radius * scale;
+      const angle = at(sheet.mechanism.coordinates[0]), longest = Math.max(...muscles.map((m) => m.length)), scale = (BOTTOM - TOP - 20) / (1.06 * longest), x = WIDTH / 2, r = radius * scale;
       const parts = [line(`M${x - 120} ${BOTTOM}H${x + 120}`, 4)];
       muscles.forEach((m, k) => {
         const side = k ? 1 : -1, widest = Math.max(...m.points.map((p) => p[1])) * scale, middle = x + side * Math.max(r, widest + 5), top = BOTTOM - m.now * scale, place = (s, radial) => [middle + radial * scale, BOTTOM - s * scale];

@@ -64,8 +64,9 @@
         const side = k === 0 ? -1 : 1, gap = Math.max(r, Math.max(...m.points.map((p) => p[1])) * scale + 6), at = x + side * gap, place = (s, radial) => [at + radial * scale, base - s * scale], top = base - m.current * scale;
         parts.push(body(m.points, place, m.pressure, highest), line(at, top, x + side * r, y, 2), label(at + side * 46, base - 60, bar(m.pressure), side < 0 ? "end" : "start"), label(at + side * 46, base - 40, m.muscle.name, side < 0 ? "end" : "start"));
       });
-      const armX = x + 92 * Math.sin(angle), armY = y - 0 + 0 - 92 * Math.cos(angle) * 0.55;
-      parts.push(svg("circle", { cx: x, cy: y, r, fill: "var(--card)", stroke: "var(--ink)", "stroke-width": 2 }), line(x, y, x + r * Math.sin(angle), y - r * Math.cos(angle), 4), line(x, y, armX, armY, 2), svg("circle", { cx: x, cy: y, r: 3.5, fill: "var(--ink)" }));
+      /* the first muscle, on the left, increases the angle: the pulley turns to the left */
+      const armX = x - 92 * Math.sin(angle), armY = y - 51 * Math.cos(angle);
+      parts.push(svg("circle", { cx: x, cy: y, r, fill: "var(--card)", stroke: "var(--ink)", "stroke-width": 2 }), line(x, y, x - r * Math.sin(angle), y - r * Math.cos(angle), 4), line(x, y, armX, armY, 2), svg("circle", { cx: x, cy: y, r: 3.5, fill: "var(--ink)" }));
       parts.push(label(x, base + 24, `angle ${shortText(angle * 180 / Math.PI, 3)}°`));
     }
 
