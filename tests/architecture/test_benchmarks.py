@@ -113,6 +113,7 @@ def test_lmfit_computes_the_same_coefficients():
     assert all(target.met for target in section.targets)
 
 
+@pytest.mark.slow
 def test_the_section_of_loops_has_a_row_for_each_plant_and_integrator():
     section = loops.section(rounds=1, count=2, duration=0.02)
     assert len(section.rows) == 6

@@ -85,10 +85,10 @@ initial_state = { pressure = "2 bar" }
 """
 
 
-def test_of_a_joint_the_angle_and_its_speed_are_drawn_after_every_muscle(tmp_path):
+def test_a_joint_has_one_panel_for_each_quantity_with_the_angle_and_its_speed_after_those_of_the_muscles(tmp_path):
     (tmp_path / "joint.toml").write_text(JOINT, encoding="utf-8")
     scenario = load_scenario(tmp_path / "joint.toml")
     axes = run_chapter(scenario, scenario.simulate()).plots[0].figure.axes
     names = [axis.get_ylabel().partition("\n")[0] for axis in axes]
-    assert names[-2:] == ["angle", "angular_speed"]
-    assert {"left.pressure", "right.pressure", "left.force", "right.force"} <= set(names)
+    assert names == ["pressure", "contraction", "force", "angle", "angular speed"]
+    assert [len(axis.get_lines()) for axis in axes] == [2, 2, 2, 1, 1]

@@ -11,7 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..core.annotation import abridged
+from ..core.annotation import abridged, one_line
 from ..core.arrays import Array
 from ..core.declaration import as_float
 from ..core.errors import ParameterError, suggestion
@@ -71,14 +71,14 @@ def _pairs(kind: str, name: str, given: Sequence[tuple[float, float]]) -> list[t
         return [(as_float("a time", time), as_float("a value", value)) for time, value in given]
     except (TypeError, ValueError, ParameterError):
         raise ParameterError(
-            f"the {kind} of '{name}' is {str(given)[:80]}; write pairs of time [s] and value, ((5, 1), (15, 0))."
+            f"the {kind} of '{name}' is {one_line(given)}; write pairs of time [s] and value, ((5, 1), (15, 0))."
         ) from None
 
 
 def _check_points(kind: str, noun: str, name: str, points: Sequence[tuple[float, float]]) -> None:
     """Raise ParameterError unless all numbers are finite and times rise."""
     if points and not np.isfinite(points).all():
-        raise ParameterError(f"the {kind} of '{name}' holds a number that is not finite: {str(points)[:80]}.")
+        raise ParameterError(f"the {kind} of '{name}' holds a number that is not finite: {one_line(points)}.")
     for i, (a, b) in enumerate(itertools.pairwise(time for time, _ in points)):
         if b <= a:
             raise ParameterError(
@@ -154,7 +154,7 @@ class SampledSignal(InputSignal):
         """
         if not isinstance(recording, Recording):
             raise ParameterError(
-                f"SampledSignal.recorded: {str(recording)[:80]} is no Recording; give what read_csv or read returns."
+                f"SampledSignal.recorded: {one_line(recording)} is no Recording; give what read_csv or read returns."
             )
         _check_mapping("recorded signal", columns, "'column'")
         times = recording["time"].tolist()

@@ -58,3 +58,9 @@ def abridged(value: Any) -> str:
     except ValueError:  # Python does not print an integer of more than 4300 digits
         return "an integer of thousands of digits"
     return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+def one_line(value: Any) -> str:
+    """The text of a value for a message, on one line with at most 80 characters."""
+    text = " ".join(str(value).split())
+    return text if len(text) <= 80 else f"{text[:77]}..."

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..core import tree
+from ..core.annotation import one_line
 from ..core.arrays import Array
 from ..core.errors import ParameterError
 from ..simulation.batch.variations import Column
@@ -26,11 +27,11 @@ class EpisodeDraw:
     def __init__(self, task: EnvironmentTask, randomisations: tuple[Randomisation, ...]) -> None:
         if not isinstance(task, EnvironmentTask):
             raise ParameterError(
-                f"the task is {str(task)[:80]}; give an EnvironmentTask, such as JointTracking(plant)."
+                f"the task is {one_line(task)}; give an EnvironmentTask, such as JointTracking(plant)."
             )
         if not isinstance(randomisations, tuple) or not all(isinstance(r, Randomisation) for r in randomisations):
             raise ParameterError(
-                f"the randomisation is {str(randomisations)[:80]}; give a tuple, such as "
+                f"the randomisation is {one_line(randomisations)}; give a tuple, such as "
                 "(FactorRange(('plant.mechanism.inertia',), 0.8, 1.2),)."
             )
         check_actions(task.actions)

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core import tree
+from ..core.annotation import one_line
 from ..core.arrays import Array
 from ..core.errors import ParameterError, suggestion
 from ..core.short_repr import ShortRepr
@@ -97,7 +98,7 @@ class FitUncertainty(ShortRepr, Randomisation):
     def __post_init__(self) -> None:
         if not isinstance(self.uncertainty, ParameterUncertainty):
             raise ParameterError(
-                f"FitUncertainty: uncertainty is {str(self.uncertainty)[:60]}; give that of a muscle file with a table "
+                f"FitUncertainty: uncertainty is {one_line(self.uncertainty)}; give that of a muscle file with a table "
                 "[uncertainty]: am.load(PATH).uncertainty."
             )
 

@@ -13,6 +13,7 @@ from ..compile.text.c import CLanguage
 from ..compile.text.javascript import JavaScriptLanguage
 from ..compile.text.matlab import DEFINITION, MatlabLanguage
 from ..core import autodiff
+from ..core.annotation import one_line
 from ..core.errors import ParameterError
 from ..core.tree import Leaf, leaves
 from .c_text import c_array, c_strings
@@ -101,7 +102,7 @@ def print_law(law: Characteristic, name: str, title: str) -> PrintedLaw:
     import casadi
 
     if not isinstance(law, Characteristic):
-        raise ParameterError(f"{str(law)[:80]} is not a characteristic; pass load('dmsp-20-300').characteristic, say.")
+        raise ParameterError(f"{one_line(law)} is not a characteristic; pass load('dmsp-20-300').characteristic, say.")
     check_closed_form(law)
     _, method, arguments, results = next(form for form in FORMS if isinstance(law, form[0]))
     model, parameters = autodiff.symbolic(law)

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from ..characteristic import PooledLengthLaw
 from ..characteristic.base import Characteristic
 from ..core import tree
+from ..core.annotation import one_line
 from ..core.arrays import Array
 from ..core.errors import IdentificationError, ParameterError
 from ..core.hints import Hint, HintedText
@@ -117,13 +118,13 @@ def refit(
 def _check_types(characteristic: object, recording: object) -> None:
     if not isinstance(characteristic, Characteristic):
         raise ParameterError(
-            f"fit: {str(characteristic)[:80]} is not a characteristic. Give one, for example load(...).characteristic."
+            f"fit: {one_line(characteristic)} is not a characteristic. Give one, for example load(...).characteristic."
         )
     runs = recording if isinstance(recording, Sequence) else [recording]
     for run in runs:
         if not isinstance(run, Recording):
             raise ParameterError(
-                f"fit: {str(run)[:80]} is not a Recording. Give one, as returned by read, read_csv or simulate."
+                f"fit: {one_line(run)} is not a Recording. Give one, as returned by read, read_csv or simulate."
             )
 
 

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from ..core.annotation import one_line
 from ..core.errors import FileError, ParameterError
 from .build import TEXT_KEYS
 from .entry import OPTIONAL_PARTS, Check, Entry
@@ -62,7 +63,7 @@ def scenario_toml(
 def save(entry: Entry, path: str | Path) -> Path:
     """Write an entry to a file that `load` reads; the file is complete or unchanged. Raises FileError."""
     if not isinstance(entry, Entry):
-        raise ParameterError(f"save: {str(entry)[:80]} is not an Entry; build one with Entry, or load and replace one.")
+        raise ParameterError(f"save: {one_line(entry)} is not an Entry; build one with Entry, or load and replace one.")
     if not isinstance(path, str | Path):
         raise FileError(f"save: {path!r} is not a path; give a text or a Path.")
     path = Path(path)

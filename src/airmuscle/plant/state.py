@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ..core.annotation import one_line
 from ..core.arrays import Array
 from ..core.declaration import as_float
 from ..core.errors import ParameterError, suggestion
@@ -15,7 +16,7 @@ from ..core.system import System
 def check_system(what: str, given: object) -> None:
     """Raise ParameterError for anything that is not a System, such as a muscle or a class."""
     if not isinstance(given, System):
-        raise ParameterError(f"{what}: {str(given)[:80]} is no plant; give Plant(muscle, circuit, mechanism).")
+        raise ParameterError(f"{what}: {one_line(given)} is no plant; give Plant(muscle, circuit, mechanism).")
 
 
 def state_vector(system: System, state: Mapping[str, float]) -> Array:

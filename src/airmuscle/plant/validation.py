@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..characteristic.validity_range import ValidityRange
+from ..core.annotation import one_line
 from ..core.declaration import check_structure, parameters
 from ..core.errors import ParameterError, TraceError
 from ..mechanism import Mechanism
@@ -63,7 +64,7 @@ def _check_kind(field: str, part: Any, kind: type[Any]) -> None:
         return
     hint = " Put several into a tuple." if isinstance(part, list) else ""
     hint = f" It has one: give its .{field}." if hasattr(part, field) else hint
-    raise ParameterError(f"Plant: its {field} must be a {kind.__name__}; it is {str(part)[:80]}.{hint}")
+    raise ParameterError(f"Plant: its {field} must be a {kind.__name__}; it is {one_line(part)}.{hint}")
 
 
 def _check_closed_form(muscles: Sequence[Muscle]) -> None:

@@ -8,6 +8,7 @@ import os
 from pathlib import Path
 from typing import TextIO
 
+from ..core.annotation import one_line
 from ..core.errors import FileError, ParameterError
 from .constants import CONSTANT_UNITS
 from .recording import Recording, column_heading
@@ -23,7 +24,7 @@ def write_csv(recording: Recording, path: str | Path, *, comments: bool = True) 
     """
     if not isinstance(recording, Recording):
         raise ParameterError(
-            f"write_csv: {str(recording)[:80]} is not a Recording. Pass the result of simulate, read or read_csv."
+            f"write_csv: {one_line(recording)} is not a Recording. Pass the result of simulate, read or read_csv."
         )
     if not isinstance(path, str | Path):
         raise FileError(f"write_csv: {path!r} is not a path. Pass the name of a file.")

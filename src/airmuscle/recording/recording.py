@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..core.annotation import one_line
 from ..core.arrays import Array
 from ..core.errors import ColumnError, ParameterError, suggestion
 from ..core.notebook import Card, NotebookDisplay
@@ -149,7 +150,7 @@ class Recording(NotebookDisplay):
         missing.
         """
         if not hasattr(plant, "animate"):
-            raise ParameterError(f"animate: {str(plant)[:80]} is no plant; give the Plant of the run.")
+            raise ParameterError(f"animate: {one_line(plant)} is no plant; give the Plant of the run.")
         return plant.animate(self, speed)
 
     def __repr__(self) -> str:

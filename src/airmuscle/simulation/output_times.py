@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..core.annotation import one_line
 from ..core.arrays import Array
 from ..core.declaration import as_float
 from ..core.errors import ParameterError
@@ -57,7 +58,7 @@ def _times(given: Any) -> Array:
     except (TypeError, ValueError):
         times = np.empty((0, 0))
     if times.ndim != 1:
-        raise ParameterError(f"simulate: output_times is {str(given)[:80]}; give a spacing [s] or a list of times [s].")
+        raise ParameterError(f"simulate: output_times is {one_line(given)}; give a spacing [s] or a list of times [s].")
     times = np.sort(times)
     return times[np.diff(times, prepend=-np.inf) > 0]
 

@@ -13,6 +13,7 @@ from ..compile.program import CompiledSystem, compile_system
 from ..control.control_loop import ControlLoop
 from ..control.inputs import InputSignal, Schedule
 from ..control.piecewise_linear import PiecewiseLinear
+from ..core.annotation import one_line
 from ..core.declaration import as_float
 from ..core.errors import ParameterError, SimulationError
 from ..core.status import Status
@@ -171,6 +172,6 @@ def _segments(
         hold = Schedule({name: ((start, value),) for name, value in inputs.items()})
         segments = hold.segments(known.input_names, start, dt)
     else:
-        raise ParameterError(f"advance: inputs are {str(inputs)[:80]}; give a value for each name, or PiecewiseLinear.")
+        raise ParameterError(f"advance: inputs are {one_line(inputs)}; give a value for each name, or PiecewiseLinear.")
     check_input_range(compiled, segments, start)
     return segments

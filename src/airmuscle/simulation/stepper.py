@@ -12,6 +12,7 @@ import numpy.typing as npt
 from ..compile.cache.kernel import begin_step, end_step
 from ..compile.program import CompiledSystem, compile_system
 from ..core import tree
+from ..core.annotation import one_line
 from ..core.arrays import Array
 from ..core.diagnostics import ColumnLimit, DiagnosticCode
 from ..core.errors import ParameterError, SimulationError, suggestion
@@ -159,7 +160,7 @@ class Stepper:
             self.state.size, self.inputs.size
         ):  # fmt: skip
             raise ParameterError(
-                f"Stepper.restore: {str(snapshot)[:80]} is no snapshot of this plant, which has {self.state.size} "
+                f"Stepper.restore: {one_line(snapshot)} is no snapshot of this plant, which has {self.state.size} "
                 f"states and {self.inputs.size} inputs."
             )
         state_vector(self.plant, dict(zip(self.state_names, snapshot.state, strict=True)))
@@ -194,7 +195,7 @@ class Stepper:
 
     def _wrong_inputs(self, inputs: Any) -> ParameterError:
         return ParameterError(
-            f"Stepper: inputs are {str(inputs)[:80]}; give {self._given.size} numbers in the order of "
+            f"Stepper: inputs are {one_line(inputs)}; give {self._given.size} numbers in the order of "
             f"{', '.join(self.input_names)}, or values by name."
         )
 

@@ -12,6 +12,7 @@ from ...compile.program import CompiledSystem, compile_system
 from ...control.control_loop import ControlLoop
 from ...control.inputs import InputSignal
 from ...control.piecewise_linear import PiecewiseLinear
+from ...core.annotation import one_line
 from ...core.arrays import Array
 from ...core.declaration import as_float
 from ...core.errors import ParameterError, suggestion
@@ -126,7 +127,7 @@ def _check_options(
 ) -> None:  # fmt: skip
     if initial_states is not None and not isinstance(initial_states, Mapping):
         raise ParameterError(
-            f"initial_states is {str(initial_states)[:80]}; give for each state a number for all, or a column (N,)."
+            f"initial_states is {one_line(initial_states)}; give for each state a number for all, or a column (N,)."
         )
     if keep is not None and not isinstance(keep, Sequence):
         raise ParameterError(f"keep is {keep!r}; give names of columns, ('pressure', 'position').")
@@ -146,7 +147,7 @@ def _count(initial_states: Mapping[str, npt.ArrayLike] | None, input: object) ->
         return of_states
     if not isinstance(input, Sequence):
         raise ParameterError(
-            f"simulate_batch: the input is {str(input)[:80]}; give an InputSignal, a ControlLoop, or a list."
+            f"simulate_batch: the input is {one_line(input)}; give an InputSignal, a ControlLoop, or a list."
         )
     if of_states is not None and of_states != len(input):
         raise ParameterError(
@@ -165,7 +166,7 @@ def _segments(
         if id(one) in known:
             continue
         if not isinstance(one, InputSignal):
-            raise ParameterError(f"inputs, row {row} is {str(one)[:80]}; give a Schedule or a SampledSignal.")
+            raise ParameterError(f"inputs, row {row} is {one_line(one)}; give a Schedule or a SampledSignal.")
         try:
             segments = one.segments(compiled.description.input_names, start, duration)
             segments.check_shape(len(compiled.description.input_names), start)

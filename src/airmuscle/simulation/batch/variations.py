@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import tree
+from ...core.annotation import one_line
 from ...core.arrays import Array
 from ...core.errors import AirmuscleError, ParameterError, suggestion
 from ...core.system import System
@@ -144,7 +145,7 @@ def variations_of(system: Any, given: Mapping[str, npt.ArrayLike], count: int | 
     `count` is the number of plants where initial states or inputs determine it.
     """
     if not isinstance(given, Mapping):
-        raise ParameterError(f"variations: they are {str(given)[:80]}; give a column of values for each path.")
+        raise ParameterError(f"variations: they are {one_line(given)}; give a column of values for each path.")
     leaves = {leaf.path: (place, leaf) for place, leaf in enumerate(tree.leaves(system))}
     columns = []
     for path, values in given.items():
@@ -178,7 +179,7 @@ def _column(leaf: tree.Leaf, given: npt.ArrayLike) -> Array:
         values = np.array(given, dtype=float)
     except (TypeError, ValueError):
         raise ParameterError(
-            f"variations: '{leaf.path}' must be numbers, one for each plant; it is {str(given)[:80]}."
+            f"variations: '{leaf.path}' must be numbers, one for each plant; it is {one_line(given)}."
         ) from None
     if values.ndim != 1:
         raise ParameterError(
