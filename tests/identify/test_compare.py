@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -268,3 +269,11 @@ def test_laws_that_need_a_length_are_named_where_none_is_stated():
     assert causes["TonduLopez2000"] == "not every recording states its resting length"
     assert "not compared: TonduLopez2000: not every recording states its resting length." in str(found).splitlines()
     assert compare(runs, CANDIDATES[1:2], leave_out=RunSplit()).unavailable == ()
+
+
+def test_a_fit_of_another_process_states_its_errors_in_the_unit_of_the_force():
+    """A result from a process is a copy, also of the quantity that was fitted."""
+    fit = am.fit(ContractileSurface.blank(2), load_data("dmsp-20-300"))
+    copy = pickle.loads(pickle.dumps(fit))
+    assert copy.format_residual(12.5) == fit.format_residual(12.5) == "12.5 N"
+    assert copy.summary() == fit.summary()

@@ -234,9 +234,9 @@ def make_problem(
     quantity = fitted_quantity_of(law)
     signs = censoring.signs(data["force"])
     target = data[quantity.name]
-    if quantity is FORCE:
+    if quantity == FORCE:
         target = np.where(signs > 0, censoring.min_force, np.where(signs < 0, censoring.max_force, target))
-    elif quantity is PRESSURE:
+    elif quantity == PRESSURE:
         signs = -signs  # a smaller force at the same pressure means that the stated force needs a higher pressure
     leaves = tuple(tree.leaves(law))
     _check_known(law, leaves, fixed)

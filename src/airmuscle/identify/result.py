@@ -200,9 +200,9 @@ class Fit(NotebookDisplay):
 
     def format_residual(self, residual: float) -> str:
         """A residual [SI] as text in the usual unit of the fitted quantity."""
-        if self.fitted_quantity is FORCE:
+        if self.fitted_quantity == FORCE:
             return quantity_text(residual, "N", "N")
-        if self.fitted_quantity is CONTRACTION:
+        if self.fitted_quantity == CONTRACTION:
             return contraction_text(residual, ".4%")
         return quantity_text(residual, "Pa", "kPa")
 

@@ -152,7 +152,7 @@ def _rows_of_run(recording: Recording, run: Run) -> Recording:
 
 
 def _path_of(run: Run) -> FrictionPath:
-    return PressurePath() if run.kind is ISOMETRIC else ContractionPath()
+    return PressurePath() if run.kind == ISOMETRIC else ContractionPath()
 
 
 def _directions(recording: Recording, friction_path: FrictionPath) -> np.ndarray:
@@ -171,7 +171,7 @@ def _make_loop(
     if law is not None:
         static_curve: StaticCurve = FixedCharacteristic(law)
     elif run.kind in (ISOBARIC, ISOMETRIC):
-        static_curve = PolynomialCurve("contraction" if run.kind is ISOBARIC else "pressure", degree)
+        static_curve = PolynomialCurve("contraction" if run.kind == ISOBARIC else "pressure", degree)
     else:
         raise IdentificationError(
             f"{recording.origin}: the run is {run.kind.name}, so pressure and contraction change together and the "
@@ -181,7 +181,7 @@ def _make_loop(
     rows = _select_rows(recording, sensors, all_rows)
     direction = _directions(recording, friction_path)
     _check_two_directions(recording, direction, rows)
-    transient = 0 if run.kind is ISOBARIC else int(np.count_nonzero(rows & ~_has_steady_pressure(recording, sensors)))
+    transient = 0 if run.kind == ISOBARIC else int(np.count_nonzero(rows & ~_has_steady_pressure(recording, sensors)))
     return HysteresisLoop(recording, run, friction_path, static_curve, rows, transient)
 
 

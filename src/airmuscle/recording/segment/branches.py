@@ -72,10 +72,10 @@ def find_branches(
         return ()
     runs = find_runs(recording) if runs is None else runs
     column = moved_column(recording)
-    isobaric = [run.interval for run in runs if run.kind is ISOBARIC and column in run.swept_columns]
+    isobaric = [run.interval for run in runs if run.kind == ISOBARIC and column in run.swept_columns]
     if 2 * sum(len(interval) for interval in isobaric) > len(recording):
         return tuple(b for each in isobaric for b in _motion_branches(recording, column, each, reversal))
-    if sensor is None and any(run.kind is AT_REST for run in runs):
+    if sensor is None and any(run.kind == AT_REST for run in runs):
         sensor = Sensor("pressure", 0.0, estimate_noise(recording["pressure"]))
     return _pressure_branches(recording, sensor, reversal)
 

@@ -93,7 +93,7 @@ def _sensor_findings(recording: Recording, sensors: Mapping[str, Sensor]) -> Ite
 
 def _run_findings(recording: Recording, runs: tuple[Run, ...]) -> Iterator[Finding]:
     stated = recording.constants.get("run")
-    if any(run.kind is AT_REST for run in runs):
+    if any(run.kind == AT_REST for run in runs):
         subject = "no measured quantity varies" if len(recording.columns) > 2 else "the only quantity does not vary"
         yield Finding(
             f"{subject}{_pressure_range(recording)}: no characteristic can be identified. Vary the pressure of an "

@@ -74,5 +74,5 @@ def check_contents(recordings: Sequence[Recording]) -> None:
     sensors = estimate_sensors(recordings) if recordings else {}
     for recording in recordings:
         runs = find_runs(recording, {name: s for name, s in sensors.items() if name in recording.columns})
-        if len(recordings) == 1 or all(run.kind is not AT_REST for run in runs):
+        if len(recordings) == 1 or all(run.kind != AT_REST for run in runs):
             check_swept(recording, runs)

@@ -70,7 +70,7 @@ def find_runs(recording: Recording, sensors: Mapping[str, Sensor] | None = None)
         return ()
     bands = _constant_bands(recording, sensors or estimate_sensors(recording))
     whole = _classify(recording, Interval(0, len(recording)), bands)
-    if whole.kind is not FREE:
+    if whole.kind != FREE:
         return (whole,)
     candidates = [runs for kind in _kinds_of(recording) if (runs := _runs_at_levels(recording, kind, bands))]
     return max(candidates, key=lambda runs: sum(len(run.interval) for run in runs), default=(whole,))
@@ -79,7 +79,7 @@ def find_runs(recording: Recording, sensors: Mapping[str, Sensor] | None = None)
 def _kinds_of(recording: Recording) -> tuple[RunKind, ...]:
     """The kinds that the columns can tell: without a measured motion, a constant force is that of a slack muscle at a
     held length as well as an isotonic one."""
-    return KINDS if moved_column(recording) is not None else tuple(kind for kind in KINDS if kind is not ISOTONIC)
+    return KINDS if moved_column(recording) is not None else tuple(kind for kind in KINDS if kind != ISOTONIC)
 
 
 def _column(recording: Recording, kind: RunKind) -> str | None:
@@ -111,7 +111,7 @@ def _classify(recording: Recording, interval: Interval, bands: dict[str, float])
         kind
         for kind, name in names.items()
         if _spread(recording[name][interval.rows]) <= bands[name]
-        or (kind is ISOBARIC and _has_ripple(recording, interval, bands))
+        or (kind == ISOBARIC and _has_ripple(recording, interval, bands))
     ]
     swept = tuple(name for kind, name in names.items() if kind not in constant)
     isotonic_only = constant == [ISOTONIC] and ISOTONIC not in possible
@@ -139,7 +139,7 @@ def _runs_at_levels(recording: Recording, kind: RunKind, bands: dict[str, float]
         return ()
     runs = []
     intervals = list(level_intervals(recording[name], bands[name]))
-    for interval in _join_ripple(recording, intervals, bands) if kind is ISOBARIC else intervals:
+    for interval in _join_ripple(recording, intervals, bands) if kind == ISOBARIC else intervals:
         swept = tuple(
             other
             for other, band in bands.items()
