@@ -111,8 +111,10 @@ def section(rounds: int = 5, count: int = SIMULATED, duration: float = DURATION)
             rows.append(
                 (case.name, str(integrator), format_time(cpu), format_time(cpu / samples), format_time(total), error)
             )
-            if case.name == "lifted load" and reference is controlled:
-                name = f"{COUNT} control loops of {DURATION:g} s on {available_cores()} cores"
+            in_lanes = isinstance(integrator, RungeKutta4)
+            if in_lanes or (case.name == "lifted load" and reference is controlled):
+                method = "RungeKutta4 in lanes" if in_lanes else "default integrator"
+                name = f"{COUNT} loops of {DURATION:g} s on {available_cores()} cores, {case.name}, {method}"
                 targets.append(Target(name, total * DURATION / duration, 10.0, "s", reason=REASON))
     return Section("Control loops in a batch", TEXT, HEADER, tuple(rows), tuple(targets))
 

@@ -49,7 +49,7 @@ def compile_anew(system: System) -> Program:
 def compile_with_step(system: System) -> Any:
     """A new program and its compiled step of ode8, 13 stages in one function."""
     program = compile_anew(system)
-    return program.step(*DormandPrince8(1e-4).tableau(), compile_system(system).parameters)
+    return program.step(DormandPrince8(1e-4).tableau(), compile_system(system).parameters)
 
 
 def many_muscles() -> Plant:

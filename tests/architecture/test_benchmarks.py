@@ -118,7 +118,7 @@ def test_the_section_of_loops_has_a_row_for_each_plant_and_integrator():
     section = loops.section(rounds=1, count=2, duration=0.02)
     assert len(section.rows) == 6
     assert [row[-1] for row in section.rows[::3]] == ["0.0e+00"] * 2
-    assert len(section.targets) == 1
+    assert len(section.targets) == 3
 
 
 def test_a_section_and_its_targets_are_printed():
