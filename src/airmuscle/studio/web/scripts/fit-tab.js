@@ -185,7 +185,7 @@
         return;
       }
       this.resultHost.replaceChildren();
-      this.stateChanged();
+      this.stateChanged(true);  /* the address leads back to the fit, also if the page is closed now */
       await this.follow();
     }
 

@@ -19,13 +19,16 @@
     return { tab: shown, ...Object.fromEntries(Object.entries(tabs).map(([name, { view }]) => [name, view.state()])) };
   }
 
-  /* The address follows the page, at most four times a second. */
-  function stateChanged() {
+  /* The address contains the state of the page. */
+  function writeState() {
+    const text = link.encode(currentState());
+    try { history.replaceState(null, "", text.length < 60000 ? `#${text}` : "#"); } catch { /* a page opened as a file in some browsers */ }
+  }
+
+  /* Write the state into the address, at once or when it has not changed for a moment. */
+  function stateChanged(atOnce = false) {
     clearTimeout(writing);
-    writing = setTimeout(() => {
-      const text = link.encode(currentState());
-      try { history.replaceState(null, "", text.length < 60000 ? `#${text}` : "#"); } catch { /* a page opened as a file in some browsers */ }
-    }, 250);
+    if (atOnce === true) writeState(); else writing = setTimeout(writeState, 250);
   }
 
   function show(name, focus) {
