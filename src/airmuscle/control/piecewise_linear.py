@@ -63,6 +63,12 @@ class PiecewiseLinear(ShortRepr):
             return self
         return PiecewiseLinear(*(np.array(t, dtype=float, order="C") for t in tables))
 
+    def read_only(self) -> PiecewiseLinear:
+        """The same inputs; nobody can write to these arrays any more."""
+        for table in (self.ends, self.values, self.slopes):
+            table.setflags(write=False)
+        return self
+
     def split_at(self, starts: Array, start: float) -> PiecewiseLinear:
         """The same inputs with segments that start at other instants (R,), in rising order, the first not before
         `start`; no segment may end within one of them."""

@@ -27,8 +27,13 @@ _ENTRY = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
 
 
 def address_of(array: Any) -> int:
-    """The address of the first element of a C-contiguous, writeable array."""
-    return _address(_view(array)) if array.size else 0
+    """The address of the first element of a C-contiguous array."""
+    if not array.size:
+        return 0
+    try:
+        return _address(_view(array))
+    except TypeError:  # an array that cannot be written to; the other way is quicker
+        return int(array.ctypes.data)
 
 
 def _kind(argument: Any) -> str:
@@ -106,7 +111,7 @@ class BoundKernel:
         self._slots = (ctypes.c_int64 * sum(counts))()
         self._floats = (ctypes.c_double * sum(counts)).from_buffer(self._slots)
         self._address = ctypes.addressof(self._slots)
-        self._arguments = list(arguments)
+        self._arguments: list[Any] = [None] * len(arguments)
         for index, argument in enumerate(arguments):
             self.replace(index, argument)
         self._kernel = kernel  # its machine code must live as long
@@ -116,6 +121,8 @@ class BoundKernel:
 
     def replace(self, index: int, argument: Any) -> None:
         """Take another argument of the same kind in place of number `index`."""
+        if self._arguments[index] is argument:
+            return
         self._arguments[index] = argument
         kind, offset = self._kinds[index], self._offsets[index]
         if kind == "d":
@@ -124,7 +131,7 @@ class BoundKernel:
             self._slots[offset] = argument
         else:
             slots = self._slots
-            slots[offset] = _address(_view(argument)) if argument.size else 0
+            slots[offset] = address_of(argument)
             for length in argument.shape:
                 offset += 1
                 slots[offset] = length
@@ -136,9 +143,11 @@ class BoundKernel:
             offset = offsets[i]
             slots[offset] = address
             slots[offset + 1] = length
-        if self._numba is not None:
-            for i, address in enumerate(addresses, index):
-                arguments[i] = _array_at(address, (length, *arguments[i].shape[1:]))
+        if self._numba is None:
+            arguments[index : index + len(addresses)] = addresses
+            return
+        for i, address in enumerate(addresses, index):
+            arguments[i] = _array_at(address, (length, *arguments[i].shape[1:]))
 
     @property
     def entry_address(self) -> int | None:
