@@ -129,6 +129,8 @@ class Description:
         """Integrators bound to this system that no run uses at present, by their integrator."""
         self.holders: dict[Any, list[Any]] = {}
         """The same for steps with held inputs."""
+        self.loop_runs: dict[Any, list[Any]] = {}
+        """Runs of control loops at this system that nothing uses at present, by the form of the loop."""
         self.recorders: list[Any] = []
         """Kernels of the rows bound to this system that no run uses at present."""
         self._name_columns()

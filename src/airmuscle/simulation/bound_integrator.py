@@ -71,8 +71,9 @@ class BoundIntegrator:
         """Integrate from `state` (n,) at `start` [s] through the segments; rows (N, n) at rising `times` (N,)."""
         rows = np.empty((times.size, self.state.size)) if rows is None else rows
         self.state[:] = state
-        for i, argument in enumerate((segments.ends, segments.values, segments.slopes, times, rows), self._first):
-            self._kernel.replace(i, argument)
+        for i, argument in enumerate((segments.ends, segments.values, segments.slopes, times), self._first):
+            self._kernel.replace_input(i, argument)
+        self._kernel.replace(self._first + 4, rows)
         return self._solve(start, rows, max_steps)
 
     def hold(self, state: Array, inputs: Array, duration: float) -> Status:

@@ -90,7 +90,9 @@ def merge_output_times(grid: Array, instants: Array, duration: float) -> Array:
     behind = np.searchsorted(instants, grid)
     before, after = instants[np.maximum(behind - 1, 0)], instants[np.minimum(behind, instants.size - 1)]
     apart = np.minimum(np.abs(grid - before), np.abs(grid - after)) > close
-    merged: Array = np.sort(np.concatenate([grid[apart], instants]))  # np.unique would import numpy.ma
+    merged: Array = instants.copy()
+    if apart.any():
+        merged = np.sort(np.concatenate([grid[apart], instants]))  # np.unique would import numpy.ma
     new: npt.NDArray[np.bool_] = np.diff(merged, prepend=-np.inf) > 0
     return merged[new]
 

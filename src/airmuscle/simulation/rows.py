@@ -57,9 +57,14 @@ class RowRecorder:
         """Inputs and outputs at states (N, n) and rising times (N,) of a run whose segments begin at `start` [s]."""
         count = times.size
         inputs, outputs = np.empty((count, self.sizes.inputs)), np.empty((count, self.sizes.outputs))
-        arguments = (states, times, start, segments.ends, segments.values, segments.slopes, inputs, outputs)
-        for i, argument in enumerate(arguments, 2):
-            self._kernel.replace(i, argument)
+        kernel = self._kernel
+        kernel.replace(2, states)
+        kernel.replace_input(3, times)
+        kernel.replace(4, start)
+        for i, argument in enumerate((segments.ends, segments.values, segments.slopes), 5):
+            kernel.replace_input(i, argument)
+        kernel.replace(8, inputs)
+        kernel.replace(9, outputs)
         first = self._kernel()
         lower, upper = self._ranges.tolist()
         return RowTable(inputs, outputs, lower, upper, first)
