@@ -56,6 +56,8 @@ class BoundIntegrator:
         self._kernel = binding.kernel.bind(*binding.leading, *run, *binding.trailing, *end)
         self._first = len(binding.leading) + 1
         self._clock_view, self._count_view = flat_view(self._clock), flat_view(self._count)
+        self._slots: list[int] = self.places.tolist()
+        self._words = None if self._kernel.entry_address is None else flat_view(self._kernel.slots)
         self._budget = len(binding.leading) + len(run) + len(binding.trailing) + 2
 
     def rebind(self, binding: Binding) -> None:
@@ -105,10 +107,18 @@ class BoundIntegrator:
     ) -> tuple[Status, int, float]:
         """Go on from `self.state` at `begin` [s] through `count` segments: how it ended, rows reached, where.
 
-        Ends, values and slopes of the segments, times and rows are given by the addresses of their first numbers.
+        Ends, values and slopes of the segments, times and rows are given by the addresses of their first numbers. Not
+        to be mixed with `run`.
         """
-        self._kernel.point(self._first, segments, count)
-        self._kernel.point(self._first + 3, (times, rows), wanted)
+        if self._words is None:
+            self._kernel.point(self._first, segments, count)
+            self._kernel.point(self._first + 3, (times, rows), wanted)
+        else:
+            words, (a, b, c, d, e) = self._words, self._slots
+            words[a], words[b], words[c] = segments
+            words[a + 1] = words[b + 1] = words[c + 1] = count
+            words[d], words[e] = times, rows
+            words[d + 1] = words[e + 1] = wanted
         clock, counts = self._clock_view, self._count_view
         clock[0] = clock[2] = begin
         clock[1] = 0.0
