@@ -54,7 +54,7 @@ class BoundIntegrator:
         end = (self._clock, self._count, INTERRUPT_CHECK_STEPS, work)
         self._bound_values = (*binding.leading, *binding.trailing)
         self._kernel = binding.kernel.bind(*binding.leading, *run, *binding.trailing, *end)
-        self._first = len(binding.leading) + 1
+        self._run, self._first = self._kernel.runner, len(binding.leading) + 1
         self._clock_view, self._count_view = flat_view(self._clock), flat_view(self._count)
         self._slots: list[int] = self.places.tolist()
         self._words = None if self._kernel.entry_address is None else flat_view(self._kernel.slots)
@@ -91,7 +91,7 @@ class BoundIntegrator:
         if duration != self._duration:
             self._end[0] = self._duration = duration
         self._progress.fill(0)
-        status = self._kernel()
+        status = self._run()
         if status == _PAUSED:
             status = self._continue(status, MAX_STEPS)
         return Status.DONE if status == 0 else Status(status)
@@ -124,7 +124,7 @@ class BoundIntegrator:
         clock[1] = 0.0
         counts[0] = counts[1] = 0
         before = counts[2]
-        status = self._kernel()
+        status = self._run()
         if status == _PAUSED:
             status = self._continue(status, before + MAX_STEPS)
             self._kernel.replace(self._budget, INTERRUPT_CHECK_STEPS)
