@@ -80,6 +80,8 @@ class CSource:
             "segments": str(segments.ends.size),
             "columns": str(len(columns)),
             "constants": "".join(constants),
+            "valid": filled("valid.c", {}, self.name),
+            "program": filled("program.c", {"failures": ""}, self.name),
         }
         return filled("main.c", places, self.name)
 
