@@ -223,7 +223,7 @@ fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2S
 
 /* Model Exchange */
 fmi2Status fmi2EnterEventMode(fmi2Component c) { UNUSED(c); return fmi2OK; }
-fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) { UNUSED(c); return fmi2OK; }
+fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) { model_settle(&C->m); return fmi2OK; }
 
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info)
 {
@@ -259,8 +259,9 @@ fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real f[], size_t n)
 
 fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real z[], size_t n)
 {
-  UNUSED(z);
-  return n ? refuse(c, "there are no event indicators") : fmi2OK;
+  if (n != MODEL_INDICATORS) return refuse(c, "the number of event indicators is another one");
+  model_get_indicators(&C->m, z);
+  return fmi2OK;
 }
 
 fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t n)

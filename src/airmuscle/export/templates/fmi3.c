@@ -255,7 +255,7 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
 
 fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance)
 {
-  UNUSED(instance);
+  model_settle(&C->m);
   return fmi3OK;
 }
 
@@ -293,8 +293,9 @@ fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance instance, fmi3Float64 
 
 fmi3Status fmi3GetEventIndicators(fmi3Instance instance, fmi3Float64 eventIndicators[], size_t nEventIndicators)
 {
-  UNUSED(eventIndicators);
-  return nEventIndicators ? refuse(instance, "there are no event indicators") : fmi3OK;
+  if (nEventIndicators != MODEL_INDICATORS) return refuse(instance, "the number of event indicators is another one");
+  model_get_indicators(&C->m, eventIndicators);
+  return fmi3OK;
 }
 
 fmi3Status fmi3GetContinuousStates(fmi3Instance instance, fmi3Float64 continuousStates[], size_t nContinuousStates)
@@ -315,7 +316,7 @@ fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, fmi3Float64 
 fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventIndicators)
 {
   UNUSED(instance);
-  *nEventIndicators = 0;
+  *nEventIndicators = MODEL_INDICATORS;
   return fmi3OK;
 }
 

@@ -9,6 +9,9 @@
 #define MODEL_TOKEN "@token@"
 #define MODEL_PARTIALS @partials@
 #define MODEL_LIMITS @limits@
+#define MODEL_INDICATORS @indicators@
+/* An event follows where an indicator lies so far beyond the change of its sign, so that rounding causes none. */
+#define MODEL_SLACK @slack@
 #define MODEL_RTOL_START @rtol@
 
 /* Value references; 0 is time. The tolerance exists for an integrator that controls its error. */
@@ -18,10 +21,14 @@
 #define MODEL_FIRST_OUTPUT (MODEL_FIRST_INPUT + MODEL_INPUTS)
 #define MODEL_FIRST_PARAMETER (MODEL_FIRST_OUTPUT + MODEL_OUTPUTS)
 #define MODEL_TOLERANCE (MODEL_FIRST_PARAMETER + MODEL_PARAMETERS)
+/* Event indicators have value references in FMI 3.0. */
+#define MODEL_FIRST_INDICATOR (MODEL_TOLERANCE + (MODEL_RTOL_START > 0.0 ? 1u : 0u))
 #define MODEL_ROWS (MODEL_STATES + MODEL_OUTPUTS)
 
 /* d(rates, outputs)/d(states, inputs): values of the non-zeros, whose places are in model_rows and model_columns. */
 void model_partials(const double *restrict x, const double *restrict u, const double *restrict c, double *restrict D);
+/* Differences that change sign where the rates are not smooth. */
+void model_indicators(const double *restrict x, const double *restrict u, const double *restrict c, double *restrict z);
 
 @constants@
 typedef struct {
@@ -29,7 +36,7 @@ typedef struct {
   double u[MODEL_INPUTS + 1], w[MODEL_INPUTS + 1], p[MODEL_PARAMETERS + 1], c[MODEL_PRECOMPUTED + 1];
   double f[MODEL_STATES], o[MODEL_OUTPUTS + 1];
   int unprepared, unevaluated, jumped;
-  unsigned char told[MODEL_LIMITS + 1];
+  unsigned char told[MODEL_LIMITS + 1], above[MODEL_INDICATORS + 1];
 } model_instance;
 
 typedef void (*model_report)(void *owner, int is_error, const char *text);
@@ -61,9 +68,33 @@ static void model_evaluate(model_instance *m)
   m->unevaluated = 0;
 }
 
+/* Event indicators relative to their scales, moved away from zero on the side on which the last event left them. */
+static void model_get_indicators(model_instance *m, double *z)
+{
+  double values[MODEL_INDICATORS + 1];
+  int i;
+  model_ready(m);
+  model_indicators(m->s.x, m->u, m->c, values);
+  for (i = 0; i < MODEL_INDICATORS; i++) {
+    const double value = isfinite(values[i]) ? values[i] / model_scales[i] : 0.0;
+    z[i] = m->above[i] ? value + MODEL_SLACK : value - MODEL_SLACK;
+  }
+}
+
+/* At an event: on which side each indicator lies from now on. */
+static void model_settle(model_instance *m)
+{
+  double values[MODEL_INDICATORS + 1];
+  int i;
+  model_ready(m);
+  model_indicators(m->s.x, m->u, m->c, values);
+  for (i = 0; i < MODEL_INDICATORS; i++) m->above[i] = values[i] > 0.0;
+}
+
 /* The value of a variable; 1 for an unknown value reference. */
 static int model_get(model_instance *m, unsigned v, double *value)
 {
+  double z[MODEL_INDICATORS + 1];
   if (v >= MODEL_FIRST_RATE && (v < MODEL_FIRST_INPUT || (v >= MODEL_FIRST_OUTPUT && v < MODEL_FIRST_PARAMETER)))
     model_evaluate(m);
   if (v == 0) *value = m->s.t;
@@ -73,7 +104,10 @@ static int model_get(model_instance *m, unsigned v, double *value)
   else if (v < MODEL_FIRST_PARAMETER) *value = m->o[v - MODEL_FIRST_OUTPUT];
   else if (v < MODEL_TOLERANCE) *value = m->p[v - MODEL_FIRST_PARAMETER];
   else if (v == MODEL_TOLERANCE && MODEL_RTOL_START > 0.0) *value = m->s.rtol;
-  else return 1;
+  else if (v >= MODEL_FIRST_INDICATOR && v < MODEL_FIRST_INDICATOR + MODEL_INDICATORS) {
+    model_get_indicators(m, z);
+    *value = z[v - MODEL_FIRST_INDICATOR];
+  } else return 1;
   return 0;
 }
 
