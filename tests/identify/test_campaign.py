@@ -217,7 +217,7 @@ def test_predictions_at_unseen_pressures_and_speeds_stay_within_the_bands(one_le
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("bar, contraction", [(3.0, 0.06), (4.0, 0.10)])
+@pytest.mark.parametrize(("bar", "contraction"), [(3.0, 0.06), (4.0, 0.10)])
 def test_predictions_of_unseen_holds_stay_within_the_band(one_length, bar, contraction):
     """A fast motion, then two minutes at rest: friction and creep along the motion remain through the noise."""
     run = recording(MUSCLE.hold(bar, contraction, np.random.default_rng(91)), "hold")
