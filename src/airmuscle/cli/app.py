@@ -51,6 +51,7 @@ COMMANDS = (
     CommandRow("hysteresis", "hysteresis", "hysteresis", "Fit friction models to hysteresis loops."),
     CommandRow("fit-dynamic", "fit_dynamic", "fit_dynamic", "Identify plant parameters from transient records."),
     CommandRow("campaign", "campaign", "campaign", "Identify a muscle from all files of a test rig."),
+    CommandRow("predict", "predict", "predict", "Predict further records by an identified muscle or plant."),
     CommandRow("fit-volume", "fit_volume", "fit_volume_command", "Fit the volume of a muscle over its contraction."),
     CommandRow("plan", "plan", "plan", "Design the most informative static experiments (D-optimal)."),
     CommandRow("bench", "bench", "bench", "Fit a surface while rows arrive; name the next point."),
