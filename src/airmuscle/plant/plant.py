@@ -19,11 +19,8 @@ from ..muscle import Muscle
 from ..pneumatics import Circuit, CircuitFlows
 from ..pneumatics.gas import Air, Ambient, Gas, Polytropic
 from ..pneumatics.ports import key_by_muscle, key_by_port
-from ..recording import Recording
 from . import diagnostics
-from .animation import Animation
 from .display import PlantDisplay
-from .drawing import scene_of
 from .evaluation import PlantEvaluation
 from .muscle_state import MuscleState, air_states, muscle_outputs, muscle_state, states_of_muscle
 from .steady_state import fill_muscles, settle_muscles
@@ -271,13 +268,18 @@ class Plant(PlantDisplay, System):
 
     def diagnose(self, columns: Columns) -> list[Diagnostic]:
         """Extrapolation of characteristics, limits of geometries, components beyond the validity of their model."""
+        rated, limits, circuits = self._checks
         remarks: dict[str, str] = {}
-        for prefix, circuit in self._circuits():
+        for prefix, circuit in circuits:
             remarks |= self._outside(prefix, circuit.validity_warnings(self._within(prefix, columns), self.ambient))
-        named = {name.removesuffix("."): text for name, text in remarks.items()}
-        components = [Diagnostic(DiagnosticCode.COMPONENT, name, f"{name}: {text}") for name, text in named.items()]
+        return [*rated, *diagnostics.extrapolation(limits, columns), *diagnostics.components(remarks)]
+
+    @functools.cached_property
+    def _checks(self) -> diagnostics.Checks:
+        """What `diagnose` compares a run with."""
         rated = diagnostics.rated_temperature(self.muscles, self.ambient.temperature)
-        return [*rated, *diagnostics.extrapolation(self.column_limits, columns), *components]
+        circuits = tuple((prefix, circuit) for prefix, circuit in self._circuits() if circuit.has_validity_range)
+        return diagnostics.Checks(rated, diagnostics.with_tolerance(self.column_limits), circuits)
 
     @functools.cached_property
     def column_limits(self) -> tuple[ColumnLimit, ...]:
@@ -290,7 +292,3 @@ class Plant(PlantDisplay, System):
             return diagnostics.first_hint(self._enclosures(state))
         except GeometryLimitError as error:
             return str(error)
-
-    def animate(self, recording: Recording, speed: float = 1.0) -> Animation:
-        """Animation of a run of this plant; see Recording.animate."""
-        return Animation(scene_of([m.geometry for m in self.muscles], self.prefixes, self.mechanism), recording, speed)

@@ -71,8 +71,9 @@ class BoundIntegrator:
         """Integrate from `state` (n,) at `start` [s] through the segments; rows (N, n) at rising `times` (N,)."""
         rows = np.empty((times.size, self.state.size)) if rows is None else rows
         self.state[:] = state
-        for i, argument in enumerate((segments.ends, segments.values, segments.slopes, times, rows), self._first):
-            self._kernel.replace(i, argument)
+        for i, argument in enumerate((segments.ends, segments.values, segments.slopes, times), self._first):
+            self._kernel.replace_input(i, argument)
+        self._kernel.replace(self._first + 4, rows)
         return self._solve(start, rows, max_steps)
 
     def hold(self, state: Array, inputs: Array, duration: float) -> Status:
@@ -150,9 +151,9 @@ class BoundIntegrator:
         return int(self._count[2]), int(self._count[3])
 
     def _solve(self, start: float, rows: Array, max_steps: int) -> RawSolution:
-        clock, count = self._clock, self._count
-        clock[:] = start, 0.0, start
-        count[:] = 0
+        clock, count = self._clock_view, self._count_view
+        clock[0], clock[1], clock[2] = start, 0.0, start
+        count[0] = count[1] = count[2] = count[3] = 0
         if max_steps < INTERRUPT_CHECK_STEPS:
             self._kernel.replace(self._budget, max_steps)
         try:
@@ -162,9 +163,10 @@ class BoundIntegrator:
         except KeyboardInterrupt:
             status = Status.INTERRUPTED.value
         self._kernel.replace(self._budget, INTERRUPT_CHECK_STEPS)
-        _, reached, steps, rejected = count.tolist()
-        rows[reached:] = np.nan
-        return RawSolution(rows, reached, float(clock[0]), self.state.copy(), Status(status), steps, rejected)
+        reached, ended = count[1], Status.DONE if status == 0 else Status(status)
+        if reached < len(rows):
+            rows[reached:] = np.nan
+        return RawSolution(rows, reached, clock[0], self.state.copy(), ended, count[2], count[3])
 
     def _continue(self, status: int, max_steps: int) -> int:
         """Go on where the kernel paused so that an interruption can be noticed."""
