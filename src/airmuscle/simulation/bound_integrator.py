@@ -54,8 +54,10 @@ class BoundIntegrator:
         end = (self._clock, self._count, INTERRUPT_CHECK_STEPS, work)
         self._bound_values = (*binding.leading, *binding.trailing)
         self._kernel = binding.kernel.bind(*binding.leading, *run, *binding.trailing, *end)
-        self._first = len(binding.leading) + 1
+        self._run, self._first = self._kernel.runner, len(binding.leading) + 1
         self._clock_view, self._count_view = flat_view(self._clock), flat_view(self._count)
+        self._slots: list[int] = self.places.tolist()
+        self._words = None if self._kernel.entry_address is None else flat_view(self._kernel.slots)
         self._budget = len(binding.leading) + len(run) + len(binding.trailing) + 2
 
     def rebind(self, binding: Binding) -> None:
@@ -89,7 +91,7 @@ class BoundIntegrator:
         if duration != self._duration:
             self._end[0] = self._duration = duration
         self._progress.fill(0)
-        status = self._kernel()
+        status = self._run()
         if status == _PAUSED:
             status = self._continue(status, MAX_STEPS)
         return Status.DONE if status == 0 else Status(status)
@@ -105,16 +107,24 @@ class BoundIntegrator:
     ) -> tuple[Status, int, float]:
         """Go on from `self.state` at `begin` [s] through `count` segments: how it ended, rows reached, where.
 
-        Ends, values and slopes of the segments, times and rows are given by the addresses of their first numbers.
+        Ends, values and slopes of the segments, times and rows are given by the addresses of their first numbers. Not
+        to be mixed with `run`.
         """
-        self._kernel.point(self._first, segments, count)
-        self._kernel.point(self._first + 3, (times, rows), wanted)
+        if self._words is None:
+            self._kernel.point(self._first, segments, count)
+            self._kernel.point(self._first + 3, (times, rows), wanted)
+        else:
+            words, (a, b, c, d, e) = self._words, self._slots
+            words[a], words[b], words[c] = segments
+            words[a + 1] = words[b + 1] = words[c + 1] = count
+            words[d], words[e] = times, rows
+            words[d + 1] = words[e + 1] = wanted
         clock, counts = self._clock_view, self._count_view
         clock[0] = clock[2] = begin
         clock[1] = 0.0
         counts[0] = counts[1] = 0
         before = counts[2]
-        status = self._kernel()
+        status = self._run()
         if status == _PAUSED:
             status = self._continue(status, before + MAX_STEPS)
             self._kernel.replace(self._budget, INTERRUPT_CHECK_STEPS)

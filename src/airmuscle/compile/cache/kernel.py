@@ -7,11 +7,12 @@ machine code is stored (`store`), and every later process loads that alone. It i
 from __future__ import annotations
 
 import ctypes
+import functools
 import importlib
 import itertools
 import math
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -170,6 +171,11 @@ class BoundKernel:
     def slot_of(self, index: int) -> int:
         """The place in the slots of argument number `index`."""
         return self._offsets[index]
+
+    @property
+    def runner(self) -> Callable[[], int]:
+        """A function that runs the kernel with less overhead than the kernel itself, as long as the kernel lives."""
+        return self if self._numba else functools.partial(self._run, self._address)
 
     def __call__(self) -> int:
         """Run the kernel; its status."""
