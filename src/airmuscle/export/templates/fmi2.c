@@ -245,7 +245,7 @@ fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n
 {
   if (n != MODEL_STATES) return refuse(c, "the number of states is another one");
   memcpy(C->m.s.x, x, sizeof C->m.s.x);
-  C->m.unevaluated = 1;
+  C->m.old_rates = C->m.old_outputs = 1;
   return fmi2OK;
 }
 

@@ -278,7 +278,7 @@ fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 cont
 {
   if (nContinuousStates != MODEL_STATES) return refuse(instance, "the number of states is another one");
   memcpy(C->m.s.x, continuousStates, sizeof C->m.s.x);
-  C->m.unevaluated = 1;
+  C->m.old_rates = C->m.old_outputs = 1;
   return fmi3OK;
 }
 
