@@ -37,7 +37,9 @@ def test_a_controller_that_is_called_meets_the_same_sensors_and_the_same_actuati
     stuck = replace(SHORT, name="stuck", stuck=StuckValve("left.discharge", 0.4, 0.1))
     record = compare_controllers(JOINT, [called], [stuck], budget=0).runs["called", "stuck"].recording
     assert np.unique(record["left.discharge"][record["time"] > 0.401]) == pytest.approx([0.1])
-    with pytest.raises(ParameterError, match="Called is no ControlLaw, its gains cannot be tuned in a batch"):
+    with pytest.raises(
+        ParameterError, match=r"Called has no declared parameter 'gain' to be tuned; there are inner\.gain"
+    ):
         replace(called, bounds={"gain": (1e5, 5e5)})
     with pytest.raises(ParameterError, match="commands angle; allowed are 'difference'"):
         complete(JOINT, Contender("wrong", Called(Readings(("angle",)))))

@@ -12,9 +12,9 @@ from .contender_of_scenario import scenario_contender
 from .contenders import Contender, standard_contenders
 from .joints import BenchmarkJoint, on_off_joint, proportional_joint
 from .learning import LearningCurve, learn
+from .motion_dynamics import inverse_dynamics
 from .motions import JointMotion, MinimumJerkMotion, RampMotion, SineMotion, StepMotion, SumOfMotions
 from .plots import error_plot, run_plot
-from .task_signals import inverse_dynamics
 from .tasks import STANDARD_TASKS, ControlTask, StuckValve, find_tasks
 from .tracking_metrics import TrackingMetrics
 
