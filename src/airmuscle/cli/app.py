@@ -53,7 +53,7 @@ COMMANDS = (
     CommandRow("campaign", "campaign", "campaign", "Identify a muscle from all files of a test rig."),
     CommandRow("predict", "predict", "predict", "Predict further records by an identified muscle or plant."),
     CommandRow("fit-volume", "fit_volume", "fit_volume_command", "Fit the volume of a muscle over its contraction."),
-    CommandRow("plan", "plan", "plan", "Design the most informative static experiments (D-optimal)."),
+    CommandRow("plan", "plan", "plan", "Design the most informative experiments."),
     CommandRow("bench", "bench", "bench", "Fit a surface while rows arrive; name the next point."),
     CommandRow("size", "size", "size", "Size muscles of the catalogue for a lift or a joint."),
     CommandRow("simulate", "simulate", "simulate", "Simulate the plant of a scenario file."),
