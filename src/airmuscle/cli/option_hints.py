@@ -83,6 +83,7 @@ INSTRUCTIONS: Mapping[str, Mapping[str, Instruction]] = {
         "characteristic": lambda hint: "use --muscle NAME with --use-characteristic",
     },
     "campaign": _FILES,
+    "predict": _FILES,
     "plan": {"fixed": _fix},
     "fit-dynamic": {**_RECORDS, "free": lambda hint: f"write free = {json.dumps(list(hint.value))} under [fit]"},
 }

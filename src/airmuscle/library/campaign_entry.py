@@ -10,6 +10,7 @@ from ..core.errors import IdentificationError
 from ..friction import NoFriction
 from ..identify.campaign import Campaign, CreepStage, ReleaseStage, StaticStage
 from .entry import Entry
+from .stated_band import StatedBand
 from .uncertainty import ParameterUncertainty
 
 
@@ -37,6 +38,7 @@ def campaign_entry(campaign: Campaign, title: str, resting_length: float | None 
         note=_note(campaign, stage),
         validity_range=stage.fit.validity_range,
         uncertainty=_uncertainty(campaign, stage),
+        error_band=StatedBand("force", stage.band.half_width, str(stage.band)),
     )
 
 

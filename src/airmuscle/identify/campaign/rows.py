@@ -17,6 +17,8 @@ PREDICTED_ROWS = 3000
 """Maximum number of rows of a record for which the friction is computed (chosen)."""
 NOISE_STEPS = 4.0
 """Mean step of the displacement between two rows, in standard deviations of its noise (chosen)."""
+DEAD_BAND = 4.0
+"""Half width of the dead band of the motion, in standard deviations of the noise of the displacement (chosen)."""
 
 
 def thin(recording: Recording, count: int) -> Recording:
@@ -41,6 +43,22 @@ def path_rows(recording: Recording, max_rows: int = MAX_ROWS) -> Array:
     span = float(np.ptp(path))
     count = max_rows if noise == 0.0 else int(min(max_rows, max(2.0 * span / (NOISE_STEPS * noise), 20)))
     return thinned_rows(len(recording), count)
+
+
+def held_steady(path: Array, noise: float) -> Array:
+    """The motion without its noise: the output of a play operator, which rests while the path [m] stays within a dead
+    band of `DEAD_BAND` standard deviations of the noise [m]; shape (N,).
+
+    The noise of a held length would otherwise unload the friction: cycles within the presliding distance relax the
+    force of most friction laws towards zero.
+    """
+    if noise == 0.0:
+        return path
+    half, output, current = DEAD_BAND * noise, np.empty(path.size), float(path[0])
+    for i, value in enumerate(path.tolist()):
+        current = min(max(current, value - half), value + half)
+        output[i] = current
+    return output
 
 
 def with_force(recording: Recording, added: Array) -> Recording:
