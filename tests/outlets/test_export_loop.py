@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import dataclasses
 import re
-import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -72,30 +71,11 @@ NAMES = [pytest.param(name, marks=() if name in SOME else pytest.mark.slow) for 
 
 
 def run_c(folder, *options):
-    sources = sorted(path.name for path in folder.glob("*.c"))
-    command = [
-        printed.require("gcc"),
-        *printed.STRICT,
-        "-pedantic",
-        *(options or ("-O0",)),
-        *sources,
-        "-o",
-        "run",
-        "-lm",
-    ]
-    built = subprocess.run(command, cwd=folder, capture_output=True, text=True)
-    assert built.returncode == 0, built.stderr[:2000]
-    return finished(["./run"], folder)
+    return printed.finished([printed.built(folder, *options, level="-O0")], folder)
 
 
 def run_javascript(folder):
-    return finished([printed.require("node"), next(folder.glob("*.run.mjs")).name], folder)
-
-
-def finished(command, folder):
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return done.stderr, done.stdout
+    return printed.finished([printed.require("node"), next(folder.glob("*.run.mjs")).name], folder)
 
 
 def table(csv):

@@ -11,7 +11,8 @@
     [run]
     duration = "25 s"
     output_times = "10 ms"                      optional
-    initial_state = { pressure = "0 bar" }      optional: equilibrium at this pressure; or a state, position = "10 mm"
+    initial_state = { pressure = "0 bar" }      optional: equilibrium at this pressure; or a state, position = "10 mm";
+                                                or all states of the plant by name
     integrator = { model = "Rodas4", rtol = 1e-8 }  optional
     [output]
     columns = ["pressure", "force"]             optional: columns of the recording besides time; all by default
@@ -186,6 +187,9 @@ def _build_initial_state(
         raise ParameterError(
             f'{location} is {table!r}; it must be a table. Write initial_state = {{ pressure = "0 bar" }}.'
         )
+    all_states = {state.name: state.unit for state in plant.states}
+    if set(table) == set(all_states):
+        return {name: read_finite_number(table[name], unit, f"{location}, {name}") for name, unit in all_states.items()}
     coordinates = {
         name: unit for c in plant.mechanism.coordinates for name, unit in ((c.name, c.unit), (c.speed, f"{c.unit}/s"))
     }

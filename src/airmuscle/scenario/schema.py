@@ -28,6 +28,7 @@ from ..plant.plant import Plant
 from ..pneumatics.orifice import Orifice
 from ..simulation.integrators import Integrator
 from . import controller, inputs, plant_uncertainty, scenario
+from .law_table import plant_fields
 
 Schema = dict[str, Any]
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
@@ -156,7 +157,8 @@ class _ModelSchemas:
         for field in dataclasses.fields(cls):
             if field.init:
                 properties[field.name] = self.field(declared.get(field.name), hints[field.name])
-        required = [*(["model"] if model_needed else []), *_required_fields(cls)]
+        of_plant = plant_fields(cls)
+        required = [*(["model"] if model_needed else []), *(n for n in _required_fields(cls) if n not in of_plant)]
         summary = " ".join(inspect.cleandoc(cls.__doc__ or "").partition("\n\n")[0].split())
         return {"description": summary, **_table(properties, required)}
 
@@ -172,8 +174,18 @@ class _ModelSchemas:
         default = {"default": declared.default} if isinstance(declared.default, float | int) else {}
         return {"description": f"{declared.symbol}{unit}: {declared.meaning}", **number, **default}
 
+    def muscle(self) -> Schema:
+        """A muscle: the name of a library entry or of a file, or a table, which may be based on one."""
+        muscle = self.table(Muscle, model_needed=False)
+        name = {"description": "a library entry, or a muscle file relative to this file", **_TEXT}
+        required = muscle.pop("required")
+        muscle["properties"] |= {"library": name, **{size: _quantity("m", 0.0) for size in plant_file.SIZES}}
+        return {"anyOf": [name, {**muscle, "anyOf": [{"required": ["library"]}, {"required": required}]}]}
+
     def part(self, hint: Any) -> Schema:
         """A structural field, by its annotation."""
+        if hint is Muscle:
+            return self.muscle()
         if typing.get_origin(hint) in (typing.Union, types.UnionType):
             options = [self.part(option) for option in typing.get_args(hint) if option is not types.NoneType]
             return options[0] if len(options) == 1 else {"anyOf": options}
@@ -192,15 +204,10 @@ def _required_fields(cls: type[Any]) -> list[str]:
 
 def _plant(models: _ModelSchemas) -> Schema:
     """Table of a plant; a muscle may also be the name of a library entry, or a table based on one."""
-    plant, muscle = (models.table(cls, model_needed=False) for cls in (Plant, Muscle))
+    plant, each = models.table(Plant, model_needed=False), models.muscle()
     needed = plant.pop("required")
     plant["properties"]["library"] = {"description": "a plant of the library, whose parts are replaced", **_TEXT}
     plant["anyOf"] = [{"required": ["library"]}, {"required": needed}]
-    name = {"description": "a library entry, or a muscle file relative to this file", **_TEXT}
-    required = muscle.pop("required")
-    muscle["properties"] |= {"library": name, **{size: _quantity("m", 0.0) for size in plant_file.SIZES}}
-    table = {**muscle, "anyOf": [{"required": ["library"]}, {"required": required}]}
-    each = {"anyOf": [name, table]}
     plant["properties"]["muscle"] = {"anyOf": [*each["anyOf"], {"type": "array", "items": each}]}
     return plant
 

@@ -130,7 +130,7 @@ def tune_contender(
     joint: BenchmarkJoint, contender: Contender, law: CompleteLaw, *, budget: int, seed: int, progress: Progress
 ) -> TunedContender:
     """A contender with the gains that are best for the tuning tasks in the joint's family of models."""
-    if not law.bounds or not budget or not isinstance(law.law, ControlLaw):
+    if not law.bounds or not budget:
         return TunedContender(contender, law.law, None)
     cases = []
     for task in TUNING_TASKS:
@@ -148,6 +148,7 @@ def tune_contender(
         return TunedContender(contender, tuned, tuning)
     progress(f"identifying gains of {contender.name}", 0, 1)
     bounds = {path: contender.bounds[path] for path in contender.identified}
+    assert isinstance(tuned, ControlLaw)
     gains, _ = identify_gains(joint, tuned, bounds, TUNING_TASKS[0])
     return TunedContender(contender, with_gains(tuned, gains), tuning, gains)
 
