@@ -1,10 +1,12 @@
 """Exported programs: time of a step in an FMU and in MuJoCo, of a run in C and JavaScript, and sizes of the code.
 
-Needs gcc; node and mujoco where their rows are measured. Times are processor times of one process each.
+Needs gcc; node, ziglang and mujoco where their rows are measured. Kernel and C are timed in turn in one process, the
+other rows are processor times of a process of their own.
 """
 
 from __future__ import annotations
 
+import ctypes
 import shutil
 import subprocess
 import tempfile
@@ -15,19 +17,23 @@ from pathlib import Path
 
 import numpy as np
 from filling import DURATION, Run, runs
-from measure import Section, Target, format_time, print_section
+from measure import Section, Target, format_time, print_section, time_variants
 
 from airmuscle.compile.program import compile_system
+from airmuscle.core.errors import ParameterError
 from airmuscle.export import C99, JavaScript, write_fmu, write_mujoco_plugin, write_program
 from airmuscle.export.mujoco_plugin import check_mujoco
+from airmuscle.export.platforms import find_cross_compiler
 from airmuscle.simulation import Problem, Rodas4
 
 STEPS = 1000
 TEXT = (
     f"The runs of {DURATION:g} s with Rodas4(1e-6), with three, six, eight and ten states. `DoStep` of 1 ms is called "
-    "from C, an input being set and an output read in each, with a jump of the input every 50 steps. A run in C or "
-    "JavaScript writes no rows but the last and is compared with the kernel of the library. The step in MuJoCo is RK4 "
-    "of 1 ms of a mass: with the muscle, less that without."
+    "from C, an input being set and an output read in each, with a jump of the input every 50 steps. C is the "
+    "integration of the same steps without output, timed in turn with the kernel of the library, which is called from "
+    "Python, in one process; their ratio is the median over the rounds, all times are the least. "
+    "WebAssembly is the same C, compiled by zig and run in Node; JavaScript writes the "
+    "last row only. The step in MuJoCo is RK4 of 1 ms of a mass: with the muscle, less that without."
 )
 HEADER = ("program", "time", "relative to the kernel", "machine code")
 DO_STEP = """
@@ -63,28 +69,38 @@ RUNS = """
 #define main exported_main
 #include "main.c"
 #undef main
-#include <time.h>
-int main(void)
+void integrate(int count)
 {
-  FILE *nowhere = fopen("/dev/null", "w");
-  double best = 1e9;
-  int round, k;
-  for (round = 0; round < 9; round++) {
-    const clock_t start = clock();
-    for (k = 0; k < 20; k++)
-      if (run(nowhere)) return 1;
-    if ((double)(clock() - start) / CLOCKS_PER_SEC < best) best = (double)(clock() - start) / CLOCKS_PER_SEC;
+  double c[PLANT_PRECOMPUTED + 1];
+  plant_solver s;
+  int k, segment, status = PLANT_DONE;
+  (void)run, (void)exported_main;
+  plant_prepare(plant_defaults, c);
+  for (k = 0; k < count; k++) {
+    plant_begin(&s, start, initial);
+    for (segment = 0; segment < SEGMENTS; segment++) {
+      plant_set_segment(&s, ends[segment], values[segment], slopes[segment]);
+      s.h = PLANT_FIRST_STEP;
+      while (s.t < ends[segment] && status == PLANT_DONE) status = plant_step(&s, c);
+    }
   }
-  printf("%.9g", best / 20.0);
-  return 0;
 }
 """
-SCRIPT = """
+"""The integration alone, as the kernel makes it: no row is written."""
+WASM_OPTIONS = ("-target", "wasm32-wasi", "-mexec-model=reactor", "-std=c99", "-O2", "-ffp-contract=off", "-s")
+LAST_ROW = """
 import {simulate} from "./plant.mjs";
+const integrate = count => { for (let k = 0; k < count; k++) simulate(); };
+"""
+IN_WASM = """
+import {readFileSync} from "fs";
+const {instance: {exports: {integrate}}} = await WebAssembly.instantiate(readFileSync("plant.wasm"));
+"""
+SCRIPT = """
 let best = 1e9;
 for (let round = 0; round < 9; round++) {
   const start = process.cpuUsage();
-  for (let k = 0; k < 20; k++) simulate();
+  integrate(20);
   const used = process.cpuUsage(start);
   best = Math.min(best, (used.user + used.system) / 1e6 / 20);
 }
@@ -143,26 +159,53 @@ def code_size(folder: Path, source: str) -> str:
     return f"{int(text.split()[6]) / 1e3:.1f} kB"
 
 
-def rows_of(case: Run, folder: Path) -> tuple[list[tuple[str, ...]], list[Target]]:
+def in_node(folder: Path, script: str) -> float:
+    """The number that a JavaScript module prints."""
+    (folder / "driver.mjs").write_text(script)
+    done = subprocess.run(["node", "driver.mjs"], cwd=folder, check=True, capture_output=True, text=True)
+    return float(done.stdout)
+
+
+def in_webassembly(folder: Path) -> float | None:
+    """Processor time of a run of the C sources in WebAssembly [s]; None without the cross compiler."""
+    try:
+        compiler = find_cross_compiler()
+    except ParameterError:
+        return None
+    files = ["driver.c", "plant.c", "-o", "plant.wasm", "-Wl,--export=integrate", "-lm"]
+    subprocess.run([*compiler, *WASM_OPTIONS, *files], cwd=folder, check=True, capture_output=True)
+    return in_node(folder, IN_WASM + SCRIPT)
+
+
+def in_c(folder: Path) -> Callable[[], object]:
+    """A run of the C sources, which a shared library makes in this process."""
+    options = ["-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared"]
+    subprocess.run(["gcc", *options, "driver.c", "plant.c", "-o", "plant.so", "-lm"], cwd=folder, check=True)
+    function = ctypes.CDLL(str(folder / "plant.so")).integrate
+    return lambda: function(1)
+
+
+def rows_of(case: Run, folder: Path, rounds: int) -> tuple[list[tuple[str, ...]], list[Target]]:
     """The rows of one plant."""
     name, problem = f"{len(case.system.states)} states", problem_of(case)
     ready, method = compile_system(case.system), Rodas4(1e-6)
     end, state = np.array([DURATION]), case.vector
-    kernel = processor_time(lambda: method.run(ready, case.segments, 0.0, state, end))
-    rows = [(f"{name}: kernel", format_time(kernel), "1", "")]
     write_program(problem, folder / "c", C99(), name="plant")
     (folder / "c" / "driver.c").write_text(RUNS)
-    in_c = built(folder / "c", "driver.c", "plant.c")
-    rows.append((f"{name}: C", format_time(in_c), f"{in_c / kernel:.2f}", code_size(folder / "c", "plant.c")))
+    times = time_variants(
+        {"kernel": lambda: method.run(ready, case.segments, 0.0, state, end), "C": in_c(folder / "c")}, 5 * rounds
+    )
+    kernel, ratio = times["kernel"].minimum, times["C"].ratio_to(times["kernel"])
+    rows = [(f"{name}: kernel", format_time(kernel), "1", "")]
+    size = code_size(folder / "c", "plant.c")
+    rows.append((f"{name}: C", format_time(times["C"].minimum), f"{ratio:.2f}", size))
     if shutil.which("node"):
         write_program(problem, folder / "js", JavaScript(), name="plant")
-        (folder / "js" / "driver.mjs").write_text(SCRIPT)
-        done = subprocess.run(["node", "driver.mjs"], cwd=folder / "js", check=True, capture_output=True, text=True)
-        in_js = float(done.stdout)
-        rows.append((f"{name}: JavaScript", format_time(in_js), f"{in_js / kernel:.2f}", ""))
+        others = {"JavaScript": in_node(folder / "js", LAST_ROW + SCRIPT), "WebAssembly": in_webassembly(folder / "c")}
+        rows += [(f"{name}: {k}", format_time(v), f"{v / kernel:.2f}", "") for k, v in others.items() if v is not None]
     step = do_step(case, folder)
     rows.append((f"{name}: FMU, DoStep of 1 ms", format_time(step), "", ""))
-    targets = [Target(f"C against the kernel, {name}", in_c / kernel, 1.15, "")]
+    targets = [Target(f"C against the kernel, {name}", ratio, 1.15, "")]
     if len(case.system.states) == 8:
         targets.append(Target("DoStep of 1 ms, 8 states", step * 1e6, 3.0, "us"))
     return rows, targets
@@ -189,13 +232,13 @@ def in_mujoco(case: Run, folder: Path) -> float:
     return times[0] - times[1]
 
 
-def section(rounds: int = 1) -> Section:
+def section(rounds: int = 5) -> Section:
     """The complete benchmark."""
     rows: list[tuple[str, ...]] = []
     targets: list[Target] = []
     for case in runs().values():
         with tempfile.TemporaryDirectory() as folder:
-            more, reached = rows_of(case, Path(folder))
+            more, reached = rows_of(case, Path(folder), rounds)
             rows, targets = rows + more, targets + reached
     try:
         with tempfile.TemporaryDirectory() as folder:

@@ -34,6 +34,30 @@ def shared_library(text: str, folder, name="printed", level="-O1"):
     return ctypes.CDLL(str(target))
 
 
+def built(folder, *options, level="-O1"):
+    """The path of the program of all C sources in a folder, compiled with all warnings as errors."""
+    sources = sorted(path.name for path in folder.glob("*.c"))
+    command = [require("gcc"), *STRICT, "-pedantic", *(options or (level,)), *sources, "-o", "program", "-lm"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[:2000]
+    return str(folder / "program")
+
+
+def finished(command, folder):
+    """Standard error and standard output of a program that must end well."""
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stderr, done.stdout
+
+
+def run_octave(folder):
+    """Steps in words, and the CSV, of an exported program in Octave."""
+    function = next(folder.glob("run_*.m")).stem
+    script = f"r = {function}('run.csv'); fprintf(stderr, '%d steps, %d rejected\\n', r.steps, r.rejected);"
+    said, _ = finished([require("octave-cli"), "--no-init-file", "--quiet", "--eval", script], folder)
+    return said, (folder / "run.csv").read_text()
+
+
 def call(function, *arrays, kind=np.float64):
     """Call a C function of arrays; lists are converted to arrays of `kind`."""
     given = [a if isinstance(a, float) else np.ascontiguousarray(a, dtype=kind) for a in arrays]

@@ -23,7 +23,7 @@ from airmuscle.cli.app import app
 from airmuscle.control import PID, ControlLoop, SampledSignal, Schedule
 from airmuscle.core import autodiff
 from airmuscle.core.errors import AirmuscleWarning, FileError, ParameterError
-from airmuscle.export import C99, JavaScript, Octave, make_identifiers, write_law, write_program
+from airmuscle.export import C99, JavaScript, Octave, make_identifiers, write_fmu, write_law, write_program
 from airmuscle.export.building import build_and_run
 from airmuscle.export.identifiers import LONGEST, RESERVED
 from airmuscle.library.files import list_laws
@@ -44,43 +44,11 @@ def problem_of(name, integrator=None, duration=1.0):
 
 def run_c(folder, *options):
     """Standard error and CSV rows of the exported C program, which is compiled with all warnings as errors."""
-    sources = [str(path) for path in sorted(folder.glob("*.c"))]
-    command = [
-        printed.require("gcc"),
-        *printed.STRICT,
-        "-pedantic",
-        *(options or ("-O1",)),
-        *sources,
-        "-o",
-        "run",
-        "-lm",
-    ]
-    built = subprocess.run(command, cwd=folder, capture_output=True, text=True)
-    assert built.returncode == 0, built.stderr[:2000]
-    return finished(["./run"], folder)
+    return printed.finished([printed.built(folder, *options)], folder)
 
 
 def run_javascript(folder):
-    return finished([printed.require("node"), next(folder.glob("*.run.mjs")).name], folder)
-
-
-def run_octave(folder):
-    function = next(folder.glob("run_*.m")).stem
-    script = f"r = {function}('run.csv'); fprintf(stderr, '%d steps, %d rejected\\n', r.steps, r.rejected);"
-    done = subprocess.run(
-        [printed.require("octave-cli"), "--no-init-file", "--quiet", "--eval", script],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stderr, (folder / "run.csv").read_text()
-
-
-def finished(command, folder):
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return done.stderr, done.stdout
+    return printed.finished([printed.require("node"), next(folder.glob("*.run.mjs")).name], folder)
 
 
 def check_run(text, csv, problem):
@@ -99,7 +67,7 @@ def check_run(text, csv, problem):
     assert (np.abs(found - expected) <= 1e-8 * scale).all()
 
 
-RUN = {C99(): run_c, JavaScript(): run_javascript, Octave(): run_octave}
+RUN = {C99(): run_c, JavaScript(): run_javascript, Octave(): printed.run_octave}
 TARGETS = pytest.mark.parametrize("target", RUN, ids=lambda target: type(target).__name__)
 CASES = {
     "one muscle": ("dmsp-20-300", Rodas4(1e-6)),
@@ -122,7 +90,14 @@ def test_the_program_makes_the_steps_of_the_library(case, target, tmp_path):
 def test_the_octave_program_makes_the_steps_of_the_library(case, tmp_path):
     problem = problem_of(*CASES[case], duration=0.2)
     write_program(problem, tmp_path, Octave(), name="plant")
-    check_run(*run_octave(tmp_path), problem)
+    check_run(*printed.run_octave(tmp_path), problem)
+
+
+def test_the_octave_command_writes_its_file_and_displays_nothing(tmp_path):
+    write_program(problem_of("heat", RungeKutta4(1e-2), duration=0.05), tmp_path, Octave(), name="plant")
+    command = [printed.require("octave-cli"), "--no-init-file", "--quiet", "--eval", "run_plant('run.csv')"]
+    assert printed.finished(command, tmp_path)[1] == ""
+    assert (tmp_path / "run.csv").read_text().startswith("time [s],")
 
 
 def end_of(problem, factor=1.0):
@@ -424,7 +399,8 @@ def test_a_controller_is_refused_by_name(tmp_path):
     loop = ControlLoop(PID("pressure", "fill", 1e-5), 0.01, Schedule({"pressure": ((0.0, 2e5),)}))
     problem = Problem(plant, loop, 0.1, plant.state_at(pressure=1e5))
     with pytest.raises(ParameterError, match="the controller PID cannot be exported to this target"):
-        write_program(problem, tmp_path, Octave())
+        write_fmu(problem, tmp_path / "a.fmu")
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(

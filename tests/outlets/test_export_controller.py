@@ -51,20 +51,7 @@ def problem_of(law, setpoint=STEP, duration=0.5):
 
 def replay(folder, *options):
     """What the replay says."""
-    sources = sorted(path.name for path in folder.glob("*.c"))
-    command = [
-        printed.require("gcc"),
-        *printed.STRICT,
-        "-pedantic",
-        *(options or ("-O1",)),
-        *sources,
-        "-o",
-        "replay",
-        "-lm",
-    ]
-    built = subprocess.run(command, cwd=folder, capture_output=True, text=True)
-    assert built.returncode == 0, built.stderr[:2000]
-    return subprocess.run(["./replay"], cwd=folder, capture_output=True, text=True)
+    return subprocess.run([printed.built(folder, *options)], capture_output=True, text=True)
 
 
 CASES = {

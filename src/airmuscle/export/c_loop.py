@@ -12,6 +12,9 @@ from .provenance import block_comment
 from .run_data import RunData
 from .templates import filled
 
+NOT_COMMANDED = '         : status == NOT_COMMANDED      ? "a measurement or a command is not finite\\n"\n'
+"""A further reason for which a control loop ends early."""
+
 
 def loop_main(
     name: str, system: ExportedSystem, run: RunData, loop: ExportedLoop, columns: Sequence[str],
@@ -25,6 +28,7 @@ def loop_main(
         "pieces": str(loop.prepared.setpoint_signal.ends.size), "columns": str(len(columns)), "drivers": str(drivers),
         "capacity": str(loop.capacity), "drivers_source": filled("drivers.c", {}, name) if drivers else "",
         "apply_drivers": "  apply_drivers(begin);\n" if drivers else "",
+        "valid": filled("valid.c", {}, name), "program": filled("program.c", {"failures": NOT_COMMANDED}, name),
         "constants": _constants(name, system, run, loop, columns),
     }  # fmt: skip
     return filled("loop.c", places, name)

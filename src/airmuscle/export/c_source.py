@@ -20,7 +20,7 @@ from .provenance import block_comment
 from .run_data import RunData, tableau_arrays
 from .templates import filled
 
-PUBLIC = frozenset({"prepare", "rhs", "outputs", "partials"})
+PUBLIC = frozenset({"prepare", "rhs", "outputs", "partials", "indicators"})
 """Printed functions that other files may call."""
 COEFFICIENTS = {name: value for name, value in vars(rodas4_coefficients).items() if name.isupper()}
 """Coefficients of Rodas4 by name."""
@@ -80,6 +80,8 @@ class CSource:
             "segments": str(segments.ends.size),
             "columns": str(len(columns)),
             "constants": "".join(constants),
+            "valid": filled("valid.c", {}, self.name),
+            "program": filled("program.c", {"failures": ""}, self.name),
         }
         return filled("main.c", places, self.name)
 

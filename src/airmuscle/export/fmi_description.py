@@ -29,6 +29,7 @@ class FmuDescription:
     name       identifier of the model
     token      text that an importer passes on, so that description and binary belong together
     places     places of the partial derivatives that are not zero
+    indicators  number of event indicators
     """
 
     name: str
@@ -38,6 +39,7 @@ class FmuDescription:
     run: RunData
     variables: Sequence[Variable]
     places: Sequence[Place]
+    indicators: int
 
     def text(self, version: int) -> str:
         """The file for FMI 2 or 3."""
@@ -65,7 +67,7 @@ class FmuDescription:
             SubElement(categories, "Category", name=name)
 
     def _fmi2(self) -> Element:
-        root = self._root({"fmiVersion": "2.0", "guid": self.token, "numberOfEventIndicators": "0"})
+        root = self._root({"fmiVersion": "2.0", "guid": self.token, "numberOfEventIndicators": str(self.indicators)})
         can = {
             "modelIdentifier": self.name, "canNotUseMemoryManagementFunctions": "true", "canGetAndSetFMUstate": "true",
             "canSerializeFMUstate": "true", "providesDirectionalDerivative": "true",
@@ -115,6 +117,9 @@ class FmuDescription:
                 SubElement(structure, element, {"valueReference": str(reference), **self._dependencies(reference, 0)})
         for reference in self._initial_unknowns:
             SubElement(structure, "InitialUnknown", valueReference=str(reference))
+        for v in self.variables:
+            if v.is_indicator:
+                SubElement(structure, "EventIndicator", valueReference=str(v.reference))
         return root
 
     @property

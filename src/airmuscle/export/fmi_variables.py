@@ -35,10 +35,14 @@ class Variable:
     derivative_of: int | None = None
     """The value reference of the state whose derivative the variable is."""
     nominal: float | None = None
+    is_indicator: bool = False
 
 
-def make_variables(system: ExportedSystem, run: RunData) -> list[Variable]:
-    """The variables of an FMU, by increasing value reference. Raises ParameterError for two of one name."""
+def make_variables(system: ExportedSystem, run: RunData, indicators: int = 0) -> list[Variable]:
+    """The variables of an FMU, by increasing value reference, with so many event indicators at the end.
+
+    Raises ParameterError for two variables of one name.
+    """
     variables = [Variable("time", 0, "independent", unit="s", description="time")]
     units, known = system.units, system.compiled.system
 
@@ -68,6 +72,9 @@ def make_variables(system: ExportedSystem, run: RunData) -> list[Variable]:
         about = "relative tolerance of the integrator in Co-Simulation"
         start = run.integrator.rtol
         add(TOLERANCE, "parameter", variability="tunable", initial="exact", start=start, description=about)
+    for i in range(1, indicators + 1):
+        about = "changes its sign where the rates are not smooth"
+        add(f"event_indicator[{i}]", "local", is_indicator=True, description=about)
     return _checked(variables)
 
 

@@ -11,6 +11,8 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from ..compile.event_indicators import EventIndicators, event_indicators
+from ..compile.functions import Printer
 from ..compile.partials import Partials, partials
 from ..core.errors import ParameterError
 from ..plant.diagnostics import column_limits, describe_limit
@@ -39,6 +41,8 @@ PAGE = """<!DOCTYPE html>
 <body><pre>{1}</pre></body></html>
 """
 """The documentation of an FMU."""
+SLACK = 1e-10
+"""Distance of an event from the change of sign of its indicator, relative to the scale of the indicator; chosen."""
 NOTE = (
     "The FMU contains the equations of the plant and its integrator. Its log states where a run leaves the validity "
     "range of a characteristic, the range of the data of a friction, the contraction range of a geometry, or the range "
@@ -94,21 +98,35 @@ def write_fmu(
 
 def fmu_files(program: ExportedRun, fmi: int) -> dict[str, bytes]:
     """The files of an FMU without its binary, by their paths in it."""
-    derivatives = partials(program.system.traced)
-    source = CSource(
-        program.name, program.system, program.run.integrator, program.provenance, derivatives.extend
-    ).files()  # fmt: skip
-    variables = make_variables(program.system, program.run)
+    derivatives, indicators = partials(program.system.traced), event_indicators(program.system.traced)
+
+    def extend(printer: Printer) -> None:
+        derivatives.extend(printer)
+        indicators.extend(printer)
+
+    source = CSource(program.name, program.system, program.run.integrator, program.provenance, extend).files()
+    variables = make_variables(program.system, program.run, indicators.count if fmi == 3 else 0)
     content = json.dumps([*source.values(), *map(repr, variables), fmi]).encode()
     token = f"{{{hashlib.sha256(content).hexdigest()[:32]}}}"
     title = program.provenance[0]
-    about = FmuDescription(program.name, title, token, program.system, program.run, variables, derivatives.places)
+    about = FmuDescription(
+        program.name,
+        title,
+        token,
+        program.system,
+        program.run,
+        variables,
+        derivatives.places,
+        indicators.count,
+    )
     places = {"provenance": block_comment(program.provenance), "file": program.name}
     if fmi == 3:
         places["adjoint"] = filled("adjoint.h", {}, program.name)
     texts = {
         **source,
-        f"{program.name}_instance.h": filled("instance.h", _instance(program, derivatives, token), program.name),
+        f"{program.name}_instance.h": filled(
+            "instance.h", _instance(program, derivatives, indicators, token), program.name
+        ),
         f"fmi{fmi}.c": filled(f"fmi{fmi}.c", places, program.name),
         **{file: template(f"fmi/{file}") for file in HEADERS[fmi]},
     }
@@ -130,7 +148,9 @@ def _build_description(name: str) -> str:
     )
 
 
-def _instance(program: ExportedRun, derivatives: Partials, token: str) -> Mapping[str, str]:
+def _instance(
+    program: ExportedRun, derivatives: Partials, indicators: EventIndicators, token: str
+) -> Mapping[str, str]:
     """The places of the template of an instance."""
     system, run, name = program.system, program.run, program.name
     known, limits = system.compiled.description, _limits(system.compiled.system, system.columns)
@@ -141,11 +161,13 @@ def _instance(program: ExportedRun, derivatives: Partials, token: str) -> Mappin
         f"  {{{column}, {c_number(low)}, {c_number(high)}, {c_string(text)}}},\n" for column, low, high, text in limits
     )
     upper = name.upper()
+    scales = indicators.scales(run.initial, run.segments.values[0], system.defaults, system.nominal)
     constants = [
         c_strings(f"static const char *const {name}_names[]", system.columns),
         c_array(f"static const double {name}_minimum[]", lowest),
         c_array(f"static const double {name}_start_states[{upper}_STATES]", run.initial),
         c_array(f"static const double {name}_start_inputs[{upper}_INPUTS + 1]", first_inputs(run), 1),
+        c_array(f"static const double {name}_scales[{upper}_INDICATORS + 1]", scales, 1),
         _indices(f"{name}_rows", [row for row, _ in derivatives.places]),
         _indices(f"{name}_columns", [column for _, column in derivatives.places]),
         "/* Ranges that are reported once when a column leaves them. */\n"
@@ -155,6 +177,7 @@ def _instance(program: ExportedRun, derivatives: Partials, token: str) -> Mappin
     rtol = run.integrator.rtol if isinstance(run.integrator, Rodas4) else 0.0
     return {
         "file": name, "token": token, "partials": str(len(derivatives.places)), "limits": str(len(limits)),
+        "indicators": str(indicators.count), "slack": c_number(SLACK),
         "rtol": c_number(rtol), "start": c_number(run.start), "constants": "".join(constants),
     }  # fmt: skip
 

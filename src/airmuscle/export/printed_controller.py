@@ -10,10 +10,10 @@ import numpy as np
 
 from ..compile.functions import Printer
 from ..compile.ir import emission
+from ..compile.ir.emission import TargetLanguage
 from ..compile.ir.instructions import Code, instructions
 from ..compile.ir.interpreter import InterpretedBody
 from ..compile.text.c import CLanguage
-from ..compile.text.javascript import JavaScriptLanguage
 from ..control.control_law import ControlLaw
 from ..control.control_loop import ControlLoop
 from ..core.arrays import Array
@@ -30,6 +30,14 @@ from .templates import filled
 
 SINGLE_TOLERANCE = 1e-4
 """Part of its range by which a command in single precision may differ from that in double precision (chosen)."""
+
+ABOUT = {
+    "double": "/* Replay of a recorded run. The expected commands are those of the printed operations in IEEE 754 "
+    "double precision;\n   they are met bit by bit if products and sums are not fused (gcc, clang: -ffp-contract=off, "
+    "which -std=c99 implies for\n   gcc). */",
+    "float": "/* Replay of a recorded run in single precision. The expected commands are those of double precision. */",
+}
+"""Comment of the program that replays a run, by the type of numbers."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -70,9 +78,10 @@ class PrintedController:
             f"{self.name}.c": filled("controller.c", places, self.name),
         }
 
-    def javascript(self) -> str:
-        """The function `control_sample(measurement, setpoint, memory, parameters, command, later)`."""
-        printer = Printer(JavaScriptLanguage("control_"))
+    def sample_in(self, language: TargetLanguage) -> str:
+        """The function of a sample in another language; its arguments are measurement, set point, memory, parameters,
+        and the arrays of the command and of the later memory, which MATLAB returns."""
+        printer = Printer(language)
         printer.add_code("sample", list(self.inputs), self.code, list(self.outputs))
         return printer.text[-1]
 
@@ -86,11 +95,13 @@ class PrintedController:
         )
         places = {
             "provenance": block_comment(self.provenance), "file": self.name, "samples": str(len(samples.measured)),
-            "tables": "".join(tables), "tolerance": c_number(SINGLE_TOLERANCE),
-            "ranges": c_array(f"static const double ranges[{upper}_COMMANDS + 1]", self.ranges_of(samples), 1),
+            "tables": "".join(tables), "number": number, "about": ABOUT[number],
+            "comparison": filled(f"replay_{'double' if number == 'double' else 'single'}.c", {
+                "tolerance": c_number(SINGLE_TOLERANCE),
+                "ranges": c_array(f"static const double ranges[{upper}_COMMANDS + 1]", self.ranges_of(samples), 1),
+            }, self.name),
         }  # fmt: skip
-        main = "replay.c" if number == "double" else "replay_single.c"
-        return {**self.source_files(), "main.c": filled(main, places, self.name)}
+        return {**self.source_files(), "main.c": filled("replay.c", places, self.name)}
 
     def ranges_of(self, samples: ReplayedSamples) -> Array:
         """The width of the range of each command (c,); of one without limits its greatest size in the run."""

@@ -29,6 +29,9 @@ def to_toml(entry: Entry) -> str:
         tables["validity_range"] = dataclasses.asdict(entry.validity_range)
     if entry.uncertainty is not None:
         tables["uncertainty"] = uncertainty_table(entry.uncertainty)
+    if entry.error_band is not None:
+        stated = dataclasses.asdict(entry.error_band)
+        tables["error_band"] = {key: value for key, value in stated.items() if value is not None}
     if entry.checks:
         tables["check"] = [_check_table(check) for check in entry.checks]
     if entry.references:
@@ -50,14 +53,16 @@ def tables_toml(tables: Mapping[str, Any]) -> str:
 
 
 def scenario_toml(
-    title: str, plant: Any, input_table: Mapping[str, Any], run: Mapping[str, Any], note: str = ""
-) -> str:
+    title: str, plant: Any, input_table: Mapping[str, Any], run: Mapping[str, Any], note: str = "",
+    uncertainty: Mapping[str, Any] | None = None,
+) -> str:  # fmt: skip
     """Text of a scenario that `load_scenario` reads: a plant with all parameters, the command and run tables.
 
-    Each line of `note` becomes a comment at the beginning.
+    Each line of `note` becomes a comment at the beginning; `uncertainty` is that of the fit of the plant.
     """
     comments = "".join(f"# {line}\n" for line in note.splitlines())
-    return comments + _to_text({"title": title, "plant": model_table(plant), "input": input_table, "run": run})
+    last = {} if uncertainty is None else {"uncertainty": uncertainty}
+    return comments + _to_text({"title": title, "plant": model_table(plant), "input": input_table, "run": run, **last})
 
 
 def save(entry: Entry, path: str | Path) -> Path:

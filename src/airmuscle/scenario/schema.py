@@ -19,7 +19,7 @@ from ..control.controller import RELATIVE, Controller
 from ..control.driver import Driver
 from ..core.declaration import Parameter, parameters
 from ..core.reference import Reference
-from ..library import entry_file, plant_file, uncertainty
+from ..library import entry_file, plant_file, stated_band, uncertainty
 from ..library.build import TEXT_KEYS
 from ..library.models import model_class, model_names
 from ..library.valve_entry import PATHS
@@ -27,7 +27,7 @@ from ..muscle import Muscle
 from ..plant.plant import Plant
 from ..pneumatics.orifice import Orifice
 from ..simulation.integrators import Integrator
-from . import controller, inputs, scenario
+from . import controller, inputs, plant_uncertainty, scenario
 from .law_table import plant_fields
 
 Schema = dict[str, Any]
@@ -48,6 +48,7 @@ def scenario_schema() -> Schema:
         "input": _input(models),
         "run": _run(models),
         "output": _table({"columns": {"type": "array", "items": _TEXT}}),
+        "uncertainty": _table(_plant_uncertainty(), (plant_uncertainty.DEVIATIONS,)),
     }
     return _document("A simulation with airmuscle", _select_keys(tables, scenario.TABLES), ("plant", "run"), models)
 
@@ -70,6 +71,7 @@ def muscle_schema() -> Schema:
         "ratings": models.table(model_class("Ratings", "schema"), model_needed=False),
         "validity_range": models.table(model_class("ValidityRange", "schema"), model_needed=False),
         "uncertainty": _table(_uncertainty(), uncertainty.KEYS),
+        "error_band": _table(_error_band(), stated_band.KEYS[:2]),
         "check": {"type": "array", "items": _table(check, ("quantity", "equals", "tolerance", "source"))},
         "reference": {"type": "array", "items": models.table(Reference, model_needed=None)},
     }
@@ -85,6 +87,16 @@ def _uncertainty() -> Schema:
     numbers = {"type": "array", "items": {"type": "number"}}
     names = {"type": "array", "items": _TEXT}
     return {"parameters": names, "standard_errors": numbers, "correlations": {"type": "array", "items": numbers}}
+
+
+def _plant_uncertainty() -> Schema:
+    deviations = {"type": "object", "additionalProperties": _quantity("")}
+    return {plant_uncertainty.DEVIATIONS: deviations, **_uncertainty()}
+
+
+def _error_band() -> Schema:
+    widths = dict.fromkeys(("half_width", "held_half_width"), _quantity("", 0.0))
+    return {"quantity": {"enum": list(stated_band.PREDICTED)}, "source": _TEXT, **widths}
 
 
 def _document(title: str, properties: Schema, required: Sequence[str], models: _ModelSchemas) -> Schema:

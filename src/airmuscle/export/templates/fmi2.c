@@ -223,7 +223,7 @@ fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind kind, fmi2S
 
 /* Model Exchange */
 fmi2Status fmi2EnterEventMode(fmi2Component c) { UNUSED(c); return fmi2OK; }
-fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) { UNUSED(c); return fmi2OK; }
+fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) { model_settle(&C->m); return fmi2OK; }
 
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info)
 {
@@ -245,7 +245,7 @@ fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n
 {
   if (n != MODEL_STATES) return refuse(c, "the number of states is another one");
   memcpy(C->m.s.x, x, sizeof C->m.s.x);
-  C->m.unevaluated = 1;
+  C->m.old_rates = C->m.old_outputs = 1;
   return fmi2OK;
 }
 
@@ -259,8 +259,9 @@ fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real f[], size_t n)
 
 fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real z[], size_t n)
 {
-  UNUSED(z);
-  return n ? refuse(c, "there are no event indicators") : fmi2OK;
+  if (n != MODEL_INDICATORS) return refuse(c, "the number of event indicators is another one");
+  model_get_indicators(&C->m, z);
+  return fmi2OK;
 }
 
 fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t n)

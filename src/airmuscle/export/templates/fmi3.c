@@ -255,7 +255,7 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
 
 fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance)
 {
-  UNUSED(instance);
+  model_settle(&C->m);
   return fmi3OK;
 }
 
@@ -278,7 +278,7 @@ fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 cont
 {
   if (nContinuousStates != MODEL_STATES) return refuse(instance, "the number of states is another one");
   memcpy(C->m.s.x, continuousStates, sizeof C->m.s.x);
-  C->m.unevaluated = 1;
+  C->m.old_rates = C->m.old_outputs = 1;
   return fmi3OK;
 }
 
@@ -293,8 +293,9 @@ fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance instance, fmi3Float64 
 
 fmi3Status fmi3GetEventIndicators(fmi3Instance instance, fmi3Float64 eventIndicators[], size_t nEventIndicators)
 {
-  UNUSED(eventIndicators);
-  return nEventIndicators ? refuse(instance, "there are no event indicators") : fmi3OK;
+  if (nEventIndicators != MODEL_INDICATORS) return refuse(instance, "the number of event indicators is another one");
+  model_get_indicators(&C->m, eventIndicators);
+  return fmi3OK;
 }
 
 fmi3Status fmi3GetContinuousStates(fmi3Instance instance, fmi3Float64 continuousStates[], size_t nContinuousStates)
@@ -315,7 +316,7 @@ fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, fmi3Float64 
 fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventIndicators)
 {
   UNUSED(instance);
-  *nEventIndicators = 0;
+  *nEventIndicators = MODEL_INDICATORS;
   return fmi3OK;
 }
 

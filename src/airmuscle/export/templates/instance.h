@@ -9,6 +9,9 @@
 #define MODEL_TOKEN "@token@"
 #define MODEL_PARTIALS @partials@
 #define MODEL_LIMITS @limits@
+#define MODEL_INDICATORS @indicators@
+/* An event follows where an indicator lies so far beyond the change of its sign, so that rounding causes none. */
+#define MODEL_SLACK @slack@
 #define MODEL_RTOL_START @rtol@
 
 /* Value references; 0 is time. The tolerance exists for an integrator that controls its error. */
@@ -18,18 +21,22 @@
 #define MODEL_FIRST_OUTPUT (MODEL_FIRST_INPUT + MODEL_INPUTS)
 #define MODEL_FIRST_PARAMETER (MODEL_FIRST_OUTPUT + MODEL_OUTPUTS)
 #define MODEL_TOLERANCE (MODEL_FIRST_PARAMETER + MODEL_PARAMETERS)
+/* Event indicators have value references in FMI 3.0. */
+#define MODEL_FIRST_INDICATOR (MODEL_TOLERANCE + (MODEL_RTOL_START > 0.0 ? 1u : 0u))
 #define MODEL_ROWS (MODEL_STATES + MODEL_OUTPUTS)
 
 /* d(rates, outputs)/d(states, inputs): values of the non-zeros, whose places are in model_rows and model_columns. */
 void model_partials(const double *restrict x, const double *restrict u, const double *restrict c, double *restrict D);
+/* Differences that change sign where the rates are not smooth. */
+void model_indicators(const double *restrict x, const double *restrict u, const double *restrict c, double *restrict z);
 
 @constants@
 typedef struct {
   model_solver s;
   double u[MODEL_INPUTS + 1], w[MODEL_INPUTS + 1], p[MODEL_PARAMETERS + 1], c[MODEL_PRECOMPUTED + 1];
   double f[MODEL_STATES], o[MODEL_OUTPUTS + 1];
-  int unprepared, unevaluated, jumped;
-  unsigned char told[MODEL_LIMITS + 1];
+  int unprepared, old_rates, old_outputs, jumped;
+  unsigned char told[MODEL_LIMITS + 1], above[MODEL_INDICATORS + 1];
 } model_instance;
 
 typedef void (*model_report)(void *owner, int is_error, const char *text);
@@ -41,7 +48,7 @@ static void model_reset(model_instance *m)
   m->s.rtol = MODEL_RTOL_START;
   memcpy(m->u, model_start_inputs, sizeof m->u);
   memcpy(m->p, model_defaults, sizeof m->p);
-  m->unprepared = m->unevaluated = m->jumped = 1;
+  m->unprepared = m->old_rates = m->old_outputs = m->jumped = 1;
 }
 
 static void model_ready(model_instance *m)
@@ -49,31 +56,64 @@ static void model_ready(model_instance *m)
   if (!m->unprepared) return;
   model_prepare(m->p, m->c);
   m->unprepared = 0;
-  m->unevaluated = m->jumped = 1;
+  m->old_rates = m->old_outputs = m->jumped = 1;
 }
 
-static void model_evaluate(model_instance *m)
+/* Rates and outputs at the present states and inputs. */
+static const double *model_rates_now(model_instance *m)
 {
   model_ready(m);
-  if (!m->unevaluated) return;
-  model_rhs(m->s.x, m->u, m->c, m->f);
-  model_outputs(m->s.x, m->u, m->c, m->o);
-  m->unevaluated = 0;
+  if (m->old_rates) model_rhs(m->s.x, m->u, m->c, m->f);
+  m->old_rates = 0;
+  return m->f;
+}
+
+static const double *model_outputs_now(model_instance *m)
+{
+  model_ready(m);
+  if (m->old_outputs) model_outputs(m->s.x, m->u, m->c, m->o);
+  m->old_outputs = 0;
+  return m->o;
+}
+
+/* Event indicators relative to their scales, moved away from zero on the side on which the last event left them. */
+static void model_get_indicators(model_instance *m, double *z)
+{
+  double values[MODEL_INDICATORS + 1];
+  int i;
+  model_ready(m);
+  model_indicators(m->s.x, m->u, m->c, values);
+  for (i = 0; i < MODEL_INDICATORS; i++) {
+    const double value = isfinite(values[i]) ? values[i] / model_scales[i] : 0.0;
+    z[i] = m->above[i] ? value + MODEL_SLACK : value - MODEL_SLACK;
+  }
+}
+
+/* At an event: on which side each indicator lies from now on. */
+static void model_settle(model_instance *m)
+{
+  double values[MODEL_INDICATORS + 1];
+  int i;
+  model_ready(m);
+  model_indicators(m->s.x, m->u, m->c, values);
+  for (i = 0; i < MODEL_INDICATORS; i++) m->above[i] = values[i] > 0.0;
 }
 
 /* The value of a variable; 1 for an unknown value reference. */
 static int model_get(model_instance *m, unsigned v, double *value)
 {
-  if (v >= MODEL_FIRST_RATE && (v < MODEL_FIRST_INPUT || (v >= MODEL_FIRST_OUTPUT && v < MODEL_FIRST_PARAMETER)))
-    model_evaluate(m);
+  double z[MODEL_INDICATORS + 1];
   if (v == 0) *value = m->s.t;
   else if (v < MODEL_FIRST_RATE) *value = m->s.x[v - MODEL_FIRST_STATE];
-  else if (v < MODEL_FIRST_INPUT) *value = m->f[v - MODEL_FIRST_RATE];
+  else if (v < MODEL_FIRST_INPUT) *value = model_rates_now(m)[v - MODEL_FIRST_RATE];
   else if (v < MODEL_FIRST_OUTPUT) *value = m->u[v - MODEL_FIRST_INPUT];
-  else if (v < MODEL_FIRST_PARAMETER) *value = m->o[v - MODEL_FIRST_OUTPUT];
+  else if (v < MODEL_FIRST_PARAMETER) *value = model_outputs_now(m)[v - MODEL_FIRST_OUTPUT];
   else if (v < MODEL_TOLERANCE) *value = m->p[v - MODEL_FIRST_PARAMETER];
   else if (v == MODEL_TOLERANCE && MODEL_RTOL_START > 0.0) *value = m->s.rtol;
-  else return 1;
+  else if (v >= MODEL_FIRST_INDICATOR && v < MODEL_FIRST_INDICATOR + MODEL_INDICATORS) {
+    model_get_indicators(m, z);
+    *value = z[v - MODEL_FIRST_INDICATOR];
+  } else return 1;
   return 0;
 }
 
@@ -96,7 +136,7 @@ static int model_set(model_instance *m, unsigned v, double value)
   } else {
     return 1;
   }
-  m->unevaluated = 1;
+  m->old_rates = m->old_outputs = 1;
   return 0;
 }
 
@@ -112,7 +152,7 @@ static int model_check(model_instance *m, model_report report, void *owner)
 {
   char text[640];
   int k;
-  model_evaluate(m);
+  (void)model_outputs_now(m);
   for (k = 0; k < MODEL_STATES + MODEL_INPUTS + MODEL_OUTPUTS; k++) {
     const double value = model_column(m, k);
     if (isfinite(value) && value >= model_minimum[k]) continue;
@@ -146,7 +186,7 @@ static int model_do_step(model_instance *m, double t, double h, model_report rep
   m->jumped = 0;
   while (m->s.t < end && status == MODEL_DONE) status = model_step(&m->s, m->c);
   for (i = 0; i < MODEL_INPUTS; i++) m->u[i] += m->w[i] * h;
-  m->unevaluated = 1;
+  m->old_rates = m->old_outputs = 1;
   if (status != MODEL_DONE) {
     report(owner, 1, status == MODEL_STEP_TOO_SMALL ? "the internal step became too small" : "a rate is not finite");
     return 1;

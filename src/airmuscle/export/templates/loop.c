@@ -44,21 +44,18 @@ static void setpoints_at(double time, double *result)
 }
 
 @drivers_source@
+@valid@
 static int write_row(FILE *out, double time, const double *x, const double *u)
 {
   double o[MODEL_OUTPUTS + 1], r[SETPOINTS + 1];
   const double *const arrays[] = {x, u, o, r, measured, command};
-  int i, finite = 1;
+  int i;
   model_outputs(x, u, c, o);
   setpoints_at(time, r);
   fprintf(out, "%.17g", time);
   for (i = 0; i < COLUMNS; i++) fprintf(out, ",%.17g", arrays[columns[i][0]][columns[i][1]]);
   fputc('\n', out);
-  for (i = 0; i < MODEL_STATES; i++)
-    if (!isfinite(x[i]) || x[i] < model_state_minimum[i]) finite = 0;
-  for (i = 0; i < MODEL_OUTPUTS; i++)
-    if (!isfinite(o[i])) finite = 0;
-  return finite;
+  return is_valid(x, o);
 }
 
 static int write_at(FILE *out, double time)
@@ -166,23 +163,4 @@ static int run(FILE *out)
   return status;
 }
 
-int main(int argc, char **argv)
-{
-  FILE *out = argc > 1 ? fopen(argv[1], "w") : stdout;
-  int status;
-  if (!out) {
-    perror(argv[1]);
-    return 1;
-  }
-  fputs(header, out);
-  status = run(out);
-  if (out != stdout && fclose(out) != 0) {
-    perror(argv[1]);
-    return 1;
-  }
-  if (status != MODEL_DONE)
-    fputs(status == MODEL_STEP_TOO_SMALL ? "the step became too small\n"
-          : status == NOT_COMMANDED      ? "a measurement or a command is not finite\n"
-                                         : "a state or an output is not finite, or below its limit\n", stderr);
-  return status;
-}
+@program@

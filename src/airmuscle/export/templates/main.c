@@ -10,10 +10,11 @@
 #define COLUMNS @columns@
 
 @constants@
+@valid@
 static int write_row(FILE *out, double time, const double *x, const double *u, const double *c)
 {
   double o[MODEL_OUTPUTS + 1];
-  int i, finite = 1;
+  int i;
   model_outputs(x, u, c, o);
   fprintf(out, "%.17g", time);
   for (i = 0; i < COLUMNS; i++) {
@@ -24,11 +25,7 @@ static int write_row(FILE *out, double time, const double *x, const double *u, c
     fprintf(out, ",%.17g", value);
   }
   fputc('\n', out);
-  for (i = 0; i < MODEL_STATES; i++)
-    if (!isfinite(x[i]) || x[i] < model_state_minimum[i]) finite = 0;
-  for (i = 0; i < MODEL_OUTPUTS; i++)
-    if (!isfinite(o[i])) finite = 0;
-  return finite;
+  return is_valid(x, o);
 }
 
 /* Rows up to `time`, in the segment that the solver is in. */
@@ -69,22 +66,4 @@ static int run(FILE *out)
   return status;
 }
 
-int main(int argc, char **argv)
-{
-  FILE *out = argc > 1 ? fopen(argv[1], "w") : stdout;
-  int status;
-  if (!out) {
-    perror(argv[1]);
-    return 1;
-  }
-  fputs(header, out);
-  status = run(out);
-  if (out != stdout && fclose(out) != 0) {
-    perror(argv[1]);
-    return 1;
-  }
-  if (status != MODEL_DONE)
-    fputs(status == MODEL_STEP_TOO_SMALL ? "the step became too small\n"
-                                         : "a state or an output is not finite, or below its limit\n", stderr);
-  return status;
-}
+@program@

@@ -1,17 +1,18 @@
 @provenance@
-/* Replay of a recorded run. The expected commands are those of the printed operations in IEEE 754 double precision; they
-   are met bit by bit if products and sums are not fused (gcc, clang: -ffp-contract=off, which -std=c99 implies for gcc). */
+@about@
 #include "@file@.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #define SAMPLES @samples@
 
 @tables@
+@comparison@
 int main(void)
 {
-  double memory[MODEL_MEMORY + 1], command[MODEL_COMMANDS + 1] = {0.0};
+  @number@ memory[MODEL_MEMORY + 1], command[MODEL_COMMANDS + 1] = {0};
   long different = 0;
   int k, i;
   memcpy(memory, model_initial_memory, sizeof memory);
@@ -20,10 +21,10 @@ int main(void)
       printf("sample %d: a measurement or a command is not finite\n", k);
       return 1;
     }
-    for (i = 0; i < MODEL_COMMANDS; i++)
-      if (memcmp(&command[i], &commands[k][i], sizeof(double)) != 0) different++;
+    for (i = 0; i < MODEL_COMMANDS; i++) different += differs((double)command[i], commands[k][i], i);
   }
-  printf("%d samples, %ld commands differ; memory %lu bytes, parameters %lu bytes\n", SAMPLES, different,
-         (unsigned long)sizeof model_initial_memory, (unsigned long)sizeof model_parameters);
+  print_result(different);
+  printf("; memory %lu bytes, parameters %lu bytes\n", (unsigned long)sizeof model_initial_memory,
+         (unsigned long)sizeof model_parameters);
   return different != 0;
 }
