@@ -61,6 +61,13 @@ REASONS = (
         "0.40 and 0.95 degrees at 0.5, 1, 2 and 3 Hz, within all bounds.",
     ),
     (
+        f"{PREDICTIVE} / {COMPENSATED}",
+        "MPC: two gains of its feed-forward are identified on the truth, which those of feed-forward + PID are not. "
+        "Beside the compensated PID, which has the same commissioning, it is missed by little; the error that remains "
+        "is that of the feed-forward, which both share. With 2400 loops the compensated PID alone had less, 0.40 "
+        "degrees.",
+    ),
+    (
         "learning, monotone",
         "Learning: after the first trials the differences from trial to trial are those of the noise of the sensors.",
     ),
@@ -211,12 +218,15 @@ def targets(results: Mapping[str, Any]) -> list[tuple[str, str, str, bool]]:
 def predictive_targets(data: Mapping[str, Any]) -> list[tuple[str, str, str, bool]]:
     """The targets of model predictive control at 2 Hz: its error beside feed-forward and PID, and its constraint."""
     task = "sine 2 Hz"
-    ratio = value(data, PREDICTIVE, task, "rmse") / value(data, FORWARD, task, "rmse")
+    ratio, fair = (
+        value(data, PREDICTIVE, task, "rmse") / value(data, other, task, "rmse") for other in (FORWARD, COMPENSATED)
+    )
     low, high = data["limits"]
     least, most = data["pressures"].get((PREDICTIVE, task), (-math.inf, math.inf))
     kept = low - PRESSURE_MARGIN <= least and most <= high + PRESSURE_MARGIN
     return [
         (f"{PREDICTIVE} / {FORWARD}, 2 Hz", f"≤ {PREDICTIVE_TARGET:g}", f"{ratio:.2f}", ratio <= PREDICTIVE_TARGET),
+        (f"{PREDICTIVE} / {COMPENSATED}, 2 Hz", f"≤ {PREDICTIVE_TARGET:g}", f"{fair:.2f}", fair <= PREDICTIVE_TARGET),
         (f"{PREDICTIVE}, pressures at 2 Hz", f"{low:g} to {high:g} bar", f"{least:.2f} to {most:.2f} bar", kept),
     ]
 
@@ -300,7 +310,8 @@ HISTORY = (
     "friction and with the lead time alone identified, had 0.21, 0.26, 0.80 and 1.81 degrees at 0.5, 1, 2 and 3 Hz. "
     "LQG and MPC were added last, when all other results were known. Their first form had the feed-forward without "
     "compensation, and MPC, tuned with the models alone (budget 1200), an error of 1.83 degrees at 2 Hz on the truth; "
-    "therefore they received the compensation of the other controller, with the same two gains identified. Nothing was "
+    "therefore they received the compensation of the other controller, with the same two gains identified; "
+    "with untuned weights this gave 0.56 degrees (MPC) and 0.88 (LQG) at 2 Hz, seen before the run. Nothing was "
     "changed after the run of this page. Its budget is half the default one, because the machine was shared; the "
     "proportional and the on/off part ran as two processes, with 13.6 minutes of CPU time together."
 )
