@@ -227,6 +227,21 @@ def test_predictions_of_unseen_holds_stay_within_the_band(one_length, bar, contr
 
 
 @pytest.mark.slow
+def test_the_band_of_an_isometric_run_contains_the_error_without_all_isometric_runs(one_length):
+    """A held length has no friction, and residuals of one sign, which bands from sweeps of the length do not show."""
+    stage = one_length.static
+    run = recording(MUSCLE.isometric(0.06, np.random.default_rng(93)), "isometric")
+    prediction, taut = one_length.predict(run), run["force"] > 0.0
+    half = 0.5 * (prediction.high - prediction.low)
+    assert stage.held_band.purpose == "further isometric runs"
+    np.testing.assert_allclose(half, max(stage.held_band.half_width, stage.band.half_width))
+    inside = np.abs(prediction.force - run["force"]) <= half
+    assert 0.93 <= inside[taut].mean() <= 0.99
+    moved = recording(MUSCLE.isobaric(3.0, np.random.default_rng(94)), "isobaric")
+    assert stage.half_width(moved) == stage.band.half_width
+
+
+@pytest.mark.slow
 def test_predictions_of_inner_loops_stay_within_the_band(one_length):
     """Reversals within the stroke at 3 bar, which no record of the campaign has."""
     turns = np.array([0.0, 1.0, 0.4, 0.8, 0.2, 0.6, 0.0]) * 0.88 * MUSCLE.free_contraction(3e5)

@@ -4,6 +4,7 @@ the band that the model states; what a record lacks or a model cannot predict is
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import tomllib
 from pathlib import Path
@@ -289,6 +290,15 @@ def test_an_uncertainty_of_a_plant_that_is_none_names_its_table(study, tmp_path,
     )
     with pytest.raises(ParameterError, match=message):
         load_scenario(tmp_path / "s.toml")
+
+
+def test_a_record_at_a_held_length_has_the_band_of_isometric_runs(muscle):
+    entry = am.load(muscle)
+    entry = dataclasses.replace(entry, error_band=dataclasses.replace(entry.error_band, held_half_width=20.0))
+    swept = predict_with_entry(entry, sweep(4e5, 9)).quantities[0]
+    held = predict_with_entry(entry, sweep(4e5, 9, top=0.022)).quantities[0]
+    assert set(held.half_width) == {20.0}
+    assert set(swept.half_width) == {entry.error_band.half_width}
 
 
 @pytest.mark.parametrize(("name", "width", "message"), [("mass", 1.0, "allowed are force"), ("force", 0.0, "positive"),

@@ -6,6 +6,7 @@ import dataclasses
 
 from ..characteristic.base import ForceLaw
 from ..core.errors import ParameterError
+from ..identify.campaign.rows import is_held
 from ..identify.compared_points import law_of_length
 from ..identify.cross_validation import specimen_name
 from ..identify.prediction import RecordPrediction, predict_static
@@ -49,11 +50,19 @@ def predict_with_entry(entry: Entry, recording: Recording) -> RecordPrediction:
             f"the law was scaled from {1e3 * (own or 0.0):.4g} mm to {1e3 * (length or 0.0):.4g} mm; the stated band "
             "is that of the measured length"
         )
-    band = entry.error_band
-    quantity = fitted_quantity_of(law).name
-    half = band.half_width if band is not None and band.quantity == quantity else None
+    half = _half_width(entry, fitted_quantity_of(law).name, recording)
     result = predict_static(
         law, recording, friction=entry.friction, creep=entry.creep, half_width=half,
         validity_range=entry.validity_range,
     )  # fmt: skip
     return dataclasses.replace(result, notes=(*result.notes, *notes))
+
+
+def _half_width(entry: Entry, quantity: str, recording: Recording) -> float | None:
+    """The half width of the stated band of a quantity [SI], that of isometric runs for a held length."""
+    band = entry.error_band
+    if band is None or band.quantity != quantity:
+        return None
+    if band.held_half_width is None or "contraction" not in recording or not is_held(recording):
+        return band.half_width
+    return band.held_half_width

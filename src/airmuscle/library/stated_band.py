@@ -11,7 +11,7 @@ from ..core.errors import ParameterError
 from ..recording.columns import QUANTITIES
 from .location import Location, check_keys, read_finite_number, read_text
 
-KEYS = ("quantity", "half_width", "source")
+KEYS = ("quantity", "half_width", "source", "held_half_width")
 """Keys of the table [error_band]."""
 PREDICTED = ("force", "contraction", "pressure")
 """Quantities that a law may give."""
@@ -19,17 +19,23 @@ PREDICTED = ("force", "contraction", "pressure")
 
 @dataclasses.dataclass(frozen=True)
 class StatedBand:
-    """The half width [SI] of the 95 % band of a predicted quantity, and the rows or groups that it comes from."""
+    """The half width [SI] of the 95 % band of a predicted quantity, and the rows or groups that it comes from.
+
+    `held_half_width` is that for isometric runs, None where it is the same.
+    """
 
     quantity: str
     half_width: float
     source: str
+    held_half_width: float | None = None
 
     def __post_init__(self) -> None:
         if self.quantity not in PREDICTED:
             raise ParameterError(f"StatedBand: quantity is '{self.quantity}'; allowed are {', '.join(PREDICTED)}.")
-        if not (math.isfinite(self.half_width) and self.half_width > 0.0):
-            raise ParameterError(f"StatedBand: half_width is {self.half_width:g}; it must be finite and positive.")
+        for name in ("half_width", "held_half_width"):
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and value > 0.0):
+                raise ParameterError(f"StatedBand: {name} is {value:g}; it must be finite and positive.")
 
 
 def read_stated_band(table: Any, location: Location) -> StatedBand:
@@ -41,8 +47,12 @@ def read_stated_band(table: Any, location: Location) -> StatedBand:
     unit = QUANTITIES[quantity].unit if quantity in PREDICTED else "1"
     if "half_width" not in table:
         raise ParameterError(f"{location}: 'half_width' is missing; give the half width of the 95 % band.")
-    half_width = read_finite_number(table["half_width"], unit, f"{location}, half_width")
+    half, held = (
+        read_finite_number(table[key], unit, f"{location}, {key}") if key in table else None
+        for key in ("half_width", "held_half_width")
+    )
+    assert half is not None
     try:
-        return StatedBand(quantity, half_width, read_text(table, "source", location, needed=False) or "")
+        return StatedBand(quantity, half, read_text(table, "source", location, needed=False) or "", held)
     except ParameterError as error:
         raise error.located(location) from None

@@ -30,7 +30,8 @@ def to_toml(entry: Entry) -> str:
     if entry.uncertainty is not None:
         tables["uncertainty"] = uncertainty_table(entry.uncertainty)
     if entry.error_band is not None:
-        tables["error_band"] = dataclasses.asdict(entry.error_band)
+        stated = dataclasses.asdict(entry.error_band)
+        tables["error_band"] = {key: value for key, value in stated.items() if value is not None}
     if entry.checks:
         tables["check"] = [_check_table(check) for check in entry.checks]
     if entry.references:

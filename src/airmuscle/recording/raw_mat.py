@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from ..core.hints import Hint
 from .channels import Channel, merge_channels
 from .downsampling import Decimation, Downsampling
 from .heading import parse_heading
-from .large_mat import is_version_7_3, read_large_mat
+from .large_mat import LargeContents, is_version_7_3, read_large_mat
 from .mat_objects import READABLE, MatlabObject, find_objects, read_objects
 from .optional_dependency import import_lab_package, run_reader
 from .pieces import Reduction, with_reduction
@@ -61,9 +61,9 @@ def read_mat_tables_here(
     def read() -> Mapping[str, Any]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # about unreadable objects; the error below reports missing vectors
-            return dict(pymatreader.read_mat(str(path)))
+            return dict(pymatreader.read_mat(str(path))) if large is None else large.variables
 
-    contents = run_reader(path, "MATLAB", read) if large is None else large.variables
+    contents = run_reader(path, "MATLAB", read)
     objects = find_objects(path)
     tables = run_reader(path, "MATLAB", lambda: read_objects(path, objects))
     unread = [each for each in objects if each.name not in tables]
@@ -86,17 +86,21 @@ def read_mat_tables_here(
             f"{', '.join([*variables, *map(str, unread)]) or 'no variables'}). {_remedy(unread)}"
         )
     constants = _scalar_fields(variables)
-    several = len(groups) > 1
-    made = [_make_table(path, name, fields, constants, several, columns) for name, fields in selected.items()]
+    made = [_make_table(path, name, fields, constants, len(groups) > 1, columns) for name, fields in selected.items()]
     notes = tuple(f"Not read: {each}. {_remedy([each])}" for each in unread)
     if large is not None:
-        whole = Reduction(0, 1)
-        made = [
-            with_reduction(table, large.reductions.get(name, whole), downsampling)
-            for name, table in zip(selected, made, strict=True)
-        ]
-        notes += large.notes
+        made, notes = _with_reductions(selected, made, large, downsampling), notes + large.notes
     return tuple(dataclasses.replace(table, notes=(*table.notes, *notes)) for table in made)
+
+
+def _with_reductions(
+    names: Iterable[str], tables: Sequence[RawTable], large: LargeContents, downsampling: Downsampling
+) -> list[RawTable]:
+    whole = Reduction(0, 1)
+    return [
+        with_reduction(table, large.reductions.get(name, whole), downsampling)
+        for name, table in zip(names, tables, strict=True)
+    ]
 
 
 def _remedy(unread: Sequence[MatlabObject]) -> str:

@@ -95,7 +95,8 @@ def _plant_uncertainty() -> Schema:
 
 
 def _error_band() -> Schema:
-    return {"quantity": {"enum": list(stated_band.PREDICTED)}, "half_width": _quantity("", 0.0), "source": _TEXT}
+    widths = dict.fromkeys(("half_width", "held_half_width"), _quantity("", 0.0))
+    return {"quantity": {"enum": list(stated_band.PREDICTED)}, "source": _TEXT, **widths}
 
 
 def _document(title: str, properties: Schema, required: Sequence[str], models: _ModelSchemas) -> Schema:

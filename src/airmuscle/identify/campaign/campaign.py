@@ -122,9 +122,8 @@ class Campaign(ShortRepr):
         limit = FORCE_MARGIN * max(float(np.nanmax(run["force"])) for run in self.static.points)
         force = predicted_force(law, recording, self.friction, self.creep_elements, limit)
         known = {r.resting_length for r in self.records if r.kind.is_static}
-        bands = self.static.bands
-        band = bands[0] if length is None or any(abs(float(length) - k) < 1e-6 for k in known if k) else bands[-1]
-        half = band.half_width
+        measured = length is None or any(abs(float(length) - k) < 1e-6 for k in known if k)
+        half = self.static.half_width(recording, measured)
         return Prediction(np.maximum(force, 0.0), force - half, force + half)
 
 
