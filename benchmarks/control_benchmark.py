@@ -36,6 +36,10 @@ TARGETS = {0.5: 0.25, 1.0: 0.45, 2.0: 0.9, 3.0: 1.3}
 RATIO_TARGET, LEARNING_TARGET, HOLD_TARGET, REST_TARGET, SHARE_TARGET = 3.0, 0.15, 0.5, 10.0, 5.0
 FORWARD, PLAIN, BOTH = "feed-forward + PID", "PID", "angle and stiffness"
 COMPENSATED = "feed-forward + PID, compensated"
+PREDICTIVE, QUADRATIC = "feed-forward + MPC, compensated", "feed-forward + LQG, compensated"
+PREDICTIVE_TARGET, PRESSURE_MARGIN = 0.7, 0.05
+"""Ratio of the errors at 2 Hz, and what noise and inner control may exceed the limits of the pressures by [bar] (the
+margin is chosen)."""
 ON_OFF = (PLAIN, FORWARD, "feed-forward + sliding mode")
 REASONS = (
     (
@@ -111,18 +115,26 @@ PUBLISHED = (
 
 def measure(budget: int, seed: int) -> dict[str, Any]:
     """All results as plain data."""
+    return {"budget": budget, "seed": seed, **measure_proportional(budget, seed), **measure_on_off(budget, seed)}
+
+
+def measure_proportional(budget: int, seed: int) -> dict[str, Any]:
+    """The results of the joint with proportional valves, and those of learning."""
     joint = proportional_joint()
     result = compare_controllers(joint, standard_contenders(joint), budget=budget, seed=seed, progress=_show)
     tuned = next(each for each in result.contenders if each.name == FORWARD)
     curve = learn(joint, tuned, find_tasks(("sine 2 Hz",))[0], trials=31, seed=seed)
-    other = on_off_joint()
-    chosen = [each for each in standard_contenders(other) if each.name in ON_OFF]
-    switched = compare_controllers(other, chosen, budget=budget, seed=seed, progress=_show)
     return {
-        "budget": budget, "seed": seed, "proportional": _plain(result), "on/off": _plain(switched),
-        "learning": curve.errors.tolist(), "monotone": curve.is_monotone,
+        "proportional": _plain(result), "learning": curve.errors.tolist(), "monotone": curve.is_monotone,
         "spread": curve.spread, "forward": forward_error(joint),
     }  # fmt: skip
+
+
+def measure_on_off(budget: int, seed: int) -> dict[str, Any]:
+    """The results of the joint with on/off valves."""
+    joint = on_off_joint()
+    chosen = [each for each in standard_contenders(joint) if each.name in ON_OFF]
+    return {"on/off": _plain(compare_controllers(joint, chosen, budget=budget, seed=seed, progress=_show))}
 
 
 def forward_error(joint: BenchmarkJoint) -> float:
@@ -143,9 +155,19 @@ def _plain(result: Any) -> dict[str, Any]:
         "tasks": [task.name for task in result.tasks],
         "gains": {each.name: {**each.tuning.gains, **each.identified} for each in result.contenders if each.tuning},
         "on bound": {each.name: dict(each.tuning.on_bound) for each in result.contenders if each.tuning},
+        "limits": (joint.min_pressure / 1e5, joint.max_pressure / 1e5),
+        "pressures": {
+            key: pressure_range(joint, run.recording) for key, run in result.runs.items() if run.recording is not None
+        },
         "metrics": {key: dataclasses.asdict(run.metrics) if run.metrics else None for key, run in result.runs.items()},
         "span": joint.pressure_span,
     }
+
+
+def pressure_range(joint: BenchmarkJoint, recording: Any) -> tuple[float, float]:
+    """Smallest and greatest true gauge pressure [bar] of both muscles in a run."""
+    values = np.concatenate([np.asarray(recording[name]) for name in joint.pressures]) / 1e5
+    return float(values.min()), float(values.max())
 
 
 def _show(step: str, done: int, total: int) -> None:
@@ -163,6 +185,7 @@ def targets(results: Mapping[str, Any]) -> list[tuple[str, str, str, bool]]:
     """The targets: name, bound, what was reached, and whether it is met."""
     data = results["proportional"]
     rows = [row for name in (FORWARD, COMPENSATED) for row in tracking_targets(data, name)]
+    rows += predictive_targets(data)
     errors = results["learning"]
     tenth = errors[10]
     rows.append(
@@ -184,6 +207,19 @@ def targets(results: Mapping[str, Any]) -> list[tuple[str, str, str, bool]]:
     met = max(angle, stiffness) <= SHARE_TARGET
     rows.append((BOTH, f"both ≤ {SHARE_TARGET:g} %", f"angle {angle:.1f} %, stiffness {stiffness:.1f} %", met))
     return rows
+
+
+def predictive_targets(data: Mapping[str, Any]) -> list[tuple[str, str, str, bool]]:
+    """The targets of model predictive control at 2 Hz: its error beside feed-forward and PID, and its constraint."""
+    task = "sine 2 Hz"
+    ratio = value(data, PREDICTIVE, task, "rmse") / value(data, FORWARD, task, "rmse")
+    low, high = data["limits"]
+    least, most = data["pressures"].get((PREDICTIVE, task), (-math.inf, math.inf))
+    kept = low - PRESSURE_MARGIN <= least and most <= high + PRESSURE_MARGIN
+    return [
+        (f"{PREDICTIVE} / {FORWARD}, 2 Hz", f"≤ {PREDICTIVE_TARGET:g}", f"{ratio:.2f}", ratio <= PREDICTIVE_TARGET),
+        (f"{PREDICTIVE}, pressures at 2 Hz", f"{low:g} to {high:g} bar", f"{least:.2f} to {most:.2f} bar", kept),
+    ]
 
 
 def tracking_targets(data: Mapping[str, Any], name: str) -> list[tuple[str, str, str, bool]]:
@@ -246,7 +282,10 @@ def part_rows(title: str, part: Mapping[str, Any]) -> list[str]:
     lines = [f"## {title}", "", f"{valve}. rms error [degree]:", "", *error_rows(part, "rmse")]
     lines += ["", "| controller | score | tuned gains [SI] |", "|---|---|---|"]
     for name, score in part["scores"].items():
-        gains = ", ".join(f"{path.split('outer.')[-1]} {v:.3g}" for path, v in part["gains"].get(name, {}).items())
+        gains = ", ".join(
+            f"{path.split('outer.')[-1].removeprefix('controller.')} {v:.3g}"
+            for path, v in part["gains"].get(name, {}).items()
+        )
         lines.append(f"| {name} | {score:.3g} | {gains} |")
     for metric, text in FURTHER.items():
         lines += ["", f"{text}:", "", *error_rows(part, metric)]

@@ -6,50 +6,24 @@ identified by runs of a motion on the truth, judged by the encoder alone.
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
-from typing import ClassVar
 
 import numpy as np
 import pytest
+from benchmark_contender import JOINT, MINE, SHORT
 from called_controller import Called
 
-from airmuscle.control import ControlLaw
-from airmuscle.core import model, parameter
 from airmuscle.core.errors import ParameterError
 from airmuscle.study.control_benchmark import (
     Contender,
-    ControlTask,
-    SineMotion,
     StuckValve,
     compare_controllers,
-    proportional_joint,
     standard_contenders,
 )
 from airmuscle.study.control_benchmark.called_contender import Readings
 from airmuscle.study.control_benchmark.commissioning import identify_gains, tracking_error
 from airmuscle.study.control_benchmark.contenders import complete
 from airmuscle.study.tuning.case import with_gains
-
-JOINT = proportional_joint()
-SHORT = ControlTask("short sine", SineMotion(math.radians(10.0), 2.0), 1.0, begin=0.5)
-
-
-@model
-class AngleLaw(ControlLaw):
-    """A user's law: proportional, from the angle to half the pressure difference."""
-
-    gain: float = parameter("Pa/rad", "K", "gain", bounds=(0.0, 1e7))
-    measured_columns = ("angle",)
-    setpoints = ("angle",)
-    inputs = ("difference",)
-    initial_memory: ClassVar = {}
-
-    def step(self, memory, measurement, dt):
-        return {"difference": self.gain * (measurement.setpoints["angle"] - measurement.columns["angle"])}, {}
-
-
-MINE = Contender("mine", AngleLaw(2e5), {"gain": (1e5, 5e5)})
 
 
 def test_a_controller_that_is_called_meets_the_same_sensors_and_the_same_actuation():
@@ -63,7 +37,9 @@ def test_a_controller_that_is_called_meets_the_same_sensors_and_the_same_actuati
     stuck = replace(SHORT, name="stuck", stuck=StuckValve("left.discharge", 0.4, 0.1))
     record = compare_controllers(JOINT, [called], [stuck], budget=0).runs["called", "stuck"].recording
     assert np.unique(record["left.discharge"][record["time"] > 0.401]) == pytest.approx([0.1])
-    with pytest.raises(ParameterError, match="Called is no ControlLaw, its gains cannot be tuned in a batch"):
+    with pytest.raises(
+        ParameterError, match=r"Called has no declared parameter 'gain' to be tuned; there are inner\.gain"
+    ):
         replace(called, bounds={"gain": (1e5, 5e5)})
     with pytest.raises(ParameterError, match="commands angle; allowed are 'difference'"):
         complete(JOINT, Contender("wrong", Called(Readings(("angle",)))))

@@ -19,6 +19,8 @@ from airmuscle.control.pid import PID
 from airmuscle.control.piecewise_linear import PiecewiseLinear, merge_columns
 from airmuscle.core import arrays
 from airmuscle.core.errors import GeometryLimitError, ParameterError
+from airmuscle.core.system import System
+from airmuscle.core.variables import Input, StateVariable
 from airmuscle.mechanism import HangingMass
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
@@ -81,6 +83,56 @@ def test_a_kept_recorder_gives_what_a_new_one_gives(monkeypatch):
     fresh = simulate(lifting(), signal, duration=1.0, initial_state=start)
     for other in (again, fresh):
         assert all(np.array_equal(other[name], long[name]) for name in long)
+
+
+class Lag(System):
+    """A state that follows an input of some range."""
+
+    def __init__(self, maximum):
+        self.maximum = maximum
+
+    states = (StateVariable("y", "1", 1.0),)
+    inputs = ("u",)
+
+    @property
+    def input_variables(self):
+        return (Input("u", "1", 0.0, self.maximum),)
+
+    def rates(self, state, inputs):
+        return {"y": inputs["u"] - state["y"]}
+
+    def outputs(self, state, inputs):
+        return {"double": 2.0 * state["y"]}
+
+
+def test_a_command_that_was_used_before_gives_the_runs_of_a_new_one():
+    changes = {"fill": ((0.1, 1.0), (0.3, 0.0))}
+    signal, plant, start = Schedule(changes), lifting(), lifting().state_at(pressure=1e5)
+    asked = [(1.0, 0.0, None)] * 2 + [(1.0, 0.05, None), (0.5, 0.0, 0.05), (1.0, 0.0, 0.05), (1.0, 0.0, None)]
+    for duration, begin, times in asked:
+        again, new = (
+            simulate(plant, s, duration=duration, initial_state=start, start_time=begin, output_times=times)
+            for s in (signal, Schedule(changes))
+        )
+        assert all(np.array_equal(again[name], new[name]) for name in new)
+    other = Schedule({"fill": ((0.2, 1.0),)})
+    run = simulate(plant, other, duration=1.0, initial_state=start)
+    assert run["fill"].tolist() == (run["time"] >= 0.2).tolist()
+
+
+def test_what_is_kept_of_a_run_for_the_next_one_cannot_be_written_to():
+    problem = Problem(lifting(), Schedule({"fill": ((0.1, 1.0),)}), 1.0, lifting().state_at(pressure=1e5))
+    for kept in (problem.segments.ends, problem.segments.values, problem.segments.slopes, problem.times):
+        with pytest.raises(ValueError, match="read-only"):
+            kept[0] = 9.0
+
+
+def test_a_command_that_one_system_takes_is_refused_by_another_of_a_smaller_range():
+    signal = Schedule({"u": ((0.0, 2.0),)})
+    for _ in range(2):
+        assert simulate(Lag(3.0), signal, duration=1.0, initial_state={"y": 0.0})["u"].max() == 2.0
+        with pytest.raises(ParameterError, match="the input 'u' is 2"):
+            simulate(Lag(1.0), signal, duration=1.0, initial_state={"y": 0.0})
 
 
 # Times

@@ -33,7 +33,10 @@ NOT_IN_A_PLANT = {
         "Schedule", "SampledSignal", "SolenoidDriver", "PWM", "Rodas4", "DormandPrince8", "RungeKutta4"),
     "controllers, which look at a plant from outside": (
         "PID", "OnOffController", "SplitRange", "DeadZoneController", "CoContraction", "Decentralised", "SetpointCommand",
-        "SetpointLead", "SigmaDelta", "SlidingMode", "StaticFeedForward", "StaticInverse", "WithFeedForward"),
+        "SetpointLead", "SigmaDelta", "SlidingMode", "StaticFeedForward", "StaticInverse", "WithFeedForward",
+        "AngleAndStiffness", "AntagonisticInverse", "Cascade", "ColumnSensor", "ComputedTorque", "FrictionFeedForward",
+        "GainSchedule", "HysteresisCompensation", "HysteresisOperator", "InverseHysteresisOperator",
+        "ProportionalFeedback", "StateFeedback", "SuperTwisting", "WithSensors", "WithSetpointDelay", "WithStuckValve"),
     "laws solved for pressure or contraction, where as_force_law stands in, and their readings": (
         "BorzikovaDirect", "BorzikovaExponential", "Hunt2017", "Saga2007", "ArcIntegral", "AxialIntegral",
         "UniformFibreSum", "UserDefinedFibreSum", "HalfShellFibreSum", "PrintedFibreSum",

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import ClassVar
 
 import numpy as np
 import pytest
+from benchmark_contender import JOINT, MINE, SHORT, AngleLaw
 
 import airmuscle as am
-from airmuscle.control import ControlLaw
-from airmuscle.core import model, parameter
+from airmuscle.core import model
 from airmuscle.core.errors import ParameterError
 from airmuscle.friction import LuGre, NoFriction
 from airmuscle.recording import Recording
@@ -32,7 +31,6 @@ from airmuscle.study.control_benchmark import (
     compare_controllers,
     learn,
     on_off_joint,
-    proportional_joint,
     standard_contenders,
 )
 from airmuscle.study.control_benchmark.contenders import complete
@@ -41,27 +39,8 @@ from airmuscle.study.control_benchmark.task_signals import task_signals
 from airmuscle.study.control_benchmark.tasks import find_tasks
 from airmuscle.study.control_benchmark.tracking_metrics import RATED_STROKES, track
 
-JOINT = proportional_joint()
 DEGREE = math.pi / 180
-SHORT = ControlTask("short sine", SineMotion(10 * DEGREE, 2.0), 1.0, begin=0.5)
 STEP = ControlTask("short step", StepMotion(10 * DEGREE, 0.1), 0.8, begin=0.1, event=0.1)
-
-
-@model
-class MyLaw(ControlLaw):
-    """A user's law: proportional, from the angle to half the pressure difference."""
-
-    gain: float = parameter("Pa/rad", "K", "gain", bounds=(0.0, 1e7))
-    measured_columns = ("angle",)
-    setpoints = ("angle",)
-    inputs = ("difference",)
-    initial_memory: ClassVar = {}
-
-    def step(self, memory, measurement, dt):
-        return {"difference": self.gain * (measurement.setpoints["angle"] - measurement.columns["angle"])}, {}
-
-
-MINE = Contender("mine", MyLaw(2e5), {"gain": (1e5, 5e5)})
 
 
 def chosen(*names):
@@ -295,7 +274,7 @@ def test_impossible_benchmarks_are_rejected(call, message):
     ],
 )
 def test_a_law_that_does_not_suit_the_joint_is_rejected(change, message):
-    law = model(type("Other", (MyLaw,), {"__annotations__": {}, **change}))(2e5)
+    law = model(type("Other", (AngleLaw,), {"__annotations__": {}, **change}))(2e5)
     with pytest.raises(ParameterError, match=message):
         compare_controllers(JOINT, [Contender("other", law)], [SHORT], budget=0)
 

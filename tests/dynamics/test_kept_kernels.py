@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import concurrent.futures
 import ctypes
+import dataclasses
 import math
 import os
 import warnings
@@ -71,12 +72,19 @@ def files(folder):
     return sorted(path for path in folder.rglob("*") if path.is_file())
 
 
-@pytest.mark.parametrize("method", [Rodas4(1e-6), DormandPrince8(1e-3)], ids=["rodas4", "fixed_step"])
+@pytest.mark.parametrize(
+    "method",
+    [
+        pytest.param(Rodas4(1e-6), id="rodas4", marks=pytest.mark.slow),
+        pytest.param(DormandPrince8(1e-3), id="fixed_step"),
+    ],
+)
 def test_a_run_is_bit_for_bit_that_of_numba(method, monkeypatch):
     ramps = Schedule({"fill": ((0.5, 1.0), (1.5, 0.0)), "discharge": ((2.0, 0.7),)})
 
     def run():
-        return simulate(CASE.system, ramps, duration=3.0, initial_state=CASE.initial_state, integrator=method)
+        system = dataclasses.replace(CASE.system)  # nothing that was bound before is kept with it
+        return simulate(system, ramps, duration=3.0, initial_state=CASE.initial_state, integrator=method)
 
     by_code = run()
     monkeypatch.setattr(Kernel, "entry", lambda self, kinds: None)
@@ -108,6 +116,21 @@ def test_an_array_that_is_not_contiguous_and_writeable_is_an_error(other):
     given[2] = other(given[2])
     with pytest.raises((TypeError, ValueError, BufferError)):
         Kernel("evaluate")(*given)
+
+
+def test_an_input_may_be_read_only_but_must_be_contiguous_and_of_its_kind(without_numba):
+    bound, second = Kernel("evaluate").bind(*arguments()), arguments()
+    for index in (1, 2, 3):
+        given = second[index].copy()
+        given.setflags(write=False)
+        bound.replace_input(index, given)
+    bound.replace(4, second[4])
+    bound()
+    assert np.array_equal(second[-1], expected())
+    for wrong in (np.asfortranarray(second[2]), second[2].astype(np.float32), second[1].copy()):
+        wrong.setflags(write=False)
+        with pytest.raises(TypeError, match="argument 2"):
+            bound.replace_input(2, wrong)
 
 
 def test_replaced_arguments_are_those_that_count(without_numba):

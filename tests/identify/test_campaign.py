@@ -12,6 +12,7 @@ import pytest
 from made_campaign import THREE_LENGTHS, TrueMuscle, unseen_records, write_campaign, write_german
 
 from airmuscle.core.errors import IdentificationError
+from airmuscle.friction import BoucWen
 from airmuscle.identify.campaign import (
     CreepStage,
     FillStage,
@@ -24,7 +25,9 @@ from airmuscle.identify.campaign import (
     identify_campaign,
 )
 from airmuscle.identify.campaign.creep_stage import creep_stretches, fit_creep_stage
+from airmuscle.identify.campaign.friction_stage import friction_along
 from airmuscle.identify.campaign.next_experiment import _levels
+from airmuscle.identify.campaign.rows import held_steady
 from airmuscle.identify.campaign.transient import count_pulses
 from airmuscle.identify.campaign.volume import VolumeChange, relate_volumes
 from airmuscle.identify.experiment_design import PlannedRun
@@ -165,6 +168,26 @@ def test_the_stretch_of_a_maxwell_element_is_exact_for_a_constant_speed():
     np.testing.assert_allclose(stretch, speed * tau * (1.0 - np.exp(-time / tau)), rtol=1e-12)
 
 
+def test_a_held_length_keeps_its_friction_through_the_noise_of_the_sensor():
+    """Small cycles unload a Bouc-Wen model; the noise of a held length is none of them."""
+    time = np.linspace(0.0, 60.0, 600)
+    path = 0.018 * np.clip((time - 2.0) / 0.5, 0.0, 1.0)
+    noise = np.random.default_rng(1).normal(0.0, 2e-5, time.size)
+    columns = {"time": time, "pressure": np.full(time.size, 3e5), "length": 0.3 - path - noise}
+    run = recording(columns | {"force": np.full(time.size, 500.0)}, "hold")
+    force = friction_along(BoucWen(5e4, 30.0, 1.0, 20.0), run)
+    np.testing.assert_allclose(force[time > 3.0], 30.0, atol=0.5)
+
+
+def test_the_dead_band_of_the_noise_follows_a_motion_and_holds_a_rest():
+    path = np.concatenate([np.linspace(0.0, 1e-2, 100), np.full(50, 1e-2), np.linspace(1e-2, 0.0, 100)])
+    noisy = path + np.random.default_rng(2).normal(0.0, 2e-5, path.size)
+    steady = held_steady(noisy, 2e-5)
+    assert np.abs(steady - path).max() < 2.0 * 4.0 * 2e-5
+    assert np.ptp(steady[110:149]) < 2e-5
+    np.testing.assert_array_equal(held_steady(path, 0.0), path)
+
+
 def test_fills_at_several_lengths_determine_volume_and_conductance():
     change = VolumeChange((7e-4, -5e-4), 0.3, 0.25)
     contractions, true_scale, at_rest = np.array([0.0, 0.08, 0.15]), 0.4, 9e-5
@@ -191,6 +214,44 @@ def test_every_stage_of_the_made_campaign_is_identified(one_length):
 def test_predictions_at_unseen_pressures_and_speeds_stay_within_the_bands(one_length):
     inside = np.concatenate(list(shares_within_bands(one_length, (0.3,)).values()))
     assert 0.93 <= inside.mean() <= 0.97
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("bar", "contraction"), [(3.0, 0.06), (4.0, 0.10)])
+def test_predictions_of_unseen_holds_stay_within_the_band(one_length, bar, contraction):
+    """A fast motion, then two minutes at rest: friction and creep along the motion remain through the noise."""
+    run = recording(MUSCLE.hold(bar, contraction, np.random.default_rng(91)), "hold")
+    prediction = one_length.predict(run)
+    inside = (run["force"] >= prediction.low) & (run["force"] <= prediction.high)
+    assert 0.93 <= inside.mean() <= 0.98
+
+
+@pytest.mark.slow
+def test_the_band_of_an_isometric_run_contains_the_error_without_all_isometric_runs(one_length):
+    """A held length has no friction, and residuals of one sign, which bands from sweeps of the length do not show."""
+    stage = one_length.static
+    run = recording(MUSCLE.isometric(0.06, np.random.default_rng(93)), "isometric")
+    prediction, taut = one_length.predict(run), run["force"] > 0.0
+    half = 0.5 * (prediction.high - prediction.low)
+    assert stage.held_band.purpose == "further isometric runs"
+    np.testing.assert_allclose(half, max(stage.held_band.half_width, stage.band.half_width))
+    inside = np.abs(prediction.force - run["force"]) <= half
+    assert 0.93 <= inside[taut].mean() <= 0.99
+    moved = recording(MUSCLE.isobaric(3.0, np.random.default_rng(94)), "isobaric")
+    assert stage.half_width(moved) == stage.band.half_width
+
+
+@pytest.mark.slow
+def test_predictions_of_inner_loops_stay_within_the_band(one_length):
+    """Reversals within the stroke at 3 bar, which no record of the campaign has."""
+    turns = np.array([0.0, 1.0, 0.4, 0.8, 0.2, 0.6, 0.0]) * 0.88 * MUSCLE.free_contraction(3e5)
+    travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(turns)))]) * 0.3 / 3e-3
+    time = np.linspace(0.0, travelled[-1], 900)
+    path = np.interp(time, travelled, turns)
+    run = recording(MUSCLE.measured(time, np.full(900, 3e5), path, np.random.default_rng(92)), "inner loops")
+    prediction, taut = one_length.predict(run), run["force"] > 0.0
+    inside = (run["force"] >= prediction.low) & (run["force"] <= prediction.high)
+    assert 0.93 <= inside[taut].mean() <= 0.97
 
 
 @pytest.mark.slow

@@ -54,6 +54,7 @@ def test_commands_options_and_names_of_the_library_are_completed(monkeypatch: py
     assert "--pressure" in completed("airmuscle solve --pre", monkeypatch)
     assert completed("airmuscle show matr", monkeypatch) == ["matrix-821"]
     assert completed("airmuscle simulate arm", monkeypatch) == ["arm-lilly-quesada"]
+    assert {"dmsp-20-300", "joint-dmsp-20-matrix"} <= set(completed("airmuscle predict ", monkeypatch))
     assert "dmsp-20-300" in completed("airmuscle fit dmsp", monkeypatch)
 
 

@@ -33,7 +33,7 @@ from airmuscle.study.study import load_study
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "pressure_loop.toml"
 PAGE = (ROOT / "docs" / "control.md").read_text(encoding="utf-8")
-(TABLE,) = re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)
+TABLE, NESTED = re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)
 
 VALVE = '{ model = "Valve", conductance = 3e-9, critical_ratio = 0.3 }'
 PLANT = f"""
@@ -99,6 +99,18 @@ def test_the_table_of_the_page_is_a_loop(tmp_path: Path):
     run = scenario.simulate()
     assert np.ptp(run["position"][run["time"] <= 0.1]) < 1e-12
     assert run["position"][-1] > run["position"][0] + 1e-3
+
+
+def test_the_table_of_laws_inside_laws_is_that_of_the_example():
+    example = (EXAMPLE.parent / "joint_cascade.toml").read_text(encoding="utf-8")
+    page, whole = (tomllib.loads(text)["input"]["controller"] for text in (NESTED, example))
+    assert page["law"]["inner"] == whole["law"]["inner"]
+    assert page["sensors"] == whole["sensors"][:1]
+    for key in ("minimum", "maximum", "model"):
+        assert page["law"][key] == whole["law"][key]
+    assert {key: page[key] for key in ("model", "seed", "sample_time")} == {
+        key: whole[key] for key in ("model", "seed", "sample_time")
+    }
 
 
 @pytest.mark.parametrize(
@@ -202,7 +214,7 @@ PID_TABLE = ('commanded = "fill"', 'commanded = {{ model = "SplitRange", positiv
         (SETPOINT, f'{SETPOINT}\ndrivers = {{ pressure = "SolenoidDriver" }}', ParameterError, r"a set point has no drivers; write \[input.drivers\]"),
         (SETPOINT, f'{SETPOINT}\ncontroller = 3', ParameterError, r"a controller is allowed only in a scenario"),
         (SETPOINT, 'file = "none.csv"', AirmuscleError, r"none.csv"),
-        ('model = "PID"', 'model = "Valve"', ParameterError, r"\[input.controller\]: Valve is not a controller; there are CoContraction, DeadZoneController, .*OnOffController, PID"),
+        ('model = "PID"', 'model = "Valve"', ParameterError, r"\[input.controller\]: Valve is not a controller; there are AngleAndStiffness, Cascade, .*OnOffController, PID"),
         ('model = "PID"', 'model = "PDI"', UnknownNameError, r"no model 'PDI'"),
         ('model = "PID"\n', "", ParameterError, r"\[input.controller\]: the model is not named"),
         ("[input]\n", '[input]\nfill = [["0.1 s", 1]]\n', ParameterError, r"'fill' is commanded by the controller and by other_inputs"),
@@ -297,20 +309,33 @@ def test_what_the_schema_refuses_the_program_refuses(tmp_path: Path, was: str, b
 
 def test_the_schema_knows_every_controller():
     tables = scenario_schema()["properties"]["input"]["properties"]["controller"]["anyOf"]
-    assert [table["properties"]["model"]["const"] for table in tables] == [
+    named = {table["properties"]["model"]["const"]: table for table in tables}
+    assert list(named) == [
+        "AngleAndStiffness",
+        "Cascade",
         "CoContraction",
+        "ComputedTorque",
         "DeadZoneController",
         "Decentralised",
+        "FrictionFeedForward",
+        "GainSchedule",
+        "HysteresisCompensation",
         "OnOffController",
         "PID",
+        "ProportionalFeedback",
         "SetpointCommand",
         "SetpointLead",
         "SigmaDelta",
         "SlidingMode",
+        "StateFeedback",
         "StaticFeedForward",
+        "SuperTwisting",
         "WithFeedForward",
+        "WithSensors",
+        "WithSetpointDelay",
+        "WithStuckValve",
     ]
-    assert tables[4]["properties"]["gain"]["description"] == "K [u/y]: proportional gain"
+    assert named["PID"]["properties"]["gain"]["description"] == "K [u/y]: proportional gain"
 
 
 def test_the_report_shows_set_point_and_measurement_with_units():

@@ -5,7 +5,9 @@ What the records cannot tell is named with the experiment that would; a study th
 
 from __future__ import annotations
 
+import dataclasses
 import json
+import pickle
 import re
 from pathlib import Path
 
@@ -128,6 +130,15 @@ def test_what_the_records_were_made_with_is_found_written_and_simulated(folder, 
     measured = read_csv(folder / "run1.csv")
     height = np.interp(measured["time"] - found["start time of record 1"][0], run["time"], run["position"])
     assert np.sqrt(np.mean((height - measured["height"]) ** 2)) == pytest.approx(5e-5, rel=0.2)
+
+
+def test_a_fit_can_be_stored_and_loaded_by_another_process(folder):
+    """A campaign keeps the fits of its finished stages; what was compiled is compiled again."""
+    study = load_dynamic_fit(folder / "study.toml")
+    fit = dataclasses.replace(study, starts=1).fit()
+    again = pickle.loads(pickle.dumps(fit))
+    assert again.rms("pressure", 1) == fit.rms("pressure", 1)
+    assert again.plant(1) == fit.plant(1)
 
 
 def prediction(ratio: float) -> CrossPrediction:

@@ -67,6 +67,11 @@ def test_the_code_on_dynamic_identification_runs(capsys):
     assert "gas.exponent" in capsys.readouterr().out
 
 
+def test_the_code_on_prediction_runs(capsys):
+    run("prediction.md")
+    assert capsys.readouterr().out == "14.6 N, 39.1 N in row 125\n"
+
+
 def loop(seed):
     """A slow loop of contraction at 300 kPa of a muscle that rubs."""
     eps = np.concatenate([np.linspace(a, b, 80) for a, b in itertools.pairwise((0.02, 0.14, 0.08, 0.12, 0.02))])

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenario_files import LIFT
 from studio_pages import BEGINNING, WEB, run_script, scripts
 from typer.testing import CliRunner
 
@@ -232,17 +233,7 @@ def test_a_run_by_hand_is_the_run_of_its_schedule(tmp_path):
         np.testing.assert_allclose(again[column], live[column], atol=2e-5 * size)
 
 
-OWN = """
-title = "own"
-[plant]
-muscle = "dmsp-20-300"
-circuit = { model = "FillDischarge", supply = { model = "Supply", pressure = "6 bar" }, fill = { library = "matrix-821" }, discharge = { library = "matrix-821" } }
-mechanism = { model = "HangingMass", mass = "5 kg" }
-[input]
-fill = [["1 s", 1]]
-[run]
-duration = "2 s"
-"""
+OWN = f'title = "own"{LIFT}'
 START = """
 const run = new airmuscle.PlantRun(DATA[0]);
 for (const [path, value] of Object.entries(DATA[1])) run.set(DATA[0].parameters.find((row) => row.path === path), value);

@@ -10,6 +10,7 @@ import tomllib
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
+from scenario_files import LIFT
 from studio_pages import HOST, InThisProcess, request, run_script
 
 pytest.importorskip("starlette", reason="needs starlette")
@@ -28,16 +29,6 @@ from airmuscle.studio.uploads import MAX_TEXT, read_text_tables
 from airmuscle.studio.worker import LimitError, WorkerPool
 
 MUSCLE = to_toml(load("tondu-lopez"))
-SCENARIO = """
-[plant]
-muscle = "dmsp-20-300"
-circuit = { model = "FillDischarge", supply = { model = "Supply", pressure = "6 bar" }, fill = { library = "matrix-821" }, discharge = { library = "matrix-821" } }
-mechanism = { model = "HangingMass", mass = "5 kg" }
-[input]
-fill = [["1 s", 1]]
-[run]
-duration = "2 s"
-"""
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +65,7 @@ def test_a_muscle_of_the_library_and_its_program_are_sent(app):
 
 def test_own_files_are_read(app):
     muscle = request(app, "POST", "/api/law", MUSCLE.encode())
-    plant = request(app, "POST", "/api/plant", SCENARIO.encode())
+    plant = request(app, "POST", "/api/plant", LIFT.encode())
     assert (muscle.status, plant.status) == (200, 200)
     assert muscle.json()["own_text"] == MUSCLE
     assert [row["name"] for row in plant.json()["inputs"]] == ["fill", "discharge"]
@@ -178,13 +169,13 @@ BAD_TEXTS = (
     b"[plant]", b"[plant]\nmuscle='/etc/passwd'", b"[plant]\nmuscle='../x.toml'\n[run]\nduration='1 s'",
     b"[plant]\nmuscle='x.toml'", b"[plant]\nlibrary='/dev/zero'", b"[plant]\nlibrary='lift/../x'",
     b"[plant]\nmuscle=[]", b"[plant]\nmuscle=1\n[run]\nduration=1", b"plant = 1", b"[[plant]]", b"[plant.muscle]",
-    SCENARIO.encode().replace(b"2 s", b"-2 s"), SCENARIO.encode().replace(b"2 s", b"1e9 s"),
-    SCENARIO.encode().replace(b"2 s", b"nan s"), SCENARIO.encode().replace(b"fill = [[\"1 s\", 1]]", b"file='x.csv'"),
-    SCENARIO.encode().replace(b"fill = [[\"1 s\", 1]]", b"[input.controller]\nmodel='PID'"),
-    SCENARIO.encode().replace(b"fill = [[\"1 s\", 1]]", b"fill=[[1,2]]"),
-    SCENARIO.encode().replace(b"matrix-821", b"/absolute/valve.toml"),
-    SCENARIO.encode().replace(b"matrix-821", b"1 x/../../valve"), SCENARIO.encode().replace(b"5 kg", b"0 kg"),
-    SCENARIO.encode().replace(b"5 kg", b"5 m"), SCENARIO.encode().replace(b"HangingMass", b"__import__"),
+    LIFT.encode().replace(b"2 s", b"-2 s"), LIFT.encode().replace(b"2 s", b"1e9 s"),
+    LIFT.encode().replace(b"2 s", b"nan s"), LIFT.encode().replace(b"fill = [[\"1 s\", 1]]", b"file='x.csv'"),
+    LIFT.encode().replace(b"fill = [[\"1 s\", 1]]", b"[input.controller]\nmodel='PID'"),
+    LIFT.encode().replace(b"fill = [[\"1 s\", 1]]", b"fill=[[1,2]]"),
+    LIFT.encode().replace(b"matrix-821", b"/absolute/valve.toml"),
+    LIFT.encode().replace(b"matrix-821", b"1 x/../../valve"), LIFT.encode().replace(b"5 kg", b"0 kg"),
+    LIFT.encode().replace(b"5 kg", b"5 m"), LIFT.encode().replace(b"HangingMass", b"__import__"),
 )  # fmt: skip
 
 
@@ -232,7 +223,7 @@ def test_texts_in_a_saved_page_remain_texts(app, text):
 )
 def test_names_in_the_program_of_a_saved_page_remain_names(name, tmp_path):
     """Each script of the page has its digest in the policy; the program runs in Node, and its states have the name."""
-    tables = tomllib.loads(SCENARIO)
+    tables = tomllib.loads(LIFT)
     plant = tables["plant"]
     plant |= {"muscle": [{"library": "dmsp-20-300", "name": name}, "dmsp-20-300"], "circuit": [plant["circuit"]] * 2}
     plant["mechanism"] = {"model": "AntagonisticJoint", "radius": 0.04, "inertia": 0.05}
@@ -326,9 +317,7 @@ def test_a_plant_that_takes_too_long_is_refused_in_time(monkeypatch):
     pool = WorkerPool(1)
     app = create_app(pool=pool)
     tube = 'circuit = { model = "WithTubes", tube = { model = "DistributedTube", length = "2 m", diameter = "4 mm", segment_count = 200 }, circuit = { model = "FillDischarge"'
-    text = SCENARIO.replace('circuit = { model = "FillDischarge"', tube).replace(
-        '"matrix-821" } }', '"matrix-821" } } }'
-    )
+    text = LIFT.replace('circuit = { model = "FillDischarge"', tube).replace('"matrix-821" } }', '"matrix-821" } } }')
     try:
         assert request(app, "POST", "/api/law", MUSCLE.encode()).status == 200
         monkeypatch.setattr(studio_app, "TIME_LIMIT", 2.0)

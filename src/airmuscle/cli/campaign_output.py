@@ -38,7 +38,7 @@ def print_campaign(
     echo()
     for name, stage in campaign.stages:
         echo(f"{name}: {stage_result(stage)}")
-    for band in campaign.static.bands if isinstance(campaign.static, StaticStage) else ():
+    for band in campaign.static.all_bands if isinstance(campaign.static, StaticStage) else ():
         echo(str(band))
     for row in validation:
         echo(
@@ -89,7 +89,7 @@ def _values(result: object) -> dict[str, Any]:
         parameters = {} if isinstance(friction, NoFriction) else {leaf.path: leaf.value for leaf in leaves(friction)}
         return {"model": result.selected.name if result.selected else None, "parameters": parameters}
     if isinstance(result, StaticStage):
-        return {"bands": [dataclasses.asdict(band) for band in result.bands], "fit": fit_to_dict(result.fit)}
+        return {"bands": [dataclasses.asdict(band) for band in result.all_bands], "fit": fit_to_dict(result.fit)}
     if isinstance(result, FillStage):
         estimate = None if result.estimate is None else dataclasses.asdict(result.estimate)
         values = [dataclasses.asdict(each) for each in result.fit.estimates]

@@ -57,7 +57,7 @@ class KeptStages:
             content = pickle.dumps(result, protocol=pickle.HIGHEST_PROTOCOL)
             unfinished.write_bytes(hashlib.sha256(content).digest() + content)
             os.replace(unfinished, path)
-        except (OSError, TypeError, AttributeError, pickle.PicklingError):
+        except Exception:  # CasADi raises none of the usual errors
             unfinished.unlink(missing_ok=True)
 
     def remove(self, names: Sequence[str]) -> None:

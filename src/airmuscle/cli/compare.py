@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from ..core.errors import InputError, SimulationError, suggestion
+from ..library.files import is_path
 from ..report.chapter import Table
 from ..report.formatting import format_number, table_rows
 from ..study.control_benchmark import (
@@ -23,6 +24,7 @@ from ..study.control_benchmark import (
     learn,
     on_off_joint,
     proportional_joint,
+    scenario_contender,
     standard_contenders,
 )
 from ..study.control_benchmark.benchmark import DEFAULT_BUDGET
@@ -46,7 +48,10 @@ class Valves(enum.StrEnum):
 def compare(
     valves: Annotated[Valves, typer.Option(help="Valves of the joint.")] = Valves.PROPORTIONAL,
     controller: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="A controller; repeat it for several. Default: all.")
+        list[str] | None,
+        typer.Option(
+            metavar="NAME", help="A controller, or a scenario file with one; repeat it for several. Default: all."
+        ),
     ] = None,
     task: Annotated[
         list[str] | None, typer.Option(metavar="NAME", help="A task; repeat it for several. Default: all.")
@@ -73,6 +78,7 @@ def compare(
       airmuscle compare --out compare
       airmuscle compare --controller PID --controller "feed-forward + PID" --task "sine 1 Hz" --trials 10
       airmuscle compare --valves on-off --budget 2000
+      airmuscle compare --controller PID --controller examples/joint_cascade.toml
     """
     joint = proportional_joint() if valves is Valves.PROPORTIONAL else on_off_joint()
     contenders, tasks = _contenders(joint, controller or []), find_tasks(tuple(task or ()))
@@ -98,6 +104,8 @@ def compare(
 def _contenders(joint: BenchmarkJoint, names: list[str]) -> tuple[Contender, ...]:
     known = {each.name: each for each in standard_contenders(joint)}
     for name in names:
+        if name not in known and is_path(name):
+            known[name] = scenario_contender(joint, name)
         if name not in known:
             raise InputError(f"there is no controller '{name}'; there are {', '.join(known)}.{suggestion(name, known)}")
     return tuple(known[name] for name in dict.fromkeys(names)) or tuple(known.values())

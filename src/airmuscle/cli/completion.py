@@ -52,3 +52,5 @@ complete_plant = _beginning_with(list_plants)
 """Names of plants, for an argument that also takes a scenario file."""
 complete_data = _beginning_with(list_data)
 """Names of data sets, for an argument that also takes files."""
+complete_model = _beginning_with(lambda: (*list_laws(), *list_plants()))
+"""Names of muscles, laws and plants, for an argument that also takes their files."""

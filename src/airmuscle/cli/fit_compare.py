@@ -16,7 +16,7 @@ from ..library.entry import Entry
 from ..library.initial_law import InitialLaw, find_initial_law, resting_lengths
 from ..recording import Recording
 from ..report.compare_chapter import compare_chapter
-from ..report.fit_files import fitted_entry, missing_geometry
+from ..report.fit_files import fitted_entry, left_out_ratio, missing_geometry
 from ..report.output_folder import check_writable
 from .fit_geometry import check_one_length, with_braid
 from .fit_options import FitRequest
@@ -46,7 +46,7 @@ def compare_models(
     extras = request.options.evaluate(best.fit, recordings)
     geometry = named.entry.geometry if named is not None and best.candidate is candidates[-1] else None
     initial, notes = _initial_entry(best.candidate, geometry, recordings, request)
-    entry = fitted_entry(best.fit, initial, files)
+    entry = fitted_entry(best.fit, initial, files, left_out_ratio(best))
     notes += missing_geometry(entry)
     chapters = [compare_chapter(each, best, selection.reason) for each in selection.comparisons]
     write_results(best.fit, entry, recordings, request.out, [*chapters, *extras.chapters()])

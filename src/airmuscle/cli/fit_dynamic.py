@@ -123,7 +123,7 @@ def _write(
         for i in range(len(study.experiments)):
             suffix = f"-{i + 1}" if len(study.experiments) > 1 else ""
             names.append(f"scenario{suffix}.toml")
-            (folder / names[-1]).write_text(study.scenario(fit, i), encoding="utf-8")
+            (folder / names[-1]).write_text(study.scenario(fit, i, cross), encoding="utf-8")
         write_into(folder, dynamic_chapters(fit, study.title, profiles, findings, cross), title="Dynamic fit")
     return [out / name for name in names]
 

@@ -161,7 +161,7 @@ class FitExtras:
         if self.shaped is None:
             return entry
         note = f"{entry.note} With shape constraints: rms error {self.shaped.rmse:.4g} N."
-        return dataclasses.replace(entry, characteristic=self.shaped.model, note=note)
+        return dataclasses.replace(entry, characteristic=self.shaped.model, note=note, error_band=None)
 
 
 def parse_split(name: str | None, purpose: str | None = None, compare: bool = True) -> GroupSplit | None:

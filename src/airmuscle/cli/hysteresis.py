@@ -169,4 +169,7 @@ def _completed(entry: Entry, selected: SelectedFriction | None, held: HeldCreep 
         changes["creep"] = held.elements
         note = f"{note} Creep: {held.verdict}"
     uncertainty = entry.uncertainty and without_parts(entry.uncertainty, changes)
-    return dataclasses.replace(entry, name="muscle", note=note.strip(), uncertainty=uncertainty, **changes)
+    band = None if changes else entry.error_band  # it was stated without them
+    return dataclasses.replace(
+        entry, name="muscle", note=note.strip(), uncertainty=uncertainty, error_band=band, **changes
+    )

@@ -98,6 +98,7 @@ INSTRUCTIONS: Mapping[str, Mapping[str, Instruction]] = {
         "characteristic": lambda hint: "use --muscle NAME with --use-characteristic",
     },
     "campaign": _FILES,
+    "predict": _FILES,
     "convert-data": _CONVERTED,
     "plan": {"fixed": _fix},
     "fit-dynamic": {**_RECORDS, "free": lambda hint: f"write free = {json.dumps(list(hint.value))} under [fit]"},

@@ -16,27 +16,20 @@ from ..report.output_folder import atomic_folder, check_writable
 from ..report.sizing_chapter import choice_row, sizing_chapter
 from ..report.write import write_into
 from ..sizing import (
+    SORT_KEYS,
     JointRequirement,
     LiftRequirement,
     MuscleChoice,
     SizingConditions,
     SizingResult,
-    by_air,
-    by_count,
-    by_diameter,
-    by_length,
-    by_reserve,
     scenario_text,
     size_muscles,
 )
-from ..sizing.choice import Requirement, SortKey
+from ..sizing.choice import Requirement
 from .options import Json, OptionalFolder
 from .progress import computation_progress
 from .terminal import echo, print_json, print_table
 
-SORTS: Mapping[str, SortKey] = {
-    "air": by_air, "length": by_length, "count": by_count, "reserve": by_reserve, "diameter": by_diameter,
-}  # fmt: skip
 SCENARIO_FILE = "scenario.toml"
 FIRST = ("muscle", "number", "length [mm]", "radius [mm]")
 LAST = {"reserve [%]": "reserve [%]", "air a cycle [l (ANR)]": "air [l]", "efficiency [%]": "efficiency [%]"}
@@ -78,7 +71,7 @@ def size(
     max_count: Annotated[int, typer.Option(metavar="N", help="Greatest number of muscles in parallel.")] = 3,
     count: Annotated[int | None, typer.Option(metavar="N", help="Exact number of muscles in parallel.")] = None,
     muscle: Muscles = None,
-    sort: Annotated[str, typer.Option(metavar="KEY", help=f"Criterion of the ranking: {', '.join(SORTS)}.")] = "air",
+    sort: Annotated[str, typer.Option(metavar="KEY", help=f"Criterion of ranking: {', '.join(SORT_KEYS)}.")] = "air",
     out: OptionalFolder = None,
     json: Json = False,
 ) -> None:
@@ -96,8 +89,8 @@ def size(
       airmuscle size --load "100 N" --stiffness "2 N/mm" --stroke "40 mm" --supply "6 bar" --sort length
       airmuscle size --torque "5 N m" --angle "60 deg" --inertia "0.05 kg m^2" --supply "6 bar" --max-count 1
     """
-    if sort not in SORTS:
-        raise typer.BadParameter(f"--sort must be one of {', '.join(SORTS)}, not '{sort}'")
+    if sort not in SORT_KEYS:
+        raise typer.BadParameter(f"--sort must be one of {', '.join(SORT_KEYS)}, not '{sort}'")
     requirement = _requirement(load, stroke, stiffness, torque, angle, inertia)
     counts = (1, max_count) if count is None else (count, count)
     conditions = _conditions(supply, safety, cycle_time, max_length, max_diameter, counts)
@@ -105,7 +98,7 @@ def size(
     if out is not None:
         check_writable(out)
     with computation_progress("sizing") as progress:
-        result = size_muscles(requirement, conditions, entries, SORTS[sort], progress)
+        result = size_muscles(requirement, conditions, entries, SORT_KEYS[sort], progress)
     result.check_reachable()
     note = _write(result, out) if out is not None else ""
     if json:

@@ -123,17 +123,27 @@ class Description:
         """The default initial state, once it has been found."""
         self.checked_state: list[float] | None = None
         """The last initial state that was checked and found possible."""
+        self.checked_segments: Any = None
+        """The last segments of inputs that were found within their ranges, if nobody can write to them."""
         self.integrators: dict[Any, list[Any]] = {}
         """Integrators bound to this system that no run uses at present, by their integrator."""
         self.holders: dict[Any, list[Any]] = {}
         """The same for steps with held inputs."""
+        self.loop_runs: dict[Any, list[Any]] = {}
+        """Runs of control loops at this system that nothing uses at present, by the form of the loop."""
         self.recorders: list[Any] = []
         """Kernels of the rows bound to this system that no run uses at present."""
+        self._name_columns()
+
+    def _name_columns(self) -> None:
+        """The columns of a run, their order, and the limits of states and inputs by their names."""
         self.column_names = (*self.state_names, *self.input_names, *self.output_names)
-        self.positive_columns = [
-            len(states) + len(inputs) + i for i, name in enumerate(self.output_names) if name in positive
-        ]
+        first_output = len(self.state_names) + len(self.input_names)
+        self.positive_columns = [first_output + i for i in self.positive_outputs.tolist()]
         """The columns among `column_names` that must be positive."""
+        self.column_places = {name: i for i, name in enumerate(self.column_names)}
+        self.recorded_names = ("time", *self.state_names, *self.output_names, *self.input_names)
+        """The columns of a recording, in their order."""
         self.remark_texts = tuple(remark.message for remark in self.remarks)
         self.state_limits = dict(zip(self.state_names, self.lower_bounds.tolist(), strict=True))
         """The lower bound of each state by its name."""

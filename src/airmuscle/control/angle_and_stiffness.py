@@ -28,7 +28,6 @@ class AngleAndStiffness(ControlLaw):
     """
 
     references: ClassVar[tuple[Reference, ...]] = (TONDU_LOPEZ_2000, TONIETTI_BICCHI2002)
-    from_file: ClassVar[bool] = False
 
     inverse: AntagonisticInverse
     commanded: tuple[str, ...]
@@ -60,6 +59,11 @@ class AngleAndStiffness(ControlLaw):
     def setpoints(self) -> tuple[str, ...]:
         further = (self.acceleration_setpoint,) if self.acceleration_setpoint else ()
         return (self.inverse.coordinate, "stiffness", *further)
+
+    @property
+    def signal_units(self) -> dict[str, str]:
+        acceleration = {self.acceleration_setpoint: "rad/s2"} if self.acceleration_setpoint else {}
+        return {"stiffness": "N m/rad", **acceleration}
 
     @property
     def inputs(self) -> tuple[str, ...]:

@@ -42,7 +42,6 @@ class AntagonisticInverse:
     """
 
     references: ClassVar[tuple[Reference, ...]] = (TONDU_LOPEZ_2000, TONIETTI_BICCHI2002)
-    from_file: ClassVar[bool] = False
 
     muscles: tuple[Muscle, ...]
     mechanism: Mechanism

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from ..core import ops
-from ..core.declaration import model, parameter
+from ..core.declaration import Parameter, model, parameter
 from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.reference import Reference
@@ -28,7 +28,6 @@ class Cascade(ControlLaw):
     """
 
     references: ClassVar[tuple[Reference, ...]] = (ASTROM_HAGGLUND1995,)
-    from_file: ClassVar[bool] = False
 
     outer: ControlLaw
     inner: ControlLaw
@@ -53,6 +52,11 @@ class Cascade(ControlLaw):
                 raise ParameterError(
                     f"Cascade: '{name}' has minimum {low:g}; allowed range: below its maximum {high:g}."
                 )
+
+    def unit_of(self, declared: Parameter, index: int, units: Mapping[str, str]) -> str:
+        """The unit of a limit: that of the outer command with the same index."""
+        names = self.outer.inputs
+        return units[names[index]] or "1" if index < len(names) else "1"
 
     @property
     def measured_columns(self) -> tuple[str, ...]:

@@ -45,6 +45,10 @@ class CoContraction(OpenLoopLaw):
         return (DIFFERENCE, *((self.mean_setpoint,) if self.mean_setpoint else ()))
 
     @property
+    def signal_units(self) -> dict[str, str]:
+        return {DIFFERENCE: "Pa", **({self.mean_setpoint: "Pa"} if self.mean_setpoint else {})}
+
+    @property
     def inputs(self) -> tuple[str, ...]:
         return self.commanded
 

@@ -48,7 +48,6 @@ class ComputedTorque(ControlLaw):
     """
 
     references: ClassVar[tuple[Reference, ...]] = (SPONG2020, FLIESS1995)
-    from_file: ClassVar[bool] = False
 
     inverse: AntagonisticInverse
     commanded: tuple[str, ...]
@@ -73,6 +72,10 @@ class ComputedTorque(ControlLaw):
     @property
     def setpoints(self) -> tuple[str, ...]:
         return (self.inverse.coordinate, self._speed, "acceleration", "stiffness")
+
+    @property
+    def signal_units(self) -> dict[str, str]:
+        return {"acceleration": "rad/s2", "stiffness": "N m/rad"}
 
     @property
     def inputs(self) -> tuple[str, ...]:

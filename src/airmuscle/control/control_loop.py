@@ -17,6 +17,7 @@ from ..recording.recording import Recording
 from .controller import Controller
 from .driver import Driver
 from .inputs import ZERO_INPUT, InputSignal, Schedule, check_input_names, check_input_signal
+from .parameter_units import named_signal_units
 from .piecewise_linear import PiecewiseLinear, merge_columns
 from .with_drivers import WithDrivers
 
@@ -123,6 +124,7 @@ class ControlLoop(ShortRepr):
 
     def units(self, known: Mapping[str, str]) -> dict[str, str]:
         """The units of the columns that the loop adds to a recording, from those of the plant's columns."""
+        known = {**named_signal_units(self.controller), **{name: unit for name, unit in known.items() if unit}}
         kinds = (
             (SETPOINT, self.controller.setpoints),
             (MEASURED, self.controller.measured_columns),

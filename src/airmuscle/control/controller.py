@@ -6,9 +6,10 @@ import abc
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+from ..core.declaration import Parameter
 from ..core.ops import Value
 
-RELATIVE = ("u", "y", "u/y")
+RELATIVE = ("u", "y", "u/y", "u/s")
 """Units of a controller's parameters that follow from the loop: u is the unit of the commanded input, y that of the
 measured column. In Python such a number is SI; a file gives it in any unit that fits: `"0.4 1/bar"`."""
 
@@ -22,7 +23,18 @@ class Measurement(NamedTuple):
     ranges: Mapping[str, tuple[Value, Value]]
 
 
-class Controller(abc.ABC):
+class SignalRelated(abc.ABC):
+    """A model with parameters whose units follow from the signals that it names."""
+
+    @abc.abstractmethod
+    def unit_of(self, declared: Parameter, index: int, units: Mapping[str, str]) -> str:
+        """The unit of item `index` of a declared parameter; `units` are those of the signals by name, '' if unknown.
+
+        Raises KeyError for a signal that is not among them.
+        """
+
+
+class Controller(SignalRelated):
     """A sampled controller: a frozen model with a memory that is a value, so that runs are reproducible."""
 
     @property
@@ -52,6 +64,19 @@ class Controller(abc.ABC):
         it.
         """
 
+    @property
+    def signal_units(self) -> Mapping[str, str]:
+        """Units of the signals that this controller names and that are no columns of a plant, by name."""
+        return {}
+
+    def unit_of(self, declared: Parameter, index: int, units: Mapping[str, str]) -> str:
+        """The unit of a parameter: u is that of the first commanded input, y that of the first measured column."""
+        if declared.unit not in RELATIVE:
+            return declared.unit
+        measured = units[self.measured_columns[0]] or "1" if "y" in declared.unit else "1"
+        commanded = units[self.inputs[0]] or "1" if "u" in declared.unit else "1"
+        return relative_unit(declared.unit, measured, commanded)
+
     def notes(self, memory: Any) -> tuple[str, ...]:
         """Remarks on a run that ended with this memory, for the notes of its recording; none by default."""
         return ()
@@ -63,4 +88,6 @@ def relative_unit(unit: str, measured: str, commanded: str) -> str:
         if measured in ("1", commanded):
             return commanded if measured == "1" else "1"
         return f"{commanded}/({measured})" if set(measured) & set("/ ") else f"{commanded}/{measured}"
+    if unit == "u/s":
+        return "1/s" if commanded == "1" else f"({commanded})/s"
     return {"u": commanded, "y": measured}.get(unit, unit)

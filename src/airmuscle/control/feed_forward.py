@@ -41,6 +41,11 @@ class StaticFeedForward(OpenLoopLaw):
         return (self.position, *(name for name in (self.load_setpoint, self.acceleration_setpoint) if name))
 
     @property
+    def signal_units(self) -> dict[str, str]:
+        named = {self.load_setpoint: "N", self.acceleration_setpoint: "m/s2"}
+        return {name: unit for name, unit in named.items() if name}
+
+    @property
     def inputs(self) -> tuple[str, ...]:
         return (self.commanded,)
 

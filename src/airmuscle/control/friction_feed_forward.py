@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from ..core import ops
-from ..core.declaration import model, parameter
+from ..core.declaration import Parameter, model, parameter
 from ..core.ops import Value
 from ..core.reference import Reference
 from .open_loop_law import OpenLoopLaw
@@ -33,12 +33,17 @@ class FrictionFeedForward(OpenLoopLaw):
     """
 
     references: ClassVar[tuple[Reference, ...]] = (ARMSTRONG1994,)
-    from_file: ClassVar[bool] = False
 
     speed: str
     commanded: str
     amplitude: float = parameter("u", "A", "command that balances the friction", bounds=(0.0, 1e9))
     boundary_speed: float = parameter("SI", "v_0", "speed from which on it is constant", bounds=(1e-9, 1e9))
+
+    def unit_of(self, declared: Parameter, index: int, units: Mapping[str, str]) -> str:
+        """The unit of a parameter; that of v_0 is that of the speed."""
+        if declared.name == "boundary_speed":
+            return units[self.speed] or "1"
+        return super().unit_of(declared, index, units)
 
     @property
     def setpoints(self) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from ..core import ops
-from ..core.declaration import model, parameter
+from ..core.declaration import Parameter, model, parameter
 from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.reference import Reference
@@ -16,6 +16,7 @@ from ..core.variables import united
 from .control_law import ControlLaw
 from .controller import Measurement
 from .enclosing_law import EnclosingLaw
+from .parameter_units import parameter_units
 
 RUGH_SHAMMA2000 = Reference(
     key="rugh-shamma-2000",
@@ -39,7 +40,6 @@ class GainSchedule(EnclosingLaw):
     """
 
     references: ClassVar[tuple[Reference, ...]] = (RUGH_SHAMMA2000,)
-    from_file: ClassVar[bool] = False
 
     law: ControlLaw
     scheduled: str
@@ -67,6 +67,12 @@ class GainSchedule(EnclosingLaw):
                 raise ParameterError(
                     f"GainSchedule: a value of {self.scheduled} is {value:g}; allowed range: {low:g} to {high:g}."
                 )
+
+    def unit_of(self, declared: Parameter, index: int, units: Mapping[str, str]) -> str:
+        """The unit of a breakpoint is that of the scheduling column, of a value that of the scheduled parameter."""
+        if declared.name == "breakpoints":
+            return units[self.scheduling_column] or "1"
+        return parameter_units(self.law, units).get(self.scheduled, "1")
 
     @property
     def measured_columns(self) -> tuple[str, ...]:

@@ -28,7 +28,6 @@ class HysteresisCompensation(EnclosingLaw):
     """
 
     references: ClassVar[tuple[Reference, ...]] = (KUHNEN2003,)
-    from_file: ClassVar[bool] = False
 
     law: ControlLaw
     commanded: str

@@ -35,7 +35,6 @@ class HysteresisOperator:
     """
 
     references: ClassVar[tuple[Reference, ...]] = (KUHNEN2003,)
-    from_file: ClassVar[bool] = False
 
     thresholds: tuple[float, ...] = parameter("u", "r_i", "threshold of each play, the first is 0", fitted=False)
     weights: tuple[float, ...] = parameter("1", "w_i", "weight of each play")
@@ -105,7 +104,6 @@ class InverseHysteresisOperator:
     """Inverse of a HysteresisOperator: x = sum w'_i P_r'i[S'(y)]; made by `HysteresisOperator.inverse`."""
 
     references: ClassVar[tuple[Reference, ...]] = (KUHNEN2003,)
-    from_file: ClassVar[bool] = False
 
     thresholds: tuple[float, ...] = parameter("u", "r'_i", "threshold of each play", fitted=False)
     weights: tuple[float, ...] = parameter("1", "w'_i", "weight of each play", fitted=False)

@@ -36,6 +36,13 @@ class InputSignal(abc.ABC):
         Raises ParameterError for an input that the plant does not have.
         """
 
+    def checked_segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
+        """The same as arrays that a kernel can read. Raises ParameterError also for segments that do not rise in time,
+        lack an input or hold a number that is not finite."""
+        segments = self.segments(inputs, start, duration)
+        segments.check_shape(len(inputs), start)
+        return segments.as_floats()
+
     @property
     def names(self) -> tuple[str, ...] | None:
         """The inputs that the signal names; None if it names none."""
@@ -106,10 +113,19 @@ class Schedule(InputSignal):
             _check_points("schedule", "instants", name, pairs)
             changes[name] = [t for t, _ in pairs], [0.0, *(v for _, v in pairs)]
         object.__setattr__(self, "_changes", changes)
+        object.__setattr__(self, "_last", ((), 0.0, 0.0, None))
 
     @property
     def names(self) -> tuple[str, ...]:
         return tuple(self.changes)
+
+    def checked_segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
+        """As of any signal, in arrays that cannot be written to; those of the last call are kept for the next one."""
+        *asked, segments = self._last  # type: ignore[attr-defined]
+        if segments is None or asked != [inputs, start, duration]:
+            segments = super().checked_segments(inputs, start, duration).read_only()
+            object.__setattr__(self, "_last", (inputs, start, duration, segments))
+        return segments  # type: ignore[no-any-return]
 
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
         changes: dict[str, tuple[list[float], list[float]]] = self._changes  # type: ignore[attr-defined]

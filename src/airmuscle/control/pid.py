@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from typing import ClassVar
 
@@ -71,7 +72,7 @@ class PID(SisoController):
         setpoint, measured = measurement.setpoints[self.measured], measurement.columns[self.measured]
         proportional = self.gain * (self.setpoint_weight * setpoint - measured)
         weighted = self.derivative_weight * setpoint - measured
-        started, integrates = memory["started"] > 0, self.integral_time > 0
+        started, (integrates, integral_time, tracking) = memory["started"] > 0, self._integration
         filtered = self.derivative_time + self.derivative_filter * dt
         increment = self.gain * self.derivative_filter * (weighted - memory["weighted_error"])
         derivative = self.derivative_time / filtered * (memory["derivative"] + increment)
@@ -81,13 +82,17 @@ class PID(SisoController):
         wanted = proportional + integral + derivative
         minimum, maximum = range_of(self.commanded, measurement.ranges)
         limited = ops.clip(wanted, minimum, maximum)
-        integral_time = ops.where(integrates, self.integral_time, 1.0)
-        tracking = ops.where(integrates, self._tracking(), 1.0)
         later = integral + self.gain * dt / integral_time * (setpoint - measured)
         later = later + ops.minimum(dt / tracking, 1.0) * (limited - wanted)
         integral = ops.where(integrates, later, integral)
         values = {"started": 1.0, "integral": integral, "derivative": derivative, "weighted_error": weighted}
         return commands(self.commanded, limited), values
+
+    @functools.cached_property
+    def _integration(self) -> tuple[Value, Value, Value]:
+        """Whether there is integral action, and its time constant and that of the anti-windup [s]; otherwise 1."""
+        integrates = self.integral_time > 0
+        return integrates, ops.where(integrates, self.integral_time, 1.0), ops.where(integrates, self._tracking(), 1.0)
 
     def _tracking(self) -> Value:
         """The time constant [s] of the anti-windup."""

@@ -27,12 +27,11 @@ class ProportionalFeedback(ControlLaw):
     """
 
     references: ClassVar[tuple[Reference, ...]] = (ASTROM_HAGGLUND1995,)
-    from_file: ClassVar[bool] = False
 
     controlled: tuple[str, ...]
     commanded: tuple[Commanded, ...]
-    gain: float = parameter("1/Pa", "K", "gain of all columns", bounds=(0.0, 1e6))
-    zone: float = parameter("Pa", "z", "half width of the dead zone", bounds=(0.0, 1e9), default=0.0)
+    gain: float = parameter("u/y", "K", "gain of all columns", bounds=(0.0, 1e6))
+    zone: float = parameter("y", "z", "half width of the dead zone", bounds=(0.0, 1e9), default=0.0)
 
     initial_memory: ClassVar[Mapping[str, float]] = {}
 

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from ..core import ops
-from ..core.declaration import model, parameter
+from ..core.declaration import Parameter, model, parameter
 from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.reference import Reference
 from ..core.variables import select_prefix, with_prefix
 from .control_law import ControlLaw
-from .controller import Measurement
+from .controller import Measurement, SignalRelated
 from .enclosing_law import EnclosingLaw
 from .random_numbers import LECUYER1999, STATE, drawn_normal, seeded
 
@@ -21,7 +21,7 @@ MAX_DELAY = 1000
 
 
 @model
-class ColumnSensor:
+class ColumnSensor(SignalRelated):
     """Sensor of one column: first-order lag T y' = x - y, noise, quantisation, delay, in this order.
 
         y_k = y_(k-1) + (1 - exp(-h/T)) (x_k - y_(k-1)),   z_k = q floor((y_k + sigma n_k)/q + 1/2),   output z_(k-d)
@@ -29,8 +29,6 @@ class ColumnSensor:
     x column, h sample time, n_k normal deviates. The lag starts at the first measurement, and the first value is
     delivered until the delay has passed. A parameter that is 0 disables its part. All are in the unit of the column.
     """
-
-    from_file: ClassVar[bool] = False
 
     column: str
     resolution: float = parameter("y", "q", "resolution; 0: continuous", bounds=(0.0, 1e9), fitted=False, default=0.0)
@@ -41,6 +39,10 @@ class ColumnSensor:
     def check(self) -> None:
         if not 0 <= self.delay <= MAX_DELAY:
             raise ParameterError(f"ColumnSensor: delay is {self.delay} samples; allowed range: 0 to {MAX_DELAY}.")
+
+    def unit_of(self, declared: Parameter, index: int, units: Mapping[str, str]) -> str:
+        """The unit of a parameter: y is that of the column."""
+        return units[self.column] or "1" if declared.unit == "y" else declared.unit
 
     @property
     def initial_memory(self) -> dict[str, float]:
@@ -76,7 +78,6 @@ class WithSensors(EnclosingLaw):
     """
 
     references: ClassVar[tuple[Reference, ...]] = (LECUYER1999,)
-    from_file: ClassVar[bool] = False
 
     law: ControlLaw
     sensors: tuple[ColumnSensor, ...]

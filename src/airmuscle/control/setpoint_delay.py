@@ -31,7 +31,6 @@ class WithSetpointDelay(EnclosingLaw):
     """
 
     references: ClassVar[tuple[Reference, ...]] = (ASTROM_HAGGLUND1995,)
-    from_file: ClassVar[bool] = False
 
     law: ControlLaw
     samples: int

@@ -37,7 +37,6 @@ class StateFeedback(MultivariableController, ControlLaw):
     """
 
     references: ClassVar[tuple[Reference, ...]] = (FRANKLIN1998,)
-    from_file: ClassVar[bool] = False
 
     measured: tuple[str, ...]
     controlled: tuple[str, ...]

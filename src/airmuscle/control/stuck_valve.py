@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar
 
 from ..core import ops
 from ..core.declaration import model, parameter
@@ -22,8 +21,6 @@ class WithStuckValve(EnclosingLaw):
     t time since the first sample, u_i the command of one input. With u_f = 0 a valve remains closed, with a small u_f
     it leaks. All other inputs receive what the law commands.
     """
-
-    from_file: ClassVar[bool] = False
 
     law: ControlLaw
     stuck_input: str

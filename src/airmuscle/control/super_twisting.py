@@ -37,12 +37,11 @@ class SuperTwisting(SisoController):
     """
 
     references: ClassVar[tuple[Reference, ...]] = (LEVANT1993,)
-    from_file: ClassVar[bool] = False
 
     measured: str
     commanded: Commanded
     proportional: float = parameter("u/y^0.5", "k_1", "gain of the square root, in SI units", bounds=(0.0, 1e12))
-    integral: float = parameter("u/s", "k_2", "rate of the integral, in SI units", bounds=(0.0, 1e12))
+    integral: float = parameter("u/s", "k_2", "rate of the integral", bounds=(0.0, 1e12))
     sliding_time: float = parameter("s", "T_s", "time constant of the error on s = 0", bounds=(0.0, 1e3), default=0.0)
     filter_time: float = parameter("s", "T_f", "time constant of the derivative", bounds=(0.0, 1e3), default=0.0)
     initial_output: float = parameter("u", "u_0", "initial integral", default=0.0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import enum
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from .arrays import Array
@@ -64,10 +64,16 @@ class ColumnLimit(NamedTuple):
 
 
 class Columns(Mapping[str, Array]):
-    """Columns (N,) of a run by name, with the smallest and largest value of each."""
+    """Columns (N,) of a run by name, with the smallest and largest value of each.
 
-    def __init__(self, columns: Mapping[str, Array], limits: Mapping[str, tuple[float, float]] | None = None) -> None:
-        self._columns, self._limits = columns, limits or {}
+    places, lower, upper   the smallest and largest values that are known, and by column where they stand among them
+    """
+
+    def __init__(
+        self, columns: Mapping[str, Array], places: Mapping[str, int] | None = None, lower: Sequence[float] = (),
+        upper: Sequence[float] = (),
+    ) -> None:  # fmt: skip
+        self._columns, self._places, self._lower, self._upper = columns, places or {}, lower, upper
 
     def __getitem__(self, name: str) -> Array:
         return self._columns[name]
@@ -78,9 +84,13 @@ class Columns(Mapping[str, Array]):
     def __len__(self) -> int:
         return len(self._columns)
 
+    def __contains__(self, name: object) -> bool:
+        return name in self._columns
+
     def limits(self, name: str) -> tuple[float, float]:
         """The smallest and largest value of a column that has rows."""
-        if name in self._limits:
-            return self._limits[name]
+        place = self._places.get(name)
+        if place is not None:
+            return self._lower[place], self._upper[place]
         values = self._columns[name]
         return float(values.min()), float(values.max())

@@ -17,7 +17,7 @@ MAX_ROWS = 14
 """Maximum number of rows of a table."""
 MAX_NOTES = 5
 """Maximum number of notes."""
-MAX_TEXT = 300
+MAX_TEXT = 600
 """Maximum number of characters of a text in a card."""
 MAX_CHART = 130_000
 """Maximum number of bytes of a chart; a larger one is drawn again with fewer pixels."""

@@ -10,6 +10,7 @@ from ..core.errors import IdentificationError
 from ..friction import NoFriction
 from ..identify.campaign import Campaign, CreepStage, ReleaseStage, StaticStage
 from .entry import Entry
+from .stated_band import StatedBand
 from .uncertainty import ParameterUncertainty
 
 
@@ -37,6 +38,7 @@ def campaign_entry(campaign: Campaign, title: str, resting_length: float | None 
         note=_note(campaign, stage),
         validity_range=stage.fit.validity_range,
         uncertainty=_uncertainty(campaign, stage),
+        error_band=_stated_band(stage),
     )
 
 
@@ -45,6 +47,13 @@ def _note(campaign: Campaign, stage: StaticStage) -> str:
     left_out = [name for name, result in campaign.stages if hasattr(result, "remedy")]
     text = f"Identified from {used} of {len(campaign.records)} records. {stage.band}"
     return f"{text} Not identified: {', '.join(left_out)}." if left_out else text
+
+
+def _stated_band(stage: StaticStage) -> StatedBand:
+    held = stage.held_band
+    if held is None or held.half_width == stage.band.half_width:
+        return StatedBand("force", stage.band.half_width, str(stage.band))
+    return StatedBand("force", stage.band.half_width, f"{stage.band} {held}", held.half_width)
 
 
 def _uncertainty(campaign: Campaign, stage: StaticStage) -> ParameterUncertainty | None:

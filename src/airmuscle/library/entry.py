@@ -13,6 +13,7 @@ from ..friction.base import Friction
 from ..geometry.base import Geometry
 from ..muscle import CreepElements, Damper, Muscle, Ratings, SeriesElement, Spring, Stop, Wall
 from .entry_display import EntryDisplay
+from .stated_band import StatedBand
 from .uncertainty import ParameterUncertainty
 
 OPTIONAL_PARTS = ("spring", "damper", "friction", "wall", "series", "stop", "creep")
@@ -43,8 +44,9 @@ class Entry(EntryDisplay):
 
     `provenance` is the origin of the numbers (printed, measured, secondary source, fitted, chosen), `warning` a
     restriction of use, which is issued when the entry is loaded, `validity_range` the range of the measurements or the
-    publication, `uncertainty` the standard errors and correlations of fitted parameters, if the file states them, and
-    `ratings` the values that the maker of the muscle permits, if known.
+    publication, `uncertainty` the standard errors and correlations of fitted parameters, if the file states them,
+    `error_band` the 95 % band of the predicted quantity, `ratings` the values that the maker of the muscle permits, if
+    known.
     """
 
     name: str
@@ -66,6 +68,7 @@ class Entry(EntryDisplay):
     checks: tuple[Check, ...] = ()
     references: tuple[Reference, ...] = ()
     uncertainty: ParameterUncertainty | None = None
+    error_band: StatedBand | None = None
 
     @property
     def muscle(self) -> Muscle:

@@ -17,6 +17,7 @@ from .entry import Check, Entry
 from .location import Location, check_keys, check_type, read_finite_number, read_table_array, read_text
 from .product_entry import build_limits, read_ratings
 from .references import read_references
+from .stated_band import read_stated_band
 from .uncertainty import read_uncertainty
 
 QUANTITIES = {"pressure": "Pa", "contraction": "1", "force": "N", "volume": "m3"}
@@ -26,7 +27,7 @@ PARTS = {
     "wall": Wall, "series": SeriesElement, "stop": Stop, "creep": CreepElements,
 }  # fmt: skip
 """Tables of an entry file that describe a model, each with the class that is required."""
-KEYS = (*TEXT_KEYS, *PARTS, "product", "ratings", "validity_range", "uncertainty", "check", "reference")
+KEYS = (*TEXT_KEYS, *PARTS, "product", "ratings", "validity_range", "uncertainty", "error_band", "check", "reference")
 """Keys of an entry file."""
 _CONDITIONS = {
     "pressure": ("contraction", "force"),
@@ -71,6 +72,9 @@ def build_entry(tables: Mapping[str, Any], name: str, file: Path, folder: Path) 
         references=(*read_references(tables, location), *product_references),
         uncertainty=read_uncertainty(tables["uncertainty"], location.inside("uncertainty"))
         if "uncertainty" in tables
+        else None,
+        error_band=read_stated_band(tables["error_band"], location.inside("error_band"))
+        if "error_band" in tables
         else None,
     )
 

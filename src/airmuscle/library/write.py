@@ -22,13 +22,16 @@ def to_toml(entry: Entry) -> str:
         thing = getattr(entry, part)
         belongs_to_law = part == "geometry" and thing == getattr(entry.characteristic, "geometry", None)
         if thing is not None and not belongs_to_law:
-            tables[part] = _model_table(thing)
+            tables[part] = model_table(thing)
     if entry.ratings is not None:
         tables["ratings"] = {name: getattr(entry.ratings, name) for name in entry.ratings.stated}
     if entry.validity_range is not None:
         tables["validity_range"] = dataclasses.asdict(entry.validity_range)
     if entry.uncertainty is not None:
         tables["uncertainty"] = uncertainty_table(entry.uncertainty)
+    if entry.error_band is not None:
+        stated = dataclasses.asdict(entry.error_band)
+        tables["error_band"] = {key: value for key, value in stated.items() if value is not None}
     if entry.checks:
         tables["check"] = [_check_table(check) for check in entry.checks]
     if entry.references:
@@ -41,7 +44,7 @@ def to_toml(entry: Entry) -> str:
 
 def part_toml(name: str, thing: Any) -> str:
     """Text of one table of a library file, such as [friction], with the model and its parameters."""
-    return _to_text({name: _model_table(thing)})
+    return _to_text({name: model_table(thing)})
 
 
 def tables_toml(tables: Mapping[str, Any]) -> str:
@@ -50,14 +53,16 @@ def tables_toml(tables: Mapping[str, Any]) -> str:
 
 
 def scenario_toml(
-    title: str, plant: Any, input_table: Mapping[str, Any], run: Mapping[str, Any], note: str = ""
-) -> str:
+    title: str, plant: Any, input_table: Mapping[str, Any], run: Mapping[str, Any], note: str = "",
+    uncertainty: Mapping[str, Any] | None = None,
+) -> str:  # fmt: skip
     """Text of a scenario that `load_scenario` reads: a plant with all parameters, the command and run tables.
 
-    Each line of `note` becomes a comment at the beginning.
+    Each line of `note` becomes a comment at the beginning; `uncertainty` is that of the fit of the plant.
     """
     comments = "".join(f"# {line}\n" for line in note.splitlines())
-    return comments + _to_text({"title": title, "plant": _model_table(plant), "input": input_table, "run": run})
+    last = {} if uncertainty is None else {"uncertainty": uncertainty}
+    return comments + _to_text({"title": title, "plant": model_table(plant), "input": input_table, "run": run, **last})
 
 
 def save(entry: Entry, path: str | Path) -> Path:
@@ -66,15 +71,20 @@ def save(entry: Entry, path: str | Path) -> Path:
         raise ParameterError(f"save: {one_line(entry)} is not an Entry; build one with Entry, or load and replace one.")
     if not isinstance(path, str | Path):
         raise FileError(f"save: {path!r} is not a path; give a text or a Path.")
-    path = Path(path)
+    return write_text(Path(path), to_toml(entry))
+
+
+def write_text(path: Path, text: str) -> Path:
+    """Write a text to a file, which is complete or unchanged; line ends are those of the text. Raises FileError."""
     unfinished = path.with_name(f"{path.name}.part")
     try:
-        unfinished.write_text(to_toml(entry), encoding="utf-8")
+        with unfinished.open("w", encoding="utf-8", newline="") as file:
+            file.write(text)
         unfinished.replace(path)
     except OSError as error:
         with contextlib.suppress(OSError):
             unfinished.unlink()
-        raise FileError(f"{path}: cannot be written ({error.strerror}).") from None
+        raise FileError(f"{path}: cannot be written ({error.strerror}). Name a file in a writable folder.") from None
     return path
 
 
@@ -84,7 +94,7 @@ def _to_text(tables: Mapping[str, Any]) -> str:
     return tomlkit.dumps(_plain(tables))
 
 
-def _model_table(thing: Any) -> dict[str, Any]:
+def model_table(thing: Any) -> dict[str, Any]:
     """A model as the table that `build` reads; fields that are None have this default and are left out."""
     fields = {f.name: getattr(thing, f.name) for f in dataclasses.fields(thing) if f.init}
     return {"model": type(thing).__name__, **{name: value for name, value in fields.items() if value is not None}}
@@ -98,7 +108,7 @@ def _check_table(check: Check) -> dict[str, Any]:
 def _plain(value: Any) -> Any:
     """Models as tables, tuples as lists, NumPy numbers as floats; in a table, values stand before inner tables."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return _plain(_model_table(value))
+        return _plain(model_table(value))
     if isinstance(value, Mapping):
         plain = {key: _plain(item) for key, item in value.items()}
         return dict(sorted(plain.items(), key=lambda item: _is_table(item[1])))

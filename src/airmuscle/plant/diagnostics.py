@@ -14,6 +14,7 @@ from ..core.ops import Value
 from ..core.variables import select_prefix
 from ..friction import NoFriction
 from ..muscle import INNER_CONTRACTION, ElasticSeriesElement, Muscle
+from ..pneumatics import Circuit
 
 MARGIN = 1e-3
 """Fraction of the contraction range of a geometry within which a muscle is at its limit (chosen)."""
@@ -51,21 +52,29 @@ def column_limits(muscles: Sequence[Muscle], prefixes: Sequence[str]) -> tuple[C
     )
 
 
-def extrapolation(limits: Sequence[ColumnLimit], columns: Columns) -> list[Diagnostic]:
-    """Diagnostics of a run that left the validity range of a characteristic, the range of the data of a friction, or
-    the contraction range of a geometry."""
-    diagnostics = []
-    for muscle, code, column, quantity, bounds in limits:
-        if column in columns and columns["time"].size and _exceeds(columns.limits(column), bounds):
-            diagnostics.append(_excess(columns["time"], columns[column], muscle, code, quantity, bounds))
-    return diagnostics
+def with_tolerance(limits: Sequence[ColumnLimit]) -> tuple[tuple[ColumnLimit, float, float], ...]:
+    """Each limit of a column, with the bounds that the column may reach through rounding."""
+    return tuple((limit, *_widened(*limit.bounds)) for limit in limits)
 
 
-def _exceeds(limits: tuple[float, float], bounds: tuple[float, float]) -> bool:
-    (smallest, largest), (low, high) = limits, bounds
+def _widened(low: float, high: float) -> tuple[float, float]:
     span = high - low if np.isfinite(high - low) else abs(high if np.isfinite(high) else low)
     slack = _TOLERANCE * span
-    return smallest < low - slack or largest > high + slack
+    return low - slack, high + slack
+
+
+def extrapolation(limits: Sequence[tuple[ColumnLimit, float, float]], columns: Columns) -> list[Diagnostic]:
+    """Diagnostics of a run that left the validity range of a characteristic, the range of the data of a friction, or
+    the contraction range of a geometry; `limits` are those of `with_tolerance`."""
+    diagnostics: list[Diagnostic] = []
+    if not columns["time"].size:
+        return diagnostics
+    for limit, low, high in limits:
+        if limit.column in columns:
+            smallest, largest = columns.limits(limit.column)
+            if smallest < low or largest > high:
+                diagnostics.append(_excess(columns["time"], columns[limit.column], limit))
+    return diagnostics
 
 
 def _limits(muscle: Muscle, prefix: str) -> Iterator[tuple[DiagnosticCode, str, str, tuple[float, float]]]:
@@ -85,11 +94,9 @@ def _limits(muscle: Muscle, prefix: str) -> Iterator[tuple[DiagnosticCode, str, 
     yield DiagnosticCode.GEOMETRY_LIMIT, f"{prefix}{own}", own, muscle.geometry.contraction_range
 
 
-def _excess(
-    time: Array, values: Array, subject: str, code: DiagnosticCode, quantity: str, bounds: tuple[float, float]
-) -> Diagnostic:
+def _excess(time: Array, values: Array, limit: ColumnLimit) -> Diagnostic:
     """The diagnostic of a column of pressure, speed or contraction that exceeds its limits."""
-    low, high = bounds
+    subject, code, _, quantity, (low, high) = limit
     excess = np.maximum(low - values, values - high)
     scale, unit = _shown_unit(quantity)
     worst, rows = int(np.argmax(excess)), int(np.count_nonzero(excess > 0))
@@ -132,6 +139,21 @@ def rated_temperature(muscles: Sequence[Muscle], ambient_temperature: float) -> 
         if muscle.ratings
         for text in muscle.ratings.excesses(temperature=ambient_temperature)
     ]
+
+
+class Checks(NamedTuple):
+    """What the rows of a run are compared with: diagnostics that every run has, limits of columns as in
+    `with_tolerance`, and the circuits with a validity range, by the prefixes of their names."""
+
+    constant: list[Diagnostic]
+    limits: tuple[tuple[ColumnLimit, float, float], ...]
+    circuits: tuple[tuple[str, Circuit], ...]
+
+
+def components(remarks: Mapping[str, str]) -> list[Diagnostic]:
+    """Diagnostics of components that were beyond the validity of their model, by the prefixes of their names."""
+    named = {name.removesuffix("."): text for name, text in remarks.items()}
+    return [Diagnostic(DiagnosticCode.COMPONENT, name, f"{name}: {text}") for name, text in named.items()]
 
 
 class Enclosure(NamedTuple):

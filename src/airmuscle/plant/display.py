@@ -9,6 +9,9 @@ from ..core.display import quantity_text
 from ..core.notebook import Card, NotebookDisplay
 from ..core.plotting import new_figure
 from ..muscle.display import plot_isobars
+from ..recording import Recording
+from .animation import Animation
+from .drawing import scene_of
 
 MAX_CHARTS = 2
 """Maximum number of muscles with a chart; muscles with the same law have one."""
@@ -16,6 +19,12 @@ MAX_CHARTS = 2
 
 class PlantDisplay(NotebookDisplay):
     """Base of Plant for its display."""
+
+    def animate(self, recording: Recording, speed: float = 1.0) -> Animation:
+        """Animation of a run of this plant; see Recording.animate."""
+        plant: Any = self
+        scene = scene_of([muscle.geometry for muscle in plant.muscles], plant.prefixes, plant.mechanism)
+        return Animation(scene, recording, speed)
 
     def _card(self) -> Card:
         plant: Any = self

@@ -10,24 +10,21 @@ from typing import Any, ClassVar
 
 from ..core.declaration import as_finite_float, model
 from ..core.diagnostics import ColumnLimit, Columns, Diagnostic, DiagnosticCode
-from ..core.errors import GeometryLimitError, ParameterError
+from ..core.errors import GeometryLimitError
 from ..core.ops import Value
 from ..core.system import System
 from ..core.variables import Input, StateVariable, add_prefix, select_prefix, with_prefix
 from ..mechanism import Mechanism
 from ..muscle import Muscle
 from ..pneumatics import Circuit, CircuitFlows
-from ..pneumatics.gas import Air, Ambient, Gas, Polytropic, check_above_vacuum
+from ..pneumatics.gas import Air, Ambient, Gas, Polytropic
 from ..pneumatics.ports import key_by_muscle, key_by_port
-from ..recording import Recording
 from . import diagnostics
-from .animation import Animation
 from .display import PlantDisplay
-from .drawing import scene_of
 from .evaluation import PlantEvaluation
 from .muscle_state import MuscleState, air_states, muscle_outputs, muscle_state, states_of_muscle
 from .steady_state import fill_muscles, settle_muscles
-from .validation import check_free, check_parts, check_unique
+from .validation import check_free, check_parts, check_pressures, check_unique
 
 _AIR_STATES = ("air_mass", "internal_energy")
 _ROUNDING = 1e-3
@@ -224,18 +221,14 @@ class Plant(PlantDisplay, System):
         ParameterError for a pressure below absolute zero, another number of pressures than muscles, an unknown name, or
         a volume that is not positive; GeometryLimitError for an impossible contraction.
         """
-        given = pressure if isinstance(pressure, tuple) else (pressure,) * len(self.muscles)
-        pressures = [as_finite_float("Plant: the pressure of a state", p) for p in given]
+        pressures = check_pressures(pressure, len(self.muscles), self.ambient)
         values = {name: as_finite_float(f"Plant: the {name} of a state", value) for name, value in values.items()}
-        if len(pressures) != len(self.muscles):
-            raise ParameterError(f"Plant: {len(pressures)} pressures are given for {len(self.muscles)} muscles.")
         muscles = zip(self.prefixes, self.muscles, strict=True)
         air = {f"{p}{s.name}" for p, m in muscles for s in air_states(m, self.gas, self.ambient)}
         check_free(values, [s.name for s in self.states if s.name not in air])
         state: dict[str, Value] = {n: 0.0 for c in self.mechanism.coordinates for n in (c.name, c.speed)} | values
         contractions = self.mechanism.contractions(state, self.resting_lengths)
-        for muscle, p, contraction in zip(self.muscles, pressures, contractions, strict=True):
-            check_above_vacuum(p, self.ambient)
+        for muscle, contraction in zip(self.muscles, contractions, strict=True):
             muscle.geometry.check_contraction(contraction)
         state, volumes = self.settle_muscles(pressures, state)
         diagnostics.check_volumes(self.muscles, pressures, volumes)
@@ -275,13 +268,18 @@ class Plant(PlantDisplay, System):
 
     def diagnose(self, columns: Columns) -> list[Diagnostic]:
         """Extrapolation of characteristics, limits of geometries, components beyond the validity of their model."""
+        rated, limits, circuits = self._checks
         remarks: dict[str, str] = {}
-        for prefix, circuit in self._circuits():
+        for prefix, circuit in circuits:
             remarks |= self._outside(prefix, circuit.validity_warnings(self._within(prefix, columns), self.ambient))
-        named = {name.removesuffix("."): text for name, text in remarks.items()}
-        components = [Diagnostic(DiagnosticCode.COMPONENT, name, f"{name}: {text}") for name, text in named.items()]
+        return [*rated, *diagnostics.extrapolation(limits, columns), *diagnostics.components(remarks)]
+
+    @functools.cached_property
+    def _checks(self) -> diagnostics.Checks:
+        """What `diagnose` compares a run with."""
         rated = diagnostics.rated_temperature(self.muscles, self.ambient.temperature)
-        return [*rated, *diagnostics.extrapolation(self.column_limits, columns), *components]
+        circuits = tuple((prefix, circuit) for prefix, circuit in self._circuits() if circuit.has_validity_range)
+        return diagnostics.Checks(rated, diagnostics.with_tolerance(self.column_limits), circuits)
 
     @functools.cached_property
     def column_limits(self) -> tuple[ColumnLimit, ...]:
@@ -294,7 +292,3 @@ class Plant(PlantDisplay, System):
             return diagnostics.first_hint(self._enclosures(state))
         except GeometryLimitError as error:
             return str(error)
-
-    def animate(self, recording: Recording, speed: float = 1.0) -> Animation:
-        """Animation of a run of this plant; see Recording.animate."""
-        return Animation(scene_of([m.geometry for m in self.muscles], self.prefixes, self.mechanism), recording, speed)

@@ -9,12 +9,12 @@ import numpy as np
 
 from ..characteristic.validity_range import ValidityRange
 from ..core.annotation import one_line
-from ..core.declaration import check_structure, parameters
+from ..core.declaration import as_finite_float, check_structure, parameters
 from ..core.errors import ParameterError, TraceError
 from ..mechanism import Mechanism
 from ..muscle import Muscle
 from ..pneumatics import Circuit
-from ..pneumatics.gas import Ambient, Gas
+from ..pneumatics.gas import Ambient, Gas, check_above_vacuum
 from ..pneumatics.supply import check_not_shared
 
 
@@ -98,3 +98,17 @@ def check_free(values: Iterable[str], free: Sequence[str]) -> None:
     for name in values:
         if name not in free:
             raise ParameterError(f"Plant: no coordinate '{name}'; there are {', '.join(free) or 'none'}.")
+
+
+def check_pressures(pressure: float | tuple[float, ...], muscles: int, ambient: Ambient) -> list[float]:
+    """The gauge pressure [Pa] of each muscle, from one for all or one for each.
+
+    Raises ParameterError for a pressure that is not above absolute vacuum and for another number than of muscles.
+    """
+    given = pressure if isinstance(pressure, tuple) else (pressure,) * muscles
+    pressures = [as_finite_float("Plant: the pressure of a state", p) for p in given]
+    if len(pressures) != muscles:
+        raise ParameterError(f"Plant: {len(pressures)} pressures are given for {muscles} muscles.")
+    for each in pressures:
+        check_above_vacuum(each, ambient)
+    return pressures

@@ -67,6 +67,11 @@ class Circuit(abc.ABC):
         """Warnings by prefix of the part where a run left the validity range; `columns` are arrays (N,) by name."""
         return {}
 
+    @property
+    def has_validity_range(self) -> bool:
+        """Whether `validity_warnings` compares a run with a validity range; True where a class defines it."""
+        return type(self).validity_warnings is not Circuit.validity_warnings
+
     def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         """State variables of circuit and supply."""
         return (*self.own_states(ambient), *add_prefix(SUPPLY, self.supply.states(ambient)))

@@ -25,3 +25,9 @@ def display_scale(name: str) -> tuple[float, str]:
         return usual
     factor, unit = chosen_scale(quantity.unit, *usual)
     return factor, "-" if unit == "1" else unit
+
+
+def displayed(name: str, value: float, digits: int = 4) -> str:
+    """A value [SI] of a column as text in the unit in which the column is displayed, such as "5.309 kPa"."""
+    factor, unit = display_scale(name)
+    return f"{value * factor:.{digits}g} {unit}".removesuffix(" -").rstrip()

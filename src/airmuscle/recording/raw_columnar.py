@@ -4,18 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..core.errors import FileError, suggestion
 from .channels import Channel, merge_channels
+from .downsampling import Decimation, Downsampling
 from .optional_dependency import import_lab_package, run_reader
+from .pieces import Reduction, check_reduced_lengths, read_reduced, with_reduction
 from .separate_process import read_in_separate_process
 from .table import RawTable
 
-MAX_VALUES = 200_000_000
-"""Values of a dataset that are read at most (chosen): 1.6 GB."""
+
+class StoredTable(NamedTuple):
+    """The channels and constants of a group or a dataset of an HDF5 file, and the reduction of its rows."""
+
+    name: str
+    channels: list[Channel]
+    constants: dict[str, float | str]
+    reduction: Reduction
 
 
 def read_parquet_tables(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
@@ -47,24 +55,30 @@ def read_parquet_tables_here(path: Path) -> tuple[RawTable, ...]:
     return run_reader(path, "Parquet", read)
 
 
-def read_hdf5_tables(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
+def read_hdf5_tables(
+    path: Path, group: str | None = None, downsampling: Downsampling = Decimation()
+) -> tuple[RawTable, ...]:
     """Read one table from each group with vectors, or from the named group; the attribute `unit` states a unit.
 
-    A dataset of records (named fields) is a table of its own, and so is a matrix with an attribute `columns`. Raises
-    FileError or ColumnError.
+    A dataset of records (named fields) is a table of its own, and so is a matrix with an attribute `columns`. A table
+    of more than `downsampling.max_rows` rows is read by pieces and reduced. Raises FileError or ColumnError.
     """
-    tables: tuple[RawTable, ...] = read_in_separate_process("h5py", __name__, "read_hdf5_tables_here", path, group)
+    tables: tuple[RawTable, ...] = read_in_separate_process(
+        "h5py", __name__, "read_hdf5_tables_here", path, group, downsampling
+    )
     return tables
 
 
-def read_hdf5_tables_here(path: Path, group: str | None) -> tuple[RawTable, ...]:
+def read_hdf5_tables_here(
+    path: Path, group: str | None, downsampling: Downsampling = Decimation()
+) -> tuple[RawTable, ...]:
     """As `read_hdf5_tables`, in this process."""
     h5py = import_lab_package("h5py", path)
 
-    def read() -> dict[str, tuple[list[Channel], dict[str, float | str]]]:
+    def read() -> dict[str, StoredTable]:
         with h5py.File(path, "r") as file:
             check_own_values(h5py, file, path)
-            return {name: content for name, content in _groups(h5py, file) if content[0]}
+            return {each.name: each for each in _groups(h5py, file, path.name, downsampling) if each.channels}
 
     contents = run_reader(path, "HDF5", read)
     if not contents:
@@ -75,10 +89,11 @@ def read_hdf5_tables_here(path: Path, group: str | None) -> tuple[RawTable, ...]
         names = ", ".join(contents)
         raise FileError(f"{path.name}: no group '{group}'; the groups are {names}.{suggestion(group, contents)}")
     several, selected = len(contents) > 1, contents if group is None else {group: contents[group]}
-    return tuple(
-        merge_channels(f"{path.name}, group '{name}'" if several else path.name, channels, constants)
-        for name, (channels, constants) in selected.items()
-    )
+    tables = []
+    for name, each in selected.items():
+        table = merge_channels(f"{path.name}, group '{name}'" if several else path.name, each.channels, each.constants)
+        tables.append(with_reduction(table, each.reduction, downsampling))
+    return tuple(tables)
 
 
 def check_own_values(h5py: Any, file: Any, path: Path) -> None:
@@ -103,8 +118,8 @@ def check_no_external_links(h5py: Any, group: Any, path: Path) -> None:
             check_no_external_links(h5py, group[name], path)
 
 
-def _groups(h5py: Any, group: Any) -> Iterator[tuple[str, tuple[list[Channel], dict[str, float | str]]]]:
-    """Channels and constants of each group with vectors and each dataset that is a table; no links are followed."""
+def _groups(h5py: Any, group: Any, origin: str, downsampling: Downsampling) -> Iterator[StoredTable]:
+    """The table of each group with vectors and of each dataset that is a table; no links are followed."""
     vectors: list[Any] = []
     tables: list[Any] = []
     groups: list[Any] = []
@@ -114,29 +129,42 @@ def _groups(h5py: Any, group: Any) -> Iterator[tuple[str, tuple[list[Channel], d
         item = group[name]
         if isinstance(item, h5py.Group):
             groups.append(item)
-        elif item.size and item.size <= MAX_VALUES:
+        elif item.size and item.ndim:
             (vectors if item.ndim == 1 and item.dtype.names is None else tables).append(item)
-    constants = _constants(group.attrs)
-    yield (
-        group.name,
-        ([Channel(_name(d), d[:], unit=_unit(d.attrs)) for d in vectors if d.dtype.kind in "biuf"], constants),
-    )
+    constants, numeric = _constants(group.attrs), [d for d in vectors if d.dtype.kind in "biuf"]
+    reduction = Reduction.of((d.size for d in numeric), downsampling)
+    channels = [Channel(_name(d), _values(d, reduction.step, downsampling), unit=_unit(d.attrs)) for d in numeric]
+    place = f"{origin}, group '{group.name}'"
+    check_reduced_lengths(place, (d.size for d in numeric), (len(c.values) for c in channels))
+    yield StoredTable(group.name, channels, constants, reduction)
     for dataset in tables:
-        yield dataset.name, (_columns(dataset), {**constants, **_constants(dataset.attrs)})
+        reduction = Reduction.of([dataset.shape[0]], downsampling)
+        channels = _columns(dataset, reduction.step, downsampling)
+        yield StoredTable(dataset.name, channels, {**constants, **_constants(dataset.attrs)}, reduction)
     for inner in groups:
-        yield from _groups(h5py, inner)
+        yield from _groups(h5py, inner, origin, downsampling)
 
 
-def _columns(dataset: Any) -> list[Channel]:
+def _values(dataset: Any, step: int, downsampling: Downsampling, field: str | None = None) -> Any:
+    """The reduced rows of a dataset, or of one of its fields."""
+
+    def get(first: int, end: int) -> Any:
+        return dataset[first:end] if field is None else dataset[first:end][field]
+
+    return read_reduced(get, dataset.shape[0], step, downsampling)
+
+
+def _columns(dataset: Any, step: int, downsampling: Downsampling) -> list[Channel]:
     """Channels of a dataset of records, or of a matrix with an attribute `columns`; empty for another dataset."""
     units = _texts(dataset.attrs.get("units", ()))
     if dataset.dtype.names is not None and dataset.ndim == 1:
-        names, values = list(dataset.dtype.names), [dataset[name] for name in dataset.dtype.names]
+        names = list(dataset.dtype.names)
+        values = [_values(dataset, step, downsampling, name) for name in names]
     else:
         names = _texts(dataset.attrs.get("columns", ()))
         if dataset.ndim != 2 or len(names) != dataset.shape[1]:
             return []
-        values = list(np.asarray(dataset[:]).T)
+        values = list(np.asarray(_values(dataset, step, downsampling)).T)
     units = units if len(units) == len(names) else [""] * len(names)
     return [Channel(name, value, unit=unit) for name, value, unit in zip(names, values, units, strict=True)]
 

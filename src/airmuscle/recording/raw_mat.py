@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +17,12 @@ import numpy as np
 from ..core.errors import ColumnError, FileError, suggestion
 from ..core.hints import Hint
 from .channels import Channel, merge_channels
+from .downsampling import Decimation, Downsampling
 from .heading import parse_heading
+from .large_mat import LargeContents, is_version_7_3, read_large_mat
 from .mat_objects import READABLE, MatlabObject, find_objects, read_objects
 from .optional_dependency import import_lab_package, run_reader
+from .pieces import Reduction, with_reduction
 from .raw_columnar import check_no_external_links, check_own_values
 from .separate_process import read_in_separate_process
 from .table import RawTable
@@ -30,29 +33,35 @@ _UNNAMED = "None"
 """Name that SciPy gives to objects."""
 
 
-def read_mat_tables(path: Path, group: str | None = None, columns: Sequence[str] = ()) -> tuple[RawTable, ...]:
+def read_mat_tables(
+    path: Path, group: str | None = None, columns: Sequence[str] = (), downsampling: Downsampling = Decimation()
+) -> tuple[RawTable, ...]:
     """Read one table from each struct with vectors, or from the named struct. Raises FileError or ColumnError.
 
     If the vectors of a struct differ in length, those of the length of the mapped `columns` are read, or without any
     those of the length of the known quantities.
 
+    A file with a variable of more than `downsampling.max_rows` rows is reduced while it is read, see `read_large_mat`.
     The packages for this format are native code, therefore a separate process reads the file.
     """
     tables: tuple[RawTable, ...] = read_in_separate_process(
-        "pymatreader", __name__, "read_mat_tables_here", path, group, tuple(columns)
+        "pymatreader", __name__, "read_mat_tables_here", path, group, tuple(columns), downsampling
     )
     return tables
 
 
-def read_mat_tables_here(path: Path, group: str | None, columns: Sequence[str] = ()) -> tuple[RawTable, ...]:
+def read_mat_tables_here(
+    path: Path, group: str | None, columns: Sequence[str] = (), downsampling: Downsampling = Decimation()
+) -> tuple[RawTable, ...]:
     """As `read_mat_tables`, in this process."""
     pymatreader = import_lab_package("pymatreader", path)
     _check_links(path)
+    large = run_reader(path, "MATLAB", lambda: read_large_mat(path, pymatreader, downsampling))
 
     def read() -> Mapping[str, Any]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # about unreadable objects; the error below reports missing vectors
-            return dict(pymatreader.read_mat(str(path)))
+            return dict(pymatreader.read_mat(str(path))) if large is None else large.variables
 
     contents = run_reader(path, "MATLAB", read)
     objects = find_objects(path)
@@ -77,10 +86,21 @@ def read_mat_tables_here(path: Path, group: str | None, columns: Sequence[str] =
             f"{', '.join([*variables, *map(str, unread)]) or 'no variables'}). {_remedy(unread)}"
         )
     constants = _scalar_fields(variables)
-    several = len(groups) > 1
-    made = [_make_table(path, name, fields, constants, several, columns) for name, fields in selected.items()]
+    made = [_make_table(path, name, fields, constants, len(groups) > 1, columns) for name, fields in selected.items()]
     notes = tuple(f"Not read: {each}. {_remedy([each])}" for each in unread)
+    if large is not None:
+        made, notes = _with_reductions(selected, made, large, downsampling), notes + large.notes
     return tuple(dataclasses.replace(table, notes=(*table.notes, *notes)) for table in made)
+
+
+def _with_reductions(
+    names: Iterable[str], tables: Sequence[RawTable], large: LargeContents, downsampling: Downsampling
+) -> list[RawTable]:
+    whole = Reduction(0, 1)
+    return [
+        with_reduction(table, large.reductions.get(name, whole), downsampling)
+        for name, table in zip(names, tables, strict=True)
+    ]
 
 
 def _remedy(unread: Sequence[MatlabObject]) -> str:
@@ -95,9 +115,8 @@ def _remedy(unread: Sequence[MatlabObject]) -> str:
 
 def _check_links(path: Path) -> None:
     """Raise FileError if a file of version 7.3, which is HDF5, takes values from another file."""
-    with path.open("rb") as beginning:
-        if beginning.read(10) != b"MATLAB 7.3":
-            return
+    if not is_version_7_3(path):
+        return
     h5py = import_lab_package("h5py", path)
 
     def check() -> None:

@@ -30,21 +30,21 @@ Source = str | Path | Iterable[str | Path]
 Tables = tuple[RawTable, ...]
 
 TEXT_EXTENSIONS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".prn")
-_BINARY_READERS: Mapping[str, Callable[[Path, ColumnMapping], Tables]] = {
-    ".xlsx": lambda path, m: read_excel_tables(path, m.sheet, headerless=m.text_format.headerless),
-    ".xlsm": lambda path, m: read_excel_tables(path, m.sheet, headerless=m.text_format.headerless),
-    ".xls": lambda path, m: read_workbook_tables(path, m.sheet, headerless=m.text_format.headerless),
-    ".ods": lambda path, m: read_workbook_tables(path, m.sheet, headerless=m.text_format.headerless),
-    ".parquet": lambda path, m: read_parquet_tables(path, m.group),
-    ".h5": lambda path, m: read_hdf5_tables(path, m.group),
-    ".hdf5": lambda path, m: read_hdf5_tables(path, m.group),
-    ".mat": lambda path, m: read_mat_tables(path, m.group, tuple(m.columns)),
-    ".tdms": lambda path, m: read_tdms_tables(path, m.group),
-    ".mf4": lambda path, m: read_mdf_tables(path, m.group),
-    ".mdf": lambda path, m: read_mdf_tables(path, m.group),
-    ".bag": lambda path, m: read_rosbag_tables(path, m.group),
-    ".db3": lambda path, m: read_rosbag_tables(path, m.group),
-    ".mcap": lambda path, m: read_rosbag_tables(path, m.group),
+_BINARY_READERS: Mapping[str, Callable[[Path, ColumnMapping, Downsampling], Tables]] = {
+    ".xlsx": lambda path, m, d: read_excel_tables(path, m.sheet, headerless=m.text_format.headerless),
+    ".xlsm": lambda path, m, d: read_excel_tables(path, m.sheet, headerless=m.text_format.headerless),
+    ".xls": lambda path, m, d: read_workbook_tables(path, m.sheet, headerless=m.text_format.headerless),
+    ".ods": lambda path, m, d: read_workbook_tables(path, m.sheet, headerless=m.text_format.headerless),
+    ".parquet": lambda path, m, d: read_parquet_tables(path, m.group),
+    ".h5": lambda path, m, d: read_hdf5_tables(path, m.group, d),
+    ".hdf5": lambda path, m, d: read_hdf5_tables(path, m.group, d),
+    ".mat": lambda path, m, d: read_mat_tables(path, m.group, tuple(m.columns), d),
+    ".tdms": lambda path, m, d: read_tdms_tables(path, m.group),
+    ".mf4": lambda path, m, d: read_mdf_tables(path, m.group, d),
+    ".mdf": lambda path, m, d: read_mdf_tables(path, m.group, d),
+    ".bag": lambda path, m, d: read_rosbag_tables(path, m.group),
+    ".db3": lambda path, m, d: read_rosbag_tables(path, m.group),
+    ".mcap": lambda path, m, d: read_rosbag_tables(path, m.group),
 }
 EXTENSIONS = (*TEXT_EXTENSIONS, *_BINARY_READERS)
 """Extensions of the supported files."""
@@ -157,7 +157,7 @@ def read_tables(
     """The uninterpreted tables of one file. Raises FileError or ColumnError."""
     suffix = path.suffix.lower()
     if suffix in _BINARY_READERS:
-        return tuple(downsample(table, downsampling) for table in _BINARY_READERS[suffix](path, mapping))
+        return tuple(downsample(table, downsampling) for table in _BINARY_READERS[suffix](path, mapping, downsampling))
     check_text_file(path)
     if is_large_file(path):
         return (read_large_csv(path, mapping.text_format, downsampling, progress),)

@@ -14,6 +14,8 @@ from .plot import plot_columns
 
 MAX_PANELS = 4
 """Maximum number of panels of the chart."""
+ROUNDING = 1e-12
+"""Values below this fraction of the greatest one of a column are shown as 0 (chosen)."""
 MAX_POINTS = 20_000
 """Maximum number of rows of the chart; of more, every n-th row is drawn."""
 
@@ -29,6 +31,7 @@ def recording_card(recording: Any, units: Mapping[str, str]) -> Card:
 def _row(name: str, values: Array, units: Mapping[str, str]) -> tuple[str, ...]:
     factor, unit = display_scale(name)
     finite = values[np.isfinite(values)] * factor
+    finite[np.abs(finite) < ROUNDING * np.max(np.abs(finite), initial=0.0)] = 0.0
     shown = (finite[0], finite.min(), finite.max(), finite[-1]) if finite.size else ()
     return (name, unit or units.get(name, ""), *(f"{value:.4g}" for value in shown))
 

@@ -81,7 +81,7 @@ def _overview(campaign: Campaign, unread: Sequence[UnreadFile], scenarios: dict[
     left_out = [name for name, stage in campaign.stages if isinstance(stage, LeftOutStage)]
     sentences.append(f"Not identified: {', '.join(left_out)}." if left_out else "All stages are identified.")
     if isinstance(campaign.static, StaticStage):
-        sentences += [f"{band}" for band in campaign.static.bands]
+        sentences += [f"{band}" for band in campaign.static.all_bands]
     columns: dict[str, Any] = {
         "stage": [name for name, _ in campaign.stages],
         "records": [count_records(campaign, name) for name, _ in campaign.stages],
@@ -127,7 +127,7 @@ def _next(campaign: Campaign) -> Chapter:
 def _band_table(campaign: Campaign) -> Table | None:
     if not isinstance(campaign.static, StaticStage):
         return None
-    bands = campaign.static.bands
+    bands = campaign.static.all_bands
     columns: dict[str, Any] = {
         "prediction of": [band.purpose for band in bands],
         "half width of the 95 % band [N]": [band.half_width for band in bands],

@@ -6,9 +6,14 @@ import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from ..geometry import Geometry
 from ..identify import Fit
+from ..identify.candidate_scores import RankedModel
+from ..identify.prediction.result import LEVEL
 from ..library.entry import MISSING_GEOMETRY, Entry
+from ..library.stated_band import StatedBand
 from ..library.write import save
 from ..recording import Recording
 from .chapter import Chapter
@@ -19,8 +24,11 @@ MAX_NAMES, MAX_NAME = 3, 60
 """Maximum number of file names in a title, and of characters of each (chosen)."""
 
 
-def fitted_entry(result: Fit, initial: Entry, files: Sequence[Path]) -> Entry:
-    """The initial entry with the fitted characteristic and a new provenance, without its checks."""
+def fitted_entry(result: Fit, initial: Entry, files: Sequence[Path], error_ratio: float = 1.0) -> Entry:
+    """The initial entry with the fitted characteristic, a new provenance and its 95 % band, without its checks.
+
+    error_ratio  rms error of rows left out of the fit over that of its own rows, by which the band is widened
+    """
     summary = dict(result.summary())
     names = list_files([f.name for f in files])
     note = f"Fitted to {names}: rms error {summary['rms error']}, maximum error {summary['maximum error']}."
@@ -29,8 +37,29 @@ def fitted_entry(result: Fit, initial: Entry, files: Sequence[Path]) -> Entry:
     entry = dataclasses.replace(
         initial, name="muscle", title=title, provenance="fitted", note=note, warning="", characteristic=result.model,
         geometry=geometry, validity_range=result.validity_range, checks=(),
+        uncertainty=None, error_band=_error_band(result, error_ratio),
     )  # fmt: skip
     return dataclasses.replace(entry, note=" ".join([note, *missing_geometry(entry)]))
+
+
+def left_out_ratio(best: RankedModel) -> float:
+    """Rms error of the rows left out over that of all rows; 1 where it is unknown or smaller."""
+    if not (best.in_sample_rmse > 0.0 and np.isfinite(best.cross_validated_rmse)):
+        return 1.0
+    return max(best.cross_validated_rmse / best.in_sample_rmse, 1.0)
+
+
+def _error_band(result: Fit, ratio: float) -> StatedBand | None:
+    """The quantile of the residuals of the uncensored rows that contains 95 % of further ones [SI]."""
+    residuals = np.abs(result.residuals[result.censoring == 0])
+    size = residuals.size
+    half = ratio * float(np.quantile(residuals, min(np.ceil((size + 1) * LEVEL) / size, 1.0))) if size else 0.0
+    if not (np.isfinite(half) and half > 0.0):
+        return None
+    source = f"95 % quantile of the residuals of {size} rows of the fit"
+    if ratio != 1.0:
+        source += f", times {ratio:.3g}, the ratio of the rms errors of rows left out and of all rows"
+    return StatedBand(result.fitted_quantity.name, half, source)
 
 
 def list_files(names: Sequence[str]) -> str:

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..control.trajectory import ACCELERATION, spline_trajectory
+from ..core import tree
 from ..core.arrays import Array
 from ..core.errors import AirmuscleError
 from ..identify.campaign import Campaign, CampaignRecord, FillStage, RecordKind, ReleaseStage, valve_commands
@@ -20,6 +21,7 @@ from ..pneumatics import ProportionalRegulator, SecondOrderLag, Supply, Valve
 from ..recording import Recording
 from ..recording.segment.interval import running_median
 from ..recording.segment.runs import CONTRACTION_BAND
+from .plant_uncertainty import DEVIATIONS, SEPARATOR, fit_uncertainty, tail_factor
 
 POINTS = 120
 """Number of points of the pressure and of the motion of a slow record (chosen)."""
@@ -84,7 +86,8 @@ def _fill(campaign: Campaign, record: CampaignRecord, muscle: Muscle) -> tuple[s
     plant, known, start = _fitted_record(stage, record, muscle)
     points = {name: [list(point) for point in rows] for name, rows in valve_commands(record).items()}
     run = {"duration": float(record.recording["time"][-1]) - start, "initial_state": {"pressure": known["pressure"]}}
-    return scenario_toml(record.origin, plant, points, run, _note(record, start)), ""
+    table = fit_uncertainty(stage.fit) | {DEVIATIONS: {"pressure": _fill_deviation(stage)}}
+    return scenario_toml(record.origin, plant, points, run, _note(record, start), _known_in(table, plant)), ""
 
 
 def _release(campaign: Campaign, record: CampaignRecord, muscle: Muscle) -> tuple[str, str]:
@@ -94,7 +97,22 @@ def _release(campaign: Campaign, record: CampaignRecord, muscle: Muscle) -> tupl
     plant, known, start = _fitted_record(stage, record, muscle)
     state = {name: known[name] for name in ("pressure", "position", "speed")}
     run = {"duration": float(record.recording["time"][-1]) - start, "initial_state": state}
-    return scenario_toml(record.origin, plant, {"latched": [[0.0, 0.0]]}, run, _note(record, start)), ""
+    table = _known_in(fit_uncertainty(stage.fit), plant)
+    return scenario_toml(record.origin, plant, {"latched": [[0.0, 0.0]]}, run, _note(record, start), table), ""
+
+
+def _fill_deviation(stage: FillStage) -> float:
+    """Standard deviation of the predicted pressure [Pa]: of the fills by each other, or of the joint fit if greater."""
+    fitted = [stage.fit.rms("pressure", i) for i in range(len(stage.records))]
+    deviation = max(float(np.sqrt(np.mean(np.square(rms)))) for rms in (fitted, stage.cross_rms) if len(rms))
+    return deviation * tail_factor(stage.fit, "pressure")
+
+
+def _known_in(table: dict[str, Any], plant: Plant) -> dict[str, Any]:
+    """The table without the covariance if the plant lacks one of its parameters."""
+    paths = {leaf.path for leaf in tree.leaves(plant)}
+    named = {path for name in table.get("parameters", ()) for path in name.split(SEPARATOR)}
+    return table if named <= paths else {DEVIATIONS: table[DEVIATIONS]}
 
 
 def _fitted_record(

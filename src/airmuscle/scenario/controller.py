@@ -12,26 +12,28 @@ sample_time = "5 ms"
 [input.controller.setpoint]               input signal of the set point: rows, model, file, columns, period
 pressure = [["0 s", "1 bar"], ["2 s", "3 bar"]]
 [input.drivers]                           as in an open loop
+
+Laws inside a law, such as those of a Cascade, are read by law_table.py.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from ..control.control_loop import ControlLoop, check_present
-from ..control.controller import RELATIVE, Controller, relative_unit
+from ..control.control_loop import ControlLoop
+from ..control.controller import Controller
 from ..control.inputs import InputSignal
-from ..core.declaration import Parameter, parameters
+from ..control.parameter_units import named_signal_units, parameter_units
 from ..core.errors import ParameterError
 from ..core.variables import Input
-from ..library.build import build
-from ..library.location import Location, check_type, located_errors, read_finite_number, read_number
-from ..library.models import model_class, model_names
+from ..library.location import Location, located_errors, read_finite_number
 from ..plant.plant import Plant
 from ..plant.units import column_units
 from .inputs import build_drivers, build_input_signal
+from .law_table import build_law
 
 LOOP_KEYS = ("sample_time", "setpoint")
 """Keys of the table that are not parameters of the controller."""
@@ -58,7 +60,7 @@ def build_control_loop(
             "sample_time and setpoint in it."
         )
     parameter_table = {key: value for key, value in controller_table.items() if key not in LOOP_KEYS}
-    controller = _build_controller(parameter_table, plant.inputs, units, inner)
+    controller = build_law(parameter_table, plant, units, inner)
     for key, example in (("sample_time", 'sample_time = "10 ms"'), ("setpoint", f"[{inner.table}.setpoint]")):
         if key not in controller_table:
             raise ParameterError(f"{inner}: '{key}' is missing; write {example}.")
@@ -73,45 +75,14 @@ def build_control_loop(
     return loop
 
 
-def _build_controller(
-    table: Mapping[str, Any], inputs: Sequence[str], units: Mapping[str, str], location: Location
-) -> Controller:
-    """The controller. It is built twice: the first time to find the signals that determine the units of its gains."""
-    relative: dict[str, Parameter] = {}
-    if isinstance(table.get("model"), str):
-        cls = model_class(table["model"], f"{location}, model")
-        if not issubclass(cls, Controller):
-            known = [n for n in model_names() if issubclass(model_class(n, ""), Controller)]
-            raise ParameterError(f"{location}: {cls.__name__} is not a controller; there are {', '.join(known)}.")
-        relative = {p.name: p for p in parameters(cls) if p.unit in RELATIVE and p.name in table}
-    draft: Controller = check_type(build({**table, **dict.fromkeys(relative, 1.0)}, location), Controller, location)
-    with located_errors(location):
-        check_present(draft, [name for name in units if name not in inputs], inputs)
-    if relative and len({units[name] for name in draft.inputs}) > 1:
-        raise ParameterError(
-            f"{location}: {' and '.join(draft.inputs)} have different units; choose inputs of the same unit."
-        )
-    numbers = {
-        name: read_number(table[name], _unit(p, draft, units), f"{location}, {name}", f" ({p.symbol}, {p.meaning})")
-        for name, p in relative.items()
-    }
-    controller: Controller = build({**table, **numbers}, location)
-    return controller
-
-
-def _unit(declared: Parameter, controller: Controller, units: Mapping[str, str]) -> str:
-    """Unit of a controller parameter for its signals; "1" replaces an unknown unit of a signal."""
-    measured, commanded = (units.get(names[0]) or "1" for names in (controller.measured_columns, controller.inputs))
-    return relative_unit(declared.unit, measured, commanded)
-
-
 def _build_setpoint(table: Any, controller: Controller, units: Mapping[str, str], location: Location) -> InputSignal:
     names: Sequence[str] = controller.setpoints
     if not isinstance(table, Mapping):
         raise ParameterError(f'{location} is {table!r}; it must be a table. Write {names[0]} = [["0 s", ...]] in it.')
     if "drivers" in table:
         raise ParameterError(f"{location}: a set point has no drivers; write [input.drivers] for those of the inputs.")
-    setpoints = [Input(name, units.get(name) or "1", -math.inf, math.inf) for name in names]
+    known = {**named_signal_units(controller), **{name: unit for name, unit in units.items() if unit}}
+    setpoints = [Input(name, known.get(name) or "1", -math.inf, math.inf) for name in names]
     return build_input_signal(table, setpoints, location, "the controller has no set point")
 
 
@@ -119,10 +90,28 @@ def controller_number_paths(
     table: Mapping[str, Any], loop: ControlLoop, units: Mapping[str, str]
 ) -> Iterator[tuple[tuple[str | int, ...], str]]:
     """Key paths of all numbers that the table [input.controller] may contain, with their units, for studies."""
-    for p in parameters(loop.controller):
-        yield (p.name,), _unit(p, loop.controller, units)
+    for path, unit in parameter_units(loop.controller, units).items():
+        keys = path_keys(path)
+        if _has_table(table, keys[:-1]):
+            yield keys, unit
     yield ("sample_time",), "s"
+    known = {**named_signal_units(loop.controller), **units}
     for name, rows in table["setpoint"].items():
         for i in range(len(rows)) if isinstance(rows, list) else ():
             yield ("setpoint", name, i, 0), "s"
-            yield ("setpoint", name, i, 1), units.get(name) or "1"
+            yield ("setpoint", name, i, 1), known.get(name) or "1"
+
+
+def path_keys(path: str) -> tuple[str | int, ...]:
+    """The keys of a parameter path: `laws[0].gain` is laws, 0, gain."""
+    return tuple(int(part) if part.isdecimal() else part for part in re.findall(r"[^.\[\]]+", path))
+
+
+def _has_table(table: Any, keys: Sequence[str | int]) -> bool:
+    """Whether a table contains a table or a list under these keys; a number of a muscle that is named has none."""
+    for key in keys:
+        known = isinstance(table, Mapping) and key in table
+        if not known and not (isinstance(table, list) and isinstance(key, int) and key < len(table)):
+            return False
+        table = table[key]
+    return isinstance(table, Mapping | list)

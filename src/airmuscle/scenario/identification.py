@@ -42,19 +42,27 @@ from ..identify.dynamic import (
     DynamicFit,
     Experiment,
     InitialValue,
-    StartTime,
     cross_predict,
     fit_dynamic,
 )
 from ..identify.dynamic.experiment import ParameterPaths, RecordUnknown
-from ..library.build import build
 from ..library.files import read_toml
-from ..library.location import Location, check_keys, check_type, read_finite_number, read_text
+from ..library.location import Location, check_keys, read_finite_number, read_text
 from ..library.plant_file import build_plant
 from ..library.write import scenario_toml
 from ..plant.plant import Plant
 from ..simulation import Integrator
-from .record import Record, optional_table, signal_unit
+from .plant_uncertainty import fit_uncertainty
+from .record import Record, optional_table
+from .study_tables import (
+    build_method,
+    read_integer,
+    read_list,
+    read_observed,
+    read_own,
+    read_shared,
+    required_table,
+)
 
 _TABLES = ("title", "plant", "input", "observed", "fit", "record")
 _FIT = ("free", "own", "start_time", "initial_state", "starts", "seed", "integrator", "bounds")
@@ -95,8 +103,9 @@ class DynamicFitSetup:
 
         return cross_predict(fit, refit)
 
-    def scenario(self, fit: DynamicFit, record: int = 0) -> str:
-        """Text of a scenario with the fitted plant, the input, the initial state and the duration of a record."""
+    def scenario(self, fit: DynamicFit, record: int = 0, cross: Sequence[CrossPrediction] = ()) -> str:
+        """Text of a scenario with the fitted plant, the input, the initial state and the duration of a record, and the
+        uncertainty of the fit, with the predictions of the records by each other."""
         plant, origin = fit.plant(record), self.experiments[record].recording.origin
         note = f"{self.title}: parameters estimated from {', '.join(e.recording.origin for e in self.experiments)}."
         assert isinstance(plant, Plant)
@@ -111,7 +120,8 @@ class DynamicFitSetup:
         start = {name: value for name, value in known.items() if name == "pressure" or name in given}
         duration = float(record_model.times[-1]) - record_model.start_time(fit.values)
         run = {"duration": duration, "initial_state": start}
-        return scenario_toml(f"{self.title}, {origin}", plant, self.input_tables[record], run, note)
+        title, uncertainty = f"{self.title}, {origin}", fit_uncertainty(fit, cross)
+        return scenario_toml(title, plant, self.input_tables[record], run, note, uncertainty)
 
 
 def load_dynamic_fit(path: str | Path) -> DynamicFitSetup:
@@ -123,8 +133,8 @@ def load_dynamic_fit(path: str | Path) -> DynamicFitSetup:
     tables = read_toml(file)
     location = Location(str(file), "", file.parent)
     check_keys(tables, _TABLES, location)
-    plant = build_plant(_required_table(tables, "plant", location), location.inside("plant"))
-    observed = _read_observed(_required_table(tables, "observed", location), plant, location.inside("observed"))
+    plant = build_plant(required_table(tables, "plant", location), location.inside("plant"))
+    observed = read_observed(required_table(tables, "observed", location), plant, location.inside("observed"))
     rows = tables.get("record")
     if not isinstance(rows, list) or not rows:
         raise ParameterError(f'{location}: no record is given; write [[record]] with file = "fill.csv" for each.')
@@ -132,7 +142,7 @@ def load_dynamic_fit(path: str | Path) -> DynamicFitSetup:
         Record(row, location.inside(f"record {i}"), tables, plant).build_experiment(observed)
         for i, row in enumerate(rows, 1)
     ]
-    fit, in_fit = _required_table(tables, "fit", location), location.inside("fit")
+    fit, in_fit = required_table(tables, "fit", location), location.inside("fit")
     check_keys(fit, _FIT, in_fit)
     return DynamicFitSetup(
         title=read_text(tables, "title", location, needed=False) or file.stem,
@@ -140,91 +150,13 @@ def load_dynamic_fit(path: str | Path) -> DynamicFitSetup:
         experiments=tuple(experiment for experiment, _ in records),
         input_tables=tuple(table for _, table in records),
         observed={name: deviation for name, (deviation, _) in observed.items()},
-        free=tuple(_read_shared(item, f"{in_fit}, free") for item in _read_list(fit, "free", in_fit)),
-        own=_read_own(fit, plant, in_fit),
+        free=tuple(read_shared(item, f"{in_fit}, free") for item in read_list(fit, "free", in_fit)),
+        own=read_own(fit, plant, in_fit),
         bounds=_read_bounds(optional_table(fit, "bounds", in_fit), plant, in_fit.inside("bounds")),
-        starts=_read_integer(fit, "starts", 1, in_fit),
-        seed=_read_integer(fit, "seed", 0, in_fit),
-        method=_build_method(fit, in_fit),
+        starts=read_integer(fit, "starts", 1, in_fit),
+        seed=read_integer(fit, "seed", 0, in_fit),
+        method=build_method(fit, in_fit),
     )  # fmt: skip
-
-
-def _required_table(tables: Mapping[str, Any], key: str, location: Location) -> Mapping[str, Any]:
-    if key not in tables:
-        raise ParameterError(f"{location}: the table [{key}] is missing.")
-    return optional_table(tables, key, location)
-
-
-def _read_list(table: Mapping[str, Any], key: str, location: Location) -> list[Any]:
-    items = table.get(key, [])
-    if not isinstance(items, list):
-        raise ParameterError(
-            f'{location}, {key} is {items!r}; it must be a list of paths, such as ["circuit.fill.conductance"].'
-        )
-    return items
-
-
-def _read_integer(table: Mapping[str, Any], key: str, minimum: int, location: Location) -> int:
-    value = table.get(key, minimum)
-    if isinstance(value, bool) or not isinstance(value, int) or value < minimum:
-        raise ParameterError(f"{location}, {key} is {value!r}; it must be an integer of at least {minimum}.")
-    return value
-
-
-def _build_method(table: Mapping[str, Any], location: Location) -> Integrator | None:
-    value = table.get("integrator")
-    if value is None:
-        return None
-    inner = location.inside("integrator")
-    model_table = {"model": value} if isinstance(value, str) else value
-    method: Integrator = check_type(build(model_table, inner), Integrator, inner)
-    return method
-
-
-def _read_observed(table: Mapping[str, Any], plant: Plant, location: Location) -> dict[str, tuple[float, str]]:
-    """Standard deviation and column of each measured output."""
-    observed = {}
-    for name, value in table.items():
-        entry = value if isinstance(value, Mapping) else {"deviation": value}
-        check_keys(entry, ("deviation", "column"), location.inside(name))
-        deviation = read_finite_number(entry.get("deviation"), signal_unit(name, plant) or "1", f"{location}, {name}")
-        if not deviation > 0:
-            raise ParameterError(
-                f"{location}, {name} is {deviation:g}; the standard deviation of a sensor must be greater than zero."
-            )
-        observed[name] = deviation, read_text(entry, "column", location.inside(name), needed=False) or name
-    if not observed:
-        raise ParameterError(
-            f'{location}: no output is given; write pressure = "500 Pa", the standard deviation of its sensor.'
-        )
-    return observed
-
-
-def _read_shared(value: Any, where: str) -> ParameterPaths:
-    if isinstance(value, str):
-        return value
-    if isinstance(value, list) and value and all(isinstance(path, str) for path in value):
-        return tuple(value)
-    raise ParameterError(
-        f"{where} contains {value!r}; each item must be a path in quotes, or a list of paths with one common value."
-    )
-
-
-def _read_own(table: Mapping[str, Any], plant: Plant, location: Location) -> tuple[RecordUnknown, ...]:
-    own: list[RecordUnknown] = [_read_shared(item, f"{location}, own") for item in _read_list(table, "own", location)]
-    if "start_time" in table:
-        own.append(StartTime(_read_positive(table["start_time"], "s", f"{location}, start_time")))
-    for name, margin in optional_table(table, "initial_state", location).items():
-        unit = signal_unit(name, plant) or "1"
-        own.append(InitialValue(name, _read_positive(margin, unit, f"{location}, start, {name}")))
-    return tuple(own)
-
-
-def _read_positive(value: Any, unit: str, where: str) -> float:
-    number = read_finite_number(value, unit, where)
-    if not number > 0:
-        raise ParameterError(f"{where} is {value!r}; it must be greater than zero.")
-    return number
 
 
 def _read_bounds(table: Mapping[str, Any], plant: Plant, location: Location) -> dict[str, tuple[float, float]]:

@@ -31,6 +31,8 @@ class Record:
     location: Location
     tables: Mapping[str, Any]
     shared: Plant
+    given: Recording | None = None
+    """The recording, if it was read before; then the table needs no file."""
 
     def build_experiment(self, observed: Mapping[str, tuple[float, str]]) -> tuple[Experiment, Mapping[str, Any]]:
         """The record as an experiment, and its table [input]; `observed` has the column of each output.
@@ -44,7 +46,8 @@ class Record:
         table = dict(optional_table({**self.tables, **self.row}, "input", self.location))
         if "file" in table:  # absolute, because the table is also written to other folders
             table["file"] = str((self.location.folder / str(table["file"])).resolve())
-        recording, in_input = self._read_recording(observed), self.location.inside("input")
+        in_input = self.location.inside("input")
+        recording = self._read_recording(observed) if self.given is None else self._cut(self.given)
         start_time = read_finite_number(self.row.get("start_time", 0.0), "s", f"{self.location}, start_time")
         signal = build_input_signal(table, plant.input_variables, in_input)
         with located_errors(in_input):

@@ -11,7 +11,8 @@
     [run]
     duration = "25 s"
     output_times = "10 ms"                      optional
-    initial_state = { pressure = "0 bar" }      optional: equilibrium at this pressure; or a state, position = "10 mm"
+    initial_state = { pressure = "0 bar" }      optional: equilibrium at this pressure; or a state, position = "10 mm";
+                                                or all states of the plant by name
     integrator = { model = "Rodas4", rtol = 1e-8 }  optional
     [output]
     columns = ["pressure", "force"]             optional: columns of the recording besides time; all by default
@@ -31,6 +32,7 @@ from ..analysis.equilibrium import find_equilibrium
 from ..control.control_loop import ControlLoop
 from ..control.inputs import InputSignal
 from ..core.errors import ParameterError, suggestion
+from ..identify.prediction import PlantUncertainty
 from ..library.build import build
 from ..library.files import is_path, list_plants, read_toml
 from ..library.location import Location, check_keys, check_type, located_errors, read_finite_number, read_text
@@ -40,8 +42,9 @@ from ..recording import Recording
 from ..simulation import Integrator, Problem, solve
 from .controller import build_control_loop, signal_units
 from .inputs import build_input_signal
+from .plant_uncertainty import read_plant_uncertainty
 
-TABLES = ("title", *SCENARIO_TABLES)
+TABLES = ("title", *SCENARIO_TABLES, "uncertainty")
 RUN = ("duration", "start_time", "output_times", "initial_state", "integrator")
 OUTPUT = ("columns",)
 DEFAULT_INITIAL_STATE: Mapping[str, Any] = MappingProxyType({"pressure": 0.0})
@@ -56,6 +59,8 @@ class Scenario:
     problem: Problem
     columns: tuple[str, ...] = ()
     """Columns of the recording besides time; all if empty."""
+    uncertainty: PlantUncertainty | None = None
+    """That of the fit of the plant, for predictions; a simulation does not use it."""
 
     @property
     def plant(self) -> Plant:
@@ -129,6 +134,9 @@ def build_scenario(
         title=read_text(tables, "title", location, needed=False) or Path(location.file).stem,
         problem=problem,
         columns=_read_columns(output_table, list(run_column_units(problem)), location.inside("output")),
+        uncertainty=read_plant_uncertainty(tables["uncertainty"], plant, location.inside("uncertainty"))
+        if "uncertainty" in tables
+        else None,
     )
 
 
@@ -179,6 +187,9 @@ def _build_initial_state(
         raise ParameterError(
             f'{location} is {table!r}; it must be a table. Write initial_state = {{ pressure = "0 bar" }}.'
         )
+    all_states = {state.name: state.unit for state in plant.states}
+    if set(table) == set(all_states):
+        return {name: read_finite_number(table[name], unit, f"{location}, {name}") for name, unit in all_states.items()}
     coordinates = {
         name: unit for c in plant.mechanism.coordinates for name, unit in ((c.name, c.unit), (c.speed, f"{c.unit}/s"))
     }

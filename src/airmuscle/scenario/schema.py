@@ -19,7 +19,7 @@ from ..control.controller import RELATIVE, Controller
 from ..control.driver import Driver
 from ..core.declaration import Parameter, parameters
 from ..core.reference import Reference
-from ..library import entry_file, plant_file, uncertainty
+from ..library import entry_file, plant_file, stated_band, uncertainty
 from ..library.build import TEXT_KEYS
 from ..library.models import model_class, model_names
 from ..library.valve_entry import PATHS
@@ -27,7 +27,8 @@ from ..muscle import Muscle
 from ..plant.plant import Plant
 from ..pneumatics.orifice import Orifice
 from ..simulation.integrators import Integrator
-from . import controller, inputs, scenario
+from . import controller, inputs, plant_uncertainty, scenario
+from .law_table import plant_fields
 
 Schema = dict[str, Any]
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
@@ -47,6 +48,7 @@ def scenario_schema() -> Schema:
         "input": _input(models),
         "run": _run(models),
         "output": _table({"columns": {"type": "array", "items": _TEXT}}),
+        "uncertainty": _table(_plant_uncertainty(), (plant_uncertainty.DEVIATIONS,)),
     }
     return _document("A simulation with airmuscle", _select_keys(tables, scenario.TABLES), ("plant", "run"), models)
 
@@ -69,6 +71,7 @@ def muscle_schema() -> Schema:
         "ratings": models.table(model_class("Ratings", "schema"), model_needed=False),
         "validity_range": models.table(model_class("ValidityRange", "schema"), model_needed=False),
         "uncertainty": _table(_uncertainty(), uncertainty.KEYS),
+        "error_band": _table(_error_band(), stated_band.KEYS[:2]),
         "check": {"type": "array", "items": _table(check, ("quantity", "equals", "tolerance", "source"))},
         "reference": {"type": "array", "items": models.table(Reference, model_needed=None)},
     }
@@ -84,6 +87,16 @@ def _uncertainty() -> Schema:
     numbers = {"type": "array", "items": {"type": "number"}}
     names = {"type": "array", "items": _TEXT}
     return {"parameters": names, "standard_errors": numbers, "correlations": {"type": "array", "items": numbers}}
+
+
+def _plant_uncertainty() -> Schema:
+    deviations = {"type": "object", "additionalProperties": _quantity("")}
+    return {plant_uncertainty.DEVIATIONS: deviations, **_uncertainty()}
+
+
+def _error_band() -> Schema:
+    widths = dict.fromkeys(("half_width", "held_half_width"), _quantity("", 0.0))
+    return {"quantity": {"enum": list(stated_band.PREDICTED)}, "source": _TEXT, **widths}
 
 
 def _document(title: str, properties: Schema, required: Sequence[str], models: _ModelSchemas) -> Schema:
@@ -145,7 +158,8 @@ class _ModelSchemas:
         for field in dataclasses.fields(cls):
             if field.init:
                 properties[field.name] = self.field(declared.get(field.name), hints[field.name])
-        required = [*(["model"] if model_needed else []), *_required_fields(cls)]
+        of_plant = plant_fields(cls)
+        required = [*(["model"] if model_needed else []), *(n for n in _required_fields(cls) if n not in of_plant)]
         summary = " ".join(inspect.cleandoc(cls.__doc__ or "").partition("\n\n")[0].split())
         return {"description": summary, **_table(properties, required)}
 
@@ -161,8 +175,18 @@ class _ModelSchemas:
         default = {"default": declared.default} if isinstance(declared.default, float | int) else {}
         return {"description": f"{declared.symbol}{unit}: {declared.meaning}", **number, **default}
 
+    def muscle(self) -> Schema:
+        """A muscle: the name of a library entry or of a file, or a table, which may be based on one."""
+        muscle = self.table(Muscle, model_needed=False)
+        name = {"description": "a library entry, or a muscle file relative to this file", **_TEXT}
+        required = muscle.pop("required")
+        muscle["properties"] |= {"library": name, **{size: _quantity("m", 0.0) for size in plant_file.SIZES}}
+        return {"anyOf": [name, {**muscle, "anyOf": [{"required": ["library"]}, {"required": required}]}]}
+
     def part(self, hint: Any) -> Schema:
         """A structural field, by its annotation."""
+        if hint is Muscle:
+            return self.muscle()
         if typing.get_origin(hint) in (typing.Union, types.UnionType):
             options = [self.part(option) for option in typing.get_args(hint) if option is not types.NoneType]
             return options[0] if len(options) == 1 else {"anyOf": options}
@@ -181,15 +205,10 @@ def _required_fields(cls: type[Any]) -> list[str]:
 
 def _plant(models: _ModelSchemas) -> Schema:
     """Table of a plant; a muscle may also be the name of a library entry, or a table based on one."""
-    plant, muscle = (models.table(cls, model_needed=False) for cls in (Plant, Muscle))
+    plant, each = models.table(Plant, model_needed=False), models.muscle()
     needed = plant.pop("required")
     plant["properties"]["library"] = {"description": "a plant of the library, whose parts are replaced", **_TEXT}
     plant["anyOf"] = [{"required": ["library"]}, {"required": needed}]
-    name = {"description": "a library entry, or a muscle file relative to this file", **_TEXT}
-    required = muscle.pop("required")
-    muscle["properties"] |= {"library": name, **{size: _quantity("m", 0.0) for size in plant_file.SIZES}}
-    table = {**muscle, "anyOf": [{"required": ["library"]}, {"required": required}]}
-    each = {"anyOf": [name, table]}
     plant["properties"]["muscle"] = {"anyOf": [*each["anyOf"], {"type": "array", "items": each}]}
     return plant
 

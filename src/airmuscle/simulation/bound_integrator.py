@@ -54,8 +54,10 @@ class BoundIntegrator:
         end = (self._clock, self._count, INTERRUPT_CHECK_STEPS, work)
         self._bound_values = (*binding.leading, *binding.trailing)
         self._kernel = binding.kernel.bind(*binding.leading, *run, *binding.trailing, *end)
-        self._first = len(binding.leading) + 1
+        self._run, self._first = self._kernel.runner, len(binding.leading) + 1
         self._clock_view, self._count_view = flat_view(self._clock), flat_view(self._count)
+        self._slots: list[int] = self.places.tolist()
+        self._words = None if self._kernel.entry_address is None else flat_view(self._kernel.slots)
         self._budget = len(binding.leading) + len(run) + len(binding.trailing) + 2
 
     def rebind(self, binding: Binding) -> None:
@@ -71,8 +73,9 @@ class BoundIntegrator:
         """Integrate from `state` (n,) at `start` [s] through the segments; rows (N, n) at rising `times` (N,)."""
         rows = np.empty((times.size, self.state.size)) if rows is None else rows
         self.state[:] = state
-        for i, argument in enumerate((segments.ends, segments.values, segments.slopes, times, rows), self._first):
-            self._kernel.replace(i, argument)
+        for i, argument in enumerate((segments.ends, segments.values, segments.slopes, times), self._first):
+            self._kernel.replace_input(i, argument)
+        self._kernel.replace(self._first + 4, rows)
         return self._solve(start, rows, max_steps)
 
     def hold(self, state: Array, inputs: Array, duration: float) -> Status:
@@ -88,7 +91,7 @@ class BoundIntegrator:
         if duration != self._duration:
             self._end[0] = self._duration = duration
         self._progress.fill(0)
-        status = self._kernel()
+        status = self._run()
         if status == _PAUSED:
             status = self._continue(status, MAX_STEPS)
         return Status.DONE if status == 0 else Status(status)
@@ -104,16 +107,24 @@ class BoundIntegrator:
     ) -> tuple[Status, int, float]:
         """Go on from `self.state` at `begin` [s] through `count` segments: how it ended, rows reached, where.
 
-        Ends, values and slopes of the segments, times and rows are given by the addresses of their first numbers.
+        Ends, values and slopes of the segments, times and rows are given by the addresses of their first numbers. Not
+        to be mixed with `run`.
         """
-        self._kernel.point(self._first, segments, count)
-        self._kernel.point(self._first + 3, (times, rows), wanted)
+        if self._words is None:
+            self._kernel.point(self._first, segments, count)
+            self._kernel.point(self._first + 3, (times, rows), wanted)
+        else:
+            words, (a, b, c, d, e) = self._words, self._slots
+            words[a], words[b], words[c] = segments
+            words[a + 1] = words[b + 1] = words[c + 1] = count
+            words[d], words[e] = times, rows
+            words[d + 1] = words[e + 1] = wanted
         clock, counts = self._clock_view, self._count_view
         clock[0] = clock[2] = begin
         clock[1] = 0.0
         counts[0] = counts[1] = 0
         before = counts[2]
-        status = self._kernel()
+        status = self._run()
         if status == _PAUSED:
             status = self._continue(status, before + MAX_STEPS)
             self._kernel.replace(self._budget, INTERRUPT_CHECK_STEPS)
@@ -150,9 +161,9 @@ class BoundIntegrator:
         return int(self._count[2]), int(self._count[3])
 
     def _solve(self, start: float, rows: Array, max_steps: int) -> RawSolution:
-        clock, count = self._clock, self._count
-        clock[:] = start, 0.0, start
-        count[:] = 0
+        clock, count = self._clock_view, self._count_view
+        clock[0], clock[1], clock[2] = start, 0.0, start
+        count[0] = count[1] = count[2] = count[3] = 0
         if max_steps < INTERRUPT_CHECK_STEPS:
             self._kernel.replace(self._budget, max_steps)
         try:
@@ -162,9 +173,10 @@ class BoundIntegrator:
         except KeyboardInterrupt:
             status = Status.INTERRUPTED.value
         self._kernel.replace(self._budget, INTERRUPT_CHECK_STEPS)
-        _, reached, steps, rejected = count.tolist()
-        rows[reached:] = np.nan
-        return RawSolution(rows, reached, float(clock[0]), self.state.copy(), Status(status), steps, rejected)
+        reached, ended = count[1], Status.DONE if status == 0 else Status(status)
+        if reached < len(rows):
+            rows[reached:] = np.nan
+        return RawSolution(rows, reached, clock[0], self.state.copy(), ended, count[2], count[3])
 
     def _continue(self, status: int, max_steps: int) -> int:
         """Go on where the kernel paused so that an interruption can be noticed."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..control.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoopState
+from ..control.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop, ControlLoopState
 from ..control.controller import Measurement
 from ..control.piecewise_linear import PiecewiseLinear
 from ..control.with_drivers import WithDrivers
@@ -19,9 +19,10 @@ from ..plant.units import column_units
 from .bound_integrator import RawSolution
 from .compiled_loop import CompiledLoop, CompiledRun, can_be_compiled
 from .intervals import DrivenIntervals, HeldIntervals, Intervals
+from .kept_loops import form_of, keep_run, kept_run
 from .problem import Problem
 from .rows import make_recording, recorded_rows, truncate_at_invalid_row
-from .sampled_loop import SampledLoop, make_measurement, prepare_loop
+from .sampled_loop import SampledLoop, intervals_of, make_measurement, prepare_loop
 from .solution import Solution, Statistics
 
 
@@ -33,11 +34,16 @@ def solve_closed_loop(problem: Problem) -> Solution:
     the command of the same instant: an output that jumps with an input has not jumped yet. Split at a sampling instant
     and continued, a run equals the run in one, to the last bit; split between two, to the integrator's tolerance.
     """
-    loop = problem.input
+    loop, form = problem.input, form_of(problem)
     control_state = problem.control_state or loop.init(problem.start_time)  # type: ignore[union-attr]
-    run = start_run(problem, prepare_loop(problem, control_state), control_state)
+    run: CompiledRun | CalledRun | None = kept_run(problem, form, control_state)
+    if run is None:
+        run = start_run(problem, prepare_loop(problem, control_state), control_state)
     run.integrate()
-    return _solution(problem, run)
+    solution = _solution(problem, run)
+    if form is not None and isinstance(run, CompiledRun) and run.status == Status.DONE:
+        keep_run(problem, form, run)
+    return solution
 
 
 def start_run(problem: Problem, prepared: SampledLoop, control_state: ControlLoopState) -> CompiledRun | CalledRun:
@@ -165,8 +171,11 @@ class CalledRun:
 
 def _solution(problem: Problem, run: CompiledRun | CalledRun) -> Solution:
     """The rows of all intervals as one solution."""
-    compiled, prepared, integrator = problem.compiled, run.prepared, problem.integrator
+    compiled, loop, integrator = problem.compiled, problem.input, problem.integrator
+    assert isinstance(loop, ControlLoop)
     segments, (times, states) = run.signal, run.rows
+    if isinstance(run, CompiledRun):  # the next run may be in the same arrays
+        times, states = times.copy(), states.copy()
     begun = len(run.measured) > 0
     at, state = (run.stopped_at, run.bound.state.copy()) if begun else (run.time, run.state)
     raw = RawSolution(states, times.size, at, state, run.status, *run.bound.step_counts)
@@ -177,9 +186,9 @@ def _solution(problem: Problem, run: CompiledRun | CalledRun) -> Solution:
     raw, table = truncate_at_invalid_row(compiled, raw, table, times)
     units = column_units(problem.system, compiled.output_names)
     way = "compiled with the plant" if isinstance(run, CompiledRun) else "called from Python at each sample"
-    note = f"controlled by {prepared.loop.describe(units)}; {way}"
-    remark = Diagnostic(DiagnosticCode.CONTROLLER, type(prepared.loop.controller).__name__, note)
-    notes = prepared.loop.controller.notes(run.control_state.controller)
+    note = f"controlled by {loop.describe(units)}; {way}"
+    remark = Diagnostic(DiagnosticCode.CONTROLLER, type(loop.controller).__name__, note)
+    notes = loop.controller.notes(run.control_state.controller)
     remarks = (remark, *(Diagnostic(DiagnosticCode.CONTROLLER, remark.subject, text) for text in notes))
     more = _controller_columns(problem, run, times[: raw.reached])
     recording, diagnostics = make_recording(compiled, raw, table, times, integrator, problem.end_time, more, remarks)
@@ -191,11 +200,13 @@ def _solution(problem: Problem, run: CompiledRun | CalledRun) -> Solution:
 def _controller_columns(problem: Problem, run: CompiledRun | CalledRun, times: Array) -> dict[str, Array]:
     """Set points in time; measurements and commands of the last sample at every row."""
     prepared, controller = run.prepared, run.prepared.loop.controller
-    intervals = np.searchsorted(prepared.instants, times, side="right") - 1
-    intervals = np.clip(intervals, 0, max(len(run.measured) - 1, 0))
-    setpoints = prepared.setpoint_signal.inputs_at(times, problem.start_time)
-    columns = {f"{SETPOINT}{name}": setpoints[:, i] for i, name in enumerate(controller.setpoints)}
-    kinds = ((MEASURED, controller.measured_columns), (COMMAND, controller.inputs))
-    for values, (prefix, names) in zip((run.measured, run.commanded), kinds, strict=True):
-        columns |= {f"{prefix}{name}": values[intervals, i] for i, name in enumerate(names)}
+    intervals = np.minimum(intervals_of(times, prepared.instants), max(len(run.measured) - 1, 0))
+    setpoints, _ = prepared.setpoint_signal.at_rising(times, problem.start_time)
+    measured, commanded = (values.take(intervals, axis=0) for values in (run.measured, run.commanded))
+    columns: dict[str, Array] = {}
+    for values, prefix, names in (
+        (setpoints, SETPOINT, controller.setpoints), (measured, MEASURED, controller.measured_columns),
+        (commanded, COMMAND, controller.inputs),
+    ):  # fmt: skip
+        columns |= {f"{prefix}{name}": column for name, column in zip(names, values.T, strict=True)}
     return columns

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import array
+import ctypes
 import dataclasses
+import itertools
+import math
 from typing import Any
 
 import numpy as np
@@ -16,6 +20,8 @@ from ..core.arrays import Array
 from ..core.errors import TraceError
 
 _ARGUMENTS = ("measured", "setpoints", "memory", "minimum", "maximum", "sample_time", "parameters")
+UNLIMITED = (-math.inf, math.inf)
+"""Range of an input that a measurement does not contain."""
 _functions: dict[tree.Structure, Function] = {}
 _lanes: dict[tuple[tree.Structure, int], LanesFunction] = {}
 
@@ -29,6 +35,42 @@ def compiled_sample(law: ControlLaw) -> Function:
     if structure not in _functions:
         _functions[structure] = Function(*_arguments(law))
     return _functions[structure]
+
+
+class LawSample:
+    """The sample of a control law as machine code that is called from Python; its memory is a tuple.
+
+    Raises TraceError if the law cannot be traced.
+    """
+
+    def __init__(self, law: ControlLaw) -> None:
+        self._function = compiled_sample(law)
+        self._call = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 9)(self._function.address)
+        self._measured, self._setpoints, self._inputs = law.measured_columns, law.setpoints, law.inputs
+        self._parameters = parameters_of(law).tolist()
+        self.initial = tuple(float(value) for value in law.initial_memory.values())
+        sizes = (
+            len(self._measured), len(self._setpoints), len(self.initial), len(self._inputs), len(self._inputs), 1,
+            len(self._parameters), len(self._inputs), len(self.initial),
+        )  # fmt: skip
+        self._ends = list(itertools.accumulate(sizes))
+        self._offsets = [8 * (end - size) for end, size in zip(self._ends, sizes, strict=True)]
+
+    def step(
+        self, memory: tuple[float, ...], measurement: Measurement, dt: float
+    ) -> tuple[dict[str, float], tuple[float, ...]]:
+        """The commands of a sample and the memory after it, as `ControlLaw.step`."""
+        columns, setpoints, ranges = measurement
+        limits = [ranges.get(name, UNLIMITED) for name in self._inputs]
+        given = array.array("d", (
+            *[columns[name] for name in self._measured], *[setpoints[name] for name in self._setpoints], *memory,
+            *[low for low, _ in limits], *[high for _, high in limits], dt, *self._parameters,
+        ))  # fmt: skip
+        given.frombytes(bytes(8 * (self._ends[8] - self._ends[6])))
+        start = given.buffer_info()[0]
+        self._call(*[start + offset for offset in self._offsets])
+        commands = dict(zip(self._inputs, given[self._ends[6] : self._ends[7]], strict=True))
+        return commands, tuple(given[self._ends[7] :])
 
 
 def sample_in_lanes(law: ControlLaw, lanes: int) -> LanesFunction:

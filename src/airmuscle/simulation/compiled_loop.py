@@ -78,20 +78,26 @@ class CompiledRun:
         self._make_arrays(compiled.sizes.states, compiled.sizes.inputs)
         self._parameters = parameters_of(loop.law) if parameters is None else parameters
         arguments = self._arguments(compiled, self._parameters)
-        self._first_buffer = len(arguments) - 9
+        self._first_buffer, self._budget = len(arguments) - 9, len(arguments) - 1
         self._kernel = kernel.sampled_loop.bind(*arguments)
 
-    def restart(self, compiled: CompiledSystem, initial_state: Array, parameters: Array) -> None:
+    def restart(
+        self, compiled: CompiledSystem, initial_state: Array, parameters: Array,
+        control_state: ControlLoopState | None = None,
+    ) -> None:  # fmt: skip
         """Begin again in the same arrays, with a plant of the same structure and other parameters; arguments as before.
 
-        Everything that was returned by this run is overwritten.
+        `control_state` is by default that of the first time; another one differs from it in the controller's memory
+        alone. Everything that was returned by this run is overwritten.
         """
+        self._begin_state = control_state or self._begin_state
         self.bound.rebind(self._integrator.binding(compiled))
         self._precomputed[:], self._parameters[:] = compiled.precomputed, parameters
         state, inputs = self._begin_state, self.loop.prepared.inputs
         self.bound.state[:] = self._kept[:] = initial_state
         self.bound.count[:] = 0
         self.progress.fill(0)
+        self._kernel.replace(self._budget, INTERRUPT_CHECK_STEPS)
         self._memory[:] = [state.controller[name] for name in self.loop.law.initial_memory]
         self._measured[:], self._command[:] = state.measured, state.commanded
         self._applied[:] = state.applied_inputs or inputs.values[0]
@@ -103,6 +109,11 @@ class CompiledRun:
     def prepared(self) -> SampledLoop:
         """The prepared loop."""
         return self.loop.prepared
+
+    @property
+    def room(self) -> int:
+        """Rows for which this run has arrays."""
+        return len(self._rows)
 
     @property
     def can_run(self) -> bool:

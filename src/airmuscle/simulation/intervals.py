@@ -37,6 +37,8 @@ class Intervals(abc.ABC):
     _ends: Any
     _values: Any
     _slopes: Any
+    _sloped = True
+    """Whether an input may change within a segment."""
 
     def __init__(self, prepared: SampledLoop, states: int) -> None:
         self.prepared, self.states, self.inputs = prepared, states, prepared.inputs.values.shape[1]
@@ -54,6 +56,9 @@ class Intervals(abc.ABC):
     def final_inputs(self, begin: float, end: float) -> list[float]:
         """The inputs (m,) at the end of the interval that was appended last."""
         last, width = self.segment_count - 1, self.inputs
+        if not self._sloped:
+            held: list[float] = self._values[last * width : (last + 1) * width].tolist()
+            return held
         duration = end - (self._ends[last - 1] if last > self._first else begin)
         values, slopes = self._values, self._slopes
         return [values[i] + slopes[i] * duration for i in range(last * width, (last + 1) * width)]
@@ -83,6 +88,7 @@ class HeldIntervals(Intervals):
     def __init__(self, prepared: SampledLoop, states: int) -> None:
         super().__init__(prepared, states)
         signal, times = prepared.inputs, prepared.times
+        self._sloped = bool(signal.slopes.any())
         self._rows = np.empty((times.size, states))
         self._arrays = (signal.ends, signal.values, signal.slopes, times, self._rows)
         self._ends, self._values, self._slopes = map(flat_view, self._arrays[:3])

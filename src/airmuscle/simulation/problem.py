@@ -87,9 +87,8 @@ class Problem(ShortRepr):
     def _other_segments(self, loop: ControlLoop) -> PiecewiseLinear:
         """The signal of the inputs of a control loop that its controller does not command."""
         inputs = self.compiled.description.input_names
-        segments = WithDrivers(loop.other_inputs, loop.drivers).segments(inputs, self.start_time, self.duration)
-        segments.check_shape(len(inputs), self.start_time)
-        return segments
+        driven = WithDrivers(loop.other_inputs, loop.drivers)
+        return driven.checked_segments(inputs, self.start_time, self.duration)
 
     @property
     def end_time(self) -> float:
@@ -106,9 +105,7 @@ class Problem(ShortRepr):
         """The input signal of an open-loop run."""
         assert isinstance(self.input, InputSignal)
         inputs = self.compiled.description.input_names
-        segments = self.input.segments(inputs, self.start_time, self.duration)
-        segments.check_shape(len(inputs), self.start_time)
-        return segments.as_floats()
+        return self.input.checked_segments(inputs, self.start_time, self.duration)
 
     @functools.cached_property
     def times(self) -> Array:
@@ -173,7 +170,7 @@ def check_signal(system: System, signal: InputSignal, start: float, duration: fl
 def check_input_range(compiled: CompiledSystem, segments: PiecewiseLinear, start: float) -> None:
     """Raise ParameterError where an input is beyond its range."""
     known = compiled.description
-    if not len(known.input_names):
+    if not len(known.input_names) or segments is known.checked_segments:
         return
     values, slopes = segments.values, segments.slopes
     tables = [values]
@@ -185,6 +182,8 @@ def check_input_range(compiled: CompiledSystem, segments: PiecewiseLinear, start
         low, high = known.input_lower_limits, known.input_upper_limits
         row, column = np.argwhere(~((table >= low) & (table <= high)))[0]
         _refuse_input(compiled, int(column), table[row, column], f"before {segments.ends[row]:g} s")
+    if not values.flags.writeable:
+        known.checked_segments = segments
 
 
 def check_inputs(compiled: CompiledSystem, values: Array, when: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import operator
 from typing import Any, NamedTuple
 
@@ -56,9 +57,14 @@ class RowRecorder:
         """Inputs and outputs at states (N, n) and rising times (N,) of a run whose segments begin at `start` [s]."""
         count = times.size
         inputs, outputs = np.empty((count, self.sizes.inputs)), np.empty((count, self.sizes.outputs))
-        arguments = (states, times, start, segments.ends, segments.values, segments.slopes, inputs, outputs)
-        for i, argument in enumerate(arguments, 2):
-            self._kernel.replace(i, argument)
+        kernel = self._kernel
+        kernel.replace(2, states)
+        kernel.replace_input(3, times)
+        kernel.replace(4, start)
+        for i, argument in enumerate((segments.ends, segments.values, segments.slopes), 5):
+            kernel.replace_input(i, argument)
+        kernel.replace(8, inputs)
+        kernel.replace(9, outputs)
         first = self._kernel()
         lower, upper = self._ranges.tolist()
         return RowTable(inputs, outputs, lower, upper, first)
@@ -119,26 +125,31 @@ def make_recording(
     before  diagnostics that come first
     """
     known, reached = compiled.description, raw.reached
-    states, times = raw.rows[:reached], times[:reached]
+    states = raw.rows
+    if reached < times.size:
+        states, times = states[:reached], times[:reached]
     for array in (times, states, table.outputs, table.inputs, *more.values()):
         array.setflags(write=False)
-    columns: dict[str, Array] = {"time": times}
-    columns.update(zip(known.state_names, states.T, strict=True))
-    columns.update(zip(known.output_names, table.outputs.T, strict=True))
-    columns.update(zip(known.input_names, table.inputs.T, strict=True))
+    values = times, *states.T, *table.outputs.T, *table.inputs.T
+    columns: dict[str, Array] = dict(zip(known.recorded_names, values, strict=True))
     columns.update(more)
-    text = f"simulated by {integrator}: {raw.steps} steps, {raw.rejected} rejected"
+    text = f"simulated by {_name(integrator)}: {raw.steps} steps, {raw.rejected} rejected"
     diagnostics = [*before, Diagnostic(DiagnosticCode.INTEGRATOR, "integrator", text)]
     notes = [*(diagnostic.message for diagnostic in diagnostics), *known.remark_texts]
     diagnostics += known.remarks
     later: list[Diagnostic] = []
     if reached:
-        limits = dict(zip(known.column_names, zip(table.lower, table.upper, strict=True), strict=True))
-        later += compiled.system.diagnose(Columns(columns, limits))
+        later += compiled.system.diagnose(Columns(columns, known.column_places, table.lower, table.upper))
     if raw.status != Status.DONE:
         later.append(early_end(compiled, raw, end))
     notes += [diagnostic.message for diagnostic in later]
     return Recording.from_arrays(columns, "simulation", known.constants, tuple(notes)), (*diagnostics, *later)
+
+
+@functools.lru_cache(maxsize=32)
+def _name(integrator: Integrator | None) -> str:
+    """The representation of an integrator."""
+    return str(integrator)
 
 
 def early_end(compiled: CompiledSystem, raw: RawSolution, end: float) -> Diagnostic:

@@ -41,8 +41,9 @@ def _solve_open_loop(problem: Problem) -> Solution:
     bound = borrow(pool, compiled, integrator)
     raw = bound.run(segments, problem.start_time, problem.initial_vector, times)
     give_back(pool, integrator, bound)
-    reached = raw.reached
-    table = recorded_rows(compiled, raw.rows[:reached], times[:reached], segments, problem.start_time)
+    rows, reached = raw.rows, raw.reached
+    shown = (rows, times) if reached == times.size else (rows[:reached], times[:reached])
+    table = recorded_rows(compiled, *shown, segments, problem.start_time)
     raw, table = truncate_at_invalid_row(compiled, raw, table, times)
     recording, diagnostics = make_recording(compiled, raw, table, times, integrator, problem.end_time, {})
     final = dict(zip(compiled.description.state_names, raw.state.tolist(), strict=True))

@@ -14,7 +14,7 @@ from ..compile.cache.kernel import evaluate
 from ..compile.program import CompiledSystem
 from ..control.control_loop import ControlLoop, ControlLoopState
 from ..control.inputs import InputSignal
-from ..control.piecewise_linear import PiecewiseLinear
+from ..control.piecewise_linear import FEW_SEGMENTS, PiecewiseLinear
 from ..core.arrays import Array, flat_view
 from ..core.errors import ParameterError
 from .output_times import output_times
@@ -91,16 +91,19 @@ def prepare_loop(problem: Problem, state: ControlLoopState) -> SampledLoop:
     edges, sampled = _edges(loop.sample_time, state, start, problem.end_time)
     close = CLOSE * loop.sample_time
     others = snapped(loop.other_inputs, names, edges, close)
-    starts = np.unique(np.concatenate([edges[:-1], others.starts(start)]))
+    starts = _merged(edges[:-1], others.ends[:-1])
     inputs = others.split_at(starts, start).as_floats()
     commanded = [names.index(name) for name in loop.controller.inputs]
-    inputs.values[:, commanded] = inputs.slopes[:, commanded] = 0.0
-    first_segments = np.append(np.searchsorted(starts, edges[:-1]), starts.size)
+    for column in commanded:
+        inputs.values[:, column] = inputs.slopes[:, column] = 0.0
+    first_segments = np.arange(edges.size)
+    if starts.size >= edges.size:
+        first_segments[:-1], first_segments[-1] = np.searchsorted(starts, edges[:-1]), starts.size
     times = output_times(problem.output_times, start, duration, np.append(start, inputs.ends))
     setpoint = snapped(loop.setpoint, loop.controller.setpoints, edges, close)
-    bounds = known.lower_bounds.tolist()
+    bounds, (setpoints, _) = known.lower_bounds.tolist(), setpoint.at_rising(edges[:-1], start)
     return SampledLoop(
-        loop, edges, sampled, inputs, first_segments, commanded, setpoint, setpoint.inputs_at(edges[:-1], start), times,
+        loop, edges, sampled, inputs, first_segments, commanded, setpoint, setpoints, times,
         first_rows_of(times, edges), names, _ranges(compiled, loop),
         [(i, bound) for i, bound in enumerate(bounds) if bound > -math.inf],
     )  # fmt: skip
@@ -108,9 +111,25 @@ def prepare_loop(problem: Problem, state: ControlLoopState) -> SampledLoop:
 
 def first_rows_of(times: Array, instants: Array) -> npt.NDArray[np.int64]:
     """The first output time of each interval (K + 1,); the rows at the end of an interval belong to it."""
-    rows = np.searchsorted(times, instants, side="right")
+    if times.size == instants.size and (times == instants).all():
+        rows = np.arange(1, times.size + 1)
+    else:
+        rows = np.searchsorted(times, instants, side="right")
     rows[0] = 0
     return rows
+
+
+def intervals_of(times: Array, instants: Array) -> npt.NDArray[np.int64]:
+    """The interval in which each output time is; where one ends and another begins, the later one."""
+    if times.size == instants.size and (times == instants).all():
+        return np.arange(times.size)
+    return np.maximum(np.searchsorted(instants, times, side="right") - 1, 0)
+
+
+def _merged(instants: Array, others: Array) -> Array:
+    """The instants and the others, both rising, each once."""
+    at = np.minimum(instants.searchsorted(others), instants.size - 1)
+    return instants if (instants[at] == others).all() else np.unique(np.concatenate([instants, others]))
 
 
 def _ranges(compiled: CompiledSystem, loop: ControlLoop) -> dict[str, tuple[float, float]]:
@@ -142,12 +161,30 @@ def snapped(signal: InputSignal, names: tuple[str, ...], edges: Array, close: fl
     """The segments of a signal; an end that is close to a sampling instant is moved to it."""
     start = float(edges[0])
     segments = signal.segments(names, start, float(edges[-1]) - start)
+    if segments.ends.size <= FEW_SEGMENTS:
+        return _few_snapped(segments, edges, close)
     behind = np.clip(np.searchsorted(edges, segments.ends), 1, edges.size - 1)
     before, after = edges[behind - 1], edges[behind]
     nearest = np.where(segments.ends - before < after - segments.ends, before, after)
     ends = np.where(np.abs(nearest - segments.ends) <= close, nearest, segments.ends)
     kept = np.diff(ends, prepend=edges[0]) > 0
     return PiecewiseLinear(ends[kept], segments.values[kept], segments.slopes[kept])
+
+
+def _few_snapped(segments: PiecewiseLinear, edges: Array, close: float) -> PiecewiseLinear:
+    """The same of a few segments, one by one."""
+    ends, kept, last = [], [], float(edges[0])
+    behind = edges.searchsorted(segments.ends).tolist()
+    for row, (end, i) in enumerate(zip(segments.ends.tolist(), behind, strict=True)):
+        after = min(max(i, 1), edges.size - 1)
+        low, high = edges[after - 1 : after + 1].tolist()
+        nearest = low if end - low < high - end else high
+        moved = nearest if abs(nearest - end) <= close else end
+        if moved > last:
+            ends.append(moved)
+            kept.append(row)
+        last = moved
+    return PiecewiseLinear(np.array(ends), segments.values[kept], segments.slopes[kept])
 
 
 def make_measurement(

@@ -178,13 +178,12 @@ class Stepper:
         self._limits = _Limits(compiled, self.check_validity)
         self._next, self._given = self._bound.state, self._bound.held
         known = compiled.description
-        self._begin = begin_step.bind(
-            self._given, known.input_lower_limits, known.input_upper_limits, self.state, self._next
-        )
-        self._end = end_step.bind(
+        begin = begin_step.bind(self._given, known.input_lower_limits, known.input_upper_limits, self.state, self._next)
+        end = end_step.bind(
             compiled.address["outputs"], compiled.precomputed, self._next, self._given, self._found,
             *self._limits.arrays, self.state, self.inputs, self.outputs, self._always,
         )  # fmt: skip
+        self._kernels, self._begin, self._end = (begin, end), begin.runner, end.runner
 
     def _settle(self) -> Array:
         """Compute the outputs at the present state and the given inputs."""

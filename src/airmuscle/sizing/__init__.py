@@ -5,6 +5,7 @@ analysis of a given plant (equilibria, statics of a joint) is below the library 
 """
 
 from .choice import (
+    SORT_KEYS,
     MuscleChoice,
     MuscleDesign,
     UnsuitableMuscle,
@@ -21,6 +22,7 @@ from .static_muscle import EndPoint, StaticMuscle
 from .valve_sizing import discharge_valve, fill_valve
 
 __all__ = [
+    "SORT_KEYS",
     "EndPoint",
     "JointRequirement",
     "LiftRequirement",

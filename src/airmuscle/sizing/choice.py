@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 
 from ..core.errors import ParameterError
 from ..core.short_repr import ShortRepr
@@ -145,6 +146,12 @@ def by_reserve(choice: MuscleChoice) -> float | None:
 def by_diameter(choice: MuscleChoice) -> float | None:
     """Greatest outer diameter [m]."""
     return choice.diameter
+
+
+SORT_KEYS: Mapping[str, SortKey] = MappingProxyType({
+    "air": by_air, "length": by_length, "count": by_count, "reserve": by_reserve, "diameter": by_diameter,
+})  # fmt: skip
+"""The criteria by their names."""
 
 
 def rank(choices: list[MuscleChoice], sort: SortKey) -> tuple[MuscleChoice, ...]:

@@ -125,9 +125,10 @@ def _read_file(path: Path, settings: FitSettings, found: ReadSet) -> None:
 
 def without_folder(text: str, folder: Path) -> str:
     """The text without the path of a folder, or its beginning, which a reader of another package may quote."""
-    path, least = str(folder), len("/tmp/")
+    path = str(folder)
     text = text.replace(f"{path}{os.sep}", "")
-    for length in range(len(path), least, -1):
+    first_directory = folder.parents[-2] if len(folder.parents) > 1 else folder
+    for length in range(len(path), len(f"{first_directory}{os.sep}"), -1):
         text = text.replace(path[:length], "…")
     return text
 

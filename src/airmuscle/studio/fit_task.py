@@ -28,7 +28,7 @@ from ..library.write import part_toml
 from ..recording import Recording
 from ..recording.segment import check_contents, motion_direction
 from ..report.compare_chapter import compare_chapter
-from ..report.fit_files import fitted_entry, missing_geometry, write_fit
+from ..report.fit_files import fitted_entry, left_out_ratio, missing_geometry, write_fit
 from ..report.hysteresis_chapter import hysteresis_chapters
 from ..report.output_folder import atomic_folder
 from ..report.write import as_json, write_into
@@ -69,7 +69,7 @@ def run_fit(folder: str, out: str, settings: FitSettings, report: Report) -> Non
         raise as_field_error(error, "fit") from None
     best = selection.recommended
     initial = Entry(best.candidate.name, best.candidate.name, "chosen", best.candidate.law, geometry)
-    entry = fitted_entry(best.fit, initial, names)
+    entry = fitted_entry(best.fit, initial, names, left_out_ratio(best))
     chapters = [compare_chapter(each, best, selection.reason) for each in selection.comparisons]
     with atomic_folder(out) as staging, warnings.catch_warnings():
         warnings.simplefilter("ignore", AirmuscleWarning)

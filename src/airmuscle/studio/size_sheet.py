@@ -16,23 +16,16 @@ from ..core.units import quantity
 from ..muscle.isobars import compute_isobars
 from ..report.sizing_chapter import choice_row
 from ..sizing import (
+    SORT_KEYS,
     JointRequirement,
     LiftRequirement,
     MuscleChoice,
     SizingConditions,
-    by_air,
-    by_count,
-    by_diameter,
-    by_length,
-    by_reserve,
     scenario_text,
     size_muscles,
 )
-from ..sizing.choice import Requirement, SortKey
+from ..sizing.choice import Requirement
 
-SORTS: Mapping[str, SortKey] = {
-    "air": by_air, "length": by_length, "count": by_count, "reserve": by_reserve, "diameter": by_diameter,
-}  # fmt: skip
 FIELDS = (
     "kind", "load", "stroke", "stiffness", "torque", "angle", "inertia", "supply", "safety", "cycle_time",
     "max_length", "max_diameter", "max_count", "sort",
@@ -50,7 +43,7 @@ def size_sheet(text: str) -> dict[str, Any]:
     """The sheet of a request in JSON. Raises ParameterError, UnitError, or SolveError with what is reachable."""
     given = read_request(text)
     requirement, conditions = _requirement(given), _conditions(given)
-    result = size_muscles(requirement, conditions, sort=SORTS[given["sort"]])
+    result = size_muscles(requirement, conditions, sort=SORT_KEYS[given["sort"]])
     result.check_reachable()
     sheet: dict[str, Any] = {
         "tab": "size",
@@ -80,8 +73,8 @@ def read_request(text: str) -> dict[str, str]:
     fields = {name: given.get(name, "").strip() for name in FIELDS}
     if fields["kind"] not in ("lift", "joint"):
         raise ParameterError("kind must be lift or joint.")
-    if fields["sort"] not in SORTS:
-        raise ParameterError(f"sort must be one of {', '.join(SORTS)}.")
+    if fields["sort"] not in SORT_KEYS:
+        raise ParameterError(f"sort must be one of {', '.join(SORT_KEYS)}.")
     return fields
 
 

@@ -7,12 +7,14 @@ its owner, its number of items, their size, its data, its shape and its strides;
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator, Sequence
 
 _NUMBERS = {"q": "i64", "d": "double"}
 _ITEM_SIZES = {"q": 8, "d": 8, "f": 4}
 
 
+@functools.cache
 def slot_count(kind: str) -> int:
     """Slots of an argument of this kind: "q" whole number, "d" float, "d2" array of doubles, "f1" of singles."""
     return 1 + int(kind[1:] or 0)

@@ -7,10 +7,12 @@ machine code is stored (`store`), and every later process loads that alone. It i
 from __future__ import annotations
 
 import ctypes
+import functools
 import importlib
+import itertools
 import math
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,6 +23,7 @@ from .entry_point import slot_count
 from .object_code import build, load_engine
 
 _ITEMS = {np.dtype(np.int64): "q", np.dtype(np.float64): "d", np.dtype(np.float32): "f"}
+_KINDS = {(dtype, dimensions): f"{item}{dimensions}" for dtype, item in _ITEMS.items() for dimensions in range(5)}
 _compiling = threading.RLock()
 _address, _view = ctypes.addressof, ctypes.c_char.from_buffer
 _ENTRY = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p)
@@ -37,7 +40,7 @@ def _kind(argument: Any) -> str:
         return "d"
     if type(argument) is int:
         return "q"
-    return f"{_ITEMS[argument.dtype]}{argument.ndim}"
+    return _KINDS[argument.dtype, argument.ndim]
 
 
 def _array_at(address: int, shape: tuple[int, ...]) -> Any:
@@ -101,14 +104,13 @@ class BoundKernel:
 
     def __init__(self, kernel: Kernel, arguments: tuple[Any, ...]) -> None:
         self._kinds = tuple(map(_kind, arguments))
-        counts = list(map(slot_count, self._kinds))
-        self._offsets = [sum(counts[:i]) for i in range(len(counts))]
-        self._slots = (ctypes.c_int64 * sum(counts))()
-        self._floats = (ctypes.c_double * sum(counts)).from_buffer(self._slots)
+        *self._offsets, count = itertools.accumulate(map(slot_count, self._kinds), initial=0)
+        self._slots = (ctypes.c_int64 * count)()
+        self._floats = (ctypes.c_double * count).from_buffer(self._slots)
         self._address = ctypes.addressof(self._slots)
         self._arguments = list(arguments)
-        for index, argument in enumerate(arguments):
-            self.replace(index, argument)
+        for kind, offset, argument in zip(self._kinds, self._offsets, arguments, strict=True):
+            self._set(kind, offset, argument)
         self._kernel = kernel  # its machine code must live as long
         entry = kernel.entry(self._kinds)
         self._run: Any = entry
@@ -116,15 +118,29 @@ class BoundKernel:
 
     def replace(self, index: int, argument: Any) -> None:
         """Take another argument of the same kind in place of number `index`."""
-        self._arguments[index] = argument
-        kind, offset = self._kinds[index], self._offsets[index]
+        if self._arguments[index] is not argument:
+            self._arguments[index] = argument
+            self._set(self._kinds[index], self._offsets[index], argument)
+
+    def replace_input(self, index: int, array: Any) -> None:
+        """Take another array in place of number `index`, which the kernel only reads; it may be read-only."""
+        if array.flags.writeable or self._arguments[index] is array:
+            self.replace(index, array)
+        elif not array.flags.c_contiguous or _kind(array) != self._kinds[index]:
+            raise TypeError(f"argument {index} must be a C-contiguous array of kind {self._kinds[index]}")
+        else:
+            self._arguments[index], offset = array, self._offsets[index]
+            self._slots[offset : offset + 1 + array.ndim] = [array.ctypes.data, *array.shape]
+
+    def _set(self, kind: str, offset: int, argument: Any) -> None:
+        """Write an argument into its slots."""
         if kind == "d":
             self._floats[offset] = argument
         elif kind == "q":
             self._slots[offset] = argument
         else:
             slots = self._slots
-            slots[offset] = _address(_view(argument)) if argument.size else 0
+            slots[offset] = address_of(argument)
             for length in argument.shape:
                 offset += 1
                 slots[offset] = length
@@ -136,9 +152,11 @@ class BoundKernel:
             offset = offsets[i]
             slots[offset] = address
             slots[offset + 1] = length
-        if self._numba is not None:
-            for i, address in enumerate(addresses, index):
-                arguments[i] = _array_at(address, (length, *arguments[i].shape[1:]))
+        if self._numba is None:
+            arguments[index : index + len(addresses)] = addresses
+            return
+        for i, address in enumerate(addresses, index):
+            arguments[i] = _array_at(address, (length, *arguments[i].shape[1:]))
 
     @property
     def entry_address(self) -> int | None:
@@ -153,6 +171,11 @@ class BoundKernel:
     def slot_of(self, index: int) -> int:
         """The place in the slots of argument number `index`."""
         return self._offsets[index]
+
+    @property
+    def runner(self) -> Callable[[], int]:
+        """A function that runs the kernel with less overhead than the kernel itself, as long as the kernel lives."""
+        return self if self._numba else functools.partial(self._run, self._address)
 
     def __call__(self) -> int:
         """Run the kernel; its status."""

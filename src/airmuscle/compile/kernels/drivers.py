@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
+
+from .parts import PART
 
 THRESHOLD = 0.5
 INFINITY = np.inf
 ARRIVED = 1e-12
-PART = numba.njit(error_model="numpy", nogil=True, inline="always")
-"""Decorator of a part of a kernel; numba copies it into the kernel."""
 
 
 @PART

@@ -6,7 +6,8 @@ from typing import Any
 
 from ...core.status import Status
 from .calls import invoke, pointer
-from .matrices import PART, add_product
+from .matrices import add_product
+from .parts import PART
 
 DONE, NOT_FINITE = Status.DONE.value, Status.NOT_FINITE.value
 MAX_NORM = 0.125

@@ -9,7 +9,7 @@ import numba
 from ...core.status import Status
 from .calls import invoke, pointer
 from .exponential import exponential_step
-from .matrices import PART
+from .parts import PART
 
 DONE, NOT_FINITE = Status.DONE.value, Status.NOT_FINITE.value
 

@@ -13,12 +13,13 @@ import numpy as np
 
 from ...core.status import Status
 from .calls import invoke, pointer
-from .segments import PART, set_inputs, set_slopes, write_present
+from .parts import CONTRACTED_PART
+from .segments import set_inputs, set_slopes, write_present
 
 DONE, PAUSED, NOT_FINITE = Status.DONE.value, Status.PAUSED.value, Status.NOT_FINITE.value
 
 
-@PART
+@CONTRACTED_PART
 def write_between(
     step: Any, at_y: Any, at_u: Any, at_c: Any, at_w: Any, at_new: Any, new: Any,
     times: Any, row: Any, limit: Any, t: Any, rows: Any,
@@ -32,7 +33,7 @@ def write_between(
     return row
 
 
-@PART
+@CONTRACTED_PART
 def take(new: Any, y: Any) -> Any:
     """Copy the new states to `y`; the sum of their sizes."""
     total_size = 0.0

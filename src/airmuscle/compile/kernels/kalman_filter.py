@@ -9,7 +9,8 @@ import numba
 from ...core.status import Status
 from .calls import invoke, pointer
 from .exponential import exponential_step
-from .matrices import PART, cholesky, multiply, multiply_by_transpose, solve_row
+from .matrices import cholesky, multiply, solve_row
+from .parts import PART
 
 DONE, SINGULAR, NOT_FINITE = Status.DONE.value, Status.SINGULAR.value, Status.NOT_FINITE.value
 
@@ -87,7 +88,7 @@ def correct_extended(
     invoke(measured, (pointer(x), pointer(u), pointer(constants), pointer(difference), pointer(c)))
     for i in range(p):
         difference[i] = values[i] - difference[i]
-    multiply_by_transpose(covariance, c, gain)
+    multiply(covariance, c.T, gain)
     multiply(c, gain, s)
     for i in range(p):
         s[i, i] += noise[i]

@@ -15,14 +15,11 @@ import numpy as np
 
 from ...core.status import Status
 from .calls import invoke, pointer
+from .parts import PART
 
 DONE, NOT_FINITE, INTERRUPTED = Status.DONE.value, Status.NOT_FINITE.value, Status.INTERRUPTED.value
 MAX_UNINTERRUPTED = 10_000
 """Steps between two checks whether the caller wants to stop."""
-
-
-PART = numba.njit(error_model="numpy", nogil=True, inline="always")
-"""Decorator of the parts of the kernel; numba copies them into it."""
 
 
 @PART

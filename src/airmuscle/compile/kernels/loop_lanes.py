@@ -14,7 +14,8 @@ import numpy as np
 
 from ...core.status import Status
 from .calls import invoke, pointer
-from .lanes import PART
+from .lanes import write_columns
+from .parts import PART
 
 DONE, NOT_FINITE, INTERRUPTED = Status.DONE.value, Status.NOT_FINITE.value, Status.INTERRUPTED.value
 LARGEST = 1.7976931348623157e308
@@ -86,15 +87,7 @@ def write_row(
         needs_outputs = needs_outputs or n <= chosen[j] < n + k
     if needs_outputs:
         invoke(outputs, (pointer(states), pointer(base), pointer(c), pointer(o)))
-    for j in range(chosen.shape[0]):
-        i = chosen[j]
-        for lane in range(states.shape[1]):
-            if i < n:
-                rows[j, lane, row] = states[i, lane]
-            elif i < n + k:
-                rows[j, lane, row] = o[i - n, lane]
-            else:
-                rows[j, lane, row] = base[i - n - k, lane]
+    write_columns(chosen, row, states, o, base, rows)
 
 
 @PART

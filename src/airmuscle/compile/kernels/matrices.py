@@ -5,13 +5,10 @@ from __future__ import annotations
 from math import sqrt
 from typing import Any
 
-import numba
-
 from ...core.status import Status
+from .parts import PART
 
 DONE, SINGULAR = Status.DONE.value, Status.SINGULAR.value
-PART = numba.njit(error_model="numpy", nogil=True, inline="always")
-"""Decorator of a part of a kernel."""
 
 
 @PART
@@ -22,17 +19,6 @@ def multiply(a: Any, b: Any, result: Any) -> None:
             value = 0.0
             for k in range(b.shape[0]):
                 value += a[i, k] * b[k, j]
-            result[i, j] = value
-
-
-@PART
-def multiply_by_transpose(a: Any, b: Any, result: Any) -> None:
-    """The product of `a` (n, k) and the transpose of `b` (m, k) in `result` (n, m)."""
-    for i in range(result.shape[0]):
-        for j in range(result.shape[1]):
-            value = 0.0
-            for k in range(b.shape[1]):
-                value += a[i, k] * b[j, k]
             result[i, j] = value
 
 

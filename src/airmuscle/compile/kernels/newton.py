@@ -8,15 +8,12 @@ import numba
 
 from ...core.status import Status
 from .calls import invoke, pointer
+from .parts import PART
 
 DONE, SINGULAR = Status.DONE.value, Status.SINGULAR.value
 NOT_FINITE, NOT_CONVERGED = Status.NOT_FINITE.value, Status.NOT_CONVERGED.value
 MAX_ITERATIONS, MAX_STEP, TOLERANCE = 50, 10.0, 1e-11
 """Iterations; the longest step and the step that ends the search, both in sizes of the unknowns."""
-
-
-PART = numba.njit(nogil=True, error_model="numpy", inline="always")
-"""Decorator of the parts of the kernel; numba copies them into it."""
 
 
 @PART

@@ -7,7 +7,7 @@ from typing import Any
 import numba
 
 from .calls import invoke, pointer
-from .matrices import PART
+from .parts import PART
 
 LANES, ITERATIONS = 8, 30
 """Points of one call of a function, as in `lanes_function`; iterations of Newton's method."""

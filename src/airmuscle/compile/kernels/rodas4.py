@@ -14,6 +14,7 @@ import numba
 
 from ...core.status import Status
 from .calls import invoke, pointer
+from .parts import CONTRACTED_PART
 from .rodas4_coefficients import (
     A21,
     A31,
@@ -59,13 +60,13 @@ from .rodas4_coefficients import (
     N3,
     N4,
 )
-from .segments import PART, set_inputs, write_present
+from .segments import set_inputs, write_present
 
 DONE, PAUSED = Status.DONE.value, Status.PAUSED.value
 STEP_TOO_SMALL, NOT_FINITE = Status.STEP_TOO_SMALL.value, Status.NOT_FINITE.value
 
 
-@PART
+@CONTRACTED_PART
 def workspace(work: Any, n: Any, m: Any, jacobian_size: Any) -> Any:
     """The arrays f0, ft, x, yn, g, k1 .. k6 (n,), u, w (m,), Jacobian and factors within the workspace."""
     rest = 11 * n + 2 * m
@@ -78,7 +79,7 @@ def workspace(work: Any, n: Any, m: Any, jacobian_size: Any) -> Any:
     )  # fmt: skip
 
 
-@PART
+@CONTRACTED_PART
 def begin_segment(slopes: Any, segment: Any, w: Any, ft: Any) -> Any:
     """Set the slopes `w` of the inputs and the derivative `ft` with respect to time; whether an input changes."""
     moving = False
@@ -90,7 +91,7 @@ def begin_segment(slopes: Any, segment: Any, w: Any, ft: Any) -> Any:
     return moving
 
 
-@PART
+@CONTRACTED_PART
 def differentiate(jac: Any, df_dt: Any, moving: Any, y: Any, at: Any, at_j: Any, w: Any, f0: Any, ft: Any) -> None:
     """Rates and Jacobian at `y`, and their derivative with respect to time where an input changes."""
     _, at_u, at_c, _, _ = at
@@ -99,7 +100,7 @@ def differentiate(jac: Any, df_dt: Any, moving: Any, y: Any, at: Any, at_j: Any,
         invoke(df_dt, (pointer(y), at_u, at_c, pointer(w), pointer(ft)))
 
 
-@PART
+@CONTRACTED_PART
 def initial_step(y: Any, f0: Any, relative: Any, absolute: Any, left: Any) -> Any:
     """The first step of a segment, from the sizes of states and rates; at most `left`."""
     size = 0.0
@@ -114,7 +115,7 @@ def initial_step(y: Any, f0: Any, relative: Any, absolute: Any, left: Any) -> An
     return h
 
 
-@PART
+@CONTRACTED_PART
 def compute_stages(
     solve: Any, stage: Any, at: Any, at_k: Any, k: Any, y: Any, x: Any, g: Any, f0: Any, ft: Any,
     values: Any, segment: Any, w: Any, u: Any, t: Any, start: Any, h: Any, moving: Any,
@@ -147,7 +148,7 @@ def compute_stages(
         set_inputs(values, segment, t + h - start, w, u)
 
 
-@PART
+@CONTRACTED_PART
 def compute_last_stages(stage: Any, at: Any, at_k: Any, k: Any, y: Any, x: Any, g: Any, h: Any) -> None:
     """Stages five and six, at the end of the step."""
     k1, k2, k3, k4, k5, n, r = k[0], k[1], k[2], k[3], k[4], y.shape[0], 1.0 / h
@@ -162,7 +163,7 @@ def compute_last_stages(stage: Any, at: Any, at_k: Any, k: Any, y: Any, x: Any, 
     invoke(stage, (at_x, at_u, at_c, at_a, at_g, at_k[5]))
 
 
-@PART
+@CONTRACTED_PART
 def finish_step(y: Any, x: Any, k6: Any, relative: Any, absolute: Any, yn: Any) -> Any:
     """The states `yn` at the end of the step; its error in tolerances, rms over the states."""
     error = 0.0
@@ -172,7 +173,7 @@ def finish_step(y: Any, x: Any, k6: Any, relative: Any, absolute: Any, yn: Any) 
     return sqrt(error / y.shape[0]) + 1e-16
 
 
-@PART
+@CONTRACTED_PART
 def step_factor(error: Any) -> Any:
     """The ratio of the next step to this one."""
     factor = 0.5
@@ -181,7 +182,7 @@ def step_factor(error: Any) -> Any:
     return factor
 
 
-@PART
+@CONTRACTED_PART
 def accepted_step(
     factor: Any, solve: Any, stage: Any, at: Any, at_k: Any, at_j: Any, k: Any, y: Any, x: Any, g: Any, f0: Any,
     ft: Any, yn: Any, values: Any, segment: Any, w: Any, u: Any, t: Any, start: Any, end: Any, h: Any, moving: Any,
@@ -211,7 +212,7 @@ def accepted_step(
     return status, h, ratio, last, rejections
 
 
-@PART
+@CONTRACTED_PART
 def complete_step(
     times: Any, row: Any, reached: Any, t: Any, h: Any, y: Any, yn: Any, k: Any, x: Any, g: Any, rows: Any
 ) -> Any:

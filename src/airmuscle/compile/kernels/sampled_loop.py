@@ -10,7 +10,7 @@ from ...core.status import Status
 from ..kernel_layout import Progress
 from .calls import call_kernel, invoke, pointer
 from .driven_inputs import drive_inputs, is_full
-from .drivers import PART
+from .parts import PART
 
 DONE, PAUSED, NOT_FINITE = Status.DONE.value, Status.PAUSED.value, Status.NOT_FINITE.value
 NON_FINITE_COMMAND, BELOW_LIMIT = Status.NON_FINITE_COMMAND.value, Status.NEGATIVE_AIR_MASS.value

@@ -7,27 +7,24 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
-
-PART = numba.njit(error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True, inline="always")
-"""Decorator of a part of a kernel that integrates."""
+from .parts import CONTRACTED_PART
 
 
-@PART
+@CONTRACTED_PART
 def set_slopes(slopes: Any, segment: Any, w: Any) -> None:
     """The slopes `w` of the inputs in a segment."""
     for i in range(w.shape[0]):
         w[i] = slopes[segment, i]
 
 
-@PART
+@CONTRACTED_PART
 def set_inputs(values: Any, segment: Any, elapsed: Any, w: Any, u: Any) -> None:
     """The inputs `u` so long after the start of a segment."""
     for i in range(u.shape[0]):
         u[i] = values[segment, i] + elapsed * w[i]
 
 
-@PART
+@CONTRACTED_PART
 def write_present(times: Any, row: Any, t: Any, y: Any, rows: Any) -> Any:
     """Write the present states at the output times up to `t`; the next row."""
     while row < times.shape[0] and times[row] <= t:

@@ -11,7 +11,8 @@ from ...core.status import Status
 from .calls import invoke, pointer
 from .exponential import exponential_step
 from .kalman_filter import apply_gain
-from .matrices import PART, cholesky, solve_row
+from .matrices import cholesky, solve_row
+from .parts import PART
 
 DONE, SINGULAR, NOT_FINITE = Status.DONE.value, Status.SINGULAR.value, Status.NOT_FINITE.value
 

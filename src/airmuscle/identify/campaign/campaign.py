@@ -17,11 +17,11 @@ from ...geometry import Geometry
 from ...muscle import CreepElements, LinearDamper, Muscle
 from ...recording import Recording
 from ..compared_points import FORCE_MARGIN, law_of_length
-from ..force_evaluation import evaluate_force
-from .creep_stage import CreepStage, creep_force, fit_creep_stage
+from .creep_stage import CreepStage, fit_creep_stage
 from .fill_stage import FillStage, fit_fill_stage
-from .friction_stage import FrictionStage, fit_friction_stage, friction_along
+from .friction_stage import FrictionStage, fit_friction_stage
 from .next_experiment import NextExperiment, plan_next
+from .predicted_force import predicted_force
 from .record import CampaignRecord, RecordKind, classify_records
 from .release_stage import ReleaseStage, fit_release_stage
 from .rig import check_one_rig
@@ -120,13 +120,10 @@ class Campaign(ShortRepr):
         length = recording.constants.get("resting_length")
         law = law_of_length(self.static.fit.model, None if length is None else float(length))
         limit = FORCE_MARGIN * max(float(np.nanmax(run["force"])) for run in self.static.points)
-        force = evaluate_force(law, recording["pressure"], recording["contraction"], limit)
-        if length is not None:
-            force = force - friction_along(self.friction, recording) - creep_force(self.creep_elements, recording)
+        force = predicted_force(law, recording, self.friction, self.creep_elements, limit)
         known = {r.resting_length for r in self.records if r.kind.is_static}
-        bands = self.static.bands
-        band = bands[0] if length is None or any(abs(float(length) - k) < 1e-6 for k in known if k) else bands[-1]
-        half = band.half_width
+        measured = length is None or any(abs(float(length) - k) < 1e-6 for k in known if k)
+        half = self.static.half_width(recording, measured)
         return Prediction(np.maximum(force, 0.0), force - half, force + half)
 
 

@@ -14,7 +14,7 @@ from ..compared_points import FORCE_MARGIN, force_residuals
 from ..fit_points import FitPoints
 from ..result import Fit
 from ..static_fit import refit
-from .record import CampaignRecord
+from .record import CampaignRecord, RecordKind
 
 LEVEL = 0.95
 """Share of further rows within the band."""
@@ -82,6 +82,25 @@ def calibrate(fit: Fit, points: Sequence[Recording], records: Sequence[CampaignR
     return tuple(bands)
 
 
+def calibrate_held(
+    fit: Fit, points: Sequence[Recording], records: Sequence[CampaignRecord], band: ErrorBand
+) -> ErrorBand | None:
+    """The band for further isometric runs, from all of them left out at once; not narrower than `band`.
+
+    A ramp of the pressure at a held length has no friction, and another history of creep than a sweep of the length, so
+    that its residuals are of one sign. None where there is no isometric run, or the others do not determine the law.
+    """
+    labels = [("kind", 0) if record.kind is RecordKind.ISOMETRIC else None for record in records]
+    if None not in labels or ("kind", 0) not in labels:
+        return None
+    max_force = FORCE_MARGIN * max(float(np.nanmax(run["force"])) for run in points)
+    residuals, groups = _left_out_residuals(fit, points, labels, max_force, share=1.0)
+    if not groups:
+        return None
+    own = _band("further isometric runs", residuals, groups)
+    return dataclasses.replace(own, half_width=max(own.half_width, band.half_width))
+
+
 def _band(purpose: str, residuals: Array, groups: int) -> ErrorBand:
     size = residuals.size
     share = min(np.ceil((size + 1) * LEVEL) / size, 1.0)
@@ -116,8 +135,9 @@ def _inner(values: Sequence[tuple[str, float] | None]) -> list[tuple[str, int] |
 
 
 def _left_out_residuals(
-    fit: Fit, points: Sequence[Recording], labels: Sequence[tuple[str, int] | None], max_force: float
-) -> tuple[Array, int]:
+    fit: Fit, points: Sequence[Recording], labels: Sequence[tuple[str, int] | None], max_force: float,
+    share: float = SHARE_OF_ERROR,
+) -> tuple[Array, int]:  # fmt: skip
     """The residuals [N] at the rows of each group, with the share of the error without it; and the number of groups."""
     residuals, count = [np.zeros(0)], 0
     fixed = tuple(leaf.path for i, leaf in enumerate(fit.problem.leaves) if i not in set(fit.problem.free))
@@ -129,6 +149,6 @@ def _left_out_residuals(
         except AirmuscleError:
             continue  # the others do not determine the law, so that this group cannot judge it
         inside = force_residuals(fit.model, others, max_force)
-        residuals.append(inside + SHARE_OF_ERROR * (force_residuals(model, others, max_force) - inside))
+        residuals.append(inside + share * (force_residuals(model, others, max_force) - inside))
         count += 1
     return np.concatenate(residuals), count

@@ -13,10 +13,11 @@ from ...core.short_repr import ShortRepr
 from ...friction import Friction, NoFriction
 from ...muscle import CreepElements
 from ...recording import Recording
+from ...recording.segment.sensor import estimate_noise
 from ..hysteresis import HysteresisLoop, JointFit, LoopFit, find_loops, fit_jointly, fit_loop, identified_friction
 from .creep_stage import creep_force
 from .record import CampaignRecord, RecordKind
-from .rows import PREDICTED_ROWS, displacement, path_rows, with_force
+from .rows import PREDICTED_ROWS, displacement, held_steady, path_rows, with_force
 from .stage import LeftOutStage
 
 NAME = "hysteresis"
@@ -123,13 +124,15 @@ def _spread(loops: Sequence[HysteresisLoop]) -> list[HysteresisLoop]:
 def friction_along(friction: Friction, recording: Recording) -> Array:
     """Friction force against contraction [N] along the motion of a recording, relaxed at its start; shape (N,).
 
-    It is computed at rows whose steps are beyond the noise of the displacement, and interpolated between them.
+    It is computed at rows whose steps are beyond the noise of the displacement, and interpolated between them. The
+    motion is that outside a dead band of the noise, so that a held length keeps its friction.
     """
     if isinstance(friction, NoFriction):
         return np.zeros(len(recording))
     rows = path_rows(recording, PREDICTED_ROWS)
     time = recording.columns.get("time")
-    path = displacement(recording)[rows]
+    path = displacement(recording)
+    path = held_steady(path[rows], estimate_noise(path))
     force = np.asarray(friction.force_along(path, None if time is None else time[rows]))
     factor = np.asarray(friction.pressure_factor(recording["pressure"][rows]))
     return np.asarray(np.interp(np.arange(len(recording)), rows, factor * force))

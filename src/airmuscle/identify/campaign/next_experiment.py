@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from ...characteristic.validity_range import ValidityRange
 from ...core.errors import AirmuscleError
 from ...core.short_repr import ShortRepr
+from ..dynamic import rank_records
+from ..dynamic.record_ranking import MIN_GAIN
 from ..experiment_design import BenchLimits, ExperimentPlan, PlannedRun, optimal_design
 from .creep_stage import CreepStage
 from .fill_stage import FillStage
@@ -17,6 +19,8 @@ from .static_stage import StaticStage
 
 PLANNED_RUNS, PLANNED_POINTS = 4, 15
 """Number of planned static runs, and of their points (chosen)."""
+POORLY_DETERMINED = 0.05
+"""Relative standard error of a parameter of valve or wall from which a further record is planned (chosen)."""
 MIN_LENGTHS = 3
 """Number of resting lengths from which the error for other lengths can be judged."""
 
@@ -54,12 +58,27 @@ def _undetermined(stages: Sequence[object]) -> list[NextExperiment]:
             for each in stage.fit.identifiability.undetermined:
                 names = ", ".join(name for name, _ in each.shares)
                 experiments.append(NextExperiment(_sentence(each.remedy), f"fills: {names} are not determined"))
+            experiments += _separating_record(stage)
         if isinstance(stage, CreepStage) and stage.elements.relaxation_times:
             longest = max(stage.elements.relaxation_times)
             if longest > stage.longest / 2:
                 text = f"Hold the length for {6 * longest:.2g} s instead of {stage.longest:.3g} s."
                 experiments.append(NextExperiment(text, "creep: the longest relaxation time is extrapolated"))
     return experiments
+
+
+def _separating_record(stage: FillStage) -> list[NextExperiment]:
+    """The record that would separate valve and wall, where the fills leave one of the two poorly determined."""
+    try:
+        ranking = rank_records(stage.fit)
+    except AirmuscleError:
+        return []  # fewer than two common parameters within their bounds
+    best, (first, second) = ranking.ranking[0], ranking.pair
+    if ranking.now.worst < POORLY_DETERMINED or best.gain < MIN_GAIN:
+        return []
+    now, after = (100.0 * each.worst for each in (ranking.now, best.precision))
+    purpose = f"fills: {first} and {second} have a relative standard error of up to {now:.2g} %, then {after:.2g} %"
+    return [NextExperiment(_sentence(f"measure {best.description}"), purpose)]
 
 
 def _lengths(static: StaticStage | LeftOutStage, records: Sequence[CampaignRecord]) -> list[NextExperiment]:

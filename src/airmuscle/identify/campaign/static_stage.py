@@ -13,10 +13,10 @@ from ...recording import Recording
 from ..model_selection import Comparison, compare
 from ..result import Fit
 from .creep_stage import creep_force
-from .error_band import ErrorBand, calibrate
+from .error_band import ErrorBand, calibrate, calibrate_held
 from .friction_stage import friction_along
 from .record import CampaignRecord, slow_rows
-from .rows import thin, with_force
+from .rows import is_held, thin, with_force
 from .stage import LeftOutStage
 
 NAME = "static characteristic"
@@ -33,6 +33,8 @@ class StaticStage(ShortRepr):
     """The rows of the fit, freed of friction and creep, one recording for each record."""
     bands: tuple[ErrorBand, ...]
     """One for each purpose that the records can judge."""
+    held_band: ErrorBand | None = None
+    """For further isometric runs, if the records contain some."""
 
     @property
     def fit(self) -> Fit:
@@ -47,7 +49,19 @@ class StaticStage(ShortRepr):
     @property
     def verdict(self) -> str:
         """The recommended law and the bands, as sentences."""
-        return " ".join([self.comparison.reason, *(str(band) for band in self.bands)])
+        return " ".join([self.comparison.reason, *(str(band) for band in self.all_bands)])
+
+    @property
+    def all_bands(self) -> tuple[ErrorBand, ...]:
+        """The bands for each purpose, then that for isometric runs."""
+        return self.bands if self.held_band is None else (*self.bands, self.held_band)
+
+    def half_width(self, recording: Recording, measured_length: bool = True) -> float:
+        """The half width [N] of the band for a recording, at a resting length of the records or at another one."""
+        band = self.bands[0] if measured_length else self.bands[-1]
+        if self.held_band is None or not is_held(recording):
+            return band.half_width
+        return max(band.half_width, self.held_band.half_width)
 
 
 def fit_static_stage(
@@ -72,10 +86,11 @@ def fit_static_stage(
         points = tuple(thin(r, max(FIT_ROWS // len(cleaned), MIN_FIT_ROWS)) for r in cleaned)
         comparison = compare(points, progress=lambda _, fraction: progress(0.9 * fraction))
         bands = calibrate(comparison.recommended.fit, points, used)
+        held = calibrate_held(comparison.recommended.fit, points, used, bands[0])
     except AirmuscleError as error:
         return LeftOutStage(NAME, str(error.message), "measure at more levels of pressure and contraction")
     progress(1.0)
-    return StaticStage(comparison, points, bands)
+    return StaticStage(comparison, points, bands, held)
 
 
 def freed_rows(record: CampaignRecord, friction: Friction, creep: CreepElements) -> Recording:

@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 
 from ...core.errors import AirmuscleError
+from ...recording.display_units import displayed
 from .result import DynamicFit
 
 OF_RECORD = " of record "
@@ -29,8 +30,11 @@ class CrossPrediction:
         return max(self.rms[name] / max(self.fitted[name], 1e-300) for name in self.rms)
 
     def __str__(self) -> str:
-        parts = ", ".join(f"{name} {self.rms[name]:.3g} (joint fit {self.fitted[name]:.3g})" for name in self.rms)
-        return f"{self.record} predicted by the parameters of the other records: rms error {parts} (SI)."
+        parts = ", ".join(
+            f"{name} {displayed(name, error, 3)} (joint fit {displayed(name, self.fitted[name], 3)})"
+            for name, error in self.rms.items()
+        )
+        return f"{self.record} predicted by the parameters of the other records: rms error {parts}."
 
 
 def cross_predict(fit: DynamicFit, refit: Callable[[Sequence[int]], DynamicFit]) -> tuple[CrossPrediction, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -40,6 +40,7 @@ class RecordModel:
         self, plant: System, experiment: Experiment, number: int, unknowns: Sequence[Unknown],
         observed: Mapping[str, float], method: Integrator,
     ) -> None:  # fmt: skip
+        self._arguments = plant, experiment, number, unknowns, dict(observed), method
         self.plant, self.experiment, self.method = experiment.plant or plant, experiment, method
         self.unknowns = unknowns
         self.unknown_indices = [k for k, u in enumerate(unknowns) if u.record in (None, number)]
@@ -68,6 +69,10 @@ class RecordModel:
         self._state_nominal = np.array([s.nominal for s in self.plant.states])
         self._guess = np.array([experiment.initial_conditions.guess[s.name] for s in self.plant.states])
         self._last_grid: _TimeGrid | None = None
+
+    def __reduce__(self) -> tuple[type[RecordModel], tuple[Any, ...]]:
+        """Compiled functions are not stored; a loaded model compiles them again."""
+        return RecordModel, self._arguments
 
     def leaves(self, values: Array) -> Array:
         """The leaves of the plant with the unknowns at `values` (P,) [SI]."""

@@ -13,6 +13,7 @@ from ...core.arrays import Array
 from ...core.errors import ParameterError, suggestion
 from ...core.notebook import Card, NotebookDisplay
 from ...recording import Recording
+from ...recording.display_units import displayed
 from ..identifiability import Identifiability
 from ..result import Estimate, estimate_rows, estimate_table
 from .experiment import Unknown
@@ -112,8 +113,8 @@ class DynamicFit(NotebookDisplay):
     def _summary_lines(self) -> list[str]:
         lines = []
         for i, model in enumerate(self.problem.record_models):
-            rms = ", ".join(f"{name} {self.rms(name, i):.4g}" for name in model.names)
-            lines.append(f"record {i + 1}, {model.experiment.recording.origin}: rms residual {rms} (SI)")
+            rms = ", ".join(f"{name} {displayed(name, self.rms(name, i))}" for name in model.names)
+            lines.append(f"record {i + 1}, {model.experiment.recording.origin}: rms residual {rms}")
         analysis = self.identifiability
         lines.append(
             f"residual std {self.residual_std:.3g} times that of the sensors; rank {analysis.rank} of "

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...core.notebook import Card, NotebookDisplay
-from ...core.tree import leaves
+from ...core.tree import Leaf, leaves
 from ...friction import Friction, PressureScaledFriction
 from ..identifiability import UndeterminedCombination
 from ..model_evidence import format_p_value
@@ -128,7 +128,7 @@ class JointFit(NotebookDisplay):
 
     def _card(self) -> Card:
         rows = [
-            (leaf.path, leaf.declared.symbol, f"{leaf.value:.4g}", leaf.declared.unit, leaf.declared.meaning)
+            (leaf.path, leaf.declared.symbol, f"{leaf.value:.4g}", _unit_text(leaf), leaf.declared.meaning)
             for leaf in leaves(self.friction)
         ]
         table = [("parameter", "symbol", "value", "unit", "meaning"), *rows]
@@ -136,8 +136,12 @@ class JointFit(NotebookDisplay):
 
     def __str__(self) -> str:
         lines = [
-            f"{leaf.path:<24}{leaf.declared.symbol:<9}{leaf.value:<12.6g}"
-            f"{'' if leaf.declared.unit == '1' else leaf.declared.unit}".rstrip()
+            f"{leaf.path:<24}{leaf.declared.symbol:<9}{leaf.value:<12.6g}{_unit_text(leaf)}".rstrip()
             for leaf in leaves(self.friction)
         ]
         return "\n".join([f"{self.name} fitted to {len(self.series)} runs", *lines, self.verdict])
+
+
+def _unit_text(leaf: Leaf) -> str:
+    """The unit of a parameter, empty for a dimensionless one."""
+    return "" if leaf.declared.unit == "1" else leaf.declared.unit

@@ -78,7 +78,8 @@ def estimate_sensors(recordings: Recording | Sequence[Recording]) -> Mapping[str
 
 def _estimate_sensor(name: str, runs: list[Array]) -> Sensor:
     steps = [step for values in runs if (step := estimate_resolution(values))]
-    resolution = float(np.median(steps)) if steps else estimate_resolution(np.concatenate(runs))
+    together = steps or len(runs) == 1
+    resolution = float(np.median(steps or 0.0)) if together else estimate_resolution(np.concatenate(runs))
     low, at_low = _upper_limit([-v for v in runs], resolution)
     high, at_high = _upper_limit(runs, resolution)
     sensor = Sensor(name, resolution, 0.0, -low, high, at_low, at_high)
@@ -125,9 +126,14 @@ def _refine_step(step: float, differences: Array) -> float:
 def _are_multiples(steps: Array, step: float) -> bool:
     """Whether nearly all small differences are integer multiples of a step, and enough of them are single steps."""
     small = steps[steps < 8.5 * step] / step
-    offset = small - np.round(small)
-    enough = len(small) >= 10 and np.count_nonzero(np.round(small) == 1) >= 3
-    return bool(enough and np.sqrt(np.mean(offset**2)) < MAX_RMS_OFFSET and np.mean(np.round(small) > 0) > 0.98)
+    count = len(small)
+    if count < 10:
+        return False
+    multiples = np.round(small)
+    offset = small - multiples
+    if math.sqrt(float(offset @ offset) / count) >= MAX_RMS_OFFSET:
+        return False
+    return bool(np.count_nonzero(multiples == 1) >= 3 and np.count_nonzero(multiples > 0) > 0.98 * count)
 
 
 def _upper_limit(runs: list[Array], resolution: float) -> tuple[float, int]:
@@ -144,11 +150,13 @@ def _upper_limit(runs: list[Array], resolution: float) -> tuple[float, int]:
         return math.inf, 0
     count = len(combined) - len(below)
     rows_at_top = max(_longest_interval(mask) for mask in at_top)
+    if rows_at_top < MIN_SATURATED_ROWS:
+        return math.inf, 0
     between = [values[(values < top - tolerance) & (values > combined.min() + tolerance)] for values in runs]
     rows_elsewhere = max(_longest_constant(values, tolerance) for values in between)
     noise = max(estimate_noise(values) for values in between)
     is_noisy = noise > max(MIN_NOISE * resolution, 1e-6 * float(np.ptp(combined)))
-    saturated = is_noisy and rows_at_top >= MIN_SATURATED_ROWS and rows_at_top > 2 * rows_elsewhere
+    saturated = is_noisy and rows_at_top > 2 * rows_elsewhere
     return (top, count) if saturated else (math.inf, 0)
 
 

@@ -8,12 +8,13 @@ result.scores(), result.metric("mine", "sine 1 Hz", "rmse")
 
 from .benchmark import BenchmarkResult, BenchmarkRun, TunedContender, compare_controllers
 from .chapter import benchmark_chapter, write_benchmark
+from .contender_of_scenario import scenario_contender
 from .contenders import Contender, standard_contenders
 from .joints import BenchmarkJoint, on_off_joint, proportional_joint
 from .learning import LearningCurve, learn
+from .motion_dynamics import inverse_dynamics
 from .motions import JointMotion, MinimumJerkMotion, RampMotion, SineMotion, StepMotion, SumOfMotions
 from .plots import error_plot, run_plot
-from .task_signals import inverse_dynamics
 from .tasks import STANDARD_TASKS, ControlTask, StuckValve, find_tasks
 from .tracking_metrics import TrackingMetrics
 
@@ -43,6 +44,7 @@ __all__ = [
     "on_off_joint",
     "proportional_joint",
     "run_plot",
+    "scenario_contender",
     "standard_contenders",
     "write_benchmark",
 ]

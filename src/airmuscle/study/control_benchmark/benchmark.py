@@ -130,7 +130,7 @@ def tune_contender(
     joint: BenchmarkJoint, contender: Contender, law: CompleteLaw, *, budget: int, seed: int, progress: Progress
 ) -> TunedContender:
     """A contender with the gains that are best for the tuning tasks in the joint's family of models."""
-    if not law.bounds or not budget or not isinstance(law.law, ControlLaw):
+    if not law.bounds or not budget:
         return TunedContender(contender, law.law, None)
     cases = []
     for task in TUNING_TASKS:

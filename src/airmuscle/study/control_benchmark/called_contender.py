@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Mapping
 from typing import Any, ClassVar, NamedTuple
 
@@ -11,6 +12,7 @@ from ...control.controller import Controller, Measurement
 from ...control.sensors import WithSensors
 from ...core.declaration import model
 from ...core.ops import Value
+from ...simulation.compiled_law import LawSample
 from .tasks import StuckValve
 
 COMMANDED = "commanded."
@@ -80,17 +82,28 @@ class SensedController(Controller):
     def inputs(self) -> tuple[str, ...]:
         return self.actuation.inputs
 
+    @functools.cached_property
+    def _compiled(self) -> tuple[LawSample, LawSample]:
+        """Sensors and actuation as machine code."""
+        return LawSample(self.sensors), LawSample(self.actuation)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields without machine code, which belongs to one process."""
+        return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+
     def init(self) -> SensedMemory:
-        return SensedMemory(self.sensors.init(), self.controller.init(), self.actuation.init(), 0)
+        sensors, actuation = self._compiled
+        return SensedMemory(sensors.initial, self.controller.init(), actuation.initial, 0)
 
     def step(
         self, memory: SensedMemory, measurement: Measurement, dt: float
     ) -> tuple[Mapping[str, float], SensedMemory]:
-        readings, sensors = self.sensors.step(memory.sensors, measurement, dt)
+        sense, act = self._compiled
+        readings, sensors = sense.step(memory.sensors, measurement, dt)
         seen = Measurement(readings, measurement.setpoints, {**measurement.ranges, **self.ranges})
         commands, own = self.controller.step(memory.controller, seen, dt)
         points = {**measurement.setpoints, **{f"{COMMANDED}{name}": value for name, value in commands.items()}}
-        valves, actuation = self.actuation.step(memory.actuation, seen._replace(setpoints=points), dt)
+        valves, actuation = act.step(memory.actuation, seen._replace(setpoints=points), dt)
         if self.stuck is not None and (memory.samples + 0.5) * dt > self.stuck.time:
             valves = {**valves, self.stuck.input: self.stuck.opening}
         return valves, SensedMemory(sensors, own, actuation, memory.samples + 1)

@@ -25,7 +25,9 @@ from ...control.split_range import SplitRange
 from ...control.super_twisting import SuperTwisting
 from ...control.with_feed_forward import WithFeedForward
 from ...core.errors import ParameterError
+from ...core.tree import leaves
 from .called_contender import COMMANDED, SensedController, sensed
+from .designed_controllers import AlongMotion, ControlDesign, PredictiveDesign, QuadraticDesign, joint_design_model
 from .joints import SIDES, BenchmarkJoint
 
 BAR = 1e5
@@ -39,8 +41,8 @@ class Contender:
     """A controller that takes part in the benchmark.
 
     name     for tables
-    law      a ControlLaw, which is compiled with the plant, or another Controller, which is called at each sample and
-             not tuned. It commands half the pressure difference (`difference`), both pressures (`left.pressure`,
+    law      a ControlLaw, which is compiled with the plant, or another Controller, which is called at each sample. It
+             commands half the pressure difference (`difference`), both pressures (`left.pressure`,
              `right.pressure`) or the valves. It may measure the angle, the angular speed and both pressures. Its set
              points are names of
              TaskSignals: `angle`, `angular_speed`, `angular_acceleration`, `mean_pressure`, `stiffness`,
@@ -67,10 +69,11 @@ class Contender:
                 f"contender '{self.name}': there are no bounds of '{unknown[0]}', which is to be identified; "
                 f"there are bounds of {', '.join(self.bounds) or 'nothing'}."
             )
-        if self.bounds and not isinstance(self.law, ControlLaw):
+        known = [leaf.path for leaf in leaves(self.law)]
+        if unknown := [path for path in self.bounds if path not in known]:
             raise ParameterError(
-                f"contender '{self.name}': {type(self.law).__name__} is no ControlLaw, its gains cannot be tuned in a "
-                "batch. Omit the bounds, and give a controller that is designed already."
+                f"contender '{self.name}': {type(self.law).__name__} has no declared parameter '{unknown[0]}' to be "
+                f"tuned; there are {', '.join(known) or 'none'}. Omit its bounds."
             )
 
 
@@ -94,11 +97,12 @@ def complete(joint: BenchmarkJoint, contender: Contender, seed: int = 1) -> Comp
         return CompleteLaw(WithSensors(law, sensors, float(seed)), _within("law.", bounds))
     inputs = contender.law.inputs
     stand_in = SetpointCommand(inputs, tuple(f"{COMMANDED}{name}" for name in inputs))
-    law, _ = _actuated(joint, stand_in, {}, contender.name)
+    law, own = _actuated(joint, stand_in, {}, contender.name)
+    bounds = {**_within("controller.", contender.bounds), **_within("actuation.", own)} if contender.bounds else {}
     span = joint.pressure_span
     limits = dict.fromkeys(joint.pressures, (joint.min_pressure, joint.max_pressure)) | {DIFFERENCE: (-span, span)}
     ranges = {name: limits[name] for name in inputs if name in limits}
-    return CompleteLaw(sensed(contender.law, law, ranges, joint.sensors, seed), {})
+    return CompleteLaw(sensed(contender.law, law, ranges, joint.sensors, seed), bounds)
 
 
 def _check_columns(joint: BenchmarkJoint, contender: Contender) -> None:
@@ -159,6 +163,10 @@ def _feed_forward() -> SetpointLead:
     return SetpointLead("feed_forward", "feed_forward_rate", DIFFERENCE, 0.02)
 
 
+def _friction() -> FrictionFeedForward:
+    return FrictionFeedForward("angular_speed", DIFFERENCE, 1e3, boundary_speed=0.1)
+
+
 def pid_contender() -> Contender:
     """PID of the angle without a model of the muscles."""
     return Contender("PID", _pid(), PID_BOUNDS)
@@ -184,8 +192,7 @@ def compensated_contender(joint: BenchmarkJoint) -> Contender:
     """
     delay = next(sensor.delay for sensor in joint.sensors if sensor.column == "angle")
     feedback = WithSetpointDelay(dataclasses.replace(_pid(), derivative_weight=1.0), delay)
-    friction = FrictionFeedForward("angular_speed", DIFFERENCE, 1e3, boundary_speed=0.1)
-    law = WithFeedForward(_feed_forward(), WithFeedForward(friction, feedback))
+    law = WithFeedForward(_feed_forward(), WithFeedForward(_friction(), feedback))
     bounds = {
         "feed_forward.lead_time": _LEAD, "feedback.feed_forward.amplitude": _FRICTION,
         **_within("feedback.feedback.law.", PID_BOUNDS),
@@ -227,9 +234,37 @@ def angle_and_stiffness_contender(joint: BenchmarkJoint) -> Contender:
     return Contender("angle and stiffness", law, bounds)
 
 
+_DESIGN: Bounds = {
+    "feed_forward.feed_forward.lead_time": _LEAD, "feed_forward.feedback.amplitude": _FRICTION,
+    "design.permitted_angle": (2e-3, 0.2), "design.speed_noise": (0.1, 100.0),
+    "design.pressure_time": (3e-3, 0.1),
+}  # fmt: skip
+
+
+def quadratic_contender(joint: BenchmarkJoint) -> Contender:
+    """Linear-quadratic Gaussian control (LQG) of the deviation beside the feed-forward; its weights are tuned."""
+    design = QuadraticDesign(joint_design_model(joint), 0.02, 0.005, 5.0, 0.01)
+    return _along_motion(joint, "LQG", design, {"design.permitted_integral": (5e-4, 0.5)})
+
+
+def predictive_contender(joint: BenchmarkJoint) -> Contender:
+    """Linear model predictive control (MPC) of the deviation beside the feed-forward; its weights are tuned."""
+    design = PredictiveDesign(joint_design_model(joint), 0.02, 5.0, 200.0, 0.01)
+    return _along_motion(joint, "MPC", design, {"design.disturbance_noise": (10.0, 1e4)})
+
+
+def _along_motion(joint: BenchmarkJoint, name: str, design: ControlDesign, bounds: Bounds) -> Contender:
+    """A designed controller beside the feed-forward of the compensated one, two gains of which are identified."""
+    delay = next(sensor.delay for sensor in joint.sensors if sensor.column == "angle")
+    law = AlongMotion(WithFeedForward(_feed_forward(), _friction()), design, delay)
+    identified = "feed_forward.feed_forward.lead_time", "feed_forward.feedback.amplitude"
+    return Contender(f"feed-forward + {name}, compensated", law, {**_DESIGN, **bounds}, identified)
+
+
 def standard_contenders(joint: BenchmarkJoint) -> tuple[Contender, ...]:
     """The contenders of the package for a joint; all ranges of gains are chosen."""
     return (
         pid_contender(), open_loop_contender(), feed_forward_contender(), compensated_contender(joint),
         sliding_mode_contender(), super_twisting_contender(), angle_and_stiffness_contender(joint),
+        quadratic_contender(joint), predictive_contender(joint),
     )  # fmt: skip

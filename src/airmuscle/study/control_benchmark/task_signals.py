@@ -9,17 +9,13 @@ import numpy as np
 
 from ...control.antagonistic_inverse import AntagonisticInverse
 from ...control.inputs import SampledSignal
-from ...control.static_inverse import static_force
 from ...core.arrays import Array
 from ...core.errors import ParameterError, suggestion
 from ...plant.plant import Plant
 from .joints import BenchmarkJoint
-from .motions import JointMotion
+from .motion_dynamics import inverse_dynamics
 from .tasks import ControlTask
 
-BISECTIONS = 40
-ANGLE_STEP = 1e-4
-"""Step of the angle [rad] for the speed of the muscles, by central differences (chosen)."""
 TORQUE_INPUT = "external_torque"
 
 
@@ -73,34 +69,6 @@ def interpolated(points: Sequence[tuple[float, float]], time: Array) -> Array:
         return np.zeros_like(time)
     times, values = np.array(points).T
     return np.asarray(np.interp(time, times, values))
-
-
-def inverse_dynamics(joint: BenchmarkJoint, plant: Plant, motion: JointMotion, time: Array, mean: Array) -> Array:
-    """Half the pressure difference (N,) [Pa] by which a plant without friction follows a motion at times (N,) [s].
-
-    The torque of both muscles, with their dampers, gives the acceleration of the motion; it is solved for the pressure
-    difference by bisection within the range of the joint. A motion beyond the range receives the limit.
-    """
-    angle, speed, acceleration = motion.at(time)
-    mechanism, lengths = plant.mechanism, plant.resting_lengths
-    name, rate = mechanism.coordinates[0].name, mechanism.coordinates[0].speed
-    q, v = {name: angle}, {rate: speed}
-    rest = dict.fromkeys((each.name for each in mechanism.inputs), 0.0)
-    free, driven = (mechanism.acceleration(q, v, {name: torque}, rest)[name] for torque in (0.0, 1.0))
-    wanted = (acceleration - free) / (driven - free)
-    contractions = mechanism.contractions(q, lengths)
-    beside = [mechanism.contractions({name: angle + side * ANGLE_STEP}, lengths) for side in (0.5, -0.5)]
-    shortening = [length * (b - a) / ANGLE_STEP * speed for length, b, a in zip(lengths, *beside, strict=True)]
-    low, high = np.full(time.shape, -joint.pressure_span), np.full(time.shape, joint.pressure_span)
-    for _ in range(BISECTIONS):
-        half = 0.5 * (low + high)
-        tensions = [
-            static_force(muscle, p, c) - muscle.damper.force(p, c, u)
-            for muscle, p, c, u in zip(plant.muscles, (mean + half, mean - half), contractions, shortening, strict=True)
-        ]
-        below = mechanism.generalised_forces(q, tensions, lengths)[name] < wanted
-        low, high = np.where(below, half, low), np.where(below, high, half)
-    return np.asarray(0.5 * (low + high))
 
 
 def stiffness_of(plant: Plant, first: Array, second: Array, angle: Array) -> Array:

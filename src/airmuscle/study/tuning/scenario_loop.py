@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import math
 import re
@@ -13,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ...control.control_loop import ControlLoop
-from ...control.controller import relative_unit
+from ...control.parameter_units import parameter_units
 from ...core.errors import AirmuscleWarning, FileError, ParameterError, suggestion
 from ...core.short_repr import ShortRepr
 from ...core.tree import Leaf, leaves
@@ -22,8 +21,9 @@ from ...library.files import is_path, list_plants, read_toml
 from ...library.law_file import load_law
 from ...library.location import Location, located_errors
 from ...library.uncertainty import ParameterUncertainty
+from ...library.write import write_text
 from ...plant.plant import Plant
-from ...scenario.controller import signal_units
+from ...scenario.controller import path_keys, signal_units
 from ...scenario.scenario import Scenario, build_scenario
 from .case import with_gains as controller_with_gains
 from .perturbations import Perturbations, PerturbedFamily, muscle_paths, perturbed_family
@@ -126,13 +126,9 @@ class ScenarioLoop(ShortRepr):
         return path, (first, second)
 
     def unit(self, leaf: Leaf) -> str:
-        """The unit of a parameter of the controller; of one of an inner law that of its declaration."""
-        if "." in leaf.path:
-            return leaf.declared.unit
-        controller = self.loop.controller
+        """The unit of a parameter of the controller or of a law inside it."""
         known = signal_units(self.scenario.plant, self.scenario.initial_state)
-        measured, commanded = (known.get(names[0]) or "1" for names in (controller.measured_columns, controller.inputs))
-        return relative_unit(leaf.declared.unit, measured, commanded)
+        return parameter_units(self.loop.controller, known)[leaf.path]
 
     def with_gains(self, gains: Mapping[str, float]) -> str:
         """The text of the file with other gains [SI]; all else, comments and units included, is unchanged.
@@ -145,7 +141,7 @@ class ScenarioLoop(ShortRepr):
         document = tomlkit.parse(self.text)
         known = {leaf.path: leaf for leaf in leaves(self.loop.controller)}
         for path, value in gains.items():
-            *keys, last = (*CONTROLLER_KEYS, *_keys(path))
+            *keys, last = (*CONTROLLER_KEYS, *path_keys(path))
             table: Any = document
             for key in keys:
                 table = table[key]
@@ -161,18 +157,7 @@ class ScenarioLoop(ShortRepr):
         """
         text = self.with_gains(gains)
         self.check_target(path, text)
-        unfinished = path.with_name(f"{path.name}.part")
-        try:
-            with unfinished.open("w", encoding="utf-8", newline="") as file:
-                file.write(text)
-            unfinished.replace(path)
-        except OSError as error:
-            with contextlib.suppress(OSError):
-                unfinished.unlink()
-            raise FileError(
-                f"{path}: cannot be written ({error.strerror}). Name a file in a writable folder."
-            ) from None
-        return path
+        return write_text(path, text)
 
     def check_target(self, path: Path, text: str = "") -> None:
         """Raise what `save` raises for a path that is a folder, or from which files of the scenario are not found."""
@@ -241,11 +226,6 @@ def _read_bound(text: str, unit: str, where: str) -> float:
         return float(text)
     except ValueError:
         return quantity(text, unit, where=where)
-
-
-def _keys(path: str) -> list[str | int]:
-    """The keys of a parameter path: `laws[0].gain` is laws, 0, gain."""
-    return [int(part) if part.isdecimal() else part for part in re.findall(r"[^.\[\]]+", path)]
 
 
 def _written(value: float, present: Any, unit: str) -> Any:

@@ -1,0 +1,134 @@
+"""Prediction of a transient record by an identified plant: simulation of its input, with the band of the fit."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ...compile import System
+from ...core.arrays import Array
+from ...core.errors import IdentificationError, ParameterError
+from ...core.short_repr import ShortRepr
+from ...simulation.integrators import Integrator, Rodas4
+from ..dynamic.experiment import Experiment, ParameterPaths, RecordUnknown, StartTime, Unknown, make_unknowns
+from ..dynamic.fit import fit_dynamic
+from ..dynamic.record_model import ModelOutputs, RecordModel
+from ..dynamic.result import DynamicFit
+from .result import QuantityPrediction, RecordPrediction
+
+NORMAL_QUANTILE = 1.959963984540054
+"""97.5 % quantile of the normal distribution."""
+ASSUMED_DEVIATION = 0.01
+"""Standard deviation of a quantity without a stated one, relative to its range in the record (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class PlantUncertainty(ShortRepr):
+    """The uncertainty of an identified plant.
+
+    deviations  standard deviation of the residuals of each observed quantity [SI], with the model error that the
+                records of the fit showed
+    parameters  the fitted parameters; several paths have one common value
+    covariance  their covariance matrix [SI], shape (P, P)
+    """
+
+    deviations: Mapping[str, float]
+    parameters: tuple[ParameterPaths, ...] = ()
+    covariance: Array = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
+
+
+def predict_dynamic(
+    plant: System,
+    experiment: Experiment,
+    observed: Mapping[str, float],
+    *,
+    uncertainty: PlantUncertainty | None = None,
+    own: Sequence[RecordUnknown] = (),
+    method: Integrator | None = None,
+) -> RecordPrediction:
+    """Predict quantities of a transient record by simulating an identified plant from its initial conditions.
+
+    plant        the identified plant; that of the experiment replaces it
+    observed     the quantities to predict, outputs of the plant that the recording has, each with the standard
+                 deviation of its sensor [SI], which weights the estimation of `own`; 0 where it is not known
+    uncertainty  of the plant; the half width of the 95 % band is 1.96 sqrt(g^T C g + s^2) with the sensitivities g to
+                 the fitted parameters, their covariance C and the standard deviation s of the residuals of the fit
+    own          unknowns that are estimated from the record itself before the prediction: StartTime(margin),
+                 InitialValue(name, margin) or paths, such as a supply pressure
+    method       by default Rodas4(rtol=1e-6)
+
+    Raises IdentificationError where the simulation fails, ParameterError for unknown names.
+    """
+    plant = experiment.plant or plant
+    deviations = {name: sensor or _deviation(name, experiment, uncertainty) for name, sensor in observed.items()}
+    notes: list[str] = []
+    if own:
+        fit = fit_dynamic(plant, [experiment], free=(), per_record=own, observed=deviations, method=method)
+        plant, experiment = fit.plant(), _with_estimates(fit, experiment)
+        values = ", ".join(
+            f"{e.name.removesuffix(' of record 1')} {e.value:.5g} {e.display_unit}".rstrip() for e in fit.estimates
+        )
+        notes.append(f"estimated from the record itself: {values} (SI)")
+    modelled, unknowns = _simulate(plant, experiment, deviations, uncertainty, method or Rodas4())
+    spread = _parameter_variance(modelled, unknowns, uncertainty)
+    recording, quantities = experiment.recording, []
+    for i, name in enumerate(observed):
+        half = None
+        if uncertainty is not None and name in uncertainty.deviations:
+            half = NORMAL_QUANTILE * np.sqrt(spread[:, i] + uncertainty.deviations[name] ** 2)
+        measured, predicted = recording[name], modelled.values[:, i]
+        compared = np.isfinite(measured) & np.isfinite(predicted)
+        quantities.append(QuantityPrediction(name, measured, predicted, half, compared))
+    return RecordPrediction(recording, tuple(quantities), tuple(notes))
+
+
+def _deviation(name: str, experiment: Experiment, uncertainty: PlantUncertainty | None) -> float:
+    if uncertainty is not None and name in uncertainty.deviations:
+        return float(uncertainty.deviations[name])
+    values = experiment.recording[name]
+    return ASSUMED_DEVIATION * float(np.nanmax(values) - np.nanmin(values)) or 1.0
+
+
+def _with_estimates(fit: DynamicFit, experiment: Experiment) -> Experiment:
+    """The experiment with its estimated start time and initial values, and the plant with its own parameters."""
+    model = fit.problem.record_models[0]
+    known = dict(experiment.initial_conditions.known)
+    for estimate, unknown in zip(fit.estimates, fit.unknowns, strict=True):
+        target = unknown.target
+        if not isinstance(target, tuple | StartTime):
+            known[target.name] = estimate.value
+    conditions = dataclasses.replace(experiment.initial_conditions, known=known)
+    return dataclasses.replace(
+        experiment, plant=fit.plant(), start_time=model.start_time(fit.values), initial_conditions=conditions
+    )
+
+
+def _simulate(
+    plant: System, experiment: Experiment, deviations: Mapping[str, float], uncertainty: PlantUncertainty | None,
+    method: Integrator,
+) -> tuple[ModelOutputs, tuple[Unknown, ...]]:  # fmt: skip
+    """The outputs at the rows of the record, with their derivatives by the fitted parameters."""
+    groups = () if uncertainty is None else uncertainty.parameters
+    unknowns = make_unknowns(plant, [experiment], groups, (), {}) if groups else ()
+    model = RecordModel(plant, experiment, 0, unknowns, deviations, method)
+    values = np.array([unknown.value for unknown in unknowns])
+    return model.evaluate(values), unknowns
+
+
+def _parameter_variance(
+    modelled: ModelOutputs, unknowns: Sequence[Unknown], uncertainty: PlantUncertainty | None
+) -> Array:
+    """Variance of the outputs by the covariance of the parameters [SI], shape (N, Q)."""
+    if not unknowns or uncertainty is None:
+        return np.zeros(modelled.values.shape)
+    if uncertainty.covariance.shape != (len(unknowns),) * 2:
+        raise ParameterError(
+            f"PlantUncertainty: {len(unknowns)} parameters need a covariance of {len(unknowns)} rows and columns, not "
+            f"{uncertainty.covariance.shape}."
+        )
+    variance = np.einsum("nqi,ij,nqj->nq", modelled.jacobian, uncertainty.covariance, modelled.jacobian)
+    if not np.isfinite(variance).all():
+        raise IdentificationError("the sensitivities of the prediction are not finite. Check the plant and the input.")
+    return np.asarray(np.maximum(variance, 0.0))

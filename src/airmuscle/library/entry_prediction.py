@@ -1,0 +1,68 @@
+"""Prediction of a record by the muscle of an entry, at the resting length of the record."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from ..characteristic.base import ForceLaw
+from ..core.errors import ParameterError
+from ..identify.campaign.rows import is_held
+from ..identify.compared_points import law_of_length
+from ..identify.cross_validation import specimen_name
+from ..identify.prediction import RecordPrediction, predict_static
+from ..identify.problem import fitted_quantity_of
+from ..recording import Recording
+from .entry import Entry
+from .length_scaling import LENGTH_TOLERANCE, scale_to_length
+
+UNUSED_PARTS = ("damper", "wall", "series", "stop")
+"""Elements of a muscle that a static prediction leaves out."""
+
+
+def predict_with_entry(entry: Entry, recording: Recording) -> RecordPrediction:
+    """Predict a slow record by the law of an entry, its friction and its creep elements, with its stated 95 % band.
+
+    Law and geometry are scaled to the resting length that the record states; without one, friction and creep take that
+    of the geometry. Raises ParameterError for an entry that cannot be scaled or has a spring, and ColumnError for a
+    record without pressure, contraction and force.
+    """
+    if entry.spring is not None:
+        raise ParameterError(
+            f"{entry.name}: a parallel spring is not part of a static prediction. Give a muscle whose law contains the "
+            "force of the spring, or a scenario with the muscle."
+        )
+    stated = recording.constants.get("resting_length")
+    length = None if stated is None else float(stated)
+    law = law_of_length(entry.characteristic, length, specimen_name(recording))
+    notes = []
+    if length is None and entry.geometry is not None:
+        recording = dataclasses.replace(
+            recording, constants={**recording.constants, "resting_length": float(entry.geometry.resting_length)}
+        )
+    elif length is not None:
+        law = scale_to_length(law, length, f"{recording.origin}, resting length")
+    left_out = [part for part in UNUSED_PARTS if getattr(entry, part) is not None]
+    if left_out and isinstance(law, ForceLaw):
+        notes.append(f"left out of the static prediction: {', '.join(left_out)}")
+    own = None if entry.geometry is None else float(entry.geometry.resting_length)
+    if None not in (own, length) and abs((own or 0.0) - (length or 0.0)) > LENGTH_TOLERANCE:
+        notes.append(
+            f"the law was scaled from {1e3 * (own or 0.0):.4g} mm to {1e3 * (length or 0.0):.4g} mm; the stated band "
+            "is that of the measured length"
+        )
+    half = _half_width(entry, fitted_quantity_of(law).name, recording)
+    result = predict_static(
+        law, recording, friction=entry.friction, creep=entry.creep, half_width=half,
+        validity_range=entry.validity_range,
+    )  # fmt: skip
+    return dataclasses.replace(result, notes=(*result.notes, *notes))
+
+
+def _half_width(entry: Entry, quantity: str, recording: Recording) -> float | None:
+    """The half width of the stated band of a quantity [SI], that of isometric runs for a held length."""
+    band = entry.error_band
+    if band is None or band.quantity != quantity:
+        return None
+    if band.held_half_width is None or "contraction" not in recording or not is_held(recording):
+        return band.half_width
+    return band.held_half_width

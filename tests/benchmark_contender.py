@@ -1,0 +1,30 @@
+"""A user's contender of the control benchmark with the joint and the short task on which tests try it."""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+from airmuscle.control import ControlLaw
+from airmuscle.core.declaration import model, parameter
+from airmuscle.study.control_benchmark import Contender, ControlTask, SineMotion, proportional_joint
+
+JOINT = proportional_joint()
+SHORT = ControlTask("short sine", SineMotion(math.radians(10.0), 2.0), 1.0, begin=0.5)
+
+
+@model
+class AngleLaw(ControlLaw):
+    """A user's law: proportional, from the angle to half the pressure difference."""
+
+    gain: float = parameter("Pa/rad", "K", "gain", bounds=(0.0, 1e7))
+    measured_columns = ("angle",)
+    setpoints = ("angle",)
+    inputs = ("difference",)
+    initial_memory: ClassVar = {}
+
+    def step(self, memory, measurement, dt):
+        return {"difference": self.gain * (measurement.setpoints["angle"] - measurement.columns["angle"])}, {}
+
+
+MINE = Contender("mine", AngleLaw(2e5), {"gain": (1e5, 5e5)})

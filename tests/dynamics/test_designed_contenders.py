@@ -1,0 +1,145 @@
+"""Designed contenders: linear-quadratic and model predictive control of the deviation from a motion of the model.
+
+The design model is the linearisation of the joint's model, the sum of feed-forward and designed command keeps its range,
+and the weights of a design are tuned like the gains of any controller. Sensors and actuation of a controller that is
+called are compiled.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import pickle
+
+import numpy as np
+import pytest
+
+from airmuscle.analysis import find_equilibrium
+from airmuscle.control import ControlLoop, Measurement, Schedule
+from airmuscle.core.errors import ParameterError
+from airmuscle.simulation import simulate
+from airmuscle.simulation.compiled_law import LawSample
+from airmuscle.study.control_benchmark import (
+    ControlTask,
+    SineMotion,
+    StepMotion,
+    proportional_joint,
+    standard_contenders,
+)
+from airmuscle.study.control_benchmark.benchmark import TunedContender, run_task, tune_contender
+from airmuscle.study.control_benchmark.contenders import complete
+from airmuscle.study.control_benchmark.designed_controllers import AlongMotion, joint_design_model
+from airmuscle.study.control_benchmark.motion_dynamics import angular_acceleration
+
+pytest.importorskip("daqp", reason="the package daqp is not installed")
+JOINT = proportional_joint()
+LQG, MPC = "feed-forward + LQG, compensated", "feed-forward + MPC, compensated"
+CONTENDERS = {each.name: each for each in standard_contenders(JOINT) if each.name in (LQG, MPC)}
+
+
+def test_the_design_model_has_the_accelerations_of_the_joint():
+    linear = joint_design_model(JOINT)
+    for angle, speed, half in ((0.01, 0.0, 0.0), (0.0, 0.05, 0.0), (0.0, 0.0, 2e3), (-0.005, 0.03, 1e3)):
+        wanted = angular_acceleration(JOINT, JOINT.model, angle, speed, half)
+        assert -linear.stiffness * angle - linear.damping * speed + linear.gain * half == pytest.approx(
+            wanted, rel=2e-3
+        )
+
+
+def test_the_design_model_responds_as_the_joint_whose_pressures_follow_at_once():
+    """A pressure difference that is held: angle at rest of the linear model and equilibrium of the joint."""
+    linear, half = joint_design_model(JOINT), 5e3
+    first, second = JOINT.mean_pressure + half, JOINT.mean_pressure - half
+    rest = find_equilibrium(JOINT.model, pressure=(first, second))
+    assert rest["angle"] == pytest.approx(linear.gain / linear.stiffness * half, rel=0.01)
+
+
+def measured(law: AlongMotion, angle: float, wanted: float, forward: float) -> Measurement:
+    setpoints = {"angle": wanted, "feed_forward": forward, "feed_forward_rate": 0.0, "angular_speed": 0.0}
+    return Measurement({"angle": angle}, setpoints, {"difference": (-JOINT.pressure_span, JOINT.pressure_span)})
+
+
+@pytest.mark.parametrize("name", [LQG, MPC])
+def test_without_deviation_the_command_is_the_feed_forward(name: str):
+    law = CONTENDERS[name].law
+    memory = law.init()
+    for k in range(5):
+        command, memory = law.step(memory, measured(law, 0.1, 0.1, 3e4 + k), 2e-3)
+        assert command["difference"] == pytest.approx(3e4 + k, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", [LQG, MPC])
+def test_the_sum_of_both_commands_keeps_its_range(name: str):
+    law, rng = CONTENDERS[name].law, np.random.default_rng(3)
+    memory, found = law.init(), []
+    for _ in range(60):
+        given = measured(law, rng.normal(scale=0.5), rng.normal(scale=0.5), rng.normal(scale=3e5))
+        command, memory = law.step(memory, given, 2e-3)
+        found.append(command["difference"])
+    assert np.abs(found).max() <= JOINT.pressure_span * (1 + 1e-9)
+    assert np.abs(found).max() > 0.99 * JOINT.pressure_span
+
+
+@pytest.mark.parametrize("name", [LQG, MPC])
+def test_a_disturbance_leaves_no_offset_and_the_pressures_keep_their_limits(name: str):
+    """A torque that the model does not know, and a step that saturates the command."""
+    contender = CONTENDERS[name]
+    tuned = TunedContender(contender, complete(JOINT, contender).law, None)
+    pushed = ControlTask("pushed", StepMotion(0.0, 0.1), 1.5, begin=1.2, torque=((0.0, 0.0), (0.2, 0.0), (0.21, -1.0)))
+    run = run_task(JOINT, tuned, pushed)
+    assert run.metrics.rmse < 0.25
+    stepped = run_task(JOINT, tuned, ControlTask("step", StepMotion(math.radians(40.0), 0.1), 0.6))
+    for column in JOINT.pressures:
+        pressure = stepped.recording[column]
+        assert JOINT.min_pressure - 5e3 < pressure.min()
+        assert pressure.max() < JOINT.max_pressure + 5e3
+    assert np.ptp(stepped.recording["angle"]) > math.radians(30.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [LQG, MPC])
+def test_the_weights_of_a_design_are_tuned_like_gains(name: str):
+    alone = dataclasses.replace(JOINT, family={"nominal": JOINT.model})
+    law = complete(alone, CONTENDERS[name])
+    assert {path.rpartition(".")[2] for path in law.bounds} >= {"permitted_angle", "lead_time", "gain"}
+    tuned = tune_contender(alone, CONTENDERS[name], law, budget=32, seed=1, progress=lambda *_: None)
+    assert tuned.tuning.objective < tuned.tuning.present_objective
+    assert tuned.law.controller.design.permitted_angle == tuned.tuning.gains["controller.design.permitted_angle"]
+
+
+def test_bounds_of_a_parameter_that_a_controller_does_not_have_are_refused():
+    with pytest.raises(
+        ParameterError, match=r"AlongMotion has no declared parameter 'design\.weight' to be tuned; there"
+    ):
+        dataclasses.replace(CONTENDERS[LQG], bounds={"design.weight": (1.0, 2.0)}, identified=())
+    with pytest.raises(ParameterError, match=r"AlongMotion: delay is -1; allowed range: 0 to 1000 samples"):
+        dataclasses.replace(CONTENDERS[LQG].law, delay=-1)
+
+
+def test_sensors_and_actuation_as_machine_code_are_those_called_from_python():
+    sensed = complete(JOINT, CONTENDERS[LQG]).law
+    sample, rng = LawSample(sensed.sensors), np.random.default_rng(1)
+    ours, theirs = sample.initial, sensed.sensors.init()
+    for _ in range(8):
+        given = Measurement({name: float(rng.normal()) for name in sensed.sensors.measured_columns}, {}, {})
+        compiled, ours = sample.step(ours, given, 2e-3)
+        called, theirs = sensed.sensors.step(theirs, given, 2e-3)
+        assert compiled == pytest.approx(called, rel=1e-12, abs=1e-15)
+    assert ours == pytest.approx(tuple(theirs.values()), rel=1e-12)
+
+
+def test_a_called_contender_can_be_sent_to_another_process():
+    sensed = complete(JOINT, CONTENDERS[MPC]).law
+    sensed.init()
+    again = pickle.loads(pickle.dumps(sensed))
+    task = ControlTask("short", SineMotion(0.1, 2.0), 0.05)
+    wanted = Schedule(
+        {name: ((0.0, 0.0),) for name in sensed.setpoints if name != "mean_pressure"}
+        | {"mean_pressure": ((0.0, 2.5e5),)}
+    )
+    start = JOINT.start(JOINT.truth)
+    first, second = (
+        simulate(JOINT.truth, ControlLoop(law, 2e-3, wanted), duration=task.duration, initial_state=start)
+        for law in (sensed, again)
+    )
+    assert np.array_equal(first["angle"], second["angle"])

@@ -1,0 +1,165 @@
+"""Which record to measure next: the Fisher information of a record adds to that of the fit, so that the expected standard
+errors are those of a joint fit with it, and a record that responds to one of two parameters alone separates them.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from airmuscle.cli.app import app
+from airmuscle.control.inputs import Schedule
+from airmuscle.core.errors import IdentificationError, ParameterError
+from airmuscle.geometry import Vessel
+from airmuscle.identify.dynamic import Experiment, InitialConditions, StartTime, fit_dynamic, rank_records
+from airmuscle.identify.dynamic.candidate_records import candidate_records
+from airmuscle.library.catalogue import load
+from airmuscle.mechanism import Isometric
+from airmuscle.muscle import Muscle
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import FillDischarge, Supply, Valve
+from airmuscle.pneumatics.gas import EnergyBalance, Polytropic
+from airmuscle.recording import Recording
+from airmuscle.simulation import simulate
+
+NOISE = 500.0
+FILL = Schedule({"fill": ((0.0, 1.0),)})
+VALVE, WALL = "circuit.fill.critical_ratio", "gas.heat_transfer"
+
+
+def rig(muscle=None, gas=None):
+    valve = Valve(4e-9, 0.3)
+    circuit = FillDischarge(Supply(5e5), valve, valve)
+    return Plant(muscle or load("dmsp-20-300").muscle, circuit, Isometric(0.05), gas=gas or EnergyBalance(1.0))
+
+
+def measured(plant, command, times, initial_pressure, seed):
+    """A record of the plant with noise, as an experiment."""
+    state = plant.state_at(pressure=initial_pressure)
+    step = float(times[1] - times[0])
+    run = simulate(plant, command, duration=float(times[-1]), initial_state=state, output_times=step)
+    noise = NOISE * np.random.default_rng(seed).standard_normal(times.size)
+    columns = {"time": times, "pressure": np.interp(times, run["time"], run["pressure"]) + noise}
+    conditions = InitialConditions.at_rest(plant, initial_pressure)
+    return Experiment(Recording(columns, f"record {seed}"), command, conditions, 0.0, plant)
+
+
+def fitted(plant, free, *more):
+    records = [measured(plant, FILL, np.arange(0.0, 2.0, 0.01), 0.0, 1), *more]
+    return fit_dynamic(plant, records, free=free, observed={"pressure": NOISE}, per_record=(StartTime(0.02),))
+
+
+@pytest.fixture(scope="module")
+def fill():
+    return fitted(rig(), ("circuit.fill.conductance", VALVE, WALL))
+
+
+def test_the_pair_of_valve_and_wall_with_the_greatest_correlation_is_separated(fill):
+    ranking = rank_records(fill)
+    assert ranking.pair == (VALVE, WALL)
+    assert abs(ranking.now.correlation) > 0.7
+    best = ranking.ranking[0]
+    assert "whose valve is closed" in best.description
+    assert abs(best.precision.correlation) < 0.5
+    assert best.gain > 3.0
+    assert f"To separate them, measure {best.description}" in ranking.verdict
+    assert [each.gain for each in ranking.ranking] == sorted((each.gain for each in ranking.ranking), reverse=True)
+
+
+def test_the_present_precision_is_that_of_the_fit(fill):
+    now = rank_records(fill, (VALVE, WALL)).now
+    for name, error in zip((VALVE, WALL), now.standard_errors, strict=True):
+        assert error == pytest.approx(fill[name].stderr / fill[name].value, rel=0.01)
+
+
+def test_a_repeat_divides_the_standard_errors_by_the_root_of_two(fill):
+    (again,) = (each for each in rank_records(fill).ranking if each.description == "a repeat of the record")
+    assert again.gain == pytest.approx(math.sqrt(2.0), rel=0.05)
+
+
+def test_the_expected_standard_errors_are_those_of_a_joint_fit_with_the_record(fill):
+    best = rank_records(fill).ranking[0]
+    (candidate,) = (each for each in candidate_records(fill) if each.description == best.description)
+    planned = candidate.experiment
+    initial = planned.initial_conditions.known["pressure"]
+    further = measured(planned.plant, planned.command, planned.recording["time"], initial, 2)
+    joint = fitted(rig(), ("circuit.fill.conductance", VALVE, WALL), further)
+    for name, expected in zip((VALVE, WALL), best.precision.standard_errors, strict=True):
+        assert joint[name].stderr / joint[name].value == pytest.approx(expected, rel=0.2)
+
+
+def test_a_tank_of_known_volume_separates_conductance_and_volume():
+    """One fill determines their ratio only: C/V."""
+    plant = rig(Muscle.ideal(Vessel(1e-4, 0.3)), Polytropic(1.2))
+    fit = fitted(plant, ("circuit.fill.conductance", "muscle.geometry.enclosed_volume"))
+    ranking = rank_records(fit)
+    assert ranking.now.worst > 1.0
+    assert ranking.now.correlation > 0.99
+    assert "rigid tank of known volume" in ranking.ranking[0].description
+    assert ranking.ranking[0].precision.worst < 0.02
+
+
+@pytest.mark.parametrize(
+    ("pair", "message"),
+    [
+        ((VALVE, "gas.heat"), r"'gas.heat' is no common unknown of the fit.*gas.heat_transfer"),
+        ((VALVE, VALVE), "is named twice"),
+    ],
+)
+def test_a_pair_that_is_none_is_refused(fill, pair, message):
+    with pytest.raises(ParameterError, match=message):
+        rank_records(fill, pair)
+
+
+def test_a_fit_of_one_parameter_has_no_pair():
+    with pytest.raises(IdentificationError, match="1 common unknowns"):
+        rank_records(fitted(rig(), ("circuit.fill.conductance",)))
+
+
+STUDY = """
+[plant]
+gas = { model = "EnergyBalance", heat_transfer = 1.2 }
+[plant.muscle]
+library = "dmsp-20-300"
+[plant.circuit]
+model = "FillDischarge"
+supply = { model = "Supply", pressure = "5 bar" }
+fill = { model = "Valve", conductance = 4e-9, critical_ratio = 0.3 }
+discharge = { model = "Valve", conductance = 4e-9, critical_ratio = 0.3 }
+[plant.mechanism]
+model = "Isometric"
+contraction = 0.05
+[input]
+fill = [["0 s", 1]]
+[observed]
+pressure = "500 Pa"
+[fit]
+free = ["circuit.fill.conductance", "circuit.fill.critical_ratio", "gas.heat_transfer"]
+[[record]]
+file = "fill.csv"
+initial_state = { pressure = "0 bar" }
+"""
+
+
+def test_the_command_ranks_the_records_of_a_study(fill, tmp_path):
+    recording = fill.problem.record_models[0].experiment.recording
+    rows = zip(recording["time"], recording["pressure"], strict=True)
+    lines = ["time [s],pressure [Pa]", *(f"{t:.9g},{p:.9g}" for t, p in rows)]
+    (tmp_path / "fill.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
+    call = ["plan", str(tmp_path / "study.toml")]
+    done = CliRunner().invoke(app, [*call, "--out", str(tmp_path / "plan"), "--json"])
+    assert done.exit_code == 0, done.stderr
+    said = json.loads(done.stdout)
+    assert said["pair"] == [VALVE, WALL]
+    assert "whose valve is closed" in said["ranking"][0]["description"]
+    text = (tmp_path / "plan" / "plan.csv").read_text(encoding="utf-8")
+    assert text.splitlines()[1].startswith("none,1.0,")
+    assert "To separate them" in (tmp_path / "plan" / "report.html").read_text(encoding="utf-8")
+    assert CliRunner().invoke(app, [*call, "--separate", VALVE]).exit_code == 2
+    assert CliRunner().invoke(app, ["plan", "dmsp-20-300", "--separate", VALVE]).exit_code == 2
+    assert CliRunner().invoke(app, ["plan", "dmsp-20-300"]).exit_code == 2
