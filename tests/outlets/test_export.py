@@ -148,6 +148,14 @@ def test_a_system_without_inputs_is_exported(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("case", ["one muscle", "two muscles on a spool", "fixed steps"])
+def test_clang_builds_the_program_as_gcc_does(case, tmp_path):
+    problem = problem_of(*CASES[case])
+    write_program(problem, tmp_path, C99(), name="plant")
+    check_run(*printed.finished([printed.built(tmp_path, compiler="clang")], tmp_path), problem)
+
+
+@pytest.mark.slow
 def test_the_program_has_no_undefined_behaviour(tmp_path):
     write_program(problem_of("overlap", duration=0.2), tmp_path, C99(), name="plant")
     run_c(tmp_path, "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
