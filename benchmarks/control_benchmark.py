@@ -36,7 +36,7 @@ TARGETS = {0.5: 0.25, 1.0: 0.45, 2.0: 0.9, 3.0: 1.3}
 RATIO_TARGET, LEARNING_TARGET, HOLD_TARGET, REST_TARGET, SHARE_TARGET = 3.0, 0.15, 0.5, 10.0, 5.0
 FORWARD, PLAIN, BOTH = "feed-forward + PID", "PID", "angle and stiffness"
 COMPENSATED = "feed-forward + PID, compensated"
-PREDICTIVE, QUADRATIC = "feed-forward + MPC", "feed-forward + LQG"
+PREDICTIVE, QUADRATIC = "feed-forward + MPC, compensated", "feed-forward + LQG, compensated"
 PREDICTIVE_TARGET, PRESSURE_MARGIN = 0.7, 0.05
 """Ratio of the errors at 2 Hz, and what noise and inner control may exceed the limits of the pressures by [bar] (the
 margin is chosen)."""
@@ -115,18 +115,26 @@ PUBLISHED = (
 
 def measure(budget: int, seed: int) -> dict[str, Any]:
     """All results as plain data."""
+    return {"budget": budget, "seed": seed, **measure_proportional(budget, seed), **measure_on_off(budget, seed)}
+
+
+def measure_proportional(budget: int, seed: int) -> dict[str, Any]:
+    """The results of the joint with proportional valves, and those of learning."""
     joint = proportional_joint()
     result = compare_controllers(joint, standard_contenders(joint), budget=budget, seed=seed, progress=_show)
     tuned = next(each for each in result.contenders if each.name == FORWARD)
     curve = learn(joint, tuned, find_tasks(("sine 2 Hz",))[0], trials=31, seed=seed)
-    other = on_off_joint()
-    chosen = [each for each in standard_contenders(other) if each.name in ON_OFF]
-    switched = compare_controllers(other, chosen, budget=budget, seed=seed, progress=_show)
     return {
-        "budget": budget, "seed": seed, "proportional": _plain(result), "on/off": _plain(switched),
-        "learning": curve.errors.tolist(), "monotone": curve.is_monotone,
+        "proportional": _plain(result), "learning": curve.errors.tolist(), "monotone": curve.is_monotone,
         "spread": curve.spread, "forward": forward_error(joint),
     }  # fmt: skip
+
+
+def measure_on_off(budget: int, seed: int) -> dict[str, Any]:
+    """The results of the joint with on/off valves."""
+    joint = on_off_joint()
+    chosen = [each for each in standard_contenders(joint) if each.name in ON_OFF]
+    return {"on/off": _plain(compare_controllers(joint, chosen, budget=budget, seed=seed, progress=_show))}
 
 
 def forward_error(joint: BenchmarkJoint) -> float:
@@ -148,7 +156,9 @@ def _plain(result: Any) -> dict[str, Any]:
         "gains": {each.name: {**each.tuning.gains, **each.identified} for each in result.contenders if each.tuning},
         "on bound": {each.name: dict(each.tuning.on_bound) for each in result.contenders if each.tuning},
         "limits": (joint.min_pressure / 1e5, joint.max_pressure / 1e5),
-        "pressures": {key: pressure_range(joint, run.recording) for key, run in result.runs.items() if run.recording},
+        "pressures": {
+            key: pressure_range(joint, run.recording) for key, run in result.runs.items() if run.recording is not None
+        },
         "metrics": {key: dataclasses.asdict(run.metrics) if run.metrics else None for key, run in result.runs.items()},
         "span": joint.pressure_span,
     }

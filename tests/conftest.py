@@ -3,7 +3,8 @@
 Ctrl-C interrupts here too, where a shell that runs the tests in the background has it ignored. `--hypothesis-profile
 thorough` draws 300 examples in place of 20. A figure whose axes, labels and curves are those of one that was drawn
 before gets the files of that one, except in tests with the marker `drawn`, which look at the files. The configuration
-file of the user is not read.
+file of the user is not read. Where Python must not write bytecode beside the sources, that of the tests, whose
+assertions pytest rewrites, is stored in the cache folder of pytest.
 """
 
 from __future__ import annotations
@@ -11,6 +12,8 @@ from __future__ import annotations
 import os
 import re
 import signal
+import sys
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -20,6 +23,9 @@ from airmuscle.core import plotting
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
 os.environ["AIRMUSCLE_CONFIG_DIR"] = os.devnull
+if sys.dont_write_bytecode and sys.pycache_prefix is None:
+    sys.dont_write_bytecode = False
+    sys.pycache_prefix = str(Path(__file__).parents[1] / ".pytest_cache" / "bytecode")
 settings.register_profile("few", settings(), max_examples=20, deadline=None)
 settings.register_profile("thorough", settings(), max_examples=300, deadline=None)
 settings.load_profile("few")

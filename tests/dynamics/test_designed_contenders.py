@@ -33,7 +33,7 @@ from airmuscle.study.control_benchmark.motion_dynamics import angular_accelerati
 
 pytest.importorskip("daqp", reason="the package daqp is not installed")
 JOINT = proportional_joint()
-LQG, MPC = "feed-forward + LQG", "feed-forward + MPC"
+LQG, MPC = "feed-forward + LQG, compensated", "feed-forward + MPC, compensated"
 CONTENDERS = {each.name: each for each in standard_contenders(JOINT) if each.name in (LQG, MPC)}
 
 
@@ -55,7 +55,7 @@ def test_the_design_model_responds_as_the_joint_whose_pressures_follow_at_once()
 
 
 def measured(law: AlongMotion, angle: float, wanted: float, forward: float) -> Measurement:
-    setpoints = {"angle": wanted, "feed_forward": forward, "feed_forward_rate": 0.0}
+    setpoints = {"angle": wanted, "feed_forward": forward, "feed_forward_rate": 0.0, "angular_speed": 0.0}
     return Measurement({"angle": angle}, setpoints, {"difference": (-JOINT.pressure_span, JOINT.pressure_span)})
 
 
@@ -111,7 +111,7 @@ def test_bounds_of_a_parameter_that_a_controller_does_not_have_are_refused():
     with pytest.raises(
         ParameterError, match=r"AlongMotion has no declared parameter 'design\.weight' to be tuned; there"
     ):
-        dataclasses.replace(CONTENDERS[LQG], bounds={"design.weight": (1.0, 2.0)})
+        dataclasses.replace(CONTENDERS[LQG], bounds={"design.weight": (1.0, 2.0)}, identified=())
     with pytest.raises(ParameterError, match=r"AlongMotion: delay is -1; allowed range: 0 to 1000 samples"):
         dataclasses.replace(CONTENDERS[LQG].law, delay=-1)
 

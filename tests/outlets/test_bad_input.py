@@ -412,7 +412,8 @@ def test_a_full_disk_is_one_line(option: tuple[str, ...]):
     assert done.stderr == "error: output: No space left on device.\n"
 
 
-COMPILING = "compiling fixed_step, once on this machine (some seconds) ...\n"
+COMPILING = "compiling "
+"""Beginning of the lines on kernels that are not yet stored on the machine."""
 
 
 class Interrupted:
@@ -443,7 +444,8 @@ def test_an_interrupted_simulation_keeps_what_it_has(tmp_path: Path, monkeypatch
     monkeypatch.setattr(bound_integrator, "INTERRUPT_CHECK_STEPS", 100)
     result = CliRunner().invoke(app, ["simulate", str(tmp_path / "run.toml"), "--out", str(tmp_path / "run")])
     assert result.exit_code == 130
-    assert result.stderr.removeprefix(COMPILING) == f"partial results were written to {tmp_path / 'run'}\ninterrupted\n"
+    lines = [line for line in result.stderr.splitlines() if not line.startswith(COMPILING)]
+    assert lines == [f"partial results were written to {tmp_path / 'run'}", "interrupted"]
     kept = read_csv(tmp_path / "run" / "recording.csv")
     assert kept["time"][-1] == pytest.approx(0.2, abs=0.0011)
 

@@ -23,7 +23,7 @@ from airmuscle.cli.app import app
 from airmuscle.control import PID, ControlLoop, SampledSignal, Schedule
 from airmuscle.core import autodiff
 from airmuscle.core.errors import AirmuscleWarning, FileError, ParameterError
-from airmuscle.export import C99, JavaScript, Octave, make_identifiers, write_law, write_program
+from airmuscle.export import C99, JavaScript, Octave, make_identifiers, write_fmu, write_law, write_program
 from airmuscle.export.building import build_and_run
 from airmuscle.export.identifiers import LONGEST, RESERVED
 from airmuscle.library.files import list_laws
@@ -91,6 +91,13 @@ def test_the_octave_program_makes_the_steps_of_the_library(case, tmp_path):
     problem = problem_of(*CASES[case], duration=0.2)
     write_program(problem, tmp_path, Octave(), name="plant")
     check_run(*printed.run_octave(tmp_path), problem)
+
+
+def test_the_octave_command_writes_its_file_and_displays_nothing(tmp_path):
+    write_program(problem_of("heat", RungeKutta4(1e-2), duration=0.05), tmp_path, Octave(), name="plant")
+    command = [printed.require("octave-cli"), "--no-init-file", "--quiet", "--eval", "run_plant('run.csv')"]
+    assert printed.finished(command, tmp_path)[1] == ""
+    assert (tmp_path / "run.csv").read_text().startswith("time [s],")
 
 
 def end_of(problem, factor=1.0):
@@ -392,7 +399,8 @@ def test_a_controller_is_refused_by_name(tmp_path):
     loop = ControlLoop(PID("pressure", "fill", 1e-5), 0.01, Schedule({"pressure": ((0.0, 2e5),)}))
     problem = Problem(plant, loop, 0.1, plant.state_at(pressure=1e5))
     with pytest.raises(ParameterError, match="the controller PID cannot be exported to this target"):
-        write_program(problem, tmp_path, Octave())
+        write_fmu(problem, tmp_path / "a.fmu")
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(

@@ -30,6 +30,7 @@ FORMATS = {
     "linux64": (b"\x7fELF\x02\x01", 18, 62),
     "linux-aarch64": (b"\x7fELF\x02\x01", 18, 183),
     "win64": (b"MZ", None, 0x8664),
+    "win-aarch64": (b"MZ", None, 0xAA64),
     "darwin64": (b"\xcf\xfa\xed\xfe", 4, 0x01000007),
     "darwin-aarch64": (b"\xcf\xfa\xed\xfe", 4, 0x0100000C),
 }
@@ -90,7 +91,8 @@ def test_an_unknown_platform_is_refused_with_the_nearest():
 def test_the_folders_are_those_of_the_standard():
     assert {name: (each.folder(2), each.folder(3)) for name, each in PLATFORMS.items()} == {
         "linux64": ("linux64", "x86_64-linux"), "linux-aarch64": ("aarch64-linux", "aarch64-linux"),
-        "win64": ("win64", "x86_64-windows"), "darwin64": ("darwin64", "x86_64-darwin"),
+        "win64": ("win64", "x86_64-windows"), "win-aarch64": ("aarch64-windows", "aarch64-windows"),
+        "darwin64": ("darwin64", "x86_64-darwin"),
         "darwin-aarch64": ("aarch64-darwin", "aarch64-darwin"),
     }  # fmt: skip
     assert this_platform().suffix in (".so", ".dll", ".dylib")

@@ -62,7 +62,8 @@ def in_one_line(text: str) -> str:
 def source_hints() -> Iterator[tuple[str, str, str]]:
     """(place, argument, function) of every hint that is created in the package."""
     for path in sorted(SOURCE.rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        source = path.read_text(encoding="utf-8")
+        for node in ast.walk(ast.parse(source)) if "Hint(" in source else ():
             if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Hint":
                 given = dict(zip(Hint.__match_args__, node.args, strict=False))
                 given |= {str(keyword.arg): keyword.value for keyword in node.keywords}

@@ -6,7 +6,9 @@ import sys
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from airmuscle.cli.app import app
 from airmuscle.core.errors import FileError
 from airmuscle.recording import read
 
@@ -47,6 +49,25 @@ def test_one_topic_can_be_chosen(bag):
     assert len(run) == 11
     with pytest.raises(FileError, match="there is no topic nothing"):
         read(bag, group="nothing")
+
+
+def test_the_command_converts_a_bag(bag, tmp_path):
+    """As the guide states, here to CSV: the same columns, rows and numbers."""
+    target, mapping = tmp_path / "run.csv", tmp_path / "rig.toml"
+    mapping.write_text('[columns]\n"pressure" = "pressure [Pa]"\n')
+    done = CliRunner().invoke(app, ["convert-data", str(bag), str(target), "--mapping", str(mapping)])
+    assert done.exit_code == 0, done.output
+    (run,), (written,) = read(bag, mapping=mapping), read(target)
+    assert list(written) == list(run)
+    for name in run:
+        assert written[name].tolist() == run[name].tolist()
+
+
+def test_a_quantity_without_unit_is_refused_with_the_line_that_states_it(bag, tmp_path):
+    done = CliRunner().invoke(app, ["convert-data", str(bag), str(tmp_path / "run.csv")])
+    assert done.exit_code == 1
+    assert '"pressure" = "pressure [...]" under [columns] in a --mapping file' in " ".join(done.output.split())
+    assert not (tmp_path / "run.csv").exists()
 
 
 def test_a_bag_without_its_metadata_is_refused(bag):

@@ -44,7 +44,7 @@ class JavaScriptModule:
         solver = filled("rodas4.mjs" if implicit else "explicit.mjs", {}, self.name)
         if self.loop is not None:
             text += f"export const loop = {to_json(self._loop_data(self.loop))};\n"
-            functions += f"\n{self.loop.controller.javascript()}"
+            functions += f"\n{self.loop.controller.sample_in(JavaScriptLanguage('control_'))}"
         places = {
             "provenance": comment, "constants": text, "functions": functions, "solver": solver,
             "simulate": self._simulation(),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from ..compile.text.matlab import DEFINITION, MatlabBody, MatlabLanguage
 from ..core.errors import printable
 from ..simulation.integrators import ExplicitRungeKutta, Rodas4
 from .c_source import COEFFICIENTS, csv_header
+from .exported_loop import ExportedLoop
 from .printed_system import ExportedSystem
 from .provenance import line_comment
 from .run_data import RunData, tableau_arrays
@@ -20,6 +21,15 @@ from .templates import filled
 _BODY = MatlabBody()
 _IN_LINE = 6
 """Numbers in a line."""
+LOOP_HELP = """% In addition: controller_parameters, those of the control law; setpoint, with the fields ends, values
+% and slopes.
+"""
+DRIVE = """    for j = 1:numel(drivers)
+      i = drivers{j}.input;
+      [signals{i}, drivers{j}] = driven(drivers{j}, signals{i}, start);
+    end
+"""
+"""The lines that pass commands through their drivers."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -30,22 +40,38 @@ class OctaveFunctions:
     system: ExportedSystem
     run: RunData
     provenance: Sequence[str]
+    loop: ExportedLoop | None = None
 
     def files(self, columns: Sequence[str]) -> dict[str, str]:
         """Contents of the function, and of a function that writes these columns, after time, as CSV, by file name."""
         implicit = isinstance(self.run.integrator, Rodas4)
         functions, _ = self.system.printed(MatlabLanguage(), implicit=implicit)
-        steps = self._steps()
+        steps, constants = self._steps(), self._constants()
+        if self.loop is not None:
+            functions += f"\n{self.loop.controller.sample_in(MatlabLanguage('control_'))}"
+            constants += self._loop_constants(self.loop)
         solver = filled("rodas4.m" if implicit else "explicit.m", steps, self.name)
         places = {
             "provenance": line_comment(self.provenance), "file": self.name, "functions": f"{DEFINITION}\n{functions}",
-            "constants": self._constants(), "solver": solver, **steps,
+            "constants": constants, "solver": solver, **steps,
+            "simulate": self._simulation(steps), "loop_help": LOOP_HELP if self.loop else "",
             "columns": m_strings(["time", *columns]), "header": m_string(csv_header(columns).strip("\n")),
         }  # fmt: skip
         return {
             f"{self.name}.m": filled("program.m", places, self.name),
             f"run_{self.name}.m": filled("run.m", places, self.name),
         }
+
+    def _simulation(self, steps: Mapping[str, str]) -> str:
+        """The function `simulate`."""
+        if self.loop is None:
+            return filled("simulate.m", steps, self.name)
+        driven = len(self.loop.drivers.kinds)
+        places = {
+            "drivers": filled("drivers.m", {}, self.name) if driven else "",
+            "apply_drivers": DRIVE if driven else "",
+        }
+        return filled("loop.m", {**places, **steps}, self.name)
 
     def _steps(self) -> dict[str, str]:
         integrator = self.run.integrator
@@ -77,6 +103,30 @@ class OctaveFunctions:
             "run.times": m_array(run.times),
         }
         return "".join(f"  model.{name} = {text};\n" for name, text in values.items())
+
+    def _loop_constants(self, loop: ExportedLoop) -> str:
+        law, signal, table = loop.controller.law, loop.prepared.setpoint_signal, loop.drivers
+        values = {
+            "sample_time": m_number(loop.sample_time),
+            "samples": str(loop.samples),
+            "finish": m_number(float(loop.prepared.instants[-1])),
+            "near": m_number(loop.near),
+            "columns": m_strings(loop.added_columns),
+            "measured_at": m_array(loop.measured_at(self.system)),
+            "commanded": m_array(loop.prepared.commanded),
+            "initial_memory": m_array([float(value) for value in law.initial_memory.values()]),
+            "parameters": m_strings(leaf.path for leaf in loop.controller.tunable),
+            "parameter_defaults": m_array([float(leaf.value) for leaf in loop.controller.tunable]),
+            "setpoint.ends": m_array(signal.ends),
+            "setpoint.values": m_array(signal.values),
+            "setpoint.slopes": m_array(signal.slopes),
+            "drivers": "{}",
+        }
+        drivers = zip(table.kinds.tolist(), table.settings, loop.driver_states, strict=True)
+        for k, ((i, kind), settings, state) in enumerate(drivers, 1):
+            values[f"drivers{{{k}}}.input"], values[f"drivers{{{k}}}.kind"] = str(i + 1), str(kind)
+            values[f"drivers{{{k}}}.settings"], values[f"drivers{{{k}}}.state"] = m_array(settings), m_array(state)
+        return "".join(f"  model.loop.{name} = {text};\n" for name, text in values.items())
 
 
 def m_number(value: float) -> str:

@@ -45,6 +45,7 @@ PLATFORMS = {
     "linux64": Platform("linux64", "x86_64-linux", ".so", "x86_64-linux-gnu.2.17"),
     "linux-aarch64": Platform("aarch64-linux", "aarch64-linux", ".so", "aarch64-linux-gnu.2.17"),
     "win64": Platform("win64", "x86_64-windows", ".dll", "x86_64-windows-gnu"),
+    "win-aarch64": Platform("aarch64-windows", "aarch64-windows", ".dll", "aarch64-windows-gnu"),
     "darwin64": Platform("darwin64", "x86_64-darwin", ".dylib", "x86_64-macos"),
     "darwin-aarch64": Platform("aarch64-darwin", "aarch64-darwin", ".dylib", "aarch64-macos"),
 }

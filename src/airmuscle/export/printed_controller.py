@@ -10,10 +10,10 @@ import numpy as np
 
 from ..compile.functions import Printer
 from ..compile.ir import emission
+from ..compile.ir.emission import TargetLanguage
 from ..compile.ir.instructions import Code, instructions
 from ..compile.ir.interpreter import InterpretedBody
 from ..compile.text.c import CLanguage
-from ..compile.text.javascript import JavaScriptLanguage
 from ..control.control_law import ControlLaw
 from ..control.control_loop import ControlLoop
 from ..core.arrays import Array
@@ -78,9 +78,10 @@ class PrintedController:
             f"{self.name}.c": filled("controller.c", places, self.name),
         }
 
-    def javascript(self) -> str:
-        """The function `control_sample(measurement, setpoint, memory, parameters, command, later)`."""
-        printer = Printer(JavaScriptLanguage("control_"))
+    def sample_in(self, language: TargetLanguage) -> str:
+        """The function of a sample in another language; its arguments are measurement, set point, memory, parameters,
+        and the arrays of the command and of the later memory, which MATLAB returns."""
+        printer = Printer(language)
         printer.add_code("sample", list(self.inputs), self.code, list(self.outputs))
         return printer.text[-1]
 

@@ -83,8 +83,10 @@ class JavaScript(Target):
 class Octave(Target):
     """Functions for GNU Octave and MATLAB, and a function that runs the scenario."""
 
+    has_loops: ClassVar[bool] = True
+
     def run_files(self, program: ExportedRun) -> dict[str, str]:
-        functions = OctaveFunctions(program.name, program.system, program.run, program.provenance)
+        functions = OctaveFunctions(program.name, program.system, program.run, program.provenance, program.loop)
         return functions.files(program.columns)
 
     def law_files(self, law: PrintedLaw) -> dict[str, str]:

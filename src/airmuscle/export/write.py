@@ -37,7 +37,7 @@ def write_program(
 ) -> tuple[Path, ...]:
     """Write a system and its run as a program in another language; returns the paths of its files.
 
-    problem  a system with its input signals or, for C99 and JavaScript, a control loop; initial state, output times and
+    problem  a system with its input signals or, for these targets, a control loop; initial state, output times and
              integrator
     target   C99(), JavaScript() or Octave()
     name     name of the files, and beginning of the names in them; by default the title

@@ -1,6 +1,7 @@
 """Simulation: problems and their solutions, integrators, open-loop and closed-loop runs, forward sensitivities."""
 
 from .integrators import DormandPrince8, ExplicitRungeKutta, Integrator, Rodas4, RungeKutta4
+from .jax_loop import loop_in_jax
 from .law_with_sensitivities import LawWithSensitivities
 from .loop_sensitivities import (
     LoopWithSensitivities,
@@ -31,6 +32,7 @@ __all__ = [
     "WithSensitivities",
     "advance",
     "differentiate_loop",
+    "loop_in_jax",
     "sensitivity",
     "simulate",
     "solve",

@@ -15,5 +15,8 @@ function r = run_@file@(file)
     fprintf(out, '%s\n', @header@);
     fprintf(out, [repmat('%.17g,', 1, sum(found) - 1), '%.17g\n'], r.data(:, columns)');
     fclose(out);
+    if nargout == 0
+      clear r % nothing is displayed
+    end
   end
 end

@@ -10,6 +10,7 @@ import numpy as np
 from ...compile import System
 from ...core.arrays import Array
 from ...core.errors import IdentificationError, ParameterError
+from ...core.short_repr import ShortRepr
 from ...simulation.integrators import Integrator, Rodas4
 from ..dynamic.experiment import Experiment, ParameterPaths, RecordUnknown, StartTime, Unknown, make_unknowns
 from ..dynamic.fit import fit_dynamic
@@ -23,8 +24,8 @@ ASSUMED_DEVIATION = 0.01
 """Standard deviation of a quantity without a stated one, relative to its range in the record (chosen)."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class PlantUncertainty:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class PlantUncertainty(ShortRepr):
     """The uncertainty of an identified plant.
 
     deviations  standard deviation of the residuals of each observed quantity [SI], with the model error that the

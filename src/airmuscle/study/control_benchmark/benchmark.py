@@ -148,7 +148,6 @@ def tune_contender(
         return TunedContender(contender, tuned, tuning)
     progress(f"identifying gains of {contender.name}", 0, 1)
     bounds = {path: contender.bounds[path] for path in contender.identified}
-    assert isinstance(tuned, ControlLaw)
     gains, _ = identify_gains(joint, tuned, bounds, TUNING_TASKS[0])
     return TunedContender(contender, with_gains(tuned, gains), tuning, gains)
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ...control.control_law import ControlLaw
 from ...control.control_loop import ControlLoop
+from ...control.controller import Controller
 from ...core.errors import AirmuscleError, ParameterError
 from ...core.tree import leaves
 from ...simulation.run import simulate
@@ -23,11 +23,11 @@ RESOLUTION = 0.01
 
 
 def identify_gains(
-    joint: BenchmarkJoint, law: ControlLaw, bounds: Mapping[str, tuple[float, float]], task: ControlTask
+    joint: BenchmarkJoint, law: Controller, bounds: Mapping[str, tuple[float, float]], task: ControlTask
 ) -> tuple[dict[str, float], int]:
     """The gains within their bounds with which the truth follows a task best, by path [SI], and the number of runs.
 
-    law     control law of the valves behind the sensors
+    law     controller of the valves behind the sensors
     bounds  minimum and maximum [SI] of each gain; a name is the end of the path of one parameter of the law
 
     Each run is judged by the rms difference of set point and reading of the encoder, whose dead time is known
@@ -61,7 +61,7 @@ def _path(known: list[str], name: str) -> str:
     return paths[0]
 
 
-def tracking_error(joint: BenchmarkJoint, law: ControlLaw, task: ControlTask) -> float:
+def tracking_error(joint: BenchmarkJoint, law: Controller, task: ControlTask) -> float:
     """The rms difference [rad] of set point and reading of the encoder in a run on the truth; infinite if it fails."""
     signals, start = task_signals(joint, task), joint.start(joint.truth)
     time = signals.time[signals.time <= task.duration + 1e-9]

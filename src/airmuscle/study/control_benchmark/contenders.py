@@ -27,7 +27,7 @@ from ...control.with_feed_forward import WithFeedForward
 from ...core.errors import ParameterError
 from ...core.tree import leaves
 from .called_contender import COMMANDED, SensedController, sensed
-from .designed_controllers import AlongMotion, PredictiveDesign, QuadraticDesign, joint_design_model
+from .designed_controllers import AlongMotion, ControlDesign, PredictiveDesign, QuadraticDesign, joint_design_model
 from .joints import SIDES, BenchmarkJoint
 
 BAR = 1e5
@@ -163,6 +163,10 @@ def _feed_forward() -> SetpointLead:
     return SetpointLead("feed_forward", "feed_forward_rate", DIFFERENCE, 0.02)
 
 
+def _friction() -> FrictionFeedForward:
+    return FrictionFeedForward("angular_speed", DIFFERENCE, 1e3, boundary_speed=0.1)
+
+
 def pid_contender() -> Contender:
     """PID of the angle without a model of the muscles."""
     return Contender("PID", _pid(), PID_BOUNDS)
@@ -188,8 +192,7 @@ def compensated_contender(joint: BenchmarkJoint) -> Contender:
     """
     delay = next(sensor.delay for sensor in joint.sensors if sensor.column == "angle")
     feedback = WithSetpointDelay(dataclasses.replace(_pid(), derivative_weight=1.0), delay)
-    friction = FrictionFeedForward("angular_speed", DIFFERENCE, 1e3, boundary_speed=0.1)
-    law = WithFeedForward(_feed_forward(), WithFeedForward(friction, feedback))
+    law = WithFeedForward(_feed_forward(), WithFeedForward(_friction(), feedback))
     bounds = {
         "feed_forward.lead_time": _LEAD, "feedback.feed_forward.amplitude": _FRICTION,
         **_within("feedback.feedback.law.", PID_BOUNDS),
@@ -232,7 +235,8 @@ def angle_and_stiffness_contender(joint: BenchmarkJoint) -> Contender:
 
 
 _DESIGN: Bounds = {
-    "feed_forward.lead_time": _LEAD, "design.permitted_angle": (2e-3, 0.2), "design.speed_noise": (0.1, 100.0),
+    "feed_forward.feed_forward.lead_time": _LEAD, "feed_forward.feedback.amplitude": _FRICTION,
+    "design.permitted_angle": (2e-3, 0.2), "design.speed_noise": (0.1, 100.0),
     "design.pressure_time": (3e-3, 0.1),
 }  # fmt: skip
 
@@ -240,20 +244,21 @@ _DESIGN: Bounds = {
 def quadratic_contender(joint: BenchmarkJoint) -> Contender:
     """Linear-quadratic Gaussian control (LQG) of the deviation beside the feed-forward; its weights are tuned."""
     design = QuadraticDesign(joint_design_model(joint), 0.02, 0.005, 5.0, 0.01)
-    bounds = {**_DESIGN, "design.permitted_integral": (5e-4, 0.5)}
-    return Contender("feed-forward + LQG", _along_motion(joint, design), bounds)
+    return _along_motion(joint, "LQG", design, {"design.permitted_integral": (5e-4, 0.5)})
 
 
 def predictive_contender(joint: BenchmarkJoint) -> Contender:
     """Linear model predictive control (MPC) of the deviation beside the feed-forward; its weights are tuned."""
     design = PredictiveDesign(joint_design_model(joint), 0.02, 5.0, 200.0, 0.01)
-    bounds = {**_DESIGN, "design.disturbance_noise": (10.0, 1e4)}
-    return Contender("feed-forward + MPC", _along_motion(joint, design), bounds)
+    return _along_motion(joint, "MPC", design, {"design.disturbance_noise": (10.0, 1e4)})
 
 
-def _along_motion(joint: BenchmarkJoint, design: QuadraticDesign | PredictiveDesign) -> AlongMotion:
+def _along_motion(joint: BenchmarkJoint, name: str, design: ControlDesign, bounds: Bounds) -> Contender:
+    """A designed controller beside the feed-forward of the compensated one, two gains of which are identified."""
     delay = next(sensor.delay for sensor in joint.sensors if sensor.column == "angle")
-    return AlongMotion(_feed_forward(), design, delay)
+    law = AlongMotion(WithFeedForward(_feed_forward(), _friction()), design, delay)
+    identified = "feed_forward.feed_forward.lead_time", "feed_forward.feedback.amplitude"
+    return Contender(f"feed-forward + {name}, compensated", law, {**_DESIGN, **bounds}, identified)
 
 
 def standard_contenders(joint: BenchmarkJoint) -> tuple[Contender, ...]:

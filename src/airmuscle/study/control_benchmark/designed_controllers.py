@@ -13,9 +13,9 @@ from ...analysis.linear_model import LinearModel
 from ...analysis.lqg import design_lqg
 from ...analysis.predictive_design import design_predictive
 from ...control.co_contraction import DIFFERENCE
+from ...control.control_law import ControlLaw
 from ...control.controller import Controller, Measurement
 from ...control.linear_model_predictive import RAWLINGS2017
-from ...control.setpoint_lead import SetpointLead
 from ...control.state_feedback import FRANKLIN1998
 from ...core.declaration import model, parameter
 from ...core.errors import ParameterError
@@ -163,7 +163,7 @@ class AlongMotion(Controller):
 
     from_file: ClassVar[bool] = False
 
-    feed_forward: SetpointLead
+    feed_forward: ControlLaw
     design: ControlDesign
     delay: int
 

@@ -1,0 +1,166 @@
+function r = simulate(model, changes)
+  loop = model.loop;
+  run = model.run;
+  run.parameters = model.defaults;
+  run.controller_parameters = loop.parameter_defaults;
+  run.setpoint = loop.setpoint;
+  if nargin > 1
+    run = changed(run, changes);
+  end
+  s = begin_run(model, run);
+  rows = struct('times', run.times(:), 'next', 1, 'count', 0, 'near', loop.near, 'setpoint', run.setpoint);
+  rows.start = run.start;
+  rows.measured = zeros(size(loop.measured_at, 1), 1);
+  rows.command = zeros(numel(loop.commanded), 1);
+  r.names = [{'time'}, model.states, model.inputs, model.output_names, loop.columns];
+  rows.data = zeros(numel(rows.times), numel(r.names));
+  memory = loop.initial_memory;
+  drivers = loop.drivers;
+  applied = run.values(1, :)';
+  status = 0;
+  r.samples = 0;
+  for k = 0:loop.samples - 1
+    [start, finish] = deal(instant(run, loop, k), instant(run, loop, k + 1));
+    values = {s.x, outputs(s.x, applied, s.c)};
+    for j = 1:numel(rows.measured)
+      rows.measured(j) = values{loop.measured_at(j, 1) + 1}(loop.measured_at(j, 2) + 1);
+    end
+    wanted = setpoints_at(run.setpoint, start, run.start);
+    [rows.command, memory] = control_sample(rows.measured, wanted, memory, run.controller_parameters);
+    if ~all(isfinite([rows.measured; rows.command]))
+      status = 3;
+      break
+    end
+    r.samples = r.samples + 1;
+    signals = segments_of(run, loop, start, finish, rows.command);
+@apply_drivers@    [s, rows, applied, status] = run_interval(s, rows, start, finish, signals);
+    if status ~= 0
+      break
+    end
+  end
+  while status == 0 && rows.next <= numel(rows.times)
+    rows = write_next(rows, s);
+  end
+  r.data = rows.data(1:rows.count, :);
+  r = ended(r, s, status);
+end
+
+function time = instant(run, loop, k)
+  if k == 0
+    time = run.start;
+  elseif k < loop.samples
+    time = run.start + loop.sample_time * k;
+  else
+    time = loop.finish;
+  end
+end
+
+function values = setpoints_at(signal, time, start)
+  piece = min(sum(signal.ends(:) <= time) + 1, numel(signal.ends));
+  if piece > 1
+    start = signal.ends(piece - 1);
+  end
+  values = signal.values(piece, :)' + (time - start) * signal.slopes(piece, :)';
+end
+
+% The segments of every input between two samples, with the columns end, value and slope: a command is held, others are
+% those of the run.
+function signals = segments_of(run, loop, start, finish, command)
+  signals = cell(1, size(run.values, 2));
+  time = start;
+  while time < finish
+    k = min(sum(run.ends(:) <= time) + 1, numel(run.ends));
+    following = finish;
+    if k < numel(run.ends)
+      following = min(finish, run.ends(k));
+    end
+    from = run.start;
+    if k > 1
+      from = run.ends(k - 1);
+    end
+    for i = 1:numel(signals)
+      signals{i}(end + 1, :) = [following, run.values(k, i) + (time - from) * run.slopes(k, i), run.slopes(k, i)];
+    end
+    time = following;
+  end
+  for j = 1:numel(command)
+    i = loop.commanded(j) + 1;
+    signals{i}(:, 2) = command(j);
+    signals{i}(:, 3) = 0;
+  end
+end
+
+% From one sample to the next, in the common segments of all inputs.
+function [s, rows, applied, status] = run_interval(s, rows, start, finish, signals)
+  count = numel(signals);
+  at = ones(count, 1);
+  starts = start * ones(count, 1);
+  u = zeros(count, 1);
+  w = u;
+  time = start;
+  status = 0;
+  while time < finish && status == 0
+    following = finish;
+    for i = 1:count
+      parts = signals{i};
+      while at(i) < size(parts, 1) && parts(at(i), 1) <= time
+        starts(i) = parts(at(i), 1);
+        at(i) = at(i) + 1;
+      end
+      u(i) = parts(at(i), 2) + (time - starts(i)) * parts(at(i), 3);
+      w(i) = parts(at(i), 3);
+      if at(i) < size(parts, 1)
+        following = min(following, parts(at(i), 1));
+      end
+    end
+    margin = @close@;
+    if following < finish
+      margin = rows.near;
+    end
+    [s, rows, status] = run_segment(s, rows, following, time > start, margin, u, w);
+    time = following;
+  end
+  applied = inputs_at(s, finish);
+end
+
+% One segment, in which the inputs are linear; `between`: it begins between two samples, where a row is written.
+function [s, rows, status] = run_segment(s, rows, finish, between, margin, u, w)
+  first = s.t;
+  count = numel(rows.times);
+  status = 0;
+  s = begin_segment(s, finish, u, w);
+  if between
+    rows = write_row(rows, first, s);
+    while rows.next <= count && rows.times(rows.next) <= first + rows.near
+      rows.next = rows.next + 1;
+    end
+  end
+  while rows.next <= count && rows.times(rows.next) <= first + @close@
+    rows = write_next(rows, s);
+  end
+  while s.t < finish && status == 0
+    [s, status] = step(s);
+    while status == 0 && rows.next <= count && rows.times(rows.next) < min(s.t + @close@, finish - margin)
+      rows = write_next(rows, s);
+    end
+  end
+  % rows close to the instant at the end of the segment
+  while rows.next <= count && margin > @close@ && rows.times(rows.next) < finish
+    rows.next = rows.next + 1;
+  end
+end
+
+function rows = write_next(rows, s)
+  rows = write_row(rows, rows.times(rows.next), s);
+  rows.next = rows.next + 1;
+end
+
+function rows = write_row(rows, time, s)
+  x = state_at(s, time);
+  u = inputs_at(s, time);
+  shown = setpoints_at(rows.setpoint, time, rows.start);
+  rows.count = rows.count + 1;
+  rows.data(rows.count, :) = [time; x; u; outputs(x, u, s.c); shown; rows.measured; rows.command]';
+end
+
+@drivers@
