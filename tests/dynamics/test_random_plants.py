@@ -2,7 +2,8 @@
 
 No exception of another package is raised, no number is NaN, and the books of air mass, of the air's energy and of the
 mechanism close. The tolerances of the books, relative to what was held or turned over, are chosen; that of the mass is
-not less than one rounding error a step. Where the energies of a plant are small beside the tolerance of the integrator, its energy books close with a smaller tolerance.
+not less than one rounding error a step. Where the energies of a plant are small beside the tolerance of the integrator,
+its energy books close with a smaller tolerance.
 """
 
 from __future__ import annotations
