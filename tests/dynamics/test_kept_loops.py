@@ -119,3 +119,22 @@ def test_few_forms_are_kept_with_a_plant():
     for problem in problems:
         solve(problem)
         assert len(problem.compiled.description.loop_runs) <= MAX_FORMS
+
+
+class Emptied(list):
+    """What another thread takes the last item from after it was seen to hold one."""
+
+    def pop(self):
+        raise IndexError
+
+
+def test_what_another_thread_takes_first_is_made_anew():
+    plant = dataclasses.replace(LIFT)
+    loop, command = Problem(plant, ControlLoop(ON_OFF, 0.05, STEPS), 0.3), Problem(plant, Schedule({}), 0.3)
+    alone = [solve(loop), solve(command)]
+    known = loop.compiled.description
+    known.loop_runs[form_of(loop)] = Emptied([None])
+    known.integrators[command.integrator] = Emptied([None])
+    known.recorders = Emptied([None])
+    for problem, before in zip((loop, command), alone, strict=True):
+        assert_identical(solve(problem), before)

@@ -7,6 +7,7 @@ from .finite_control_set import FiniteControlSet
 from .joint_plot import plot_reachable_region
 from .linear_model import LinearModel, Pole, linearise
 from .lqg import design_lqg
+from .nonlinear_model_predictive import NonlinearModelPredictive
 from .predictive_design import design_predictive
 from .state_estimator import Innovation, StateEstimate, StateEstimator
 from .static_stiffness import Stiffness, StiffnessPair, stiffness
@@ -21,6 +22,7 @@ __all__ = [
     "JointPoints",
     "JointStatics",
     "LinearModel",
+    "NonlinearModelPredictive",
     "Pole",
     "StateEstimate",
     "StateEstimator",

@@ -199,7 +199,8 @@ def _milliseconds(seconds: float) -> str:
 
 def _describe_controller(controller: Controller) -> str:
     """A controller and its fields; floats with twelve digits, which hides the rounding of a unit conversion."""
-    names = [f.name for f in dataclasses.fields(controller)] if dataclasses.is_dataclass(controller) else list[str]()
+    known = dataclasses.fields(controller) if dataclasses.is_dataclass(controller) else tuple[Any, ...]()
+    names = [field.name for field in known if field.repr]
     values = [(name, getattr(controller, name)) for name in names]
     texts = [f"{name}={value:.12g}" if isinstance(value, float) else f"{name}={value!r}" for name, value in values]
     return f"{type(controller).__name__}({', '.join(texts)})"
