@@ -7,7 +7,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from plants import chosen_muscle
+from control_plants import LIFT, SPLIT
 
 from airmuscle.control import (
     PID,
@@ -17,17 +17,10 @@ from airmuscle.control import (
     SampledSignal,
     Schedule,
     SolenoidDriver,
-    SplitRange,
 )
-from airmuscle.mechanism import HangingMass
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Supply, Valve
 from airmuscle.simulation import Problem, RungeKutta4, closed_loop, solve
 from airmuscle.simulation.kept_loops import MAX_FORMS, form_of
 
-VALVE = Valve(2.6e-9, 0.4)
-LIFT = Plant(chosen_muscle(), FillDischarge(Supply(5.5e5), VALVE, VALVE), HangingMass(2.0))
-SPLIT = SplitRange("fill", "discharge")
 STEPS = Schedule({"pressure": ((0, 1e5), (0.5, 3e5), (0.703, 2e5))})
 SOLENOID = SolenoidDriver(2e-3, 1.5e-3, 1e-3, 1.2e-3)
 DRIVERS = {"held": {}, "pulsed and delayed": {"fill": (PWM(50.0, 1e-3), SOLENOID), "discharge": (PWM(31.0), SOLENOID)}}
