@@ -43,24 +43,22 @@ margin is chosen)."""
 ON_OFF = (PLAIN, FORWARD, "feed-forward + sliding mode")
 REASONS = (
     (
-        FORWARD,
-        "Feed-forward + PID: the lead time that is best for the models, 4 ms, is too short for the truth, whose tubes, "
-        "friction and smaller valves delay the motion. With 30 ms and all other gains unchanged the errors are 0.35, "
-        "0.33, 0.38 and 1.27 degrees at 0.5, 1, 2 and 3 Hz. This lead time was found with the truth, so that it is no "
-        "result of the benchmark. A derivative of the error instead of the measurement, tuned in the same way, gives "
-        "0.54, 0.93, 1.38 and 1.46 degrees.",
-    ),
-    (
-        PLAIN,
-        "The ratio of PID to feed-forward + PID is missed for the same reason; with 30 ms it is 2.3, 4.7 and 7.0.",
-    ),
-    (
         f"{FORWARD}, ",
-        "PID compares the set point with an angle that is 6 ms old: it leads the motion by 6 ms, about 0.5 degrees "
-        "(rms) at 1 Hz, and the gains that tuning finds are a compromise with this lead. The compensated controller "
-        "delays the set point by the same time and differentiates the error. Friction and the lag of tubes and valves, "
-        "which the models do not have, need a feed-forward of their own: its two gains are identified by runs on the "
-        "truth, judged by the encoder, in the motion of the tuning. All other gains are found with the models.",
+        "Feed-forward + PID: the lead time that is best for the models, 12 ms, is too short for the truth, whose "
+        "tubes, friction and smaller valves delay the motion. With 30 ms and all other gains unchanged the errors are"
+        " 0.33, 0.44, 0.35 and 1.05 degrees at 0.5, 1, 2 and 3 Hz. This lead time was found with the truth, so that "
+        "it is no result of the benchmark. The PID compares the set point with an angle that is 6 ms old and leads "
+        "the motion by 6 ms, about 0.5 degrees (rms) at 1 Hz.",
+    ),
+    (
+        f"{PLAIN} / {FORWARD}, 2 Hz",
+        "The ratio of PID to feed-forward + PID is missed for the same reason; with 30 ms it is 4.7, 4.7 and 6.0.",
+    ),
+    (
+        COMPENSATED,
+        "Feed-forward + PID, compensated: with a budget of 1200 loops, 85 sets of gains, tuning finds other gains "
+        "than with 2400. A run of this controller alone with 2400 loops, the same joint and seed, had 0.10, 0.17, "
+        "0.40 and 0.95 degrees at 0.5, 1, 2 and 3 Hz, within all bounds.",
     ),
     (
         "learning, monotone",
@@ -73,7 +71,8 @@ REASONS = (
     (
         BOTH,
         "Angle and stiffness: the stiffness is controlled in open loop with the model. At 2.5 bar and 3 bar in both "
-        "muscles the true stiffness is 5.0 % and 3.5 % greater than that of the model.",
+        "muscles the true stiffness is 5.0 % and 3.5 % greater than that of the model. No sensor of the joint measures "
+        "it, so that feedback of the angle does not remove this error of the characteristic.",
     ),
 )
 """Beginning of the name of a target, and the reason where it was missed in the run of CONTROL.md."""
@@ -298,7 +297,12 @@ HISTORY = (
     "and is published in its last form; the bound of the learning curve's rises, 0.007 degree, is the "
     "spread of thirty repeats and replaced a rule of 10 % that an earlier run had failed. The compensated controller "
     "was designed after the errors of the other controllers on the truth had been seen; its first form, without "
-    "friction and with the lead time alone identified, had 0.21, 0.26, 0.80 and 1.81 degrees at 0.5, 1, 2 and 3 Hz."
+    "friction and with the lead time alone identified, had 0.21, 0.26, 0.80 and 1.81 degrees at 0.5, 1, 2 and 3 Hz. "
+    "LQG and MPC were added last, when all other results were known. Their first form had the feed-forward without "
+    "compensation, and MPC, tuned with the models alone (budget 1200), an error of 1.83 degrees at 2 Hz on the truth; "
+    "therefore they received the compensation of the other controller, with the same two gains identified. Nothing was "
+    "changed after the run of this page. Its budget is half the default one, because the machine was shared; the "
+    "proportional and the on/off part ran as two processes, with 13.6 minutes of CPU time together."
 )
 """What was seen before the rules of the benchmark were settled."""
 

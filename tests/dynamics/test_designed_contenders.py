@@ -30,6 +30,7 @@ from airmuscle.study.control_benchmark.benchmark import TunedContender, run_task
 from airmuscle.study.control_benchmark.contenders import complete
 from airmuscle.study.control_benchmark.designed_controllers import AlongMotion, joint_design_model
 from airmuscle.study.control_benchmark.motion_dynamics import angular_acceleration
+from airmuscle.study.control_benchmark.plots import line_style, marker_style
 
 pytest.importorskip("daqp", reason="the package daqp is not installed")
 JOINT = proportional_joint()
@@ -143,3 +144,8 @@ def test_a_called_contender_can_be_sent_to_another_process():
         for law in (sensed, again)
     )
     assert np.array_equal(first["angle"], second["angle"])
+
+
+def test_no_two_contenders_look_alike_in_a_figure():
+    for style in (marker_style, line_style):
+        assert len({tuple(map(str, style(i).values())) for i in range(14)}) == 14

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +26,19 @@ def benchmark_plots(result: BenchmarkResult, curves: Sequence[LearningCurve] = (
     return (*plots, *([learning_plot(curves)] if curves else []))
 
 
+def marker_style(number: int) -> dict[str, Any]:
+    """Marker of a contender; beyond those of the shared style the markers are open, with the colours moved by one."""
+    turn, place = divmod(number, len(MARKERS))
+    colour = LINES[(place + turn) % len(LINES)]
+    return {"marker": MARKERS[place], "color": colour, "markerfacecolor": "none" if turn else colour}
+
+
+def line_style(number: int) -> dict[str, Any]:
+    """Line of a contender; beyond those of the shared style each colour has another dash pattern."""
+    turn, place = divmod(number, len(LINES))
+    return {"color": LINES[place], "linestyle": DASHES[(place + 3 * turn) % len(DASHES)], "linewidth": 1.0}
+
+
 def error_plot(result: BenchmarkResult) -> Plot:
     """The rms error of every controller in every task."""
     names = [task.name for task in result.tasks]
@@ -33,8 +47,7 @@ def error_plot(result: BenchmarkResult) -> Plot:
     for i, each in enumerate(result.contenders):
         errors = [result.metric(each.name, name, "rmse") for name in names]
         shift = 0.08 * (i - (len(result.contenders) - 1) / 2)
-        marker, colour = MARKERS[i % len(MARKERS)], LINES[i % len(LINES)]
-        axis.plot(errors, rows + shift, linestyle="none", marker=marker, color=colour, label=each.name)
+        axis.plot(errors, rows + shift, linestyle="none", label=each.name, **marker_style(i))
     axis.set(xscale="log", xlabel="rms error [degree]")
     axis.set_yticks(rows, names)
     axis.set_ylim(len(names) - 0.5, -0.5)
@@ -61,7 +74,7 @@ def run_plot(result: BenchmarkResult, names: Sequence[str]) -> Plot:
             kept = time >= begin
             wanted = np.degrees(task.motion.at(time)[0])
             error = wanted - np.degrees(np.asarray(record["angle"]))
-            style = {"color": LINES[i % len(LINES)], "linestyle": DASHES[i % len(DASHES)], "linewidth": 1.0}
+            style = line_style(i)
             upper.plot(time[kept], (wanted - error)[kept], label=each.name, **style)
             lower.plot(time[kept], error[kept], **style)
             limit = max(limit, result.metric(each.name, name, "rmse"))
