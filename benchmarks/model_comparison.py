@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import statistics
 import time
 from collections.abc import Callable
@@ -27,6 +28,7 @@ POINTS = tuple((length, held) for length in (0.2, 0.3) for held in (0.0, 0.06, 0
 MAX_PRESSURE = 6e5
 NOISE = {"pressure": 300.0, "contraction": 2e-4, "force": 2.0}
 """Standard deviations of the sensors [SI] (chosen)."""
+TWO = "two processes"
 HEADER = ("task", "time", "CPU time", "result")
 TEXT = (
     "Synthetic sweeps of pressure, up and down, of braided muscles by Tondu and Lopez (2000) with rigid ends, with "
@@ -34,8 +36,9 @@ TEXT = (
     "two repeats, 500 rows each. Six sweeps: one muscle, 800 rows each. Comparison: all standard candidates, reading "
     "of the files not included. Hysteresis: three isobaric loops of 2000 rows with Dahl friction, all friction laws. "
     "Bootstrap: 4000 rows in eight runs, 1000 refits of a surface of degree 5, 100 of a braided muscle, which is "
-    "nonlinear in its parameters. Times are of one process, median of the rounds, the "
-    "first of which includes the tracing of the laws; the CPU time is of all threads."
+    "nonlinear in its parameters. `airmuscle fit --compare` uses one process for each core: a task of two processes is "
+    "judged by its time, including their start, any other by its CPU time. Median of the rounds, the first of which "
+    "includes the tracing of the laws; the CPU time is of all threads and processes."
 )
 
 
@@ -96,14 +99,20 @@ def make_loops(rows: int = 2000) -> list[Recording]:
     return loops
 
 
+def processor_time() -> float:
+    """CPU time [s] of this process and of its processes that have ended."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
+
+
 def timed(task: Callable[[], Any], rounds: int) -> Timing:
     """Median times of a task; the first round includes the tracing of the laws."""
     walls, processors = [], []
     for _ in range(rounds):
-        wall, processor = time.perf_counter(), time.process_time()
+        wall, processor = time.perf_counter(), processor_time()
         result = task()
         walls.append(time.perf_counter() - wall)
-        processors.append(time.process_time() - processor)
+        processors.append(processor_time() - processor)
     return Timing(statistics.median(walls), statistics.median(processors), result)
 
 
@@ -124,6 +133,8 @@ def section(rounds: int = 3) -> Section:
     tasks: dict[str, tuple[Callable[[], Any], float]] = {
         "comparison of 24 files, by specimen": (lambda: compare(family), 10.0),
         "comparison of 24 files, by run": (lambda: compare(family, leave_out=RunSplit()), 10.0),
+        f"the same by specimen, {TWO}": (lambda: compare(family, workers=2), 10.0),
+        f"the same by run, {TWO}": (lambda: compare(family, leave_out=RunSplit(), workers=2), 10.0),
         "comparison of six sweeps": (lambda: compare(sweeps), 10.0),
         "friction of three loops": (lambda: [fit_loop(loop) for loop in loops], 10.0),
         "bootstrap, surface": (lambda: bootstrap(surface, runs, by=RunSplit()), 3.0),
@@ -133,7 +144,10 @@ def section(rounds: int = 3) -> Section:
     for name, (task, limit) in tasks.items():
         timing = timed(task, rounds)
         rows.append((name, format_time(timing.wall), format_time(timing.cpu), describe(timing.result)))
-        targets.append(Target(f"{name}, CPU time", timing.cpu, limit, "s"))
+        if name.endswith(TWO):
+            targets.append(Target(f"{name}, time", timing.wall, limit, "s"))
+        else:
+            targets.append(Target(f"{name}, CPU time", timing.cpu, limit, "s"))
     return Section("Model comparison", TEXT, HEADER, tuple(rows), tuple(targets))
 
 

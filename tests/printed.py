@@ -34,10 +34,10 @@ def shared_library(text: str, folder, name="printed", level="-O1"):
     return ctypes.CDLL(str(target))
 
 
-def built(folder, *options, level="-O1"):
+def built(folder, *options, level="-O1", compiler="gcc"):
     """The path of the program of all C sources in a folder, compiled with all warnings as errors."""
     sources = sorted(path.name for path in folder.glob("*.c"))
-    command = [require("gcc"), *STRICT, "-pedantic", *(options or (level,)), *sources, "-o", "program", "-lm"]
+    command = [require(compiler), *STRICT, "-pedantic", *(options or (level,)), *sources, "-o", "program", "-lm"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[:2000]
     return str(folder / "program")

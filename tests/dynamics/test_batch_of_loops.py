@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from called_controller import Called
-from plants import chosen_muscle
+from control_plants import LIFT, SPLIT
 
 from airmuscle.control import (
     PID,
@@ -20,19 +20,14 @@ from airmuscle.control import (
     Periodic,
     Schedule,
     SolenoidDriver,
-    SplitRange,
 )
 from airmuscle.core.errors import ParameterError
 from airmuscle.core.status import Status
 from airmuscle.mechanism import HangingMass
 from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Supply, Valve
 from airmuscle.simulation import Problem, Rodas4, RungeKutta4, solve
 from airmuscle.simulation.batch import Single, simulate_batch
 
-VALVE = Valve(2.6e-9, 0.4)
-SPLIT = SplitRange("fill", "discharge")
-LIFT = Plant(chosen_muscle(), FillDischarge(Supply(5.5e5), VALVE, VALVE), HangingMass(2.0))
 PI = PID("pressure", SPLIT, gain=8e-6, integral_time=0.3)
 STEPS = Schedule({"pressure": ((0, 1e5), (0.25, 3e5))})
 PULSES = {name: (PWM(50.0, 1e-3), SolenoidDriver(2e-3, 1.5e-3)) for name in ("fill", "discharge")}

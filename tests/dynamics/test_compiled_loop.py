@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 from called_controller import Called
+from control_plants import LIFT, SPLIT
 from hypothesis import given
 from hypothesis import strategies as st
-from plants import chosen_muscle
 
 from airmuscle.control import (
     PID,
@@ -26,20 +26,14 @@ from airmuscle.control import (
     SampledSignal,
     Schedule,
     SolenoidDriver,
-    SplitRange,
 )
 from airmuscle.core import model, ops, parameter
 from airmuscle.core.diagnostics import DiagnosticCode
 from airmuscle.core.errors import ParameterError, TraceError
 from airmuscle.core.status import Status
-from airmuscle.mechanism import HangingMass, Isometric
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Supply, Valve
+from airmuscle.mechanism import Isometric
 from airmuscle.simulation import DormandPrince8, Problem, Rodas4, RungeKutta4, compiled_loop, solve
 
-VALVE = Valve(2.6e-9, 0.4)
-SPLIT = SplitRange("fill", "discharge")
-LIFT = Plant(chosen_muscle(), FillDischarge(Supply(5.5e5), VALVE, VALVE), HangingMass(2.0))
 ON_OFF = OnOffController("pressure", SPLIT, hysteresis=1e4)
 STEPS = Schedule({"pressure": ((0, 1e5), (0.5, 3e5), (1.005, 2e5))})
 PULSES = PWM(50.0, 1e-3)

@@ -7,7 +7,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from plants import chosen_muscle
+from control_plants import LIFT, SPLIT
 
 from airmuscle.control import (
     PID,
@@ -17,17 +17,10 @@ from airmuscle.control import (
     SampledSignal,
     Schedule,
     SolenoidDriver,
-    SplitRange,
 )
-from airmuscle.mechanism import HangingMass
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Supply, Valve
 from airmuscle.simulation import Problem, RungeKutta4, closed_loop, solve
 from airmuscle.simulation.kept_loops import MAX_FORMS, form_of
 
-VALVE = Valve(2.6e-9, 0.4)
-LIFT = Plant(chosen_muscle(), FillDischarge(Supply(5.5e5), VALVE, VALVE), HangingMass(2.0))
-SPLIT = SplitRange("fill", "discharge")
 STEPS = Schedule({"pressure": ((0, 1e5), (0.5, 3e5), (0.703, 2e5))})
 SOLENOID = SolenoidDriver(2e-3, 1.5e-3, 1e-3, 1.2e-3)
 DRIVERS = {"held": {}, "pulsed and delayed": {"fill": (PWM(50.0, 1e-3), SOLENOID), "discharge": (PWM(31.0), SOLENOID)}}
@@ -119,3 +112,22 @@ def test_few_forms_are_kept_with_a_plant():
     for problem in problems:
         solve(problem)
         assert len(problem.compiled.description.loop_runs) <= MAX_FORMS
+
+
+class Emptied(list):
+    """What another thread takes the last item from after it was seen to hold one."""
+
+    def pop(self):
+        raise IndexError
+
+
+def test_what_another_thread_takes_first_is_made_anew():
+    plant = dataclasses.replace(LIFT)
+    loop, command = Problem(plant, ControlLoop(ON_OFF, 0.05, STEPS), 0.3), Problem(plant, Schedule({}), 0.3)
+    alone = [solve(loop), solve(command)]
+    known = loop.compiled.description
+    known.loop_runs[form_of(loop)] = Emptied([None])
+    known.integrators[command.integrator] = Emptied([None])
+    known.recorders = Emptied([None])
+    for problem, before in zip((loop, command), alone, strict=True):
+        assert_identical(solve(problem), before)

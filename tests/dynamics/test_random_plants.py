@@ -1,8 +1,9 @@
 """Plants composed at random from every model, within the declared bounds: each runs, ends with a reason, or is refused.
 
 No exception of another package is raised, no number is NaN, and the books of air mass, of the air's energy and of the
-mechanism close. The tolerances of the books, relative to what was held or turned over, are chosen. Where the energies of
-a plant are small beside the tolerance of the integrator, its energy books close with a smaller tolerance.
+mechanism close. The tolerances of the books, relative to what was held or turned over, are chosen; that of the mass is
+not less than one rounding error a step. Where the energies of a plant are small beside the tolerance of the integrator,
+its energy books close with a smaller tolerance.
 """
 
 from __future__ import annotations
@@ -68,7 +69,8 @@ def outcome(seed):
         assert reason.code is DiagnosticCode.INCOMPLETE
         assert solution.status.message in str(reason)
     if len(run["time"]) > 1:
-        assert gaps(run)["mass"] < 1e-13, seed
+        rounding = np.finfo(float).eps * solution.statistics.steps
+        assert gaps(run)["mass"] < max(1e-13, rounding), seed
         if solution.complete and not energies_close(run, plant):
             exact = solve(dataclasses.replace(problem, integrator=Rodas4(1e-9))).recording
             assert energies_close(exact, plant), (seed, gaps(run), gaps(exact))
@@ -83,7 +85,7 @@ def energies_close(run, plant):
 
 
 @pytest.mark.parametrize(
-    "seeds", [range(2), *(pytest.param(range(n, n + 5), marks=pytest.mark.slow) for n in range(2, 42, 5))], ids=str
+    "seeds", [range(2), *(pytest.param(range(n, n + 20), marks=pytest.mark.slow) for n in (2, 22))], ids=str
 )
 def test_a_plant_composed_at_random_runs_or_ends_with_a_reason_or_is_refused(seeds):
     outcomes = collections.Counter(outcome(seed) for seed in seeds)

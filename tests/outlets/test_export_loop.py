@@ -114,6 +114,13 @@ def test_the_loop_is_that_of_the_library(name, target, tmp_path):
 
 
 @pytest.mark.slow
+def test_clang_builds_the_loop_as_gcc_does(tmp_path):
+    problem = CASES["pulses through solenoids"]
+    write_program(problem, tmp_path, C99(), name="loop")
+    check_loop(*printed.finished([printed.built(tmp_path, compiler="clang")], tmp_path), problem)
+
+
+@pytest.mark.slow
 def test_the_program_has_no_undefined_behaviour(tmp_path):
     problem = CASES["pulses through solenoids"]
     write_program(problem, tmp_path, C99(), name="loop")

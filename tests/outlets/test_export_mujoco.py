@@ -21,7 +21,7 @@ from airmuscle.analysis import find_equilibrium
 from airmuscle.cli.app import app
 from airmuscle.control import Schedule
 from airmuscle.core.errors import ParameterError
-from airmuscle.export import mujoco_plugin, write_mujoco_plugin
+from airmuscle.export import compiler, mujoco_plugin, write_mujoco_plugin
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
 from airmuscle.simulation import Problem, Rodas4, RungeKutta4, solve
 
@@ -180,6 +180,14 @@ def test_an_unsuitable_mujoco_is_refused_and_the_source_is_written(version, tmp_
     made = write_mujoco_plugin(PLANT, tmp_path, name="festo")
     assert made.library is None
     assert f"MuJoCo {version} is not supported" in made.remark
+    assert [p.name for p in tmp_path.iterdir()] == ["festo_plugin.c"]
+
+
+def test_without_a_compiler_the_source_is_written_and_the_remedy_stated(mujoco, tmp_path, monkeypatch):
+    monkeypatch.setattr(compiler.shutil, "which", lambda name: None)
+    made = write_mujoco_plugin(PLANT, tmp_path, name="festo")
+    assert made.library is None
+    assert "no C compiler (gcc, clang, cc) was found; install the package gcc or clang" in made.remark
     assert [p.name for p in tmp_path.iterdir()] == ["festo_plugin.c"]
 
 

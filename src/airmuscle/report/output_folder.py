@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import shutil
 import socket
@@ -14,6 +15,9 @@ from ..core.errors import FileError
 
 _UNFINISHED = f".unfinished-{socket.gethostname().replace('/', '')}-"
 """Beginning of the name of a temporary folder, with the machine, because folders may be shared; a process follows."""
+FULL = (errno.ENOSPC, errno.EDQUOT)
+"""Numbers of the errors of a full disk and of an exhausted quota."""
+REMEDY_WHERE_FULL = "Free space there, or specify another folder."
 
 
 @contextlib.contextmanager
@@ -33,7 +37,8 @@ def atomic_folder(folder: Path | str) -> Iterator[Path]:
             _remove_abandoned(target)
             staging = Path(tempfile.mkdtemp(prefix=f"{_UNFINISHED}{os.getpid()}-", dir=target))
         try:
-            yield staging
+            with _raise_where_full(target):
+                yield staging
             with _raise_file_errors(target):
                 _move_files(staging, target)
         finally:
@@ -82,9 +87,19 @@ def _raise_file_errors(target: Path) -> Iterator[None]:
         yield
     except OSError as error:
         at = f" ({error.filename})" if error.filename and Path(error.filename) != target else ""
-        raise FileError(
-            f"{target}: cannot be written to: {error.strerror or error}{at}. Specify a folder with write permission."
-        ) from error
+        remedy = REMEDY_WHERE_FULL if error.errno in FULL else "Specify a folder with write permission."
+        raise FileError(f"{target}: cannot be written to: {error.strerror or error}{at}. {remedy}") from error
+
+
+@contextlib.contextmanager
+def _raise_where_full(target: Path) -> Iterator[None]:
+    """Raise FileError where there is no space for a file; other errors are those of the block."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in FULL:
+            raise
+        raise FileError(f"{target}: cannot be written to: {error.strerror}. {REMEDY_WHERE_FULL}") from error
 
 
 def _missing_folders(folder: Path) -> list[Path]:

@@ -46,14 +46,12 @@ def form_of(problem: Problem) -> Hashable | None:
 
 def kept_run(problem: Problem, form: Hashable | None, state: ControlLoopState) -> CompiledRun | None:
     """A run of this form that nothing else uses, at its beginning; None where none is kept."""
-    idle = problem.compiled.description.loop_runs.get(form)
     try:
-        run: CompiledRun | None = idle.pop() if idle else None
-    except IndexError:  # another thread was quicker
-        run = None
-    if run is not None:
-        law: Any = problem.input.controller  # type: ignore[union-attr]
-        run.restart(problem.compiled, problem.initial_vector, parameters_of(law), state)
+        run: CompiledRun = problem.compiled.description.loop_runs[form].pop()
+    except (KeyError, IndexError):
+        return None
+    law: Any = problem.input.controller  # type: ignore[union-attr]
+    run.restart(problem.compiled, problem.initial_vector, parameters_of(law), state)
     return run
 
 

@@ -78,7 +78,10 @@ def recorded_rows(
     For a system with its own parameters, whose recorder is stored in its description.
     """
     idle = compiled.description.recorders
-    recorder = idle.pop() if idle else RowRecorder(compiled)
+    try:
+        recorder: RowRecorder = idle.pop()
+    except IndexError:  # none, or another thread was quicker
+        recorder = RowRecorder(compiled)
     table = recorder.evaluate(states, times, segments, start)
     idle.append(recorder)
     return table

@@ -53,8 +53,11 @@ def _solve_open_loop(problem: Problem) -> Solution:
 
 def borrow(pool: dict[Any, list[Any]], compiled: CompiledSystem, integrator: Integrator) -> BoundIntegrator:
     """An integrator bound to a system: one of the pool that no other run uses, or a new one."""
-    idle = pool.get(integrator)
-    return idle.pop() if idle else integrator.bind(compiled)
+    try:
+        idle: BoundIntegrator = pool[integrator].pop()
+    except (KeyError, IndexError):
+        return integrator.bind(compiled)
+    return idle
 
 
 def give_back(pool: dict[Any, list[Any]], integrator: Integrator, bound: BoundIntegrator) -> None:

@@ -24,8 +24,10 @@ from ...core.errors import AirmuscleWarning
 
 _PACKAGE = pathlib.Path(__file__).parents[1]
 _SOURCES = [path for room in ("kernels", "cache", "llvm") for path in sorted((_PACKAGE / room).glob("*.py"))]
-MAX_FILES = 400
-"""Number of stored codes, each of 10 to 500 kB (chosen); then those that were not used for the longest time go."""
+MAX_FILES = 4000
+"""Number of stored codes, each of 10 to 500 kB and most of 15 kB (chosen); then a tenth of them goes, those that were
+not used for the longest time. Fewer than a program uses in turn would be stored in vain: each would go before it is
+used again."""
 _HASH = hashlib.sha256().digest_size
 _POSIX = hasattr(os, "getuid")
 
@@ -62,10 +64,12 @@ def save(name: str, kinds: Sequence[str], code: bytes) -> bytes:
 
 
 def _remove_oldest(folder: pathlib.Path) -> None:
-    """Remove the codes that were not used for the longest time, until MAX_FILES are left."""
+    """Where there are more than MAX_FILES, remove the codes that were not used for the longest time."""
     with contextlib.suppress(OSError):  # another process removes the same
+        if len(os.listdir(folder)) <= MAX_FILES:
+            return
         files = sorted(folder.glob("*.code"), key=lambda path: path.stat().st_mtime)
-        for path in files[:-MAX_FILES]:
+        for path in files[: -(MAX_FILES - MAX_FILES // 10)]:
             path.unlink()
 
 

@@ -18,6 +18,7 @@ class CBody(TextBody):
     def __init__(self, scalars: Sequence[str] = (), number: str = "double") -> None:
         super().__init__(scalars)
         self.number, self._suffix = number, "f" if number == "float" else ""
+        self.infinity = "INFINITY" if self._suffix else "HUGE_VAL"  # INFINITY is a float, which clang would promote
 
     def assignment(self, name: str, expression: str) -> str:
         return f"  const {self.number} {name} = {expression};"
