@@ -23,7 +23,7 @@ from airmuscle.plant.plant import Plant
 from airmuscle.plant.state import state_vector
 from airmuscle.pneumatics import FillDischarge, Manifold, SharedSupply, Supply, Tube, Valve, WithLeak, WithTubes
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
-from airmuscle.simulation import advance, simulate
+from airmuscle.simulation import Problem, advance, bound_integrator, simulate, solve
 from airmuscle.simulation.batch import simulate_batch
 from airmuscle.simulation.integrators import Rodas4, RungeKutta4
 
@@ -221,6 +221,17 @@ PARTS = [
 def test_a_part_of_another_kind_is_named(make, message):
     with pytest.raises(AirmuscleError, match=message):
         Plant(chosen_muscle(), make(), HangingMass(10.0))
+
+
+def test_a_run_ends_soon_after_its_state_has_become_impossible(monkeypatch):
+    """Beyond the model the steps can become endlessly many: a thrown load is not followed to the end of its run."""
+    monkeypatch.setattr(bound_integrator, "INTERRUPT_CHECK_STEPS", 200)
+    start = {**STATE, "speed": 100.0}
+    problem = Problem(isothermal(), Schedule({}), 1.0, start, output_times=[1.0], integrator=RungeKutta4(1e-5))
+    solution = solve(problem)
+    assert solution.status is Status.NON_POSITIVE_VOLUME
+    assert 200 <= solution.statistics.steps < 2_000
+    assert solution.final_time == pytest.approx(1e-5 * solution.statistics.steps, rel=1e-9)
 
 
 @pytest.mark.parametrize(

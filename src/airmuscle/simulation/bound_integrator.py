@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from ..core.arrays import Array, flat_view
 from ..core.status import Status
 
 INTERRUPT_CHECK_STEPS = 100_000
-"""Steps between two checks whether the user wants to stop."""
+"""Steps between two checks whether the user wants to stop, or the state is impossible."""
 MAX_STEPS = 50_000_000
 """Steps of one run, by default."""
 _PAUSED, _TOO_MANY = Status.PAUSED.value, Status.TOO_MANY_STEPS.value
@@ -68,15 +69,19 @@ class BoundIntegrator:
 
     def run(
         self, segments: PiecewiseLinear, start: float, state: Array, times: Array, max_steps: int = MAX_STEPS,
-        rows: Array | None = None,
+        rows: Array | None = None, check: Callable[[Array, float], Status] | None = None,
     ) -> RawSolution:  # fmt: skip
-        """Integrate from `state` (n,) at `start` [s] through the segments; rows (N, n) at rising `times` (N,)."""
+        """Integrate from `state` (n,) at `start` [s] through the segments; rows (N, n) at rising `times` (N,).
+
+        `check` states for a state (n,) and a time [s], DONE or why the run ends there; it is called between packets of
+        many steps, because the steps can become endlessly many where the model does not hold.
+        """
         rows = np.empty((times.size, self.state.size)) if rows is None else rows
         self.state[:] = state
         for i, argument in enumerate((segments.ends, segments.values, segments.slopes, times), self._first):
             self._kernel.replace_input(i, argument)
         self._kernel.replace(self._first + 4, rows)
-        return self._solve(start, rows, max_steps)
+        return self._solve(start, rows, max_steps, check)
 
     def hold(self, state: Array, inputs: Array, duration: float) -> Status:
         """Advance `state` (n,) in place by `duration` [s] with the inputs (m,) held. Not to be mixed with `run`."""
@@ -160,7 +165,9 @@ class BoundIntegrator:
         """Accepted and rejected steps since the counts were last reset."""
         return int(self._count[2]), int(self._count[3])
 
-    def _solve(self, start: float, rows: Array, max_steps: int) -> RawSolution:
+    def _solve(
+        self, start: float, rows: Array, max_steps: int, check: Callable[[Array, float], Status] | None
+    ) -> RawSolution:
         clock, count = self._clock_view, self._count_view
         clock[0], clock[1], clock[2] = start, 0.0, start
         count[0] = count[1] = count[2] = count[3] = 0
@@ -169,7 +176,7 @@ class BoundIntegrator:
         try:
             status = self._kernel()
             if status == _PAUSED:
-                status = self._continue(status, max_steps)
+                status = self._continue(status, max_steps, check)
         except KeyboardInterrupt:
             status = Status.INTERRUPTED.value
         self._kernel.replace(self._budget, INTERRUPT_CHECK_STEPS)
@@ -178,9 +185,11 @@ class BoundIntegrator:
             rows[reached:] = np.nan
         return RawSolution(rows, reached, clock[0], self.state.copy(), ended, count[2], count[3])
 
-    def _continue(self, status: int, max_steps: int) -> int:
-        """Go on where the kernel paused so that an interruption can be noticed."""
+    def _continue(self, status: int, max_steps: int, check: Callable[[Array, float], Status] | None = None) -> int:
+        """Go on where the kernel paused so that an interruption or an impossible state can be noticed."""
         while status == _PAUSED:
+            if check is not None and (found := check(self.state, self._clock_view[0])) != Status.DONE:
+                return found.value
             left = max_steps - int(self._count[2])
             if left <= 0:
                 return _TOO_MANY

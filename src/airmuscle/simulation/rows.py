@@ -118,6 +118,16 @@ def truncate_at_invalid_row(
     return raw, RowTable(inputs, outputs, columns.min(axis=0).tolist(), columns.max(axis=0).tolist(), row)
 
 
+def status_of_state(
+    compiled: CompiledSystem, segments: PiecewiseLinear, start: float, state: Array, time: float
+) -> Status:
+    """DONE, or why a state (n,) at a time [s] of a run is impossible; arguments as of `recorded_rows`."""
+    raw = RawSolution(state[np.newaxis].copy(), 1, time, state, Status.DONE, 0, 0)
+    times = np.array([time])
+    table = recorded_rows(compiled, raw.rows, times, segments, start)
+    return truncate_at_invalid_row(compiled, raw, table, times)[0].status
+
+
 def make_recording(
     compiled: CompiledSystem, raw: RawSolution, table: RowTable, times: Array, integrator: Integrator | None,
     end: float, more: dict[str, Array], before: tuple[Diagnostic, ...] = (),

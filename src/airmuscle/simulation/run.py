@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import operator
 from collections.abc import Mapping
 from typing import Any
@@ -24,7 +25,7 @@ from .bound_integrator import BoundIntegrator
 from .closed_loop import solve_closed_loop
 from .integrators import Integrator, default_integrator
 from .problem import NUMBERS, Problem, check_input_range, plain_numbers
-from .rows import early_end, make_recording, recorded_rows, truncate_at_invalid_row
+from .rows import early_end, make_recording, recorded_rows, status_of_state, truncate_at_invalid_row
 from .solution import Solution, Statistics
 
 
@@ -39,7 +40,8 @@ def _solve_open_loop(problem: Problem) -> Solution:
     segments, times = problem.segments, problem.times
     pool = compiled.description.integrators
     bound = borrow(pool, compiled, integrator)
-    raw = bound.run(segments, problem.start_time, problem.initial_vector, times)
+    check = functools.partial(status_of_state, compiled, segments, problem.start_time)
+    raw = bound.run(segments, problem.start_time, problem.initial_vector, times, check=check)
     give_back(pool, integrator, bound)
     rows, reached = raw.rows, raw.reached
     shown = (rows, times) if reached == times.size else (rows[:reached], times[:reached])
