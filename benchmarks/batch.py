@@ -55,7 +55,7 @@ REASON = (
     "both are limited by the same multiplications, roots and divisions; the library skips closed valves and an "
     "extrapolation that no plant of a SIMD register needs, but also validates all parameters"
 )
-BUSY_REASON = "measured under other load, under which two threads share one core; to be repeated on an idle machine"
+BUSY_REASON = "the cores of the machine are shared with other machines"
 
 
 def random_parameters(plant: Plant, count: int) -> dict[str, Array]:
