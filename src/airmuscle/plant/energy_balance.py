@@ -36,8 +36,9 @@ class WithEnergyMeters(System):
     """A plant with energy and mass meters as further states, and its energies and its air mass as outputs.
 
     Four balances must close. Mechanical: kinetic + potential energy increase by `work_of_tension`, which includes the
-    contact force of an end stop, minus `mechanism_loss`, provided that a latch is operated at rest only. Muscle:
-    `work_of_contractile` is `work_of_tension` + `damping_heat` + `element_work` + `friction_work` (with friction),
+    contact force of an end stop, minus `mechanism_loss`, provided that a latch is operated at rest only; the energy of
+    an ExternalLoad is outside the plant, which does `work_of_tension` on it. Muscle: `work_of_contractile` is
+    `work_of_tension` + `damping_heat` + `element_work` + `friction_work` (with friction),
     provided that no muscle is slack. Air: `air_energy`, of the air in the muscles, increases by `energy_of_flow` +
     `heat_to_air` minus `work_of_air`. Mass: `air_total`, of all air, increases by `air_supplied` minus
     `air_exhausted`.
