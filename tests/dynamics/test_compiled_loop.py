@@ -199,6 +199,7 @@ class Root(ControlLaw):
         return {"fill": ops.sqrt(self.limit - memory["time"])}, {"time": memory["time"] + dt}
 
 
+@pytest.mark.filterwarnings("error")  # of NumPy, which a user could not place
 def test_a_command_that_is_not_a_number_ends_the_run():
     one, other = both(Problem(LIFT, ControlLoop(Root(), 0.03125, Schedule({})), 1.0))
     assert one.status == Status.NON_FINITE_COMMAND
