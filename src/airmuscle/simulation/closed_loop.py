@@ -66,25 +66,26 @@ def _solution(problem: Problem, run: CompiledRun | CalledRun) -> Solution:
         segments = PiecewiseLinear(np.array([problem.end_time]), np.zeros(shape), np.zeros(shape))
     table = recorded_rows(compiled, states, times, segments, problem.start_time)
     raw, table = truncate_at_invalid_row(compiled, raw, table, times)
-    units = column_units(problem.system, compiled.output_names)
     compiled_law = isinstance(run, CompiledRun) and run.loop.law is not None
     way = "compiled with the plant" if compiled_law else "called from Python at each sample"
-    note = f"controlled by {loop.describe(units)}; {way}"
+    measured = [name for name in loop.controller.measured_columns if name in compiled.output_names]
+    note = f"controlled by {loop.describe(column_units(problem.system, measured))}; {way}"
     remark = Diagnostic(DiagnosticCode.CONTROLLER, type(loop.controller).__name__, note)
-    notes = loop.controller.notes(run.control_state.controller)
+    control_state = run.control_state
+    notes = loop.controller.notes(control_state.controller)
     remarks = (remark, *(Diagnostic(DiagnosticCode.CONTROLLER, remark.subject, text) for text in notes))
-    more = _controller_columns(problem, run, times[: raw.reached])
+    more = _controller_columns(run, times[: raw.reached])
     recording, diagnostics = make_recording(compiled, raw, table, times, integrator, problem.end_time, more, remarks)
     final = dict(zip(compiled.description.state_names, run.state.tolist(), strict=True))
     statistics = Statistics(raw.steps, raw.rejected)
-    return Solution(problem, recording, raw.status, statistics, diagnostics, run.time, final, run.control_state)
+    return Solution(problem, recording, raw.status, statistics, diagnostics, run.time, final, control_state)
 
 
-def _controller_columns(problem: Problem, run: CompiledRun | CalledRun, times: Array) -> dict[str, Array]:
+def _controller_columns(run: CompiledRun | CalledRun, times: Array) -> dict[str, Array]:
     """Set points in time; measurements and commands of the last sample at every row."""
-    prepared, controller = run.prepared, run.prepared.loop.controller
-    intervals = np.minimum(intervals_of(times, prepared.instants), max(len(run.measured) - 1, 0))
-    setpoints, _ = prepared.setpoint_signal.at_rising(times, problem.start_time)
+    prepared, controller, count = run.prepared, run.prepared.loop.controller, times.size
+    at, setpoints = prepared.at(times) if prepared.loop.drivers else prepared.at_times  # drivers add rows
+    intervals, setpoints = np.minimum(at[:count], max(len(run.measured) - 1, 0)), setpoints[:count]
     measured, commanded = (values.take(intervals, axis=0) for values in (run.measured, run.commanded))
     columns: dict[str, Array] = {}
     for values, prefix, names in (
