@@ -17,8 +17,7 @@ from ...control.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop, Co
 from ...core.arrays import Array
 from ...core.errors import ParameterError
 from ...core.system import System
-from ..closed_loop import CalledRun
-from ..compiled_law import parameters_of
+from ..called_run import CalledRun
 from ..compiled_loop import CompiledLoop, CompiledRun, can_be_compiled
 from ..integrators import Integrator
 from ..problem import Problem
@@ -106,7 +105,7 @@ class LoopBatch:
         assert integrator is not None
         run: CompiledRun | CalledRun
         if isinstance(prepared, CompiledLoop):
-            parameters = parameters_of(prepared.law) if self.laws is None else self.laws.parameters(index)
+            parameters = prepared.parameters.copy() if self.laws is None else self.laws.parameters(index)
             run = self._compiled(prepared, compiled, state, start, parameters)
         else:
             run = self._called(index, plants, loop, prepared, state)
