@@ -108,6 +108,10 @@ class FiniteControlSet(ShortRepr, Controller):
                 f"more and the number of sequences at most {MAX_SEQUENCES}. Shorten the horizon."
             )
 
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields without the arrays of the compiled search, which belong to one process."""
+        return {**self.__dict__, "_searches": []}
+
     @property
     def measured_columns(self) -> tuple[str, ...]:
         return self.estimator.measured

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -105,6 +105,10 @@ class NonlinearModelPredictive(ShortRepr, MultivariableController):
                 raise ParameterError(f"{owner}: {name} is {value}; allowed range: 1 to {MAX_HORIZON}.")
         if not self.slack_weight > 0.0:
             raise ParameterError(f"{owner}: slack_weight is {self.slack_weight!r}; it must be positive.")
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields without the programs of the solver, which belong to one process."""
+        return {**self.__dict__, "_programs": []}
 
     @property
     def measured(self) -> tuple[str, ...]:  # type: ignore[override]

@@ -116,6 +116,15 @@ class StateEstimator(ShortRepr, abc.ABC):
         object.__setattr__(self, "_functions", augmented_rates(compiled, seen, *self.places))
         object.__setattr__(self, "_idle", [])
 
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields that were given; machine code and arrays belong to one process."""
+        return {field.name: getattr(self, field.name) for field in dataclasses.fields(self) if field.init}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        for name, value in state.items():
+            object.__setattr__(self, name, value)
+        self.__post_init__()
+
     @abc.abstractmethod
     def _bind(self) -> BoundFilter:
         """The compiled filter with new arrays."""
