@@ -16,7 +16,7 @@ from .compiled_loop import CompiledLoop, CompiledRun, can_be_compiled
 from .kept_loops import form_of, keep_run, kept_run
 from .problem import Problem
 from .rows import make_recording, recorded_rows, truncate_at_invalid_row
-from .sampled_loop import SampledLoop, intervals_of, prepare_loop
+from .sampled_loop import SampledLoop, prepare_loop
 from .solution import Solution, Statistics
 
 
