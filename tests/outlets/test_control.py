@@ -450,6 +450,6 @@ def test_a_study_varies_the_numbers_of_a_controller(tmp_path: Path):
 
 
 def test_a_study_depends_on_the_controllers_program():
-    from airmuscle.study.fingerprint import EXCLUDED_PACKAGES
+    from airmuscle.core.fingerprint import EXCLUDED_PACKAGES
 
     assert "control" not in EXCLUDED_PACKAGES

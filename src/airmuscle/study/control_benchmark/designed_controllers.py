@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import abc
 import functools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -15,8 +15,8 @@ from ...analysis.predictive_design import design_predictive
 from ...control.co_contraction import DIFFERENCE
 from ...control.control_law import ControlLaw
 from ...control.controller import Controller, Measurement
-from ...control.linear_model_predictive import RAWLINGS2017
-from ...control.state_feedback import FRANKLIN1998
+from ...control.linear_model_predictive import RAWLINGS2017, LinearModelPredictive
+from ...control.state_feedback import FRANKLIN1998, StateFeedback
 from ...core.declaration import model, parameter
 from ...core.errors import ParameterError
 from ...core.reference import Reference
@@ -84,10 +84,29 @@ def joint_design_model(joint: BenchmarkJoint) -> JointDesignModel:
 class ControlDesign(abc.ABC):
     """Design of a controller of the reading, which commands the half pressure difference, from its weights."""
 
+    plant: JointDesignModel
+    permitted_angle: float
+    speed_noise: float
+    pressure_time: float
+
     @property
     @abc.abstractmethod
     def controller(self) -> Controller:
         """The designed controller."""
+
+    def designed(self, design: Callable[..., Any], noise: Mapping[str, float], **further: Any) -> Any:
+        """What a function of `analysis` designs with the weights of the angle, the command and the noise.
+
+        noise    further process noise by state
+        further  arguments of this function alone
+        """
+        return design(
+            self.plant.linear_model(self.pressure_time), self.plant.sample_time,
+            measured=(READING,), controlled=(READING,),
+            permitted={"angle": self.permitted_angle, DIFFERENCE: PERMITTED_DIFFERENCE},
+            process_noise={"angular_speed": self.speed_noise, "half_difference": 1e3, **noise},
+            measurement_noise={READING: ENCODER_STEP}, **further,
+        )  # fmt: skip
 
 
 @model
@@ -106,14 +125,8 @@ class QuadraticDesign(ControlDesign):
     @functools.cached_property
     def controller(self) -> Controller:
         """The state feedback with its observer."""
-        return design_lqg(
-            self.plant.linear_model(self.pressure_time), self.plant.sample_time,
-            measured=(READING,), controlled=(READING,),
-            permitted={"angle": self.permitted_angle, DIFFERENCE: PERMITTED_DIFFERENCE},
-            permitted_integral={READING: self.permitted_integral},
-            process_noise={"angular_speed": self.speed_noise, "half_difference": 1e3},
-            measurement_noise={READING: ENCODER_STEP},
-        )  # fmt: skip
+        found: StateFeedback = self.designed(design_lqg, {}, permitted_integral={READING: self.permitted_integral})
+        return found
 
 
 @model
@@ -132,16 +145,11 @@ class PredictiveDesign(ControlDesign):
     @functools.cached_property
     def controller(self) -> Controller:
         """The predictive controller with its observer of the disturbance."""
-        return design_predictive(
-            self.plant.linear_model(self.pressure_time), self.plant.sample_time,
-            measured=(READING,), controlled=(READING,), disturbed=("angular_speed",),
-            permitted={"angle": self.permitted_angle, DIFFERENCE: PERMITTED_DIFFERENCE},
-            process_noise={
-                "angular_speed": self.speed_noise, "half_difference": 1e3,
-                "angular_speed.disturbance": self.disturbance_noise,
-            },
-            measurement_noise={READING: ENCODER_STEP}, horizon=HORIZON,
-        )  # fmt: skip
+        disturbance = {"angular_speed.disturbance": self.disturbance_noise}
+        found: LinearModelPredictive = self.designed(
+            design_predictive, disturbance, disturbed=("angular_speed",), horizon=HORIZON
+        )
+        return found
 
 
 class MotionMemory(NamedTuple):
