@@ -101,7 +101,8 @@ class CompiledRun:
         `control_state` is by default that of the first time; another one differs from it in the controller's memory
         alone. Everything that was returned by this run is overwritten.
         """
-        self._begin_state = control_state or self._begin_state
+        if control_state is not None:
+            self._begin_state, self._begin_memory = control_state, self.loop.memory_of(control_state)
         self.bound.rebind(self._integrator.binding(compiled))
         self._precomputed[:], self._parameters[:] = compiled.precomputed, parameters
         state, inputs = self._begin_state, self.loop.prepared.inputs
@@ -109,7 +110,7 @@ class CompiledRun:
         self.bound.count[:] = 0
         self.progress.fill(0)
         self._kernel.replace(self._budget, INTERRUPT_CHECK_STEPS)
-        self._memory[:] = self.loop.memory_of(state)
+        self._memory[:] = self._begin_memory
         self._forget_samples()
         self._measured[:], self._command[:] = state.measured, state.commanded
         self._applied[:] = state.applied_inputs or inputs.values[0]
@@ -136,7 +137,8 @@ class CompiledRun:
         prepared, state = self.loop.prepared, self._begin_state
         inputs, intervals = prepared.inputs, self.loop.edges.size - 1
         self.progress = np.zeros(len(Progress), dtype=np.int64)
-        self._memory = np.array([self.loop.memory_of(state)] * 2, dtype=float)
+        self._begin_memory = self.loop.memory_of(state)
+        self._memory = np.array([self._begin_memory] * 2, dtype=float)
         self._measured, self._command = np.array(state.measured, dtype=float), np.array(state.commanded, dtype=float)
         self._applied = np.array(state.applied_inputs or inputs.values[0], dtype=float)
         self._kept, self._kept_inputs = self.bound.state.copy(), self._applied.copy()

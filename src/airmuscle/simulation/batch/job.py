@@ -15,6 +15,7 @@ from ...control.piecewise_linear import PiecewiseLinear
 from ...core.arrays import Array
 from ...core.status import Status
 from ..bound_integrator import RawSolution
+from ..compiled_loop import CompiledRun
 from ..integrators import Integrator
 from ..rows import RowRecorder
 from .loops import LoopBatch
@@ -77,29 +78,29 @@ class BatchJob:
             self._run_loop(index, one, self.loops)
 
     def _run_loop(self, index: int, one: CompiledSystem, loops: LoopBatch) -> None:
-        """Simulate a control loop, whose drivers may add rows to those of the batch, and write its results."""
+        """Simulate a control loop and write its results."""
         run = loops.run(index, self.variations, one, self.initial_states[index])
         times, rows = run.rows
-        close = 1e-9 * loops.template.duration
-        at = np.searchsorted(times, self.times - close)
-        at = at[at < times.size]
+        if not isinstance(run, CompiledRun) or run.prepared.loop.drivers:  # there may be further rows
+            at = np.searchsorted(times, self.times - 1e-9 * loops.template.duration)
+            rows = rows[at[at < times.size]]
         state = run.bound.state.copy() if len(run.measured) else run.state
-        raw = RawSolution(rows[at], at.size, run.stopped_at, state, run.status, *run.bound.step_counts)
+        raw = RawSolution(rows, len(rows), run.stopped_at, state, run.status, *run.bound.step_counts)
         signal = run.signal
         if not signal.ends.size:
             inputs = np.zeros((1, self.compiled.sizes.inputs))
             signal = PiecewiseLinear(self.times[-1:], inputs, inputs)
-        more = loops.columns(index, self.columns, run, at.size) if len(run.measured) else {}
+        more = loops.columns(index, self.columns, run, len(rows)) if len(run.measured) else {}
         self._write(index, one, self._truncate(raw), signal, more)
         loops.release(run)
 
     def _truncate(self, raw: RawSolution) -> RawSolution:
         """The solution up to the first row with a negative air mass, as `simulate` ends it."""
-        rows = np.vstack([raw.rows[: raw.reached], raw.state])
-        invalid = np.flatnonzero((rows < self.lower_bounds).any(axis=1))
-        if not invalid.size:
+        rows, bounds = raw.rows[: raw.reached], self.lower_bounds
+        if not (rows < bounds).any() and not (raw.state < bounds).any():
             return raw
-        row = int(invalid[0])
+        rows = np.vstack([rows, raw.state])
+        row = int(np.flatnonzero((rows < bounds).any(axis=1))[0])
         time = float(self.times[row]) if row < raw.reached else raw.time
         return raw._replace(reached=row, time=time, state=rows[row], status=Status.NEGATIVE_AIR_MASS)
 
@@ -108,23 +109,36 @@ class BatchJob:
     ) -> None:
         reached = raw.reached
         states = np.ascontiguousarray(raw.rows[:reached])
-        recorder = self._recorder(one)
-        table = recorder.evaluate(states, self.times[:reached], segments, self.start_time)
-        self._recorders.append(recorder)
-        parts = (states, table.outputs, table.inputs)
-        places = [(i, j) for i, part in enumerate(parts) for j in range(part.shape[1])]
-        for place, (name, column) in zip(self.kept, self.columns.items(), strict=True):
-            if place < len(places):
-                part, j = places[place]
-                values = parts[part][:, j]
-            else:
-                values = more[name][:reached] if more else np.full(reached, np.nan)
-            with np.errstate(over="ignore"):  # a column in single precision
-                column[index, :reached] = values
-            column[index, reached:] = np.nan
+        parts = [states, *(self._outputs_and_inputs(one, states, segments) if self._needs_rows else ())]
+        values = [column for part in parts for column in part.T]
+        with np.errstate(over="ignore"):  # a column in single precision
+            for place, (name, column) in zip(self.kept.tolist(), self.columns.items(), strict=True):
+                if place < self._own:
+                    column[index, :reached] = values[place]
+                else:
+                    column[index, :reached] = more[name][:reached] if more else np.nan
+                column[index, reached:] = np.nan
         self.final[index], self.status[index], self.reached[index] = raw.state, raw.status, reached
         if raw.status:
             self.reasons[index] = self._reason(raw)
+
+    @functools.cached_property
+    def _own(self) -> int:
+        """The number of columns of the plant: states, outputs and inputs."""
+        sizes = self.compiled.sizes
+        return sizes.states + sizes.outputs + sizes.inputs
+
+    @functools.cached_property
+    def _needs_rows(self) -> bool:
+        """Whether outputs or inputs are stored."""
+        return bool(((self.kept >= self.compiled.sizes.states) & (self.kept < self._own)).any())
+
+    def _outputs_and_inputs(self, one: CompiledSystem, states: Array, segments: PiecewiseLinear) -> tuple[Array, Array]:
+        """Outputs and inputs at the first rows (R, n) of a plant."""
+        recorder = self._recorder(one)
+        table = recorder.evaluate(states, self.times[: len(states)], segments, self.start_time)
+        self._recorders.append(recorder)
+        return table.outputs, table.inputs
 
     def _recorder(self, one: CompiledSystem) -> RowRecorder:
         """A recorder that no thread uses at present, for this plant."""

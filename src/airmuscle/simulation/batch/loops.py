@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from ...compile.program import CompiledSystem
 from ...control.control_law import ControlLaw
-from ...control.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop, ControlLoopState
+from ...control.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop
 from ...core.arrays import Array
 from ...core.errors import ParameterError
 from ...core.system import System
@@ -100,10 +100,9 @@ class LoopBatch:
         """The loop of one plant, integrated from its initial state (n,)."""
         loop = self.loop_of(index)
         prepared = self._loop(loop)
-        start = loop.init(self.template.start_time)
         if isinstance(prepared, CompiledLoop):
             parameters = prepared.parameters.copy() if self.laws is None else self.laws.parameters(index)
-            run = self._compiled(prepared, compiled, state, start, parameters)
+            run = self._compiled(prepared, compiled, state, parameters)
             if run.can_run:
                 run.integrate()
                 return run
@@ -112,7 +111,7 @@ class LoopBatch:
         return called
 
     def _compiled(
-        self, prepared: CompiledLoop, compiled: CompiledSystem, state: Array, start: ControlLoopState, parameters: Array
+        self, prepared: CompiledLoop, compiled: CompiledSystem, state: Array, parameters: Array
     ) -> CompiledRun:
         """A run in the arrays of one that is not needed any more, or a new one."""
         idle = self._idle.setdefault(id(prepared), [])
@@ -121,6 +120,7 @@ class LoopBatch:
         except IndexError:
             integrator = self.template.integrator
             assert integrator is not None
+            start = prepared.prepared.loop.init(self.template.start_time)
             return CompiledRun(prepared, compiled, integrator, state, start, parameters)
         run.restart(compiled, state, parameters)
         return run
