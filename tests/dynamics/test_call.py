@@ -24,7 +24,7 @@ from airmuscle.core.variables import Input, StateVariable
 from airmuscle.mechanism import HangingMass
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
-from airmuscle.simulation import Problem, simulate, solve
+from airmuscle.simulation import Problem, advance, simulate, solve
 from airmuscle.simulation import output_times as rows_of_a_run
 from airmuscle.simulation.output_times import merge_few_output_times, merge_output_times
 from airmuscle.simulation.rows import RowRecorder
@@ -125,6 +125,18 @@ def test_what_is_kept_of_a_run_for_the_next_one_cannot_be_written_to():
     for kept in (problem.segments.ends, problem.segments.values, problem.segments.slopes, problem.times):
         with pytest.raises(ValueError, match="read-only"):
             kept[0] = 9.0
+
+
+@pytest.mark.parametrize("writeable", ["values", "slopes"])
+def test_segments_that_somebody_can_write_to_are_checked_again(writeable):
+    plant, state = lifting(), lifting().state_at(pressure=1e5)
+    segments = PiecewiseLinear(np.array([0.01]), np.full((1, 2), 0.5), np.zeros((1, 2)))
+    for name in {"ends", "values", "slopes"} - {writeable}:
+        getattr(segments, name).setflags(write=False)
+    advance(plant, state, segments, 0.01)
+    getattr(segments, writeable)[0, 0] = 200.0
+    with pytest.raises(ParameterError, match=r"the input 'fill' is .* allowed range: 0 to 1"):
+        advance(plant, state, segments, 0.01)
 
 
 def test_a_command_that_one_system_takes_is_refused_by_another_of_a_smaller_range():

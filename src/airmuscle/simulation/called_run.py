@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,7 @@ class CalledRun:
         self.state = self.bound.state.copy()
         self.stopped_at = problem.start_time
         self._measure = make_measurement(compiled, loop, self.bound.state)
+        self._lower_bounds = compiled.description.lower_bounds.tolist()
         self._controller, self._limits = CalledController(prepared), list(prepared.ranges.values())
 
     @property
@@ -79,9 +81,8 @@ class CalledRun:
                 drivers = intervals.append(k, commanded, drivers)
                 self.status, self.stopped_at = intervals.integrate(bound, begin)
                 if self.status is Status.DONE:
-                    for i, limit in prepared.lower_bounds:
-                        if view[i] < limit:
-                            self.status = Status.NEGATIVE_AIR_MASS
+                    if any(map(operator.lt, view, self._lower_bounds)):
+                        self.status = Status.NEGATIVE_AIR_MASS
                     applied = tuple(intervals.final_inputs(begin, end))
             except KeyboardInterrupt:
                 intervals.discard()

@@ -113,16 +113,15 @@ class Problem(ShortRepr):
     def times(self) -> Array:
         """Output times (N,) [s] of an open-loop run; where the input is that of the last run with the plant, and so is
         all that they depend on, those of the last run, which nobody can write to."""
-        known, ends, given = self.compiled.description, self.segments.ends, self.output_times
+        known, segments, given = self.compiled.description, self.segments, self.output_times
         asked = given, self.start_time, self.duration
-        if ends.flags.writeable or not (given is None or type(given) in NUMBERS):
-            return output_times(*asked, ends)
-        last_asked, last_ends, times = known.last_times
-        if ends is not last_ends or asked != last_asked:
-            times = output_times(*asked, ends)
-            if times.size <= MAX_KEPT_ROWS:
-                times.setflags(write=False)
-                known.last_times = asked, ends, times
+        kept, last_asked, last_times = known.checked_input
+        if segments is not kept or not (given is None or type(given) in NUMBERS):
+            return output_times(*asked, segments.ends)
+        times: Array = last_times if asked == last_asked else output_times(*asked, segments.ends)
+        if times is not last_times and times.size <= MAX_KEPT_ROWS:
+            times.setflags(write=False)
+            known.checked_input = segments, asked, times
         return times
 
     @functools.cached_property
@@ -183,8 +182,17 @@ def check_signal(system: System, signal: InputSignal, start: float, duration: fl
 def check_input_range(compiled: CompiledSystem, segments: PiecewiseLinear, start: float) -> None:
     """Raise ParameterError where an input is beyond its range."""
     known = compiled.description
-    if not len(known.input_names) or segments is known.checked_segments:
+    if segments is known.checked_input[0]:
         return
+    if len(known.input_names):
+        _check_within(compiled, segments, start)
+    if not any(table.flags.writeable for table in (segments.ends, segments.values, segments.slopes)):
+        known.checked_input = segments, None, None
+
+
+def _check_within(compiled: CompiledSystem, segments: PiecewiseLinear, start: float) -> None:
+    """Raise ParameterError where an input is beyond its range, from the values of all segments."""
+    known = compiled.description
     values, slopes = segments.values, segments.slopes
     tables = [values]
     if any(slopes.ravel().tolist()) if slopes.size <= FEW else slopes.any():
@@ -195,8 +203,6 @@ def check_input_range(compiled: CompiledSystem, segments: PiecewiseLinear, start
         low, high = known.input_lower_limits, known.input_upper_limits
         row, column = np.argwhere(~((table >= low) & (table <= high)))[0]
         _refuse_input(compiled, int(column), table[row, column], f"before {segments.ends[row]:g} s")
-    if not values.flags.writeable:
-        known.checked_segments = segments
 
 
 def check_inputs(compiled: CompiledSystem, values: Array, when: str) -> None:

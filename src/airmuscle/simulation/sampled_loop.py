@@ -55,7 +55,6 @@ class SampledLoop:
     first_rows: npt.NDArray[np.int64]
     input_names: tuple[str, ...]
     ranges: Mapping[str, tuple[float, float]]
-    lower_bounds: list[tuple[int, float]]
 
     @functools.cached_property
     def edges(self) -> list[float]:
@@ -113,11 +112,10 @@ def prepare_loop(problem: Problem, state: ControlLoopState) -> SampledLoop:
         first_segments[:-1], first_segments[-1] = np.searchsorted(starts, edges[:-1]), starts.size
     times = output_times(problem.output_times, start, duration, np.append(start, inputs.ends))
     setpoint = snapped(loop.setpoint, loop.controller.setpoints, edges, close)
-    bounds, (setpoints, _) = known.lower_bounds.tolist(), setpoint.at_rising(edges[:-1], start)
+    setpoints, _ = setpoint.at_rising(edges[:-1], start)
     return SampledLoop(
         loop, edges, sampled, inputs, first_segments, commanded, setpoint, setpoints, times,
         first_rows_of(times, edges), names, _ranges(compiled, loop),
-        [(i, bound) for i, bound in enumerate(bounds) if bound > -math.inf],
     )  # fmt: skip
 
 
