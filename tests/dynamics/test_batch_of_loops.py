@@ -144,6 +144,26 @@ def test_a_controller_that_is_called_from_python():
 
 
 @dataclasses.dataclass(frozen=True)
+class Counting(Called):
+    """A controller that changes its memory in place, which it should not: one pulse, then nothing."""
+
+    def init(self) -> Any:
+        return [0]
+
+    def step(self, memory: Any, measurement: Any, dt: float) -> Any:
+        memory[0] += 1
+        return {"fill": float(memory[0] < 20), "discharge": 0.0}, memory
+
+
+def test_a_memory_that_is_changed_in_place_does_not_reach_the_next_plant():
+    loop, masses = ControlLoop(Counting(PI), 0.0125, STEPS), np.array([1.0, 2.0, 3.0])
+    batch = simulate_batch(LIFT, {"mechanism.mass": masses}, loop, duration=0.75, output_times=TIMES, cores=1)
+    commands = np.asarray(batch["command.fill"])
+    assert commands[0].any()
+    assert (commands == commands[0]).all()
+
+
+@dataclasses.dataclass(frozen=True)
 class OwnDriver(Driver):
     """A driver of another class than those that kernels implement."""
 

@@ -36,9 +36,9 @@ class CompiledLoop:
         loop, known = prepared.loop, compiled.description
         controller = loop.controller
         self.prepared, self.law = prepared, controller if isinstance(controller, ControlLaw) else None
-        self._function = compiled_sample(self.law) if self.law else None
-        self.sample_address = self._function.address if self._function else 0
-        self.parameters = parameters_of(self.law) if self.law else np.zeros(1)
+        self._function = compiled_sample(self.law) if self.law is not None else None
+        self.sample_address = 0 if self._function is None else self._function.address
+        self.parameters = parameters_of(self.law) if self.law is not None else np.zeros(1)
         self.capacity = greatest_capacity(prepared) if loop.drivers else 0
         columns = (*known.state_names, *known.output_names)
         measured_at = np.array([columns.index(name) for name in controller.measured_columns], dtype=np.int64)
@@ -57,7 +57,7 @@ class CompiledLoop:
 
     def memory_of(self, state: ControlLoopState) -> list[float]:
         """The memory of the control law as numbers; none of a controller that is called."""
-        return [state.controller[name] for name in self.law.initial_memory] if self.law else []
+        return [state.controller[name] for name in self.law.initial_memory] if self.law is not None else []
 
 
 def can_be_compiled(prepared: SampledLoop) -> bool:
@@ -89,7 +89,7 @@ class CompiledRun:
         arguments = self._arguments(compiled, self._parameters)
         self._first_buffer, self._budget = len(arguments) - 9, len(arguments) - 1
         self._kernel = kernel.sampled_loop.bind(*arguments)
-        self._controller = None if loop.law else CalledController(loop.prepared)
+        self._controller = None if loop.law is not None else CalledController(loop.prepared)
         self._forget_samples()
 
     def restart(

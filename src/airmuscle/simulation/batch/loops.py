@@ -114,15 +114,16 @@ class LoopBatch:
         self, prepared: CompiledLoop, compiled: CompiledSystem, state: Array, parameters: Array
     ) -> CompiledRun:
         """A run in the arrays of one that is not needed any more, or a new one."""
+        loop, start = prepared.prepared.loop, self.template.start_time
         idle = self._idle.setdefault(id(prepared), [])
         try:
             run = idle.pop()
         except IndexError:
             integrator = self.template.integrator
             assert integrator is not None
-            start = prepared.prepared.loop.init(self.template.start_time)
-            return CompiledRun(prepared, compiled, integrator, state, start, parameters)
-        run.restart(compiled, state, parameters)
+            return CompiledRun(prepared, compiled, integrator, state, loop.init(start), parameters)
+        # a controller of the user may have changed its first memory, although a memory is a value
+        run.restart(compiled, state, parameters, loop.init(start) if prepared.law is None else None)
         return run
 
     def release(self, run: CompiledRun | CalledRun) -> None:
