@@ -320,6 +320,7 @@ def test_the_schema_knows_every_controller():
         "FrictionFeedForward",
         "GainSchedule",
         "HysteresisCompensation",
+        "MotionFeedForward",
         "OnOffController",
         "PID",
         "ProportionalFeedback",
