@@ -313,6 +313,7 @@ def test_the_schema_knows_every_controller():
         "FrictionFeedForward",
         "GainSchedule",
         "HysteresisCompensation",
+        "MotionFeedForward",
         "OnOffController",
         "PID",
         "ProportionalFeedback",
