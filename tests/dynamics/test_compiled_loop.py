@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from called_controller import Called
-from control_plants import LIFT, SPLIT
+from control_plants import LIFT, SPLIT, assert_identical
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -60,16 +60,6 @@ def both(problem: Problem):
     texts = [d.text for s in (by_program, by_calls) for d in s.diagnostics if d.code == DiagnosticCode.CONTROLLER]
     assert ["compiled" in text for text in texts] == [True, False], texts
     return by_program, by_calls
-
-
-def assert_identical(one, other):
-    assert one.status == other.status
-    assert list(one.recording) == list(other.recording)
-    for name in one.recording:
-        np.testing.assert_array_equal(one.recording[name], other.recording[name], err_msg=name, strict=True)
-    assert (one.final_time, one.final_state) == (other.final_time, other.final_state)
-    assert one.control_state == other.control_state
-    assert one.statistics == other.statistics
 
 
 @pytest.mark.parametrize(

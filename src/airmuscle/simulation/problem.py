@@ -15,6 +15,7 @@ from ..analysis.equilibrium import find_equilibrium
 from ..compile.program import CompiledSystem, compile_system
 from ..control.control_loop import ControlLoop, ControlLoopState
 from ..control.inputs import InputSignal, check_input_signal
+from ..control.law_design import designed_loop
 from ..control.piecewise_linear import PiecewiseLinear
 from ..control.with_drivers import WithDrivers
 from ..core.arrays import FEW, Array
@@ -67,6 +68,7 @@ class Problem(ShortRepr):
         object.__setattr__(self, "integrator", default_integrator(self.integrator))
         self._check_time()
         if isinstance(self.input, ControlLoop):
+            object.__setattr__(self, "input", designed_loop(self.input))
             known = self.compiled.description
             self.input.check_columns((*known.state_names, *known.output_names), known.input_names)
             if self.control_state is None:

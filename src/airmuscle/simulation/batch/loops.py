@@ -14,6 +14,7 @@ import numpy.typing as npt
 from ...compile.program import CompiledSystem
 from ...control.control_law import ControlLaw
 from ...control.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop
+from ...control.law_design import designed_loop
 from ...core.arrays import Array
 from ...core.errors import ParameterError
 from ...core.system import System
@@ -187,6 +188,8 @@ def loops_of(given: Any) -> tuple[ControlLoop, ...] | None:
         return None
     if len(loops) < len(inputs):
         raise ParameterError("simulate_batch: the inputs are control loops and signals; give one kind for all plants.")
+    distinct = {id(loop): designed_loop(loop) for loop in loops}
+    loops = tuple(distinct[id(loop)] for loop in loops)
     first = _names(loops[0])
     for row, loop in enumerate(loops):
         if _names(loop) != first:
