@@ -99,7 +99,8 @@ def test_the_section_of_the_batch_has_its_rows_and_targets():
     assert any("NumPy" in target.name for target in section.targets)
 
 
-def test_the_section_of_the_environments_has_a_row_for_each_variant():
+def test_the_section_of_the_environments_has_a_row_for_each_variant(monkeypatch):
+    monkeypatch.setattr(environments, "STEPS", 20)
     section = environments.section(rounds=1, count=16)
     names = [row[0] for row in section.rows]
     assert names[0] == "Stepper.step, 10 ms"

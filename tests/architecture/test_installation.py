@@ -7,7 +7,6 @@ import os
 import re
 import subprocess
 import sys
-import time
 import tomllib
 from pathlib import Path
 from types import ModuleType
@@ -104,10 +103,13 @@ needs_posix = pytest.mark.skipif(os.name == "nt", reason="the environment of thi
 
 @needs_posix
 def test_a_second_start_adds_less_than_a_fifth_of_a_second(checkout: Path):
+    """Of CPU time, because other processes may run on the machine."""
+
     def seconds() -> float:
-        start = time.perf_counter()
+        before = os.times()
         subprocess.run([sys.executable, checkout / "run", "true"], check=True)
-        return time.perf_counter() - start
+        after = os.times()
+        return after.children_user - before.children_user + after.children_system - before.children_system
 
     assert min(seconds() for _ in range(5)) < 0.2
 

@@ -16,7 +16,6 @@ import numpy as np
 import pytest
 from plants import chosen_muscle
 from scipy.linalg import expm
-from scipy.signal import cont2discrete
 
 from airmuscle.analysis.linear_model import linearise
 from airmuscle.compile.program import Description
@@ -117,6 +116,8 @@ def test_between_samples_a_held_command_meets_a_driven_disturbance():
 
 def test_for_small_steps_a_loop_is_that_of_the_linearised_plant():
     """What is left is quadratic in the step: half the step, a quarter of it."""
+    from scipy.signal import cont2discrete
+
     valve = ProportionalValve(Supply(5e5), VALVE, VALVE, SecondOrderLag(20.0, 0.7), overlap=-0.3)
     plant = Plant(chosen_muscle(), valve, Isometric(0.05), Isothermal())
     rest = solution(plant, ControlLoop(PID("pressure", "command", 0.0), 0.5, Schedule({"pressure": ()})), duration=20.0,

@@ -14,7 +14,7 @@ import casadi
 import numba
 import numpy as np
 import pytest
-from filling import runs
+from filling import lifting_run
 
 from airmuscle.compile.cache import kernel as kernels
 from airmuscle.compile.cache import module
@@ -29,7 +29,7 @@ from airmuscle.core.errors import AirmuscleWarning
 from airmuscle.simulation import simulate
 from airmuscle.simulation.integrators import DormandPrince8, Rodas4
 
-CASE = runs()[3]
+CASE = lifting_run(1)
 READY = compile_system(CASE.system)
 kept_found = kept.load
 ROWS = 7

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from joints import chosen_muscle, joint, joint_start
-from scipy.signal import lsim
 
 from airmuscle.analysis.equilibrium import find_equilibrium
 from airmuscle.analysis.linear_model import linearise
@@ -93,6 +92,8 @@ def test_the_matrices_are_the_slopes_of_rates_and_outputs(plant, inputs):
 
 def test_it_follows_a_small_step_of_the_simulated_plant():
     """The error is of second order: half the step leaves a quarter of it."""
+    from scipy.signal import lsim
+
     start, times = find_equilibrium(HANGING, pressure=3e5), np.linspace(0.0, 0.3, 61)
     found = linearise(HANGING, start).select(("fill",), ("position", "pressure", "force"))
     errors = []

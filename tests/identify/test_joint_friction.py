@@ -51,7 +51,7 @@ def sweep(pressure, coulomb, seed=0, density=1000):
 
 def joint(coulomb_forces, seed=0):
     loops = find_loops([sweep(p, f, seed) for p, f in coulomb_forces.items()])
-    return fit_jointly([fit_loop(loop, elements=5) for loop in loops])
+    return fit_jointly([fit_loop(loop, elements=3) for loop in loops])
 
 
 @pytest.fixture(scope="module")

@@ -69,10 +69,11 @@ def test_the_error_of_one_length_is_reported_with_its_alternatives():
     runs = rig(0.002)
     found = {each.specimen: each.offset for each in find_length_errors(am.fit(LAW, runs).model, runs)}
     assert found["202 mm"] == pytest.approx(-0.002, abs=4e-4)
-    (note,) = compare(runs, [Candidate("ends", LAW)]).notes
+    comparison = compare(runs, [Candidate("ends", LAW)])
+    (note,) = comparison.notes
     assert "that of 202 mm were 2" in note
     assert "mm less" in note
-    assert f"note: {note}" in str(compare(runs, [Candidate("ends", LAW)]))
+    assert f"note: {note}" in str(comparison)
 
 
 @pytest.mark.parametrize("law", [LAW, OTHER])

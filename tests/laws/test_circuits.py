@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import scipy.signal
 from joints import chosen_muscle
 
 from airmuscle.control.inputs import ZERO_INPUT, Schedule
@@ -143,10 +142,12 @@ def spool_course(overlap=0.0, follower=SPOOL, to=0.6, duration=0.3):
 
 @pytest.mark.parametrize("damping", [0.2, 0.7, 1.0, 3.0])
 def test_a_spool_follows_its_command_as_a_second_order_lag(damping):
+    from scipy.signal import step
+
     follower = SecondOrderLag(20.0, damping)
     _, run = spool_course(follower=follower)
     w = 2 * np.pi * 20.0
-    _, expected = scipy.signal.step(([w**2], [1, 2 * damping * w, w**2]), T=run["time"])
+    _, expected = step(([w**2], [1, 2 * damping * w, w**2]), T=run["time"])
     np.testing.assert_allclose(run["spool"], 0.6 * expected, atol=1e-7)
 
 

@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.signal import lfilter
 
 from airmuscle.control import PID, OnOffController, SplitRange
 from airmuscle.control.controller import Measurement, relative_unit
@@ -50,6 +49,8 @@ courses = st.lists(st.tuples(numbers, numbers), min_size=2, max_size=40)
 )
 def test_pid_is_its_discrete_transfer_functions(course, k, t_i, t_d, n, b, c):
     """P, I = K h/T_i/(z - 1) and D = K T_d N (1 - 1/z)/(T_d + N h - T_d/z), each by a filter of its own."""
+    from scipy.signal import lfilter
+
     r, y = np.array(course).T
     pid = PID("y", "fill", k, t_i, t_d, n, b, c, initial_output=0.7)
     told, _ = carried(pid, r, y)

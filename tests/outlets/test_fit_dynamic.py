@@ -13,9 +13,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from dynamic_study import VALVES, airmuscle, noisy_run, plant_table, run_table
 
-from airmuscle.cli.app import app
 from airmuscle.core.tree import leaves
 from airmuscle.identify.dynamic import CrossPrediction, InitialValue, StartTime, describe_cross_predictions
 from airmuscle.mechanism import HangingMass
@@ -24,28 +23,10 @@ from airmuscle.recording.csv_writer import write_csv
 from airmuscle.scenario.identification import load_dynamic_fit
 from airmuscle.scenario.scenario import load_scenario
 
-PLANT = """
-[plant]
-gas = {{ model = "Polytropic", exponent = {exponent} }}
-[plant.muscle]
-library = "dmsp-20-300"
-damper = {{ model = "LinearDamper", damping = {damping} }}
-[plant.circuit]
-model = "FillDischarge"
-supply = {{ model = "Supply", pressure = "5 bar" }}
-fill = {{ model = "Valve", conductance = {conductance}, critical_ratio = 0.3 }}
-discharge = {{ model = "Valve", conductance = {conductance}, critical_ratio = 0.3 }}
-[plant.mechanism]
-model = "HangingMass"
-mass = "10 kg"
-[input]
-fill = [["0.1 s", 1], ["1 s", 0]]
-discharge = [["1.3 s", 1]]
-"""
+INPUT = '[input]\nfill = [["0.1 s", 1], ["1 s", 0]]\ndischarge = [["1.3 s", 1]]\n'
+WEIGHT = 'model = "HangingMass"\nmass = "10 kg"'
 TRUE = {"exponent": 1.25, "damping": 200.0, "conductance": 3e-9}
 START = {"exponent": 1.1, "damping": 100.0, "conductance": 4e-9}
-RUN = '[run]\nduration = "2 s"\noutput_times = "10 ms"\ninitial_state = { pressure = "0.6 bar" }\n'
-VALVES = '["circuit.fill.conductance", "circuit.discharge.conductance"]'
 ASKED = f"""
 [observed]
 pressure = "500 Pa"
@@ -61,24 +42,19 @@ starts = 2
 RECORD = '[[record]]\nfile = "{}"\nstart_time = "0.2 s"\ninitial_state = {{ pressure = "0.6 bar" }}\n'
 
 
-def airmuscle(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments], env={"COLUMNS": "160"})
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> Path:
     """Two noisy records of one plant, begun 13 ms after and 4 ms before what the study says; the second's height is in
     millimetres, as its heading says."""
     place = tmp_path_factory.mktemp("study")
-    (place / "truth.toml").write_text(PLANT.format(**TRUE) + RUN, encoding="utf-8")
+    truth = plant_table(WEIGHT, **TRUE) + INPUT + run_table("0.6 bar")
+    (place / "truth.toml").write_text(truth, encoding="utf-8")
     rng = np.random.default_rng(1)
     for name, shift, heading, factor in (("run1", 0.213, "height", 1.0), ("run2", 0.196, "height [mm]", 1e3)):
-        run = load_scenario(place / "truth.toml").simulate()
-        noise = rng.standard_normal((2, len(run)))
-        columns = {"time": run["time"] + shift, "pressure": run["pressure"] + 500.0 * noise[0]}
-        height = factor * (run["position"] + 5e-5 * noise[1])
-        write_csv(Recording({**columns, heading: height}, name), place / f"{name}.csv")
-    study = PLANT.format(**START) + ASKED + RECORD.format("run1.csv") + RECORD.format("run2.csv")
+        run = noisy_run(place / "truth.toml", rng, {"pressure": 500.0, "position": 5e-5})
+        columns = {"time": run["time"] + shift, "pressure": run["pressure"], heading: factor * run["position"]}
+        write_csv(Recording(columns, name), place / f"{name}.csv")
+    study = plant_table(WEIGHT, **START) + INPUT + ASKED + RECORD.format("run1.csv") + RECORD.format("run2.csv")
     (place / "study.toml").write_text(study, encoding="utf-8")
     return place
 

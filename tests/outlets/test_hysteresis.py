@@ -175,7 +175,7 @@ def test_without_a_muscle_the_friction_stands_in_a_table_that_a_plant_takes(two,
 
 def test_friction_that_grows_with_pressure_is_written_once_for_all_runs_and_runs_in_simulate(tmp_path):
     files = [
-        loop(tmp_path / f"{pressure}.csv", 3, MaxwellSlip((factor * 2e4, factor * 1e4), (3e-4, 1.2e-3)), TURNS[:3], 150,
+        loop(tmp_path / f"{pressure}.csv", 3, MaxwellSlip((factor * 2e4, factor * 1e4), (3e-4, 1.2e-3)), TURNS[:3], 110,
              pressure)
         for pressure, factor in ((3e5, 1.0), (4e5, 1.25), (5e5, 1.5))
     ]  # fmt: skip

@@ -11,10 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from dynamic_study import VALVES, airmuscle, noisy_run, plant_table, run_table
 
 import airmuscle as am
-from airmuscle.cli.app import app
 from airmuscle.core.errors import ColumnError, ParameterError
 from airmuscle.core.tree import leaves, with_parameters
 from airmuscle.friction import Dahl
@@ -29,21 +28,7 @@ from airmuscle.simulation import Rodas4
 
 NOISE = 4.0
 """Standard deviation of the measured force [N]."""
-PLANT = """
-[plant]
-gas = {{ model = "Polytropic", exponent = {exponent} }}
-[plant.muscle]
-library = "dmsp-20-300"
-[plant.circuit]
-model = "FillDischarge"
-supply = {{ model = "Supply", pressure = "{supply} bar" }}
-fill = {{ model = "Valve", conductance = {conductance}, critical_ratio = 0.3 }}
-discharge = {{ model = "Valve", conductance = {conductance}, critical_ratio = 0.3 }}
-[plant.mechanism]
-model = "Isometric"
-contraction = 0.05
-"""
-VALVES = '["circuit.fill.conductance", "circuit.discharge.conductance"]'
+HELD = 'model = "Isometric"\ncontraction = 0.05'
 STUDY = f"""
 [input]
 fill = [["0.1 s", 1], ["1 s", 0]]
@@ -55,13 +40,8 @@ free = [{VALVES}, "gas.exponent"]
 start_time = "50 ms"
 """
 RECORD = '[[record]]\nfile = "{}"\ninitial_state = {{ pressure = "0.2 bar" }}\n'
-RUN = '[run]\nduration = "2 s"\noutput_times = "10 ms"\ninitial_state = { pressure = "0.2 bar" }\n'
 TRUE = {"exponent": 1.25, "conductance": 3e-9}
 LATER_INPUT = '[input]\nfill = [["0.2 s", 1], ["0.5 s", 0], ["0.8 s", 1]]\ndischarge = [["1.5 s", 1]]\n'
-
-
-def airmuscle(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments], env={"COLUMNS": "200"})
 
 
 def sweep(pressure: float, seed: int, rows: int = 300, top: float = 0.2) -> Recording:
@@ -90,18 +70,18 @@ def muscle(tmp_path_factory) -> Path:
 def study(tmp_path_factory) -> Path:
     """The folder of a plant fitted to two fills, and of two later ones: with another input, and of another supply."""
     place = tmp_path_factory.mktemp("dynamic")
-    rng, values = np.random.default_rng(5), {"supply": 5.0, **TRUE}
+    rng, run_of_2_s = np.random.default_rng(5), run_table("0.2 bar")
     truth = tomllib.loads(STUDY)["input"]
-    text = PLANT.format(**values) + RUN + f"[input]\nfill = {truth['fill']}\ndischarge = {truth['discharge']}\n"
-    later = PLANT.format(**values) + RUN + LATER_INPUT
-    other = PLANT.format(**{**values, "supply": 5.6}) + RUN + LATER_INPUT
+    plant = plant_table(HELD, **TRUE)
+    text = plant + run_of_2_s + f"[input]\nfill = {truth['fill']}\ndischarge = {truth['discharge']}\n"
+    later = plant + run_of_2_s + LATER_INPUT
+    other = plant_table(HELD, **TRUE, supply=5.6) + run_of_2_s + LATER_INPUT
     for name, scenario, shift in (("run1", text, 0.01), ("run2", text, 0.0), ("later", later, 0.02),
                                   ("again", text, 0.03), ("other", other, 0.0)):  # fmt: skip
         (place / "truth.toml").write_text(scenario, encoding="utf-8")
-        run = load_scenario(place / "truth.toml").simulate()
-        pressure = run["pressure"] + 500.0 * rng.standard_normal(len(run))
-        write_csv(Recording({"time": run["time"] + shift, "pressure": pressure}, name), place / f"{name}.csv")
-    start = PLANT.format(exponent=1.1, conductance=4e-9, supply=5.0)
+        run = noisy_run(place / "truth.toml", rng, {"pressure": 500.0})
+        write_csv(Recording({**run, "time": run["time"] + shift}, name), place / f"{name}.csv")
+    start = plant_table(HELD, exponent=1.1, conductance=4e-9)
     (place / "study.toml").write_text(
         start + STUDY + RECORD.format("run1.csv") + RECORD.format("run2.csv"), encoding="utf-8"
     )

@@ -1,0 +1,52 @@
+"""Files of dynamic identification that several tests use: a muscle between two valves, its runs, and noisy records."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from typer.testing import CliRunner
+
+from airmuscle.cli.app import app
+from airmuscle.scenario.scenario import load_scenario
+
+VALVES = '["circuit.fill.conductance", "circuit.discharge.conductance"]'
+
+
+def plant_table(
+    mechanism: str, *, exponent: float, conductance: float, damping: float | None = None, supply: float = 5
+) -> str:
+    """The table of a plant with two valves of one conductance [m3/(s Pa)] at a supply [bar]."""
+    damper = "" if damping is None else f'damper = {{ model = "LinearDamper", damping = {damping} }}\n'
+    return f"""
+[plant]
+gas = {{ model = "Polytropic", exponent = {exponent} }}
+[plant.muscle]
+library = "dmsp-20-300"
+{damper}[plant.circuit]
+model = "FillDischarge"
+supply = {{ model = "Supply", pressure = "{supply} bar" }}
+fill = {{ model = "Valve", conductance = {conductance}, critical_ratio = 0.3 }}
+discharge = {{ model = "Valve", conductance = {conductance}, critical_ratio = 0.3 }}
+[plant.mechanism]
+{mechanism}
+"""
+
+
+def run_table(pressure: str) -> str:
+    """The table of a run of 2 s from a pressure."""
+    return f'[run]\nduration = "2 s"\noutput_times = "10 ms"\ninitial_state = {{ pressure = "{pressure}" }}\n'
+
+
+def noisy_run(scenario: Path, rng: np.random.Generator, deviations: Mapping[str, float]) -> dict[str, Any]:
+    """Time and noisy columns of the run of a scenario; `deviations` are the standard deviations of their noise."""
+    run = load_scenario(scenario).simulate()
+    noisy = {name: run[name] + deviation * rng.standard_normal(len(run)) for name, deviation in deviations.items()}
+    return {"time": run["time"], **noisy}
+
+
+def airmuscle(*arguments: object) -> Any:
+    """The result of a command, in a terminal of 160 columns."""
+    return CliRunner().invoke(app, [str(each) for each in arguments], env={"COLUMNS": "160"})
