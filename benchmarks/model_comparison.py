@@ -30,8 +30,7 @@ NOISE = {"pressure": 300.0, "contraction": 2e-4, "force": 2.0}
 """Standard deviations of the sensors [SI] (chosen)."""
 TWO = "two processes"
 REASON = (
-    "the comparison fits 17 laws to up to seven groups of files, of which the command shares the work among the cores; "
-    "a nonlinear bootstrap solves each refit by Gauss-Newton in Python, and a fifth of them by SciPy"
+    "the comparison fits 17 laws to up to seven groups of files, of which the command shares the work among the cores"
 )
 HEADER = ("task", "time", "CPU time", "result")
 TEXT = (

@@ -15,12 +15,14 @@ import typing
 import numpy as np
 from plants import EXAMPLES
 
-from airmuscle.control.inputs import Schedule
+from airmuscle.control import SampledSignal, Schedule
+from airmuscle.control.control_loop import CombinedSignal
 from airmuscle.core.annotation import conforms, type_hints
 from airmuscle.core.declaration import parameters
 from airmuscle.core.errors import AirmuscleError
 from airmuscle.library.models import model_names
-from airmuscle.mechanism import Mechanism
+from airmuscle.mechanism import ExternalLoad, Mechanism
+from airmuscle.mechanism.external_load import SHORTENING, SHORTENING_SPEED
 from airmuscle.muscle import Muscle
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import Circuit, SharedSupply
@@ -33,6 +35,8 @@ WIDEST = 1e4
 """Largest ratio of a drawn value to that of the stock."""
 HIGHEST_COMMAND = 6e5
 """Magnitude [Pa] of a commanded pressure."""
+LARGEST_SHORTENING = 0.02
+"""Magnitude [m] of a shortening of an open plant."""
 
 
 def models_in(thing):
@@ -168,17 +172,20 @@ class Composer:
             self._in_manifold = outer
 
     def command(self, plant, duration):
-        """A schedule of levels within the ranges of the inputs, at random instants."""
+        """A schedule of levels within the ranges of the inputs, at random instants; shortenings are moved."""
         changes = {}
         for given in plant.input_variables:
             low, high = (min(max(b, -HIGHEST_COMMAND), HIGHEST_COMMAND) for b in (given.minimum, given.maximum))
             if given.unit not in ("1", "Pa") and high == HIGHEST_COMMAND:
                 low, high = -5.0, 5.0
+            if given.name.endswith(SHORTENING):
+                low, high = -LARGEST_SHORTENING, LARGEST_SHORTENING
             instants = np.cumsum(self.rng.uniform(0.02, duration / 5, 5))
             levels = self.rng.uniform(low, high, 5)
-            levels = np.round(levels) if high <= 1.0 and self.chance(0.7) else levels
+            levels = np.round(levels) if high <= 1.0 and given.unit != "m" and self.chance(0.7) else levels
             changes[given.name] = tuple(zip(instants.tolist(), levels.tolist(), strict=True))
-        return Schedule(changes)
+        open_ports = [model for model in models_in(plant.mechanism) if isinstance(model, ExternalLoad)]
+        return _moved(changes, open_ports[0].shortenings) if open_ports else Schedule(changes)
 
     def state(self, plant):
         """An initial state at a random pressure, its coordinates drawn anew until every muscle is within its range."""
@@ -195,3 +202,15 @@ class Composer:
         """An initial gauge pressure [Pa], sometimes below absolute vacuum."""
         vacuum = plant.ambient.pressure
         return float(self.one_of((0.0, self.rng.uniform(-1.02 * vacuum, 0.0), self.rng.uniform(0.0, 4e5))))
+
+
+def _moved(changes, start):
+    """The signal of a schedule in which the shortenings of an open plant are linear in pieces from those at the start,
+    and their speeds the derivatives."""
+    place, held = {}, dict(changes)
+    for name, first in zip([name for name in changes if name.endswith(SHORTENING)], start, strict=True):
+        instants, levels = zip((0.0, first), *held.pop(name), strict=True)
+        speeds = np.append(np.diff(levels) / np.diff(instants), 0.0)
+        place[name] = tuple(zip(instants, levels, strict=True))
+        held[name.removesuffix(SHORTENING) + SHORTENING_SPEED] = tuple(zip(instants, speeds.tolist(), strict=True))
+    return CombinedSignal(SampledSignal(place), Schedule(held))

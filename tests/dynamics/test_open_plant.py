@@ -60,7 +60,7 @@ def motion():
 
 @pytest.mark.parametrize("name", ["dmsp-20-300", "heat", "LuGre"])
 def test_its_books_close(name):
-    """Mass of the air, energy of the air, and work of the contractile element, over a motion that is imposed."""
+    """Mass and energy of the air, work on the load, and work of the contractile element, over a motion that is imposed."""
     metered = WithEnergyMeters(open_plant(plants.EXAMPLES[name], [SHORTENINGS[0]]))
     start = metered.extend_state(metered.plant.state_at(pressure=1e5))
     run = solve(Problem(metered, motion(), 0.8, start, integrator=Rodas4(1e-9))).raise_if_incomplete().recording
@@ -72,8 +72,37 @@ def test_its_books_close(name):
 
     closes(run["air_total"], run["air_supplied"], -run["air_exhausted"])
     closes(run["air_energy"], run["energy_of_flow"], run["heat_to_air"], -run["work_of_air"])
+    closes(run["kinetic_energy"] + run["potential_energy"], run["work_of_tension"], -run["mechanism_loss"])
     friction = [run["friction_work"]] if "friction_work" in run else []
     closes(run["work_of_contractile"], run["work_of_tension"], run["damping_heat"], run["element_work"], *friction)
+
+
+def test_the_work_on_the_load_is_the_integral_of_tension_over_shortening():
+    """The integral by the midpoint rule, from the given shortenings and not from their speeds.
+
+    The tensions jump with the speeds, at the ends of intervals. The muscles work against each other: by different
+    amounts, one shortens while the other lengthens.
+    """
+    factors = {"m0": 1.0, "m1": -0.6}
+    speeds = (*(np.diff(SHORTENINGS) / np.diff(TIMES)), 0.0)
+    place = {
+        f"{m}.shortening": [(t, f * s) for t, s in zip(TIMES, SHORTENINGS, strict=True)] for m, f in factors.items()
+    }
+    speed = {
+        f"{m}.shortening_speed": [(t, f * v) for t, v in zip(TIMES, speeds, strict=True)] for m, f in factors.items()
+    }
+    fill = {"m0.fill": ((0.05, 1.0), (0.4, 0.0)), "m1.fill": ((0.3, 1.0), (0.5, 0.0))}
+    command = CombinedSignal(SampledSignal(place), Schedule({**speed, **fill}))
+    start = [f * SHORTENINGS[0] for f in factors.values()]
+    metered = WithEnergyMeters(open_plant(plants.EXAMPLES["joint with stops"], start))
+    state = metered.extend_state(metered.plant.state_at(pressure=1.5e5))
+    problem = Problem(metered, command, 0.8, state, output_times=1e-4, integrator=Rodas4(1e-9))
+    run = solve(problem).raise_if_incomplete().recording
+    steps = np.diff(np.interp(run["time"][::2], TIMES, SHORTENINGS))
+    works = [np.cumsum(factor * run[f"{muscle}.force"][1::2] * steps) for muscle, factor in factors.items()]
+    assert min(np.abs(work[-1]) for work in works) > 0.3
+    for meter in ("mechanism_loss", "work_of_tension"):
+        np.testing.assert_allclose(run[meter][2::2], sum(works), rtol=0, atol=1e-6)
 
 
 def test_a_state_without_inputs_is_at_the_given_shortening():

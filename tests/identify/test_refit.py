@@ -15,11 +15,11 @@ import airmuscle as am
 from airmuscle.characteristic import ContractileSurface, EffectiveLength, Hunt2017, InverseLength, TonduLopez2000
 from airmuscle.core import autodiff, tree
 from airmuscle.geometry.braid import Braid
-from airmuscle.identify import Candidate, RunSplit, bootstrap, compare
+from airmuscle.identify import Candidate, RunSplit, bootstrap, bootstrapping, compare
 from airmuscle.identify.candidates import blank_surface
 from airmuscle.identify.fit_points import FitPoints
 from airmuscle.identify.gauss_newton import gauss_newton
-from airmuscle.identify.group_refits import GroupRefits
+from airmuscle.identify.group_refits import GroupRefits, KnownMinima
 from airmuscle.identify.problem import fitted_quantity_of
 from airmuscle.identify.solver import LeastSquaresSolution, solve, solve_iteratively
 from airmuscle.identify.static_fit import refit
@@ -106,6 +106,35 @@ def test_samples_of_a_bootstrap_are_fits_to_the_drawn_runs():
     by_name = {r.origin: r for r in runs}
     sample = [by_name[names[i]] for i, n in enumerate(counts[0]) for _ in range(n)]
     assert drawn.values[0] == pytest.approx(am.fit(fit.model, sample).values, rel=1e-5)
+
+
+def test_samples_far_along_a_valley_and_on_bounds_are_refitted_without_a_search(monkeypatch):
+    """Radius and angle of the braid change together by a factor of 10, up to the lower bound of the angle and k = 1."""
+    runs = bench()
+    fit = am.fit(LAWS["braid"], runs)
+    monkeypatch.setattr(bootstrapping, "_search", lambda *_: pytest.fail("a search of its own"))
+    drawn = bootstrap(fit, runs, refits=20, by=RunSplit(), seed=1).values
+    assert (drawn[:, 1] < 0.0501).mean() > 0.2 < (drawn[:, 2] < 1.0001).mean()
+    counts = np.random.default_rng(1).multinomial(8, np.full(8, 1 / 8), size=20)
+    group = np.unique(np.repeat([r.origin for r in runs], 60), return_inverse=True)[1]
+    for repeats, values in list(zip(counts, drawn, strict=True))[::4]:
+        problem = dataclasses.replace(fit.problem, weights=fit.problem.weights * np.sqrt(repeats[group]))
+        plain = solve_iteratively(problem, fit.loss, fit.values)
+        squares, expected = (np.sum(problem.residuals(m) ** 2) for m in (problem.predict(values), plain.modelled))
+        assert squares == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_sample_starts_at_the_known_parameters_with_its_least_sum_of_squares():
+    runs = bench()
+    fit = am.fit(LAWS["braid"], runs)
+    group = np.repeat(np.arange(8), 60)
+    known, repeats = KnownMinima(fit.problem, fit.values, group, 8), np.repeat([1.0, 0.0], 4)
+    assert known.best(repeats) is None
+    of_short = am.fit(fit.model, runs[:4]).values
+    known.add(2 * fit.values)
+    known.add(of_short)
+    assert known.best(repeats) is of_short
+    assert known.best(np.ones(8)) is None
 
 
 def test_a_comparison_states_the_errors_of_plain_fits():

@@ -21,6 +21,7 @@ from airmuscle.mechanism import (
     ArmLink,
     ConstantRadius,
     CrankProfile,
+    ExternalLoad,
     HangingMass,
     Isometric,
     Isotonic,
@@ -160,6 +161,33 @@ def test_the_power_of_the_pulls_goes_into_energy_or_is_lost(mechanism, count, dr
     assert growth == pytest.approx(power - lost, abs=1e-9 * scale)
     if not {"prescribed_acceleration", "external_torque"} & set(inputs):  # a drive may give power
         assert lost >= -1e-12 * scale
+
+
+@pytest.mark.parametrize(
+    "mechanism",
+    [
+        ExternalLoad(("a", "b")),
+        WithOffsets(ExternalLoad(("a", "b")), (0.05, -0.02)),
+        WithLatch(ExternalLoad(("a", "b"))),
+        MusclesInSeries(ExternalLoad(), (0.3,)),
+    ],
+    ids=repr,
+)
+def test_a_load_outside_moves_its_muscles_also_through_a_wrapper_and_receives_their_power(mechanism):
+    """The speeds are differences of the contractions along the given motion; the tensions' power is in the books."""
+    lengths, tensions, dt = LENGTHS[:2], (300.0, 120.0), 1e-6
+    places = [i.name for i in mechanism.inputs if i.name.endswith("shortening")]
+    places += [c.name for c in mechanism.coordinates]
+    speeds = [f"{name}_speed" if name.endswith("shortening") else name.replace("position", "speed") for name in places]
+    q, v = dict(zip(places, (0.01, -0.004), strict=True)), dict(zip(speeds, (0.05, 0.2), strict=True))
+    moved = {n: q[n] + dt * v[s] for n, s in zip(places, speeds, strict=True)}
+    before, after = (mechanism.contractions(at, lengths) for at in (q, moved))
+    found = mechanism.contraction_speeds(q, v, lengths)
+    assert found == pytest.approx([n * (b - a) / dt for n, a, b in zip(lengths, before, after, strict=True)], rel=1e-8)
+    pulls = mechanism.generalised_forces(q, tensions, lengths)
+    lost = mechanism.dissipated_power(q, v, pulls, v)
+    kept = sum(pulls[c.name] * v[c.speed] for c in mechanism.coordinates)
+    assert lost + kept == pytest.approx(sum(f * s for f, s in zip(tensions, found, strict=True)), rel=1e-12)
 
 
 # What each is

@@ -17,7 +17,7 @@ from ..core.hints import Hint
 from ..core.short_repr import ShortRepr
 from ..recording import Recording
 from .cross_validation import GroupSplit, LevelSplit, default_split
-from .group_refits import GroupRefits, RowIndices
+from .group_refits import GroupRefits, KnownMinima, RowIndices
 from .loss import LeastSquares
 from .problem import FitProblem
 from .result import Fit
@@ -144,18 +144,20 @@ def _has_full_rank(normal: Array) -> npt.NDArray[np.bool_]:
 def _refit_iteratively(
     fit: Fit, group: RowIndices, draws: Array, progress: Callable[[float], None] | None = None
 ) -> Array:
-    """Refits one by one, each started at the parameters of the original fit."""
+    """Refits one by one, each started at the best of the parameters found before, the fit's own included."""
     values = np.full((draws.shape[0], len(fit.estimates)), np.nan)
-    problem = fit.problem
-    near = None
+    problem, count = fit.problem, draws.shape[1]
+    near, known = None, KnownMinima(problem, fit.values, group, count)
     if isinstance(fit.loss, LeastSquares) and not is_linear(problem):
         solution = LeastSquaresSolution(fit.values, problem.predict(fit.values), problem.jacobian(fit.values))
-        near = GroupRefits(problem, solution, group, draws.shape[1])
+        near = GroupRefits(problem, solution, group, count)
     for i, counts in enumerate(draws):
         if progress is not None:
             progress(i / len(draws))
-        found = None if near is None else near.refit(counts)
+        found = None if near is None else near.refit(counts, known.best(counts))
         values[i] = _search(fit, counts[group], near is not None) if found is None else found
+        if np.isfinite(values[i]).all():
+            known.add(values[i])
     return values
 
 

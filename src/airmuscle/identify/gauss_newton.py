@@ -24,14 +24,12 @@ MIN_EIGENVALUE = 1e-6
 BOUND_MARGIN = 1e-6
 """Relative distance from a bound within which a parameter is on it (chosen): a search may stop strictly inside."""
 _MAX_ITERATIONS = 50
-_MAX_DAMPINGS = 20
-"""Maximum increases of the damping in one step (chosen)."""
-_MIN_DAMPING = 1e-5
-"""First damping, relative to the normal matrix at the start (chosen)."""
+_MAX_REDUCTIONS = 20
+"""Maximum reductions of the length of one step (chosen)."""
+_REDUCTION = 0.5
+"""Ratio of a reduced step to the one that increased the sum of squares (chosen)."""
 _PROBE = 0.1
 """Fraction of the step at which the second derivative along it is estimated (reference: 0.1)."""
-_MAX_BEND = 0.75
-"""Maximum ratio of twice the acceleration to the step (reference: 0.75)."""
 
 
 class StepBasis(NamedTuple):
@@ -78,7 +76,7 @@ def gauss_newton(
     None where the iteration is not certain: redundant parameters, a step that does not reduce the sum of squares, or
     slow convergence. With `known` the first step needs no Jacobian, and the last Jacobian is one step old.
     """
-    point, basis, previous, damping = _evaluate(problem, np.asarray(start, dtype=float)), None, 0.0, 0.0
+    point, basis, previous, fraction = _evaluate(problem, np.asarray(start, dtype=float)), None, 0.0, 1.0
     if known is not None:
         basis = known.basis
         first = _evaluate(problem, point.values + basis.directions @ known.step)
@@ -95,12 +93,12 @@ def gauss_newton(
         tolerance = residual_std(point.residuals, point.values.size)
         if length <= RELATIVE_STEP * tolerance:
             return point.values, point.modelled, jacobian
-        moved = _damped_step(problem, point, linear, damping)
+        moved = _curved_step(problem, point, linear, min(2 * fraction, 1.0))
         if moved is None:
             return None
-        point, damping = moved
+        point, fraction = moved
         ratio = min(length / previous, 1.0) if previous > 0 else 1.0
-        if damping == 0 and length * ratio <= relative_step * tolerance and relative_step > RELATIVE_STEP:
+        if fraction == 1 and length * ratio <= relative_step * tolerance and relative_step > RELATIVE_STEP:
             return point.values, point.modelled, jacobian  # the next step is smaller by the same ratio at least
         previous = length
     return None
@@ -114,10 +112,26 @@ def _evaluate(problem: FitProblem, values: Array) -> _Point:
 
 
 def _linearise(problem: FitProblem, point: _Point, jacobian: Array, basis: StepBasis | None) -> _Linearisation | None:
-    """The normal equations in the given basis, or in a new one where other parameters are free or the normal matrix is
-    nearly singular; None for redundant parameters."""
+    """The normal equations of the parameters that are not held on a bound; None for redundant parameters.
+
+    A parameter on a bound is held where the gradient or the step of all free parameters points outwards: a step that
+    the bound cuts off, along a narrow valley, would make no progress in the others.
+    """
     matrix = (problem.weights * problem.active_rows(point.modelled))[:, None] * jacobian
     free = ~held_on_bounds(problem, point.values, matrix.T @ point.residuals)
+    linear = _in_basis(matrix, point, free, basis)
+    while linear is not None:
+        step = -linear.basis.directions @ np.linalg.solve(linear.normal, linear.gradient)
+        held = linear.basis.free & held_on_bounds(problem, point.values, -step)
+        if not held.any() or np.array_equal(held, linear.basis.free):
+            break
+        linear = _in_basis(matrix, point, linear.basis.free & ~held, basis)
+    return linear
+
+
+def _in_basis(matrix: Array, point: _Point, free: BoolArray, basis: StepBasis | None) -> _Linearisation | None:
+    """The normal equations of the free parameters in the given basis, or in a new one where it is of other parameters
+    or the normal matrix is nearly singular; None for redundant parameters."""
     for each in (basis if basis is not None and np.array_equal(free, basis.free) else None, None):
         current = orthonormal_basis(matrix, free) if each is None else each
         if current is None:
@@ -129,30 +143,30 @@ def _linearise(problem: FitProblem, point: _Point, jacobian: Array, basis: StepB
     return None
 
 
-def _damped_step(
-    problem: FitProblem, point: _Point, linear: _Linearisation, damping: float
+def _curved_step(
+    problem: FitProblem, point: _Point, linear: _Linearisation, fraction: float
 ) -> tuple[_Point, float] | None:
-    """The point after a Levenberg-Marquardt step with geodesic acceleration, and the damping of the next step.
+    """The point after at most this fraction of a Gauss-Newton step with geodesic acceleration, and the fraction made.
 
-    The acceleration follows the curved valley of correlated parameters; the damping increases until it is smaller than
-    the step and the sum of squares does not increase. Reference: Transtrum and Sethna, arXiv:1201.5885 (2012).
+    The acceleration follows the curved valley of correlated parameters; the fraction decreases until the sum of squares
+    does not increase. The direction stays that of the full step: damping the normal matrix would damp the motion along
+    the valley first. Reference: Transtrum and Sethna, arXiv:1201.5885 (2012).
     """
     low, high = problem.bounds
     active = problem.weights * problem.active_rows(point.modelled)
-    for _ in range(_MAX_DAMPINGS):
-        inverse = np.asarray(np.linalg.inv(linear.normal + damping * np.eye(len(linear.normal))), dtype=float)
+    directions, inverse = linear.basis.directions, np.asarray(np.linalg.inv(linear.normal), dtype=float)
+    for _ in range(_MAX_REDUCTIONS):
         step, fixed = _bounded_step(
-            -inverse @ linear.gradient, inverse, linear.basis, low - point.values, high - point.values
+            -fraction * inverse @ linear.gradient, inverse, linear.basis, low - point.values, high - point.values
         )
-        directions = linear.basis.directions
         ahead = problem.predict(np.clip(point.values + _PROBE * directions @ step, low, high))
         second = 2 / _PROBE * (active * (ahead - point.modelled) / _PROBE - linear.columns @ step)
         bend = fixed @ (-0.5 * inverse @ (linear.columns.T @ second))
-        if np.isfinite(bend).all() and 2 * np.linalg.norm(bend) <= _MAX_BEND * np.linalg.norm(step):
+        if np.isfinite(bend).all():
             trial = _evaluate(problem, point.values + directions @ (step + bend))
             if trial.sum_of_squares <= point.sum_of_squares * (1 + 1e-12):
-                return trial, damping / 5 if damping > 1e-3 * _MIN_DAMPING else 0.0
-        damping = max(4 * damping, _MIN_DAMPING)
+                return trial, fraction
+        fraction *= _REDUCTION
     return None
 
 

@@ -45,6 +45,30 @@ class _Sums(NamedTuple):
     squares: Array
 
 
+class KnownMinima:
+    """Parameters found for other multiplicities of the groups, with the sum of squares of each group.
+
+    The best of them for given multiplicities is close to the minimum where the minima lie far apart along a valley.
+    """
+
+    def __init__(self, problem: FitProblem, values: Array, group: RowIndices, count: int) -> None:
+        self._problem, self._group, self._count = problem, group, count
+        self._values: list[Array] = []
+        self._squares: list[Array] = []
+        self.add(values)
+
+    def add(self, values: Array) -> None:
+        """Keep these parameters (P,)."""
+        residuals = self._problem.residuals(self._problem.predict(values))
+        self._values.append(values)
+        self._squares.append(np.asarray(np.bincount(self._group, residuals**2, self._count), dtype=float))
+
+    def best(self, counts: Array) -> Array | None:
+        """The kept parameters with the least sum of squares for these multiplicities (G,); None for the first."""
+        chosen = int(np.argmin(np.stack(self._squares) @ counts))
+        return self._values[chosen] if chosen else None
+
+
 class GroupRefits:
     """Least-squares refits of a law, started at its fit to all rows; `group` (N,) is the group of each row,
     from 0 to `count` - 1."""
@@ -63,15 +87,18 @@ class GroupRefits:
             self._sums = self._sum_groups(residuals, count)
             self._smallest = 1.0 / float(np.linalg.norm(basis.directions * _norms(weighted[self._active])[:, None], 2))
 
-    def refit(self, counts: Array) -> Array | None:
-        """The parameters (P,) for these multiplicities of the groups (G,); None where the refit is not certain."""
+    def refit(self, counts: Array, start: Array | None = None) -> Array | None:
+        """The parameters (P,) for these multiplicities of the groups (G,); None where the refit is not certain.
+
+        start  of the iteration for a law that is not linear in its parameters; by default the fit to all rows
+        """
         if self._basis is None or not self._is_determined(counts):
             return None
         normal, gradient = (np.tensordot(counts, part, 1) for part in (self._sums.normal, self._sums.gradient))
         step = normal_step(normal, gradient)
         if step is None:
             return None
-        return self._solve_linear(counts, step, self._basis) if self._linear else self._iterate(counts, step)
+        return self._solve_linear(counts, step, self._basis) if self._linear else self._iterate(counts, step, start)
 
     def _sum_groups(self, residuals: Array, count: int) -> _Sums:
         masked = self._rows * self._active[:, None]
@@ -110,15 +137,15 @@ class GroupRefits:
             step, previous = next_step, active
         return None
 
-    def _iterate(self, counts: Array, step: Array) -> Array | None:
+    def _iterate(self, counts: Array, step: Array, start: Array | None) -> Array | None:
         """Gauss-Newton steps on the drawn rows."""
         assert self._basis is not None
         repeats = counts[self._group]
         drawn = repeats > 0
         problem = self._problem.rows(drawn)
         problem = dataclasses.replace(problem, weights=problem.weights * np.sqrt(repeats[drawn]))
-        start = FirstStep(self._basis, step, float(counts @ self._sums.squares))
-        found = gauss_newton(problem, self._solution.values, start, RELATIVE_STEP)
+        first = FirstStep(self._basis, step, float(counts @ self._sums.squares)) if start is None else None
+        found = gauss_newton(problem, self._solution.values if start is None else start, first, RELATIVE_STEP)
         return None if found is None else found[0]
 
 

@@ -102,7 +102,7 @@ class Mechanism(abc.ABC):
     def dissipated_power(
         self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Value:
-        """Power [W] that leaves the mechanism through its dampers, end stops and drives."""
+        """Power [W] that leaves the mechanism through its dampers, end stops, drives and external loads."""
         return 0.0
 
     def potential_energy(self, q: Mapping[str, Value]) -> Value:

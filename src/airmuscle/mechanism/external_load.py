@@ -20,7 +20,8 @@ class ExternalLoad(Mechanism):
 
     A plant with this load has the causality of an actuator: shortening and its speed in, tension out; gas, valves,
     tubes, friction and series springs are inside. The speed that the caller gives must be the derivative of the
-    shortening.
+    shortening. The shortenings are coordinates outside the plant, on which the tensions act: the power F v that the
+    load receives is part of the power that leaves the mechanism.
     `muscles` are the names before the inputs (`left.shortening`), none for a single muscle. `shortenings` are those at
     which a state is described without inputs, such as the initial state.
     """
@@ -72,7 +73,21 @@ class ExternalLoad(Mechanism):
     ) -> tuple[Value, ...]:
         return tuple(v.get(f"{prefix}{SHORTENING_SPEED}", 0.0) for prefix in self._prefixes)
 
+    def generalised_forces(
+        self, q: Mapping[str, Value], tensions: Sequence[Value], resting_lengths: Sequence[Value]
+    ) -> dict[str, Value]:
+        """Tension [N] of each muscle, by the name of its shortening."""
+        return {f"{prefix}{SHORTENING}": tension for prefix, tension in zip(self._prefixes, tensions, strict=True)}
+
     def acceleration(
         self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
     ) -> Mapping[str, Value]:
         return {}
+
+    def dissipated_power(
+        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
+    ) -> Value:
+        """Power [W] that the load outside receives: the sum of tension times shortening speed."""
+        speeds = self.contraction_speeds({}, inputs, ())
+        pulls = (forces[f"{prefix}{SHORTENING}"] for prefix in self._prefixes)
+        return sum((pull * speed for pull, speed in zip(pulls, speeds, strict=True)), 0.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 
 from ..core.constants import STANDARD_GRAVITY
@@ -61,6 +62,13 @@ class MusclesInSeries(MechanismWrapper):
         (last,) = self.inner.contractions(q, [total])
         positions = [0.0, *(q[node.name] for node in self.nodes), total * last]
         return tuple((positions[i + 1] - positions[i]) / length for i, length in enumerate(resting_lengths))
+
+    def contraction_speeds(
+        self, q: Mapping[str, Value], v: Mapping[str, Value], resting_lengths: Sequence[Value]
+    ) -> tuple[Value, ...]:
+        speeds = [0.0, *(v[node.speed] for node in self.nodes)]
+        speeds += self.inner.contraction_speeds(q, v, [sum(resting_lengths)])
+        return tuple(after - before for before, after in itertools.pairwise(speeds))
 
     def generalised_forces(
         self, q: Mapping[str, Value], tensions: Sequence[Value], resting_lengths: Sequence[Value]

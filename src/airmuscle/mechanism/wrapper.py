@@ -29,6 +29,11 @@ class MechanismWrapper(Mechanism):
     def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         return self.inner.contractions(q, resting_lengths)
 
+    def contraction_speeds(
+        self, q: Mapping[str, Value], v: Mapping[str, Value], resting_lengths: Sequence[Value]
+    ) -> tuple[Value, ...]:
+        return self.inner.contraction_speeds(q, v, resting_lengths)
+
     def generalised_forces(
         self, q: Mapping[str, Value], tensions: Sequence[Value], resting_lengths: Sequence[Value]
     ) -> dict[str, Value]:

@@ -24,7 +24,7 @@ _METERS = (
     StateVariable("damping_heat", "J", 1.0, "work dissipated by the dampers"),
     StateVariable("work_of_contractile", "J", 1.0, "work of the contractile elements"),
     StateVariable("element_work", "J", 1.0, "work done on springs, creep and end stops: dissipated, and stored"),
-    StateVariable("mechanism_loss", "J", 1.0, "work that the mechanism lost to its dampers, stops and drives"),
+    StateVariable("mechanism_loss", "J", 1.0, "work of the mechanism on dampers, stops, drives and external loads"),
     StateVariable("air_supplied", "kg", 1e-3, "air mass that entered the plant"),
     StateVariable("air_exhausted", "kg", 1e-3, "air mass that left the plant to the surroundings"),
 )
@@ -36,9 +36,9 @@ class WithEnergyMeters(System):
     """A plant with energy and mass meters as further states, and its energies and its air mass as outputs.
 
     Four balances must close. Mechanical: kinetic + potential energy increase by `work_of_tension`, which includes the
-    contact force of an end stop, minus `mechanism_loss`, provided that a latch is operated at rest only; the energy of
-    an ExternalLoad is outside the plant, which does `work_of_tension` on it. Muscle: `work_of_contractile` is
-    `work_of_tension` + `damping_heat` + `element_work` + `friction_work` (with friction),
+    contact force of an end stop, minus `mechanism_loss`, provided that a latch is operated at rest only; the energies
+    of an ExternalLoad are outside the plant, and the work on it is part of `mechanism_loss`. Muscle:
+    `work_of_contractile` is `work_of_tension` + `damping_heat` + `element_work` + `friction_work` (with friction),
     provided that no muscle is slack. Air: `air_energy`, of the air in the muscles, increases by `energy_of_flow` +
     `heat_to_air` minus `work_of_air`. Mass: `air_total`, of all air, increases by `air_supplied` minus
     `air_exhausted`.

@@ -29,6 +29,8 @@ from .output_times import output_times
 
 NUMBERS = frozenset({float, int, np.float64})
 """Types of numbers that need no conversion."""
+MAX_KEPT_ROWS = 100_000
+"""Output times that are kept with a plant for its next run, 0.8 MB (chosen)."""
 LARGEST = sys.float_info.max
 """The largest finite number."""
 
@@ -111,8 +113,19 @@ class Problem(ShortRepr):
 
     @functools.cached_property
     def times(self) -> Array:
-        """Output times (N,) [s] of an open-loop run."""
-        return output_times(self.output_times, self.start_time, self.duration, self.segments.ends)
+        """Output times (N,) [s] of an open-loop run; where the input is that of the last run with the plant, and so is
+        all that they depend on, those of the last run, which nobody can write to."""
+        known, ends, given = self.compiled.description, self.segments.ends, self.output_times
+        asked = given, self.start_time, self.duration
+        if ends.flags.writeable or not (given is None or type(given) in NUMBERS):
+            return output_times(*asked, ends)
+        last_asked, last_ends, times = known.last_times
+        if ends is not last_ends or asked != last_asked:
+            times = output_times(*asked, ends)
+            if times.size <= MAX_KEPT_ROWS:
+                times.setflags(write=False)
+                known.last_times = asked, ends, times
+        return times
 
     @functools.cached_property
     def initial_vector(self) -> Array:
