@@ -8,9 +8,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..core.ops import Value
+from ..core.tree import Structure, structure
 from .control_law import ControlLaw
 from .control_loop import ControlLoop
 from .controller import Controller, Measurement
+
+_without_design: set[Structure] = set()
+"""Structures of control laws that contain no design."""
 
 
 class LawDesign(ControlLaw):
@@ -47,17 +51,29 @@ class LawDesign(ControlLaw):
         return self.law.step(memory, measurement, dt)
 
 
-def with_designed_laws(part: Any) -> Any:
-    """A controller with the designed law in place of every LawDesign in it; the same object where there is none."""
+def with_designed_laws(law: Controller) -> Controller:
+    """A controller with the designed law in place of every LawDesign in it; the same object where there is none.
+
+    A controller that is no ControlLaw remains as it is.
+    """
+    if not isinstance(law, ControlLaw) or structure(law) in _without_design:
+        return law
+    found: Controller = _designed(law)
+    if found is law:
+        _without_design.add(structure(law))
+    return found
+
+
+def _designed(part: Any) -> Any:
     if isinstance(part, LawDesign):
-        return with_designed_laws(part.law)
+        return _designed(part.law)
     if isinstance(part, tuple):
-        items = tuple(with_designed_laws(item) for item in part)
+        items = tuple(_designed(item) for item in part)
         return part if all(a is b for a, b in zip(items, part, strict=True)) else items
     if not isinstance(part, Controller) or not dataclasses.is_dataclass(part):
         return part
     fields = {field.name: getattr(part, field.name) for field in dataclasses.fields(part) if field.init}
-    found = {name: with_designed_laws(value) for name, value in fields.items()}
+    found = {name: _designed(value) for name, value in fields.items()}
     changed = {name: value for name, value in found.items() if value is not fields[name]}
     return dataclasses.replace(part, **changed) if changed else part
 
