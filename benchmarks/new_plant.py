@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import os
 import pathlib
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
+from unittest import mock
 
 from filling import hanging, runs
 from measure import Section, Target, format_time, print_section, time_variants
@@ -27,7 +29,8 @@ from airmuscle.simulation.integrators import DormandPrince8
 
 HEADER = ("task", "median", "minimum")
 TEXT = (
-    "In a process that has already compiled a plant; the cache of traced functions is cleared each time. The first "
+    "In a process that has already compiled a plant; the caches of traced functions and of machine code are empty "
+    "each time. The first "
     "plant of a process also loads CasADi and LLVM, which is part of `Process start` below. The plant with energy "
     "meters has four muscles with friction, creep and a lagging wall, heat, and tubes of two volumes."
 )
@@ -45,16 +48,25 @@ simulate(run.system, run.command, duration=0.1, initial_state=run.initial_state)
 """
 
 
+@contextlib.contextmanager
+def without_stored_code() -> Iterator[None]:
+    """A folder without machine code in place of the kernel cache."""
+    with tempfile.TemporaryDirectory() as folder, mock.patch.dict(os.environ, {"AIRMUSCLE_CACHE_DIR": folder}):
+        yield
+
+
 def compile_anew(system: System) -> Program:
-    """The program of a system, without the cache of traced laws."""
+    """The program of a system, without the caches of traced laws and of machine code."""
     autodiff._traced_functions.clear()
-    return Program(system)
+    with without_stored_code():
+        return Program(system)
 
 
 def compile_with_step(system: System) -> Any:
     """A new program and its compiled step of ode8, 13 stages in one function."""
     program = compile_anew(system)
-    return program.step(DormandPrince8(1e-4).tableau(), compile_system(system).parameters)
+    with without_stored_code():
+        return program.step(DormandPrince8(1e-4).tableau(), compile_system(system).parameters)
 
 
 def many_muscles() -> Plant:
