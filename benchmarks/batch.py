@@ -87,10 +87,8 @@ def c_parameters(plant: Any, count: int) -> Array:
 
 
 def _stretch(braid: Any) -> tuple[Array, Array]:
-    return (
-        np.pi * braid.radius**2 * braid.resting_length / np.sin(braid.braid_angle) ** 2,
-        np.cos(braid.braid_angle),
-    )
+    volume_factor = np.pi * braid.radius**2 * braid.resting_length / np.sin(braid.braid_angle) ** 2
+    return volume_factor, np.cos(braid.braid_angle)
 
 
 def compile_libraries(folder: pathlib.Path) -> dict[str, tuple[ctypes.CDLL, int]]:
@@ -195,10 +193,8 @@ def measure_growth() -> list[tuple[str, ...]]:
     for count in GROWTH:
         parameters, seconds = random_parameters(plant, count), DURATION if count < 100_000 else DURATION / 5
         for cores in sorted({1, min(2, available_cores())}):
-            times = time_variants({"": lambda p=parameters, t=seconds, n=cores: run_library(plant, p, start, t, n)}, 2)[
-                ""
-            ]
-            rows.append(_row("simulate_batch, scaling", count, cores, times, seconds))
+            batch = {"batch": lambda p=parameters, t=seconds, n=cores: run_library(plant, p, start, t, n)}
+            rows.append(_row("simulate_batch, scaling", count, cores, time_variants(batch, 2)["batch"], seconds))
     return rows
 
 

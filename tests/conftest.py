@@ -2,8 +2,9 @@
 
 Ctrl-C interrupts here too, where a shell that runs the tests in the background has it ignored. `--hypothesis-profile
 thorough` draws 300 examples in place of 20. A figure whose axes, labels and curves are those of one that was drawn
-before gets the files of that one, except in tests with the marker `drawn`, which look at the files. The configuration
-file of the user is not read. Where Python must not write bytecode beside the sources, that of the tests, whose
+before gets the files of that one, except in tests with the marker `drawn`, which look at the files; its image has a low
+resolution. A command that is called within a test uses one process, because the tests themselves run on all cores;
+tests of several processes state their number. The configuration file of the user is not read. Where Python must not write bytecode beside the sources, that of the tests, whose
 assertions pytest rewrites, is stored in the cache folder of pytest.
 """
 
@@ -15,11 +16,12 @@ import signal
 import sys
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import pytest
 from hypothesis import settings
 
-from airmuscle.core import plotting
+from airmuscle.core import plotting, processes
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
 os.environ["AIRMUSCLE_CONFIG_DIR"] = os.devnull
@@ -29,6 +31,7 @@ if sys.dont_write_bytecode and sys.pycache_prefix is None:
 settings.register_profile("few", settings(), max_examples=20, deadline=None)
 settings.register_profile("thorough", settings(), max_examples=300, deadline=None)
 settings.load_profile("few")
+processes.available_cores = lambda: 1
 
 
 class OneOfAKind:
@@ -43,7 +46,8 @@ class OneOfAKind:
             return self.draw(figure, *options, **named)
         kind = kind_of(figure), repr((options, sorted(named.items())))
         if kind not in self.files:
-            self.files[kind] = self.draw(figure, *options, **named)
+            with mock.patch.dict(plotting._STYLE, {"savefig.dpi": 40}):
+                self.files[kind] = self.draw(figure, *options, **named)
         return self.files[kind]
 
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
 from plants import chosen_muscle
 
 from airmuscle.control import PID, AntagonisticInverse, Decentralised, SplitRange
 from airmuscle.mechanism import AntagonisticJoint, HangingMass
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
+from airmuscle.simulation import Solution
 
 VALVE = Valve(2.6e-9, 0.4)
 LARGE = Valve(1e-8, 0.4)
@@ -27,3 +29,14 @@ PRESSURES = Decentralised(
 )
 PRESSURE = PID("pressure", SPLIT, gain=2e-5, integral_time=0.5)
 INVERSE = AntagonisticInverse(MUSCLES, MECHANISM, 0.2e5, 5e5)
+
+
+def assert_identical(one: Solution, other: Solution, notes: bool = False) -> None:
+    """Two solutions are the same to the last bit; with `notes`, so are the notes of their recordings."""
+    assert one.status == other.status
+    assert list(one.recording) == list(other.recording)
+    for name in one.recording:
+        np.testing.assert_array_equal(one.recording[name], other.recording[name], err_msg=name, strict=True)
+    assert (one.final_time, one.final_state) == (other.final_time, other.final_state)
+    assert (one.control_state, one.statistics) == (other.control_state, other.statistics)
+    assert not notes or one.recording.notes == other.recording.notes

@@ -1,4 +1,10 @@
-"""Texts of muscle and scenario files that several tests use: a braid, two valves at a supply, a lift of the library."""
+"""Texts of muscle and scenario files that several tests use: a braid, two valves at a supply, a lift of the library;
+and files that are one of these texts with some of it replaced."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
 
 BRAID = '{ model = "Braid", radius = "10 mm", braid_angle = "25 deg", resting_length = "300 mm" }'
 MUSCLE_FILE = f"""
@@ -26,3 +32,17 @@ fill = [["1 s", 1]]
 [run]
 duration = "2 s"
 """
+
+
+def writer_of(whole: str) -> Callable[..., Path]:
+    """`written(folder, *changes)`: a text with some of it replaced, as the file scenario.toml of the folder."""
+
+    def written(folder: Path, *changes: tuple[str, str], text: str = whole) -> Path:
+        for was, becomes in changes:
+            assert was in text, was
+            text = text.replace(was, becomes, 1)
+        path = folder / "scenario.toml"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return written

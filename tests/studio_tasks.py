@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 
 from airmuscle.core.errors import InputError
-from airmuscle.report.output_folder import atomic_folder
+from airmuscle.core.output_folder import atomic_folder
 from airmuscle.studio.fit_settings import FieldError
 
 

@@ -16,6 +16,7 @@ from airmuscle.control import (
     PID,
     PWM,
     ControlLoop,
+    Driver,
     OnOffController,
     Periodic,
     Schedule,
@@ -27,6 +28,7 @@ from airmuscle.mechanism import HangingMass
 from airmuscle.plant.plant import Plant
 from airmuscle.simulation import Problem, Rodas4, RungeKutta4, solve
 from airmuscle.simulation.batch import Single, simulate_batch
+from airmuscle.simulation.bound_integrator import BoundIntegrator
 
 PI = PID("pressure", SPLIT, gain=8e-6, integral_time=0.3)
 STEPS = Schedule({"pressure": ((0, 1e5), (0.25, 3e5))})
@@ -139,6 +141,39 @@ def test_a_controller_that_is_called_from_python():
         assert_rows_are(batch, row, alone(plant, loop), ["pressure", "command.fill"])
     with pytest.raises(ParameterError, match=r"'controller.gain' varies .* its controller is no ControlLaw"):
         simulate_batch(LIFT, {"controller.gain": [1.0, 2.0]}, loop, duration=0.75)
+
+
+@dataclasses.dataclass(frozen=True)
+class OwnDriver(Driver):
+    """A driver of another class than those that kernels implement."""
+
+    inner: Driver
+
+    def init(self, start: float) -> Any:
+        return self.inner.init(start)
+
+    def step(self, state: Any, command: Any, start: float) -> Any:
+        return self.inner.step(state, command, start)
+
+
+@pytest.mark.parametrize("way", ["own driver", "no machine code"])
+def test_gains_differ_also_where_drivers_are_called_from_python(way, monkeypatch):
+    """The kernel of a loop neither knows a driver of the user nor calls an integrator that has no machine code."""
+    own = way == "own driver"
+    if not own:
+        monkeypatch.setattr(BoundIntegrator, "entry_address", property(lambda self: None))
+    drivers = {"fill": OwnDriver(PWM(50.0)) if own else PWM(50.0)}
+    switching, gains = OnOffController("pressure", SPLIT, hysteresis=1e4), np.array([1e4, 8e4])
+    batch = simulate_batch(
+        LIFT, {"controller.hysteresis": gains}, ControlLoop(switching, 0.0125, STEPS, drivers=drivers),
+        duration=0.75, output_times=TIMES,
+    )  # fmt: skip
+    monkeypatch.undo()
+    for row, gain in enumerate(gains):
+        law = dataclasses.replace(switching, hysteresis=gain)
+        loop = ControlLoop(law, 0.0125, STEPS, drivers={"fill": PWM(50.0)})
+        assert_rows_are(batch, row, alone(LIFT, loop), ["pressure", "setpoint.pressure", "command.fill"])
+    assert not np.array_equal(*batch["pressure"])
 
 
 def test_final_states_alone_need_no_rows():

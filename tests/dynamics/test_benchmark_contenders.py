@@ -51,16 +51,17 @@ def test_the_gains_that_are_identified_follow_the_truth_better_than_the_ends_of_
     contender = next(each for each in standard_contenders(JOINT) if "compensated" in each.name)
     law = complete(JOINT, contender).law
     task = replace(SHORT, begin=0.0, duration=1.2)
-    bounds = {"lead_time": (0.001, 0.1), "amplitude": (10.0, 5e4)}
+    bounds = {"lead_time": (0.001, 0.1), "amplitude": (10.0, 5e4), "acceleration_gain": (-500.0, 500.0)}
+    assert [(path.rsplit(".", 1)[1], pair) for path, pair in contender.identified.items()] == list(bounds.items())
     gains, runs = identify_gains(JOINT, law, bounds, task)
     assert [path.rsplit(".", 1)[1] for path in gains] == list(bounds)
-    assert 4 < runs <= 48
+    assert 6 < runs <= 72
     best = tracking_error(JOINT, with_gains(law, gains), task)
     for path, (low, high) in zip(gains, bounds.values(), strict=True):
         assert low < gains[path] < high
         ends = [tracking_error(JOINT, with_gains(law, {**gains, path: value}), task) for value in (low, high)]
         assert best < min(ends), path
-    with pytest.raises(ParameterError, match="no bounds of 'lag', which is to be identified; there are bounds of gain"):
-        replace(MINE, identified=("lag",))
+    with pytest.raises(ParameterError, match="no declared parameter 'lag' to be identified; there are gain"):
+        replace(MINE, identified={"lag": (0.0, 1.0)})
     with pytest.raises(ParameterError, match="0 gains end with 'lead'; give the end of exactly one path"):
         identify_gains(JOINT, law, {"lead": (0.0, 1.0)}, task)

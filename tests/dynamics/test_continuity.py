@@ -34,7 +34,7 @@ NOT_IN_A_PLANT = {
     "controllers, which look at a plant from outside": (
         "PID", "OnOffController", "SplitRange", "DeadZoneController", "CoContraction", "Decentralised", "SetpointCommand",
         "SetpointLead", "SigmaDelta", "SlidingMode", "StaticFeedForward", "StaticInverse", "WithFeedForward",
-        "AngleAndStiffness", "AntagonisticInverse", "Cascade", "ColumnSensor", "ComputedTorque", "FrictionFeedForward",
+        "AngleAndStiffness", "AntagonisticInverse", "Cascade", "ColumnSensor", "ComputedTorque", "FrictionFeedForward", "MotionFeedForward",
         "GainSchedule", "HysteresisCompensation", "HysteresisOperator", "InverseHysteresisOperator",
         "ProportionalFeedback", "StateFeedback", "SuperTwisting", "WithSensors", "WithSetpointDelay", "WithStuckValve"),
     "laws solved for pressure or contraction, where as_force_law stands in, and their readings": (

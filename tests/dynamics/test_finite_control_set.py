@@ -5,6 +5,7 @@ is held with few switchings, which a cost of switching reduces.
 from __future__ import annotations
 
 import itertools
+import pickle
 
 import numpy as np
 import pytest
@@ -106,3 +107,15 @@ def test_an_impossible_law_is_refused(changes, message):
     given = {"modes": MODES, "permitted": {"position": 1e-3}, **changes}
     with pytest.raises(ParameterError, match=message):
         FiniteControlSet(FILTER, FIRST, **given)
+
+
+def test_a_controller_with_a_filter_can_be_sent_to_another_process():
+    """Also after it has run, when it holds machine code and arrays."""
+    judged = law(horizon=2)
+    first = judged.best_sequence(FIRST.mean, [START["position"] + 2e-3], 0)
+    again = pickle.loads(pickle.dumps(judged))
+    assert again.best_sequence(FIRST.mean, [START["position"] + 2e-3], 0) == first
+    inputs = list(MODES[1].values())
+    ours, theirs = (each.predict(FIRST, inputs) for each in (FILTER, again.estimator))
+    assert np.array_equal(ours.mean, theirs.mean)
+    assert np.array_equal(ours.covariance, theirs.covariance)

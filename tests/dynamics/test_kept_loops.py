@@ -7,7 +7,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from control_plants import LIFT, SPLIT
+from control_plants import LIFT, SPLIT, assert_identical
 
 from airmuscle.control import (
     PID,
@@ -27,16 +27,6 @@ DRIVERS = {"held": {}, "pulsed and delayed": {"fill": (PWM(50.0, 1e-3), SOLENOID
 ON_OFF = OnOffController("pressure", SPLIT, hysteresis=1e4)
 SLOW = PID("pressure", SPLIT, gain=4e-6, integral_time=0.4)
 QUICK = PID("pressure", SPLIT, gain=2e-5, integral_time=0.2, initial_output=0.1)
-
-
-def assert_identical(one, other):
-    assert one.status == other.status
-    assert list(one.recording) == list(other.recording)
-    for name in one.recording:
-        np.testing.assert_array_equal(one.recording[name], other.recording[name], err_msg=name, strict=True)
-    assert (one.final_time, one.final_state) == (other.final_time, other.final_state)
-    assert (one.control_state, one.statistics) == (other.control_state, other.statistics)
-    assert one.recording.notes == other.recording.notes
 
 
 def fresh(problem: Problem):
@@ -67,7 +57,7 @@ def test_loops_of_other_gains_run_in_the_same_arrays_with_the_results_of_new_run
     solutions = [solve(problem) for problem in problems]
     assert len(prepared) == 1
     for problem, solution in zip(problems, solutions, strict=True):
-        assert_identical(solution, fresh(problem))
+        assert_identical(solution, fresh(problem), notes=True)
     assert not np.array_equal(solutions[0].recording["pressure"], solutions[1].recording["pressure"])
     assert "initial_output=0.1" in solutions[1].diagnostics[0].text
 
@@ -89,7 +79,7 @@ def test_loops_of_another_form_are_prepared_anew():
     ):
         solve(first)
         other = dataclasses.replace(first, **change)
-        assert_identical(solve(other), fresh(other))
+        assert_identical(solve(other), fresh(other), notes=True)
 
 
 def test_a_run_that_is_continued_is_the_run_in_one_also_after_other_runs_of_its_form():
@@ -130,4 +120,4 @@ def test_what_another_thread_takes_first_is_made_anew():
     known.integrators[command.integrator] = Emptied([None])
     known.recorders = Emptied([None])
     for problem, before in zip((loop, command), alone, strict=True):
-        assert_identical(solve(problem), before)
+        assert_identical(solve(problem), before, notes=True)

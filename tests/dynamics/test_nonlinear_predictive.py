@@ -4,6 +4,7 @@ order; limits of columns are kept, there is no offset at rest, and a program wit
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -161,3 +162,12 @@ def test_another_sample_time_than_that_of_the_estimator_is_refused():
         ParameterError, match=r"the sample time of the loop is 0\.02 s and that of the estimator 0\.01 s"
     ):
         LAW.step(LAW.init(), measurement, 0.02)
+
+
+def test_a_controller_can_be_sent_to_another_process():
+    """Also after it has planned, when it holds the programs of the solver."""
+    wanted, low, high = np.array([REST["position"] + 1e-3]), np.zeros(1), np.ones(1)
+    first, _ = LAW.plan(FIRST.mean, wanted, low, high)
+    again = pickle.loads(pickle.dumps(LAW))
+    assert again._programs == []
+    assert np.array_equal(again.plan(FIRST.mean, wanted, low, high)[0], first)

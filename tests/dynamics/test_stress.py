@@ -147,7 +147,7 @@ def series(seed):
 
 def test_a_series_spring_and_a_tube_with_inertia_keep_the_books_as_well():
     plant = series(1)
-    metered, (command, duration) = WithEnergyMeters(plant), switched(np.random.default_rng(1), 400)
+    metered, (command, duration) = WithEnergyMeters(plant), switched(np.random.default_rng(1), 150)
     start = metered.extend_state(plant.state_at(pressure=1e5, position=0.0))
     run = simulate(metered, command, duration=duration, initial_state=start, integrator=Rodas4(1e-6), output_times=1e-3)
     found = gaps(run)

@@ -273,9 +273,21 @@ def test_a_fill_is_predicted_by_the_others_within_one_per_cent_of_the_supply(one
     assert max(one_length.fills.cross_rms) < 6.2e3
 
 
-def test_stages_without_records_state_what_to_measure():
-    runs = [recording(MUSCLE.isobaric(bar, RANDOM), f"{bar} bar") for bar in (1.0, 3.0, 5.0)]
-    campaign = identify_campaign(runs)
+@pytest.fixture(scope="module")
+def isobaric_records():
+    """The campaign of three isobaric records, its progress, and its stages in the order in which they ended."""
+    runs = [recording(MUSCLE.isobaric(bar, np.random.default_rng(3)), f"{bar} bar") for bar in (1.0, 3.0, 5.0)]
+    fractions, ended = [], []
+    campaign = identify_campaign(
+        runs,
+        progress=lambda _, fraction: fractions.append(fraction),
+        finished=lambda name, _: ended.append(name),
+    )
+    return campaign, fractions, ended
+
+
+def test_stages_without_records_state_what_to_measure(isobaric_records):
+    campaign, _, _ = isobaric_records
     left_out = {name for name, stage in campaign.stages if isinstance(stage, LeftOutStage)}
     assert left_out == {"creep", "fills and volume", "release"}
     measures = " ".join(each.measure for each in campaign.next_experiments)
@@ -284,14 +296,8 @@ def test_stages_without_records_state_what_to_measure():
     assert campaign.muscle() is None
 
 
-def test_progress_ends_at_one_and_each_stage_is_reported_when_it_ends():
-    runs = [recording(MUSCLE.isobaric(bar, RANDOM), f"{bar} bar") for bar in (1.0, 3.0)]
-    fractions, ended = [], []
-    identify_campaign(
-        runs,
-        progress=lambda _, fraction: fractions.append(fraction),
-        finished=lambda name, _: ended.append(name),
-    )
+def test_progress_ends_at_one_and_each_stage_is_reported_when_it_ends(isobaric_records):
+    _, fractions, ended = isobaric_records
     assert fractions == sorted(fractions)
     assert fractions[-1] == pytest.approx(1.0)
     assert ended == ["records", "creep", "hysteresis", "static characteristic", "fills and volume", "release", "plan"]

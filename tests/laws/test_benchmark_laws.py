@@ -14,6 +14,7 @@ from airmuscle.control import (
     CoContraction,
     ColumnSensor,
     FrictionFeedForward,
+    MotionFeedForward,
     ProportionalFeedback,
     SetpointLead,
     SplitRange,
@@ -99,6 +100,14 @@ def test_friction_is_balanced_along_the_wanted_motion():
     assert told == pytest.approx([-3.0, -1.5, 0.0, 3.0, 3.0])
     with pytest.raises(ParameterError, match="boundary_speed"):
         FrictionFeedForward("r_rate", "u", amplitude=3.0, boundary_speed=0.0)
+
+
+def test_damping_and_inertia_are_balanced_along_the_wanted_motion():
+    law = MotionFeedForward("r_rate", "r_acceleration", "u", speed_gain=2.0, acceleration_gain=-0.5)
+    assert stepped(law, {"r_rate": 3.0, "r_acceleration": 4.0})[0]["u"] == 2.0 * 3.0 - 0.5 * 4.0
+    assert stepped(MotionFeedForward("r_rate", "r_acceleration", "u"), {"r_rate": 3.0, "r_acceleration": 4.0})[0] == {
+        "u": 0.0
+    }
 
 
 @pytest.mark.parametrize(("stuck_time", "samples"), [(0.0, 0), (0.03, 3), (0.035, 4)])

@@ -23,15 +23,16 @@ def in_series(stiffness=2e5, **parts):
 
 
 def bisected(muscle, p, contraction):
-    """The greatest inner contraction at which the spring does not hold more than the contractile part pulls."""
+    """The greatest inner contractions at which the spring does not hold more than the contractile part pulls."""
     (least, most), length = muscle.geometry.contraction_range, muscle.geometry.resting_length
     here = muscle.internal_imbalance(p, contraction, contraction)
-    low, high = (min(least, contraction), contraction) if here < 0 else (contraction, max(most, contraction))
-    if here >= 0:
-        high = min(high, contraction + here / (muscle.series.stiffness * length))
-    for _ in range(200):
+    high = np.minimum(np.maximum(most, contraction), contraction + here / (muscle.series.stiffness * length))
+    low = np.where(here < 0, np.minimum(least, contraction), contraction)
+    high = np.where(here < 0, contraction, high)
+    for _ in range(80):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if muscle.internal_imbalance(p, middle, contraction) >= 0 else (low, middle)
+        not_held = muscle.internal_imbalance(p, middle, contraction) >= 0
+        low, high = np.where(not_held, middle, low), np.where(not_held, high, middle)
     return low
 
 
@@ -49,7 +50,7 @@ INSIDE = {
 def test_newtons_method_inside_finds_what_bisection_does(muscle, p):
     """Also where what is out of balance is zero on a stretch, of which the far end is meant: no pressure, no spring."""
     contractions = np.array([-0.09, -0.02, 0.0, 0.05, 0.1, 0.11, 0.25, 0.6])
-    expected = [bisected(muscle, p, c) for c in contractions]
+    expected = bisected(muscle, p, contractions)
     together = muscle.steady_state(p, contractions)["inner_contraction"]
     np.testing.assert_allclose(together, expected, rtol=0.0, atol=1e-13)
     alone = [muscle.steady_state(p, float(c))["inner_contraction"] for c in contractions]

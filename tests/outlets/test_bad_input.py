@@ -24,12 +24,12 @@ from airmuscle.compile.cache.kernel import BoundKernel, fixed_step
 from airmuscle.control.inputs import SampledSignal, Schedule
 from airmuscle.core.declaration import model, parameter
 from airmuscle.core.errors import FileError, ParameterError, SolveError, UnitError
+from airmuscle.core.output_folder import atomic_folder, check_writable
 from airmuscle.core.units import ABSOLUTE, conversion, quantity
 from airmuscle.library.files import list_laws, read_toml
 from airmuscle.mechanism import HangingMass
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
-from airmuscle.report.output_folder import atomic_folder, check_writable
 from airmuscle.simulation import bound_integrator
 
 MUSCLE = "dmsp-20-300"
@@ -452,7 +452,7 @@ def test_an_interrupted_simulation_keeps_what_it_has(tmp_path: Path, monkeypatch
 
 def test_what_a_killed_process_has_left_is_removed_by_the_next_one(tmp_path: Path):
     code = (
-        "import os, signal, sys; from airmuscle.report.output_folder import atomic_folder\n"
+        "import os, signal, sys; from airmuscle.core.output_folder import atomic_folder\n"
         "with atomic_folder(sys.argv[1]) as folder:\n    (folder / 'a.csv').touch(); os.kill(os.getpid(), signal.SIGKILL)"
     )
     subprocess.run([sys.executable, "-c", code, str(tmp_path)], check=False)

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenario_files import writer_of
 from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
@@ -64,15 +65,7 @@ sample_time = "5 ms"
 [input.controller.setpoint]
 {SETPOINT}
 """
-
-
-def written(folder: Path, *changes: tuple[str, str], text: str = GOOD) -> Path:
-    for was, becomes in changes:
-        assert was in text, was
-        text = text.replace(was, becomes, 1)
-    path = folder / "scenario.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
+written = writer_of(GOOD)
 
 
 # What is right
@@ -320,6 +313,7 @@ def test_the_schema_knows_every_controller():
         "FrictionFeedForward",
         "GainSchedule",
         "HysteresisCompensation",
+        "MotionFeedForward",
         "OnOffController",
         "PID",
         "ProportionalFeedback",
@@ -450,6 +444,6 @@ def test_a_study_varies_the_numbers_of_a_controller(tmp_path: Path):
 
 
 def test_a_study_depends_on_the_controllers_program():
-    from airmuscle.study.fingerprint import EXCLUDED_PACKAGES
+    from airmuscle.core.fingerprint import EXCLUDED_PACKAGES
 
     assert "control" not in EXCLUDED_PACKAGES

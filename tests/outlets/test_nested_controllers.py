@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenario_files import writer_of
 
 from airmuscle.control import (
     PID,
@@ -26,6 +27,7 @@ from airmuscle.control import (
     GainSchedule,
     HysteresisCompensation,
     HysteresisOperator,
+    MotionFeedForward,
     OnOffController,
     Periodic,
     ProportionalFeedback,
@@ -56,6 +58,7 @@ from airmuscle.study.tuning.scenario_loop import load_scenario_loop
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "joint_cascade.toml"
 TEXT = EXAMPLE.read_text(encoding="utf-8")
+written = writer_of(TEXT)
 DEGREE, BAR = math.pi / 180.0, 1e5
 SIDES = ("left", "right")
 SETPOINTS, PRESSURES = (tuple(f"{side}.{name}" for side in SIDES) for name in ("setpoint", "pressure"))
@@ -81,6 +84,7 @@ def laws(regulated: Scenario) -> dict[str, ControlLaw]:
         StateFeedback(("angle",), ("angle",), (first,), ("angle", "speed"), *matrices),
         StaticFeedForward(StaticInverse(plant.muscles[0]), first, 0.3), SetpointCommand((first,), ("wanted",)),
         SetpointLead("wanted", "wanted_rate", first, 0.02), FrictionFeedForward("angular_speed", first, 5e3, 0.1),
+        MotionFeedForward("angular_speed", "angular_acceleration", first, 2e3, -200.0),
         ProportionalFeedback(PRESSURES, SETPOINTS, 0.5), SigmaDelta(both), WithStuckValve(pid, first, 1.0, 0.5),
         WithSetpointDelay(pid, 3), WithFeedForward(CoContraction(SETPOINTS, 2e5), pid),
         WithSensors(pid, (ColumnSensor("angle", 1e-3, 2e-4, 3e-3, 2),), seed=7.0),
@@ -95,16 +99,6 @@ def with_law(base: Scenario, law: Controller) -> Scenario:
     """The scenario of a joint with regulators and a law; its set points are constant."""
     loop = ControlLoop(law, 5e-3, Schedule(dict.fromkeys(law.setpoints, ((0.0, 0.1), (0.5, 0.2)))))
     return replace(base, problem=replace(base.problem, input=loop, duration=0.05))
-
-
-def written(folder: Path, *changes: tuple[str, str]) -> Path:
-    text = TEXT
-    for was, becomes in changes:
-        assert was in text, was
-        text = text.replace(was, becomes, 1)
-    path = folder / "scenario.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
 
 
 def test_the_example_is_the_loop_in_python():

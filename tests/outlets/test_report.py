@@ -26,12 +26,12 @@ import pytest
 from airmuscle.core import plotting
 from airmuscle.core.display import display
 from airmuscle.core.errors import FileError, SolveError, UnknownNameError
+from airmuscle.core.output_folder import atomic_folder, check_writable
 from airmuscle.core.reference import Reference
 from airmuscle.report.chapter import AtLeast, AtMost, Chapter, Claim, Equal, Kind, Plot, Table, statements
 from airmuscle.report.formatting import MARKS, MEANINGS, count_verdicts, format_number, format_published
 from airmuscle.report.formula import to_mathtext, to_plain
 from airmuscle.report.html import MAX_SVG_BYTES, render_cell, render_header
-from airmuscle.report.output_folder import atomic_folder, check_writable
 from airmuscle.report.write import as_json, write_report
 from airmuscle.reproduce import run
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenario_files import writer_of
 
 from airmuscle.control.driver import PWM, SolenoidDriver
 from airmuscle.control.inputs import Periodic, SampledSignal, Schedule
@@ -63,16 +64,7 @@ discharge = {{ model = "Valve", conductance = 3e-9, critical_ratio = 0.3 }}
 {DURATION}
 initial_state = {{ pressure = "1 bar" }}
 """
-
-
-def written(folder: Path, *changes: tuple[str, str], text: str = GOOD) -> Path:
-    """The scenario with some of its text replaced, as a file."""
-    for was, becomes in changes:
-        assert was in text
-        text = text.replace(was, becomes, 1)
-    path = folder / "scenario.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
+written = writer_of(GOOD)
 
 
 # Every form of docs/scenario.md

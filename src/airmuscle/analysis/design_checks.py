@@ -27,3 +27,12 @@ def check_numbers(
     for name in needed:
         if name not in given:
             raise ParameterError(f"{owner}: {argument} has no number for '{name}'; give one.")
+
+
+def check_sample_time(owner: str, sample_time: float, of_estimator: float) -> None:
+    """Raise ParameterError where the sample time of the loop [s] is not that of the estimator [s]."""
+    if abs(sample_time - of_estimator) > 1e-9 * sample_time:
+        raise ParameterError(
+            f"{owner}: the sample time of the loop is {sample_time:g} s and that of the estimator {of_estimator:g} s; "
+            "they must be equal."
+        )

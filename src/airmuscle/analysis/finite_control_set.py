@@ -18,7 +18,7 @@ from ..core.errors import ParameterError, SolveError
 from ..core.reference import Reference
 from ..core.short_repr import ShortRepr
 from ..core.status import Status
-from .design_checks import check_known, check_numbers
+from .design_checks import check_known, check_numbers, check_sample_time
 from .state_estimator import StateEstimate, StateEstimator
 
 QI2019 = Reference(
@@ -90,7 +90,7 @@ class FiniteControlSet(ShortRepr, Controller):
 
     def __post_init__(self) -> None:
         owner, known = "FiniteControlSet", compile_system(self.estimator.plant).description
-        columns = (*known.state_names, *known.output_names)
+        columns = self.estimator.plant_columns
         check_numbers(owner, "permitted", self.permitted, columns, ())
         if not self.permitted or not self.modes:
             raise ParameterError(f"{owner}: give one mode or more, and the permitted deviation of one column or more.")
@@ -107,6 +107,10 @@ class FiniteControlSet(ShortRepr, Controller):
                 f"{owner}: {len(self.modes)} modes over a horizon of {self.horizon} samples; the horizon must be 1 or "
                 f"more and the number of sequences at most {MAX_SEQUENCES}. Shorten the horizon."
             )
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields without the arrays of the compiled search, which belong to one process."""
+        return {**self.__dict__, "_searches": []}
 
     @property
     def measured_columns(self) -> tuple[str, ...]:
@@ -126,11 +130,7 @@ class FiniteControlSet(ShortRepr, Controller):
     def step(
         self, memory: FiniteSetMemory, measurement: Measurement, dt: float
     ) -> tuple[Mapping[str, float], FiniteSetMemory]:
-        if abs(dt - self.estimator.sample_time) > 1e-9 * dt:
-            raise ParameterError(
-                f"FiniteControlSet: the sample time of the loop is {dt:g} s and that of the estimator "
-                f"{self.estimator.sample_time:g} s; they must be equal."
-            )
+        check_sample_time("FiniteControlSet", dt, self.estimator.sample_time)
         table = self._mode_table
         values = [float(measurement.columns[name]) for name in self.measured_columns]
         estimate, _ = self.estimator.correct(memory.estimate, values, table[memory.mode])
@@ -163,8 +163,8 @@ class FiniteControlSet(ShortRepr, Controller):
 
     def _bind(self) -> BoundSearch:
         filter_, ready = self.estimator, compile_system(self.estimator.plant)
-        known, total, p = ready.description, len(self.estimator.states), len(self.permitted)
-        columns = (*known.state_names, *known.output_names)
+        total, p = len(filter_.states), len(self.permitted)
+        columns = filter_.plant_columns
         functions = augmented_rates(ready, [columns.index(name) for name in self.permitted], *filter_.places)
         table, n = self._mode_table, ready.sizes.states
         changes = np.zeros((len(table), len(table)))

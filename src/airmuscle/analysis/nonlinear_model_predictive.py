@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from ..compile.program import compile_system
-from ..control.controller import Controller, Measurement
+from ..control.controller import Measurement
 from ..control.linear_model_predictive import RAWLINGS2017
+from ..control.multivariable import MultivariableController, failure_notes
 from ..core.arrays import Array
 from ..core.errors import ParameterError
 from ..core.reference import Reference
 from ..core.short_repr import ShortRepr
-from .design_checks import check_known, check_numbers
+from .design_checks import check_known, check_numbers, check_sample_time
 from .linear_model import linearise
 from .predictive_program import MAX_HORIZON, PredictiveProgram, Programs
 from .riccati import discretised, regulator
@@ -35,7 +36,7 @@ class NonlinearMemory(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class NonlinearModelPredictive(ShortRepr, Controller):
+class NonlinearModelPredictive(ShortRepr, MultivariableController):
     """Nonlinear model predictive control: the first input of the best plan under the equations of the plant.
 
         f(x_s, u_s, d) = 0,   min |z(x_s) - r|^2 w + |u_s - u_0|_R^2                       target
@@ -83,7 +84,7 @@ class NonlinearModelPredictive(ShortRepr, Controller):
 
     def __post_init__(self) -> None:
         owner, known = "NonlinearModelPredictive", compile_system(self.estimator.plant).description
-        columns = (*known.state_names, *known.output_names)
+        columns = self.estimator.plant_columns
         for argument, names, allowed in (
             ("controlled", self.controlled, columns), ("commanded", self.commanded, known.input_names),
             ("limits", self.limits, columns), ("operating_inputs", self.operating_inputs, known.input_names),
@@ -105,38 +106,26 @@ class NonlinearModelPredictive(ShortRepr, Controller):
         if not self.slack_weight > 0.0:
             raise ParameterError(f"{owner}: slack_weight is {self.slack_weight!r}; it must be positive.")
 
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields without the programs of the solver, which belong to one process."""
+        return {**self.__dict__, "_programs": []}
+
     @property
-    def measured_columns(self) -> tuple[str, ...]:
+    def measured(self) -> tuple[str, ...]:  # type: ignore[override]
+        """The columns that the estimator receives."""
         return self.estimator.measured
-
-    @property
-    def setpoints(self) -> tuple[str, ...]:
-        return self.controlled
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        return self.commanded
 
     def init(self) -> NonlinearMemory:
         start = np.array([float(self.operating_inputs.get(name, 0.0)) for name in self.commanded])
         return NonlinearMemory(self.first, start, np.zeros((0, start.size)), 0, None, 0)
 
     def notes(self, memory: NonlinearMemory) -> tuple[str, ...]:
-        if not memory.failures:
-            return ()
-        return (
-            f"NonlinearModelPredictive: the nonlinear program had no solution at {memory.failures} samples; the next "
-            "input of the last plan was applied. Make the limits of columns soft (a finite slack_weight) or wider.",
-        )
+        return failure_notes("NonlinearModelPredictive", "nonlinear program", memory.failures)
 
     def step(
         self, memory: NonlinearMemory, measurement: Measurement, dt: float
     ) -> tuple[Mapping[str, float], NonlinearMemory]:
-        if abs(dt - self.estimator.sample_time) > 1e-9 * dt:
-            raise ParameterError(
-                f"NonlinearModelPredictive: the sample time of the loop is {dt:g} s and that of the estimator "
-                f"{self.estimator.sample_time:g} s; they must be equal."
-            )
+        check_sample_time("NonlinearModelPredictive", dt, self.estimator.sample_time)
         values = [float(measurement.columns[name]) for name in self.measured_columns]
         estimate, _ = self.estimator.correct(memory.estimate, values, self._all_inputs(memory.applied))
         wanted = np.array([float(measurement.setpoints[name]) for name in self.controlled])

@@ -96,14 +96,14 @@ class StateEstimator(ShortRepr, abc.ABC):
         owner = type(self).__name__
         check_system(owner, self.plant)
         compiled = compile_system(self.plant)
+        object.__setattr__(self, "_compiled", compiled)
         states, leaves = compiled.description.state_names, [leaf.path for leaf in tree.leaves(self.plant)]
-        columns = (*states, *compiled.output_names)
+        columns = self.plant_columns
         for argument, names, known in (
             ("measured", self.measured, columns), ("parameters", self.parameters, leaves),
             ("disturbances", self.disturbances, states),
         ):  # fmt: skip
             check_known(owner, argument, names, known)
-        object.__setattr__(self, "_compiled", compiled)
         check_known(owner, "process_noise", self.process_noise, self.states)
         check_known(owner, "measurement_noise", self.measurement_noise, self.measured)
         for name in self.measured:
@@ -115,6 +115,15 @@ class StateEstimator(ShortRepr, abc.ABC):
         seen = [columns.index(name) for name in self.measured]
         object.__setattr__(self, "_functions", augmented_rates(compiled, seen, *self.places))
         object.__setattr__(self, "_idle", [])
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields that were given; machine code and arrays belong to one process."""
+        return {field.name: getattr(self, field.name) for field in dataclasses.fields(self) if field.init}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        for name, value in state.items():
+            object.__setattr__(self, name, value)
+        self.__post_init__()
 
     @abc.abstractmethod
     def _bind(self) -> BoundFilter:
@@ -136,6 +145,11 @@ class StateEstimator(ShortRepr, abc.ABC):
             *self._compiled.description.state_names, *self.parameters,
             *(f"{name}{DISTURBANCE}" for name in self.disturbances),
         )  # fmt: skip
+
+    @property
+    def plant_columns(self) -> tuple[str, ...]:
+        """The names of the states and outputs of the plant."""
+        return (*self._compiled.description.state_names, *self._compiled.output_names)
 
     @property
     def places(self) -> tuple[list[int], list[int]]:

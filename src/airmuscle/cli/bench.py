@@ -12,13 +12,13 @@ import typer
 from ..characteristic import ValidityRange
 from ..core.display import quantity_text
 from ..core.errors import ColumnError, IdentificationError
+from ..core.output_folder import atomic_folder, check_writable
 from ..core.units import quantity
 from ..identify.experiment_design import BenchLimits
 from ..identify.recursive_fit import RecursiveFit
 from ..library.entry import Entry
 from ..library.write import save
 from ..recording.follow import RowReader, follow_lines
-from ..report.output_folder import atomic_folder, check_writable
 from .options import Json, OptionalFolder
 from .reading_options import Columns, Constants, Length, Units, parse_pairs
 from .terminal import echo, percent

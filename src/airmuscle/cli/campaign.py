@@ -11,6 +11,7 @@ import numpy as np
 import typer
 
 from ..core.errors import AirmuscleError, ColumnError, FileError, IdentificationError
+from ..core.output_folder import atomic_folder, check_writable
 from ..geometry import Geometry
 from ..identify.campaign import STAGES, Campaign, LeftOutStage, StaticStage, identify_campaign
 from ..library.campaign_entry import campaign_entry
@@ -20,7 +21,6 @@ from ..library.write import save
 from ..recording import ColumnMapping, Recording
 from ..recording.reader import check_bench, find_files, read_file
 from ..report.campaign_chapters import UnreadFile, ValidationRow, campaign_chapters
-from ..report.output_folder import atomic_folder, check_writable
 from ..report.write import as_json, write_into
 from ..scenario.campaign import RecordScenario, campaign_scenarios
 from .campaign_output import campaign_to_dict, print_campaign, stage_to_dict

@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from ..compile.cache.store import cache_folder, read_private
+from ..core.fingerprint import fingerprint, program_fingerprint
 from ..geometry import Geometry
 from ..recording import Recording
-from ..study.fingerprint import fingerprint, program_fingerprint
 
 OMITTED_PACKAGES = ("cli", "export", "report", "reproduce", "studio", "environments", "sizing", "control")
 """Parts of the program that do not affect the stages of a campaign."""

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from ..core.output_folder import check_writable
 from ..export import (
     C99,
     JavaScript,
@@ -24,7 +25,6 @@ from ..export.identifiers import make_identifier
 from ..export.microcontroller import PROCESSORS, run_in_emulator
 from ..export.platforms import PLATFORMS, Platform, find_platform
 from ..library.law_file import load_law
-from ..report.output_folder import check_writable
 from ..scenario.scenario import load_scenario
 from ..simulation.batch import Double, Precision, Single
 from .completion import complete_entry

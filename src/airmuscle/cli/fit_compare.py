@@ -8,6 +8,7 @@ from typing import Any
 
 import typer
 
+from ..core.output_folder import check_writable
 from ..core.processes import available_cores
 from ..geometry import Geometry
 from ..identify import Candidate, Comparison, standard_candidates
@@ -17,7 +18,6 @@ from ..library.initial_law import InitialLaw, find_initial_law, resting_lengths
 from ..recording import Recording
 from ..report.compare_chapter import compare_chapter
 from ..report.fit_files import fitted_entry, left_out_ratio, missing_geometry
-from ..report.output_folder import check_writable
 from .fit_geometry import check_one_length, with_braid
 from .fit_options import FitRequest
 from .fit_output import fit_to_dict, print_results, write_results

@@ -9,11 +9,11 @@ from typing import Annotated, Any
 
 import typer
 
+from ..core.output_folder import atomic_folder, check_writable
 from ..identify.dynamic import CrossPrediction, DynamicFit, describe_cross_predictions
 from ..identify.dynamic.profile import DynamicProfile
 from ..recording.segment import inspect
 from ..report.dynamic_chapter import dynamic_chapters
-from ..report.output_folder import atomic_folder, check_writable
 from ..report.write import write_into
 from ..scenario.identification import DynamicFitSetup, load_dynamic_fit
 from .options import Folder, Json

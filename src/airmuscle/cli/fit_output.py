@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from ..core.output_folder import atomic_folder
 from ..identify import Fit
 from ..library.entry import Entry
 from ..recording import Recording
 from ..report.chapter import Chapter
 from ..report.fit_files import write_fit
-from ..report.output_folder import atomic_folder
 from .option_hints import in_options
 from .terminal import echo
 

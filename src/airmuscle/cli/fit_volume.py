@@ -14,6 +14,7 @@ from ..characteristic import ValidityRange
 from ..characteristic.validity_range import validity_range_of
 from ..core.declaration import parameters
 from ..core.errors import ParameterError, PhysicsError
+from ..core.output_folder import atomic_folder, check_writable
 from ..core.units import quantity
 from ..identify.volume_fit import VolumeFit, fit_volume, volume_points
 from ..library.entry import Entry
@@ -22,7 +23,6 @@ from ..library.law_file import load_law
 from ..library.write import part_toml, save
 from ..recording import Recording
 from ..report.fit_files import list_files
-from ..report.output_folder import atomic_folder, check_writable
 from ..report.volume_chapter import volume_chapter
 from ..report.write import write_into
 from .bench_files import Files, read_recordings

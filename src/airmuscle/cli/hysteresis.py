@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from ..characteristic.base import ForceLaw
+from ..core.output_folder import atomic_folder, check_writable
 from ..identify.campaign import HeldCreep, fit_held_creep, free_of_creep
 from ..identify.hysteresis import (
     LoopFit,
@@ -26,7 +27,6 @@ from ..library.write import part_toml, save
 from ..recording import Recording
 from ..report.chapter import Chapter
 from ..report.hysteresis_chapter import hysteresis_chapters
-from ..report.output_folder import atomic_folder, check_writable
 from ..report.write import write_into
 from .bench_files import Files, read_recordings
 from .hysteresis_output import creep_to_dict, joint_to_dict, loop_to_dict, print_creep, print_joint, print_loops

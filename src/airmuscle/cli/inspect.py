@@ -9,11 +9,11 @@ from typing import Annotated, Any
 
 import typer
 
+from ..core.output_folder import atomic_folder
 from ..core.plotting import save
 from ..recording import ColumnMapping, Recording, read
 from ..recording.columns import quantity_of
 from ..recording.segment import Inspection, Sampling, inspect_all
-from ..report.output_folder import atomic_folder
 from .inspection_text import COLUMNS, column_rows, summary
 from .options import Json, OptionalFolder
 from .progress import reading_progress

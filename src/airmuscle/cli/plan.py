@@ -9,12 +9,12 @@ import typer
 
 from ..characteristic import ValidityRange
 from ..core.display import quantity_text
+from ..core.output_folder import atomic_folder, check_writable
 from ..core.units import quantity
 from ..identify.experiment_design import BenchLimits, ExperimentPlan, PlannedRun, optimal_design
 from ..library.files import is_path, read_toml
 from ..library.law_file import load_law
 from ..recording import write_csv
-from ..report.output_folder import atomic_folder, check_writable
 from .options import Json, Name, OptionalFolder
 from .plan_records import describes_study, plan_records
 from .terminal import echo, percent, print_json, print_table

@@ -9,9 +9,9 @@ from typing import Any
 
 import typer
 
+from ..core.output_folder import atomic_folder, check_writable
 from ..identify.dynamic import RecordRanking, rank_records
 from ..report.chapter import Chapter, Table
-from ..report.output_folder import atomic_folder, check_writable
 from ..report.write import save_table, write_into
 from ..scenario.identification import load_dynamic_fit
 from .terminal import echo, print_json, print_table

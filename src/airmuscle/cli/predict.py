@@ -9,13 +9,13 @@ from typing import Annotated, Any
 import typer
 
 from ..core.errors import FileError
+from ..core.output_folder import atomic_folder, check_writable
 from ..core.units import quantity
 from ..identify.dynamic import StartTime
 from ..identify.prediction import RecordPrediction
 from ..library.entry_prediction import predict_with_entry
 from ..library.files import is_path, list_plants, read_toml
 from ..library.law_file import describes_plant, load_law
-from ..report.output_folder import atomic_folder, check_writable
 from ..report.prediction_chapter import describe_band, prediction_chapters, with_unit
 from ..report.write import write_into
 from ..scenario.prediction import load_plant_model

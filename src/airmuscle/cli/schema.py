@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..report.output_folder import atomic_folder
+from ..core.output_folder import atomic_folder
 from ..report.write import as_json
 from ..scenario.schema import muscle_schema, scenario_schema
 from .terminal import echo, print_json

@@ -9,10 +9,10 @@ from typing import Annotated, Any
 import typer
 
 from ..core.errors import AirmuscleError, UnitError
+from ..core.output_folder import atomic_folder, check_writable
 from ..core.units import quantity
 from ..library.law_file import load_law
 from ..report.formatting import format_number
-from ..report.output_folder import atomic_folder, check_writable
 from ..report.sizing_chapter import choice_row, sizing_chapter
 from ..report.write import write_into
 from ..sizing import (

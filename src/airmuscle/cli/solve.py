@@ -14,6 +14,7 @@ from ..characteristic.validity_range import validity_range_of
 from ..core import leaves
 from ..core.display import quantity_text
 from ..core.errors import AirmuscleWarning, GeometryLimitError, PhysicsError, RatingError, SolveError
+from ..core.output_folder import atomic_folder
 from ..core.plotting import save
 from ..core.units import quantity
 from ..library.entry import Entry
@@ -24,7 +25,6 @@ from ..muscle.isobars import WorkingPoint, compute_isobars
 from ..pneumatics import Ambient
 from ..pneumatics.gas import check_above_vacuum
 from ..report.isobar_plot import describe_point, isobar_plot, isobar_table
-from ..report.output_folder import atomic_folder
 from ..report.write import save_table
 from .options import Diameter, Json, Name, OptionalFolder, RestingLength
 from .terminal import echo, percent, print_json, print_table

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..control.control_loop import ControlLoop
+from ..core.output_folder import atomic_folder, check_writable
 from ..core.tree import leaves
 from ..report.chapter import Table
 from ..report.formatting import format_number, table_rows
-from ..report.output_folder import atomic_folder, check_writable
 from ..report.write import save_table, write_into
 from ..scenario.controller import signal_units
 from ..study import (

@@ -31,3 +31,5 @@ class Progress(enum.IntEnum):
     FIRST_SEGMENT = 7
     FIRST_ROW = 8
     """The first segment and row of the present interval."""
+    WAITING = 9
+    """1 while the commands of the present interval are awaited from a controller that is called from Python."""

@@ -125,6 +125,9 @@ class Description:
         """The last initial state that was checked and found possible."""
         self.checked_segments: Any = None
         """The last segments of inputs that were found within their ranges, if nobody can write to them."""
+        self.last_times: tuple[Any, Any, Array] = None, None, np.empty(0)
+        """What was asked for, the instants of the input, and the output times of the last run, if nobody can write to
+        them."""
         self.integrators: dict[Any, list[Any]] = {}
         """Integrators bound to this system that no run uses at present, by their integrator."""
         self.holders: dict[Any, list[Any]] = {}

@@ -18,7 +18,9 @@ from .hysteresis_compensation import HysteresisCompensation
 from .hysteresis_operator import HysteresisOperator, InverseHysteresisOperator
 from .inputs import ZERO_INPUT, InputSignal, Periodic, SampledSignal, Schedule
 from .iterative_learning import IterativeLearning
+from .law_design import LawDesign
 from .linear_model_predictive import LinearModelPredictive
+from .motion_feed_forward import MotionFeedForward
 from .on_off import OnOffController
 from .open_loop_law import OpenLoopLaw
 from .pid import PID
@@ -64,8 +66,10 @@ __all__ = [
     "InputSignal",
     "InverseHysteresisOperator",
     "IterativeLearning",
+    "LawDesign",
     "LinearModelPredictive",
     "Measurement",
+    "MotionFeedForward",
     "OnOffController",
     "OpenLoopLaw",
     "Periodic",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 import sys
 from collections.abc import Mapping, Sequence
@@ -106,7 +107,7 @@ class ControlLoop(ShortRepr):
             measured=(math.nan,) * len(controller.measured_columns),
             commanded=(0.0,) * len(controller.inputs),
             applied_inputs=(),
-            drivers=WithDrivers(self.other_inputs, self.drivers).init(start),
+            drivers=WithDrivers(self.other_inputs, self.drivers).init(start) if self.drivers else {},
         )
 
     def check_columns(self, columns: Sequence[str], inputs: Sequence[str]) -> None:
@@ -134,15 +135,19 @@ class ControlLoop(ShortRepr):
 
     def describe(self, units: Mapping[str, str]) -> str:
         """Controller, sample time, controlled and manipulated variables; `units` by the names of columns and inputs."""
-        with_unit = {name: f"{name} [{unit}]" if unit not in ("", "1") else name for name, unit in units.items()}
         measured, commanded = (
-            ", ".join(with_unit.get(name, name) for name in names)
+            ", ".join(f"{name} [{units[name]}]" if units.get(name, "1") not in ("", "1") else name for name in names)
             for names in (self.controller.measured_columns, self.controller.inputs)
         )
         return (
-            f"{_describe_controller(self.controller)}, sample time {_milliseconds(self.sample_time)}, "
+            f"{self._controller_text}, sample time {_milliseconds(self.sample_time)}, "
             f"measured {measured}, commanded {commanded}"
         )
+
+    @functools.cached_property
+    def _controller_text(self) -> str:
+        """The controller and its fields."""
+        return _describe_controller(self.controller)
 
     def as_open_loop(self, recording: Recording) -> InputSignal:
         """The commands of a complete recorded run as an input signal without a controller.

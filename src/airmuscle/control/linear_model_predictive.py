@@ -16,7 +16,7 @@ from ..core.reference import Reference
 from ..core.short_repr import ShortRepr
 from .condensed_problem import CondensedProblem
 from .controller import Measurement
-from .multivariable import MultivariableController
+from .multivariable import MultivariableController, failure_notes
 
 RAWLINGS2017 = Reference(
     key="rawlings-2017",
@@ -127,12 +127,7 @@ class LinearModelPredictive(ShortRepr, MultivariableController):
         return PredictiveMemory(np.zeros(len(self.observer.transition)), empty, 0, free, 0)
 
     def notes(self, memory: PredictiveMemory) -> tuple[str, ...]:
-        if not memory.failures:
-            return ()
-        return (
-            f"LinearModelPredictive: the quadratic program had no solution at {memory.failures} samples; the next "
-            "input of the last plan was applied. Make the limits of columns soft (a finite slack_weight) or wider.",
-        )
+        return failure_notes("LinearModelPredictive", "quadratic program", memory.failures)
 
     def step(
         self, memory: PredictiveMemory, measurement: Measurement, dt: float

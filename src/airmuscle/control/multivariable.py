@@ -23,3 +23,13 @@ class MultivariableController(Controller):
     @property
     def inputs(self) -> tuple[str, ...]:
         return self.commanded
+
+
+def failure_notes(owner: str, program: str, failures: int) -> tuple[str, ...]:
+    """The note of a predictive controller on the samples at which its program had no solution; none without them."""
+    if not failures:
+        return ()
+    return (
+        f"{owner}: the {program} had no solution at {failures} samples; the next input of the last plan was applied. "
+        "Make the limits of columns soft (a finite slack_weight) or wider.",
+    )

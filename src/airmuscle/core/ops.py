@@ -21,6 +21,16 @@ _PLAIN = frozenset({float, int, bool})
 """Types of plain numbers, which need no library; a controller calls these functions dozens of times for each sample."""
 
 
+_SMALLEST, _LARGEST = sys.float_info.min, sys.float_info.max
+_DOMAINS = {
+    **dict.fromkeys(("sin", "cos", "tan", "arctan", "arcsinh", "floor"), (-_LARGEST, _LARGEST)),
+    **dict.fromkeys(("exp", "sinh", "cosh"), (-700.0, 700.0)),
+    "sqrt": (0.0, _LARGEST),
+    "log": (_SMALLEST, _LARGEST),
+}
+"""Numbers for which a function is certain to have a finite value."""
+
+
 def _library(*operands: Value) -> ModuleType | None:
     """Return the module that handles these operands; None for plain numbers."""
     library = None
@@ -86,65 +96,68 @@ def both(a: Value, b: Value) -> Value:
 
 def floor(x: Value) -> Value:
     """Greatest integer that is not above `x`; its derivative is 0."""
-    return _on_float(_unary("floor", x), x)
+    return _unary("floor", x)
 
 
 def _unary(name: str, x: Value) -> Value:
+    """A function of the library of `x`; of a number outside its domain NaN or infinity, without a warning of NumPy."""
     library = _library(x)
-    return getattr(np if library is None else library, name)(x)
-
-
-def _on_float(result: Value, x: Value) -> Value:
-    return float(result) if isinstance(x, float | int) else result
+    if library is not None:
+        return getattr(library, name)(x)
+    low, high = _DOMAINS[name]
+    if low <= x <= high:
+        return float(getattr(np, name)(x))
+    with np.errstate(all="ignore"):  # takes several times as long as the function
+        return float(getattr(np, name)(x))
 
 
 def sqrt(x: Value) -> Value:
     """Square root; NaN below zero."""
     if type(x) is float and x >= 0.0:
         return math.sqrt(x)
-    return _on_float(_unary("sqrt", x), x)
+    return _unary("sqrt", x)
 
 
 def exp(x: Value) -> Value:
     """Exponential function."""
-    return _on_float(_unary("exp", x), x)
+    return _unary("exp", x)
 
 
 def log(x: Value) -> Value:
     """Natural logarithm; NaN below zero."""
-    return _on_float(_unary("log", x), x)
+    return _unary("log", x)
 
 
 def sin(x: Value) -> Value:
     """Sine of an angle in radians."""
-    return _on_float(_unary("sin", x), x)
+    return _unary("sin", x)
 
 
 def cos(x: Value) -> Value:
     """Cosine of an angle in radians."""
-    return _on_float(_unary("cos", x), x)
+    return _unary("cos", x)
 
 
 def tan(x: Value) -> Value:
     """Tangent of an angle in radians."""
-    return _on_float(_unary("tan", x), x)
+    return _unary("tan", x)
 
 
 def sinh(x: Value) -> Value:
     """Hyperbolic sine."""
-    return _on_float(_unary("sinh", x), x)
+    return _unary("sinh", x)
 
 
 def cosh(x: Value) -> Value:
     """Hyperbolic cosine."""
-    return _on_float(_unary("cosh", x), x)
+    return _unary("cosh", x)
 
 
 def arctan(x: Value) -> Value:
     """Inverse tangent, in radians."""
-    return _on_float(_unary("arctan", x), x)
+    return _unary("arctan", x)
 
 
 def arcsinh(x: Value) -> Value:
     """Inverse hyperbolic sine."""
-    return _on_float(_unary("arcsinh", x), x)
+    return _unary("arcsinh", x)

@@ -23,6 +23,7 @@ from .registration import EPISODE_PERIODS
 from .task import EnvironmentTask
 
 Booleans = npt.NDArray[np.bool_]
+Autoreset = gymnasium.vector.AutoresetMode
 
 
 class _Stock(NamedTuple):
@@ -43,24 +44,31 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
     integrator         RungeKutta4(1e-3) by default; the period of the task is a whole number of its steps
     precision          Double() or Single()
     cores              threads; all cores of this process unless given
+    autoreset_mode     NEXT_STEP or SAME_STEP of gymnasium.vector.AutoresetMode
 
     Plant i is what `PlantEnv` with the seed `seed + i` is, to the rounding of the lanes. An episode that is over begins
-    anew in the next step (AutoresetMode.NEXT_STEP): the action of that step is ignored, its reward is 0. Beyond the
-    arrays that it returns, a step in which no episode begins allocates some arrays (N,) of time and flags.
+    anew in the next step (NEXT_STEP): the action of that step is ignored, its reward is 0. With SAME_STEP it begins
+    anew at once, and `info["final_obs"]` holds the last observation of each plant whose episode is over, None for
+    others.
+    Beyond the arrays that it returns, a step in which no episode begins allocates some arrays (N,) of time and flags.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {
-        "render_modes": [],
-        "autoreset_mode": gymnasium.vector.AutoresetMode.NEXT_STEP,
-    }
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": [], "autoreset_mode": Autoreset.NEXT_STEP}
 
     def __init__(
         self, num_envs: int, task: EnvironmentTask, randomisation: tuple[Randomisation, ...] = (), *,
         max_episode_steps: int = EPISODE_PERIODS, integrator: RungeKutta4 = STEP,
-        precision: Precision = Double(), cores: int | None = None,
+        precision: Precision = Double(), cores: int | None = None, autoreset_mode: Any = Autoreset.NEXT_STEP,
     ) -> None:  # fmt: skip
         if not isinstance(max_episode_steps, int) or max_episode_steps < 1:
             raise ParameterError(f"max_episode_steps is {max_episode_steps!r}; it must be a whole number from 1 on.")
+        if autoreset_mode not in (Autoreset.NEXT_STEP, Autoreset.SAME_STEP):
+            raise ParameterError(
+                f"autoreset_mode is {autoreset_mode!r}; allowed are AutoresetMode.NEXT_STEP and SAME_STEP of "
+                "gymnasium.vector."
+            )
+        self.metadata = {**type(self).metadata, "autoreset_mode": autoreset_mode}  # type: ignore[misc]
+        self._at_once = autoreset_mode is Autoreset.SAME_STEP
         self._draw, self.task = EpisodeDraw(task, randomisation), task
         self._steps, self.max_episode_steps = whole_steps(task, integrator), max_episode_steps
         self._plants = BatchStepper(task, num_envs, integrator, precision=precision, cores=cores)
@@ -95,7 +103,8 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
 
     def step(self, actions: Any) -> tuple[npt.NDArray[np.float32], Array, Booleans, Booleans, dict[str, Any]]:
         """Hold an action (N, m) of every plant for one period: observations (N, k), rewards, terminated and truncated
-        (N,), and an empty dictionary. Raises ParameterError for another shape, or an action that is not finite."""
+        (N,), and a dictionary, empty with NEXT_STEP. Raises ParameterError for another shape, or an action that is not
+        finite."""
         count = len(self.task.actions)
         if not self._generators:
             raise ParameterError("the environment has no state yet; call reset() before the first step.")
@@ -113,7 +122,11 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
         observations, rewards, terminated = self._observed()
         truncated: Booleans = self._elapsed >= self.max_episode_steps
         rewards[anew], terminated[anew] = 0.0, False
-        self._over = terminated | truncated
+        over: Booleans = terminated | truncated
+        if not self._at_once:
+            self._over = over
+        elif over.any():
+            return self._begun_at_once(observations, over), rewards, terminated, truncated, _final(observations, over)
         return observations, rewards, terminated, truncated, {}
 
     def close_extras(self, **options: Any) -> None:
@@ -143,6 +156,11 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
         self._inputs[plants] = 0.0
         self._plants.inputs[...] = self._given.transpose(0, 2, 1)
         self._plants.advance(0)
+
+    def _begun_at_once(self, observations: npt.NDArray[np.float32], over: Booleans) -> npt.NDArray[np.float32]:
+        """The observations (N, k) after new episodes have begun in place of those that are over (N,)."""
+        self._begin(np.flatnonzero(over))
+        return np.where(over[:, None], self._observed()[0], observations)
 
     def _refill(self) -> None:
         """Draw the next episode of all plants that have none, which takes little more time than one draw."""
@@ -175,6 +193,14 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
             return ParameterError(f"the actions have the shape {actions.shape}; give ({self.num_envs}, {count}).")
         row = int(np.flatnonzero(~np.isfinite(actions).all(axis=1))[0])
         return ParameterError(f"the actions, row {row}: {actions[row]}; give {count} finite numbers from -1 to 1.")
+
+
+def _final(observations: npt.NDArray[np.float32], over: Booleans) -> dict[str, Any]:
+    """The dictionary of a step in which episodes are over (N,), as that of Gymnasium's own vectors."""
+    last = np.full(over.size, None, dtype=object)
+    for i in np.flatnonzero(over):
+        last[i] = observations[i].copy()
+    return {"final_obs": last, "_final_obs": over.copy()}
 
 
 def make_joint_vector(num_envs: int = 1, task: EnvironmentTask | None = None, **options: Any) -> PlantVectorEnv:

@@ -15,9 +15,9 @@ from ..compile.event_indicators import EventIndicators, event_indicators
 from ..compile.functions import Printer
 from ..compile.partials import Partials, partials
 from ..core.errors import ParameterError
+from ..core.output_folder import atomic_folder
 from ..plant.diagnostics import column_limits, describe_limit
 from ..plant.plant import Plant
-from ..report.output_folder import atomic_folder
 from ..simulation import Problem
 from ..simulation.integrators import Rodas4
 from .c_source import CSource

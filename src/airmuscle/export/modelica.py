@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..report.output_folder import atomic_folder
+from ..core.output_folder import atomic_folder
 from ..simulation import Problem
 from .c_source import CSource
 from .fmi_variables import first_inputs

@@ -14,13 +14,13 @@ from ..compile.program import compile_system
 from ..compile.text.c import CLanguage
 from ..core.arrays import Array
 from ..core.errors import ParameterError
+from ..core.output_folder import atomic_folder
 from ..core.short_repr import ShortRepr
 from ..core.tree import leaves, with_parameters
 from ..core.variables import Input
 from ..mechanism import ExternalLoad
 from ..mechanism.external_load import SHORTENING, SHORTENING_SPEED
 from ..plant import Plant, open_plant
-from ..report.output_folder import atomic_folder
 from .c_text import c_array, c_number, c_strings
 from .compiler import compile_library
 from .printed_system import ExportedSystem, export_system

@@ -8,9 +8,9 @@ from importlib import metadata
 from typing import Any
 
 from ..core.errors import printable
+from ..core.fingerprint import fingerprint
 from ..core.reference import cite
 from ..core.tree import leaves
-from ..study.fingerprint import fingerprint
 
 LICENCE = (
     "SPDX-License-Identifier: BSD-3-Clause",

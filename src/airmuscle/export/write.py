@@ -8,7 +8,7 @@ from pathlib import Path
 from ..characteristic import Characteristic
 from ..control.control_loop import ControlLoop
 from ..core.errors import ParameterError, suggestion
-from ..report.output_folder import atomic_folder
+from ..core.output_folder import atomic_folder
 from ..simulation import Problem
 from .exported_loop import CONTROLLER, export_loop
 from .identifiers import make_identifier

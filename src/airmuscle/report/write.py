@@ -15,11 +15,11 @@ import numpy as np
 
 from ..core import plotting
 from ..core.errors import FileError
+from ..core.output_folder import atomic_folder
 from .chapter import Chapter, Table
 from .formatting import table_rows
 from .formula import to_plain
 from .html import render_page
-from .output_folder import atomic_folder
 
 REPORT_FILE = "report.html"
 

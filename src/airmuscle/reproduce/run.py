@@ -9,10 +9,10 @@ from concurrent.futures import Executor, as_completed
 from pathlib import Path
 from typing import Any
 
+from ..core.output_folder import check_writable
 from ..core.processes import process_pool
 from ..library.files import complete_name
 from ..report.chapter import Chapter
-from ..report.output_folder import check_writable
 from ..report.write import with_rendered_figures, write_report
 
 PAPERS: dict[str, str] = {

@@ -1,4 +1,7 @@
-"""Control loop as one program: a control law, drivers and plant from sample to sample without a return to Python."""
+"""Control loop as one program: control law, drivers and plant from sample to sample without a return to Python.
+
+A controller that is no control law is called from Python; only then does the program pause at each sample.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +15,10 @@ from ..compile.program import CompiledSystem
 from ..control.control_law import ControlLaw
 from ..control.control_loop import ControlLoopState
 from ..control.piecewise_linear import PiecewiseLinear
-from ..core.arrays import Array
+from ..core.arrays import Array, flat_view
 from ..core.status import Status
 from .bound_integrator import INTERRUPT_CHECK_STEPS, MAX_STEPS
+from .called_controller import CalledController
 from .compiled_law import compiled_sample, parameters_of
 from .driver_table import MAX_CAPACITY, DriverTable, are_known, greatest_capacity
 from .integrators import Integrator
@@ -22,21 +26,24 @@ from .sampled_loop import SampledLoop
 
 FIRST_SEGMENTS = 4096
 """Segments and rows that the buffers of driven inputs hold at first."""
+_PAUSED, _WAITING, _INTERVAL = Status.PAUSED.value, Progress.WAITING.value, Progress.INTERVAL.value
 
 
 class CompiledLoop:
-    """A prepared loop whose controller is a control law, with the data that all its runs share."""
+    """A prepared loop with the data that all its runs share; `law` is None for a controller that is called."""
 
     def __init__(self, compiled: CompiledSystem, prepared: SampledLoop) -> None:
         loop, known = prepared.loop, compiled.description
-        assert isinstance(loop.controller, ControlLaw)
-        self.prepared, self.law = prepared, loop.controller
-        self.function = compiled_sample(self.law)
+        controller = loop.controller
+        self.prepared, self.law = prepared, controller if isinstance(controller, ControlLaw) else None
+        self._function = compiled_sample(self.law) if self.law else None
+        self.sample_address = self._function.address if self._function else 0
+        self.parameters = parameters_of(self.law) if self.law else np.zeros(1)
         self.capacity = greatest_capacity(prepared) if loop.drivers else 0
         columns = (*known.state_names, *known.output_names)
-        measured_at = np.array([columns.index(name) for name in self.law.measured_columns], dtype=np.int64)
+        measured_at = np.array([columns.index(name) for name in controller.measured_columns], dtype=np.int64)
         commanded_at = np.array(prepared.commanded, dtype=np.int64)
-        limits = np.array([prepared.ranges[name] for name in self.law.inputs], dtype=float).reshape(-1, 2)
+        limits = np.array([prepared.ranges[name] for name in controller.inputs], dtype=float).reshape(-1, 2)
         self.edges = prepared.instants
         self.measuring = compiled.address["outputs"], measured_at
         low, high = np.ascontiguousarray(limits[:, 0]), np.ascontiguousarray(limits[:, 1])
@@ -48,21 +55,23 @@ class CompiledLoop:
         self.offsets = prepared.first_segments
         self.grid = prepared.times, prepared.first_rows
 
+    def memory_of(self, state: ControlLoopState) -> list[float]:
+        """The memory of the control law as numbers; none of a controller that is called."""
+        return [state.controller[name] for name in self.law.initial_memory] if self.law else []
+
 
 def can_be_compiled(prepared: SampledLoop) -> bool:
-    """Whether a loop consists of a control law and of drivers that kernels implement."""
+    """Whether all drivers of a loop are among those that kernels implement."""
     loop = prepared.loop
-    if not isinstance(loop.controller, ControlLaw) or not are_known(loop):
-        return False
-    return not loop.drivers or greatest_capacity(prepared) <= MAX_CAPACITY
+    return not loop.drivers or (are_known(loop) and greatest_capacity(prepared) <= MAX_CAPACITY)
 
 
 class CompiledRun:
-    """A run of a compiled loop; the results are those of `closed_loop.CalledRun`, to rounding errors.
+    """A run of a compiled loop; the results are those of `called_run.CalledRun`, with a control law to rounding errors.
 
     compiled       the plant, whose structure is that of the loop's plant
     initial_state  (n,)
-    parameters     of the control law (P,); those of the loop's controller unless given
+    parameters     of the control law (P,), an array of this run; those of the loop's controller unless given
     """
 
     def __init__(
@@ -76,10 +85,12 @@ class CompiledRun:
         self.status, self.stopped_at = Status.DONE, float(loop.edges[0])
         self._drivers = DriverTable(loop.prepared, control_state, loop.capacity)
         self._make_arrays(compiled.sizes.states, compiled.sizes.inputs)
-        self._parameters = parameters_of(loop.law) if parameters is None else parameters
+        self._parameters = loop.parameters.copy() if parameters is None else parameters
         arguments = self._arguments(compiled, self._parameters)
         self._first_buffer, self._budget = len(arguments) - 9, len(arguments) - 1
         self._kernel = kernel.sampled_loop.bind(*arguments)
+        self._controller = None if loop.law else CalledController(loop.prepared)
+        self._forget_samples()
 
     def restart(
         self, compiled: CompiledSystem, initial_state: Array, parameters: Array,
@@ -98,7 +109,8 @@ class CompiledRun:
         self.bound.count[:] = 0
         self.progress.fill(0)
         self._kernel.replace(self._budget, INTERRUPT_CHECK_STEPS)
-        self._memory[:] = [state.controller[name] for name in self.loop.law.initial_memory]
+        self._memory[:] = self.loop.memory_of(state)
+        self._forget_samples()
         self._measured[:], self._command[:] = state.measured, state.commanded
         self._applied[:] = state.applied_inputs or inputs.values[0]
         self._kept_inputs[:] = self._applied
@@ -121,16 +133,15 @@ class CompiledRun:
         return self.bound.entry_address is not None
 
     def _make_arrays(self, n: int, m: int) -> None:
-        prepared, state, law = self.loop.prepared, self._begin_state, self.loop.law
+        prepared, state = self.loop.prepared, self._begin_state
         inputs, intervals = prepared.inputs, self.loop.edges.size - 1
         self.progress = np.zeros(len(Progress), dtype=np.int64)
-        memory = [state.controller[name] for name in law.initial_memory]
-        self._memory = np.array([memory] * 2, dtype=float).reshape(2, -1)
+        self._memory = np.array([self.loop.memory_of(state)] * 2, dtype=float)
         self._measured, self._command = np.array(state.measured, dtype=float), np.array(state.commanded, dtype=float)
         self._applied = np.array(state.applied_inputs or inputs.values[0], dtype=float)
         self._kept, self._kept_inputs = self.bound.state.copy(), self._applied.copy()
-        self._samples = np.empty((intervals, len(law.measured_columns)))
-        self._commands = np.empty((intervals, len(law.inputs)))
+        self._samples = np.empty((intervals, self._measured.size))
+        self._commands = np.empty((intervals, self._command.size))
         self._inputs = inputs.ends, inputs.values.copy(), inputs.slopes
         if self._drivers.kinds.size:
             segments, rows = FIRST_SEGMENTS + self.loop.capacity * m, FIRST_SEGMENTS + 2 * self.loop.capacity * m
@@ -146,7 +157,7 @@ class CompiledRun:
         return (
             bound.entry_address or 0, bound.slots, bound.places, bound.clock, bound.count, bound.state,
             outputs, compiled.precomputed, np.empty(max(compiled.sizes.outputs, 1)), measured_at,
-            loop.function.address, parameters, *loop.commanding, *loop.intervals, *self._inputs, loop.offsets,
+            loop.sample_address, parameters, *loop.commanding, *loop.intervals, *self._inputs, loop.offsets,
             *loop.grid, drivers.kinds, drivers.settings, drivers.states, drivers.columns, drivers.counts,
             drivers.scratch, drivers.begins, compiled.description.lower_bounds, self._applied, self._memory,
             self._measured, self._command, self._kept, self._kept_inputs, drivers.kept, *self._segments, self._times,
@@ -155,12 +166,17 @@ class CompiledRun:
 
     def integrate(self) -> None:
         """Run the loop until its end, or until an interval fails or the user stops it."""
+        run, flags = self._kernel.runner, flat_view(self.progress)
         try:
-            status = self._kernel()
-            while status == Status.PAUSED and not self._takes_too_many_steps():
-                if self.progress[Progress.FULL]:
+            status = run()
+            while status == _PAUSED:
+                if flags[_WAITING]:
+                    self._call_controller(flags[_INTERVAL])
+                elif flags[Progress.FULL]:
                     self._extend()
-                status = self._kernel()
+                elif self._takes_too_many_steps():
+                    break
+                status = run()
         except KeyboardInterrupt:
             status = Status.INTERRUPTED
         self.status = Status.TOO_MANY_STEPS if status == Status.PAUSED else Status(status)
@@ -168,6 +184,21 @@ class CompiledRun:
             self.stopped_at = float(self.bound.clock[0])
         if self.status == Status.INTERRUPTED:
             self._discard_interval()
+
+    def _forget_samples(self) -> None:
+        """No sample has been taken yet by a controller that is called."""
+        self._memories, self._called_at = [self._begin_state.controller] * 2, -1
+        self._views = flat_view(self._measured), flat_view(self._command)
+
+    def _call_controller(self, interval: int) -> None:
+        """Take the sample of an interval: from the measurements of the kernel to its commands."""
+        (measured, command), memories = self._views, self._memories
+        memories[0] = memories[1]
+        assert self._controller is not None
+        commands, memories[1] = self._controller.step(memories[0], measured.tolist(), interval)
+        self._called_at = interval
+        for i, value in enumerate(commands):
+            command[i] = value
 
     def _takes_too_many_steps(self) -> bool:
         running = self.progress[Progress.RUNNING]
@@ -229,7 +260,7 @@ class CompiledRun:
         if not done:
             return begun
         return ControlLoopState(
-            controller=dict(zip(self.loop.law.initial_memory, self._memory[0].tolist(), strict=True)),
+            controller=self._controller_memory(done),
             origin=begun.origin,
             time=self.time,
             sample_count=begun.sample_count + done - (0 if self.loop.prepared.sampled else 1),
@@ -238,6 +269,12 @@ class CompiledRun:
             applied_inputs=tuple(self._kept_inputs.tolist()),
             drivers=self._drivers.as_mapping(),
         )
+
+    def _controller_memory(self, done: int) -> Any:
+        """The memory of the controller after so many completed intervals."""
+        if self.loop.law is None:  # the last sample may be that of an interval that was not completed
+            return self._memories[1 if done > self._called_at else 0]
+        return dict(zip(self.loop.law.initial_memory, self._memory[0].tolist(), strict=True))
 
 
 def _longer(array: Array) -> Array:

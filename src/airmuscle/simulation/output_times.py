@@ -16,8 +16,6 @@ MAX_OUTPUT_STEP = 0.01
 """The default grid is at least this fine [s]."""
 MAX_ROWS = 10_000_000
 """Rows of a recording that fit a usual memory."""
-MAX_KEPT_ROWS = 100_000
-"""Times that are kept for the next run, 0.8 MB (chosen)."""
 _FEW = 32
 """Instants up to which they are merged one by one, which is faster (measured)."""
 
@@ -31,29 +29,12 @@ def output_times(given: float | npt.ArrayLike | None, start: float, duration: fl
     if given is None:
         given = min(duration / 1000, MAX_OUTPUT_STEP)
     if isinstance(given, float | int) or not np.ndim(given):
-        return _at_spacing(as_float("simulate: output_times", given), start, duration, instants)
+        spacing = as_float("simulate: output_times", given)
+        return merge_output_times(_grid(spacing, start, duration), instants, duration)
     grid = _times(given)
     if grid.size and not (grid[0] >= start and grid[-1] <= end):
         raise ParameterError(f"simulate: output_times must lie within {start:g} to {end:g} s.")
     return merge_output_times(grid, instants, duration)
-
-
-def _at_spacing(spacing: float, start: float, duration: float, instants: Array) -> Array:
-    """The times at a spacing and the instants. For instants that nobody can write to they are kept for the next run,
-    and nobody can write to them either."""
-    global _last  # noqa: PLW0603
-    key, last_instants, last = _last
-    if instants is last_instants and key == (spacing, start, duration):
-        return last
-    times = merge_output_times(_grid(spacing, start, duration), instants, duration)
-    if not instants.flags.writeable and times.size <= MAX_KEPT_ROWS:
-        times.setflags(write=False)
-        _last = (spacing, start, duration), instants, times
-    return times
-
-
-_last: tuple[Any, Any, Array] = (None, None, np.empty(0))
-"""Spacing, start and duration, instants, and the times of the last run at a spacing."""
 
 
 def _grid(spacing: float, start: float, duration: float) -> Array:

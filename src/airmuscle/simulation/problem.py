@@ -15,6 +15,7 @@ from ..analysis.equilibrium import find_equilibrium
 from ..compile.program import CompiledSystem, compile_system
 from ..control.control_loop import ControlLoop, ControlLoopState
 from ..control.inputs import InputSignal, check_input_signal
+from ..control.law_design import designed_loop
 from ..control.piecewise_linear import PiecewiseLinear
 from ..control.with_drivers import WithDrivers
 from ..core.arrays import FEW, Array
@@ -28,6 +29,8 @@ from .output_times import output_times
 
 NUMBERS = frozenset({float, int, np.float64})
 """Types of numbers that need no conversion."""
+MAX_KEPT_ROWS = 100_000
+"""Output times that are kept with a plant for its next run, 0.8 MB (chosen)."""
 LARGEST = sys.float_info.max
 """The largest finite number."""
 
@@ -65,6 +68,7 @@ class Problem(ShortRepr):
         object.__setattr__(self, "integrator", default_integrator(self.integrator))
         self._check_time()
         if isinstance(self.input, ControlLoop):
+            object.__setattr__(self, "input", designed_loop(self.input))
             known = self.compiled.description
             self.input.check_columns((*known.state_names, *known.output_names), known.input_names)
             if self.control_state is None:
@@ -109,8 +113,19 @@ class Problem(ShortRepr):
 
     @functools.cached_property
     def times(self) -> Array:
-        """Output times (N,) [s] of an open-loop run."""
-        return output_times(self.output_times, self.start_time, self.duration, self.segments.ends)
+        """Output times (N,) [s] of an open-loop run; where the input is that of the last run with the plant, and so is
+        all that they depend on, those of the last run, which nobody can write to."""
+        known, ends, given = self.compiled.description, self.segments.ends, self.output_times
+        asked = given, self.start_time, self.duration
+        if ends.flags.writeable or not (given is None or type(given) in NUMBERS):
+            return output_times(*asked, ends)
+        last_asked, last_ends, times = known.last_times
+        if ends is not last_ends or asked != last_asked:
+            times = output_times(*asked, ends)
+            if times.size <= MAX_KEPT_ROWS:
+                times.setflags(write=False)
+                known.last_times = asked, ends, times
+        return times
 
     @functools.cached_property
     def initial_vector(self) -> Array:

@@ -81,6 +81,18 @@ class SampledLoop:
         numbers: list[int] = self.first_rows.tolist()
         return numbers
 
+    @functools.cached_property
+    def at_times(self) -> tuple[npt.NDArray[np.int64], Array]:
+        """The interval (N,) and the set points (N, s) of each output time; nobody can write to them."""
+        intervals, setpoints = self.at(self.times)
+        for array in (intervals, setpoints):
+            array.setflags(write=False)
+        return intervals, setpoints
+
+    def at(self, times: Array) -> tuple[npt.NDArray[np.int64], Array]:
+        """The interval (N,) and the set points (N, s) at rising times (N,)."""
+        return intervals_of(times, self.instants), self.setpoint_signal.at_rising(times, float(self.instants[0]))[0]
+
 
 def prepare_loop(problem: Problem, state: ControlLoopState) -> SampledLoop:
     """The control loop of a problem, prepared for its run."""

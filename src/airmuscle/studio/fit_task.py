@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import AirmuscleError, AirmuscleWarning
+from ..core.output_folder import atomic_folder
 from ..geometry import Geometry
 from ..identify import Candidate, standard_candidates
 from ..identify.hysteresis import LoopFit, find_loops, fit_jointly, fit_loop, loops_not_joined
@@ -30,7 +31,6 @@ from ..recording.segment import check_contents, motion_direction
 from ..report.compare_chapter import compare_chapter
 from ..report.fit_files import fitted_entry, left_out_ratio, missing_geometry, write_fit
 from ..report.hysteresis_chapter import hysteresis_chapters
-from ..report.output_folder import atomic_folder
 from ..report.write import as_json, write_into
 from .fit_hints import as_field_error, in_page_words
 from .fit_reading import read_set

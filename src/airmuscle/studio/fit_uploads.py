@@ -18,8 +18,8 @@ import unicodedata
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
+from ..core.output_folder import is_running
 from ..recording.reader import EXTENSIONS
-from ..report.output_folder import is_running
 from .requests import BadRequest
 
 MAX_FILE = 32 * 10**6

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ..core.output_folder import atomic_folder
 from ..core.reference import cite
 from ..report.chapter import Chapter, Table
-from ..report.output_folder import atomic_folder
 from ..report.write import save_table, write_into
 from .distributions import LevelSet, Variation
 from .plots import study_plots

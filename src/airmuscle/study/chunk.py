@@ -19,10 +19,10 @@ import numpy.typing as npt
 
 from ..core.arrays import Array
 from ..core.errors import FileError
+from ..core.fingerprint import fingerprint, program_fingerprint
 from ..core.processes import check_running
 from ..recording import Recording
 from ..scenario.scenario import Scenario
-from .fingerprint import fingerprint, program_fingerprint
 from .scenario_runs import RUN_ERRORS, failure_reason, simulate_all
 from .study import Study, load_study
 

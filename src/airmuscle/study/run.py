@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core.errors import FileError, SimulationError
-from ..report.output_folder import check_writable
+from ..core.output_folder import check_writable
 from .chunk import Chunk, chunk_file_name, metric_times, read_chunk, register_study, run_chunk, write_chunk
 from .result import StudyResult
 from .scenario_runs import simulate_all

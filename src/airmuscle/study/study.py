@@ -28,6 +28,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core.errors import ParameterError, suggestion
+from ..core.fingerprint import fingerprint
 from ..core.short_repr import ShortRepr
 from ..library.build import build
 from ..library.files import read_toml
@@ -36,7 +37,6 @@ from ..scenario.scenario import Scenario, build_scenario, load_scenario, run_col
 from .design import DESIGNS, Design
 from .distributions import Variation, read_variation
 from .fields import read_count
-from .fingerprint import fingerprint
 from .metrics import METRICS, Metric, Scalar, TimeSeries
 from .paths import ScenarioParameter, ScenarioTemplate
 

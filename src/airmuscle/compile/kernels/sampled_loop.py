@@ -17,7 +17,7 @@ NON_FINITE_COMMAND, BELOW_LIMIT = Status.NON_FINITE_COMMAND.value, Status.NEGATI
 LARGEST = 1.7976931348623157e308
 DRIVER_WIDTH = 4
 """Numbers of the settings and of the state of a driver."""
-INTERVAL, RUNNING, SEGMENTS, ROWS, SAMPLES, STEPS_BEFORE, FULL, FIRST_SEGMENT, FIRST_ROW = map(int, Progress)
+INTERVAL, RUNNING, SEGMENTS, ROWS, SAMPLES, STEPS_BEFORE, FULL, FIRST_SEGMENT, FIRST_ROW, WAITING = map(int, Progress)
 
 
 @PART
@@ -58,20 +58,30 @@ def limit_commands(command: Any, low: Any, high: Any) -> Any:
 @PART
 def take_sample(
     outputs: Any, y: Any, applied: Any, c: Any, o: Any, measured_at: Any, sample: Any, setpoint: Any, low: Any,
-    high: Any, period: Any, parameters: Any, controlled: Any, memory: Any, measured: Any, command: Any,
+    high: Any, period: Any, parameters: Any, controlled: Any, memory: Any, measured: Any, command: Any, progress: Any,
 ) -> Any:  # fmt: skip
-    """Copy the memory; where the interval is controlled: measure, call the controller, limit its commands; a status."""
-    for i in range(memory.shape[1]):
-        memory[1, i] = memory[0, i]
-    status = DONE
-    if controlled:
-        status = measure(outputs, y, applied, c, o, measured_at, measured)
-        if status == DONE:
+    """Copy the memory; where the interval is controlled: measure, call the controller, limit its commands; a status.
+
+    PAUSED where the controller is called from Python: its commands are limited when the kernel is called again.
+    """
+    status, waited = DONE, progress[WAITING] == 1
+    if not waited:
+        for i in range(memory.shape[1]):
+            memory[1, i] = memory[0, i]
+        if controlled:
+            status = measure(outputs, y, applied, c, o, measured_at, measured)
+        if status == DONE and controlled and sample != 0:
             invoke(sample, (
                 pointer(measured), pointer(setpoint), pointer(memory[0]), pointer(low), pointer(high),
                 pointer(period), pointer(parameters), pointer(command), pointer(memory[1]),
             ))  # fmt: skip
+    progress[WAITING] = 0
+    if status == DONE and controlled:
+        if sample != 0 or waited:
             status = limit_commands(command, low, high)
+        else:
+            status = PAUSED
+            progress[WAITING] = 1
     return status
 
 
@@ -154,7 +164,8 @@ def sampled_loop(
     integrate, slots, places, clock, count, y  entry point of the integrator, its slots, the places in them of ends,
                   values, slopes, times and rows; its clock, counts and state
     outputs, c, o, measured_at  printed outputs; where each measured column stands among states and outputs
-    sample(measured, setpoints, memory, low, high, period, parameters, command, memory)  address of the controller
+    sample(measured, setpoints, memory, low, high, period, parameters, command, memory)  address of the controller; 0:
+                  the kernel pauses at each sample, and its caller writes the commands
     edges (K + 1,), ulps (K + 1,), setpoints (K, s)  intervals; samples begin with number `first_sample`
     ends .. slopes, first (K + 1,), grid, grid_row (K + 1,)  segments and output times, and the first of each interval
     kinds .. begins  drivers (D, ..) and their workspace
@@ -175,7 +186,7 @@ def sampled_loop(
                 return PAUSED
             status = take_sample(
                 outputs, y, applied, c, o, measured_at, sample, setpoints[k], low, high, period, parameters,
-                k >= first_sample, memory, measured, command,
+                k >= first_sample, memory, measured, command, progress,
             )  # fmt: skip
             if status != DONE:
                 return status

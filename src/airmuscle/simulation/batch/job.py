@@ -89,7 +89,7 @@ class BatchJob:
         if not signal.ends.size:
             inputs = np.zeros((1, self.compiled.sizes.inputs))
             signal = PiecewiseLinear(self.times[-1:], inputs, inputs)
-        more = loops.columns(self.columns, run, at.size) if len(run.measured) else {}
+        more = loops.columns(index, self.columns, run, at.size) if len(run.measured) else {}
         self._write(index, one, self._truncate(raw), signal, more)
         loops.release(run)
 

@@ -14,11 +14,11 @@ import numpy.typing as npt
 from ...compile.program import CompiledSystem
 from ...control.control_law import ControlLaw
 from ...control.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop, ControlLoopState
+from ...control.law_design import designed_loop
 from ...core.arrays import Array
 from ...core.errors import ParameterError
 from ...core.system import System
-from ..closed_loop import CalledRun
-from ..compiled_law import parameters_of
+from ..called_run import CalledRun
 from ..compiled_loop import CompiledLoop, CompiledRun, can_be_compiled
 from ..integrators import Integrator
 from ..problem import Problem
@@ -91,7 +91,7 @@ class LoopBatch:
 
     def _rows_of(self, loop: ControlLoop, prepared: SampledLoop) -> tuple[npt.NDArray[np.intp], Array]:
         """The interval of each row (T,), and the set points (T, s) there."""
-        key = id(loop)  # a loop that is called is prepared anew for each run
+        key = id(loop)  # one that is called is prepared anew for each run, with the same instants and set points
         if key not in self._at_rows:
             at = np.maximum(np.searchsorted(prepared.instants, self.times, side="right") - 1, 0)
             self._at_rows[key] = at, prepared.setpoint_signal.inputs_at(self.times, self.template.start_time)
@@ -102,16 +102,15 @@ class LoopBatch:
         loop = self.loop_of(index)
         prepared = self._loop(loop)
         start = loop.init(self.template.start_time)
-        integrator = self.template.integrator
-        assert integrator is not None
-        run: CompiledRun | CalledRun
         if isinstance(prepared, CompiledLoop):
-            parameters = parameters_of(prepared.law) if self.laws is None else self.laws.parameters(index)
+            parameters = prepared.parameters.copy() if self.laws is None else self.laws.parameters(index)
             run = self._compiled(prepared, compiled, state, start, parameters)
-        else:
-            run = self._called(index, plants, loop, prepared, state)
-        run.integrate()
-        return run
+            if run.can_run:
+                run.integrate()
+                return run
+        called = self._called(index, plants, loop, state)
+        called.integrate()
+        return called
 
     def _compiled(
         self, prepared: CompiledLoop, compiled: CompiledSystem, state: Array, start: ControlLoopState, parameters: Array
@@ -132,11 +131,12 @@ class LoopBatch:
         if isinstance(run, CompiledRun):
             self._idle[id(run.loop)].append(run)
 
-    def _called(
-        self, index: int, plants: Variations, loop: ControlLoop, prepared: SampledLoop, state: Array
-    ) -> CalledRun:
-        """A run that calls the controller; a prepared loop is filled during a run, so each has its own."""
+    def _called(self, index: int, plants: Variations, loop: ControlLoop, state: Array) -> CalledRun:
+        """A run that calls controller and drivers; a prepared loop is filled during a run, so each has its own."""
         plant = plants.one(index)
+        if self.laws is not None:
+            law: Any = self.laws.one(index)
+            loop = dataclasses.replace(loop, controller=law)
         names = [s.name for s in plant.states]
         problem = dataclasses.replace(
             self.template, system=plant, input=loop, initial_state=dict(zip(names, state.tolist(), strict=True))
@@ -159,10 +159,12 @@ class LoopBatch:
         rows = first_rows_of(self.times, prepared.instants)
         return dataclasses.replace(prepared, times=self.times, first_rows=rows)
 
-    def columns(self, wanted: Collection[str], run: CompiledRun | CalledRun, count: int) -> dict[str, Array]:
+    def columns(
+        self, index: int, wanted: Collection[str], run: CompiledRun | CalledRun, count: int
+    ) -> dict[str, Array]:
         """The wanted ones of set points, measurements and commands at the first rows (R,) of one plant."""
-        prepared, controller = run.prepared, self.loops[0].controller
-        intervals, setpoints = self._rows_of(prepared.loop, prepared)
+        controller = self.loops[0].controller
+        intervals, setpoints = self._rows_of(self.loop_of(index), run.prepared)
         intervals = np.minimum(intervals[:count], max(len(run.measured) - 1, 0))
         columns: dict[str, Array] = {}
         for values, rows, prefix, names in (
@@ -185,6 +187,8 @@ def loops_of(given: Any) -> tuple[ControlLoop, ...] | None:
         return None
     if len(loops) < len(inputs):
         raise ParameterError("simulate_batch: the inputs are control loops and signals; give one kind for all plants.")
+    distinct = {id(loop): designed_loop(loop) for loop in loops}
+    loops = tuple(distinct[id(loop)] for loop in loops)
     first = _names(loops[0])
     for row, loop in enumerate(loops):
         if _names(loop) != first:

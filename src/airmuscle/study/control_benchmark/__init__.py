@@ -6,7 +6,7 @@ result = compare_controllers(joint, contenders, seed=1)
 result.scores(), result.metric("mine", "sine 1 Hz", "rmse")
 """
 
-from .benchmark import BenchmarkResult, BenchmarkRun, TunedContender, compare_controllers
+from .benchmark import BenchmarkResult, BenchmarkRun, TunedContender, compare_controllers, ranking
 from .chapter import benchmark_chapter, write_benchmark
 from .contender_of_scenario import scenario_contender
 from .contenders import Contender, standard_contenders
@@ -43,6 +43,7 @@ __all__ = [
     "learn",
     "on_off_joint",
     "proportional_joint",
+    "ranking",
     "run_plot",
     "scenario_contender",
     "standard_contenders",

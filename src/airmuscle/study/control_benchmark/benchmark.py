@@ -80,14 +80,20 @@ class BenchmarkResult(ShortRepr):
 
         1 is a contender that is best in every task; infinite one that did not complete a task.
         """
-        errors = np.array([[self.metric(c.name, task.name, "rmse") for task in self.tasks] for c in self.contenders])
-        errors = np.where(np.isfinite(errors), errors, math.inf)
-        best = errors.min(axis=0)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ratios = np.where(np.isfinite(best), errors / best, 1.0)
-            scores = np.exp(np.mean(np.log(ratios), axis=1)).tolist()
-        named = {each.name: score for each, score in zip(self.contenders, scores, strict=True)}
-        return dict(sorted(named.items(), key=lambda item: item[1]))
+        return ranking(
+            {c.name: [self.metric(c.name, task.name, "rmse") for task in self.tasks] for c in self.contenders}
+        )
+
+
+def ranking(errors: Mapping[str, Sequence[float]]) -> dict[str, float]:
+    """The scores of `BenchmarkResult.scores`, ascending, from the rms errors of each contender, task by task."""
+    table = np.array(list(errors.values()), dtype=float)
+    table = np.where(np.isfinite(table), table, math.inf)
+    best = table.min(axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratios = np.where(np.isfinite(best), table / best, 1.0)
+        scores = np.exp(np.mean(np.log(ratios), axis=1)).tolist()
+    return dict(sorted(zip(errors, scores, strict=True), key=lambda item: item[1]))
 
 
 def compare_controllers(
@@ -147,8 +153,7 @@ def tune_contender(
     if not contender.identified:
         return TunedContender(contender, tuned, tuning)
     progress(f"identifying gains of {contender.name}", 0, 1)
-    bounds = {path: contender.bounds[path] for path in contender.identified}
-    gains, _ = identify_gains(joint, tuned, bounds, TUNING_TASKS[0])
+    gains, _ = identify_gains(joint, tuned, contender.identified, TUNING_TASKS[0])
     return TunedContender(contender, with_gains(tuned, gains), tuning, gains)
 
 

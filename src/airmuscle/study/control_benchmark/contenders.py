@@ -13,6 +13,7 @@ from ...control.co_contraction import DIFFERENCE, CoContraction
 from ...control.control_law import ControlLaw
 from ...control.controller import Controller
 from ...control.friction_feed_forward import FrictionFeedForward
+from ...control.motion_feed_forward import MotionFeedForward
 from ...control.pid import PID
 from ...control.proportional_feedback import ProportionalFeedback
 from ...control.sensors import WithSensors
@@ -27,7 +28,7 @@ from ...control.with_feed_forward import WithFeedForward
 from ...core.errors import ParameterError
 from ...core.tree import leaves
 from .called_contender import COMMANDED, SensedController, sensed
-from .designed_controllers import AlongMotion, ControlDesign, PredictiveDesign, QuadraticDesign, joint_design_model
+from .designed_controllers import AlongMotion, DeviationLaw, PredictiveDesign, QuadraticDesign, joint_design_model
 from .joints import SIDES, BenchmarkJoint
 
 BAR = 1e5
@@ -49,14 +50,14 @@ class Contender:
              `feed_forward`, `feed_forward_rate`
     bounds   minimum and maximum [SI] of the gains of the law that are tuned, by path. Without bounds, and with a law
              that commands the valves, nothing is tuned
-    identified  paths of those of these gains that are identified after the tuning, by runs on the truth with its
+    identified  minimum and maximum [SI] of gains that are identified after the tuning, by runs on the truth with its
              sensors; none unless given
     """
 
     name: str
     law: Controller
     bounds: Bounds = dataclasses.field(default_factory=dict)
-    identified: tuple[str, ...] = ()
+    identified: Bounds = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not isinstance(self.law, Controller):
@@ -64,17 +65,13 @@ class Contender:
                 f"contender '{self.name}': its law is a {type(self.law).__name__}; give a ControlLaw or another "
                 "Controller."
             )
-        if unknown := [path for path in self.identified if path not in self.bounds]:
-            raise ParameterError(
-                f"contender '{self.name}': there are no bounds of '{unknown[0]}', which is to be identified; "
-                f"there are bounds of {', '.join(self.bounds) or 'nothing'}."
-            )
         known = [leaf.path for leaf in leaves(self.law)]
-        if unknown := [path for path in self.bounds if path not in known]:
-            raise ParameterError(
-                f"contender '{self.name}': {type(self.law).__name__} has no declared parameter '{unknown[0]}' to be "
-                f"tuned; there are {', '.join(known) or 'none'}. Omit its bounds."
-            )
+        for purpose, bounds in (("tuned", self.bounds), ("identified", self.identified)):
+            if unknown := [path for path in bounds if path not in known]:
+                raise ParameterError(
+                    f"contender '{self.name}': {type(self.law).__name__} has no declared parameter '{unknown[0]}' to "
+                    f"be {purpose}; there are {', '.join(known) or 'none'}. Omit its bounds."
+                )
 
 
 class CompleteLaw(NamedTuple):
@@ -151,7 +148,7 @@ def _within(prefix: str, bounds: Bounds) -> dict[str, tuple[float, float]]:
 
 
 _GAIN, _INTEGRAL, _DERIVATIVE, _LEAD = (2e4, 2e6), (0.02, 3.0), (1e-3, 0.2), (1e-3, 0.1)
-_FRICTION = (10.0, 5e4)
+_FRICTION, _INERTIA = (10.0, 5e4), (-500.0, 500.0)
 PID_BOUNDS: Bounds = {"gain": _GAIN, "integral_time": _INTEGRAL, "derivative_time": _DERIVATIVE}
 
 
@@ -165,6 +162,20 @@ def _feed_forward() -> SetpointLead:
 
 def _friction() -> FrictionFeedForward:
     return FrictionFeedForward("angular_speed", DIFFERENCE, 1e3, boundary_speed=0.1)
+
+
+def _compensated() -> WithFeedForward:
+    """Feed-forward of the model with compensation of friction and of inertia."""
+    inertia = MotionFeedForward("angular_speed", "angular_acceleration", DIFFERENCE)
+    return WithFeedForward(_feed_forward(), WithFeedForward(_friction(), inertia))
+
+
+_COMPENSATION: Bounds = {
+    "feed_forward.feed_forward.lead_time": _LEAD,
+    "feed_forward.feedback.feed_forward.amplitude": _FRICTION,
+}
+_IDENTIFIED: Bounds = {**_COMPENSATION, "feed_forward.feedback.feedback.acceleration_gain": _INERTIA}
+"""Gains of the compensated feed-forward that are tuned, and those that are identified."""
 
 
 def pid_contender() -> Contender:
@@ -185,20 +196,20 @@ def feed_forward_contender() -> Contender:
 
 
 def compensated_contender(joint: BenchmarkJoint) -> Contender:
-    """Feed-forward with compensation of friction, and PID whose set point has the dead time of the encoder.
+    """Feed-forward with compensation of friction and inertia, and PID whose set point has the dead time of the encoder.
 
     The PID differentiates the error. The dead time is that of the data sheet of the sensors, the same for model and
     truth.
     """
-    delay = next(sensor.delay for sensor in joint.sensors if sensor.column == "angle")
-    feedback = WithSetpointDelay(dataclasses.replace(_pid(), derivative_weight=1.0), delay)
-    law = WithFeedForward(_feed_forward(), WithFeedForward(_friction(), feedback))
-    bounds = {
-        "feed_forward.lead_time": _LEAD, "feedback.feed_forward.amplitude": _FRICTION,
-        **_within("feedback.feedback.law.", PID_BOUNDS),
-    }  # fmt: skip
-    identified = "feed_forward.lead_time", "feedback.feed_forward.amplitude"
-    return Contender("feed-forward + PID, compensated", law, bounds, identified)
+    feedback = WithSetpointDelay(dataclasses.replace(_pid(), derivative_weight=1.0), _delay(joint))
+    bounds = {**_COMPENSATION, **_within("feedback.law.", PID_BOUNDS)}
+    law = WithFeedForward(_compensated(), feedback)
+    return Contender("feed-forward + PID, compensated", law, bounds, _IDENTIFIED)
+
+
+def _delay(joint: BenchmarkJoint) -> int:
+    """Dead time of the encoder [samples]."""
+    return next(sensor.delay for sensor in joint.sensors if sensor.column == "angle")
 
 
 def sliding_mode_contender() -> Contender:
@@ -234,31 +245,23 @@ def angle_and_stiffness_contender(joint: BenchmarkJoint) -> Contender:
     return Contender("angle and stiffness", law, bounds)
 
 
-_DESIGN: Bounds = {
-    "feed_forward.feed_forward.lead_time": _LEAD, "feed_forward.feedback.amplitude": _FRICTION,
-    "design.permitted_angle": (2e-3, 0.2), "design.speed_noise": (0.1, 100.0),
-    "design.pressure_time": (3e-3, 0.1),
-}  # fmt: skip
+_DESIGN: Bounds = {"permitted_angle": (2e-3, 0.2), "speed_noise": (0.1, 100.0), "pressure_time": (3e-3, 0.1)}
 
 
 def quadratic_contender(joint: BenchmarkJoint) -> Contender:
     """Linear-quadratic Gaussian control (LQG) of the deviation beside the feed-forward; its weights are tuned."""
     design = QuadraticDesign(joint_design_model(joint), 0.02, 0.005, 5.0, 0.01)
-    return _along_motion(joint, "LQG", design, {"design.permitted_integral": (5e-4, 0.5)})
+    law = WithFeedForward(_compensated(), WithSetpointDelay(DeviationLaw(design), _delay(joint)))
+    weights = _within("feedback.law.law.", {**_DESIGN, "permitted_integral": (5e-4, 0.5)})
+    return Contender("feed-forward + LQG, compensated", law, {**_COMPENSATION, **weights}, _IDENTIFIED)
 
 
 def predictive_contender(joint: BenchmarkJoint) -> Contender:
     """Linear model predictive control (MPC) of the deviation beside the feed-forward; its weights are tuned."""
     design = PredictiveDesign(joint_design_model(joint), 0.02, 5.0, 200.0, 0.01)
-    return _along_motion(joint, "MPC", design, {"design.disturbance_noise": (10.0, 1e4)})
-
-
-def _along_motion(joint: BenchmarkJoint, name: str, design: ControlDesign, bounds: Bounds) -> Contender:
-    """A designed controller beside the feed-forward of the compensated one, two gains of which are identified."""
-    delay = next(sensor.delay for sensor in joint.sensors if sensor.column == "angle")
-    law = AlongMotion(WithFeedForward(_feed_forward(), _friction()), design, delay)
-    identified = "feed_forward.feed_forward.lead_time", "feed_forward.feedback.amplitude"
-    return Contender(f"feed-forward + {name}, compensated", law, {**_DESIGN, **bounds}, identified)
+    law = AlongMotion(_compensated(), design, _delay(joint))
+    weights = _within("design.", {**_DESIGN, "disturbance_noise": (10.0, 1e4)})
+    return Contender("feed-forward + MPC, compensated", law, {**_COMPENSATION, **weights}, _IDENTIFIED)
 
 
 def standard_contenders(joint: BenchmarkJoint) -> tuple[Contender, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import abc
 import functools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -15,10 +15,13 @@ from ...analysis.predictive_design import design_predictive
 from ...control.co_contraction import DIFFERENCE
 from ...control.control_law import ControlLaw
 from ...control.controller import Controller, Measurement
-from ...control.linear_model_predictive import RAWLINGS2017
-from ...control.state_feedback import FRANKLIN1998
+from ...control.enclosing_law import EnclosingLaw
+from ...control.law_design import LawDesign
+from ...control.linear_model_predictive import RAWLINGS2017, LinearModelPredictive
+from ...control.state_feedback import FRANKLIN1998, StateFeedback
 from ...core.declaration import model, parameter
 from ...core.errors import ParameterError
+from ...core.ops import Value
 from ...core.reference import Reference
 from .joints import ENCODER_STEP, BenchmarkJoint
 from .motion_dynamics import angular_acceleration
@@ -81,17 +84,31 @@ def joint_design_model(joint: BenchmarkJoint) -> JointDesignModel:
     return JointDesignModel(-slopes[0], -slopes[1], slopes[2], dead_time, joint.sample_time)
 
 
-class ControlDesign(abc.ABC):
-    """Design of a controller of the reading, which commands the half pressure difference, from its weights."""
+class JointDesign(abc.ABC):
+    """Weights of a design of a controller of the reading, which commands the half pressure difference (base)."""
 
-    @property
-    @abc.abstractmethod
-    def controller(self) -> Controller:
-        """The designed controller."""
+    plant: JointDesignModel
+    permitted_angle: float
+    speed_noise: float
+    pressure_time: float
+
+    def designed(self, design: Callable[..., Any], noise: Mapping[str, float], **further: Any) -> Any:
+        """What a function of `analysis` designs with the weights of the angle, the command and the noise.
+
+        noise    further process noise by state
+        further  arguments of this function alone
+        """
+        return design(
+            self.plant.linear_model(self.pressure_time), self.plant.sample_time,
+            measured=(READING,), controlled=(READING,),
+            permitted={"angle": self.permitted_angle, DIFFERENCE: PERMITTED_DIFFERENCE},
+            process_noise={"angular_speed": self.speed_noise, "half_difference": 1e3, **noise},
+            measurement_noise={READING: ENCODER_STEP}, **further,
+        )  # fmt: skip
 
 
 @model
-class QuadraticDesign(ControlDesign):
+class QuadraticDesign(JointDesign, LawDesign):
     """`analysis.design_lqg`: weights 1/d^2 of angle and integral, noise of the speed; references there."""
 
     references: ClassVar[tuple[Reference, ...]] = (FRANKLIN1998,)
@@ -104,20 +121,14 @@ class QuadraticDesign(ControlDesign):
     pressure_time: float = parameter("s", "T", "time constant of the pressures", bounds=(1e-4, 1.0))
 
     @functools.cached_property
-    def controller(self) -> Controller:
+    def law(self) -> ControlLaw:
         """The state feedback with its observer."""
-        return design_lqg(
-            self.plant.linear_model(self.pressure_time), self.plant.sample_time,
-            measured=(READING,), controlled=(READING,),
-            permitted={"angle": self.permitted_angle, DIFFERENCE: PERMITTED_DIFFERENCE},
-            permitted_integral={READING: self.permitted_integral},
-            process_noise={"angular_speed": self.speed_noise, "half_difference": 1e3},
-            measurement_noise={READING: ENCODER_STEP},
-        )  # fmt: skip
+        found: StateFeedback = self.designed(design_lqg, {}, permitted_integral={READING: self.permitted_integral})
+        return found
 
 
 @model
-class PredictiveDesign(ControlDesign):
+class PredictiveDesign(JointDesign):
     """`analysis.design_predictive`: weight 1/d^2 of the angle, noise of speed and disturbance; references there."""
 
     references: ClassVar[tuple[Reference, ...]] = (RAWLINGS2017,)
@@ -130,18 +141,44 @@ class PredictiveDesign(ControlDesign):
     pressure_time: float = parameter("s", "T", "time constant of the pressures", bounds=(1e-4, 1.0))
 
     @functools.cached_property
-    def controller(self) -> Controller:
+    def controller(self) -> LinearModelPredictive:
         """The predictive controller with its observer of the disturbance."""
-        return design_predictive(
-            self.plant.linear_model(self.pressure_time), self.plant.sample_time,
-            measured=(READING,), controlled=(READING,), disturbed=("angular_speed",),
-            permitted={"angle": self.permitted_angle, DIFFERENCE: PERMITTED_DIFFERENCE},
-            process_noise={
-                "angular_speed": self.speed_noise, "half_difference": 1e3,
-                "angular_speed.disturbance": self.disturbance_noise,
-            },
-            measurement_noise={READING: ENCODER_STEP}, horizon=HORIZON,
-        )  # fmt: skip
+        disturbance = {"angular_speed.disturbance": self.disturbance_noise}
+        found: LinearModelPredictive = self.designed(
+            design_predictive, disturbance, disturbed=("angular_speed",), horizon=HORIZON
+        )
+        return found
+
+
+@model
+class DeviationLaw(EnclosingLaw):
+    """u = law(y - r; 0): the law receives the deviation of the angle from its set point, and 0 as its own set point.
+
+    The deviation from a motion that the model can follow obeys the linearised model, whatever the motion.
+    """
+
+    from_file: ClassVar[bool] = False
+
+    law: ControlLaw
+
+    @property
+    def measured_columns(self) -> tuple[str, ...]:
+        return ("angle",)
+
+    @property
+    def setpoints(self) -> tuple[str, ...]:
+        return ("angle",)
+
+    @property
+    def initial_memory(self) -> Mapping[str, float]:
+        """That of the law."""
+        return self.law.initial_memory
+
+    def step(
+        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
+    ) -> tuple[Mapping[str, Value], Mapping[str, Value]]:
+        deviation = measurement.columns["angle"] - measurement.setpoints["angle"]
+        return self.law.step(memory, Measurement({READING: deviation}, {READING: 0.0}, measurement.ranges), dt)
 
 
 class MotionMemory(NamedTuple):
@@ -154,17 +191,16 @@ class MotionMemory(NamedTuple):
 
 @model
 class AlongMotion(Controller):
-    """u = u_ff + u_c:  a designed controller u_c of the deviation y - r(t - T_s) beside the feed-forward of the model.
+    """u = u_ff + u_c:  predictive control u_c of the deviation y - r(t - T_s) beside the feed-forward of the model.
 
-    The deviation from a motion that the model can follow obeys the linearised model, whatever the motion, so that its
-    set point is 0. The designed controller sees the range of the command less the feed-forward: the sum keeps it.
-    `delay` [samples] is that of the encoder.
+    It is the sum of a law and a `DeviationLaw` for a controller that is called at each sample. The designed controller
+    sees the range of the command less the feed-forward: the sum keeps it. `delay` [samples] is that of the encoder.
     """
 
     from_file: ClassVar[bool] = False
 
     feed_forward: ControlLaw
-    design: ControlDesign
+    design: PredictiveDesign
     delay: int
 
     def check(self) -> None:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from ...control.control_law import ControlLaw
 from ...control.control_loop import COMMAND, SETPOINT, ControlLoop
+from ...control.law_design import with_designed_laws
 from ...core.arrays import Array
 from ...core.errors import AirmuscleError
 from ...core.tree import flatten, leaves, structure
@@ -167,7 +168,8 @@ class Evaluator:
         first = group.cases[0]
         variations = {path: np.tile(values, sets) for path, values in group.varied.items()}
         loop: ControlLoop | list[ControlLoop] = group.loop
-        if isinstance(group.loop.controller, ControlLaw):
+        controller = group.loop.controller
+        if isinstance(controller, ControlLaw) and with_designed_laws(controller) is controller:
             for i, path in enumerate(self.paths):
                 variations[f"{CONTROLLER}{first.full_path(path)}"] = np.repeat(gains[:, i], m)
         else:

@@ -11,7 +11,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from ..core.errors import FileError
+from .errors import FileError
 
 _UNFINISHED = f".unfinished-{socket.gethostname().replace('/', '')}-"
 """Beginning of the name of a temporary folder, with the machine, because folders may be shared; a process follows."""

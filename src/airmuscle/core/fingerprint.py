@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 PACKAGE_ROOT = Path(__file__).parents[1]
-EXCLUDED_PACKAGES = ("cli", "export", "report", "reproduce", "identify")
+EXCLUDED_PACKAGES = ("cli", "studio", "export", "report", "reproduce", "sizing", "environments", "identify")
 """Parts of the program that do not affect a simulation."""
 NUMERICAL_PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "casadi")
 
