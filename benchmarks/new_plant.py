@@ -29,10 +29,9 @@ from airmuscle.simulation.integrators import DormandPrince8
 
 HEADER = ("task", "median", "minimum")
 TEXT = (
-    "In a process that has already compiled a plant; the caches of traced functions and of machine code are empty "
-    "each time. The first "
-    "plant of a process also loads CasADi and LLVM, which is part of `Process start` below. The plant with energy "
-    "meters has four muscles with friction, creep and a lagging wall, heat, and tubes of two volumes."
+    "In a process that has already compiled a plant; the caches of traced functions and of machine code are empty each "
+    "time. The first plant of a process also loads CasADi and LLVM, which is part of `Process start` below. The plant "
+    "with energy meters has four muscles with friction, creep and a lagging wall, heat, and tubes of two volumes."
 )
 MUSCLES = 24
 REASON = (
