@@ -74,7 +74,6 @@ def section(rounds: int = 5) -> Section:
             15,
             "x",
             True,
-            reason="half of the time is the search of the fit for quantities held constant, run by run, for its rank",
         ),
         Target("bootstrap: difference of the standard deviations", differences[second], 1e-6, "relative"),
     )

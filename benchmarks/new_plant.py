@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import os
 import pathlib
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
+from unittest import mock
 
 from filling import hanging, runs
 from measure import Section, Target, format_time, print_section, time_variants
@@ -17,14 +19,19 @@ from measure import Section, Target, format_time, print_section, time_variants
 from airmuscle.compile.program import Program, compile_system
 from airmuscle.core import autodiff
 from airmuscle.core.system import System
+from airmuscle.friction import LuGre
 from airmuscle.mechanism import HangingMass
+from airmuscle.muscle import CreepElements, ViscoelasticWall
+from airmuscle.plant import WithEnergyMeters
 from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import EnergyBalance, Tube, TubeOrifice, WithTubes
 from airmuscle.simulation.integrators import DormandPrince8
 
 HEADER = ("task", "median", "minimum")
 TEXT = (
-    "In a process that has already compiled a plant; the cache of traced functions is cleared each time. The first "
-    "plant of a process also loads CasADi and LLVM, which is part of `Process start` below."
+    "In a process that has already compiled a plant; the caches of traced functions and of machine code are empty each "
+    "time. The first plant of a process also loads CasADi and LLVM, which is part of `Process start` below. The plant "
+    "with energy meters has four muscles with friction, creep and a lagging wall, heat, and tubes of two volumes."
 )
 MUSCLES = 24
 REASON = (
@@ -40,16 +47,25 @@ simulate(run.system, run.command, duration=0.1, initial_state=run.initial_state)
 """
 
 
+@contextlib.contextmanager
+def without_stored_code() -> Iterator[None]:
+    """A folder without machine code in place of the kernel cache."""
+    with tempfile.TemporaryDirectory() as folder, mock.patch.dict(os.environ, {"AIRMUSCLE_CACHE_DIR": folder}):
+        yield
+
+
 def compile_anew(system: System) -> Program:
-    """The program of a system, without the cache of traced laws."""
+    """The program of a system, without the caches of traced laws and of machine code."""
     autodiff._traced_functions.clear()
-    return Program(system)
+    with without_stored_code():
+        return Program(system)
 
 
 def compile_with_step(system: System) -> Any:
     """A new program and its compiled step of ode8, 13 stages in one function."""
     program = compile_anew(system)
-    return program.step(DormandPrince8(1e-4).tableau(), compile_system(system).parameters)
+    with without_stored_code():
+        return program.step(DormandPrince8(1e-4).tableau(), compile_system(system).parameters)
 
 
 def many_muscles() -> Plant:
@@ -59,6 +75,20 @@ def many_muscles() -> Plant:
     return dataclasses.replace(
         plant, muscle=muscles, circuit=(plant.circuits[0],) * MUSCLES, mechanism=HangingMass(100.0)
     )
+
+
+def with_meters() -> WithEnergyMeters:
+    """Four muscles with friction, creep and a lagging wall, heat and tubes of two volumes, and all energy meters."""
+    plant, tube = hanging(4), Tube(TubeOrifice(1.0, 3e-3), 1e-5, 2)
+    parts = (
+        LuGre(5e4, 15.0, 5.0, 0.01, 50.0, 20.0),
+        CreepElements((2e4, 1e4), (0.1, 2.0)),
+        ViscoelasticWall(2e-11, 0.05),
+    )
+    friction, creep, wall = parts
+    muscles = tuple(dataclasses.replace(m, friction=friction, creep=creep, wall=wall) for m in plant.muscles)
+    circuits = tuple(WithTubes(circuit, tube) for circuit in plant.circuits)
+    return WithEnergyMeters(dataclasses.replace(plant, muscle=muscles, circuit=circuits, gas=EnergyBalance(0.5)))
 
 
 def cache_counts() -> tuple[int, ...]:
@@ -87,11 +117,14 @@ def section(rounds: int = 5) -> Section:
     """The complete benchmark."""
     systems = {size: run.system for size, run in runs().items()}
     heavier, big = dataclasses.replace(hanging(), mechanism=HangingMass(6.0)), many_muscles()
+    metered = with_meters()
     compile_system(systems[3])
     variants: dict[str, Callable[[], Any]] = {
         f"new plant, {n} states": lambda s=s: compile_anew(s) for n, s in systems.items()
     }
     variants["new plant, 3 states, with compiled step of ode8"] = lambda: compile_with_step(systems[3])
+    meters = f"new plant with energy meters, {len(metered.states)} states"
+    variants[meters] = lambda: compile_anew(metered)
     variants["new parameter values of a known plant"] = lambda: compile_system(heavier)
     times = time_variants(variants, rounds)
     times |= time_variants({f"new plant, {MUSCLES} muscles on one mass, 26 states": lambda: compile_anew(big)}, 2)
@@ -100,6 +133,7 @@ def section(rounds: int = 5) -> Section:
     rows.append(("files in the cache after each of three processes", ", ".join(map(str, counts)), ""))
     targets = (
         Target("new plant, 10 states", times["new plant, 10 states"].minimum, 0.3, "s"),
+        Target(meters, times[meters].minimum, 2.0, "s"),
         Target(f"new plant, {MUSCLES} muscles", list(times.values())[-1].minimum, 4.0, "s", reason=REASON),
         Target("files added to the cache by the second and third process", counts[-1] - counts[0], 0, "files"),
     )

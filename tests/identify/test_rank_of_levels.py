@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import airmuscle as am
 from airmuscle.characteristic import ContractileSurface
 from airmuscle.core.errors import IdentificationError
-from airmuscle.identify import fit
+from airmuscle.identify import fit, fit_points
 from airmuscle.identify.statistics import count_levels
 from airmuscle.library.catalogue import load
 from airmuscle.recording import Recording
@@ -46,3 +48,28 @@ def test_the_rank_of_the_library_data_is_complete():
 def test_noise_has_one_level_and_a_grid_has_its_own():
     assert count_levels(3e5 + np.random.default_rng(0).normal(0, 300.0, 244)) == 1
     assert count_levels(np.repeat([0.0, 1e5, 2e5, 3e5], 7)) == 4
+
+
+@given(st.integers(12, 400), st.integers(0, 10**6))
+def test_no_run_within_a_band_is_taken_for_single_points(rows, seed):
+    """Among other rows, in the band of 98 % of its own values exactly, with outliers at each end."""
+    random = np.random.default_rng(seed)
+    run = random.standard_t(random.integers(1, 5), rows)
+    among = np.concatenate([random.normal(0.0, 50.0, 20), run, random.normal(0.0, 50.0, 20)])
+    low, high = np.quantile(run, [0.01, 0.99])
+    assert fit_points._may_be_constant(run, high - low)
+    assert fit_points._may_be_constant(among, high - low)
+
+
+def test_single_points_are_not_searched_for_runs(monkeypatch):
+    """Their rows stay as they are; so are rows of which a search finds no run at a level."""
+    random = np.random.default_rng(2)
+    columns = {"pressure": random.uniform(0, 6e5, 200), "contraction": random.uniform(0, 0.25, 200)}
+    points = Recording({**columns, "force": np.ones(200)}, "points")
+    plain = fit_points._columns_at_levels(points)
+    assert all((plain[name] == columns[name]).all() for name in columns)
+    monkeypatch.setattr(fit_points, "_may_be_constant", lambda *_: True)
+    assert all((fit_points._columns_at_levels(points)[name] == columns[name]).all() for name in columns)
+    monkeypatch.undo()
+    monkeypatch.setattr(fit_points, "find_runs", lambda _: pytest.fail("a search for runs"))
+    fit_points._columns_at_levels(points)

@@ -74,8 +74,8 @@ def bootstrap(
     progress    called with the completed fraction
 
     Censored rows are active where the original fit violates their bound. A law that is linear in its parameters is
-    refitted by one matrix product; any other law is refitted iteratively from the parameters of the original fit.
-    Raises IdentificationError.
+    refitted by one matrix product; any other law is refitted iteratively from the parameters of the original fit, or
+    from those of an earlier refit with a smaller sum of squares in this sample. Raises IdentificationError.
     """
     runs = [recordings] if isinstance(recordings, Recording) else list(recordings)
     group, count = _assign_groups(fit, runs, by or default_split(runs))

@@ -23,6 +23,8 @@ LEVEL_BAND = 0.1
 """Maximum range of a pressure that counts as constant in a run, as a fraction of its maximum (chosen)."""
 MIN_ROWS_OF_RUN = 12
 """Minimum number of rows of a run whose constant quantity is replaced by its level (chosen)."""
+_MAX_ROWS_OF_POINTS = 2000
+"""Maximum number of rows of a recording that is examined for single points first (chosen)."""
 POINT_COLUMNS = ("pressure", "contraction", "force")
 
 
@@ -134,12 +136,27 @@ def _columns_at_levels(recording: Recording) -> dict[str, Array]:
     if not finite:
         return columns
     bands = {"pressure": LEVEL_BAND * float(np.max(np.abs(columns["pressure"]), initial=0.0)), "contraction": 0.01}
+    if not any(_may_be_constant(columns[name], band) for name, band in bands.items()):
+        return columns
     names = {ISOBARIC: "pressure", ISOMETRIC: "contraction"}
     for run in find_runs(recording):
         name, rows = names.get(run.kind), run.interval.rows
         if name is not None and len(run.interval) >= MIN_ROWS_OF_RUN and _range(columns[name][rows]) <= bands[name]:
             columns[name][rows] = np.median(columns[name][rows])
     return columns
+
+
+def _may_be_constant(values: Array, band: float) -> bool:
+    """Whether the values, but for one at each end, of some `MIN_ROWS_OF_RUN` consecutive rows fit into a band.
+
+    It is necessary for a run at a level, and quickly answered for single points: up to 101 rows have at most one value
+    at each end outside the band of 98 %, and longer runs have as many rows in succession without any.
+    """
+    if not MIN_ROWS_OF_RUN <= len(values) <= _MAX_ROWS_OF_POINTS:
+        return len(values) > _MAX_ROWS_OF_POINTS
+    windows = np.lib.stride_tricks.sliding_window_view(values, MIN_ROWS_OF_RUN)
+    ordered = np.sort(windows, axis=1)
+    return bool((ordered[:, -2] - ordered[:, 1] <= band * (1 + 1e-9)).any())
 
 
 def _range(values: Array) -> float:
