@@ -36,7 +36,7 @@ WIDEST = 1e4
 HIGHEST_COMMAND = 6e5
 """Magnitude [Pa] of a commanded pressure."""
 LARGEST_SHORTENING = 0.02
-"""Magnitude [m] of a shortening of an open plant."""
+"""Largest shortening [m] of an open plant; some geometries permit no lengthening."""
 
 
 def models_in(thing):
@@ -179,7 +179,7 @@ class Composer:
             if given.unit not in ("1", "Pa") and high == HIGHEST_COMMAND:
                 low, high = -5.0, 5.0
             if given.name.endswith(SHORTENING):
-                low, high = -LARGEST_SHORTENING, LARGEST_SHORTENING
+                low, high = 0.0, LARGEST_SHORTENING
             instants = np.cumsum(self.rng.uniform(0.02, duration / 5, 5))
             levels = self.rng.uniform(low, high, 5)
             levels = np.round(levels) if high <= 1.0 and given.unit != "m" and self.chance(0.7) else levels
