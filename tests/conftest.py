@@ -5,13 +5,12 @@ thorough` draws 300 examples in place of 20. A figure whose axes, labels and cur
 before gets the files of that one, except in tests with the marker `drawn`, which look at the files; its image has a low
 resolution. A command that is called within a test uses one process, because the tests themselves run on all cores;
 tests of several processes state their number. The configuration file of the user is not read. Where Python must not
-write bytecode beside the sources, that of the project, also of the tests, whose assertions pytest rewrites, is stored
-in the cache folder of pytest; installed packages have their own.
+write bytecode beside the sources, that of the tests, whose assertions pytest rewrites, is stored in the cache folder of
+pytest.
 """
 
 from __future__ import annotations
 
-import importlib
 import os
 import re
 import signal
@@ -30,16 +29,6 @@ os.environ["AIRMUSCLE_CONFIG_DIR"] = os.devnull
 if sys.dont_write_bytecode and sys.pycache_prefix is None:
     sys.dont_write_bytecode = False
     sys.pycache_prefix = str(Path(__file__).parents[1] / ".pytest_cache" / "bytecode")
-    bytecode_file = importlib._bootstrap_external.cache_from_source
-
-    def installed_or_stored(source: str, *options: Any, **named: Any) -> str:
-        """The bytecode file that an installed package has beside its source, or else that in the cache folder."""
-        folder, name = os.path.split(source)
-        beside = os.path.join(folder, "__pycache__", f"{name.removesuffix('.py')}.{sys.implementation.cache_tag}.pyc")
-        installed = "site-packages" in folder or folder.startswith(sys.base_prefix)
-        return beside if installed and os.path.exists(beside) else bytecode_file(source, *options, **named)
-
-    importlib._bootstrap_external.cache_from_source = installed_or_stored
 settings.register_profile("few", settings(), max_examples=20, deadline=None)
 settings.register_profile("thorough", settings(), max_examples=300, deadline=None)
 settings.load_profile("few")
