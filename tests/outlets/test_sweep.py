@@ -28,11 +28,12 @@ from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
 from airmuscle.cli.interruption import check_interrupted, deferred_sigint
+from airmuscle.core import fingerprint
 from airmuscle.core.errors import AirmuscleError, ColumnError, FileError, InputError, SimulationError
 from airmuscle.report.write import save_table
 from airmuscle.scenario.scenario import load_scenario
 from airmuscle.simulation import simulate, solve
-from airmuscle.study import chunk, dask_cluster, fingerprint, load_study, process_pool, run_study
+from airmuscle.study import chunk, dask_cluster, load_study, process_pool, run_study
 from airmuscle.study.chapter import study_chapter, write_study
 from airmuscle.study.design import DESIGNS
 from airmuscle.study.distributions import VARIATIONS
