@@ -33,6 +33,7 @@ def force_laws():
 LAWS = dict(force_laws())
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
 @pytest.mark.parametrize("name", LAWS)
 def test_the_force_at_the_pressure_of_the_inverse_is_the_wanted_one(name):
     inverse = StaticInverse(LAWS[name], max_pressure=6e5)

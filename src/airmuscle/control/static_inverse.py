@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+import numpy as np
+
 from ..characteristic.base import ForceLaw
 from ..core import ops
 from ..core.declaration import model, parameter
@@ -67,7 +69,8 @@ class StaticInverse:
 
     def pressure(self, contraction: Value, force: Value) -> Value:
         """Gauge pressure [Pa] at a contraction [1] and a tension [N]; arrays broadcast."""
-        return pressure_between(self.min_pressure, self.max_pressure, self.law, contraction, force, self.steps)
+        with np.errstate(over="ignore", invalid="ignore"):  # beyond the range of tensions, where no iterate is used
+            return pressure_between(self.min_pressure, self.max_pressure, self.law, contraction, force, self.steps)
 
 
 def pressure_between(
