@@ -19,6 +19,7 @@ import batch
 import bootstrap
 import calls
 import components
+import controllers
 import derivative
 import environments
 import growth
@@ -55,6 +56,7 @@ SECTIONS: tuple[tuple[Callable[[int], Section], int], ...] = (
     (identification.section, 3),
     (static_fit.section, 15),
     (live.section, 1),
+    (controllers.section, 20),
     (environments.section, 9),
     (bootstrap.section, 5),
     (model_comparison.section, 3),

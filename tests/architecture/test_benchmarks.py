@@ -8,6 +8,7 @@ from __future__ import annotations
 import dataclasses
 
 import batch
+import controllers
 import environments
 import loops
 import measure
@@ -116,10 +117,19 @@ def test_lmfit_computes_the_same_coefficients():
 
 @pytest.mark.slow
 def test_the_section_of_loops_has_a_row_for_each_plant_and_integrator():
-    section = loops.section(rounds=1, count=2, duration=0.02)
-    assert len(section.rows) == 6
-    assert [row[-1] for row in section.rows[::3]] == ["0.0e+00"] * 2
+    section = loops.section(rounds=1, count=2, duration=1.5)
+    assert len(section.rows) == 8
+    assert all(float(error) < 1e-4 for row in section.rows for error in row[-2:])
     assert len(section.targets) == 3
+
+
+@pytest.mark.slow
+def test_the_section_of_controllers_has_a_row_for_each_call(monkeypatch):
+    pytest.importorskip("daqp", reason="the package daqp is not installed")
+    monkeypatch.setattr(controllers, "SAMPLES", 20)
+    section = controllers.section(rounds=1)
+    assert len(section.rows) == 6
+    assert len(section.targets) == 5
 
 
 def test_a_section_and_its_targets_are_printed():
