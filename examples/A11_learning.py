@@ -36,7 +36,10 @@ def joints(count, **options):
 
 
 class LearningJoints(VecEnv):
-    """The joints as Stable-Baselines3 expects them: an episode that is over begins anew in the same step."""
+    """The joints as Stable-Baselines3 expects them: an episode that is over begins anew in the same step.
+
+    All joints are one object: attributes and methods are those of the vector, the same for each joint.
+    """
 
     def __init__(self, count, seed):
         self.joints = joints(count, autoreset_mode=gymnasium.vector.AutoresetMode.SAME_STEP)
@@ -67,10 +70,10 @@ class LearningJoints(VecEnv):
         return [getattr(self.joints, attr_name)] * self.num_envs
 
     def set_attr(self, attr_name, value, indices=None):
-        raise NotImplementedError("the joints have no attributes of their own")
+        setattr(self.joints, attr_name, value)
 
     def env_method(self, method_name, *args, indices=None, **options):
-        raise NotImplementedError("the joints have no methods of their own")
+        return [getattr(self.joints, method_name)(*args, **options)] * self.num_envs
 
     def env_is_wrapped(self, wrapper_class, indices=None):
         return [False] * self.num_envs

@@ -78,11 +78,6 @@ class GainSchedule(EnclosingLaw):
     def measured_columns(self) -> tuple[str, ...]:
         return united(self.law.measured_columns, (self.scheduling_column,))
 
-    @property
-    def initial_memory(self) -> Mapping[str, float]:
-        """The values of the law."""
-        return self.law.initial_memory
-
     def step(
         self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
     ) -> tuple[Mapping[str, Value], Mapping[str, Value]]:

@@ -12,12 +12,13 @@ from ..core.tree import Structure, structure
 from .control_law import ControlLaw
 from .control_loop import ControlLoop
 from .controller import Controller, Measurement
+from .enclosing_law import EnclosingLaw
 
 _without_design: set[Structure] = set()
 """Structures of control laws that contain no design."""
 
 
-class LawDesign(ControlLaw):
+class LawDesign(EnclosingLaw):
     """A control law whose numbers follow from declared weights by a design, such as Riccati equations.
 
     A design cannot be traced; its result can. A run therefore compiles the designed `law`, and a search for the weights
@@ -28,22 +29,6 @@ class LawDesign(ControlLaw):
     @abc.abstractmethod
     def law(self) -> ControlLaw:
         """The designed law."""
-
-    @property
-    def measured_columns(self) -> tuple[str, ...]:
-        return self.law.measured_columns
-
-    @property
-    def setpoints(self) -> tuple[str, ...]:
-        return self.law.setpoints
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        return self.law.inputs
-
-    @property
-    def initial_memory(self) -> Mapping[str, float]:
-        return self.law.initial_memory
 
     def step(
         self, memory: Mapping[str, Value], measurement: Measurement, dt: Value

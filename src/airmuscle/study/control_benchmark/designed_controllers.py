@@ -169,11 +169,6 @@ class DeviationLaw(EnclosingLaw):
     def setpoints(self) -> tuple[str, ...]:
         return ("angle",)
 
-    @property
-    def initial_memory(self) -> Mapping[str, float]:
-        """That of the law."""
-        return self.law.initial_memory
-
     def step(
         self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
     ) -> tuple[Mapping[str, Value], Mapping[str, Value]]:
