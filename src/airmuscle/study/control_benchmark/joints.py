@@ -12,6 +12,7 @@ from ...analysis.equilibrium import find_equilibrium
 from ...control.driver import Driver, SolenoidDriver
 from ...control.sensors import ColumnSensor
 from ...core.errors import ParameterError
+from ...core.field_types import check_field_types
 from ...core.short_repr import ShortRepr
 from ...friction import Dahl, Friction, LuGre
 from ...library.law_file import load_law
@@ -72,6 +73,7 @@ class BenchmarkJoint(ShortRepr):
     objective: RobustObjective = RobustObjective(air_weight=100.0)
 
     def __post_init__(self) -> None:
+        check_field_types(self)
         check_truth_differs(self.model, self.truth)
         if not self.family:
             raise ParameterError(f"joint '{self.name}': the family of models is empty; give at least the model.")

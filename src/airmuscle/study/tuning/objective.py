@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from ...core.arrays import Array
 from ...core.errors import ParameterError
+from ...core.field_types import check_field_types
 from ...core.short_repr import ShortRepr
 
 
@@ -56,6 +57,7 @@ class RobustObjective:
     switching_weight: float = 0.0
 
     def __post_init__(self) -> None:
+        check_field_types(self)
         if not 0 <= self.quantile <= 1:
             raise ParameterError(f"RobustObjective: quantile is {self.quantile}; allowed range: 0 to 1.")
         for name in ("quantile_weight", "air_weight", "switching_weight"):

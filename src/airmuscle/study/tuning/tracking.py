@@ -13,6 +13,7 @@ import numpy as np
 from ...control.control_loop import SETPOINT
 from ...core.arrays import Array
 from ...core.errors import ParameterError, suggestion
+from ...core.field_types import check_field_types
 from ...core.reference import Reference
 
 GRAHAM_LATHROP1953 = Reference(
@@ -43,6 +44,7 @@ class TrackingIndex(abc.ABC):
     begin: float = 0.0
 
     def __post_init__(self) -> None:
+        check_field_types(self)
         for name, scale in self.scales.items():
             if not 0 < scale < math.inf:
                 raise ParameterError(f"{type(self).__name__}: scale of '{name}' is {scale}; it must be positive.")
