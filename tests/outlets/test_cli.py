@@ -197,6 +197,9 @@ def test_a_unique_beginning_of_a_name_is_enough_and_others_are_refused():
     assert_failed(airmuscle("show", "dmsp"), "'dmsp' is ambiguous: dmsp-10-250, dmsp-20-300")
     assert_failed(airmuscle("show", "dmps-20-300"), r".*Did you mean 'dmsp-20-300'\?")
     assert_failed(airmuscle("show", "no/such.toml"), "no/such.toml: there is no such file")
+    assert_failed(
+        airmuscle("export", "dmsp-20-300", "--to", "c"), "dmsp-20-300: there is no such file, .* plants are arm-"
+    )
 
 
 def test_cite_prints_each_source_in_three_ways():

@@ -147,7 +147,7 @@ def _requirement(
         return LiftRequirement(_read("stroke", stroke, "m"), stiffness=spring, **_load(load))
     assert torque is not None
     assert angle is not None
-    turned = _read("inertia", inertia, "kg m^2") if inertia else 0.0
+    turned = _read("inertia", inertia, "kg m^2") if inertia is not None else 0.0
     return JointRequirement(_read("angle", angle, "rad"), _read("torque", torque, "N m"), turned)
 
 
