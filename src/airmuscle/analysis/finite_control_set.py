@@ -32,7 +32,7 @@ QI2019 = Reference(
     note="enumeration of the modes of on/off valves over a short horizon, cost of switching",
 )
 MAX_SEQUENCES = 1_000_000
-"""Greatest number of sequences of modes (chosen)."""
+"""Maximum number of sequences of modes (chosen)."""
 _choose = Kernel("choose_mode", "finite_control_set")
 
 

@@ -59,7 +59,7 @@ class NonlinearModelPredictive(ShortRepr, MultivariableController):
     operating_inputs   values of all inputs of the plant at the first estimate; those not commanded are held there
     controlled   columns with a set point
     commanded    inputs that the controller commands
-    permitted    greatest permitted deviation of states and commanded inputs; every commanded input needs one
+    permitted    maximum permitted deviation of states and commanded inputs; every commanded input needs one
     limits       minimum and maximum of columns, such as {"pressure": (0, 5e5)}
     slack_weight weight of the squared violation relative to the size of its range; infinity makes the limits hard
     horizon      number N of samples

@@ -53,7 +53,7 @@ class JointFit(NotebookDisplay):
 
     @property
     def limits(self) -> DataLimits:
-        """Greatest force and range of the speed of all runs."""
+        """Maximum force and range of the speed of all runs."""
         return combine_limits(tuple(run.limits for run in self.series))
 
     @property

@@ -17,7 +17,7 @@ from .tracking_metrics import BONE2019, RATED_STROKES, SETTLING_BAND, STEADY_TIM
 
 HEADERS = {
     "rmse": "rms error [deg]",
-    "greatest": "greatest error [deg]",
+    "greatest": "maximum error [deg]",
     "itae": "ITAE [deg s^2]",
     "settling": "settling time [s]",
     "overshoot": "overshoot [%]",

@@ -86,7 +86,7 @@ class BenchmarkJoint(ShortRepr):
 
     @property
     def pressure_span(self) -> float:
-        """Greatest half difference of the pressures [Pa] at the mean pressure."""
+        """Maximum half difference of the pressures [Pa] at the mean pressure."""
         return min(self.mean_pressure - self.min_pressure, self.max_pressure - self.mean_pressure)
 
     def start(self, plant: Plant) -> dict[str, float]:
