@@ -18,7 +18,6 @@ from filling import Array, hanging, runs
 from measure import PRINT_PEAK_MEMORY, Section, Target, Times, format_time, print_section, time_variants
 from ode8 import compilers
 
-from airmuscle.analysis.equilibrium import find_equilibrium
 from airmuscle.control.inputs import Schedule
 from airmuscle.core import tree
 from airmuscle.plant.plant import Plant
@@ -27,6 +26,7 @@ from airmuscle.simulation.batch import Double, Precision, Single, simulate_batch
 from airmuscle.simulation.batch.initial_states import default_states
 from airmuscle.simulation.batch.thread_pool import available_cores
 from airmuscle.simulation.batch.variations import variations_of
+from airmuscle.simulation.equilibrium import find_equilibrium
 from airmuscle.simulation.integrators import RungeKutta4
 
 STEP, PLANTS, DURATION = 1e-3, 10_000, 5.0

@@ -6,11 +6,11 @@ import numpy as np
 from measure import Section, Target, format_time, print_section, time_variants
 from static_fit import design_matrix, make_points
 
-from airmuscle.characteristic.contractile_surface import ContractileSurface
 from airmuscle.identify.bootstrapping import bootstrap
 from airmuscle.identify.censoring import UNCENSORED
 from airmuscle.identify.cross_validation import RunSplit
 from airmuscle.identify.static_fit import fit
+from airmuscle.muscle.characteristic.contractile_surface import ContractileSurface
 from airmuscle.recording import Recording
 
 REFITS = 1000

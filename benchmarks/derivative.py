@@ -12,11 +12,11 @@ from filling import BRAID, Array
 from measure import Section, Target, format_time, print_section, time_variants
 from new_plant import MUSCLES, many_muscles
 
-from airmuscle.analysis.equilibrium import find_equilibrium
-from airmuscle.characteristic import ChouHannaford1996
 from airmuscle.compile.kernels.calls import invoke, pointer
 from airmuscle.compile.program import CompiledSystem, compile_system
+from airmuscle.muscle.characteristic import ChouHannaford1996
 from airmuscle.plant.plant import Plant
+from airmuscle.simulation.equilibrium import find_equilibrium
 
 HEADER = ("plant", "median", "minimum", "per muscle")
 CALLS = 10_000

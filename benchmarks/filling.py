@@ -15,18 +15,18 @@ import numpy as np
 import numpy.typing as npt
 from joints import joint, joint_start
 
-from airmuscle.analysis.equilibrium import find_equilibrium
-from airmuscle.characteristic.contractile_surface import ContractileSurface
 from airmuscle.control.inputs import Schedule
 from airmuscle.control.piecewise_linear import PiecewiseLinear
 from airmuscle.core import ops
 from airmuscle.core.system import System
-from airmuscle.geometry.braid import Braid
 from airmuscle.mechanism import HangingMass
 from airmuscle.muscle import LinearSpring, Muscle, PressureDamper
+from airmuscle.muscle.characteristic.contractile_surface import ContractileSurface
+from airmuscle.muscle.geometry.braid import Braid
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
 from airmuscle.pneumatics.gas import Ambient, Isothermal
+from airmuscle.simulation.equilibrium import find_equilibrium
 
 Array = npt.NDArray[np.float64]
 DURATION = 25.0

@@ -9,14 +9,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from airmuscle.characteristic.clamped import Clamped
-from airmuscle.characteristic.virtual_work import VirtualWork
 from airmuscle.core import ops
 from airmuscle.core.declaration import model, parameter
 from airmuscle.core.system import System
 from airmuscle.core.variables import StateVariable
-from airmuscle.geometry.braid import Braid
 from airmuscle.muscle import LinearDamper, LinearSpring, Muscle
+from airmuscle.muscle.characteristic.clamped import Clamped
+from airmuscle.muscle.characteristic.virtual_work import VirtualWork
+from airmuscle.muscle.geometry.braid import Braid
 from airmuscle.pneumatics import Supply, Valve
 from airmuscle.pneumatics.gas import GAS_CONSTANT, Ambient, absolute_pressure, gauge_pressure
 

@@ -7,9 +7,9 @@ import time
 import numpy as np
 from measure import Section, Target, format_time, print_section
 
-from airmuscle.characteristic import ValidityRange
 from airmuscle.identify.experiment_design import BenchLimits
 from airmuscle.identify.recursive_fit import RecursiveFit
+from airmuscle.muscle.characteristic import ValidityRange
 from airmuscle.recording.follow import RowReader
 
 ROWS = 5000

@@ -9,7 +9,6 @@ import numpy as np
 from joints import chosen_muscle
 from measure import Section, Target, format_time, print_section
 
-from airmuscle.analysis.equilibrium import find_equilibrium
 from airmuscle.control import (
     PID,
     AngleAndStiffness,
@@ -26,6 +25,7 @@ from airmuscle.pneumatics import FillDischarge, Supply, Valve
 from airmuscle.simulation import Integrator, Rodas4, RungeKutta4
 from airmuscle.simulation.batch import BatchSolution, simulate_batch
 from airmuscle.simulation.batch.thread_pool import available_cores
+from airmuscle.simulation.equilibrium import find_equilibrium
 
 COUNT, DURATION, SAMPLE_TIME = 10_000, 5.0, 5e-3
 SIMULATED = 400

@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from measure import Section, Target, format_time, print_section
 
-from airmuscle.characteristic import TonduLopez2000
-from airmuscle.friction import Dahl
-from airmuscle.geometry.braid import Braid
 from airmuscle.identify import Bootstrap, Comparison, RunSplit, bootstrap, compare, fit
 from airmuscle.identify.candidates import blank_surface
 from airmuscle.identify.hysteresis import find_loops, fit_loop
+from airmuscle.muscle.characteristic import TonduLopez2000
+from airmuscle.muscle.friction import Dahl
+from airmuscle.muscle.geometry.braid import Braid
 from airmuscle.recording import Recording
 
 LENGTHS = (0.15, 0.2, 0.3)

@@ -19,9 +19,9 @@ from measure import Section, Target, format_time, print_section, time_variants
 from airmuscle.compile.program import Program, compile_system
 from airmuscle.core import autodiff
 from airmuscle.core.system import System
-from airmuscle.friction import LuGre
 from airmuscle.mechanism import HangingMass
 from airmuscle.muscle import CreepElements, ViscoelasticWall
+from airmuscle.muscle.friction import LuGre
 from airmuscle.plant import WithEnergyMeters
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import EnergyBalance, Tube, TubeOrifice, WithTubes

@@ -13,7 +13,6 @@ import time
 import numpy as np
 
 from airmuscle.control.inputs import Schedule
-from airmuscle.geometry import Vessel
 from airmuscle.identify.dynamic import (
     DynamicFit,
     Experiment,
@@ -25,6 +24,7 @@ from airmuscle.identify.dynamic import (
 )
 from airmuscle.mechanism import Isometric
 from airmuscle.muscle import Muscle, SwellingWall
+from airmuscle.muscle.geometry import Vessel
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Tube, Valve, WithTubes
 from airmuscle.pneumatics.gas import Gas, Isothermal, Polytropic

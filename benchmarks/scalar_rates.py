@@ -13,7 +13,7 @@ from typing import Any
 from filling import stretch_factor
 from joints import HEAT_CAPACITY, Joint, JointWithHeat
 
-from airmuscle.characteristic.contractile_surface import ContractileSurface
+from airmuscle.muscle.characteristic.contractile_surface import ContractileSurface
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import Valve
 from airmuscle.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, absolute_pressure

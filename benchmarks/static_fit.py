@@ -6,9 +6,9 @@ import numpy as np
 from filling import BOX, Array, measured_force
 from measure import Section, Target, format_time, print_section, time_variants
 
-from airmuscle.characteristic.contractile_surface import ContractileSurface, exponents
 from airmuscle.identify.censoring import UNCENSORED
 from airmuscle.identify.static_fit import fit
+from airmuscle.muscle.characteristic.contractile_surface import ContractileSurface, exponents
 from airmuscle.recording import Recording
 
 POINTS = 1000

@@ -9,10 +9,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from airmuscle.characteristic.borzikova import SAM_30X290, BorzikovaDirect, BorzikovaExponential
 from airmuscle.core import autodiff
 from airmuscle.core.errors import GeometryLimitError, ParameterError, SolveError
 from airmuscle.library.catalogue import load
+from airmuscle.muscle.characteristic.borzikova import SAM_30X290, BorzikovaDirect, BorzikovaExponential
 
 # Coefficients of the exponent that the three printed curves determine, by Lagrange interpolation in F;
 # rows by power of p in bar, columns by power of F in N. Ten decimals were computed apart from this program.

@@ -9,8 +9,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from airmuscle.characteristic.borzikova import SAM_30X290
 from airmuscle.identify.surface.basis import LoadRange
+from airmuscle.muscle.characteristic.borzikova import SAM_30X290
 from airmuscle.report.chapter import DIFFERS, HOLDS, NOT_TESTABLE, Kind
 from airmuscle.reproduce import borzikova
 from airmuscle.reproduce import borzikova_muscle_claims as muscle_claims

@@ -9,8 +9,6 @@ from typing import Annotated, Any
 
 import typer
 
-from ..characteristic import Characteristic, ForceLaw, ValidityRange
-from ..characteristic.validity_range import validity_range_of
 from ..core import leaves
 from ..core.display import quantity_text
 from ..core.errors import AirmuscleWarning, GeometryLimitError, PhysicsError, RatingError, SolveError
@@ -21,6 +19,8 @@ from ..library.entry import Entry
 from ..library.law_file import load_law
 from ..library.scaling import scale_entry
 from ..muscle import Ratings
+from ..muscle.characteristic import Characteristic, ForceLaw, ValidityRange
+from ..muscle.characteristic.validity_range import validity_range_of
 from ..muscle.isobars import WorkingPoint, compute_isobars
 from ..pneumatics import Ambient
 from ..pneumatics.gas import check_above_vacuum

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from ..characteristic.validity_range import ValidityRange
 from ..core.annotation import one_line
 from ..core.declaration import as_finite_float, check_structure, parameters
 from ..core.errors import ParameterError, TraceError
 from ..mechanism import Mechanism
 from ..muscle import Muscle
+from ..muscle.characteristic.validity_range import ValidityRange
 from ..pneumatics import Circuit
 from ..pneumatics.gas import Ambient, Gas, check_above_vacuum
 from ..pneumatics.supply import check_not_shared

@@ -9,12 +9,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..characteristic.base import ContractionLaw
-from ..characteristic.borzikova import BORZIKOVA, SAM_30X290, PlaneCurves
 from ..core.arrays import Array
 from ..core.constants import STANDARD_GRAVITY
 from ..identify.surface.basis import Chebyshev, LoadRange, conditioning
 from ..identify.surface.exponential import SurfaceFit, SurfaceProblem, fit_linearised, fit_nonlinear
+from ..muscle.characteristic.base import ContractionLaw
+from ..muscle.characteristic.borzikova import BORZIKOVA, SAM_30X290, PlaneCurves
 from ..recording import Recording
 from ..report.chapter import AtLeast, Chapter, Claim, Equal, Kind
 from ..report.formatting import format_number, typographic

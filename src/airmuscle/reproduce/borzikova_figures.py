@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from ..characteristic.base import ContractionLaw
-from ..characteristic.borzikova import PlaneCurves
 from ..core import autodiff
 from ..core.plotting import BLACK, BLUE, DASHES, LINES, MARKERS, ORANGE, RED, legend_outside, new_figure
 from ..core.units import bar
 from ..identify.surface.basis import LoadRange
+from ..muscle.characteristic.base import ContractionLaw
+from ..muscle.characteristic.borzikova import PlaneCurves
 from ..report.chapter import Plot
 from .borzikova_surfaces import CORRECTED, EXPONENTIAL, MISPRINT_CORRECTED, MONOTONE
 

@@ -7,13 +7,13 @@ import warnings
 
 import numpy as np
 
-from ..characteristic.base import ContractionLaw
-from ..characteristic.borzikova import SAM_30X290, BorzikovaDirect, BorzikovaExponential, PlaneCurves
 from ..core.errors import AirmuscleWarning
 from ..identify.correlation_index import CorrelationIndex, correlation_index
 from ..identify.surface.basis import LoadRange
 from ..identify.surface.monotone import fit_monotone
 from ..library.law_file import load_law
+from ..muscle.characteristic.base import ContractionLaw
+from ..muscle.characteristic.borzikova import SAM_30X290, BorzikovaDirect, BorzikovaExponential, PlaneCurves
 from ..recording import Recording
 
 MISPRINT_INDEX = 2

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from ..characteristic.base import ContractionLaw
-from ..characteristic.borzikova import PlaneCurves
 from ..core.units import bar, percent
 from ..identify.surface.basis import Basis, Chebyshev, LoadRange, Monomials, conditioning
 from ..identify.surface.exponential import SurfaceFit, fit_linearised, fit_nonlinear
 from ..identify.surface.monotone import find_monotonicity_violations
+from ..muscle.characteristic.base import ContractionLaw
+from ..muscle.characteristic.borzikova import PlaneCurves
 from ..recording import Recording
 from ..report.chapter import Table
 from .borzikova_surfaces import (

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..analysis.energy_defect import maxwell_defect
-from ..characteristic.base import Characteristic
-from ..characteristic.contractile_surface import exponents
 from ..core.reference import cite
-from ..geometry.base import Geometry
 from ..library import law_file
+from ..muscle.characteristic.base import Characteristic
+from ..muscle.characteristic.contractile_surface import exponents
+from ..muscle.characteristic.energy_defect import maxwell_defect
+from ..muscle.geometry.base import Geometry
 from ..report.chapter import Chapter, Plot, Table
 from . import hosovsky_effect_ranges as causing_over_ranges
 from . import hosovsky_effects as causing

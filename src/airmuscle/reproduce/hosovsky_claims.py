@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..characteristic.contractile_surface import exponents
 from ..identify import Fit
 from ..identify.censored_least_squares import uncensored_rank
+from ..muscle.characteristic.contractile_surface import exponents
 from ..report.chapter import AtMost, Claim, Equal, Kind
 from .hosovsky_effects import Effect
 from .hosovsky_plant import PAPER, SUPPLY_PRESSURE, VOLUME_FLOW_RATIO, surface

@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 import functools
 
-from ..characteristic.contractile_surface import ContractileSurface
 from ..core.reference import CHOSEN, Reference
-from ..geometry.braid import Braid
 from ..identify import Fit, fit
 from ..library import catalogue
 from ..mechanism import HangingMass, Mechanism, WithLatch
 from ..muscle import LinearDamper, LinearSpring, Muscle, RigidSeriesElement, RigidWall, SeriesElement, Spring, Wall
+from ..muscle.characteristic.contractile_surface import ContractileSurface
+from ..muscle.geometry.braid import Braid
 from ..plant.plant import Plant
 from ..pneumatics import FillDischarge, Orifice, Supply, TubeModel, Valve, WithTubes
 from ..pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, Ambient, Gas, Isothermal

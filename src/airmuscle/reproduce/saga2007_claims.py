@@ -10,10 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..characteristic.base import Characteristic
-from ..characteristic.exact_meridian import ExactMeridian
-from ..characteristic.saga2007 import RUBBER_TEST_STRAIN, Saga2007
 from ..core.errors import SolveError
+from ..muscle.characteristic.base import Characteristic
+from ..muscle.characteristic.exact_meridian import ExactMeridian
+from ..muscle.characteristic.saga2007 import RUBBER_TEST_STRAIN, Saga2007
 from ..report.chapter import AtLeast, AtMost, Claim, Equal, Kind, PublishedValue
 from .saga2007_further_claims import further_claims
 from .saga2007_joint import feed_forward_comparisons

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ..characteristic.saga2007 import RUBBER_TEST_STRAIN, Saga2007
 from ..core.plotting import BLACK, DASHES, LINES, legend_outside, new_figure
+from ..muscle.characteristic.saga2007 import RUBBER_TEST_STRAIN, Saga2007
 from ..report.chapter import Plot
 from ..report.formula import to_mathtext
 from .saga2007_claims import FIG_2

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..characteristic.exact_meridian import ExactMeridian
-from ..characteristic.saga2007 import Saga2007
+from ..muscle.characteristic.exact_meridian import ExactMeridian
+from ..muscle.characteristic.saga2007 import Saga2007
 from ..report.chapter import AtLeast, AtMost, Claim, Equal, Kind
 from .saga2007_muscle import (
     DEFAULT,

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..characteristic.base import Characteristic
-from ..characteristic.rubber import RubberLine
 from ..core.arrays import Array
 from ..core.plotting import BLACK, DASHES, legend_outside, new_figure
 from ..core.plotting import LINES as COLOURS
+from ..muscle.characteristic.base import Characteristic
+from ..muscle.characteristic.rubber import RubberLine
 from ..report.chapter import AtMost, Claim, Kind, Plot, Table
 from .saga2007_muscle import (
     LENGTH,

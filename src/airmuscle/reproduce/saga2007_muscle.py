@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from ..characteristic.base import Characteristic
-from ..characteristic.circle_virtual_work import CircleVirtualWork
-from ..characteristic.exact_meridian import ExactMeridian
-from ..characteristic.rubber import ArcIntegral, RubberLine
-from ..characteristic.saga2007 import LINE_A, LINE_B, Saga2007
 from ..core.errors import SolveError
-from ..geometry.fibre_sum import UniformFibreSum
-from ..geometry.parabola import Parabola
-from ..geometry.pleated import PleatedTube
-from ..geometry.straight_fibre import StraightFibre
+from ..muscle.characteristic.base import Characteristic
+from ..muscle.characteristic.circle_virtual_work import CircleVirtualWork
+from ..muscle.characteristic.exact_meridian import ExactMeridian
+from ..muscle.characteristic.rubber import ArcIntegral, RubberLine
+from ..muscle.characteristic.saga2007 import LINE_A, LINE_B, Saga2007
+from ..muscle.geometry.fibre_sum import UniformFibreSum
+from ..muscle.geometry.parabola import Parabola
+from ..muscle.geometry.pleated import PleatedTube
+from ..muscle.geometry.straight_fibre import StraightFibre
 
 PAPER = "saga2007"
 LENGTH, DIAMETER, WALL = 0.072, 0.012, 0.002

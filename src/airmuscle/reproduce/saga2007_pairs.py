@@ -11,17 +11,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..characteristic.rubber import ArcIntegral, RubberIntegral, RubberLine
 from ..core import autodiff
 from ..core.arrays import Array
 from ..core.declaration import model
 from ..core.ops import Value
-from ..geometry.catenary import Catenary
-from ..geometry.circular_arc import CircularArc
-from ..geometry.meridian import Segment
-from ..geometry.parabola import Parabola, TrueArcParabola
-from ..geometry.pleated import PleatedTube
-from ..geometry.straight_fibre import FibreTube, StraightFibre
+from ..muscle.characteristic.rubber import ArcIntegral, RubberIntegral, RubberLine
+from ..muscle.geometry.catenary import Catenary
+from ..muscle.geometry.circular_arc import CircularArc
+from ..muscle.geometry.meridian import Segment
+from ..muscle.geometry.parabola import Parabola, TrueArcParabola
+from ..muscle.geometry.pleated import PleatedTube
+from ..muscle.geometry.straight_fibre import FibreTube, StraightFibre
 from ..report.chapter import Table
 from .saga2007_muscle import DIAMETER, LENGTH, LINES, WALL, exact_meridian
 

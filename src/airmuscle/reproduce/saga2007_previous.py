@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..characteristic.rubber import RubberLine
 from ..core.errors import ParameterError, SolveError
 from ..core.plotting import BLACK, DASHES, LINES, new_figure
-from ..geometry.circular_arc import CircularArc
+from ..muscle.characteristic.rubber import RubberLine
+from ..muscle.geometry.circular_arc import CircularArc
 from ..report.chapter import AtLeast, Claim, Plot, Table
 from . import saga2007_pairs as pairs
 from .saga2007_muscle import DIAMETER, LENGTH, PAPER, PRESSURE, WALL, exact_meridian

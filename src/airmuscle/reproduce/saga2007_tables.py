@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ..characteristic.saga2007 import RUBBER_TEST_STRAIN, Saga2007
 from ..core import autodiff
+from ..muscle.characteristic.saga2007 import RUBBER_TEST_STRAIN, Saga2007
 from ..report.chapter import Table
 from . import saga2007_pairs
 from .saga2007_claims import FIG_2

@@ -18,7 +18,6 @@ import numpy as np
 
 from ..core.errors import AirmuscleError, AirmuscleWarning
 from ..core.output_folder import atomic_folder
-from ..geometry import Geometry
 from ..identify import Candidate, standard_candidates
 from ..identify.hysteresis import LoopFit, find_loops, fit_jointly, fit_loop, loops_not_joined
 from ..identify.hysteresis.selection import select_friction
@@ -26,6 +25,7 @@ from ..identify.law_selection import LawSelection, select_law
 from ..library.entry import Entry
 from ..library.initial_law import find_initial_law
 from ..library.write import part_toml
+from ..muscle.geometry import Geometry
 from ..recording import Recording
 from ..recording.segment import check_contents, motion_direction
 from ..report.compare_chapter import compare_chapter

@@ -19,13 +19,13 @@ import dataclasses
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from ..characteristic import Characteristic
 from ..compile.functions import Printer
 from ..compile.text.javascript import JavaScriptLanguage
 from ..core import autodiff
 from ..core.errors import AirmuscleError, TraceError
-from ..geometry import Braid, Geometry
-from ..geometry.straight_fibre import FibreTube
+from ..muscle.characteristic import Characteristic
+from ..muscle.geometry import Braid, Geometry
+from ..muscle.geometry.straight_fibre import FibreTube
 
 DIRECTIONS = ("force", "contraction", "pressure")
 _UNTRACEABLE = (AirmuscleError, RuntimeError, TypeError, ValueError)

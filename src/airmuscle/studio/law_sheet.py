@@ -11,17 +11,17 @@ from typing import Any
 
 import numpy as np
 
-from ..characteristic import Characteristic, ContractionLaw, ForceLaw
-from ..characteristic.polynomial_surrogate import PolynomialSurrogate, as_force_law
-from ..characteristic.validity_range import validity_range_of
 from ..core import cite, leaves
 from ..core.errors import TraceError
 from ..core.tree import Leaf
 from ..core.units import conversion
-from ..geometry import Geometry
-from ..geometry.straight_fibre import FibreTube
 from ..library.entry import Entry
 from ..library.write import to_toml
+from ..muscle.characteristic import Characteristic, ContractionLaw, ForceLaw
+from ..muscle.characteristic.polynomial_surrogate import PolynomialSurrogate, as_force_law
+from ..muscle.characteristic.validity_range import validity_range_of
+from ..muscle.geometry import Geometry
+from ..muscle.geometry.straight_fibre import FibreTube
 from .law_program import print_law
 from .toml_template import Template, toml_template
 

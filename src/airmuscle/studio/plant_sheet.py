@@ -15,10 +15,10 @@ from ..core.errors import ParameterError
 from ..core.tree import Leaf, leaves
 from ..export.targets import JavaScript
 from ..export.write import make_run
-from ..geometry import Geometry
 from ..library.location import Location
 from ..library.write import part_toml, tables_toml
 from ..mechanism import AntagonisticJoint, HangingMass
+from ..muscle.geometry import Geometry
 from ..plant.plant import Plant
 from ..recording.display_units import display_scale
 from ..scenario.scenario import TABLES, Scenario, build_scenario, initial_pressure

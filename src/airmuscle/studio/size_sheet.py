@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ..characteristic.validity_range import validity_range_of
 from ..core.arrays import Array
 from ..core.errors import AirmuscleError, ParameterError, UnitError
 from ..core.units import quantity
+from ..muscle.characteristic.validity_range import validity_range_of
 from ..muscle.isobars import compute_isobars
 from ..report.sizing_chapter import choice_row
 from ..sizing import (
