@@ -37,7 +37,7 @@ _MODULES = {
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names.split()}
 _SUBPACKAGES = (
     "analysis", "control", "environments", "export", "identify", "library", "mechanism", "muscle", "plant",
-    "pneumatics", "recording", "simulation", "sizing", "units",
+    "pneumatics", "recording", "simulation", "sizing", "study", "units",
 )  # fmt: skip
 
 __all__ = sorted([*_MODULE_OF, "units"])  # noqa: PLE0605

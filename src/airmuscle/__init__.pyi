@@ -11,6 +11,7 @@ from . import pneumatics as pneumatics
 from . import recording as recording
 from . import simulation as simulation
 from . import sizing as sizing
+from . import study as study
 from . import units as units
 from .analysis import linearise as linearise
 from .control import PID as PID

@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..compile.cache.store import cache_folder, read_private
+from ..core.cache_folder import cache_folder, read_private
 from ..core.fingerprint import fingerprint, program_fingerprint
 from ..muscle.geometry import Geometry
 from ..recording import Recording

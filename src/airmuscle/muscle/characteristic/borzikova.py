@@ -17,7 +17,6 @@ from ...core.errors import GeometryLimitError, ParameterError
 from ...core.ops import Value
 from ...core.reference import Reference
 from ...core.units import bar, percent
-from ...recording import Recording
 from .base import ContractionLaw
 
 BORZIKOVA = Reference(
@@ -73,20 +72,6 @@ class PlaneCurves:
         loads = ", ".join(f"{c.force:g}" for c in self.curves)
         raise GeometryLimitError(
             f"No plane curve at {force:g} N; curves exist at {loads} N. Use a surface between these loads."
-        )
-
-    def sample(self, points: int = 15) -> Recording:
-        """Return a recording of `points` equidistant pressures from zero on every curve, curve after curve."""
-        pressures = np.linspace(0.0, self.max_pressure, points)
-        return Recording(
-            {
-                "pressure": np.tile(pressures, len(self.curves)),
-                "force": np.repeat([c.force for c in self.curves], points),
-                "contraction": np.concatenate([c.contraction(pressures) for c in self.curves]),
-            },
-            origin="plane curves of Borzíková et al., sampled",
-            constants={"specimen": "Shadow Air Muscle SAM 30 x 290", "resting_length": 0.29},
-            notes=("Curves fitted by the authors; the measured points are lost.",),
         )
 
     def interpolate(self, force_degree: int = 2) -> BorzikovaExponential:

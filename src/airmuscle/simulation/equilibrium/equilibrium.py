@@ -56,7 +56,7 @@ def find_equilibria(
     """
     one = _statics(plant, pressure, air_mass, inputs)
     rows, x = _balances(one)
-    if not rows.size and (len(one.coordinates) == 0 or _is_degenerate(one)):
+    if not rows.size and (len(one.plants.mechanism.coordinates) == 0 or _is_degenerate(one)):
         raise no_equilibrium(one)
     states, stable = _judged(one, rows, x)
     return tuple(
@@ -67,7 +67,7 @@ def find_equilibria(
 
 def _is_degenerate(one: Statics) -> bool:
     """Whether a plant with one coordinate is in equilibrium everywhere, or has no permitted position."""
-    if len(one.coordinates) != 1:
+    if len(one.plants.mechanism.coordinates) != 1:
         return False
     x = grid(one)
     return not one.accelerations(x[:, np.isfinite(x[0]), None]).any()
@@ -137,7 +137,7 @@ def _statics(
 
 def _balances(statics: Statics) -> tuple[Rows, Array]:
     """The row of the plant and the coordinates (d,) of every equilibrium."""
-    count = len(statics.coordinates)
+    count = len(statics.plants.mechanism.coordinates)
     if count == 1:
         return equilibria_of_one_coordinate(statics)
     if count > 1:

@@ -17,7 +17,7 @@ def no_equilibrium(one: Statics) -> PhysicsError:
 
     GeometryLimitError if no position is within the limits of all muscles, EquilibriumError otherwise.
     """
-    kind, count = type(one.plants.mechanism).__name__, len(one.coordinates)
+    kind, count = type(one.plants.mechanism).__name__, len(one.plants.mechanism.coordinates)
     if count == 0:
         return EquilibriumError(_without_coordinates(one))
     x = grid(one)[0][:, None] if count == 1 else starts(one)
@@ -34,7 +34,7 @@ def no_equilibrium(one: Statics) -> PhysicsError:
     if not f.any():
         return EquilibriumError(
             f"{kind} is in equilibrium at every position: no force acts on it under these inputs. Choose an initial "
-            f"state by plant.state_at(pressure=..., {one.coordinates[0].name}=...)."
+            f"state by plant.state_at(pressure=..., {one.plants.mechanism.coordinates[0].name}=...)."
         )
     if count == 1:
         places, load = [x[0], x[-1]], _required_tension(one, x[0])
@@ -69,8 +69,11 @@ def _line(one: Statics, x: Array) -> str:
     )
     accelerations = one.accelerations(x[None, None])[0, 0]
     if len(x) == 1:
-        return f"{pulls}, and the load accelerates at {accelerations[0]:+.4g} {one.coordinates[0].unit}/s2"
-    moving = ", ".join(f"{c.name} {a:+.4g} {c.unit}/s2" for c, a in zip(one.coordinates, accelerations, strict=True))
+        unit = one.plants.mechanism.coordinates[0].unit
+        return f"{pulls}, and the load accelerates at {accelerations[0]:+.4g} {unit}/s2"
+    moving = ", ".join(
+        f"{c.name} {a:+.4g} {c.unit}/s2" for c, a in zip(one.plants.mechanism.coordinates, accelerations, strict=True)
+    )
     return f"{pulls}, and the accelerations are {moving}"
 
 
@@ -84,6 +87,8 @@ def _required_tension(one: Statics, x: Array) -> str:
     accelerations = []
     for tension in (0.0, 1.0):
         forces = mechanism.generalised_forces(state, [tension], plant.resting_lengths)
-        accelerations.append(float(mechanism.acceleration(state, state, forces, inputs)[one.coordinates[0].name]))
+        accelerations.append(
+            float(mechanism.acceleration(state, state, forces, inputs)[one.plants.mechanism.coordinates[0].name])
+        )
     slope = accelerations[1] - accelerations[0]
     return f" The load requires a tension of {-accelerations[0] / slope:.6g} N." if slope else ""

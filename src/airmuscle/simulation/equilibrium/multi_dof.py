@@ -24,7 +24,7 @@ def equilibria_of_several_coordinates(statics: Statics) -> tuple[Rows, Array]:
         equilibria = _equilibria(statics.of(np.array([row])))
         rows += [row] * len(equilibria)
         places += equilibria
-    return np.array(rows, dtype=np.intp), np.array(places).reshape(len(rows), len(statics.coordinates))
+    return np.array(rows, dtype=np.intp), np.array(places).reshape(len(rows), len(statics.plants.mechanism.coordinates))
 
 
 def _equilibria(one: Statics) -> list[Array]:

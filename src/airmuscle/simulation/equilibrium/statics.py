@@ -15,7 +15,6 @@ from ...core import ops, tree
 from ...core.arrays import Array
 from ...core.errors import AirmuscleError
 from ...core.ops import Value
-from ...mechanism import Coordinate
 from ...muscle import Muscle
 from ...plant.plant import Plant
 from ...pneumatics.gas import absolute_pressure
@@ -76,20 +75,15 @@ class Statics:
         """The states, in their order."""
         return self.compiled.description.state_names
 
-    @property
-    def coordinates(self) -> tuple[Coordinate, ...]:
-        """The coordinates."""
-        return self.plants.mechanism.coordinates
-
     def limits(self, index: int) -> tuple[Array, Array, Array]:
         """Nominal size and limits (N, 1) of a coordinate."""
-        c, shape = self.coordinates[index], (len(self.parameters), 1)
+        c, shape = self.plants.mechanism.coordinates[index], (len(self.parameters), 1)
         nominal, low, high = (np.array(np.broadcast_to(v, shape)) for v in (c.nominal, c.lower_limit, c.upper_limit))
         return nominal, low, high
 
     def nominal_sizes(self) -> Array:
         """Nominal sizes (d,) of the coordinates of the first plant."""
-        return np.array([self.limits(i)[0][0, 0] for i in range(len(self.coordinates))])
+        return np.array([self.limits(i)[0][0, 0] for i in range(len(self.plants.mechanism.coordinates))])
 
     @functools.cached_property
     def contraction_limits(self) -> list[tuple[Value, Value]]:
@@ -126,10 +120,10 @@ class Statics:
 
     def place(self, x: Array) -> dict[str, float]:
         """Coordinates (d,) by name."""
-        return {c.name: float(v) for c, v in zip(self.coordinates, x, strict=True)}
+        return {c.name: float(v) for c, v in zip(self.plants.mechanism.coordinates, x, strict=True)}
 
     def _coordinate_values(self, x: Array) -> dict[str, Value]:
-        return {c.name: x[..., i] for i, c in enumerate(self.coordinates)}
+        return {c.name: x[..., i] for i, c in enumerate(self.plants.mechanism.coordinates)}
 
     def states(self, x: Array) -> Array:
         """The states at rest (N, K, n); NaN at impossible coordinates."""
@@ -141,7 +135,7 @@ class Statics:
 
     def _states(self, x: Array) -> Array:
         plant, shape = self.plants, x.shape[:2]
-        known = self._coordinate_values(x) | {c.speed: 0.0 for c in self.coordinates}
+        known = self._coordinate_values(x) | {c.speed: 0.0 for c in self.plants.mechanism.coordinates}
         contractions, possible = self.contractions(x), np.ones(shape, dtype=bool)
         for eps, muscle in zip(contractions, plant.muscles, strict=True):
             low, high = muscle.geometry.contraction_range
@@ -183,7 +177,7 @@ class Statics:
         rates = np.empty_like(states)
         if states.size:
             evaluate_rates(self.compiled.address["rhs"], self.precomputed, self.inputs, states, rates)
-        return np.asarray(rates[..., [self.names.index(c.speed) for c in self.coordinates]])
+        return np.asarray(rates[..., [self.names.index(c.speed) for c in self.plants.mechanism.coordinates]])
 
     def contracted(self, x: Array) -> Array:
         """Sum of squared contractions (N, K): the distance from full length."""
@@ -191,7 +185,7 @@ class Statics:
 
     def state(self, x: Mapping[str, float]) -> dict[str, float]:
         """The state at rest of the first plant at coordinates by name, as a mapping."""
-        place = np.array([[[x[c.name] for c in self.coordinates]]])
+        place = np.array([[[x[c.name] for c in self.plants.mechanism.coordinates]]])
         return dict(zip(self.names, self.states(place)[0, 0].tolist(), strict=True))
 
 
