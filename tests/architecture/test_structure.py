@@ -105,6 +105,29 @@ def imported(path: Path) -> set[str]:
     return modules
 
 
+def test_the_packages_have_140_arrows_and_13_floors_at_most():
+    """An arrow leads from a package (or `benchmarks/`) to another one that it imports; a floor is above all it imports."""
+    below: dict[str, set[str]] = defaultdict(set)
+    for path in FILES:
+        room, *rest = path.relative_to(SOURCE).parts
+        below[room if rest else path.stem] |= {name.split(".")[1] for name in imported(path) if name.count(".") > 1}
+    for path in (ROOT / "benchmarks").glob("*.py"):
+        names = {
+            name for node in ast.walk(tree_of(path)) if isinstance(node, ast.ImportFrom) for name in [node.module or ""]
+        }
+        below["benchmarks"] |= {name.split(".")[1] for name in names if name.startswith("airmuscle.")}
+    rooms = {path.parent.name for path in SOURCE.glob("*/__init__.py")}
+    below = {room: (names & rooms) - {room} for room, names in below.items()}
+
+    @functools.cache
+    def floor(room: str) -> int:
+        return 1 + max((floor(other) for other in below.get(room, ())), default=0)
+
+    assert len(rooms | {"benchmarks"}) <= 25
+    assert max(floor(room) for room in below) <= 13
+    assert sum(len(names) for names in below.values()) <= 140
+
+
 def test_laws_do_not_import_each_other():
     laws = {path.stem: path for path in (SOURCE / "muscle" / "characteristic").glob("*.py")}
     private = laws.keys() - SHARED_LAWS - COMPOSITES

@@ -23,8 +23,9 @@ from airmuscle.identify.surface.monotone import (
 )
 from airmuscle.muscle.characteristic.borzikova import SAM_30X290, BorzikovaExponential
 from airmuscle.recording import Recording
+from airmuscle.reproduce.borzikova_surfaces import sample
 
-CURVES = SAM_30X290.sample()
+CURVES = sample(SAM_30X290)
 EXACT = SAM_30X290.interpolate()
 FITS = [fit_linearised, fit_nonlinear]
 
