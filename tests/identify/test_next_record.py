@@ -1,4 +1,4 @@
-"""Which record to measure next: the Fisher information of a record adds to that of the fit, so that the expected standard
+"""Next record to measure: the Fisher information of a record adds to that of the fit, so that the expected standard
 errors are those of a joint fit with it, and a record that responds to one of two parameters alone separates them.
 """
 
@@ -14,12 +14,12 @@ from typer.testing import CliRunner
 from airmuscle.cli.app import app
 from airmuscle.control.inputs import Schedule
 from airmuscle.core.errors import IdentificationError, ParameterError
-from airmuscle.geometry import Vessel
 from airmuscle.identify.dynamic import Experiment, InitialConditions, StartTime, fit_dynamic, rank_records
 from airmuscle.identify.dynamic.candidate_records import candidate_records
 from airmuscle.library.catalogue import load
 from airmuscle.mechanism import Isometric
 from airmuscle.muscle import Muscle
+from airmuscle.muscle.geometry import Vessel
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
 from airmuscle.pneumatics.gas import EnergyBalance, Polytropic

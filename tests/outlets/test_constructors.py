@@ -17,11 +17,8 @@ from plants import EXAMPLES
 
 from airmuscle import (
     analysis,
-    characteristic,
     control,
     environments,
-    friction,
-    geometry,
     identify,
     load,
     mechanism,
@@ -34,6 +31,7 @@ from airmuscle.core.errors import AirmuscleError, AirmuscleWarning, ParameterErr
 from airmuscle.identify import dynamic, prediction
 from airmuscle.library.files import list_laws
 from airmuscle.mechanism import HangingMass
+from airmuscle.muscle import characteristic, friction, geometry
 from airmuscle.pneumatics import Supply, Tank, Valve
 from airmuscle.study import control_benchmark, tuning
 
