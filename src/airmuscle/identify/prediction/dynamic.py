@@ -72,7 +72,7 @@ def predict_dynamic(
         fit = fit_dynamic(plant, [experiment], free=(), per_record=own, observed=deviations, method=method)
         plant, experiment = fit.plant(), _with_estimates(fit, experiment)
         values = ", ".join(
-            f"{e.name.removesuffix(' of record 1')} {e.value:.5g} {e.display_unit}".rstrip() for e in fit.estimates
+            f"{e.name.removesuffix(' of record 1')} {e.value:.4g} {e.display_unit}".rstrip() for e in fit.estimates
         )
         notes.append(f"estimated from the record itself: {values} (SI)")
     modelled, unknowns = _simulate(plant, experiment, deviations, uncertainty, method or Rodas4())
