@@ -64,6 +64,11 @@ class RobustObjective:
             if not 0 <= getattr(self, name) < math.inf:
                 raise ParameterError(f"RobustObjective: {name} is {getattr(self, name)}; it must be 0 or positive.")
 
+    def __str__(self) -> str:
+        weights = ((self.air_weight, "mean air drawn [kg/s]"), (self.switching_weight, "mean switchings [1/s]"))
+        parts = [f" + {weight:.4g} x {what}" for weight, what in weights if weight]
+        return f"mean + {self.quantile_weight:.4g} x {self.quantile:.4g} quantile of the index{''.join(parts)}"
+
     def __call__(self, metrics: CaseMetrics) -> Array:
         """The objective (E,) of E sets of gains."""
         values = np.full(len(metrics), np.inf)

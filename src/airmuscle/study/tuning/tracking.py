@@ -51,6 +51,11 @@ class TrackingIndex(abc.ABC):
         if not 0 <= self.begin < math.inf:
             raise ParameterError(f"{type(self).__name__}: begin is {self.begin} s; it must be 0 or positive.")
 
+    def __str__(self) -> str:
+        scales = [f"{name} divided by {scale:.4g} (SI)" for name, scale in self.scales.items()]
+        begin = [f"from {self.begin:.4g} s"] if self.begin else []
+        return ", ".join([type(self).__name__, *scales, *begin])
+
     def scales_for(self, setpoints: Sequence[str], columns: Sequence[str]) -> dict[str, float]:
         """The controlled columns with their scales, for the set points of a loop and the columns of a plant."""
         controlled = [name for name in setpoints if name in columns]
