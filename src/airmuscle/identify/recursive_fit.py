@@ -17,6 +17,7 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.errors import IdentificationError, ParameterError
+from ..core.short_repr import ShortRepr
 from ..muscle.characteristic import ContractileSurface
 from ..muscle.characteristic.contractile_surface import exponents
 from .experiment_design import LEVEL_COUNT, BenchLimits
@@ -37,8 +38,8 @@ class NextPoint(NamedTuple):
     standard_error: float
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class RecursiveFit:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class RecursiveFit(ShortRepr):
     """Contractile surface fitted to the samples so far; `updated` returns it with one more sample.
 
     limits      range of the test rig, on which the surface is scaled, and its greatest force
