@@ -40,7 +40,7 @@ def in_order(code: Code, apart: IndependentGroup, early: frozenset[Operand]) -> 
     A value that is computed long before its use would be spilled to memory. Instructions in `early` do not share a
     block with others.
     """
-    items = _Pieces(code, apart, early).found()
+    items = _Pieces(code, apart, early).items()
     owner = {result: k for k, item in enumerate(items) for result in _results(item)}
     waits = [{owner[o] for o in _needs(item) if o in owner} - {k} for k, item in enumerate(items)]
     ahead: list[list[int]] = [[] for _ in items]
@@ -106,7 +106,7 @@ class _Pieces:
         self._done: set[Operand] = set()
         self._results = {line.result for line in code.body}
 
-    def found(self) -> list[Item]:
+    def items(self) -> list[Item]:
         """All instructions and blocks, in an executable order."""
         items: list[Item] = []
         left = list(self._code.body)
