@@ -1,7 +1,7 @@
 """Settings of all tests: Ctrl-C interrupts, random examples are few, figures of one kind are drawn once.
 
 Ctrl-C interrupts here too, where a shell that runs the tests in the background has it ignored. `--hypothesis-profile
-thorough` draws 300 examples in place of 20. A figure whose axes, labels and curves are those of one that was drawn
+thorough` draws 300 examples in place of 10. A figure whose axes, labels and curves are those of one that was drawn
 before gets the files of that one, except in tests with the marker `drawn`, which look at the files; its image has a low
 resolution. A command that is called within a test uses one process, because the tests themselves run on all cores;
 tests of several processes state their number. A kernel that is missing in the cache is compiled by one worker, while
@@ -43,7 +43,7 @@ if sys.dont_write_bytecode and sys.pycache_prefix is None:
     sys.pycache_prefix = str(CACHE / "bytecode")
     os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-settings.register_profile("few", settings(), max_examples=20, deadline=None)
+settings.register_profile("few", settings(), max_examples=10, deadline=None)
 settings.register_profile("thorough", settings(), max_examples=300, deadline=None)
 settings.load_profile("few")
 processes.available_cores = lambda: 1
