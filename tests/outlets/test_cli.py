@@ -25,7 +25,6 @@ from typer.testing import CliRunner, Result
 from widths import SAME_LAW, widened
 
 import airmuscle as airmuscle_package
-from airmuscle.characteristic.contractile_surface import ContractileSurface
 from airmuscle.cli.app import COMMANDS, app
 from airmuscle.cli.cite import as_bibtex
 from airmuscle.cli.terminal import print_json, print_table
@@ -33,6 +32,7 @@ from airmuscle.core.errors import UnknownNameError, printable
 from airmuscle.core.reference import Reference
 from airmuscle.library.catalogue import load
 from airmuscle.library.files import list_laws, list_plants, list_products, list_valves
+from airmuscle.muscle.characteristic.contractile_surface import ContractileSurface
 from airmuscle.recording import read_csv
 from airmuscle.report.chapter import Chapter, Claim, Equal
 from airmuscle.reproduce import run

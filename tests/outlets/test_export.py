@@ -19,7 +19,6 @@ import pytest
 from typer.testing import CliRunner
 from widths import widened
 
-from airmuscle.characteristic import Tabulated
 from airmuscle.cli.app import app
 from airmuscle.control import SampledSignal, Schedule
 from airmuscle.core import autodiff
@@ -30,6 +29,7 @@ from airmuscle.export.identifiers import LONGEST, RESERVED
 from airmuscle.library.files import list_laws
 from airmuscle.library.law_file import load_law
 from airmuscle.mechanism import HangingMass
+from airmuscle.muscle.characteristic import Tabulated
 from airmuscle.simulation import DormandPrince8, Problem, Rodas4, RungeKutta4, solve
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -15,10 +15,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..characteristic import ContractileSurface
-from ..characteristic.contractile_surface import exponents
 from ..core.arrays import Array
 from ..core.errors import IdentificationError, ParameterError
+from ..muscle.characteristic import ContractileSurface
+from ..muscle.characteristic.contractile_surface import exponents
 from .experiment_design import LEVEL_COUNT, BenchLimits
 
 PRIOR = 1e-4
