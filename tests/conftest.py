@@ -1,20 +1,20 @@
 """Settings of all tests: Ctrl-C interrupts, random examples are few, figures of one kind are drawn once.
 
 Ctrl-C interrupts here too, where a shell that runs the tests in the background has it ignored. `--hypothesis-profile
-thorough` draws 300 examples in place of 10. A figure whose axes, labels and curves are those of one that was drawn
-before gets the files of that one, except in tests with the marker `drawn`, which look at the files; its image has a low
-resolution. A command that is called within a test uses one process, because the tests themselves run on all cores;
-tests of several processes state their number. A kernel that is missing in the cache is compiled by one worker, while
-others wait for it. Objects that exist after the collection of tests are no longer searched by the garbage collector.
-The configuration file of the user is not read. Where Python must not write bytecode beside the sources, that of the
-tests, whose assertions pytest rewrites, and of the processes that they start is stored in the cache folder of pytest.
+thorough` draws 300 examples in place of 10. A figure whose axes contain the same kinds of curves and areas as one that
+was drawn before gets the files of that one, except in tests with the marker `drawn`, which look at the files; its image
+has a low resolution. A command that is called within a test uses one process, because the tests themselves run on all
+cores; tests of several processes state their number. A kernel that is missing in the cache is compiled by one worker,
+while others wait for it. Objects that exist after the collection of tests are no longer searched by the garbage
+collector. The configuration file of the user is not read. Where Python must not write bytecode beside the sources, that
+of the tests, whose assertions pytest rewrites, and of the processes that they start is stored in the cache folder of
+pytest.
 """
 
 from __future__ import annotations
 
 import gc
 import os
-import re
 import signal
 import sys
 from collections.abc import Sequence
@@ -67,16 +67,15 @@ class OneOfAKind:
 
 
 def kind_of(figure: Any) -> Any:
-    """Size, texts without their numbers, and the curves and areas of all axes of a figure."""
-    axes = [
+    """The kinds of its axes: curves, areas and texts, scales, and whether a title or a label contains a formula."""
+    return frozenset(
         (
-            [re.sub(r"[-\d.,]+", "0", text) for text in (a.get_title(), a.get_xlabel(), a.get_ylabel())],
-            [type(child).__name__ for child in a.get_children()],
-            (a.get_xscale(), a.get_yscale()),
+            frozenset(type(child).__name__ for child in axes.get_children()),
+            (axes.get_xscale(), axes.get_yscale()),
+            any("$" in text for text in (axes.get_title(), axes.get_xlabel(), axes.get_ylabel())),
         )
-        for a in figure.axes
-    ]
-    return repr((tuple(figure.get_size_inches()), [type(child).__name__ for child in figure.get_children()], axes))
+        for axes in figure.axes
+    )
 
 
 ONE_OF_A_KIND = OneOfAKind()
