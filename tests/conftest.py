@@ -1,20 +1,23 @@
 """Settings of all tests: Ctrl-C interrupts, random examples are few, figures of one kind are drawn once.
 
 Ctrl-C interrupts here too, where a shell that runs the tests in the background has it ignored. `--hypothesis-profile
-thorough` draws 300 examples in place of 20. A figure whose axes, labels and curves are those of one that was drawn
-before gets the files of that one, except in tests with the marker `drawn`, which look at the files; its image has a low
-resolution. A command that is called within a test uses one process, because the tests themselves run on all cores;
-tests of several processes state their number. The configuration file of the user is not read. Where Python must not
-write bytecode beside the sources, that of the tests, whose assertions pytest rewrites, is stored in the cache folder of
+thorough` draws 300 examples in place of 10. A figure whose axes contain the same kinds of curves and areas as one that
+was drawn before gets the files of that one, except in tests with the marker `drawn`, which look at the files; its image
+has a low resolution. A command that is called within a test uses one process, because the tests themselves run on all
+cores; tests of several processes state their number. A kernel that is missing in the cache is compiled by one worker,
+while others wait for it. Objects that exist after the collection of tests are no longer searched by the garbage
+collector. The configuration file of the user is not read. Where Python must not write bytecode beside the sources, that
+of the tests, whose assertions pytest rewrites, and of the processes that they start is stored in the cache folder of
 pytest.
 """
 
 from __future__ import annotations
 
+import gc
 import os
-import re
 import signal
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -22,14 +25,25 @@ from unittest import mock
 import pytest
 from hypothesis import settings
 
+from airmuscle.compile.cache import kernel, object_code
+from airmuscle.compile.cache.store import load, save
 from airmuscle.core import plotting, processes
 
+try:
+    import fcntl
+except ImportError:  # Windows: each worker compiles its own
+    fcntl = None  # type: ignore[assignment]
+
+CACHE = Path(__file__).parents[1] / ".pytest_cache"
+LOCKS = CACHE / "compiling"
 signal.signal(signal.SIGINT, signal.default_int_handler)
 os.environ["AIRMUSCLE_CONFIG_DIR"] = os.devnull
 if sys.dont_write_bytecode and sys.pycache_prefix is None:
     sys.dont_write_bytecode = False
-    sys.pycache_prefix = str(Path(__file__).parents[1] / ".pytest_cache" / "bytecode")
-settings.register_profile("few", settings(), max_examples=20, deadline=None)
+    sys.pycache_prefix = str(CACHE / "bytecode")
+    os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+settings.register_profile("few", settings(), max_examples=10, deadline=None)
 settings.register_profile("thorough", settings(), max_examples=300, deadline=None)
 settings.load_profile("few")
 processes.available_cores = lambda: 1
@@ -53,20 +67,40 @@ class OneOfAKind:
 
 
 def kind_of(figure: Any) -> Any:
-    """Size, texts without their numbers, and the curves and areas of all axes of a figure."""
-    axes = [
+    """The kinds of its axes: curves, areas and texts, scales, and whether a title or a label contains a formula."""
+    return frozenset(
         (
-            [re.sub(r"[-\d.,]+", "0", text) for text in (a.get_title(), a.get_xlabel(), a.get_ylabel())],
-            [type(child).__name__ for child in a.get_children()],
-            (a.get_xscale(), a.get_yscale()),
+            frozenset(type(child).__name__ for child in axes.get_children()),
+            (axes.get_xscale(), axes.get_yscale()),
+            any("$" in text for text in (axes.get_title(), axes.get_xlabel(), axes.get_ylabel())),
         )
-        for a in figure.axes
-    ]
-    return repr((tuple(figure.get_size_inches()), [type(child).__name__ for child in figure.get_children()], axes))
+        for axes in figure.axes
+    )
 
 
 ONE_OF_A_KIND = OneOfAKind()
 plotting.rendered = ONE_OF_A_KIND
+
+
+def built_once(numba_kernel: Any, kinds: Sequence[str]) -> bytes:
+    """`object_code.build`, which one worker at a time enters for a kernel; the others then find what it has stored."""
+    name = numba_kernel.py_func.__name__
+    LOCKS.mkdir(parents=True, exist_ok=True)
+    with open(LOCKS / name, "w") as file:  # closing it releases the lock
+        fcntl.flock(file, fcntl.LOCK_EX)
+        stored = load(name, kinds)
+        return save(name, kinds, object_code.build(numba_kernel, kinds)) if stored is None else stored
+
+
+if fcntl and "PYTEST_XDIST_WORKER" in os.environ:
+    kernel.build = built_once
+
+
+def pytest_collection_finish() -> None:
+    """Modules, tests and fixtures remain until the end; fewer searches among the young suffice for what tests leave."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(10_000, 10, 10)
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -100,6 +100,7 @@ def test_the_section_of_the_batch_has_its_rows_and_targets():
     assert any("NumPy" in target.name for target in section.targets)
 
 
+@pytest.mark.slow
 def test_the_section_of_the_environments_has_a_row_for_each_variant(monkeypatch):
     monkeypatch.setattr(environments, "STEPS", 20)
     section = environments.section(rounds=1, count=16)

@@ -37,7 +37,7 @@ STARTS = {
 @pytest.mark.parametrize("start", STARTS)
 def test_a_process_does_not_import_modules_that_it_does_not_need(start):
     code, absent = STARTS[start]
-    for _ in range(2):  # the second run uses the kernel cache
+    for _ in range(2):
         done = subprocess.run(
             [sys.executable, "-c", f"{code}\nimport sys; print(*sys.modules)"],
             capture_output=True,
@@ -45,6 +45,8 @@ def test_a_process_does_not_import_modules_that_it_does_not_need(start):
             timeout=60,
         )
         assert done.returncode == 0, done.stderr
+        if "compiling" not in done.stderr:  # otherwise the second run uses the kernel cache
+            break
     assert absent & set(done.stdout.splitlines()[-1].split()) == set()
 
 

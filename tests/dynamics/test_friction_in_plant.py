@@ -11,6 +11,7 @@ import casadi
 import numpy as np
 import pytest
 from joints import chosen_muscle
+from widths import widened
 
 from airmuscle.compile.functions import trace_system
 from airmuscle.control.inputs import Schedule
@@ -119,7 +120,13 @@ def test_the_slips_of_a_plant_tend_to_the_exact_ones():
     assert worst[1] <= 0.02 * sum(k * d for k, d in zip(SLIP.stiffnesses, SLIP.limits, strict=True))
 
 
-@pytest.mark.parametrize("friction", LAWS, ids=name)
+@pytest.mark.parametrize(
+    "friction",
+    widened(
+        LAWS, lambda law: not isinstance(law, BoucWen | PrandtlIshlinskii)
+    ),  # of the forms of Dahl and Maxwell slip
+    ids=name,
+)
 def test_the_result_does_not_depend_on_method_and_tolerance(friction):
     runs = [loops_of(friction, 4.0, 0.1, method) for method in (Rodas4(1e-6), Rodas4(1e-9), DormandPrince8(1e-4))]
     size = np.ptp(runs[1]["position"])

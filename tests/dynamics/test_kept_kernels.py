@@ -4,6 +4,7 @@ and code for another processor are never run; a kernel that needs the library of
 from __future__ import annotations
 
 import concurrent.futures
+import copy
 import ctypes
 import dataclasses
 import math
@@ -15,10 +16,12 @@ import numba
 import numpy as np
 import pytest
 from filling import lifting_run
+from numba.core import ir
 
 from airmuscle.compile.cache import kernel as kernels
 from airmuscle.compile.cache import module
 from airmuscle.compile.cache import store as kept
+from airmuscle.compile.cache.inlining import shallow_scope_copies
 from airmuscle.compile.cache.kernel import BoundKernel, Kernel
 from airmuscle.compile.cache.object_code import build
 from airmuscle.compile.function import Function
@@ -220,7 +223,7 @@ def test_a_folder_that_is_not_private_is_not_used_and_one_warning_says_so(place,
         folder.mkdir()
         folder.chmod(0o777)
     monkeypatch.setenv("AIRMUSCLE_CACHE_DIR", str(folder))
-    kept._warn_once.cache_clear()
+    kept.warn_not_stored.cache_clear()
     with pytest.warns(AirmuscleWarning, match="compiled kernels are not stored: .*AIRMUSCLE_CACHE_DIR") as caught:
         stored = kept.save("evaluate", ("q",), b"code")
     assert stored == b"code"
@@ -231,7 +234,7 @@ def test_a_folder_that_is_not_private_is_not_used_and_one_warning_says_so(place,
     given = arguments()
     Kernel("evaluate")(*given)
     assert np.array_equal(given[-1], expected())
-    kept._warn_once.cache_clear()
+    kept.warn_not_stored.cache_clear()
 
 
 def test_a_link_in_place_of_a_kernel_is_not_followed(empty):
@@ -272,6 +275,20 @@ def calls_a_library(x, y):
 @numba.njit(error_model="numpy")
 def returns_a_float(x, y):
     return x[0] + y[0]
+
+
+def test_a_copied_scope_has_its_own_names_and_numba_is_as_before_afterwards():
+    scope = ir.Scope(None, ir.unknown_loc)
+    variable = scope.define("x", ir.unknown_loc)
+    scope.redefine("x", ir.unknown_loc)
+    with shallow_scope_copies():
+        copied = copy.deepcopy(scope)
+    assert copied.get_exact("x") is variable
+    copied.redefine("x", ir.unknown_loc)
+    copied.define("y", ir.unknown_loc)
+    assert (scope.get_versions_of("x"), copied.get_versions_of("x")) == ({"x.1"}, {"x.1", "x.2"})
+    assert "y" not in scope.localvars
+    assert copy.deepcopy(scope).get_exact("x") is not variable
 
 
 def test_only_what_does_without_numba_is_made_machine_code():

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from joints import HEAT_CAPACITY, chosen_muscle, joint, joint_start
+from widths import widened
 
 from airmuscle.compile.program import compile_system
 from airmuscle.control.inputs import ZERO_INPUT, SampledSignal, Schedule
@@ -74,9 +75,14 @@ def pair(mechanism, gas=Polytropic(1.2), circuit=CIRCUIT):
     return Plant(muscles, (circuit,) * len(muscles), mechanism, gas)
 
 
-@pytest.mark.parametrize("mechanism", MECHANISMS.values(), ids=MECHANISMS)
-def test_the_energy_book_closes_with_what_is_lost(mechanism):
+OF_ONE_KIND = ("spring", "isotonic", "pulley", "lever", "series")
+"""Their losses are the friction and damping of those that remain; the power of each is judged in laws/test_mechanisms."""
+
+
+@pytest.mark.parametrize("name", widened(MECHANISMS, lambda name: name not in OF_ONE_KIND))
+def test_the_energy_book_closes_with_what_is_lost(name):
     """Fill one muscle, then the other, then let both out a little; at rtol 1e-9."""
+    mechanism = MECHANISMS[name]
     plant = WithEnergyMeters(pair(mechanism))
     start = plant.extend_state(find_equilibrium(plant.plant, pressure=2e5))
     command = Schedule({

@@ -167,8 +167,8 @@ def test_what_is_left_out_decides_what_the_law_is_for():
         bend = (25.0, -20.0, 30.0, -35.0)[i]
         for contraction in np.linspace(0.0, 0.14, 6) + 0.004 * i:
             random = np.random.default_rng(len(runs))
-            pressure, held = np.linspace(1e5, 6e5, 25), np.full(25, contraction)
-            force = inner.polynomial(pressure, held) + bend * np.sin(45 * held) + 1.0 * random.standard_normal(25)
+            pressure, held = np.linspace(1e5, 6e5, 15), np.full(15, contraction)
+            force = inner.polynomial(pressure, held) + bend * np.sin(45 * held) + 1.0 * random.standard_normal(15)
             columns = {"pressure": pressure, "contraction": held, "force": force}
             runs.append(Recording(columns, f"run {len(runs)}", {"resting_length": length, "specimen": f"{length} m"}))
     candidates = [

@@ -10,6 +10,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from widths import widened
 
 import airmuscle as am
 from airmuscle.core import autodiff, tree
@@ -50,7 +51,10 @@ def bench(rows: int = 60) -> list[Recording]:
     return [run(*point, seed, rows) for seed, point in enumerate(points)]
 
 
-@pytest.mark.parametrize("name", LAWS)
+# Linear in all parameters, in some, in none; the pressure as the fitted quantity.
+
+
+@pytest.mark.parametrize("name", widened(LAWS, lambda name: name not in ("family", "braid")))
 def test_a_refit_to_the_training_rows_is_the_fit_to_them(name):
     runs, law = bench(), LAWS[name]
     full = am.fit(law, runs)
@@ -146,7 +150,7 @@ def test_a_comparison_states_the_errors_of_plain_fits():
     assert found.fold_scores[0].rmse == pytest.approx(float(np.sqrt(np.mean(error[rows] ** 2))), rel=1e-6)
 
 
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("name", widened(LAWS, lambda name: name in ("family", "braid", "pressure")))
 def test_refits_without_a_group_are_searches_on_the_other_rows(name):
     """All folds from one Jacobian: the minimum of each is that of a search of its own."""
     runs = bench()

@@ -22,6 +22,7 @@ import numpy as np
 import pytest
 from scenario_files import BRAID, CIRCUIT
 from typer.testing import CliRunner, Result
+from widths import SAME_LAW, widened
 
 import airmuscle as airmuscle_package
 from airmuscle.cli.app import COMMANDS, app
@@ -264,9 +265,7 @@ def test_the_chart_and_its_data_stand_in_the_folder(tmp_path: Path):
 
 @pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
 @pytest.mark.parametrize(
-    "name",
-    [pytest.param(name, marks=[pytest.mark.slow] * (name == "saga2007-exact")) for name in list_laws()],
-    ids=list_laws(),
+    "name", widened(list_laws(), lambda name: name not in {*SAME_LAW, "saga2007-exact"}), ids=list_laws()
 )
 def test_every_entry_has_a_chart(tmp_path: Path, name: str):
     entry = load(name)

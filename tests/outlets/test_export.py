@@ -17,6 +17,7 @@ import plants
 import printed
 import pytest
 from typer.testing import CliRunner
+from widths import widened
 
 from airmuscle.cli.app import app
 from airmuscle.control import SampledSignal, Schedule
@@ -78,8 +79,16 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
-@pytest.mark.parametrize("target", [C99(), JavaScript()], ids=lambda target: type(target).__name__)
+def every_integrator_once(target, case):
+    """All in C; in JavaScript, whose run has the same text, that of variable steps and one of fixed steps."""
+    return target == C99() or case in ("two muscles on a spool", "fixed steps that the segments are no multiple of")
+
+
+@pytest.mark.parametrize(
+    ("target", "case"),
+    widened([(target, case) for target in (C99(), JavaScript()) for case in CASES], every_integrator_once),
+    ids=str,
+)
 def test_the_program_makes_the_steps_of_the_library(case, target, tmp_path):
     problem = problem_of(*CASES[case])
     write_program(problem, tmp_path, target, name="plant")

@@ -13,6 +13,7 @@ import pytest
 from called_controller import Called
 from control_plants import LIFT, PRESSURE, SPLIT
 from typer.testing import CliRunner
+from widths import widened
 
 from airmuscle.cli.app import app
 from airmuscle.control import (
@@ -113,8 +114,14 @@ def test_in_single_precision_the_commands_stay_within_the_stated_tolerance(name,
     assert re.match(r"100 samples, 0 commands differ by more than 0\.0001 of their range", done.stdout)
 
 
-@pytest.mark.parametrize("processor", PROCESSORS)
-@pytest.mark.parametrize("precision", [Double(), Single()], ids=lambda precision: type(precision).__name__)
+@pytest.mark.parametrize(
+    ("precision", "processor"),
+    widened(
+        [(precision, processor) for precision in (Double(), Single()) for processor in PROCESSORS],
+        lambda precision, processor: isinstance(precision, Double) == (processor == next(iter(PROCESSORS))),
+    ),
+    ids=str,
+)
 def test_on_a_cortex_m_the_commands_are_the_same(precision, processor, tmp_path):
     """In double precision bit by bit as on this machine."""
     for program in (COMPILER, EMULATOR):

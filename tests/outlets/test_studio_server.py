@@ -12,6 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 from scenario_files import LIFT
 from studio_pages import HOST, InThisProcess, request, run_script
+from widths import widened
 
 pytest.importorskip("starlette", reason="needs starlette")
 
@@ -219,7 +220,11 @@ def test_texts_in_a_saved_page_remain_texts(app, text):
 
 
 @pytest.mark.parametrize(
-    "name", ["</script><script>alert(1)</script>", "<!--<script>", "*/ alert(1) //", "`${alert(1)}`", '"; alert(1); "']
+    "name",
+    widened(
+        ["</script><script>alert(1)</script>", "<!--<script>", "*/ alert(1) //", "`${alert(1)}`", '"; alert(1); "'],
+        lambda name: name.startswith(("</", '"')),  # the ends of the element and of the text
+    ),
 )
 def test_names_in_the_program_of_a_saved_page_remain_names(name, tmp_path):
     """Each script of the page has its digest in the policy; the program runs in Node, and its states have the name."""

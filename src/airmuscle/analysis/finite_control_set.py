@@ -149,13 +149,13 @@ class FiniteControlSet(ShortRepr, Controller):
         search = self._searches.pop() if self._searches else self._bind()
         search.states[0], search.wanted[:], search.sequence[0] = state, wanted, mode
         status = Status(search.run())
-        found = tuple(int(k) for k in search.best[1:])
+        sequence = tuple(int(k) for k in search.best[1:])
         self._searches.append(search)
         if status is not Status.DONE:
             raise SolveError(
                 f"FiniteControlSet: no prediction succeeded, because {status.message}. Check the estimate."
             )
-        return found
+        return sequence
 
     @property
     def _mode_table(self) -> Array:

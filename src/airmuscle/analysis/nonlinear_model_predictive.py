@@ -153,9 +153,9 @@ class NonlinearModelPredictive(ShortRepr, MultivariableController):
         variables  those of the last solution, from which the search starts
         """
         programs = self._programs.pop() if self._programs else self._built()
-        found = programs.solve(state, wanted, low, high, variables)
+        solution = programs.solve(state, wanted, low, high, variables)
         self._programs.append(programs)
-        return found
+        return solution
 
     def _all_inputs(self, commanded: Array) -> list[float]:
         """The inputs of the plant in its order."""

@@ -135,9 +135,9 @@ def heading_scale(heading: str) -> tuple[float, str]:
     The factor is 1 if no other unit is chosen. A ratio is converted only if it is a contraction.
     """
     match = _HEADING.fullmatch(heading)
-    if match is None or (found := _known(match["unit"])) is None:
+    if match is None or (unit_and_factor := _known(match["unit"])) is None:
         return 1.0, heading
-    si_unit, factor = found
+    si_unit, factor = unit_and_factor
     if si_unit == "1" and "contraction" not in match["name"].lower():
         return 1.0, heading
     scale, unit = chosen_scale(si_unit, 1.0 / factor, match["unit"])
@@ -157,8 +157,8 @@ def _known(unit: str) -> tuple[str, float] | None:
     plain = unit.translate(_SUPERSCRIPTS)
     if plain in SI_UNITS:
         return plain, 1.0
-    found = known_factor(plain, None)
-    return None if found is None else next(((si, found) for si in SI_UNITS if _converts(plain, si)), None)
+    factor = known_factor(plain, None)
+    return None if factor is None else next(((si, factor) for si in SI_UNITS if _converts(plain, si)), None)
 
 
 def _converts(unit: str, si_unit: str) -> bool:
@@ -188,14 +188,14 @@ def _si_unit_and_factor(unit: str, where: str) -> tuple[str, float]:
     reason = ""
     for si_unit in SI_UNITS:
         try:
-            found = conversion(unit, si_unit)
+            converted = conversion(unit, si_unit)
         except UnitError as error:
             reason = reason or ("" if "measures another" in error.message else f" {error.message}")
             continue
-        if re.search(r"a$|\(a\)|abs", unit) and si_unit == "Pa" and found.offset:
+        if re.search(r"a$|\(a\)|abs", unit) and si_unit == "Pa" and converted.offset:
             raise UnitError(f"{where}: '{unit}' is absolute, but displayed pressures are gauge pressures; write 'bar'.")
-        if math.isfinite(found.factor) and found.factor > 0.0 and not found.offset:
-            return si_unit, found.factor
+        if math.isfinite(converted.factor) and converted.factor > 0.0 and not converted.offset:
+            return si_unit, converted.factor
     raise UnitError(
         f"{where}: '{unit}' cannot be chosen.{reason} Allowed are units of {', '.join(SI_UNITS)}, such as 'bar' "
         "or 'mm'."

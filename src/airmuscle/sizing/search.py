@@ -69,16 +69,16 @@ class SizingResult(ShortRepr):
 
         Bisection: it is assumed that every smaller fraction is reachable, too.
         """
-        found: MuscleChoice | None = None
+        best: MuscleChoice | None = None
         low, high = 0.0, 1.0
         for _ in range(BISECTIONS):
             fraction = 0.5 * (low + high)
             choice = _any_choice(_reduced(self.requirement, what, fraction), self.conditions, entries)
-            low, high, found = (low, fraction, found) if choice is None else (fraction, high, choice)
-        if found is None:
+            low, high, best = (low, fraction, best) if choice is None else (fraction, high, choice)
+        if best is None:
             return ""
-        size = f"{found.total_count} x {found.entry.name} of {1e3 * found.length:.4g} mm"
-        return f"{found.requirement.describe()} ({size})"
+        size = f"{best.total_count} x {best.entry.name} of {1e3 * best.length:.4g} mm"
+        return f"{best.requirement.describe()} ({size})"
 
 
 def catalogue() -> tuple[Entry, ...]:
@@ -129,9 +129,9 @@ def size_muscles(
     for done, entry in enumerate(entries):
         if progress is not None:
             progress(done / len(entries))
-        found, failed = _choices_of(entry, requirement, conditions)
-        choices += found
-        unsuitable += [] if found else [failed]
+        choices_of_entry, failed = _choices_of(entry, requirement, conditions)
+        choices += choices_of_entry
+        unsuitable += [] if choices_of_entry else [failed]
     unsuitable.sort(key=lambda item: item.count == 0)
     others = products_without_law() if muscles is None else ()
     return SizingResult(requirement, conditions, rank(choices, sort), (*unsuitable, *others), entries)
@@ -144,7 +144,7 @@ def _choices_of(
 
     A number is left out if fewer muscles are as short and take as little air.
     """
-    found: list[MuscleChoice] = []
+    choices: list[MuscleChoice] = []
     failed = UnsuitableMuscle(entry.name, 0, "")
     for count in range(conditions.min_count, conditions.max_count + 1):
         try:
@@ -153,8 +153,8 @@ def _choices_of(
             reason = str(error).removeprefix(f"{entry.name}: ").rstrip(".")
             failed = UnsuitableMuscle(entry.name, count if isinstance(error, SolveError) else 0, reason)
         else:
-            found += [] if any(_is_dominated(choice, other) for other in found) else [choice]
-    return found, failed
+            choices += [] if any(_is_dominated(choice, other) for other in choices) else [choice]
+    return choices, failed
 
 
 def _is_dominated(choice: MuscleChoice, other: MuscleChoice) -> bool:

@@ -145,8 +145,8 @@ def static_muscle(entry: Entry, conditions: SizingConditions) -> StaticMuscle:
 def own_length(entry: Entry) -> float | None:
     """Resting length [m] of the law or geometry of an entry; None if it has none."""
     parts = (part for part in (entry.characteristic, entry.geometry) if part is not None)
-    found = (leaf.value for part in parts for leaf in leaves(part) if leaf.declared.name == "resting_length")
-    return next((float(length) for length in found), None)
+    lengths = (leaf.value for part in parts for leaf in leaves(part) if leaf.declared.name == "resting_length")
+    return next((float(length) for length in lengths), None)
 
 
 def length_range(entry: Entry, max_length: float) -> LengthRange:

@@ -211,9 +211,9 @@ class Handlers:
         from starlette.responses import Response
 
         wanted = read_page_request(decoded(await limited_body(request, MAX_PAGE)))
-        found = [self._sheets.get(identifier) for identifier in wanted["sheets"]]
-        sheets = [sheet for sheet in found if sheet is not None]
-        if len(sheets) < len(found):
+        named = [self._sheets.get(identifier) for identifier in wanted["sheets"]]
+        sheets = [sheet for sheet in named if sheet is not None]
+        if len(sheets) < len(named):
             raise BadRequest("a program is no longer kept; reload the page.", 404)
         return Response(self_contained_page(sheets, wanted["state"]), media_type="text/html")
 

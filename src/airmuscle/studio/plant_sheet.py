@@ -112,8 +112,8 @@ def _parameter_rows(plant: am.Plant, sources: Mapping[str, str]) -> list[dict[st
 def _source(leaf: Leaf, sources: Mapping[str, str]) -> str:
     """The source of a number: the longest path in [sources] that its path begins with."""
     path = re.sub(r"\[\d+\]", "", leaf.path)
-    found = [key for key in sources if path == key or path.startswith(f"{key}.")]
-    return sources[max(found, key=len)] if found else "the model or its entry"
+    matching = [key for key in sources if path == key or path.startswith(f"{key}.")]
+    return sources[max(matching, key=len)] if matching else "the model or its entry"
 
 
 def _input_rows(plant: am.Plant) -> list[dict[str, Any]]:

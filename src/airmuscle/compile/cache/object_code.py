@@ -8,6 +8,7 @@ from typing import Any
 from ..llvm.jit import engine_of
 from ..target import native
 from .entry_point import entry_point, numba_arguments
+from .inlining import shallow_scope_copies
 
 _C_LIBRARY = frozenset({"sqrt", "ceil", "floor", "memset", "memcpy", "memmove"})
 _STANDALONE = {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
@@ -32,7 +33,8 @@ def build(kernel: Any, kinds: Sequence[str]) -> bytes:
     standalone = numba.njit(**options, **_STANDALONE)(kernel.py_func)
     signature = tuple(_numba_type(kind) for kind in kinds)
     try:
-        standalone.compile(signature)
+        with shallow_scope_copies():
+            standalone.compile(signature)
     except NumbaError:
         return b""
     text, returned = standalone.inspect_llvm(signature), {s.return_type for s in standalone.nopython_signatures}

@@ -176,10 +176,10 @@ def _summary(result: BenchmarkResult) -> list[str]:
 
 def _references(result: BenchmarkResult) -> tuple[Reference, ...]:
     sources = [result.joint.model, result.joint.truth, *(each.law for each in result.contenders)]
-    found = {reference.key: reference for reference in (*cite(tuple(sources)), BONE2019)}
+    references = {reference.key: reference for reference in (*cite(tuple(sources)), BONE2019)}
     for each in result.contenders:
-        found |= {reference.key: reference for reference in (each.tuning.references if each.tuning else ())}
-    return tuple(found.values())
+        references |= {reference.key: reference for reference in (each.tuning.references if each.tuning else ())}
+    return tuple(references.values())
 
 
 def _settings(result: BenchmarkResult) -> tuple[tuple[str, str, str], ...]:
