@@ -15,6 +15,7 @@ from ..compile.program import compile_system
 from ..control.controller import Controller, Measurement
 from ..core.arrays import Array
 from ..core.errors import ParameterError, SolveError
+from ..core.field_types import check_field_types
 from ..core.reference import Reference
 from ..core.short_repr import ShortRepr
 from ..core.status import Status
@@ -31,7 +32,7 @@ QI2019 = Reference(
     note="enumeration of the modes of on/off valves over a short horizon, cost of switching",
 )
 MAX_SEQUENCES = 1_000_000
-"""Greatest number of sequences of modes (chosen)."""
+"""Maximum number of sequences of modes (chosen)."""
 _choose = Kernel("choose_mode", "finite_control_set")
 
 
@@ -89,6 +90,7 @@ class FiniteControlSet(ShortRepr, Controller):
     _searches: list[BoundSearch] = dataclasses.field(init=False, repr=False, default_factory=list)
 
     def __post_init__(self) -> None:
+        check_field_types(self)
         owner, known = "FiniteControlSet", compile_system(self.estimator.plant).description
         columns = self.estimator.plant_columns
         check_numbers(owner, "permitted", self.permitted, columns, ())

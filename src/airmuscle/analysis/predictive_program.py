@@ -12,7 +12,7 @@ from ..core.arrays import Array
 from ..core.system import System
 
 MAX_HORIZON = 200
-"""Greatest number of samples of a horizon, and of steps of a sample (chosen)."""
+"""Maximum number of samples of a horizon, and of steps of a sample (chosen)."""
 MAX_ITERATIONS = 100
 """Iterations after which a search has no solution (chosen)."""
 TARGET_WEIGHT = 1e8

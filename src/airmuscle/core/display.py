@@ -102,7 +102,7 @@ def chosen_scale(si_unit: str, factor: float, label: str) -> tuple[float, str]:
 
     Raises FileError or UnitError for an invalid configuration file.
     """
-    choice = _choice_here() or _configured(str(config_folder() / CONFIG_FILE))
+    choice = _choice_here() or _of_user()
     return choice.scale(si_unit) or (factor, label)
 
 
@@ -202,14 +202,25 @@ def _si_unit_and_factor(unit: str, where: str) -> tuple[str, float]:
     )
 
 
-def config_folder() -> pathlib.Path:
-    """The folder of the configuration file: AIRMUSCLE_CONFIG_DIR, or airmuscle in the user's configuration folder."""
+def _of_user() -> DisplayUnits:
+    folder = config_folder()
+    return DisplayUnits(()) if folder is None else _configured(str(folder / CONFIG_FILE))
+
+
+def config_folder() -> pathlib.Path | None:
+    """The folder of the configuration file: AIRMUSCLE_CONFIG_DIR, or airmuscle in the user's configuration folder.
+
+    None for a user who has no home folder.
+    """
     named = os.environ.get("AIRMUSCLE_CONFIG_DIR")
     if named:
         return pathlib.Path(named)
     import platformdirs
 
-    return pathlib.Path(platformdirs.user_config_dir("airmuscle", appauthor=False))
+    try:
+        return pathlib.Path(platformdirs.user_config_dir("airmuscle", appauthor=False))
+    except RuntimeError:
+        return None
 
 
 @functools.cache
@@ -220,6 +231,8 @@ def _configured(file: str) -> DisplayUnits:
     except (FileNotFoundError, NotADirectoryError):
         return DisplayUnits(())
     except OSError as error:
+        if not os.access(os.path.dirname(file), os.X_OK):  # the folder of another user, as after `su` without a login
+            return DisplayUnits(())
         raise FileError(f"{file}: cannot be read ({error.strerror}).") from None
     except (ValueError, RecursionError) as error:  # not TOML, or not UTF-8
         raise FileError(f"{file}: is not valid TOML: {error}.") from None

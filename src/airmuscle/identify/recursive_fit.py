@@ -42,7 +42,7 @@ class NextPoint(NamedTuple):
 class RecursiveFit(ShortRepr):
     """Contractile surface fitted to the samples so far; `updated` returns it with one more sample.
 
-    limits      range of the test rig, on which the surface is scaled, and its greatest force
+    limits      range of the test rig, on which the surface is scaled, and its maximum force
     degree      degree of the polynomial; (degree + 1)(degree + 2)/2 coefficients
     sigma       standard deviation of a force [N], used until the residuals determine it
     forgetting  weight of the information of all former samples at each sample, 1 for none lost; less follows a muscle

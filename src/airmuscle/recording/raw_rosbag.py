@@ -27,7 +27,7 @@ def read_rosbag_tables(path: Path, group: str | None = None) -> tuple[RawTable, 
     highlevel = import_lab_package("rosbags.highlevel", path)
     folder = path if path.suffix == ".bag" else path.parent
     if path.suffix != ".bag" and not (folder / "metadata.yaml").exists():
-        raise FileError(f"{path}: there is no metadata.yaml beside it; copy the whole folder of the ROS 2 bag.")
+        raise FileError(f"{path}: there is no metadata.yaml next to it; copy the whole folder of the ROS 2 bag.")
     if path.suffix != ".bag" and path != min(p for p in folder.iterdir() if p.suffix == path.suffix):
         return ()
 

@@ -65,7 +65,7 @@ class SizingResult(ShortRepr):
         return f"Reachable: {' or '.join(parts)}."
 
     def _greatest(self, what: str, entries: list[Entry]) -> str:
-        """The greatest fraction of a load or travel that one of the entries reaches, as text; empty if there is none.
+        """The largest fraction of a load or travel that one of the entries reaches, as text; empty if there is none.
 
         Bisection: it is assumed that every smaller fraction is reachable, too.
         """
@@ -140,7 +140,7 @@ def size_muscles(
 def _choices_of(
     entry: Entry, requirement: Requirement, conditions: SizingConditions
 ) -> tuple[list[MuscleChoice], UnsuitableMuscle]:
-    """The choices of an entry, and the reason of the greatest number that does not suffice.
+    """The choices of an entry, and the reason of the maximum number that does not suffice.
 
     A number is left out if fewer muscles are as short and take as little air.
     """
@@ -184,7 +184,7 @@ def choose(entry: Entry, requirement: Requirement, conditions: SizingConditions,
 
 
 def _shortest_length(entry: Entry, search: Search, lengths: LengthRange) -> float:
-    """The shortest length of the range that suffices, or the greatest of the range."""
+    """The shortest length of the range that suffices, or the largest of the range."""
 
     def needed(length: float) -> float:
         return search.required_length(static_muscle(at_length(entry, length), search.conditions))
@@ -253,7 +253,7 @@ def _reduced(requirement: Requirement, what: str, fraction: float) -> Requiremen
 def _any_choice(
     requirement: Requirement | None, conditions: SizingConditions, entries: list[Entry]
 ) -> MuscleChoice | None:
-    """A choice of any of the entries, with the greatest number of muscles or with one; None if there is none."""
+    """A choice of any of the entries, with the maximum number of muscles or with one; None if there is none."""
     if requirement is None:
         return None
     for entry in entries:

@@ -41,9 +41,9 @@ LIBRARY_LIMIT = 120.0
 MAX_SHEETS = 100
 """Number of sheets that the server keeps (chosen)."""
 MAX_PAGE = 256 * 1024
-"""Greatest size of a request for a self-contained page [bytes] (chosen)."""
+"""Largest size of a request for a self-contained page [bytes] (chosen)."""
 MAX_PAGE_SHEETS = 12
-"""Greatest number of muscles and plants in a self-contained page (chosen)."""
+"""Maximum number of muscles and plants in a self-contained page (chosen)."""
 
 
 class Sheets:

@@ -25,9 +25,9 @@ from .fit_settings import FieldError, FitSettings
 from .fit_uploads import FILES
 
 MAX_ROWS = 200_000
-"""Greatest number of rows of a file that are used; of a longer file every n-th one (chosen)."""
+"""Maximum number of rows of a file that are used; of a longer file every n-th one (chosen)."""
 MAX_COLUMNS = 400
-"""Greatest number of columns that are shown (chosen)."""
+"""Maximum number of columns that are shown (chosen)."""
 NEEDED = ("pressure", "contraction", "force")
 """Quantities of a static fit."""
 

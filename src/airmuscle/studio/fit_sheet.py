@@ -21,9 +21,9 @@ from .fit_settings import FieldError, FitSettings, Rule
 from .fit_uploads import FILES
 
 MAX_POINTS = 9000
-"""Greatest number of points of the chart; of more rows every n-th one is shown (chosen)."""
+"""Maximum number of points of the chart; of more rows every n-th one is shown (chosen)."""
 MAX_LISTED = 60
-"""Greatest number of runs, outliers or findings of a recording that are listed (chosen)."""
+"""Maximum number of runs, outliers or findings of a recording that are listed (chosen)."""
 DIGITS = 7
 """Significant digits of a point of the chart (chosen)."""
 SHOWN = ("time", "pressure", "contraction", "length", "force")

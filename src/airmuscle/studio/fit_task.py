@@ -51,7 +51,7 @@ GEOMETRY = (
 FRICTION_LAWS = 4
 """Number of friction laws that are fitted to each loop and to all loops together, for the progress."""
 MAX_POINTS = 2000
-"""Greatest number of points of a loop that the page draws (chosen)."""
+"""Maximum number of points of a loop that the page draws (chosen)."""
 
 
 def run_fit(folder: str, out: str, settings: FitSettings, report: Report) -> None:

@@ -23,7 +23,7 @@ AHEAD = ("first_ahead", "second_ahead")
 INVERSE_STEPS = 3
 """Newton steps of the inverse for torque and stiffness (chosen); one is exact for laws that are affine in pressure."""
 MAX_SPEED = 20.0
-"""Greatest angular speed that the outer law of the cascade commands [rad/s] (chosen)."""
+"""Largest angular speed that the outer law of the cascade commands [rad/s] (chosen)."""
 OPENING = 0.1
 """Opening of the valves at which the joint is linearised (chosen): at closed valves the derivatives are one-sided."""
 

@@ -30,7 +30,7 @@ NAMES = (
 MAX_DURATION = 1000.0
 """Longest run in the page [s] (chosen)."""
 MAX_PARAMETERS = 120
-"""Greatest number of parameters with a slider (chosen)."""
+"""Maximum number of parameters with a slider (chosen)."""
 OUTLINE_CONTRACTIONS, OUTLINE_POINTS = 31, 25
 """Grid of an outline (chosen)."""
 _EXPORT = re.compile(r"^export ", re.MULTILINE)

@@ -34,7 +34,7 @@ PULSE_SHARE = 0.5
 VALVE_PARAMETERS = ("conductance", "critical_ratio")
 """Parameters of a valve that its flow depends on, by the last part of their paths."""
 MAX_CONTRACTION = 0.2
-"""Greatest held contraction of a candidate (chosen)."""
+"""Maximum held contraction of a candidate (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
