@@ -18,16 +18,12 @@ from filling import Array, hanging, runs
 from measure import PRINT_PEAK_MEMORY, Section, Target, Times, format_time, print_section, time_variants
 from ode8 import compilers
 
-from airmuscle.analysis.equilibrium import find_equilibrium
-from airmuscle.control.inputs import Schedule
+import airmuscle as am
 from airmuscle.core import tree
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE
-from airmuscle.simulation.batch import Double, Precision, Single, simulate_batch
+from airmuscle.simulation.batch import Double, Precision, Single
 from airmuscle.simulation.batch.initial_states import default_states
 from airmuscle.simulation.batch.thread_pool import available_cores
 from airmuscle.simulation.batch.variations import variations_of
-from airmuscle.simulation.integrators import RungeKutta4
 
 STEP, PLANTS, DURATION = 1e-3, 10_000, 5.0
 SHORT = 0.1
@@ -36,7 +32,7 @@ SOURCE = pathlib.Path(__file__).with_name("batch.c")
 FLAGS = ("-O3", "-march=native", "-ffast-math", "-fopenmp-simd")
 WIDEST = "-mprefer-vector-width=512"
 SPREAD = 0.05
-COMMAND = Schedule({"fill": ((0.5, 1.0), (2.0, 0.0)), "discharge": ((3.0, 1.0), (4.0, 0.0))})
+COMMAND = am.Schedule({"fill": ((0.5, 1.0), (2.0, 0.0)), "discharge": ((3.0, 1.0), (4.0, 0.0))})
 SWITCHED = (0.5, 2.0, 3.0, 4.0)
 SINGLE_PLANTS = 20
 """Number of plants whose equilibria are also computed one by one."""
@@ -58,7 +54,7 @@ REASON = (
 BUSY_REASON = "the cores of the machine are shared with other machines"
 
 
-def random_parameters(plant: Plant, count: int) -> dict[str, Array]:
+def random_parameters(plant: am.Plant, count: int) -> dict[str, Array]:
     """Random values of every parameter within SPREAD of its value and within its bounds, by path."""
     rng = np.random.default_rng(5)
     parameters = {}
@@ -72,7 +68,7 @@ def c_parameters(plant: Any, count: int) -> Array:
     """The parameters (46, N) of the C code, in its order."""
     muscle, circuit, load, ambient = plant.muscles[0], plant.circuits[0], plant.mechanism, plant.ambient
     law, (k, c) = muscle.contractile, _stretch(muscle.geometry)
-    scale = REFERENCE_DENSITY * np.sqrt(REFERENCE_TEMPERATURE / ambient.temperature)
+    scale = am.pneumatics.REFERENCE_DENSITY * np.sqrt(am.pneumatics.REFERENCE_TEMPERATURE / ambient.temperature)
     validity_range = (law.min_contraction, law.max_contraction), (law.min_pressure, law.max_pressure)
     valves = [
         x
@@ -80,7 +76,12 @@ def c_parameters(plant: Any, count: int) -> Array:
         for x in (scale * v.conductance, v.critical_ratio, 1 / (1 - v.critical_ratio), v.laminar_slope())
     ]
     rows = [1 / load.mass, load.gravity, 1 / muscle.geometry.resting_length, k, c * c]
-    rows += [GAS_CONSTANT * ambient.temperature, ambient.pressure, circuit.supply.pressure + ambient.pressure, *valves]
+    rows += [
+        am.pneumatics.GAS_CONSTANT * ambient.temperature,
+        ambient.pressure,
+        circuit.supply.pressure + ambient.pressure,
+        *valves,
+    ]
     rows += [x for low, high in validity_range for x in (low, 2 / (high - low))]
     rows += [law.min_force, law.max_force, muscle.spring.stiffness, muscle.damper.damping, muscle.damper.damping_slope]
     return np.array([np.broadcast_to(row, count) for row in (*rows, *law.coefficients)])
@@ -144,7 +145,7 @@ def run_numpy(table: Array, start: Array, seconds: float) -> Array:
 
 
 def run_library(
-    plant: Plant,
+    plant: am.Plant,
     parameters: dict[str, Array],
     start: Array,
     seconds: float,
@@ -153,8 +154,8 @@ def run_library(
 ) -> Array:
     """The final states (3, N) of the batch with `simulate_batch`."""
     named = dict(zip((s.name for s in plant.states), start.tolist(), strict=True))
-    solution = simulate_batch(
-        plant, parameters, COMMAND, duration=seconds, initial_states=named, integrator=RungeKutta4(STEP), keep=(),
+    solution = am.simulate_batch(
+        plant, parameters, COMMAND, duration=seconds, initial_states=named, integrator=am.RungeKutta4(STEP), keep=(),
         cores=cores,
         precision=precision,
     )  # fmt: skip
@@ -183,7 +184,10 @@ def make_variants(folder: pathlib.Path, count: int, seconds: float) -> dict[str,
             if cores == 1 or lanes == 32:
                 run = make_c_batch(library, lanes, table, start, seconds)
                 timed[f"{name}{suffix}"] = (cores, lambda run=run, n=cores: run(n))
-    timed["simulate_batch, single precision"] = (1, lambda: run_library(plant, parameters, start, seconds, 1, Single()))
+    timed["simulate_batch, single precision"] = (
+        1,
+        lambda: run_library(plant, parameters, start, seconds, 1, Single()),
+    )
     return timed
 
 
@@ -208,7 +212,7 @@ def measure_equilibria(count: int, rounds: int) -> tuple[list[tuple[str, ...]], 
         return default_states(different, lambda done: None)[0]
 
     def one_by_one() -> Array:
-        return np.array([list(find_equilibrium(different.one(i), pressure=0.0).values()) for i in few])
+        return np.array([list(am.find_equilibrium(different.one(i), pressure=0.0).values()) for i in few])
 
     check_final_states(
         {"one by one": one_by_one().T, "vectorised": vectorised()[: len(few)].T}, "vectorised", runs()[3].nominal

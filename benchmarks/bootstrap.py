@@ -6,12 +6,7 @@ import numpy as np
 from measure import Section, Target, format_time, print_section, time_variants
 from static_fit import design_matrix, make_points
 
-from airmuscle.characteristic.contractile_surface import ContractileSurface
-from airmuscle.identify.bootstrapping import bootstrap
-from airmuscle.identify.censoring import UNCENSORED
-from airmuscle.identify.cross_validation import RunSplit
-from airmuscle.identify.static_fit import fit
-from airmuscle.recording import Recording
+import airmuscle as am
 
 REFITS = 1000
 RUNS = 20
@@ -24,10 +19,10 @@ TEXT = (
 )
 
 
-def refit_library(runs: list[Recording]) -> np.ndarray:
+def refit_library(runs: list[am.Recording]) -> np.ndarray:
     """Coefficients of every refit with the library, including the initial fit."""
-    initial = fit(ContractileSurface.blank(), runs, censoring=UNCENSORED)
-    return bootstrap(initial, runs, refits=REFITS, by=RunSplit(), seed=0).values
+    initial = am.fit(am.muscle.characteristic.ContractileSurface.blank(), runs, censoring=am.identify.UNCENSORED)
+    return am.identify.bootstrap(initial, runs, refits=REFITS, by=am.identify.RunSplit(), seed=0).values
 
 
 def refit_scipy(columns: np.ndarray, force: np.ndarray) -> np.ndarray:
@@ -47,7 +42,7 @@ def section(rounds: int = 5) -> Section:
     """The complete benchmark."""
     data = make_points()
     parts = np.array_split(np.arange(len(data)), RUNS)
-    runs = [Recording(data.rows(rows).columns, f"run {i:02d}") for i, rows in enumerate(parts)]
+    runs = [am.Recording(data.rows(rows).columns, f"run {i:02d}") for i, rows in enumerate(parts)]
     columns, force = design_matrix(data), data["force"]
     variants = {
         "`bootstrap`, including the fit": lambda: refit_library(runs),

@@ -13,9 +13,6 @@ from rodas4 import hand_written_rates, kernel, lsoda
 
 import airmuscle as am
 from airmuscle.compile.program import compile_system
-from airmuscle.control import PID, PWM, Controller, ControlLoop, InputSignal, SplitRange
-from airmuscle.control.piecewise_linear import PiecewiseLinear
-from airmuscle.simulation import Rodas4
 
 HEADER = ("call", "median", "minimum", "kernel", "call / kernel")
 STEP = 1e-5
@@ -38,10 +35,10 @@ TEXT = (
 
 
 @dataclasses.dataclass(frozen=True)
-class Called(Controller):
+class Called(am.control.Controller):
     """A controller that calls a control law from Python."""
 
-    inner: PID
+    inner: am.PID
 
     @property
     def measured_columns(self) -> tuple[str, ...]:
@@ -75,14 +72,14 @@ CALLED_REASON = "most of it is the controller in Python: `PID.step` takes 5 to 1
 
 
 @dataclasses.dataclass(frozen=True)
-class Applied(InputSignal):
+class Applied(am.control.InputSignal):
     """The inputs of a recording of held and pulsed inputs, with an instant at each row."""
 
     recording: am.Recording
 
-    def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
+    def segments(self, inputs: Sequence[str], start: float, duration: float) -> am.control.PiecewiseLinear:
         values = np.stack([self.recording[name][:-1] for name in inputs], axis=1)
-        return PiecewiseLinear(self.recording["time"][1:].copy(), values, np.zeros(values.shape))
+        return am.control.PiecewiseLinear(self.recording["time"][1:].copy(), values, np.zeros(values.shape))
 
 
 def with_default_state(run: Run) -> Callable[[], Any]:
@@ -164,7 +161,7 @@ def steps(rounds: int) -> tuple[list[tuple[str, ...]], list[Target]]:
     segments = am.Schedule({name: tuple((t, 0.5) for t in (0.0, *times[:-1])) for name in plant.inputs}).segments(
         plant.inputs, 0.0, float(times[-1])
     )
-    bound = Rodas4(1e-6).bind(compile_system(plant))
+    bound = am.Rodas4(1e-6).bind(compile_system(plant))
     measured = time_variants({"advance": advance, "Stepper.step": step, "kernel": integration}, rounds)
     each = {name: (time.median / ADVANCES, time.minimum / ADVANCES) for name, time in measured.items()}
     alone = each["kernel"]
@@ -182,12 +179,12 @@ def steps(rounds: int) -> tuple[list[tuple[str, ...]], list[Target]]:
 
 def control_samples(rounds: int) -> tuple[list[tuple[str, ...]], list[Target]]:
     """One sample of a loop with a PID, compiled and called from Python: inputs held, and two pulsed inputs."""
-    pid = PID("pressure", SplitRange("fill", "discharge"), gain=1.5e-5, integral_time=0.4)
-    pulses = {"fill": PWM(50.0), "discharge": PWM(50.0)}
+    pid = am.PID("pressure", am.control.SplitRange("fill", "discharge"), gain=1.5e-5, integral_time=0.4)
+    pulses = {"fill": am.control.PWM(50.0), "discharge": am.control.PWM(50.0)}
     rows, targets = [], []
     for name, drivers, limits in (("held", {}, (5, 15)), ("two pulsed inputs", pulses, (10, 40))):
-        law = ControlLoop(pid, SAMPLE_TIME, SETPOINT, drivers=drivers)
-        called = ControlLoop(Called(pid), SAMPLE_TIME, SETPOINT, drivers=drivers)
+        law = am.ControlLoop(pid, SAMPLE_TIME, SETPOINT, drivers=drivers)
+        called = am.ControlLoop(Called(pid), SAMPLE_TIME, SETPOINT, drivers=drivers)
         times = _loop_times(law, called, rounds)
         samples = LOOP_DURATION / SAMPLE_TIME
         replay = times["replay"].median / samples
@@ -218,7 +215,7 @@ def _beside_same_instants(title: str, times: dict[str, Any]) -> tuple[str, ...]:
     return (f"{title}, replay with the same instants", *cells, f"{whole.ratio_to(same):.2f}")
 
 
-def _loop_times(law: ControlLoop, called: ControlLoop, rounds: int) -> dict[str, Any]:
+def _loop_times(law: am.ControlLoop, called: am.ControlLoop, rounds: int) -> dict[str, Any]:
     """Times of a run of the loop in both ways, and of the same run with its commands, or its inputs, as a signal."""
     run = runs()[3]
     problems = {

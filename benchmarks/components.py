@@ -13,20 +13,12 @@ from joints import HEAT_CAPACITY, Joint, JointWithHeat
 from measure import Section, Target, format_time, print_section, time_variants
 from rodas4 import kernel
 
+import airmuscle as am
 from airmuscle.compile.program import CompiledSystem, compile_system
-from airmuscle.control.inputs import Schedule
 from airmuscle.core import ops
 from airmuscle.core.declaration import model, parameter
 from airmuscle.core.ops import Value
 from airmuscle.core.variables import Input, StateVariable
-from airmuscle.mechanism.base import Coordinate, Mechanism
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import Circuit, CircuitFlows, FillDischarge, ProportionalValve, Supply, Tube, Valve, WithTubes
-from airmuscle.pneumatics.fill_discharge import ambient_air
-from airmuscle.pneumatics.flow import orifice_flow
-from airmuscle.pneumatics.gas import GAS_CONSTANT, Air, Ambient, EnergyBalance, Isothermal
-from airmuscle.pneumatics.proportional import SecondOrderLag
-from airmuscle.simulation.integrators import Rodas4
 
 RTOL = 1e-6
 SIDE_NAMES = ("left", "right")
@@ -46,7 +38,7 @@ REASON = (
 
 
 @model
-class Antagonists(Mechanism):
+class Antagonists(am.Mechanism):
     """Antagonistic muscles on a lever with a weight: J a'' = r (F_1 - F_2) - b a' - M sin a."""
 
     inertia: float = parameter("kg m^2", "J", "moment of inertia")
@@ -56,8 +48,8 @@ class Antagonists(Mechanism):
     offset: float = parameter("1", "eps_0", "contraction of both muscles at angle zero")
 
     @property
-    def coordinates(self) -> tuple[Coordinate, ...]:
-        return (Coordinate("angle", "speed", "rad", 0.1, 1.0),)
+    def coordinates(self) -> tuple[am.mechanism.Coordinate, ...]:
+        return (am.mechanism.Coordinate("angle", "speed", "rad", 0.1, 1.0),)
 
     def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         left, right = resting_lengths
@@ -71,29 +63,35 @@ class Antagonists(Mechanism):
 
 
 @model
-class LaggedValve(Circuit):
+class LaggedValve(am.Circuit):
     """The servo valve of `JointWithHeat`: a spool that follows fill minus discharge as a first-order lag."""
 
-    supply: Supply
-    valve: Valve
+    supply: am.Supply
+    valve: am.Valve
     lag: float = parameter("s", "T_s", "time constant of the spool")
 
     @property
     def inputs(self) -> tuple[Input, ...]:
         return (Input("fill"), Input("discharge"))
 
-    def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
+    def own_states(self, ambient: am.Ambient) -> tuple[StateVariable, ...]:
         return (StateVariable("spool", "1", 1.0, "position of the spool"),)
 
     def supplied_flow(
-        self, inlet: Air, airs: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
-        ambient: Ambient,
-    ) -> CircuitFlows:  # fmt: skip
+        self,
+        inlet: am.pneumatics.Air,
+        airs: tuple[am.pneumatics.Air, ...],
+        state: Mapping[str, Value],
+        inputs: Mapping[str, Value],
+        ambient: am.Ambient,
+    ) -> am.pneumatics.CircuitFlows:
         spool = state["spool"]
-        incoming = orifice_flow(self.valve, inlet, airs[0], ops.maximum(spool, 0.0))
-        outgoing = orifice_flow(self.valve, airs[0], ambient_air(ambient), ops.maximum(-spool, 0.0))
+        incoming = am.pneumatics.orifice_flow(self.valve, inlet, airs[0], ops.maximum(spool, 0.0))
+        outgoing = am.pneumatics.orifice_flow(
+            self.valve, airs[0], am.pneumatics.ambient_air(ambient), ops.maximum(-spool, 0.0)
+        )
         moving = (inputs["fill"] - inputs["discharge"] - spool) / self.lag
-        return CircuitFlows((incoming - outgoing,), incoming, outgoing, {"spool": moving})
+        return am.pneumatics.CircuitFlows((incoming - outgoing,), incoming, outgoing, {"spool": moving})
 
 
 @model
@@ -103,29 +101,31 @@ class JointWithUpstreamHeat(JointWithHeat):
     def _flows(self, side: str, state: Mapping[str, Any], pressure: Any, fill: Any, discharge: Any) -> tuple[Any, Any]:
         incoming, _ = super()._flows(side, state, pressure, fill, discharge)
         wall = self.ambient.temperature
-        in_tube = state[f"{side}.tube_mass"] * GAS_CONSTANT * wall / self.tube_volume
+        in_tube = state[f"{side}.tube_mass"] * am.pneumatics.GAS_CONSTANT * wall / self.tube_volume
         inside = state[f"{side}.energy"] / (state[f"{side}.air_mass"] * HEAT_CAPACITY)
         temperature = ops.where(in_tube >= pressure, wall, inside)
         return incoming, self.tube.mass_flow(in_tube, pressure, 1.0, temperature)
 
 
-def component_plant(system: Joint) -> Plant:
+def component_plant(system: Joint) -> am.Plant:
     """A joint of `joints.py`, made of components."""
     muscles = tuple(dataclasses.replace(system.muscle, name=name) for name in SIDE_NAMES)
     mechanism = Antagonists(system.inertia, system.radius, system.friction, system.load, system.offset)
-    tube = Tube(system.tube, system.tube_volume)
+    tube = am.pneumatics.Tube(system.tube, system.tube_volume)
     if isinstance(system, JointWithHeat):
-        line = WithTubes(LaggedValve(system.supply, system.valve, system.spool_lag), tube)
-        return Plant(muscles, (line, line), mechanism, EnergyBalance(system.heat_transfer), system.ambient)
-    line = WithTubes(FillDischarge(system.supply, system.valve, system.valve), tube)
-    return Plant(muscles, (line, line), mechanism, Isothermal(), system.ambient)
+        line = am.pneumatics.WithTubes(LaggedValve(system.supply, system.valve, system.spool_lag), tube)
+        return am.Plant(
+            muscles, (line, line), mechanism, am.pneumatics.EnergyBalance(system.heat_transfer), system.ambient
+        )
+    line = am.pneumatics.WithTubes(am.FillDischarge(system.supply, system.valve, system.valve), tube)
+    return am.Plant(muscles, (line, line), mechanism, am.Isothermal(), system.ambient)
 
 
-def with_proportional_valves(system: JointWithHeat) -> Plant:
+def with_proportional_valves(system: JointWithHeat) -> am.Plant:
     """The joint with heat transfer and a 5/3 proportional valve for each muscle: twelve states."""
-    plant, spool = component_plant(system), SecondOrderLag(1.0 / (2.0 * ops.pi * system.spool_lag))
-    valve = ProportionalValve(system.supply, system.valve, system.valve, spool)
-    return dataclasses.replace(plant, circuit=(WithTubes(valve, plant.circuits[0].tube),) * 2)
+    plant, spool = component_plant(system), am.pneumatics.SecondOrderLag(1.0 / (2.0 * ops.pi * system.spool_lag))
+    valve = am.pneumatics.ProportionalValve(system.supply, system.valve, system.valve, spool)
+    return dataclasses.replace(plant, circuit=(am.pneumatics.WithTubes(valve, plant.circuits[0].tube),) * 2)
 
 
 def written_name(name: str) -> str:
@@ -149,17 +149,17 @@ def check_rates(single: CompiledSystem, composed: CompiledSystem, start: Mapping
     return worst
 
 
-def _spools() -> Schedule:
+def _spools() -> am.Schedule:
     """The pulses of the joints as spool commands: 1 to fill a side, -1 to discharge it."""
     changes_of = JOINT_PULSES.changes
     both = {
         side: [*changes_of[f"{side}.fill"], *((t, -v) for t, v in changes_of[f"{side}.discharge"])]
         for side in SIDE_NAMES
     }
-    return Schedule({f"{side}.command": tuple(sorted(changes)) for side, changes in both.items()})
+    return am.Schedule({f"{side}.command": tuple(sorted(changes)) for side, changes in both.items()})
 
 
-def _run(plant: Plant, single: Run, command: Schedule = JOINT_PULSES) -> Run:
+def _run(plant: am.Plant, single: Run, command: am.Schedule = JOINT_PULSES) -> Run:
     """The run of the single system, for a plant of components."""
     start = {s.name: single.initial_state.get(written_name(s.name), 0.0) for s in plant.states}
     return Run(plant, start, command, "angle", single.lever)
@@ -183,11 +183,11 @@ def measure(composed: Run, single: Run | None, rounds: int) -> tuple[tuple[tuple
     if single:
         check_rates(ready["single system"], ready["components"], single.initial_state)
     derivatives = time_variants({n: make_calls(ready[n], run.initial_state) for n, run in both.items()}, rounds)
-    simulations = time_variants({n: kernel(run, ready[n], Rodas4(RTOL)) for n, run in both.items()}, rounds)
+    simulations = time_variants({n: kernel(run, ready[n], am.Rodas4(RTOL)) for n, run in both.items()}, rounds)
     last = derivatives[list(both)[-1]].minimum
     rows, size = [], len(composed.system.states)
     for name, run in both.items():
-        steps = Rodas4(RTOL).run(ready[name], run.segments, 0.0, run.vector, run.times).steps
+        steps = am.Rodas4(RTOL).run(ready[name], run.segments, 0.0, run.vector, run.times).steps
         cells = (derivatives[name].minimum / CALLS, simulations[name].median, simulations[name].minimum)
         ratio = f"{derivatives[name].minimum / last:.3g}" if single else ""
         rows.append(

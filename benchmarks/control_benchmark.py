@@ -32,7 +32,10 @@ from airmuscle.study.control_benchmark import (
     standard_contenders,
 )
 
-JOINTS = {"proportional": proportional_joint, "on/off": on_off_joint}
+JOINTS = {
+    "proportional": proportional_joint,
+    "on/off": on_off_joint,
+}
 
 
 def measure(budget: int, seed: int, processes: int) -> dict[str, Any]:
@@ -47,7 +50,11 @@ def measure(budget: int, seed: int, processes: int) -> dict[str, Any]:
         pending = [pool.submit(measure_part, *part) for part in parts]
         for done, _ in enumerate(concurrent.futures.as_completed(pending), 1):
             _show("contenders", done, len(parts))
-    results: dict[str, Any] = {"budget": budget, "seed": seed, "forward": forward_error(proportional_joint())}
+    results: dict[str, Any] = {
+        "budget": budget,
+        "seed": seed,
+        "forward": forward_error(proportional_joint()),
+    }
     for (kind, *_), each in zip(reversed(parts), (p.result() for p in reversed(pending)), strict=True):
         results |= each.pop("learning", {})
         into = results.setdefault(kind, {})

@@ -10,14 +10,6 @@ import numpy as np
 from measure import Section, Target, format_time, print_section
 
 import airmuscle as am
-from airmuscle.analysis import (
-    ExtendedKalmanFilter,
-    UnscentedKalmanFilter,
-    design_predictive,
-    joint_statics,
-    linearise,
-)
-from airmuscle.control import LinearModelPredictive, Measurement, StaticInverse
 
 SAMPLES, POINTS, SAMPLE_TIME, PRESSURE = 2000, 1000, 0.01, 2.5e5
 SIDES = ("left", "right")
@@ -37,21 +29,21 @@ TEXT = (
 )
 
 
-def predictive(joint: Any, state: Any) -> LinearModelPredictive:
+def predictive(joint: Any, state: Any) -> am.control.LinearModelPredictive:
     """Predictive control of the angle, with disturbances of both pressures and of the speed (weights chosen)."""
-    model = linearise(joint, {**state}, {f"{side}.setpoint": PRESSURE for side in SIDES})
+    model = am.linearise(joint, {**state}, {f"{side}.setpoint": PRESSURE for side in SIDES})
     noise = {"angular_speed": 0.1, "angular_speed.disturbance": 5.0}
     for side in SIDES:
         noise |= {f"{side}.air_mass": 1e-6, f"{side}.air_mass.disturbance": 1e-5, f"{side}.lagged_setpoint_rate": 1e3}
     permitted = {"angle": 0.02, "angular_speed": 1.0, **{f"{side}.setpoint": 1e5 for side in SIDES}}
-    return design_predictive(
+    return am.analysis.design_predictive(
         model, SAMPLE_TIME, measured=MEASURED, controlled=("angle",),
         disturbed=("left.air_mass", "right.air_mass", "angular_speed"), permitted=permitted, process_noise=noise,
         measurement_noise={"left.pressure": 300.0, "right.pressure": 300.0, "angle": 1e-4},
     )  # fmt: skip
 
 
-def predictive_times(law: LinearModelPredictive) -> dict[str, np.ndarray]:
+def predictive_times(law: am.control.LinearModelPredictive) -> dict[str, np.ndarray]:
     """Times [s] of the program and of the whole sample, shape (SAMPLES,)."""
     rng, memory = np.random.default_rng(3), law.init()
     ranges = {f"{side}.setpoint": (0.0, 6e5) for side in SIDES}
@@ -68,7 +60,7 @@ def predictive_times(law: LinearModelPredictive) -> dict[str, np.ndarray]:
     for _ in range(SAMPLES):
         pressures, angles = rng.uniform(1.5e5, 3.5e5, 2).tolist(), rng.uniform(-0.3, 0.3, 2).tolist()
         columns = dict(zip(MEASURED, (*pressures, angles[0]), strict=True))
-        measurement = Measurement(columns, {"angle": angles[1]}, ranges)
+        measurement = am.control.Measurement(columns, {"angle": angles[1]}, ranges)
         begun = time.perf_counter()
         _, memory = law.step(memory, measurement, SAMPLE_TIME)
         whole.append(time.perf_counter() - begun)
@@ -106,12 +98,15 @@ def section(rounds: int = 20) -> Section:
     joint = am.load("joint-dmsp-20-regulators").plant
     state = am.find_equilibrium(joint, pressure=PRESSURE)
     times = predictive_times(predictive(joint, state))
-    for name, kind in (("extended", ExtendedKalmanFilter), ("unscented", UnscentedKalmanFilter)):
+    for name, kind in (
+        ("extended", am.analysis.ExtendedKalmanFilter),
+        ("unscented", am.analysis.UnscentedKalmanFilter),
+    ):
         times[f"{name} Kalman filter, a sample"] = filter_times(kind, joint, state)
-    inverse = StaticInverse(joint.muscles[0], max_pressure=6e5)
+    inverse = am.control.StaticInverse(joint.muscles[0], max_pressure=6e5)
     contraction, force = np.linspace(0.02, 0.18, POINTS), np.linspace(300.0, 100.0, POINTS)
     times[f"static inverse, {POINTS} points"] = repeated(lambda: inverse.pressure(contraction, force), 5 * rounds)
-    statics = joint_statics(joint)
+    statics = am.analysis.joint_statics(joint)
     angles = np.linspace(-0.2, 0.2, POINTS)
     low, high = (np.asarray(each) for each in statics.stiffness_limits(angles))
     wanted = low + np.linspace(0.3, 0.7, POINTS) * (high - low)

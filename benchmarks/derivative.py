@@ -12,11 +12,9 @@ from filling import BRAID, Array
 from measure import Section, Target, format_time, print_section, time_variants
 from new_plant import MUSCLES, many_muscles
 
-from airmuscle.analysis.equilibrium import find_equilibrium
-from airmuscle.characteristic import ChouHannaford1996
+import airmuscle as am
 from airmuscle.compile.kernels.calls import invoke, pointer
 from airmuscle.compile.program import CompiledSystem, compile_system
-from airmuscle.plant.plant import Plant
 
 HEADER = ("plant", "median", "minimum", "per muscle")
 CALLS = 10_000
@@ -49,10 +47,10 @@ def make_calls(ready: CompiledSystem, start: Mapping[str, float], count: int = C
     return call
 
 
-def chou_hannaford_muscles() -> Plant:
+def chou_hannaford_muscles() -> am.Plant:
     """The same plant with the characteristic of Chou and Hannaford (1996), the simplest one."""
     plant = many_muscles()
-    law = ChouHannaford1996(BRAID)
+    law = am.muscle.characteristic.ChouHannaford1996(BRAID)
     return dataclasses.replace(plant, muscle=tuple(dataclasses.replace(m, contractile=law) for m in plant.muscles))
 
 
@@ -63,7 +61,7 @@ def section(rounds: int = 15) -> Section:
         "of Chou and Hannaford (1996)": chou_hannaford_muscles(),
     }
     variants = {
-        f"{MUSCLES} muscles {name}": make_calls(compile_system(plant), dict(find_equilibrium(plant, pressure=1e5)))
+        f"{MUSCLES} muscles {name}": make_calls(compile_system(plant), dict(am.find_equilibrium(plant, pressure=1e5)))
         for name, plant in plants.items()
     }
     times = time_variants(variants, rounds)

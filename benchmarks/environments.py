@@ -16,7 +16,6 @@ from measure import Section, Target, format_time, print_section, time_variants
 
 import airmuscle as am
 from airmuscle.core.errors import AirmuscleWarning
-from airmuscle.environments import register_environments
 from airmuscle.simulation.batch import Double, Single
 from airmuscle.simulation.batch.thread_pool import available_cores
 
@@ -110,8 +109,11 @@ def variants(count: int) -> tuple[dict[str, Callable[[], Any]], dict[str, int]]:
     runs: dict[str, Callable[[], Any]] = {"Stepper.step, 10 ms": stepper_steps(SUBSTEPS)}
     sizes = {"Stepper.step, 10 ms": STEPS}
     if is_installed("gymnasium"):
-        register_environments()
-        for name, precision in (("double", Double()), ("single precision", Single())):
+        am.environments.register_environments()
+        for name, precision in (
+            ("double", Double()),
+            ("single precision", Single()),
+        ):
             step, kernel = vector_steps(precision, count)
             runs |= {f"vector environment, {name}": step, f"kernel, {name}": kernel}
             sizes |= {f"vector environment, {name}": count, f"kernel, {name}": count}

@@ -15,28 +15,19 @@ import numpy as np
 import numpy.typing as npt
 from joints import joint, joint_start
 
-from airmuscle.analysis.equilibrium import find_equilibrium
-from airmuscle.characteristic.contractile_surface import ContractileSurface
-from airmuscle.control.inputs import Schedule
-from airmuscle.control.piecewise_linear import PiecewiseLinear
+import airmuscle as am
 from airmuscle.core import ops
 from airmuscle.core.system import System
-from airmuscle.geometry.braid import Braid
-from airmuscle.mechanism import HangingMass
-from airmuscle.muscle import LinearSpring, Muscle, PressureDamper
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Supply, Valve
-from airmuscle.pneumatics.gas import Ambient, Isothermal
 
 Array = npt.NDArray[np.float64]
 DURATION = 25.0
 SPACING = 0.01
-BRAID = Braid(0.01, 0.4363, 0.3)
+BRAID = am.muscle.geometry.Braid(0.01, 0.4363, 0.3)
 BOX = ((-1e4, 6e5), (-0.05, 0.35))
 """Validity range of the surface: gauge pressure [Pa] and contraction [1]. It starts below ambient pressure, so that a
 muscle at rest is inside and the compared codes need no extrapolation there."""
-FILL_DISCHARGE = Schedule({"fill": ((5.0, 1.0), (15.0, 0.0)), "discharge": ((19.0, 1.0),)})
-JOINT_PULSES = Schedule(
+FILL_DISCHARGE = am.Schedule({"fill": ((5.0, 1.0), (15.0, 0.0)), "discharge": ((19.0, 1.0),)})
+JOINT_PULSES = am.Schedule(
     {
         "left.fill": ((2.0, 1.0), (2.05, 0.0)),
         "right.discharge": ((2.0, 1.0), (2.05, 0.0)),
@@ -57,38 +48,44 @@ def measured_force(pressure: Array, contraction: Array) -> Array:
 
 
 @functools.cache
-def surface() -> ContractileSurface:
+def surface() -> am.muscle.characteristic.ContractileSurface:
     """The polynomial of degree five fitted to `measured_force` on a grid over its validity range."""
-    blank = ContractileSurface.blank().with_validity_range(*BOX)
+    blank = am.muscle.characteristic.ContractileSurface.blank().with_validity_range(*BOX)
     p, eps = (grid.ravel() for grid in np.meshgrid(*(np.linspace(*ends, 41) for ends in BOX)))
     columns = np.column_stack([np.asarray(c) for c in blank.basis(p, eps)])
     coefficients = np.linalg.lstsq(columns, measured_force(p, eps))[0]
     return dataclasses.replace(blank, coefficients=tuple(coefficients.tolist()))
 
 
-def hanging(muscles: int = 1) -> Plant:
+def hanging(muscles: int = 1) -> am.Plant:
     """Muscles in parallel on one mass, each with two valves and a different stiffness: one state per muscle, and two.
 
     One muscle gives the plant with three states.
     """
-    matrix, supply = Valve(2.6167e-9, 0.433), Supply(650e3 - Ambient().pressure)
+    matrix, supply = am.Valve(2.6167e-9, 0.433), am.Supply(650e3 - am.Ambient().pressure)
     each = [
-        Muscle(surface(), BRAID, LinearSpring(4000.0 + 50.0 * i), PressureDamper(100.0, 5e-4), name=f"muscle{i}")
+        am.Muscle(
+            surface(),
+            BRAID,
+            am.LinearSpring(4000.0 + 50.0 * i),
+            am.muscle.PressureDamper(100.0, 5e-4),
+            name=f"muscle{i}",
+        )
         for i in range(muscles)
     ]
-    circuits = (FillDischarge(supply, matrix, matrix),) * muscles
+    circuits = (am.FillDischarge(supply, matrix, matrix),) * muscles
     if muscles == 1:
-        return Plant(each[0], circuits[0], HangingMass(5.0), Isothermal())
-    return Plant(tuple(each), circuits, HangingMass(5.0 * muscles), Isothermal())
+        return am.Plant(each[0], circuits[0], am.HangingMass(5.0), am.Isothermal())
+    return am.Plant(tuple(each), circuits, am.HangingMass(5.0 * muscles), am.Isothermal())
 
 
-def staggered_schedule(plant: Plant) -> Schedule:
+def staggered_schedule(plant: am.Plant) -> am.Schedule:
     """The schedule of the third paper for the first muscle, delayed by 0.2 s for each further muscle."""
     changes = {}
     for i, prefix in enumerate(plant.prefixes):
         for name, instants in FILL_DISCHARGE.changes.items():
             changes[f"{prefix}{name}"] = tuple((time + 0.2 * i, value) for time, value in instants)
-    return Schedule(changes)
+    return am.Schedule(changes)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -97,7 +94,7 @@ class Run:
 
     system: System
     initial_state: dict[str, float]
-    command: Schedule
+    command: am.Schedule
     coordinate: str
     lever: float
 
@@ -110,7 +107,7 @@ class Run:
         return np.array([s.nominal for s in self.system.states])
 
     @property
-    def segments(self) -> PiecewiseLinear:
+    def segments(self) -> am.control.PiecewiseLinear:
         return self.command.segments(self.system.inputs, 0.0, DURATION)
 
     @property
@@ -128,7 +125,7 @@ class Run:
 def lifting_run(muscles: int) -> Run:
     """The run of the plant with several muscles on one mass."""
     plant = hanging(muscles)
-    return Run(plant, dict(find_equilibrium(plant, pressure=0.0)), staggered_schedule(plant), "position", 1.0)
+    return Run(plant, dict(am.find_equilibrium(plant, pressure=0.0)), staggered_schedule(plant), "position", 1.0)
 
 
 @functools.cache
@@ -143,7 +140,7 @@ def runs() -> dict[int, Run]:
     }
 
 
-def stretch_factor(braid: Braid) -> tuple[float, float]:
+def stretch_factor(braid: am.muscle.geometry.Braid) -> tuple[float, float]:
     """k and c of the volume V = k s (1 - (c s)^2), s = 1 - eps, for hand-written equations."""
     k = ops.pi * braid.radius**2 * braid.resting_length / ops.sin(braid.braid_angle) ** 2
     return float(k), float(ops.cos(braid.braid_angle))

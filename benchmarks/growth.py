@@ -10,13 +10,8 @@ from filling import DURATION, SPACING, Array, Run, lifting_run, runs
 from measure import Section, format_time, print_section, time_variants
 from new_plant import compile_anew
 
+import airmuscle as am
 from airmuscle.compile.program import compile_system
-from airmuscle.control.driver import PWM
-from airmuscle.control.inputs import Schedule
-from airmuscle.control.piecewise_linear import PiecewiseLinear
-from airmuscle.control.with_drivers import WithDrivers
-from airmuscle.plant.plant import Plant
-from airmuscle.simulation.integrators import Rodas4
 
 TOLERANCES = tuple(10.0**-k for k in range(3, 11))
 MUSCLES = (1, 2, 4, 6, 12, 24)
@@ -45,13 +40,13 @@ class Case:
     plant: str
     value: str
     run: Run
-    segments: PiecewiseLinear
+    segments: am.control.PiecewiseLinear
     duration: float
     rtol: float = 1e-6
 
     def kernel(self, rtol: float | None = None) -> Callable[[], Array]:
         """A call of the kernel, with another tolerance for the reference."""
-        ready, method, state = compile_system(self.run.system), Rodas4(rtol or self.rtol), self.run.vector
+        ready, method, state = compile_system(self.run.system), am.Rodas4(rtol or self.rtol), self.run.vector
         times = np.linspace(0.0, self.duration, round(self.duration / SPACING) + 1)
         return lambda: method.run(ready, self.segments, 0.0, state, times)
 
@@ -97,11 +92,11 @@ def by_muscles(rounds: int) -> list[Row]:
     return measure_cases(cases, rounds, {name: time.minimum for name, time in compiling.items()})
 
 
-def pwm_command(plant: Plant, frequency: float) -> WithDrivers:
+def pwm_command(plant: am.Plant, frequency: float) -> am.control.WithDrivers:
     """Duty ratios 0.3 of filling and 0.1 of discharge for every muscle; interchanged in the second half of the run."""
     large, small = ((0.0, 0.3), (PULSED / 2, 0.1)), ((0.0, 0.1), (PULSED / 2, 0.3))
     duties = {f"{p}{name}": duty for p in plant.prefixes for name, duty in (("fill", large), ("discharge", small))}
-    return WithDrivers(Schedule(duties), {name: PWM(frequency) for name in duties})
+    return am.control.WithDrivers(am.Schedule(duties), {name: am.control.PWM(frequency) for name in duties})
 
 
 def by_frequency(rounds: int) -> list[Row]:
@@ -110,7 +105,7 @@ def by_frequency(rounds: int) -> list[Row]:
     for muscles, label in ((1, "1 muscle"), (6, "6 muscles")):
         run = lifting_run(muscles)
 
-        def driven(frequency: float, run: Run = run) -> PiecewiseLinear:
+        def driven(frequency: float, run: Run = run) -> am.control.PiecewiseLinear:
             return pwm_command(run.system, frequency).segments(run.system.inputs, 0.0, PULSED)
 
         cases = [Case("PWM frequency", label, f"{f:g} Hz", run, driven(f), PULSED) for f in FREQUENCIES]

@@ -11,12 +11,10 @@ from measure import Section, Target, Times, format_time, print_section
 from scalar_rates import hill
 from sensitivities import DURATION, FREE, SENSORS, case
 
+import airmuscle as am
 from airmuscle.core import tree
 from airmuscle.identify.dynamic import fit_dynamic
 from airmuscle.identify.dynamic.fit import initial_guesses
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics.gas import GAS_CONSTANT
-from airmuscle.simulation.integrators import Rodas4
 
 STARTS = 100
 HEADER = ("variant", "time for 100 starts", "evaluations per start", "starts at the best optimum")
@@ -47,7 +45,7 @@ class ScipySettings(NamedTuple):
 SCIPY_SETTINGS = (ScipySettings(1e-6, 1e-4), ScipySettings(1e-8, 1e-5), ScipySettings(1e-8, None))
 
 
-def find_rest(plant: Plant, rates: Any) -> Array:
+def find_rest(plant: am.Plant, rates: Any) -> Array:
     """Air mass, position and speed at equilibrium at ambient pressure, by root finding on the rates."""
     from scipy.optimize import brentq
 
@@ -57,12 +55,12 @@ def find_rest(plant: Plant, rates: Any) -> Array:
     def state(position: float) -> Array:
         s = 1.0 - position / geometry.resting_length
         volume = k * s * (1.0 - c * c * s * s)
-        return np.array([air.pressure * volume / (GAS_CONSTANT * air.temperature), position, 0.0])
+        return np.array([air.pressure * volume / (am.pneumatics.GAS_CONSTANT * air.temperature), position, 0.0])
 
     return state(brentq(lambda position: rates(0.0, state(position))[2], -0.1, 0.1, xtol=1e-12))
 
 
-def simulate_scipy(plant: Plant, settings: ScipySettings) -> Array:
+def simulate_scipy(plant: am.Plant, settings: ScipySettings) -> Array:
     """Simulated pressure and position at the rows of the record."""
     from scipy.integrate import solve_ivp
 
@@ -80,7 +78,7 @@ def simulate_scipy(plant: Plant, settings: ScipySettings) -> Array:
     rows = np.concatenate(parts)
     k, c = stretch_factor(plant.muscles[0].geometry)
     s = 1.0 - rows[:, 1] / plant.muscles[0].geometry.resting_length
-    inside = rows[:, 0] * GAS_CONSTANT * plant.ambient.temperature / (k * s * (1.0 - c * c * s * s))
+    inside = rows[:, 0] * am.pneumatics.GAS_CONSTANT * plant.ambient.temperature / (k * s * (1.0 - c * c * s * s))
     return np.column_stack([inside - plant.ambient.pressure, rows[:, 1]])
 
 
@@ -89,7 +87,7 @@ def fit_scipy(settings: ScipySettings, start: Array) -> tuple[float, float, int]
     from scipy.optimize import least_squares
 
     plant, recording = case().plant, case().experiment.recording
-    leaves, problem = list(tree.leaves(plant)), case().problem(Rodas4())
+    leaves, problem = list(tree.leaves(plant)), case().problem(am.Rodas4())
     indices = [[leaf.path for leaf in leaves].index(path) for path in FREE]
     measured = np.column_stack([recording[name] for name in SENSORS])
     count = 0
@@ -109,7 +107,7 @@ def fit_scipy(settings: ScipySettings, start: Array) -> tuple[float, float, int]
 
 def section(rounds: int) -> Section:
     """The complete benchmark."""
-    problem, record = case().problem(Rodas4()), case()
+    problem, record = case().problem(am.Rodas4()), case()
     starts = [z for z in initial_guesses(problem, STARTS, 0)[1:] if np.isfinite(problem.solve(z)[1])]
     times: list[float] = []
     results: dict[ScipySettings, list[tuple[float, float, int]]] = {settings: [] for settings in SCIPY_SETTINGS}

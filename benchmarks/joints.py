@@ -9,37 +9,37 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from airmuscle.characteristic.clamped import Clamped
-from airmuscle.characteristic.virtual_work import VirtualWork
+import airmuscle as am
 from airmuscle.core import ops
 from airmuscle.core.declaration import model, parameter
 from airmuscle.core.system import System
 from airmuscle.core.variables import StateVariable
-from airmuscle.geometry.braid import Braid
-from airmuscle.muscle import LinearDamper, LinearSpring, Muscle
-from airmuscle.pneumatics import Supply, Valve
-from airmuscle.pneumatics.gas import GAS_CONSTANT, Ambient, absolute_pressure, gauge_pressure
 
-HEAT_CAPACITY = GAS_CONSTANT / 0.4
+HEAT_CAPACITY = am.pneumatics.GAS_CONSTANT / 0.4
 """Specific heat of air at constant volume [J/(kg K)], for a heat capacity ratio of 1.4."""
 SIDES = (("left", 1.0), ("right", -1.0))
 
 
-def chosen_muscle() -> Muscle:
+def chosen_muscle() -> am.Muscle:
     """A braided muscle of diameter 20 mm and length 200 mm with limited force, spring and damper."""
-    braid = Braid(0.01, 0.4363, 0.2)
-    return Muscle(Clamped(VirtualWork(braid), 0.0, 1200.0), braid, LinearSpring(3000.0), LinearDamper(150.0))
+    braid = am.muscle.geometry.Braid(0.01, 0.4363, 0.2)
+    return am.Muscle(
+        am.muscle.characteristic.Clamped(am.muscle.characteristic.VirtualWork(braid), 0.0, 1200.0),
+        braid,
+        am.LinearSpring(3000.0),
+        am.LinearDamper(150.0),
+    )
 
 
 @model
 class Joint(System):
     """Six states: angle, angular speed, and the air masses of each muscle and its tube; isothermal."""
 
-    muscle: Muscle
-    valve: Valve
-    tube: Valve
-    supply: Supply
-    ambient: Ambient = Ambient()
+    muscle: am.Muscle
+    valve: am.Valve
+    tube: am.Valve
+    supply: am.Supply
+    ambient: am.Ambient = am.Ambient()
     tube_volume: float = parameter("m3", "V_t", "volume of a tube", default=2e-5)
     inertia: float = parameter("kg m^2", "J", "moment of inertia", default=0.05)
     radius: float = parameter("m", "r", "lever arm of both muscles", default=0.03)
@@ -76,9 +76,14 @@ class Joint(System):
         """Tension [N] of one muscle, and the rates of its states."""
         contraction, speed = self._motion(sign, state)
         temperature = self.ambient.temperature
-        pressure = state[f"{side}.air_mass"] * GAS_CONSTANT * temperature / self.muscle.geometry.volume(contraction)
+        pressure = (
+            state[f"{side}.air_mass"]
+            * am.pneumatics.GAS_CONSTANT
+            * temperature
+            / self.muscle.geometry.volume(contraction)
+        )
         incoming, through = self._flows(side, state, pressure, inputs[f"{side}.fill"], inputs[f"{side}.discharge"])
-        tension = self.muscle.tension(gauge_pressure(pressure, self.ambient), contraction, speed)
+        tension = self.muscle.tension(am.pneumatics.gauge_pressure(pressure, self.ambient), contraction, speed)
         return tension, {f"{side}.air_mass": through, f"{side}.tube_mass": incoming - through}
 
     def _motion(self, sign: float, state: Mapping[str, Any]) -> tuple[Any, Any]:
@@ -87,8 +92,8 @@ class Joint(System):
 
     def _flows(self, side: str, state: Mapping[str, Any], pressure: Any, fill: Any, discharge: Any) -> tuple[Any, Any]:
         temperature = self.ambient.temperature
-        in_tube = state[f"{side}.tube_mass"] * GAS_CONSTANT * temperature / self.tube_volume
-        source = absolute_pressure(self.supply.pressure, self.ambient)
+        in_tube = state[f"{side}.tube_mass"] * am.pneumatics.GAS_CONSTANT * temperature / self.tube_volume
+        source = am.pneumatics.absolute_pressure(self.supply.pressure, self.ambient)
         incoming = self.valve.mass_flow(source, in_tube, fill, temperature)
         outgoing = self.valve.mass_flow(in_tube, self.ambient.pressure, discharge, temperature)
         return incoming - outgoing, self.tube.mass_flow(in_tube, pressure, 1.0, temperature)
@@ -115,13 +120,15 @@ class JointWithHeat(Joint):
         growth = self.muscle.geometry.volume_derivative(contraction) * speed / self.muscle.geometry.resting_length
         mass, energy, spool = (state[f"{side}.{name}"] for name in ("air_mass", "energy", "spool"))
         temperature = energy / (mass * HEAT_CAPACITY)
-        pressure = mass * GAS_CONSTANT * temperature / volume
+        pressure = mass * am.pneumatics.GAS_CONSTANT * temperature / volume
         opened = ops.maximum(spool, 0.0), ops.maximum(-spool, 0.0)
         incoming, through = self._flows(side, state, pressure, *opened)
         wall = self.ambient.temperature
-        energy_flow = (HEAT_CAPACITY + GAS_CONSTANT) * through * ops.where(through >= 0, wall, temperature)
+        energy_flow = (
+            (HEAT_CAPACITY + am.pneumatics.GAS_CONSTANT) * through * ops.where(through >= 0, wall, temperature)
+        )
         heat = self.heat_transfer * (wall - temperature)
-        tension = self.muscle.tension(gauge_pressure(pressure, self.ambient), contraction, speed)
+        tension = self.muscle.tension(am.pneumatics.gauge_pressure(pressure, self.ambient), contraction, speed)
         return tension, {
             f"{side}.air_mass": through,
             f"{side}.tube_mass": incoming - through,
@@ -132,13 +139,15 @@ class JointWithHeat(Joint):
 
 def joint(heat: bool = False) -> Joint:
     """The joint with six states, or with ten states including heat transfer and spools."""
-    valve, tube = Valve(2.6e-8, 0.433), Valve(4e-8, 0.433)
-    return (JointWithHeat if heat else Joint)(chosen_muscle(), valve, tube, Supply(6e5))
+    valve, tube = am.Valve(2.6e-8, 0.433), am.Valve(4e-8, 0.433)
+    return (JointWithHeat if heat else Joint)(chosen_muscle(), valve, tube, am.Supply(6e5))
 
 
 def joint_start(system: Joint, pressure: float = 2e5) -> dict[str, float]:
     """The state at angle and speed zero, with muscles and tubes at a gauge pressure [Pa] and ambient temperature."""
-    per_volume = absolute_pressure(pressure, system.ambient) / (GAS_CONSTANT * system.ambient.temperature)
+    per_volume = am.pneumatics.absolute_pressure(pressure, system.ambient) / (
+        am.pneumatics.GAS_CONSTANT * system.ambient.temperature
+    )
     mass = float(per_volume * system.muscle.geometry.volume(system.offset))
     start = {"angle": 0.0, "speed": 0.0}
     for side, _ in SIDES:

@@ -7,10 +7,7 @@ import time
 import numpy as np
 from measure import Section, Target, format_time, print_section
 
-from airmuscle.characteristic import ValidityRange
-from airmuscle.identify.experiment_design import BenchLimits
-from airmuscle.identify.recursive_fit import RecursiveFit
-from airmuscle.recording.follow import RowReader
+import airmuscle as am
 
 ROWS = 5000
 HEADER = ("step", "median", "99 % quantile")
@@ -32,8 +29,10 @@ def log_lines() -> list[str]:
 
 def measure() -> dict[str, np.ndarray]:
     """Times [s] of each step, shape (ROWS,)."""
-    fit = RecursiveFit(BenchLimits(ValidityRange(0.0, 6e5, 0.0, 0.25), 1500.0))
-    reader = RowReader("log")
+    fit = am.identify.RecursiveFit(
+        am.identify.BenchLimits(am.muscle.characteristic.ValidityRange(0.0, 6e5, 0.0, 0.25), 1500.0)
+    )
+    reader = am.recording.RowReader("log")
     times: dict[str, list[float]] = {"row read": [], "surface updated": [], "next point": []}
     for line in log_lines():
         start = time.perf_counter()

@@ -9,22 +9,8 @@ import numpy as np
 from joints import chosen_muscle
 from measure import Section, Target, format_time, print_section
 
-from airmuscle.analysis.equilibrium import find_equilibrium
-from airmuscle.control import (
-    PID,
-    AngleAndStiffness,
-    AntagonisticInverse,
-    Cascade,
-    ControlLoop,
-    Decentralised,
-    Schedule,
-    SplitRange,
-)
-from airmuscle.mechanism import AntagonisticJoint, HangingMass
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Supply, Valve
-from airmuscle.simulation import Integrator, Rodas4, RungeKutta4
-from airmuscle.simulation.batch import BatchSolution, simulate_batch
+import airmuscle as am
+from airmuscle.simulation.batch import BatchSolution
 from airmuscle.simulation.batch.thread_pool import available_cores
 
 COUNT, DURATION, SAMPLE_TIME = 10_000, 5.0, 5e-3
@@ -34,7 +20,7 @@ HEADER = (
     *("plant", "integrator", "CPU time of a loop", "of a sample", f"{COUNT} loops, wall time"),
     *("maximum error", "error of the rms tracking error"),
 )
-REFERENCE = Rodas4(1e-10)
+REFERENCE = am.Rodas4(1e-10)
 TEXT = (
     f"Loops of {DURATION:g} s with a sample time of {1e3 * SAMPLE_TIME:g} ms and different gains, with the columns "
     f"from which the tuning computes its metrics. {SIMULATED} loops are simulated and the wall time is scaled to "
@@ -55,17 +41,17 @@ class LoopVariant:
     """A plant with its loop, initial state, the path of the varied gain with its values, and its columns."""
 
     name: str
-    plant: Plant
-    loop: ControlLoop
+    plant: am.Plant
+    loop: am.ControlLoop
     start: dict[str, float]
     gain: str
     gains: tuple[float, float]
     columns: tuple[str, ...]
 
-    def simulate(self, count: int, duration: float, integrator: Integrator) -> BatchSolution:
+    def simulate(self, count: int, duration: float, integrator: am.simulation.Integrator) -> BatchSolution:
         """So many loops with gains between both values."""
         gains = np.geomspace(*self.gains, count)
-        return simulate_batch(
+        return am.simulate_batch(
             self.plant, {f"controller.{self.gain}": gains}, self.loop, duration=duration, initial_states=self.start,
             output_times=SAMPLE_TIME, integrator=integrator, keep=self.columns,
         )  # fmt: skip
@@ -73,34 +59,36 @@ class LoopVariant:
 
 def lifted_load() -> LoopVariant:
     """A cascade of position and pressure control."""
-    valve = Valve(2.6e-9, 0.4)
-    plant = Plant(chosen_muscle(), FillDischarge(Supply(5.5e5), valve, valve), HangingMass(2.0))
-    inner = PID("pressure", SplitRange("fill", "discharge"), gain=5e-5)
-    law = Cascade(PID("position", "pressure", 4e6, 0.3, initial_output=1e5), inner, (0.0,), (5e5,))
-    loop = ControlLoop(law, SAMPLE_TIME, Schedule({"position": ((0, 0.01), (1, 0.02), (3, 0.01))}))
+    valve = am.Valve(2.6e-9, 0.4)
+    plant = am.Plant(chosen_muscle(), am.FillDischarge(am.Supply(5.5e5), valve, valve), am.HangingMass(2.0))
+    inner = am.PID("pressure", am.control.SplitRange("fill", "discharge"), gain=5e-5)
+    law = am.control.Cascade(am.PID("position", "pressure", 4e6, 0.3, initial_output=1e5), inner, (0.0,), (5e5,))
+    loop = am.ControlLoop(law, SAMPLE_TIME, am.Schedule({"position": ((0, 0.01), (1, 0.02), (3, 0.01))}))
     columns = ("position", "setpoint.position", "command.fill", "command.discharge", "air_mass")
-    start = find_equilibrium(plant, pressure=1e5)
+    start = am.find_equilibrium(plant, pressure=1e5)
     return LoopVariant("lifted load", plant, loop, start, "outer.gain", (1e6, 8e6), columns)
 
 
 def joint() -> LoopVariant:
     """Control of angle and stiffness, with a pressure controller for each muscle."""
-    valve, names = Valve(1e-8, 0.4), ("left", "right")
+    valve, names = am.Valve(1e-8, 0.4), ("left", "right")
     muscles = tuple(dataclasses.replace(chosen_muscle(), name=name) for name in names)
-    mechanism = AntagonisticJoint(radius=0.02, inertia=0.02, damping=0.05, weight_torque=0.5, offset=0.08)
-    circuit = FillDischarge(Supply(5.5e5), valve, valve)
-    plant = Plant(muscles, (circuit, circuit), mechanism)
-    inverse = AntagonisticInverse(muscles, mechanism, 0.2e5, 5e5)
-    inner = Decentralised(
-        tuple(PID(f"{n}.pressure", SplitRange(f"{n}.fill", f"{n}.discharge"), gain=2e-5) for n in names)
+    mechanism = am.mechanism.AntagonisticJoint(radius=0.02, inertia=0.02, damping=0.05, weight_torque=0.5, offset=0.08)
+    circuit = am.FillDischarge(am.Supply(5.5e5), valve, valve)
+    plant = am.Plant(muscles, (circuit, circuit), mechanism)
+    inverse = am.control.AntagonisticInverse(muscles, mechanism, 0.2e5, 5e5)
+    inner = am.control.Decentralised(
+        tuple(am.PID(f"{n}.pressure", am.control.SplitRange(f"{n}.fill", f"{n}.discharge"), gain=2e-5) for n in names)
     )
-    outer = AngleAndStiffness(inverse, ("left.pressure", "right.pressure"), gain=5.0, integral_time=0.5)
-    law = Cascade(outer, inner, (0.2e5,) * 2, (5e5,) * 2)
+    outer = am.control.AngleAndStiffness(inverse, ("left.pressure", "right.pressure"), gain=5.0, integral_time=0.5)
+    law = am.control.Cascade(outer, inner, (0.2e5,) * 2, (5e5,) * 2)
     stiffness = float(inverse.stiffness(2e5, 2e5, 0.0))
-    wanted = Schedule({"angle": ((0, 0.0), (1, 0.2), (3, 0.0)), "stiffness": ((0, stiffness),)})
+    wanted = am.Schedule({"angle": ((0, 0.0), (1, 0.2), (3, 0.0)), "stiffness": ((0, stiffness),)})
     columns = ("angle", "setpoint.angle", *(f"command.{n}.{i}" for n in names for i in ("fill", "discharge")))
-    start = find_equilibrium(plant, pressure=2e5)
-    return LoopVariant("joint", plant, ControlLoop(law, SAMPLE_TIME, wanted), start, "outer.gain", (2.0, 10.0), columns)
+    start = am.find_equilibrium(plant, pressure=2e5)
+    return LoopVariant(
+        "joint", plant, am.ControlLoop(law, SAMPLE_TIME, wanted), start, "outer.gain", (2.0, 10.0), columns
+    )
 
 
 def section(rounds: int = 5, count: int = SIMULATED, duration: float = DURATION) -> Section:
@@ -108,15 +96,15 @@ def section(rounds: int = 5, count: int = SIMULATED, duration: float = DURATION)
     rows, targets = [], []
     for case in (lifted_load(), joint()):
         reference = case.simulate(count, duration, REFERENCE)
-        for integrator in (Rodas4(), Rodas4(1e-4), RungeKutta4(2.5e-3), RungeKutta4(6.25e-4)):
+        for integrator in (am.Rodas4(), am.Rodas4(1e-4), am.RungeKutta4(2.5e-3), am.RungeKutta4(6.25e-4)):
             errors = _errors(case, case.simulate(count, duration, integrator), reference)
             cpu, wall = _times(case, count, duration, integrator, rounds)
             samples = duration / SAMPLE_TIME
             total = wall * COUNT
             times = format_time(cpu), format_time(cpu / samples), format_time(total)
             rows.append((case.name, str(integrator), *times, *(f"{error:.1e}" for error in errors)))
-            in_lanes = integrator == RungeKutta4(2.5e-3)
-            if in_lanes or (case.name == "lifted load" and integrator == Rodas4()):
+            in_lanes = integrator == am.RungeKutta4(2.5e-3)
+            if in_lanes or (case.name == "lifted load" and integrator == am.Rodas4()):
                 method = "RungeKutta4 in lanes" if in_lanes else "default integrator"
                 name = f"{COUNT} loops of {DURATION:g} s on {available_cores()} cores, {case.name}, {method}"
                 targets.append(Target(name, total * DURATION / duration, 10.0, "s", reason=REASON))
@@ -133,7 +121,7 @@ def _errors(case: LoopVariant, batch: BatchSolution, reference: BatchSolution) -
 
 
 def _times(
-    case: LoopVariant, count: int, duration: float, integrator: Integrator, rounds: int
+    case: LoopVariant, count: int, duration: float, integrator: am.simulation.Integrator, rounds: int
 ) -> tuple[float, float]:  # fmt: skip
     """Minimum CPU time and minimum wall time of a loop [s]."""
     cpu, wall = [], []

@@ -11,13 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from measure import Section, Target, format_time, print_section
 
-from airmuscle.characteristic import TonduLopez2000
-from airmuscle.friction import Dahl
-from airmuscle.geometry.braid import Braid
-from airmuscle.identify import Bootstrap, Comparison, RunSplit, bootstrap, compare, fit
+import airmuscle as am
 from airmuscle.identify.candidates import blank_surface
 from airmuscle.identify.hysteresis import find_loops, fit_loop
-from airmuscle.recording import Recording
 
 LENGTHS = (0.15, 0.2, 0.3)
 """Resting lengths [m] of the muscles (chosen)."""
@@ -53,9 +49,9 @@ class Timing(NamedTuple):
     result: Any
 
 
-def muscle(length: float) -> TonduLopez2000:
+def muscle(length: float) -> am.muscle.characteristic.TonduLopez2000:
     """The law of the active part of a muscle between its ends."""
-    return TonduLopez2000(Braid(0.01, 0.45, length - END_LENGTH), 1.15)
+    return am.muscle.characteristic.TonduLopez2000(am.muscle.geometry.Braid(0.01, 0.45, length - END_LENGTH), 1.15)
 
 
 def add_noise(columns: dict[str, np.ndarray], seed: int) -> dict[str, np.ndarray]:
@@ -66,28 +62,28 @@ def add_noise(columns: dict[str, np.ndarray], seed: int) -> dict[str, np.ndarray
     return noisy
 
 
-def make_sweep(length: float, contraction: float, rows: int, seed: int) -> Recording:
+def make_sweep(length: float, contraction: float, rows: int, seed: int) -> am.Recording:
     """A triangular sweep of pressure at constant length."""
     seconds = np.linspace(0.0, 60.0, rows)
     pressure = MAX_PRESSURE * (1 - np.abs(seconds / 30.0 - 1))
     held = np.full(rows, contraction)
     force = muscle(length).force(pressure, held * length / (length - END_LENGTH))
     columns = add_noise({"time": seconds, "pressure": pressure, "contraction": held, "force": force}, seed)
-    return Recording(columns, f"{length * 1e3:.0f} mm, {contraction:.0%}, {seed}", {"resting_length": length})
+    return am.Recording(columns, f"{length * 1e3:.0f} mm, {contraction:.0%}, {seed}", {"resting_length": length})
 
 
-def make_family(rows: int = 500) -> list[Recording]:
+def make_family(rows: int = 500) -> list[am.Recording]:
     """24 sweeps: three muscles, four held lengths, two repeats."""
     points = [(length, held) for length in LENGTHS for held in (0.0, 0.06, 0.12, 0.18)]
     return [make_sweep(*point, rows, 2 * i + repeat) for i, point in enumerate(points) for repeat in range(2)]
 
 
-def make_sweeps(count: int = 6, rows: int = 800) -> list[Recording]:
+def make_sweeps(count: int = 6, rows: int = 800) -> list[am.Recording]:
     """Sweeps of one muscle at several held lengths."""
     return [make_sweep(0.3, held, rows, 100 + i) for i, held in enumerate(np.linspace(0.0, 0.2, count))]
 
 
-def make_loops(rows: int = 2000) -> list[Recording]:
+def make_loops(rows: int = 2000) -> list[am.Recording]:
     """Three isobaric loops with friction against shortening: lengthening and shortening in cycles of two strokes."""
     loops = []
     for i, pressure in enumerate((2e5, 3.5e5, 5e5)):
@@ -95,10 +91,10 @@ def make_loops(rows: int = 2000) -> list[Recording]:
         stroke = np.where(seconds < 60.0, 0.06, 0.03)
         contraction = 0.08 - stroke * np.cos(2 * np.pi * seconds / 30.0) * 0.9
         held = np.full(rows, pressure)
-        friction = Dahl(2e4, 12.0).force_along(contraction * 0.3, seconds)
+        friction = am.muscle.friction.Dahl(2e4, 12.0).force_along(contraction * 0.3, seconds)
         force = muscle(0.3).force(held, contraction * 0.3 / (0.3 - END_LENGTH)) - friction
         columns = add_noise({"time": seconds, "pressure": held, "contraction": contraction, "force": force}, 200 + i)
-        loops.append(Recording(columns, f"loop at {pressure / 1e3:.0f} kPa", {"resting_length": 0.3}))
+        loops.append(am.Recording(columns, f"loop at {pressure / 1e3:.0f} kPa", {"resting_length": 0.3}))
     return loops
 
 
@@ -121,9 +117,9 @@ def timed(task: Callable[[], Any], rounds: int) -> Timing:
 
 def describe(result: Any) -> str:
     """The outcome of a task in a few words."""
-    if isinstance(result, Comparison):
+    if isinstance(result, am.identify.Comparison):
         return f"recommended: {result.recommended.candidate.name}; {len(result.excluded)} excluded"
-    if isinstance(result, Bootstrap):
+    if isinstance(result, am.identify.Bootstrap):
         return f"{result.failed_refits} of {len(result.values)} refits not determined"
     return ", ".join(type(each.recommended.friction).__name__ for each in result if each.recommended is not None)
 
@@ -132,16 +128,22 @@ def section(rounds: int = 3) -> Section:
     """The complete benchmark."""
     family, sweeps, loops = make_family(), make_sweeps(), find_loops(make_loops())
     runs = [make_sweep(length, held, 500, 300 + i) for i, (length, held) in enumerate(POINTS)]
-    surface, braid = fit(blank_surface(5), runs), fit(muscle(0.3), runs)
+    surface, braid = am.fit(blank_surface(5), runs), am.fit(muscle(0.3), runs)
     tasks: dict[str, tuple[Callable[[], Any], float]] = {
-        "comparison of 24 files, by specimen": (lambda: compare(family), 10.0),
-        "comparison of 24 files, by run": (lambda: compare(family, leave_out=RunSplit()), 10.0),
-        f"the same by specimen, {TWO}": (lambda: compare(family, workers=2), 10.0),
-        f"the same by run, {TWO}": (lambda: compare(family, leave_out=RunSplit(), workers=2), 10.0),
-        "comparison of six sweeps": (lambda: compare(sweeps), 10.0),
+        "comparison of 24 files, by specimen": (lambda: am.identify.compare(family), 10.0),
+        "comparison of 24 files, by run": (lambda: am.identify.compare(family, leave_out=am.identify.RunSplit()), 10.0),
+        f"the same by specimen, {TWO}": (lambda: am.identify.compare(family, workers=2), 10.0),
+        f"the same by run, {TWO}": (
+            lambda: am.identify.compare(family, leave_out=am.identify.RunSplit(), workers=2),
+            10.0,
+        ),
+        "comparison of six sweeps": (lambda: am.identify.compare(sweeps), 10.0),
         "friction of three loops": (lambda: [fit_loop(loop) for loop in loops], 10.0),
-        "bootstrap, surface": (lambda: bootstrap(surface, runs, by=RunSplit()), 3.0),
-        "bootstrap, braid, 100 refits": (lambda: bootstrap(braid, runs, refits=100, by=RunSplit()), 3.0),
+        "bootstrap, surface": (lambda: am.identify.bootstrap(surface, runs, by=am.identify.RunSplit()), 3.0),
+        "bootstrap, braid, 100 refits": (
+            lambda: am.identify.bootstrap(braid, runs, refits=100, by=am.identify.RunSplit()),
+            3.0,
+        ),
     }
     rows, targets = [], []
     for name, (task, limit) in tasks.items():

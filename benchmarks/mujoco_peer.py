@@ -16,9 +16,8 @@ from measure import Section, Target, format_time, print_section, time_variants
 from ode8 import FLAGS, SOURCE, STEP, compile_source, compilers, constants
 from rodas4 import kernel
 
+import airmuscle as am
 from airmuscle.compile.program import compile_system
-from airmuscle.plant.plant import Plant
-from airmuscle.simulation.integrators import DormandPrince8, Integrator, Rodas4, RungeKutta4
 
 CALLBACKS = pathlib.Path(__file__).with_name("mujoco_callbacks.c")
 HEADER = ("muscles", "variant", "median", "minimum", "ratio to ode8", "maximum error [m]")
@@ -46,7 +45,7 @@ def missing_note() -> str:
     return "" if compilers() else "Omitted, because there is no C compiler for the callbacks of MuJoCo."
 
 
-def model_xml(plant: Plant, step: float) -> str:
+def model_xml(plant: am.Plant, step: float) -> str:
     """The plant as a MuJoCo model (MJCF); the position is positive upwards, as in the library."""
     load = plant.mechanism
     return BODY.format(
@@ -103,17 +102,17 @@ def measure(muscles: int, rounds: int) -> tuple[tuple[tuple[str, ...], ...], tup
     """Rows and target for a plant with several muscles on one mass."""
     run = lifting_run(muscles)
     ready = compile_system(run.system)
-    reference = kernel(run, ready, Rodas4(1e-11))()
+    reference = kernel(run, ready, am.Rodas4(1e-11))()
     segments, times, state = run.segments, run.times, run.vector
     library_name, mujoco_name = "DormandPrince8(1e-4), kernel", "MuJoCo RK4(1e-4), C callbacks"
 
-    def kernel_call(method: Integrator) -> Callable[[], Array]:
+    def kernel_call(method: am.simulation.Integrator) -> Callable[[], Array]:
         return lambda: method.run(ready, segments, 0.0, state, times).rows
 
-    variants = {library_name: kernel_call(DormandPrince8(STEP))}
+    variants = {library_name: kernel_call(am.DormandPrince8(STEP))}
     variants |= {
-        "RungeKutta4(1e-4), kernel": kernel_call(RungeKutta4(STEP)),
-        "Rodas4(1e-6), kernel": kernel_call(Rodas4(1e-6)),
+        "RungeKutta4(1e-4), kernel": kernel_call(am.RungeKutta4(STEP)),
+        "Rodas4(1e-6), kernel": kernel_call(am.Rodas4(1e-6)),
     }
     with tempfile.TemporaryDirectory() as folder:
         library = compile_callbacks(pathlib.Path(folder), muscles)
@@ -122,8 +121,8 @@ def measure(muscles: int, rounds: int) -> tuple[tuple[tuple[str, ...], ...], tup
             kind: coarsest_step(make, run, reference)
             for kind, make in {
                 "MuJoCo": lambda step: make_mujoco_run(run, library, step),
-                "RungeKutta4": lambda step: kernel_call(RungeKutta4(step)),
-                "DormandPrince8": lambda step: kernel_call(DormandPrince8(step)),
+                "RungeKutta4": lambda step: kernel_call(am.RungeKutta4(step)),
+                "DormandPrince8": lambda step: kernel_call(am.DormandPrince8(step)),
             }.items()
         }
         for kind, (step, call) in coarsest.items():

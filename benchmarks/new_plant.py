@@ -16,16 +16,10 @@ from unittest import mock
 from filling import hanging, runs
 from measure import Section, Target, format_time, print_section, time_variants
 
+import airmuscle as am
 from airmuscle.compile.program import Program, compile_system
 from airmuscle.core import autodiff
 from airmuscle.core.system import System
-from airmuscle.friction import LuGre
-from airmuscle.mechanism import HangingMass
-from airmuscle.muscle import CreepElements, ViscoelasticWall
-from airmuscle.plant import WithEnergyMeters
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import EnergyBalance, Tube, TubeOrifice, WithTubes
-from airmuscle.simulation.integrators import DormandPrince8
 
 HEADER = ("task", "median", "minimum")
 TEXT = (
@@ -65,30 +59,32 @@ def compile_with_step(system: System) -> Any:
     """A new program and its compiled step of ode8, 13 stages in one function."""
     program = compile_anew(system)
     with without_stored_code():
-        return program.step(DormandPrince8(1e-4).tableau(), compile_system(system).parameters)
+        return program.step(am.DormandPrince8(1e-4).tableau(), compile_system(system).parameters)
 
 
-def many_muscles() -> Plant:
+def many_muscles() -> am.Plant:
     """24 muscles, each with two valves, on one mass."""
     plant = hanging()
     muscles = tuple(dataclasses.replace(plant.muscles[0], name=f"muscle{i}") for i in range(MUSCLES))
     return dataclasses.replace(
-        plant, muscle=muscles, circuit=(plant.circuits[0],) * MUSCLES, mechanism=HangingMass(100.0)
+        plant, muscle=muscles, circuit=(plant.circuits[0],) * MUSCLES, mechanism=am.HangingMass(100.0)
     )
 
 
-def with_meters() -> WithEnergyMeters:
+def with_meters() -> am.plant.WithEnergyMeters:
     """Four muscles with friction, creep and a lagging wall, heat and tubes of two volumes, and all energy meters."""
-    plant, tube = hanging(4), Tube(TubeOrifice(1.0, 3e-3), 1e-5, 2)
+    plant, tube = hanging(4), am.pneumatics.Tube(am.pneumatics.TubeOrifice(1.0, 3e-3), 1e-5, 2)
     parts = (
-        LuGre(5e4, 15.0, 5.0, 0.01, 50.0, 20.0),
-        CreepElements((2e4, 1e4), (0.1, 2.0)),
-        ViscoelasticWall(2e-11, 0.05),
+        am.muscle.friction.LuGre(5e4, 15.0, 5.0, 0.01, 50.0, 20.0),
+        am.muscle.CreepElements((2e4, 1e4), (0.1, 2.0)),
+        am.muscle.ViscoelasticWall(2e-11, 0.05),
     )
     friction, creep, wall = parts
     muscles = tuple(dataclasses.replace(m, friction=friction, creep=creep, wall=wall) for m in plant.muscles)
-    circuits = tuple(WithTubes(circuit, tube) for circuit in plant.circuits)
-    return WithEnergyMeters(dataclasses.replace(plant, muscle=muscles, circuit=circuits, gas=EnergyBalance(0.5)))
+    circuits = tuple(am.pneumatics.WithTubes(circuit, tube) for circuit in plant.circuits)
+    return am.plant.WithEnergyMeters(
+        dataclasses.replace(plant, muscle=muscles, circuit=circuits, gas=am.pneumatics.EnergyBalance(0.5))
+    )
 
 
 def cache_counts() -> tuple[int, ...]:
@@ -116,7 +112,7 @@ def run_python(arguments: list[str], cache: str | None = None) -> str:
 def section(rounds: int = 5) -> Section:
     """The complete benchmark."""
     systems = {size: run.system for size, run in runs().items()}
-    heavier, big = dataclasses.replace(hanging(), mechanism=HangingMass(6.0)), many_muscles()
+    heavier, big = dataclasses.replace(hanging(), mechanism=am.HangingMass(6.0)), many_muscles()
     metered = with_meters()
     compile_system(systems[3])
     variants: dict[str, Callable[[], Any]] = {

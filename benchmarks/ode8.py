@@ -15,13 +15,8 @@ from filling import SPACING, Array, Run, lifting_run, stretch_factor
 from measure import Section, Target, Times, format_time, print_section, time_variants
 from rodas4 import kernel
 
+import airmuscle as am
 from airmuscle.compile.program import compile_system
-from airmuscle.control.piecewise_linear import PiecewiseLinear
-from airmuscle.muscle import Muscle
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge
-from airmuscle.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, Ambient, absolute_pressure
-from airmuscle.simulation.integrators import DormandPrince8, Rodas4
 
 STEP = 1e-4
 SOURCE = pathlib.Path(__file__).with_name("fill_discharge.c")
@@ -38,7 +33,7 @@ TEXT = (
 
 def stages() -> str:
     """The stages after the first and the weighted sum of slopes as C macros, without zero coefficients."""
-    rows, weights = DormandPrince8(STEP).tableau()
+    rows, weights = am.DormandPrince8(STEP).tableau()
 
     def total(row: tuple[float, ...]) -> str:
         return " + ".join(f"{a!r} * k{i}[j]" for i, a in enumerate(row) if a)
@@ -47,22 +42,22 @@ def stages() -> str:
     return f"#define EXPLICIT_STAGES {' '.join(lines)}\n#define WEIGHTED {total(weights)}\n"
 
 
-def constants(plant: Plant) -> Array:
+def constants(plant: am.Plant) -> Array:
     """The fields of the C struct `Plant`, in its order; the valves of a muscle differ only in conductance."""
     load = plant.mechanism
     muscles = [_constants(*pair, plant.ambient) for pair in zip(plant.muscles, plant.circuits, strict=True)]
     return np.array([1 / load.mass, load.gravity, *(x for one in muscles for x in one)])
 
 
-def _constants(muscle: Muscle, circuit: FillDischarge, ambient: Ambient) -> list[float]:
+def _constants(muscle: am.Muscle, circuit: am.FillDischarge, ambient: am.Ambient) -> list[float]:
     law, valve = muscle.contractile, circuit.fill
     k, c = stretch_factor(muscle.geometry)
-    scale = REFERENCE_DENSITY * np.sqrt(REFERENCE_TEMPERATURE / ambient.temperature)
+    scale = am.pneumatics.REFERENCE_DENSITY * np.sqrt(am.pneumatics.REFERENCE_TEMPERATURE / ambient.temperature)
     validity_range = (law.min_contraction, law.max_contraction), (law.min_pressure, law.max_pressure)
     scaling = [x for low, high in validity_range for x in (low, 2 / (high - low))]
     return [
-        *(1 / muscle.geometry.resting_length, k, c * c, GAS_CONSTANT * ambient.temperature),
-        *(ambient.pressure, absolute_pressure(circuit.supply.pressure, ambient)),
+        *(1 / muscle.geometry.resting_length, k, c * c, am.pneumatics.GAS_CONSTANT * ambient.temperature),
+        *(ambient.pressure, am.pneumatics.absolute_pressure(circuit.supply.pressure, ambient)),
         *(scale * v.conductance for v in (circuit.fill, circuit.discharge)),
         *(valve.critical_ratio, 1 / (1 - valve.critical_ratio), float(valve.laminar_slope())),
         *(*scaling, law.min_force, law.max_force),
@@ -70,7 +65,9 @@ def _constants(muscle: Muscle, circuit: FillDischarge, ambient: Ambient) -> list
     ]
 
 
-def make_c_run(run: Run, library: ctypes.CDLL, segments: PiecewiseLinear | None = None) -> Callable[[], Array]:
+def make_c_run(
+    run: Run, library: ctypes.CDLL, segments: am.control.PiecewiseLinear | None = None
+) -> Callable[[], Array]:
     """A function that computes the run, or given segments of it, with a compiled C library."""
     segments = segments or run.segments
     plant, start, inputs = constants(run.system), run.vector, np.ascontiguousarray(segments.values)
@@ -80,10 +77,10 @@ def make_c_run(run: Run, library: ctypes.CDLL, segments: PiecewiseLinear | None 
     rows = np.empty((int(steps.sum()) * round(STEP * 1e6) // round(SPACING * 1e6) + 1, start.size))
     arguments = [plant.ctypes.data, start.ctypes.data, len(steps), steps.ctypes.data, inputs.ctypes.data]
     at = ctypes.c_void_p
-    library.run.argtypes = [at, at, ctypes.c_int, at, at, ctypes.c_double, ctypes.c_int, at]
+    library.integrate.argtypes = [at, at, ctypes.c_int, at, at, ctypes.c_double, ctypes.c_int, at]
 
     def call(keep: Any = (plant, start, inputs, steps)) -> Array:
-        library.run(*arguments, STEP, round(SPACING / STEP), rows.ctypes.data)
+        library.integrate(*arguments, STEP, round(SPACING / STEP), rows.ctypes.data)
         return rows
 
     return call
@@ -125,8 +122,8 @@ def measure(muscles: int, rounds: int) -> tuple[tuple[tuple[str, ...], ...], tup
     """Rows and target for a plant with several muscles."""
     run = lifting_run(muscles)
     ready = compile_system(run.system)
-    reference = kernel(run, ready, Rodas4(1e-11))()
-    method, segments, times, state = DormandPrince8(STEP), run.segments, run.times, run.vector
+    reference = kernel(run, ready, am.Rodas4(1e-11))()
+    method, segments, times, state = am.DormandPrince8(STEP), run.segments, run.times, run.vector
     library_name = "DormandPrince8(1e-4), kernel"
     variants: dict[str, Callable[[], Array]] = {
         library_name: lambda: method.run(ready, segments, 0.0, state, times).rows

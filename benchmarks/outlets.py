@@ -19,12 +19,11 @@ import numpy as np
 from filling import DURATION, Run, runs
 from measure import Section, Target, format_time, print_section, time_variants
 
+import airmuscle as am
 from airmuscle.compile.program import compile_system
 from airmuscle.core.errors import ParameterError
-from airmuscle.export import C99, JavaScript, write_fmu, write_mujoco_plugin, write_program
 from airmuscle.export.mujoco_plugin import check_mujoco
 from airmuscle.export.platforms import find_cross_compiler
-from airmuscle.simulation import Problem, Rodas4
 
 STEPS = 1000
 TEXT = (
@@ -115,10 +114,10 @@ def built(folder: Path, *sources: str) -> float:
     return float(subprocess.run(["./program"], cwd=folder, check=True, capture_output=True, text=True).stdout)
 
 
-def problem_of(case: Run) -> Problem:
+def problem_of(case: Run) -> am.Problem:
     """The run with a row at its end only."""
-    return Problem(
-        case.system, case.command, DURATION, case.initial_state, integrator=Rodas4(1e-6), output_times=(DURATION,)
+    return am.Problem(
+        case.system, case.command, DURATION, case.initial_state, integrator=am.Rodas4(1e-6), output_times=(DURATION,)
     )
 
 
@@ -136,7 +135,7 @@ def processor_time(call: Callable[[], object], count: int = 20) -> float:
 
 def do_step(case: Run, folder: Path) -> float:
     """Processor time of a DoStep of 1 ms [s]."""
-    path = write_fmu(problem_of(case), folder / "a.fmu", fmi=2, name="plant", binary=False).path
+    path = am.export.write_fmu(problem_of(case), folder / "a.fmu", fmi=2, name="plant", binary=False).path
     with zipfile.ZipFile(path) as archive:
         archive.extractall(folder / "fmu")
     text = (folder / "fmu" / "modelDescription.xml").read_text()
@@ -188,9 +187,9 @@ def in_c(folder: Path) -> Callable[[], object]:
 def rows_of(case: Run, folder: Path, rounds: int) -> tuple[list[tuple[str, ...]], list[Target]]:
     """The rows of one plant."""
     name, problem = f"{len(case.system.states)} states", problem_of(case)
-    ready, method = compile_system(case.system), Rodas4(1e-6)
+    ready, method = compile_system(case.system), am.Rodas4(1e-6)
     end, state = np.array([DURATION]), case.vector
-    write_program(problem, folder / "c", C99(), name="plant")
+    am.export.write_program(problem, folder / "c", am.export.C99(), name="plant")
     (folder / "c" / "driver.c").write_text(RUNS)
     times = time_variants(
         {"kernel": lambda: method.run(ready, case.segments, 0.0, state, end), "C": in_c(folder / "c")}, 5 * rounds
@@ -200,7 +199,7 @@ def rows_of(case: Run, folder: Path, rounds: int) -> tuple[list[tuple[str, ...]]
     size = code_size(folder / "c", "plant.c")
     rows.append((f"{name}: C", format_time(times["C"].minimum), f"{ratio:.2f}", size))
     if shutil.which("node"):
-        write_program(problem, folder / "js", JavaScript(), name="plant")
+        am.export.write_program(problem, folder / "js", am.export.JavaScript(), name="plant")
         others = {"JavaScript": in_node(folder / "js", LAST_ROW + SCRIPT), "WebAssembly": in_webassembly(folder / "c")}
         rows += [(f"{name}: {k}", format_time(v), f"{v / kernel:.2f}", "") for k, v in others.items() if v is not None]
     step = do_step(case, folder)
@@ -214,7 +213,7 @@ def rows_of(case: Run, folder: Path, rounds: int) -> tuple[list[tuple[str, ...]]
 def in_mujoco(case: Run, folder: Path) -> float:
     """Processor time of a step in MuJoCo that a muscle adds [s]."""
     mujoco = check_mujoco()
-    muscle = write_mujoco_plugin(case.system, folder / "plugin", name="plant")
+    muscle = am.export.write_mujoco_plugin(case.system, folder / "plugin", name="plant")
     times = []
     for with_muscle in (True, False):
         spec = mujoco.MjSpec()

@@ -22,8 +22,8 @@ from peer_solvers import (
 )
 from rodas4 import MAX_ERROR, kernel, loosest_tolerance
 
+import airmuscle as am
 from airmuscle.compile.program import CompiledSystem, compile_system
-from airmuscle.simulation.integrators import Rodas4
 
 HEADER = ("states", "variant", "rtol", "median", "minimum", "ratio to Rodas4", "maximum error [m]")
 TEXT = (
@@ -92,9 +92,9 @@ def measure(states: int, rounds: int) -> tuple[tuple[tuple[str, ...], ...], tupl
     """Rows and targets for one plant."""
     run = runs()[states]
     ready = compile_system(run.system)
-    reference = kernel(run, ready, Rodas4(1e-11))()
-    ours = loosest_tolerance(run, lambda rtol: kernel(run, ready, Rodas4(rtol))(), reference)
-    tolerances, calls = {"Rodas4, kernel": ours}, {"Rodas4, kernel": kernel(run, ready, Rodas4(ours))}
+    reference = kernel(run, ready, am.Rodas4(1e-11))()
+    ours = loosest_tolerance(run, lambda rtol: kernel(run, ready, am.Rodas4(rtol))(), reference)
+    tolerances, calls = {"Rodas4, kernel": ours}, {"Rodas4, kernel": kernel(run, ready, am.Rodas4(ours))}
     installed = [peer for peer in PEERS if peer.installed and peer.excluded_states != states]
     for peer in installed:
         tolerances[peer.name], calls[peer.name] = at_loosest_tolerance(peer, run, ready, reference)

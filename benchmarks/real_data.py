@@ -19,19 +19,18 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+import airmuscle as am
 from airmuscle.core.errors import IdentificationError
-from airmuscle.identify import BlockSplit, SpecimenSplit, compare, fit, select_for_both
 from airmuscle.identify.candidate_scores import count_parameters
-from airmuscle.identify.candidates import Candidate, blank_surface, standard_candidates
+from airmuscle.identify.candidates import blank_surface
 from airmuscle.identify.compared_points import force_residuals
-from airmuscle.recording import Recording
 
 NAME = re.compile(r"_cut(\d+)cm_held([\d.]+)cm_test(\d+)\.csv$")
 MIN_FORCE = 2.0
 CEILING = 5000.0
 
 
-def read(path: Path) -> Recording:
+def read(path: Path) -> am.Recording:
     """One run in SI units, with its resting length as constant."""
     table = pd.read_csv(path)
     table.columns = [header.split(" [")[0] for header in table.columns]
@@ -45,10 +44,10 @@ def read(path: Path) -> Recording:
     }
     match = NAME.search(path.name)
     assert match is not None
-    return Recording(columns, path.stem, {"resting_length": rest, "specimen": f"{match[1]} cm", "repeat": match[3]})
+    return am.Recording(columns, path.stem, {"resting_length": rest, "specimen": f"{match[1]} cm", "repeat": match[3]})
 
 
-def repeats(folder: Path) -> tuple[list[Recording], list[Recording]]:
+def repeats(folder: Path) -> tuple[list[am.Recording], list[am.Recording]]:
     """The runs of repeat 8 and of repeat 9, in the same order."""
     runs = [read(path) for path in sorted(folder.glob("*.csv")) if NAME.search(path.name)]
     if not runs:
@@ -61,7 +60,7 @@ def rms(errors: np.ndarray) -> float:
     return float(np.sqrt(np.mean(np.asarray(errors) ** 2)))
 
 
-def repeatability(first: Sequence[Recording], second: Sequence[Recording]) -> float:
+def repeatability(first: Sequence[am.Recording], second: Sequence[am.Recording]) -> float:
     """The rms difference of the repeats [N]: medians of repeat 8 at the pressure and branch of each row of repeat 9."""
     differences = []
     for a, b in zip(first, second, strict=True):
@@ -76,7 +75,7 @@ def repeatability(first: Sequence[Recording], second: Sequence[Recording]) -> fl
     return rms(np.concatenate(differences))
 
 
-def select_specimen(runs: Sequence[Recording], specimen: str, *, others: bool = False) -> list[Recording]:
+def select_specimen(runs: Sequence[am.Recording], specimen: str, *, others: bool = False) -> list[am.Recording]:
     """The runs of one specimen, or of all others."""
     return [run for run in runs if (run.constants["specimen"] == specimen) != others]
 
@@ -87,14 +86,14 @@ def format_row(name: str, parameters: int, errors: Sequence[float], floor: float
 
 
 def validation_errors(
-    candidate: Candidate, train: list[Recording], test: list[Recording], specimens: list[str]
+    candidate: am.identify.Candidate, train: list[am.Recording], test: list[am.Recording], specimens: list[str]
 ) -> list[float]:
     """Error on repeat 9, then on each specimen left out of the fit; NaN if the others do not determine the law."""
     law, fixed = candidate.law, candidate.fixed
-    errors = [rms(force_residuals(fit(law, train, fixed=fixed).model, test, CEILING))]
+    errors = [rms(force_residuals(am.fit(law, train, fixed=fixed).model, test, CEILING))]
     for name in specimens:
         try:
-            model = fit(law, select_specimen(train, name, others=True), fixed=fixed).model
+            model = am.fit(law, select_specimen(train, name, others=True), fixed=fixed).model
         except IdentificationError:  # not determined by two lengths
             errors.append(np.nan)
             continue
@@ -102,7 +101,7 @@ def validation_errors(
     return errors
 
 
-def single_surface_errors(train: list[Recording], test: list[Recording]) -> np.ndarray:
+def single_surface_errors(train: list[am.Recording], test: list[am.Recording]) -> np.ndarray:
     """Errors on repeat 9 of a surface with 21 coefficients for one specimen (minimum-norm solution)."""
     matrices = []
     for runs in (train, test):
@@ -121,10 +120,10 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     train, test = repeats(parser.parse_args().folder)
     specimens = sorted({str(run.constants["specimen"]) for run in train})
-    for split in (BlockSplit(), SpecimenSplit()):
-        print(compare(train, leave_out=split, workers=2).reason, flush=True)
+    for split in (am.identify.BlockSplit(), am.identify.SpecimenSplit()):
+        print(am.identify.compare(train, leave_out=split, workers=2).reason, flush=True)
     for name, runs in (("repeat 8", train), ("repeats 8 and 9", train + test)):
-        print(f"\n{name}: {select_for_both(runs, workers=2)}", flush=True)
+        print(f"\n{name}: {am.identify.select_for_both(runs, workers=2)}", flush=True)
     floor = repeatability(train, test)
     print(f"\nrms error of the force [N]; fitted to repeat 8 ({sum(map(len, train))} rows), validated on repeat 9")
     columns = "".join(f"{'no ' + name:>9}" for name in specimens)
@@ -132,11 +131,14 @@ def main() -> None:
     each = [single_surface_errors(select_specimen(train, name), select_specimen(test, name)) for name in specimens]
     print(format_row("one surface of degree 5 per length", 63, [rms(np.concatenate(each))], floor))
     print(format_row("  each length", 21, [rms(e) for e in each], floor))
-    candidates = [Candidate("one surface of degree 5 for all lengths", blank_surface(5)), *standard_candidates(train)]
+    candidates = [
+        am.identify.Candidate("one surface of degree 5 for all lengths", blank_surface(5)),
+        *am.identify.standard_candidates(train),
+    ]
     for candidate in candidates:
         if hasattr(candidate.law, "with_resting_length") or candidate is candidates[0]:
             try:
-                size = count_parameters(fit(candidate.law, train, fixed=candidate.fixed))
+                size = count_parameters(am.fit(candidate.law, train, fixed=candidate.fixed))
                 print(
                     format_row(candidate.name, size, validation_errors(candidate, train, test, specimens), floor),
                     flush=True,

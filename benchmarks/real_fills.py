@@ -12,8 +12,7 @@ import time
 
 import numpy as np
 
-from airmuscle.control.inputs import Schedule
-from airmuscle.geometry import Vessel
+import airmuscle as am
 from airmuscle.identify.dynamic import (
     DynamicFit,
     Experiment,
@@ -23,12 +22,6 @@ from airmuscle.identify.dynamic import (
     fit_dynamic,
     locate_pressure_sensor,
 )
-from airmuscle.mechanism import Isometric
-from airmuscle.muscle import Muscle, SwellingWall
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Supply, Tube, Valve, WithTubes
-from airmuscle.pneumatics.gas import Gas, Isothermal, Polytropic
-from airmuscle.recording import Recording, read_csv
 
 SENSOR = 500.0
 """Standard deviation of a measured pressure [Pa], close to that at the end of the records; chosen."""
@@ -36,7 +29,7 @@ END = 5.0
 """Rows after this time [s] are at rest and are omitted; chosen."""
 REST_VOLUME = 1e-4
 """Assumed volume at rest [m3], which is not known; conductances and volumes are relative to it."""
-OPEN = Schedule({"fill": ((0.0, 1.0),)})
+OPEN = am.Schedule({"fill": ((0.0, 1.0),)})
 BOUNDS = {
     "supply.pressure": (590e3, 660e3), "fill.critical_ratio": (0.1, 0.6), "growth_volume": (0.0, 2 * REST_VOLUME),
     "midpoint_pressure": (0.0, 600e3), "pressure_width": (1e4, 3e5), "time_constant": (0.01, 5.0),
@@ -49,7 +42,7 @@ class Model:
     """A model variant: plant with initial values, free parameters, and location of the pressure sensor."""
 
     name: str
-    plant: Plant
+    plant: am.Plant
     free: tuple[str, ...]
     sensor: str = "pressure"
 
@@ -61,7 +54,7 @@ class Model:
     @property
     def valves(self) -> str:
         """Common prefix of the valve paths."""
-        return "circuit.circuit." if isinstance(self.plant.circuit, WithTubes) else "circuit."
+        return "circuit.circuit." if isinstance(self.plant.circuit, am.pneumatics.WithTubes) else "circuit."
 
     def nuisances(self, wall: bool) -> tuple[str | StartTime | InitialValue, ...]:
         """Nuisance parameters of each record; with the initial wall volume if `wall`."""
@@ -74,15 +67,21 @@ class Model:
         return {path: pair for end, pair in BOUNDS.items() for path in named if path.endswith(end)}
 
 
-def make_plant(gas: Gas, growth: float, lag: float, line: bool) -> Plant:
+def make_plant(gas: am.pneumatics.Gas, growth: float, lag: float, line: bool) -> am.Plant:
     """An unloaded muscle of unknown length behind a valve, with a supply tube if `line`."""
-    muscle = dataclasses.replace(Muscle.ideal(Vessel(REST_VOLUME)), wall=SwellingWall(growth, 150e3, 5e4, lag))
-    valves = FillDischarge(Supply(625e3), Valve(5e-10, 0.4), Valve(0.0, 0.3))
-    circuit = WithTubes(valves, Tube(Valve(1.3e-9, 0.3), 2e-5, gas=gas)) if line else valves
-    return Plant(muscle, circuit, Isometric(0.0), gas)
+    muscle = dataclasses.replace(
+        am.Muscle.ideal(am.muscle.geometry.Vessel(REST_VOLUME)), wall=am.muscle.SwellingWall(growth, 150e3, 5e4, lag)
+    )
+    valves = am.FillDischarge(am.Supply(625e3), am.Valve(5e-10, 0.4), am.Valve(0.0, 0.3))
+    circuit = (
+        am.pneumatics.WithTubes(valves, am.pneumatics.Tube(am.Valve(1.3e-9, 0.3), 2e-5, gas=gas)) if line else valves
+    )
+    return am.Plant(muscle, circuit, am.Isometric(0.0), gas)
 
 
-def make_model(name: str, gas: Gas, *, growing: bool = False, lagging: bool = False, line: bool = False) -> Model:
+def make_model(
+    name: str, gas: am.pneumatics.Gas, *, growing: bool = False, lagging: bool = False, line: bool = False
+) -> Model:
     """A model variant with the given features."""
     valves = "circuit.circuit." if line else "circuit."
     free = [f"{valves}fill.conductance", f"{valves}fill.critical_ratio"]
@@ -96,24 +95,24 @@ def make_model(name: str, gas: Gas, *, growing: bool = False, lagging: bool = Fa
 
 
 MODELS = (
-    make_model("isothermal, constant volume", Isothermal()),
-    make_model("polytropic 1.2, growing volume", Polytropic(), growing=True),
-    make_model("polytropic 1.2, growing volume with lag", Polytropic(), growing=True, lagging=True),
-    make_model("tube, constant volume, sensor in the tube", Polytropic(), line=True),
+    make_model("isothermal, constant volume", am.Isothermal()),
+    make_model("polytropic 1.2, growing volume", am.Polytropic(), growing=True),
+    make_model("polytropic 1.2, growing volume with lag", am.Polytropic(), growing=True, lagging=True),
+    make_model("tube, constant volume, sensor in the tube", am.Polytropic(), line=True),
     make_model(
-        "tube, growing volume with lag, sensor in the tube", Polytropic(), growing=True, lagging=True, line=True
+        "tube, growing volume with lag, sensor in the tube", am.Polytropic(), growing=True, lagging=True, line=True
     ),
 )
 
 
-def read_record(path: pathlib.Path) -> Recording:
+def read_record(path: pathlib.Path) -> am.Recording:
     """The transient part of a record; its pressure is given the names of both sensor locations."""
-    recording = read_csv(path)
+    recording = am.read_csv(path)
     recording = recording.rows(recording["time"] < END)
     return recording.with_columns(**{"tube.pressure": recording["pressure"]})
 
 
-def make_experiment(start_plant: Plant, recording: Recording, wall: bool = False) -> Experiment:
+def make_experiment(start_plant: am.Plant, recording: am.Recording, wall: bool = False) -> Experiment:
     """The fill as an experiment that starts at the first row that differs from the initial pressure."""
     pressure, first = recording["pressure"], float(np.median(recording["pressure"][:2]))
     begin = float(recording["time"][max(int(np.argmax(pressure > first + 5e3)) - 1, 0)])
@@ -125,7 +124,7 @@ def make_experiment(start_plant: Plant, recording: Recording, wall: bool = False
     return Experiment(recording, OPEN, start, begin)
 
 
-def fit_record(variant: Model, recording: Recording, starts: int) -> DynamicFit:
+def fit_record(variant: Model, recording: am.Recording, starts: int) -> DynamicFit:
     """The variant fitted to one record; nuisance parameters are initial pressure, start time and supply pressure."""
     return fit_dynamic(
         variant.plant, [make_experiment(variant.plant, recording)], free=variant.free,
@@ -133,10 +132,10 @@ def fit_record(variant: Model, recording: Recording, starts: int) -> DynamicFit:
     )  # fmt: skip
 
 
-def prediction_rms(fit: DynamicFit, variant: Model, recording: Recording, wall: bool) -> float:
+def prediction_rms(fit: DynamicFit, variant: Model, recording: am.Recording, wall: bool) -> float:
     """Rms error [Pa] of the prediction of another record, for which only the nuisance parameters are fitted."""
     plant = fit.plant()
-    assert isinstance(plant, Plant)
+    assert isinstance(plant, am.Plant)
     prediction = fit_dynamic(
         plant, [make_experiment(plant, recording, wall)], free=(), per_record=variant.nuisances(wall),
         observed={variant.sensor: SENSOR}, bounds={variant.supply: BOUNDS["supply.pressure"]},

@@ -12,10 +12,9 @@ from measure import Section, Target, Times, format_time, print_section, time_var
 from scalar_rates import Rates, hill, six_states, ten_states
 from several_rates import hanging_rates
 
+import airmuscle as am
 from airmuscle.compile.kernels.calls import invoke, pointer
 from airmuscle.compile.program import CompiledSystem, compile_system
-from airmuscle.simulation import simulate
-from airmuscle.simulation.integrators import Rodas4
 
 RTOL = 1e-6
 HAND_WRITTEN: dict[int, Callable[[Any], Callable[[Sequence[float]], Rates]]] = {
@@ -93,15 +92,15 @@ def odeint_lsoda(run: Run, rates: Callable[[Array], Any], rtol: float = RTOL) ->
     return np.concatenate(rows)
 
 
-def kernel(run: Run, ready: CompiledSystem, method: Rodas4 | None = None) -> Callable[[], Array]:
+def kernel(run: Run, ready: CompiledSystem, method: am.Rodas4 | None = None) -> Callable[[], Array]:
     """A function that runs the kernel alone on the compiled plant."""
-    method, segments, times, state = method or Rodas4(RTOL), run.segments, run.times, run.vector
+    method, segments, times, state = method or am.Rodas4(RTOL), run.segments, run.times, run.vector
     return lambda: method.run(ready, segments, 0.0, state, times).rows
 
 
 def make_simulation(run: Run) -> Callable[[], Any]:
     """A function that calls `simulate`, including validation of the initial state, outputs and the Recording."""
-    return lambda: simulate(
+    return lambda: am.simulate(
         run.system, run.command, duration=DURATION, initial_state=run.initial_state, output_times=SPACING
     )
 
@@ -129,7 +128,7 @@ def measure(states: int, rounds: int) -> tuple[tuple[tuple[str, ...], ...], tupl
     ready = compile_system(run.system)
     rate_difference = check_rates(run, ready)
     hand, machine = hand_written_rates(run), machine_code_rates(ready)
-    reference = kernel(run, ready, Rodas4(1e-11))()
+    reference = kernel(run, ready, am.Rodas4(1e-11))()
     variants: dict[str, Callable[[], Any]] = {
         "Rodas4, kernel": kernel(run, ready),
         "Rodas4, `simulate` with Recording": make_simulation(run),
@@ -179,10 +178,10 @@ def at_equal_precision(
 ) -> tuple[tuple[tuple[str, ...], ...], float]:
     """Rows and time ratio of both methods, each at its loosest sufficient rtol."""
     hand, size = hand_written_rates(run), len(run.system.states)
-    run_rodas4, run_lsoda = (lambda rtol: kernel(run, ready, Rodas4(rtol))()), (lambda rtol: lsoda(run, hand, rtol))
+    run_rodas4, run_lsoda = (lambda rtol: kernel(run, ready, am.Rodas4(rtol))()), (lambda rtol: lsoda(run, hand, rtol))
     rtol, lsoda_rtol = (loosest_tolerance(run, solve, reference) for solve in (run_rodas4, run_lsoda))
     variants = {
-        f"Rodas4({rtol:.0e}), kernel": kernel(run, ready, Rodas4(rtol)),
+        f"Rodas4({rtol:.0e}), kernel": kernel(run, ready, am.Rodas4(rtol)),
         f"solve_ivp LSODA at {lsoda_rtol:.0e}, hand-written rates": lambda: run_lsoda(lsoda_rtol),
     }
     times = time_variants(variants, max(1, rounds // 2))

@@ -13,18 +13,17 @@ from typing import Any
 from filling import stretch_factor
 from joints import HEAT_CAPACITY, Joint, JointWithHeat
 
-from airmuscle.characteristic.contractile_surface import ContractileSurface
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import Valve
-from airmuscle.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, absolute_pressure
+import airmuscle as am
 
 Rates = Callable[[float, Any], list[float]]
 Scalar = Callable[[float, float], float]
 
 
-def valve_flow(valve: Valve, temperature: float) -> Scalar:
+def valve_flow(valve: am.Valve, temperature: float) -> Scalar:
     """Mass flow [kg/s] from one absolute pressure to another [Pa], fully open."""
-    scale = valve.conductance * REFERENCE_DENSITY * sqrt(REFERENCE_TEMPERATURE / temperature)
+    scale = (
+        valve.conductance * am.pneumatics.REFERENCE_DENSITY * sqrt(am.pneumatics.REFERENCE_TEMPERATURE / temperature)
+    )
     b, laminar = valve.critical_ratio, float(valve.laminar_slope())
     inverse = 1.0 / (1.0 - b)
 
@@ -41,7 +40,7 @@ def valve_flow(valve: Valve, temperature: float) -> Scalar:
     return flow
 
 
-def extrapolate(law: ContractileSurface) -> Scalar:
+def extrapolate(law: am.muscle.characteristic.ContractileSurface) -> Scalar:
     """Extrapolation of the surface by its tangent beyond the validity range, in scaled arguments."""
     (a00, a10, a20, a30, a40, a50, a01, a11, a21, a31, a41, a02, a12, a22, a32, a03, a13, a23, a04, a14, a05) = (
         law.coefficients
@@ -66,15 +65,15 @@ def extrapolate(law: ContractileSurface) -> Scalar:
     return tangent
 
 
-def hill(plant: Plant) -> Callable[[Sequence[float]], Rates]:
+def hill(plant: am.Plant) -> Callable[[Sequence[float]], Rates]:
     """A function from valve openings to the rates of the plant with three states."""
     muscle, load, circuit, ambient = plant.muscles[0], plant.mechanism, plant.circuits[0], plant.ambient
     law, length = muscle.contractile, muscle.geometry.resting_length
     k, c = stretch_factor(muscle.geometry)
     rt, outside, source = (
-        GAS_CONSTANT * ambient.temperature,
+        am.pneumatics.GAS_CONSTANT * ambient.temperature,
         ambient.pressure,
-        absolute_pressure(circuit.supply.pressure, ambient),
+        am.pneumatics.absolute_pressure(circuit.supply.pressure, ambient),
     )
     fill_flow, discharge_flow = (valve_flow(v, ambient.temperature) for v in (circuit.fill, circuit.discharge))
     stiffness, damping, growth = muscle.spring.stiffness, muscle.damper.damping, muscle.damper.damping_slope
@@ -141,8 +140,12 @@ def six_states(system: Joint) -> Callable[[Sequence[float]], Rates]:
     """A function from valve openings to the rates of the joint with six states."""
     ambient, length = system.ambient, system.muscle.geometry.resting_length
     k, c = stretch_factor(system.muscle.geometry)
-    rt, outside, cc = GAS_CONSTANT * ambient.temperature, ambient.pressure, c * c
-    in_tube, source, radius = rt / system.tube_volume, absolute_pressure(system.supply.pressure, ambient), system.radius
+    rt, outside, cc = am.pneumatics.GAS_CONSTANT * ambient.temperature, ambient.pressure, c * c
+    in_tube, source, radius = (
+        rt / system.tube_volume,
+        am.pneumatics.absolute_pressure(system.supply.pressure, ambient),
+        system.radius,
+    )
     lever, offset, inverse_inertia = radius / length, system.offset, 1.0 / system.inertia
     friction, load, force = system.friction, system.load, _force(system)
     valve, tube = (valve_flow(v, ambient.temperature) for v in (system.valve, system.tube))
@@ -180,12 +183,15 @@ def ten_states(system: JointWithHeat) -> Callable[[Sequence[float]], Rates]:
     ambient, length = system.ambient, system.muscle.geometry.resting_length
     k, c = stretch_factor(system.muscle.geometry)
     wall, outside, cc = ambient.temperature, ambient.pressure, c * c
-    in_tube, source = GAS_CONSTANT * wall / system.tube_volume, absolute_pressure(system.supply.pressure, ambient)
+    in_tube, source = (
+        am.pneumatics.GAS_CONSTANT * wall / system.tube_volume,
+        am.pneumatics.absolute_pressure(system.supply.pressure, ambient),
+    )
     radius, offset, inverse_inertia = system.radius, system.offset, 1.0 / system.inertia
     lever, friction, load, force = radius / length, system.friction, system.load, _force(system)
     valve, tube = (valve_flow(v, wall) for v in (system.valve, system.tube))
-    transfer, inverse_lag, cp = system.heat_transfer, 1.0 / system.spool_lag, HEAT_CAPACITY + GAS_CONSTANT
-    inverse_cv, ratio, per_length = 1.0 / HEAT_CAPACITY, GAS_CONSTANT / HEAT_CAPACITY, 1.0 / length
+    transfer, inverse_lag, cp = system.heat_transfer, 1.0 / system.spool_lag, HEAT_CAPACITY + am.pneumatics.GAS_CONSTANT
+    inverse_cv, ratio, per_length = 1.0 / HEAT_CAPACITY, am.pneumatics.GAS_CONSTANT / HEAT_CAPACITY, 1.0 / length
 
     def side(
         contraction: float, speed: float, air: float, tube_air: float, energy: float, spool: float, goal: float

@@ -12,20 +12,16 @@ import numpy as np
 from filling import Array, hanging
 from measure import Section, Target, format_time, print_section, time_variants
 
+import airmuscle as am
 from airmuscle.compile.functions import trace_system
 from airmuscle.compile.ir.instructions import Code, Operand, Operation, instructions
 from airmuscle.compile.kernels.evaluate import evaluate
 from airmuscle.compile.program import compile_system
-from airmuscle.control.inputs import Schedule
-from airmuscle.control.piecewise_linear import PiecewiseLinear
 from airmuscle.core import tree
 from airmuscle.identify.dynamic import Experiment, InitialConditions
 from airmuscle.identify.dynamic.experiment import make_unknowns
 from airmuscle.identify.dynamic.problem import DynamicFitProblem
 from airmuscle.identify.dynamic.record_model import RecordModel
-from airmuscle.plant.plant import Plant
-from airmuscle.simulation import simulate
-from airmuscle.simulation.integrators import Integrator, Rodas4, RungeKutta4
 
 FREE = (
     "circuit.fill.conductance",
@@ -40,8 +36,8 @@ FREE = (
 SENSORS = {"pressure": 1e3, "position": 1e-4}
 """Standard deviations of the noise [Pa, m]; chosen."""
 DURATION, SPACING, STEP = 5.0, 0.01, 1e-3
-COMMAND = Schedule({"fill": ((0.5, 1.0), (2.5, 0.0)), "discharge": ((3.0, 1.0), (4.5, 0.0))})
-METHODS: dict[str, Integrator] = {"RungeKutta4(1e-3)": RungeKutta4(STEP), "Rodas4(1e-6)": Rodas4()}
+COMMAND = am.Schedule({"fill": ((0.5, 1.0), (2.5, 0.0)), "discharge": ((3.0, 1.0), (4.5, 0.0))})
+METHODS: dict[str, am.simulation.Integrator] = {"RungeKutta4(1e-3)": am.RungeKutta4(STEP), "Rodas4(1e-6)": am.Rodas4()}
 LIBRARY = "RungeKutta4(1e-3), residual and Jacobian"
 FORMS = ("a tuple", "an array")
 HEADER = ("method", "variant", "median", "minimum", "ratio to a simulation", "maximum difference of the Jacobian")
@@ -64,16 +60,16 @@ TEXT = (
 class Case(NamedTuple):
     """A plant, its noisy record, and the residuals of an integrator over the scaled parameters."""
 
-    plant: Plant
+    plant: am.Plant
     experiment: Experiment
 
-    def problem(self, method: Integrator) -> DynamicFitProblem:
+    def problem(self, method: am.simulation.Integrator) -> DynamicFitProblem:
         parameters = make_unknowns(self.plant, [self.experiment], FREE, (), {})
         record = RecordModel(self.plant, self.experiment, 0, parameters, SENSORS, method)
         return DynamicFitProblem((record,), parameters, np.array(list(SENSORS.values())))
 
     @property
-    def segments(self) -> PiecewiseLinear:
+    def segments(self) -> am.control.PiecewiseLinear:
         return COMMAND.segments(self.plant.inputs, 0.0, DURATION)
 
 
@@ -81,12 +77,15 @@ class Case(NamedTuple):
 def case() -> Case:
     """The record of the identification benchmarks."""
     plant, rng = hanging(), np.random.default_rng(1)
-    run = simulate(plant, COMMAND, duration=DURATION, output_times=SPACING)
+    run = am.simulate(plant, COMMAND, duration=DURATION, output_times=SPACING)
     noisy = {name: run[name] + size * rng.standard_normal(len(run)) for name, size in SENSORS.items()}
-    return Case(plant, Experiment(run.with_columns(**noisy), COMMAND, InitialConditions.at_rest(plant, 0.0)))
+    return Case(
+        plant,
+        Experiment(run.with_columns(**noisy), COMMAND, InitialConditions.at_rest(plant, 0.0)),
+    )
 
 
-def simulation(method: Integrator) -> Callable[[], Array]:
+def simulation(method: am.simulation.Integrator) -> Callable[[], Array]:
     """A function that runs the kernel and evaluates all outputs at the rows."""
     ready, segments = compile_system(case().plant), case().segments
     times = case().experiment.recording["time"].copy()  # a kernel takes writeable arrays
@@ -101,7 +100,7 @@ def simulation(method: Integrator) -> Callable[[], Array]:
     return run
 
 
-def jacobian(method: Integrator) -> Callable[[], tuple[Array, Array]]:
+def jacobian(method: am.simulation.Integrator) -> Callable[[], tuple[Array, Array]]:
     """A function that computes the residual (R,) and the Jacobian (R, 8) with respect to the scaled parameters."""
     problem = case().problem(method)
     at = np.array([u.value for u in problem.unknowns]) / problem.scales
@@ -146,7 +145,7 @@ def make_jax_variant(form: str) -> Callable[[], tuple[Array, Array]]:
     plant, leaves = case().plant, list(tree.leaves(case().plant))
     indices = [[leaf.path for leaf in leaves].index(path) for path in FREE]
     values = np.array([leaves[index].value for index in indices])
-    start, by_start = case().problem(RungeKutta4(STEP)).record_models[0].initial_state(values)
+    start, by_start = case().problem(am.RungeKutta4(STEP)).record_models[0].initial_state(values)
     t, names = trace_system(plant), [s.name for s in plant.states]
     outputs = list(t.output_names)
     seen = [t.o[outputs.index(name)] if name in outputs else t.x[names.index(name)] for name in SENSORS]
@@ -218,7 +217,7 @@ def section(rounds: int) -> Section:
         targets.append(
             Target("residual and Jacobian: JAX jacfwd, faster form / library", ratio, 10.0, "x", at_least=True)
         )
-    rows, reference = [], jacobian(Rodas4(1e-11))()[1]
+    rows, reference = [], jacobian(am.Rodas4(1e-11))()[1]
     for name, t in times.items():
         method, _, variant = name.partition(", ")
         difference = ""

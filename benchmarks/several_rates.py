@@ -8,20 +8,17 @@ from typing import Any
 from filling import stretch_factor
 from scalar_rates import Rates, extrapolate, valve_flow
 
-from airmuscle.muscle import Muscle
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge
-from airmuscle.pneumatics.gas import GAS_CONSTANT, Ambient, absolute_pressure
+import airmuscle as am
 
 OneMuscle = Callable[[float, float, float, float, float], tuple[float, float]]
 
 
-def one_muscle(muscle: Muscle, circuit: FillDischarge, ambient: Ambient) -> OneMuscle:
+def one_muscle(muscle: am.Muscle, circuit: am.FillDischarge, ambient: am.Ambient) -> OneMuscle:
     """A function from air mass, position, speed and valve openings to tension [N] and mass flow [kg/s]."""
     law, per_length = muscle.contractile, 1.0 / muscle.geometry.resting_length
     k, c = stretch_factor(muscle.geometry)
-    rt, outside, cc = GAS_CONSTANT * ambient.temperature, ambient.pressure, c * c
-    source = absolute_pressure(circuit.supply.pressure, ambient)
+    rt, outside, cc = am.pneumatics.GAS_CONSTANT * ambient.temperature, ambient.pressure, c * c
+    source = am.pneumatics.absolute_pressure(circuit.supply.pressure, ambient)
     fill_flow, discharge_flow = (valve_flow(v, ambient.temperature) for v in (circuit.fill, circuit.discharge))
     stiffness, damping, growth = muscle.spring.stiffness, muscle.damper.damping, muscle.damper.damping_slope
     low_x, scale_x = law.min_contraction, 2.0 / (law.max_contraction - law.min_contraction)
@@ -56,7 +53,7 @@ def one_muscle(muscle: Muscle, circuit: FillDischarge, ambient: Ambient) -> OneM
     return one
 
 
-def hanging_rates(plant: Plant) -> Callable[[Sequence[float]], Rates]:
+def hanging_rates(plant: am.Plant) -> Callable[[Sequence[float]], Rates]:
     """A function from valve openings to the rates of a hanging plant with several muscles."""
     load = plant.mechanism
     inverse_mass, gravity = 1.0 / load.mass, load.gravity

@@ -6,10 +6,7 @@ import numpy as np
 from filling import BOX, Array, measured_force
 from measure import Section, Target, format_time, print_section, time_variants
 
-from airmuscle.characteristic.contractile_surface import ContractileSurface, exponents
-from airmuscle.identify.censoring import UNCENSORED
-from airmuscle.identify.static_fit import fit
-from airmuscle.recording import Recording
+import airmuscle as am
 
 POINTS = 1000
 NOISE = 2.0
@@ -22,28 +19,28 @@ TEXT = (
 )
 
 
-def make_points() -> Recording:
+def make_points() -> am.Recording:
     """Forces with noise at random points of the validity range."""
     rng = np.random.default_rng(5)
     p, eps = (rng.uniform(*ends, POINTS) for ends in BOX)
     force = measured_force(p, eps) + NOISE * rng.standard_normal(POINTS)
-    return Recording({"pressure": p, "contraction": eps, "force": force}, "benchmark")
+    return am.Recording({"pressure": p, "contraction": eps, "force": force}, "benchmark")
 
 
-def design_matrix(data: Recording) -> Array:
+def design_matrix(data: am.Recording) -> Array:
     """The powers of contraction and pressure, scaled to -1 to 1."""
     x, q = (2 * (v - v.min()) / np.ptp(v) - 1 for v in (data["contraction"], data["pressure"]))
-    return np.column_stack([x**i * q**j for i, j in exponents(5)])
+    return np.column_stack([x**i * q**j for j in range(6) for i in range(6 - j)])
 
 
-def fit_library(data: Recording) -> Array:
+def fit_library(data: am.Recording) -> Array:
     """The coefficients fitted by the library, without censoring."""
-    model = fit(ContractileSurface.blank(), data, censoring=UNCENSORED).model
-    assert isinstance(model, ContractileSurface)
+    model = am.fit(am.muscle.characteristic.ContractileSurface.blank(), data, censoring=am.identify.UNCENSORED).model
+    assert isinstance(model, am.muscle.characteristic.ContractileSurface)
     return np.array(model.coefficients)
 
 
-def fit_lmfit(data: Recording, columns: Array, derivative: bool) -> Array:
+def fit_lmfit(data: am.Recording, columns: Array, derivative: bool) -> Array:
     """The coefficients fitted by lmfit (Levenberg-Marquardt from zero)."""
     import lmfit
 

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from airmuscle.characteristic import VirtualWork
 from airmuscle.control.inputs import Schedule
 from airmuscle.core.plotting import DASHES, LINES, MARKERS, new_figure, save
-from airmuscle.geometry import Braid
 from airmuscle.mechanism import Isometric
 from airmuscle.muscle import Muscle
+from airmuscle.muscle.characteristic import VirtualWork
+from airmuscle.muscle.geometry import Braid
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import DistributedTube, FillDischarge, Supply, Tube, Valve, WithTubes
 from airmuscle.pneumatics.gas import Air, Isothermal

@@ -32,8 +32,8 @@ from airmuscle.control import (
     WithSensors,
 )
 from airmuscle.core import plotting
-from airmuscle.friction import Dahl
 from airmuscle.mechanism import AntagonisticJoint
+from airmuscle.muscle.friction import Dahl
 from airmuscle.units import bar, mm, ms
 
 muscle = replace(am.load("dmsp-20-300").muscle, damper=am.LinearDamper(300.0))

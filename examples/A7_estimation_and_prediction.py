@@ -13,7 +13,7 @@ import airmuscle as am
 from airmuscle.analysis import ExtendedKalmanFilter, FiniteControlSet
 from airmuscle.control import ControlLoop, HysteresisOperator, SetpointCommand
 from airmuscle.core import plotting
-from airmuscle.friction import Dahl, MaxwellSlip, PressureScaledFriction
+from airmuscle.muscle.friction import Dahl, MaxwellSlip, PressureScaledFriction
 from airmuscle.units import bar, mm, ms
 
 figure, axes = plotting.new_figure(2, 2, height=6.2)

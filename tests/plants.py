@@ -6,24 +6,7 @@ from dataclasses import replace
 
 from joints import chosen_muscle
 
-from airmuscle import friction, geometry, pneumatics
-from airmuscle.characteristic import (
-    CircleVirtualWork,
-    Clamped,
-    ContractileSurface,
-    EffectiveLength,
-    InverseLength,
-    LogarithmicLength,
-    PooledLengthLaw,
-    RubberLine,
-    VirtualWork,
-    as_force_law,
-)
-from airmuscle.characteristic.validity_range import ValidityRange
-from airmuscle.geometry.catenary import Catenary
-from airmuscle.geometry.chebyshev import as_polynomial
-from airmuscle.geometry.parabola import Parabola, TrueArcParabola
-from airmuscle.geometry.vessel import Vessel
+from airmuscle import pneumatics
 from airmuscle.library import catalogue
 from airmuscle.mechanism import (
     AntagonisticJoint,
@@ -67,7 +50,26 @@ from airmuscle.muscle import (
     Serres2009Spring,
     SwellingWall,
     ViscoelasticWall,
+    friction,
+    geometry,
 )
+from airmuscle.muscle.characteristic import (
+    CircleVirtualWork,
+    Clamped,
+    ContractileSurface,
+    EffectiveLength,
+    InverseLength,
+    LogarithmicLength,
+    PooledLengthLaw,
+    RubberLine,
+    VirtualWork,
+    as_force_law,
+)
+from airmuscle.muscle.characteristic.validity_range import ValidityRange
+from airmuscle.muscle.geometry.catenary import Catenary
+from airmuscle.muscle.geometry.chebyshev import as_polynomial
+from airmuscle.muscle.geometry.parabola import Parabola, TrueArcParabola
+from airmuscle.muscle.geometry.vessel import Vessel
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic

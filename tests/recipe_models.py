@@ -13,9 +13,9 @@ HEAD = '''"""A model of a test."""
 
 from __future__ import annotations
 
-from ..core.declaration import model, parameter
+from {root}core.declaration import model, parameter
 '''
-LAW = """from ..core.reference import Reference
+LAW = """from {root}core.reference import Reference
 from .base import ForceLaw
 
 
@@ -63,8 +63,8 @@ class {name}(Orifice):
     def mass_flow(self, upstream, downstream, opening, temperature):
         return opening * self.slope * (upstream - downstream)
 """
-FRICTION = """from ..core import ops
-from ..core.variables import StateVariable
+FRICTION = """from {root}core import ops
+from {root}core.variables import StateVariable
 from .base import Friction
 from .path import deflection
 
@@ -115,22 +115,31 @@ class {name}(SisoController):
 
 @dataclass(frozen=True)
 class Recipe:
-    """A kind of model: its package, its source text, and its example in tests/plants.py; None where it has none."""
+    """A kind of model: its folder, its source text, and its example in tests/plants.py; None where it has none."""
 
-    package: str
+    folder: str
     text: str
     example: str | None
 
     @property
+    def package(self) -> str:
+        return self.folder.replace("/", ".")
+
+    @property
+    def root(self) -> str:
+        """The package airmuscle, relative to a module of the folder."""
+        return "." * (2 + self.folder.count("/"))
+
+    @property
     def steps(self) -> tuple[str, ...]:
-        library = ("library",) if self.package == "characteristic" else ()
+        library = ("library",) if self.folder == "muscle/characteristic" else ()
         return ("file", "export", *library, "example" if self.example else "exemption", "nomenclature")
 
 
 RECIPES = {
-    "law": Recipe("characteristic", LAW, "of({name}(1e-3))"),
+    "law": Recipe("muscle/characteristic", LAW, "of({name}(1e-3))"),
     "valve": Recipe("pneumatics", VALVE, "fed(FillDischarge(Supply(5e5), {name}(1e-8), OTHER))"),
-    "friction": Recipe("friction", FRICTION, "of(friction={name}(5e4, 4e-4))"),
+    "friction": Recipe("muscle/friction", FRICTION, "of(friction={name}(5e4, 4e-4))"),
     "controller": Recipe("control", CONTROLLER, None),
 }
 
@@ -142,12 +151,13 @@ def append(path: Path, text: str) -> None:
 def add(root: Path, kind: str, name: str, without: str = "") -> None:
     """Add a model to a copy of the project, by all steps but one; the nomenclature is generated afterwards."""
     recipe, module = RECIPES[kind], name.lower()
-    package = root / "src" / "airmuscle" / recipe.package
+    source = root / "src" / "airmuscle"
+    package = source / recipe.folder
     line = f"from .{module} import {name}"
     edits = {
-        "file": (package / f"{module}.py", HEAD + recipe.text.format(name=name)),
+        "file": (package / f"{module}.py", (HEAD + recipe.text).format(name=name, root=recipe.root)),
         "export": (package / "__init__.py", f'\n{line}\n__all__ += ["{name}"]\n'),
-        "library": (package.parent / "library" / f"{module}.toml", LAW_FILE.format(name=name)),
+        "library": (source / "library" / f"{module}.toml", LAW_FILE.format(name=name)),
         "example": (
             root / "tests" / "plants.py",
             f"\nfrom airmuscle.{recipe.package}{line[5:]}\nEXAMPLES['{module}'] = {recipe.example}\n".format(name=name),

@@ -10,7 +10,6 @@ import re
 from collections.abc import Iterable, Iterator
 from typing import Any
 
-from airmuscle.characteristic import Characteristic, ContractionLaw, ForceLaw, PressureLaw
 from airmuscle.core.annotation import describe, type_hints
 from airmuscle.core.declaration import Parameter, parameters
 from airmuscle.core.reference import Reference
@@ -18,6 +17,7 @@ from airmuscle.library import files
 from airmuscle.library.catalogue import load
 from airmuscle.library.entry import Entry
 from airmuscle.library.models import PACKAGES, model_class, model_names
+from airmuscle.muscle.characteristic import Characteristic, ContractionLaw, ForceLaw, PressureLaw
 
 from .docstrings import docstring, parts, symbol, to_markdown
 from .formulas_in_text import escape, markdown

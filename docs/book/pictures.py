@@ -12,14 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from airmuscle import characteristic, friction, geometry, mechanism, pneumatics
-from airmuscle.characteristic import Characteristic, ValidityRange
+from airmuscle import mechanism, pneumatics
 from airmuscle.core import plotting
 from airmuscle.core.errors import AirmuscleError
-from airmuscle.friction import Friction
-from airmuscle.geometry import Geometry
 from airmuscle.identify.hysteresis.plot import plot_loops
 from airmuscle.mechanism import PulleyProfile
+from airmuscle.muscle import characteristic, friction, geometry
+from airmuscle.muscle.characteristic import Characteristic, ValidityRange
+from airmuscle.muscle.friction import Friction
+from airmuscle.muscle.geometry import Geometry
 from airmuscle.muscle.isobars import compute_isobars
 from airmuscle.pneumatics import Orifice
 from airmuscle.report.isobar_plot import isobar_plot

@@ -6,9 +6,9 @@ import importlib
 import inspect
 import pkgutil
 
-from airmuscle.characteristic import Characteristic
 from airmuscle.library import files
 from airmuscle.library.models import PACKAGES, model_class, model_names
+from airmuscle.muscle.characteristic import Characteristic
 
 PARTS = {"PlaneCurve", "PlaneCurves"}
 """Coefficients of BorzikovaDirect, which builds them itself."""

@@ -46,7 +46,7 @@ for plant, signal in ((of(law), command), (fed(circuit), command), (of(friction=
 """Construction from tables, evaluation and 0.1 s of simulation of all four models."""
 STEPS = [(kind, step) for kind, recipe in RECIPES.items() for step in recipe.steps]
 MESSAGES = {
-    "export": r"export {name} in airmuscle/{package}/__init__\.py",
+    "export": r"export {name} in airmuscle/{folder}/__init__\.py",
     "library": r"write a file in airmuscle/library that names {name}",
     "example": r"{name}: airmuscle\.{package}\.{module} is in no plant of tests/plants\.py",
     "exemption": r"{name}: airmuscle\.{package}\.{module} is in no plant of tests/plants\.py, nor in NOT_IN_A_PLANT",
@@ -104,14 +104,16 @@ def test_a_complete_model_is_built_evaluated_and_simulated(complete: Path):
 @pytest.mark.slow
 def test_a_contract_test_names_a_missing_step(failures: str, kind: str, step: str):
     name = named(kind, step)
-    pattern = MESSAGES[step].format(name=name, module=name.lower(), package=RECIPES[kind].package)
+    pattern = MESSAGES[step].format(
+        name=name, module=name.lower(), package=RECIPES[kind].package, folder=RECIPES[kind].folder
+    )
     assert re.search(pattern, failures), failures[-3000:]
 
 
 @pytest.mark.parametrize("kind", RECIPES)
 def test_a_missing_file_is_named_by_the_import(complete: Path, kind: str):
     name, package = named(kind), RECIPES[kind].package
-    file = complete / "src" / "airmuscle" / package / f"{name.lower()}.py"
+    file = complete / "src" / "airmuscle" / RECIPES[kind].folder / f"{name.lower()}.py"
     aside = file.rename(file.with_suffix(".aside"))
     done = run(complete, "-c", f"import airmuscle.{package}")
     aside.rename(file)
@@ -122,7 +124,7 @@ def test_a_missing_file_is_named_by_the_import(complete: Path, kind: str):
 def test_each_step_is_in_the_rules(kind: str, step: str):
     text = (ROOT / "AGENTS.md").read_text(encoding="utf-8").split("## Adding a model")[1]
     places = {
-        "file": f"`{RECIPES[kind].package}/`",
+        "file": f"`{RECIPES[kind].folder}/`",
         "export": "`__init__.py` of the package",
         "library": "`src/airmuscle/library/`",
         "example": "`tests/plants.py`",

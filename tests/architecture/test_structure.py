@@ -75,6 +75,13 @@ def test_the_top_level_has_50_names_at_most():
     assert [name for name in names if not hasattr(airmuscle, name)] == []
 
 
+def test_type_checkers_read_the_names_that_the_face_imports_on_use():
+    airmuscle = pytest.importorskip("airmuscle")
+    statements = tree_of(SOURCE / "__init__.pyi").body
+    names = {alias.name for node in statements if isinstance(node, ast.ImportFrom) for alias in node.names}
+    assert names | {"__version__"} == set(dir(airmuscle))
+
+
 # Independence of packages and laws
 
 
@@ -98,14 +105,37 @@ def imported(path: Path) -> set[str]:
     return modules
 
 
+def test_the_packages_have_136_arrows_and_13_floors_at_most():
+    """An arrow leads from a package (or `benchmarks/`) to another one that it imports; a floor is above all it imports."""
+    below: dict[str, set[str]] = defaultdict(set)
+    for path in FILES:
+        room, *rest = path.relative_to(SOURCE).parts
+        below[room if rest else path.stem] |= {name.split(".")[1] for name in imported(path) if "." in name}
+    for path in (ROOT / "benchmarks").glob("*.py"):
+        names = {
+            name for node in ast.walk(tree_of(path)) if isinstance(node, ast.ImportFrom) for name in [node.module or ""]
+        }
+        below["benchmarks"] |= {name.split(".")[1] for name in names if name.startswith("airmuscle.")}
+    rooms = {path.parent.name for path in SOURCE.glob("*/__init__.py")}
+    below = {room: (names & rooms) - {room} for room, names in below.items()}
+
+    @functools.cache
+    def floor(room: str) -> int:
+        return 1 + max((floor(other) for other in below.get(room, ())), default=0)
+
+    assert len(rooms | {"benchmarks"}) <= 25
+    assert max(floor(room) for room in below) <= 13
+    assert sum(len(names) for names in below.values()) <= 136
+
+
 def test_laws_do_not_import_each_other():
-    laws = {path.stem: path for path in (SOURCE / "characteristic").glob("*.py")}
+    laws = {path.stem: path for path in (SOURCE / "muscle" / "characteristic").glob("*.py")}
     private = laws.keys() - SHARED_LAWS - COMPOSITES
     violations = {
         f"{law} imports {other}"
         for law in laws.keys() - COMPOSITES
         for other in private - {law}
-        if f"airmuscle.characteristic.{other}" in imported(laws[law])
+        if f"airmuscle.muscle.characteristic.{other}" in imported(laws[law])
     }
     assert violations == set()
 
@@ -117,14 +147,23 @@ def ruff(code: str, file: str) -> str:
 
 
 @pytest.mark.parametrize("module", ["math", "numpy"])
-@pytest.mark.parametrize("file", ["characteristic/x.py", "pneumatics/x.py", "mechanism/x.py", "muscle/x.py"])
+@pytest.mark.parametrize(
+    "file", ["muscle/characteristic/x.py", "muscle/friction/x.py", "pneumatics/x.py", "mechanism/x.py", "muscle/x.py"]
+)
 def test_ruff_rejects_a_law_that_imports_math_or_numpy(file: str, module: str):
     for code in (f"import {module}\n\n{module}.sqrt(2.0)\n", f"from {module} import sqrt\n\nsqrt(2.0)\n"):
         assert "TID251" in ruff(code, f"src/airmuscle/{file}")
 
 
 @pytest.mark.parametrize(
-    "file", ["characteristic/tabulated.py", "characteristic/base.py", "core/ops.py", "report/x.py"]
+    "file",
+    [
+        "muscle/characteristic/tabulated.py",
+        "muscle/characteristic/base.py",
+        "muscle/geometry/x.py",
+        "core/ops.py",
+        "report/x.py",
+    ],
 )
 def test_ruff_accepts_math_and_numpy_elsewhere(file: str):
     assert "TID251" not in ruff("import math\n\nmath.sqrt(2.0)\n", f"src/airmuscle/{file}")

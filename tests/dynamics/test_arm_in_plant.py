@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.analysis import find_equilibrium, linearise, stiffness
+from airmuscle.analysis import linearise, stiffness
 from airmuscle.control import Schedule
 from airmuscle.mechanism import (
     ArmLink,
@@ -26,7 +26,7 @@ from airmuscle.plant.energy_balance import WithEnergyMeters
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
 from airmuscle.pneumatics.gas import Polytropic
-from airmuscle.simulation import Rodas4, simulate
+from airmuscle.simulation import Rodas4, find_equilibrium, simulate
 
 NAMES = ("s_flex", "s_ext", "e_flex", "e_ext", "bi_flex", "bi_ext")
 ARM = PlanarArm(

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.analysis.equilibrium import find_equilibria, find_equilibrium
 from airmuscle.control.inputs import Schedule
 from airmuscle.core import autodiff
 from airmuscle.core.errors import EquilibriumError, ParameterError
@@ -21,6 +20,7 @@ from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import ClosedChamber, FillDischarge, Supply, Valve
 from airmuscle.pneumatics.gas import Ambient, Isothermal, Polytropic
 from airmuscle.simulation import simulate
+from airmuscle.simulation.equilibrium import find_equilibria, find_equilibrium
 from airmuscle.simulation.integrators import DormandPrince8, Rodas4
 
 VALVE = Valve(2.6167e-9, 0.433)

@@ -16,7 +16,7 @@ from benchmark_contender import JOINT, MINE, SHORT, AngleLaw
 import airmuscle as am
 from airmuscle.core import model
 from airmuscle.core.errors import ParameterError
-from airmuscle.friction import LuGre, NoFriction
+from airmuscle.muscle.friction import LuGre, NoFriction
 from airmuscle.recording import Recording
 from airmuscle.study.control_benchmark import (
     STANDARD_TASKS,

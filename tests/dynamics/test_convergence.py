@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.characteristic import VirtualWork
 from airmuscle.control.inputs import ZERO_INPUT, SampledSignal, Schedule
-from airmuscle.geometry import Braid
 from airmuscle.mechanism import HangingMass
 from airmuscle.muscle import CreepElements, CubicSpring, LinearDamper, Muscle, ViscoelasticWall
+from airmuscle.muscle.characteristic import VirtualWork
+from airmuscle.muscle.geometry import Braid
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import ClosedChamber, DistributedTube, FillDischarge, Supply, Valve, WithTubes
 from airmuscle.pneumatics.gas import EnergyBalance, Polytropic

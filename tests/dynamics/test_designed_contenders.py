@@ -14,11 +14,10 @@ import pickle
 import numpy as np
 import pytest
 
-from airmuscle.analysis import find_equilibrium
 from airmuscle.control import ControlLoop, Measurement, Schedule
 from airmuscle.core.errors import ParameterError
 from airmuscle.core.tree import leaves
-from airmuscle.simulation import simulate
+from airmuscle.simulation import find_equilibrium, simulate
 from airmuscle.simulation.compiled_law import LawSample
 from airmuscle.study.control_benchmark import (
     ControlTask,

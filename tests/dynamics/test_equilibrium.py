@@ -11,14 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joints import chosen_muscle
 
-from airmuscle.analysis.equilibrium import find_equilibria, find_equilibrium
-from airmuscle.analysis.equilibrium.single_dof import grid
-from airmuscle.analysis.equilibrium.statics import Statics
 from airmuscle.compile.program import compile_system
 from airmuscle.control.inputs import ZERO_INPUT, Schedule
 from airmuscle.core import ops
 from airmuscle.core.errors import EquilibriumError, GeometryLimitError, ParameterError
-from airmuscle.friction import Dahl
 from airmuscle.mechanism import (
     AntagonisticJoint,
     HangingMass,
@@ -33,10 +29,14 @@ from airmuscle.mechanism import (
 )
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import CreepElements, SeriesSpring, ViscoelasticWall
+from airmuscle.muscle.friction import Dahl
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import ClosedChamber, FillDischarge, ProportionalValve, SecondOrderLag, Supply, Valve
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
 from airmuscle.simulation import simulate
+from airmuscle.simulation.equilibrium import find_equilibria, find_equilibrium
+from airmuscle.simulation.equilibrium.single_dof import grid
+from airmuscle.simulation.equilibrium.statics import Statics
 
 LEFT, RIGHT = (replace(chosen_muscle(), name=name) for name in ("left", "right"))
 VALVE = Valve(2.6e-8, 0.433)

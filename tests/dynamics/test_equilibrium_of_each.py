@@ -11,15 +11,10 @@ from bumpy import Bumpy
 from joints import chosen_muscle
 from plants import BRAID, EXAMPLES, TWO_VALVES, of, pulled
 
-from airmuscle.analysis.equilibrium import find_equilibria, find_equilibrium, find_equilibrium_of_each
-from airmuscle.analysis.equilibrium.single_dof import grid
-from airmuscle.analysis.equilibrium.statics import Statics
-from airmuscle.characteristic import MartensBoblan2017, VirtualWork
 from airmuscle.compile.program import compile_system
 from airmuscle.control.inputs import ZERO_INPUT
 from airmuscle.core import ops, tree
 from airmuscle.core.errors import AirmuscleError, EquilibriumError, ParameterError
-from airmuscle.geometry import Braid
 from airmuscle.mechanism import (
     AntagonisticJoint,
     HangingMass,
@@ -31,10 +26,15 @@ from airmuscle.mechanism import (
 )
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import LinearSpring, SeriesSpring, ViscoelasticWall
+from airmuscle.muscle.characteristic import MartensBoblan2017, VirtualWork
+from airmuscle.muscle.geometry import Braid
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import ClosedChamber, FillDischarge, ProportionalRegulator, Supply, Tube, Valve, WithTubes
 from airmuscle.pneumatics.gas import Ambient, Polytropic
 from airmuscle.simulation.batch import simulate_batch
+from airmuscle.simulation.equilibrium import find_equilibria, find_equilibrium, find_equilibrium_of_each
+from airmuscle.simulation.equilibrium.single_dof import grid
+from airmuscle.simulation.equilibrium.statics import Statics
 from airmuscle.simulation.integrators import RungeKutta4
 
 SPREAD = 0.05
@@ -182,7 +182,7 @@ def test_more_plants_than_go_side_by_side_are_taken_in_blocks(monkeypatch):
     plant = JOINT
     table = varied(plant, 7)
     together = found(plant, table, 2e5)
-    module = sys.modules["airmuscle.analysis.equilibrium.equilibrium"]
+    module = sys.modules["airmuscle.simulation.equilibrium.equilibrium"]
     monkeypatch.setattr(module, "block_size", lambda states: 3)
     np.testing.assert_array_equal(found(plant, table, 2e5), together)
     assert np.isfinite(together).all()

@@ -13,7 +13,7 @@ import pytest
 import airmuscle as am
 from airmuscle.analysis import ExtendedKalmanFilter, UnscentedKalmanFilter
 from airmuscle.control import Schedule
-from airmuscle.friction import Dahl, PressureScaledFriction
+from airmuscle.muscle.friction import Dahl, PressureScaledFriction
 
 pytestmark = pytest.mark.slow
 H = 5e-3

@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.analysis.equilibrium import find_equilibrium
 from airmuscle.compile.functions import trace_system
 from airmuscle.control.inputs import Schedule
 from airmuscle.core.declaration import model, parameter
 from airmuscle.core.errors import ParameterError
-from airmuscle.friction import (
+from airmuscle.mechanism import HangingMass
+from airmuscle.mechanism.base import Coordinate, Mechanism
+from airmuscle.muscle.friction import (
     BoucWen,
     Dahl,
     IdentifiedFriction,
@@ -27,12 +28,11 @@ from airmuscle.friction import (
     PrandtlIshlinskii,
     PressureScaledFriction,
 )
-from airmuscle.mechanism import HangingMass
-from airmuscle.mechanism.base import Coordinate, Mechanism
 from airmuscle.plant.energy_balance import WithEnergyMeters
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
 from airmuscle.simulation import simulate
+from airmuscle.simulation.equilibrium import find_equilibrium
 from airmuscle.simulation.integrators import DormandPrince8, Rodas4
 
 VALVE = Valve(3e-10, 0.433)

@@ -12,18 +12,19 @@ import numpy as np
 import pytest
 
 import airmuscle as am
-from airmuscle.analysis import find_equilibria, find_equilibrium, joint_statics, plot_reachable_region, stiffness
-from airmuscle.characteristic import Clamped, ContractileSurface, VirtualWork
-from airmuscle.characteristic.contractile_surface import exponents
+from airmuscle.analysis import joint_statics, plot_reachable_region, stiffness
 from airmuscle.core.errors import ColumnError, ParameterError, SolveError
 from airmuscle.mechanism import AntagonisticJoint, CrankProfile, HangingMass, JointWithEndStops, WithLatch
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import LinearSpring, SeriesSpring, SwellingWall
+from airmuscle.muscle.characteristic import Clamped, ContractileSurface, VirtualWork
+from airmuscle.muscle.characteristic.contractile_surface import exponents
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
+from airmuscle.simulation import find_equilibria, find_equilibrium
 
 DMSP = am.load("dmsp-20-300").muscle
-BRAID = am.geometry.Braid(0.01, 0.4363, 0.3)
+BRAID = am.muscle.geometry.Braid(0.01, 0.4363, 0.3)
 JOINT = AntagonisticJoint(0.04, 0.05, 0.2, 2.0, 0.11, min_angle=-1.0, max_angle=1.0)
 SHAPED = replace(JOINT, profile=CrankProfile(0.2), weight_angle=0.5)
 VALVE = am.Valve(2.6e-9, 0.433)

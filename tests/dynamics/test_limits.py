@@ -13,11 +13,10 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.analysis.equilibrium import find_equilibrium
 from airmuscle.control.inputs import ZERO_INPUT, Schedule
-from airmuscle.friction import Dahl
 from airmuscle.mechanism import AntagonisticJoint, HangingMass, Isometric, SpringLoad, WithEndStops
 from airmuscle.mechanism.contact import HuntCrossley
+from airmuscle.muscle.friction import Dahl
 from airmuscle.plant import Plant, total_air
 from airmuscle.pneumatics import (
     ClosedChamber,
@@ -34,6 +33,7 @@ from airmuscle.pneumatics import (
 )
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
 from airmuscle.simulation import simulate
+from airmuscle.simulation.equilibrium import find_equilibrium
 from airmuscle.simulation.integrators import Rodas4
 
 GASES = [Isothermal(), Polytropic(1.2), EnergyBalance(0.2), EnergyBalance(0.0)]

@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 from joints import chosen_muscle, joint, joint_start
 
-from airmuscle.analysis.equilibrium import find_equilibrium
 from airmuscle.analysis.linear_model import linearise
 from airmuscle.compile.program import compile_system
 from airmuscle.control.inputs import Schedule
 from airmuscle.core.errors import AirmuscleError, ParameterError
-from airmuscle.friction import LuGre
 from airmuscle.mechanism import AntagonisticJoint, HangingMass, SpringLoad
 from airmuscle.muscle import SeriesSpring
+from airmuscle.muscle.friction import LuGre
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import (
     ClosedChamber,
@@ -30,6 +29,7 @@ from airmuscle.pneumatics import (
 )
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal
 from airmuscle.simulation import Problem, simulate, solve
+from airmuscle.simulation.equilibrium import find_equilibrium
 from airmuscle.simulation.integrators import Rodas4
 
 VALVE = Valve(2.6e-9, 0.433)

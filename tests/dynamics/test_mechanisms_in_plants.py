@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joints import HEAT_CAPACITY, chosen_muscle, joint, joint_start
 
-from airmuscle.analysis.equilibrium import find_equilibrium
 from airmuscle.compile.program import compile_system
 from airmuscle.control.inputs import ZERO_INPUT, SampledSignal, Schedule
 from airmuscle.control.trajectory import spline_trajectory
@@ -47,6 +46,7 @@ from airmuscle.pneumatics import (
 )
 from airmuscle.pneumatics.gas import GAS_CONSTANT, EnergyBalance, Isothermal, Polytropic
 from airmuscle.simulation import simulate
+from airmuscle.simulation.equilibrium import find_equilibrium
 from airmuscle.simulation.integrators import Rodas4
 
 LEFT, RIGHT = (replace(chosen_muscle(), name=name) for name in ("left", "right"))

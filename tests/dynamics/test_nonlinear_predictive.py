@@ -11,15 +11,10 @@ import numpy as np
 import pytest
 
 import airmuscle as am
-from airmuscle.analysis import (
-    ExtendedKalmanFilter,
-    NonlinearModelPredictive,
-    design_predictive,
-    find_equilibrium,
-    linearise,
-)
+from airmuscle.analysis import ExtendedKalmanFilter, NonlinearModelPredictive, design_predictive, linearise
 from airmuscle.control import ControlLoop, Measurement
 from airmuscle.core.errors import ParameterError
+from airmuscle.simulation import find_equilibrium
 
 pytest.importorskip("daqp", reason="the package daqp is not installed")
 H = 0.01

@@ -14,10 +14,10 @@ from joints import chosen_muscle
 from airmuscle.control.driver import SolenoidDriver
 from airmuscle.control.inputs import Schedule
 from airmuscle.control.with_drivers import WithDrivers
-from airmuscle.friction import LuGre, MaxwellSlip
 from airmuscle.mechanism import HangingMass
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import CreepElements, DirectionalDamper, EndStop, SeriesSpring, ViscoelasticWall
+from airmuscle.muscle.friction import LuGre, MaxwellSlip
 from airmuscle.plant.energy_balance import WithEnergyMeters
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import DistributedTube, FillDischarge, RegulatedSupply, Supply, Tank, Tube, Valve, WithTubes

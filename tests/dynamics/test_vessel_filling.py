@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from airmuscle.characteristic.chou_hannaford1996 import ChouHannaford1996
 from airmuscle.control.inputs import Schedule
-from airmuscle.geometry.braid import Braid
 from airmuscle.mechanism import Isometric
 from airmuscle.muscle import Muscle
+from airmuscle.muscle.characteristic.chou_hannaford1996 import ChouHannaford1996
+from airmuscle.muscle.geometry.braid import Braid
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import CheckValve, FillDischarge, Orifice, SubsonicIndexValve, Supply, Valve
 from airmuscle.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, Ambient, Isothermal

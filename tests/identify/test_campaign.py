@@ -12,7 +12,6 @@ import pytest
 from made_campaign import THREE_LENGTHS, TrueMuscle, unseen_records, write_campaign, write_german
 
 from airmuscle.core.errors import IdentificationError
-from airmuscle.friction import BoucWen
 from airmuscle.identify.campaign import (
     CreepStage,
     FillStage,
@@ -31,6 +30,7 @@ from airmuscle.identify.campaign.rows import held_steady
 from airmuscle.identify.campaign.transient import count_pulses
 from airmuscle.identify.campaign.volume import VolumeChange, relate_volumes
 from airmuscle.identify.experiment_design import PlannedRun
+from airmuscle.muscle.friction import BoucWen
 from airmuscle.recording import Recording, read
 
 RANDOM = np.random.default_rng(3)

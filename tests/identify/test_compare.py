@@ -19,15 +19,15 @@ from typer.testing import CliRunner
 
 import airmuscle as am
 from airmuscle import load_data
-from airmuscle.characteristic import ContractileSurface, Hunt2017, InverseLength, TonduLopez2000
 from airmuscle.cli.app import app
 from airmuscle.cli.fit_options import parse_split
 from airmuscle.core.errors import IdentificationError, ParameterError
-from airmuscle.geometry.braid import Braid
 from airmuscle.identify import BlockSplit, Candidate, LevelSplit, RunSplit, SpecimenSplit, compare, standard_candidates
 from airmuscle.identify.candidates import blank_surface
 from airmuscle.identify.cross_validation import ALWAYS_FITTED, default_split
 from airmuscle.identify.force_evaluation import evaluate_force
+from airmuscle.muscle.characteristic import ContractileSurface, Hunt2017, InverseLength, TonduLopez2000
+from airmuscle.muscle.geometry.braid import Braid
 from airmuscle.recording import Recording, write_csv
 
 TRUTH = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.2)

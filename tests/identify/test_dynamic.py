@@ -11,13 +11,10 @@ import numpy as np
 import pytest
 from filling import hanging
 
-from airmuscle.analysis.equilibrium import find_equilibrium
 from airmuscle.control.inputs import Schedule
 from airmuscle.core import tree
 from airmuscle.core.errors import IdentificationError, ParameterError
 from airmuscle.core.status import Status
-from airmuscle.friction import Dahl
-from airmuscle.geometry import Vessel
 from airmuscle.identify.dynamic import (
     Experiment,
     InitialConditions,
@@ -29,10 +26,13 @@ from airmuscle.identify.dynamic import (
 )
 from airmuscle.mechanism import HangingMass, Isometric
 from airmuscle.muscle import Muscle, SwellingWall
+from airmuscle.muscle.friction import Dahl
+from airmuscle.muscle.geometry import Vessel
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Tube, Valve, WithLeak, WithTubes
 from airmuscle.pneumatics.gas import EnergyBalance, Polytropic
 from airmuscle.simulation import simulate
+from airmuscle.simulation.equilibrium import find_equilibrium
 from airmuscle.simulation.integrators import Rodas4
 
 FILL = Schedule({"fill": ((0.1, 1.0), (1.0, 0.0)), "discharge": ((1.3, 1.0),)})

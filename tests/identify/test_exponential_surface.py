@@ -9,7 +9,6 @@ import math
 import numpy as np
 import pytest
 
-from airmuscle.characteristic.borzikova import SAM_30X290, BorzikovaExponential
 from airmuscle.core import autodiff
 from airmuscle.core.errors import IdentificationError
 from airmuscle.identify.correlation_index import correlation_index
@@ -22,9 +21,11 @@ from airmuscle.identify.surface.monotone import (
     fit_monotone,
     slope_constraints,
 )
+from airmuscle.muscle.characteristic.borzikova import SAM_30X290, BorzikovaExponential
 from airmuscle.recording import Recording
+from airmuscle.reproduce.borzikova_surfaces import sample
 
-CURVES = SAM_30X290.sample()
+CURVES = sample(SAM_30X290)
 EXACT = SAM_30X290.interpolate()
 FITS = [fit_linearised, fit_nonlinear]
 

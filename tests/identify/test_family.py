@@ -11,21 +11,21 @@ import dataclasses
 import numpy as np
 import pytest
 
-from airmuscle.characteristic import (
-    ContractileSurface,
-    EffectiveLength,
-    InverseLength,
-    LogarithmicLength,
-    TonduLopez2000,
-)
 from airmuscle.core.errors import IdentificationError, ParameterError
-from airmuscle.geometry.braid import Braid
 from airmuscle.identify import Candidate, SpecimenSplit, compare, fit
 from airmuscle.identify.candidates import blank_surface, standard_candidates
 from airmuscle.library.build import build
 from airmuscle.library.entry import Entry
 from airmuscle.library.location import Location
 from airmuscle.library.write import to_toml
+from airmuscle.muscle.characteristic import (
+    ContractileSurface,
+    EffectiveLength,
+    InverseLength,
+    LogarithmicLength,
+    TonduLopez2000,
+)
+from airmuscle.muscle.geometry.braid import Braid
 from airmuscle.recording import Recording
 
 LENGTHS = (0.08, 0.12, 0.2, 0.4)

@@ -10,9 +10,9 @@ import itertools
 import numpy as np
 import pytest
 
-from airmuscle.friction import Dahl, LuGre, MaxwellSlip
 from airmuscle.identify.hysteresis import PolynomialCurve, find_loops, fit_hysteresis, fit_loop
 from airmuscle.identify.hysteresis.limits import data_limits
+from airmuscle.muscle.friction import Dahl, LuGre, MaxwellSlip
 from airmuscle.recording import Recording
 
 LENGTH = 0.3

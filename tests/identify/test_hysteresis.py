@@ -11,10 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airmuscle.characteristic.virtual_work import VirtualWork
 from airmuscle.core.errors import IdentificationError, ParameterError
-from airmuscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip, PrandtlIshlinskii
-from airmuscle.geometry.braid import Braid
 from airmuscle.identify.hysteresis import (
     ContractionPath,
     FixedCharacteristic,
@@ -27,6 +24,9 @@ from airmuscle.identify.hysteresis.branches import branch_gap, repeat_difference
 from airmuscle.identify.hysteresis.creep import Creep, fit_creep
 from airmuscle.identify.hysteresis.plot import loop_path, plot_loops
 from airmuscle.identify.model_evidence import aicc, effective_sample_size, f_test_p_value
+from airmuscle.muscle.characteristic.virtual_work import VirtualWork
+from airmuscle.muscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip, PrandtlIshlinskii
+from airmuscle.muscle.geometry.braid import Braid
 from airmuscle.recording import Recording
 from airmuscle.recording.segment import motion_direction
 

@@ -10,10 +10,17 @@ import itertools
 import numpy as np
 import pytest
 
-from airmuscle.friction import BoucWen, Dahl, IdentifiedFriction, MaxwellSlip, PrandtlIshlinskii, PressureScaledFriction
 from airmuscle.identify.hysteresis import find_loops, fit_jointly, fit_loop, identified_friction
 from airmuscle.identify.hysteresis.fit import ContractionPath, PolynomialCurve, make_loop_series
 from airmuscle.identify.hysteresis.search import search_parameters
+from airmuscle.muscle.friction import (
+    BoucWen,
+    Dahl,
+    IdentifiedFriction,
+    MaxwellSlip,
+    PrandtlIshlinskii,
+    PressureScaledFriction,
+)
 from airmuscle.recording import Recording
 
 LENGTH, PRESLIDING, SPEED = 0.3, 2.5e-3, 1e-3

@@ -11,11 +11,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle.characteristic.tondu_lopez2000 import TonduLopez2000
-from airmuscle.characteristic.validity_range import ValidityRange
 from airmuscle.cli.app import app
 from airmuscle.core.errors import IdentificationError, ParameterError
-from airmuscle.geometry.braid import Braid
 from airmuscle.identify.experiment_design import (
     BenchLimits,
     _exchange,
@@ -25,6 +22,9 @@ from airmuscle.identify.experiment_design import (
     optimal_design,
 )
 from airmuscle.identify.static_fit import fit
+from airmuscle.muscle.characteristic.tondu_lopez2000 import TonduLopez2000
+from airmuscle.muscle.characteristic.validity_range import ValidityRange
+from airmuscle.muscle.geometry.braid import Braid
 from airmuscle.recording import Recording, read_csv
 
 BENCH = BenchLimits(ValidityRange(50e3, 500e3, 0.0, 0.25), 400.0)

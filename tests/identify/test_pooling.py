@@ -14,7 +14,6 @@ import pytest
 from typer.testing import CliRunner
 
 import airmuscle as am
-from airmuscle.characteristic import ContractileSurface, LogarithmicLength, PooledLengthLaw
 from airmuscle.cli.app import app
 from airmuscle.cli.fit_options import parse_split
 from airmuscle.core.errors import IdentificationError, ParameterError
@@ -24,6 +23,7 @@ from airmuscle.identify.specimen_effects import Sums, predict_effects
 from airmuscle.library.catalogue import load
 from airmuscle.library.entry import Entry
 from airmuscle.library.write import save
+from airmuscle.muscle.characteristic import ContractileSurface, LogarithmicLength, PooledLengthLaw
 from airmuscle.recording import Recording
 from airmuscle.report.equation_section import equation_section
 

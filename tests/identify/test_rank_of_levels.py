@@ -8,11 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import airmuscle as am
-from airmuscle.characteristic import ContractileSurface
 from airmuscle.core.errors import IdentificationError
 from airmuscle.identify import fit, fit_points
 from airmuscle.identify.statistics import count_levels
 from airmuscle.library.catalogue import load
+from airmuscle.muscle.characteristic import ContractileSurface
 from airmuscle.recording import Recording
 
 ROWS = 600

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from airmuscle.characteristic import ContractileSurface, ValidityRange
 from airmuscle.core.errors import IdentificationError, ParameterError
 from airmuscle.identify import fit
 from airmuscle.identify.censoring import UNCENSORED
 from airmuscle.identify.experiment_design import BenchLimits
 from airmuscle.identify.recursive_fit import NextPoint, RecursiveFit
+from airmuscle.muscle.characteristic import ContractileSurface, ValidityRange
 from airmuscle.recording import Recording
 
 LIMITS = BenchLimits(ValidityRange(0.0, 6e5, 0.0, 0.25), 1500.0)

@@ -12,9 +12,7 @@ import numpy as np
 import pytest
 
 import airmuscle as am
-from airmuscle.characteristic import ContractileSurface, EffectiveLength, Hunt2017, InverseLength, TonduLopez2000
 from airmuscle.core import autodiff, tree
-from airmuscle.geometry.braid import Braid
 from airmuscle.identify import Candidate, RunSplit, bootstrap, bootstrapping, compare
 from airmuscle.identify.candidates import blank_surface
 from airmuscle.identify.fit_points import FitPoints
@@ -24,6 +22,8 @@ from airmuscle.identify.problem import fitted_quantity_of
 from airmuscle.identify.solver import LeastSquaresSolution, solve, solve_iteratively
 from airmuscle.identify.static_fit import refit
 from airmuscle.identify.variable_projection import find_initial_values
+from airmuscle.muscle.characteristic import ContractileSurface, EffectiveLength, Hunt2017, InverseLength, TonduLopez2000
+from airmuscle.muscle.geometry.braid import Braid
 from airmuscle.recording import Recording
 
 LAWS = {

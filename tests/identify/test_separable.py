@@ -14,7 +14,6 @@ import pytest
 
 import airmuscle
 from airmuscle import read_csv
-from airmuscle.characteristic import ContractileSurface, EffectiveLength, Hunt2017, Sarosi2012
 from airmuscle.core.errors import IdentificationError
 from airmuscle.identify import UNCENSORED, Candidate, LevelSplit, compare, fit
 from airmuscle.identify.candidates import blank_surface, standard_candidates
@@ -23,6 +22,7 @@ from airmuscle.identify.censoring import Censoring
 from airmuscle.identify.cross_validation import label_folds
 from airmuscle.identify.problem import make_problem
 from airmuscle.identify.variable_projection import find_initial_values, is_linear_parameter
+from airmuscle.muscle.characteristic import ContractileSurface, EffectiveLength, Hunt2017, Sarosi2012
 from airmuscle.recording import Recording
 
 DATA = Path(airmuscle.__file__).parent / "library" / "data"

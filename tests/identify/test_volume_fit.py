@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle.analysis.energy_defect import maxwell_defect
-from airmuscle.characteristic import ValidityRange, VirtualWork
 from airmuscle.cli.app import app
 from airmuscle.core.errors import ColumnError, IdentificationError
-from airmuscle.geometry import Braid, ChebyshevGeometry
 from airmuscle.identify.volume_fit import VolumePoints, fit_volume, volume_points
 from airmuscle.library.catalogue import load
+from airmuscle.muscle.characteristic import ValidityRange, VirtualWork
+from airmuscle.muscle.characteristic.energy_defect import maxwell_defect
+from airmuscle.muscle.geometry import Braid, ChebyshevGeometry
 from airmuscle.recording import Recording
 
 BRAID = Braid(0.01, 0.43, 0.2)

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle.characteristic import ContractileSurface, TonduLopez2000
 from airmuscle.cli.app import app
-from airmuscle.geometry.braid import Braid
 from airmuscle.identify import fit
 from airmuscle.identify.weights import sensor_deviations
+from airmuscle.muscle.characteristic import ContractileSurface, TonduLopez2000
+from airmuscle.muscle.geometry.braid import Braid
 from airmuscle.recording import Recording
 from airmuscle.recording.csv_writer import write_csv
 

@@ -9,10 +9,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from airmuscle.characteristic.borzikova import SAM_30X290, BorzikovaDirect, BorzikovaExponential
 from airmuscle.core import autodiff
 from airmuscle.core.errors import GeometryLimitError, ParameterError, SolveError
 from airmuscle.library.catalogue import load
+from airmuscle.muscle.characteristic.borzikova import SAM_30X290, BorzikovaDirect, BorzikovaExponential
+from airmuscle.reproduce.borzikova_surfaces import sample
 
 # Coefficients of the exponent that the three printed curves determine, by Lagrange interpolation in F;
 # rows by power of p in bar, columns by power of F in N. Ten decimals were computed apart from this program.
@@ -63,7 +64,7 @@ def test_the_surface_through_the_curves_has_the_known_coefficients():
 
 
 def test_a_sample_of_the_curves_lies_on_the_surface_through_them():
-    data = SAM_30X290.sample(36)
+    data = sample(SAM_30X290, 36)
     assert len(data) == 108
     found = EXPONENTIAL.contraction(data["pressure"], data["force"])
     assert np.abs(found - data["contraction"]).max() < 2e-15

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airmuscle.characteristic import ContractileSurface
-from airmuscle.characteristic.contractile_surface import exponents
 from airmuscle.core.errors import ParameterError
+from airmuscle.muscle.characteristic import ContractileSurface
+from airmuscle.muscle.characteristic.contractile_surface import exponents
 
 BOX = (50e3, 650e3), (0.0, 0.25)
 

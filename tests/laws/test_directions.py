@@ -13,12 +13,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from airmuscle.characteristic.base import Characteristic, ContractionLaw, ForceLaw, PressureLaw
-from airmuscle.characteristic.validity_range import ValidityRange
 from airmuscle.core import autodiff
 from airmuscle.core.errors import AirmuscleWarning, ParameterError, SolveError
 from airmuscle.library import catalogue, files
 from airmuscle.library.entry import Entry
+from airmuscle.muscle.characteristic.base import Characteristic, ContractionLaw, ForceLaw, PressureLaw
+from airmuscle.muscle.characteristic.validity_range import ValidityRange
 
 ARGUMENTS = {
     "force": ("pressure", "contraction"),

@@ -19,8 +19,8 @@ from scipy.integrate import solve_ivp
 
 from airmuscle.core.errors import ParameterError
 from airmuscle.core.tree import leaves
-from airmuscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip, NoFriction, PrandtlIshlinskii
-from airmuscle.friction.path import stop_operators
+from airmuscle.muscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip, NoFriction, PrandtlIshlinskii
+from airmuscle.muscle.friction.path import stop_operators
 
 STIFFNESSES, LIMITS = (4e4, 2e4, 1e4), (1e-4, 4e-4, 1e-3)
 SLIP = MaxwellSlip(STIFFNESSES, LIMITS)

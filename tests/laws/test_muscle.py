@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airmuscle.characteristic import ChouHannaford1996
-from airmuscle.geometry import Braid
 from airmuscle.muscle import CubicSpring, LinearDamper, LinearSpring, Muscle, PressureDamper
+from airmuscle.muscle.characteristic import ChouHannaford1996
+from airmuscle.muscle.geometry import Braid
 from airmuscle.pneumatics.gas import GAS_CONSTANT, Ambient, Isothermal, Polytropic, absolute_pressure, gauge_pressure
 
 BRAID = Braid(0.01, 0.44, 0.3)

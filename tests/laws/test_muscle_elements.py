@@ -15,10 +15,8 @@ from joints import chosen_muscle
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from airmuscle.characteristic import Reynolds2003, Serres2009
 from airmuscle.control.inputs import ZERO_INPUT, Schedule
 from airmuscle.core.errors import ParameterError
-from airmuscle.friction import Dahl, LuGre
 from airmuscle.mechanism import HangingMass, Isometric
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import (
@@ -36,6 +34,8 @@ from airmuscle.muscle import (
     SwellingWall,
     ViscoelasticWall,
 )
+from airmuscle.muscle.characteristic import Reynolds2003, Serres2009
+from airmuscle.muscle.friction import Dahl, LuGre
 from airmuscle.plant.energy_balance import WithEnergyMeters
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import ClosedChamber, FillDischarge, Supply, Valve

@@ -8,7 +8,8 @@ import pytest
 from joints import chosen_muscle
 
 from airmuscle.core.errors import ParameterError
-from airmuscle.friction import (
+from airmuscle.muscle import Muscle
+from airmuscle.muscle.friction import (
     BoucWen,
     Dahl,
     IdentifiedFriction,
@@ -18,7 +19,6 @@ from airmuscle.friction import (
     PrandtlIshlinskii,
     PressureScaledFriction,
 )
-from airmuscle.muscle import Muscle
 
 SLIPS = (4e4, 2e4), (1e-4, 4e-4)
 LAWS = [

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.characteristic import VirtualWork
 from airmuscle.core import autodiff, tree
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import CubicSpring, EndStop, LinearSpring, SeriesSpring
+from airmuscle.muscle.characteristic import VirtualWork
 from airmuscle.muscle.series_equilibrium import find_largest_nonnegative
 
 STOP = EndStop(0.1, HuntCrossley(1e9, 0.5))

@@ -17,12 +17,12 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
 
 import airmuscle as am
-from airmuscle.characteristic import EffectiveLength, MartensBoblan2017, ValidityRange
-from airmuscle.characteristic.base import PressureLaw
 from airmuscle.core.constants import STANDARD_GRAVITY
 from airmuscle.core.errors import AirmuscleError, ParameterError, SolveError
 from airmuscle.library.entry import Entry
 from airmuscle.muscle import Ratings
+from airmuscle.muscle.characteristic import EffectiveLength, MartensBoblan2017, ValidityRange
+from airmuscle.muscle.characteristic.base import PressureLaw
 from airmuscle.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY
 from airmuscle.sizing import (
     JointRequirement,

@@ -14,12 +14,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import airmuscle as am
-from airmuscle.characteristic import ForceLaw, ValidityRange, as_force_law
 from airmuscle.control import AngleAndStiffness, StaticInverse
 from airmuscle.core import autodiff
 from airmuscle.core.errors import ParameterError
 from airmuscle.library.files import LAWS as LAW_FILES
 from airmuscle.muscle import SeriesSpring
+from airmuscle.muscle.characteristic import ForceLaw, ValidityRange, as_force_law
 
 
 def force_laws():

@@ -7,9 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from airmuscle.characteristic import Hunt2017, Reynolds2003, Serres2009
 from airmuscle.core.errors import ParameterError
 from airmuscle.library import catalogue
+from airmuscle.muscle.characteristic import Hunt2017, Reynolds2003, Serres2009
 
 
 def test_a_stiffness_model_requires_the_length_of_its_specimen():

@@ -13,13 +13,13 @@ from scipy.optimize import brentq
 
 from airmuscle.core import autodiff
 from airmuscle.core.errors import GeometryLimitError, ParameterError
-from airmuscle.geometry.catenary import Catenary
-from airmuscle.geometry.circular_arc import CircularArc
-from airmuscle.geometry.fibre_sum import HalfShellFibreSum, PrintedFibreSum, UniformFibreSum, UserDefinedFibreSum
-from airmuscle.geometry.parabola import Parabola, TrueArcParabola
-from airmuscle.geometry.pleated import PleatedTube
-from airmuscle.geometry.straight_fibre import StraightFibre
-from airmuscle.geometry.stumpff import stumpff
+from airmuscle.muscle.geometry.catenary import Catenary
+from airmuscle.muscle.geometry.circular_arc import CircularArc
+from airmuscle.muscle.geometry.fibre_sum import HalfShellFibreSum, PrintedFibreSum, UniformFibreSum, UserDefinedFibreSum
+from airmuscle.muscle.geometry.parabola import Parabola, TrueArcParabola
+from airmuscle.muscle.geometry.pleated import PleatedTube
+from airmuscle.muscle.geometry.straight_fibre import StraightFibre
+from airmuscle.muscle.geometry.stumpff import stumpff
 
 L0, D0 = 0.072, 0.012
 CIRCLE, CATENARY, TRUE_ARC, PARABOLA = CircularArc(), Catenary(), TrueArcParabola(), Parabola()

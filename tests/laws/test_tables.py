@@ -8,14 +8,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from airmuscle.characteristic.chou_hannaford1996 import ChouHannaford1996
-from airmuscle.characteristic.polynomial_surrogate import as_force_law
-from airmuscle.characteristic.tabulated import Tabulated
-from airmuscle.characteristic.validity_range import ValidityRange
 from airmuscle.core.errors import AirmuscleWarning, GeometryLimitError, ParameterError, SolveError
-from airmuscle.geometry.braid import Braid
-from airmuscle.geometry.tabulated import TabulatedGeometry
 from airmuscle.library import catalogue
+from airmuscle.muscle.characteristic.chou_hannaford1996 import ChouHannaford1996
+from airmuscle.muscle.characteristic.polynomial_surrogate import as_force_law
+from airmuscle.muscle.characteristic.tabulated import Tabulated
+from airmuscle.muscle.characteristic.validity_range import ValidityRange
+from airmuscle.muscle.geometry.braid import Braid
+from airmuscle.muscle.geometry.tabulated import TabulatedGeometry
 
 TOOL = ("festo-tool-dmsp-10", "festo-tool-dmsp-20", "festo-tool-dmsp-40")
 SMALL = Tabulated((1e5, 1e5, 1e5, 2e5, 2e5), (0.0, 0.05, 0.1, 0.0, 0.2), (100.0, 40.0, 0.0, 200.0, 0.0))

@@ -9,8 +9,8 @@ from control_plants import JOINT, LIFT
 
 import airmuscle as am
 from airmuscle.core.errors import ColumnError, FileError, ParameterError
-from airmuscle.geometry import Braid
 from airmuscle.library import catalogue
+from airmuscle.muscle.geometry import Braid
 from airmuscle.plant.drawing import muscle_outline
 
 FILL = am.Schedule({"fill": ((0.0, 0.3),)})

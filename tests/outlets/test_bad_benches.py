@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle.characteristic import ContractileSurface, TonduLopez2000
 from airmuscle.cli.app import app
-from airmuscle.geometry.braid import Braid
 from airmuscle.identify import UNCENSORED, fit
 from airmuscle.library.catalogue import load
+from airmuscle.muscle.characteristic import ContractileSurface, TonduLopez2000
+from airmuscle.muscle.geometry.braid import Braid
 from airmuscle.recording import Recording, read
 from airmuscle.recording.csv_writer import write_csv
 

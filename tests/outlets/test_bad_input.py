@@ -18,7 +18,6 @@ import pytest
 from typer.testing import CliRunner
 
 from airmuscle import advance, load, load_data, read_csv, simulate
-from airmuscle.analysis.equilibrium import find_equilibrium
 from airmuscle.cli.app import app
 from airmuscle.compile.cache.kernel import BoundKernel, fixed_step
 from airmuscle.control.inputs import SampledSignal, Schedule
@@ -31,6 +30,7 @@ from airmuscle.mechanism import HangingMass
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
 from airmuscle.simulation import bound_integrator
+from airmuscle.simulation.equilibrium import find_equilibrium
 
 MUSCLE = "dmsp-20-300"
 HEAD = "pressure [bar],length [mm],force [N]"

@@ -24,7 +24,6 @@ from scenario_files import BRAID, CIRCUIT
 from typer.testing import CliRunner, Result
 
 import airmuscle as airmuscle_package
-from airmuscle.characteristic.contractile_surface import ContractileSurface
 from airmuscle.cli.app import COMMANDS, app
 from airmuscle.cli.cite import as_bibtex
 from airmuscle.cli.terminal import print_json, print_table
@@ -32,6 +31,7 @@ from airmuscle.core.errors import UnknownNameError, printable
 from airmuscle.core.reference import Reference
 from airmuscle.library.catalogue import load
 from airmuscle.library.files import list_laws, list_plants, list_products, list_valves
+from airmuscle.muscle.characteristic.contractile_surface import ContractileSurface
 from airmuscle.recording import read_csv
 from airmuscle.report.chapter import Chapter, Claim, Equal
 from airmuscle.reproduce import run

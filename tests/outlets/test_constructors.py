@@ -14,10 +14,11 @@ from typing import Any
 import pytest
 from plants import EXAMPLES
 
-from airmuscle import characteristic, control, friction, geometry, load, mechanism, muscle, pneumatics
+from airmuscle import control, load, mechanism, muscle, pneumatics
 from airmuscle.core.errors import AirmuscleError, AirmuscleWarning, ParameterError, UnitError
 from airmuscle.library.files import list_laws
 from airmuscle.mechanism import HangingMass
+from airmuscle.muscle import characteristic, friction, geometry
 from airmuscle.pneumatics import Supply, Tank, Valve
 
 FACES = (characteristic, control, friction, geometry, mechanism, muscle, pneumatics)

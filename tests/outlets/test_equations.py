@@ -20,7 +20,9 @@ import numpy.typing as npt
 import pytest
 
 from airmuscle import load
-from airmuscle.characteristic import (
+from airmuscle.identify import fit
+from airmuscle.library.catalogue import load_data
+from airmuscle.muscle.characteristic import (
     Characteristic,
     ContractileSurface,
     ContractionLaw,
@@ -28,8 +30,6 @@ from airmuscle.characteristic import (
     LogarithmicLength,
     PressureLaw,
 )
-from airmuscle.identify import fit
-from airmuscle.library.catalogue import load_data
 from airmuscle.report.equation import LawEquation, law_equation
 from airmuscle.report.equation.source_code import EXAMPLE, source_codes
 from airmuscle.report.equation_section import equation_section

@@ -18,7 +18,6 @@ import printed
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle.characteristic import Tabulated
 from airmuscle.cli.app import app
 from airmuscle.control import SampledSignal, Schedule
 from airmuscle.core import autodiff
@@ -29,6 +28,7 @@ from airmuscle.export.identifiers import LONGEST, RESERVED
 from airmuscle.library.files import list_laws
 from airmuscle.library.law_file import load_law
 from airmuscle.mechanism import HangingMass
+from airmuscle.muscle.characteristic import Tabulated
 from airmuscle.simulation import DormandPrince8, Problem, Rodas4, RungeKutta4, solve
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -17,13 +17,12 @@ import printed
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle.analysis import find_equilibrium
 from airmuscle.cli.app import app
 from airmuscle.control import Schedule
 from airmuscle.core.errors import ParameterError
 from airmuscle.export import compiler, mujoco_plugin, write_mujoco_plugin
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
-from airmuscle.simulation import Problem, Rodas4, RungeKutta4, solve
+from airmuscle.simulation import Problem, Rodas4, RungeKutta4, find_equilibrium, solve
 
 VALVE = Valve(2.6167e-9, 0.433)
 PLANT = replace(plants.EXAMPLES["dmsp-20-300"], circuit=FillDischarge(Supply(5.5e5), VALVE, VALVE))

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle.characteristic import EffectiveLength, MartensBoblan2017
 from airmuscle.cli.app import app
 from airmuscle.core.errors import ParameterError, UnknownNameError
-from airmuscle.geometry import Braid
 from airmuscle.identify.candidates import blank_surface
 from airmuscle.library.catalogue import load
 from airmuscle.library.length_scaling import scale_to_length
 from airmuscle.library.write import save
+from airmuscle.muscle.characteristic import EffectiveLength, MartensBoblan2017
+from airmuscle.muscle.geometry import Braid
 
 MUSCLE = "dmsp-20-300"
 SURFACE = ("--characteristic", "ContractileSurface", "--degree", 3)

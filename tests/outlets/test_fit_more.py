@@ -13,8 +13,6 @@ import pytest
 from typer.testing import CliRunner
 
 from airmuscle import load_data
-from airmuscle.characteristic import ContractileSurface, Sarosi2012
-from airmuscle.characteristic.validity_range import ValidityRange
 from airmuscle.cli.app import app
 from airmuscle.identify import (
     LevelSplit,
@@ -28,6 +26,8 @@ from airmuscle.identify import (
 )
 from airmuscle.identify.candidates import blank_surface
 from airmuscle.library.catalogue import load
+from airmuscle.muscle.characteristic import ContractileSurface, Sarosi2012
+from airmuscle.muscle.characteristic.validity_range import ValidityRange
 from airmuscle.recording import Recording
 from airmuscle.recording.csv_writer import write_csv
 from airmuscle.report.band_plot import band_plot

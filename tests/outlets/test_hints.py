@@ -22,7 +22,6 @@ import pytest
 from typer.testing import CliRunner
 
 import airmuscle as am
-from airmuscle.characteristic import Sarosi2012
 from airmuscle.cli.app import COMMANDS, app
 from airmuscle.cli.option_hints import INSTRUCTIONS, in_options
 from airmuscle.core.diagnostics import Diagnostic, DiagnosticCode
@@ -32,6 +31,7 @@ from airmuscle.identify import LevelSplit, RunSplit, bootstrap, compare, fit
 from airmuscle.identify.candidates import blank_surface, standard_candidates
 from airmuscle.identify.hysteresis import find_loops, fit_loop
 from airmuscle.library.location import located_errors
+from airmuscle.muscle.characteristic import Sarosi2012
 from airmuscle.recording import Recording, read, read_csv
 from airmuscle.recording.csv_writer import write_csv
 from airmuscle.recording.time_base import NoTime

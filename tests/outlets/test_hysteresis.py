@@ -16,7 +16,6 @@ import pytest
 from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
-from airmuscle.friction import MaxwellSlip
 from airmuscle.identify.campaign import fit_held_creep
 from airmuscle.identify.campaign.creep_stage import creep_force
 from airmuscle.identify.hysteresis import PressurePath, find_holds, find_loops, fit_loop
@@ -26,6 +25,7 @@ from airmuscle.library.location import Location
 from airmuscle.library.plant_file import build_muscle
 from airmuscle.library.write import save
 from airmuscle.muscle import CreepElements
+from airmuscle.muscle.friction import MaxwellSlip
 from airmuscle.recording import Recording, read
 from airmuscle.recording.csv_writer import write_csv
 from airmuscle.recording.segment import motion_direction

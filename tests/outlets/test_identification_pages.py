@@ -12,9 +12,9 @@ import pytest
 
 from airmuscle import read
 from airmuscle.control.inputs import Schedule
-from airmuscle.friction import MaxwellSlip
 from airmuscle.identify.dynamic import Experiment, InitialConditions
 from airmuscle.library.catalogue import load
+from airmuscle.muscle.friction import MaxwellSlip
 from airmuscle.pneumatics.gas import Polytropic
 from airmuscle.recording import Recording, write_csv
 from airmuscle.reproduce.hosovsky_plant import UnpublishedParameters, hanging_load

@@ -13,18 +13,18 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.analysis.equilibrium import find_equilibrium
 from airmuscle.core import tree
 from airmuscle.core.errors import AirmuscleWarning, TraceError
-from airmuscle.friction import MaxwellSlip
 from airmuscle.library.catalogue import load
 from airmuscle.library.files import list_laws
 from airmuscle.mechanism import HangingMass
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import CreepElements, EndStop, SeriesSpring, ViscoelasticWall
+from airmuscle.muscle.friction import MaxwellSlip
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Tank, Tube, Valve, WithLeak, WithTubes
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
+from airmuscle.simulation.equilibrium import find_equilibrium
 
 jax = pytest.importorskip("jax")
 jax.config.update("jax_enable_x64", True)

@@ -12,8 +12,6 @@ from pathlib import Path
 
 import pytest
 
-from airmuscle.characteristic.chou_hannaford1996 import ChouHannaford1996
-from airmuscle.characteristic.clamped import Clamped
 from airmuscle.core.errors import (
     AirmuscleError,
     AirmuscleWarning,
@@ -23,8 +21,6 @@ from airmuscle.core.errors import (
     UnknownNameError,
 )
 from airmuscle.core.reference import cite
-from airmuscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip, NoFriction, PrandtlIshlinskii
-from airmuscle.geometry.braid import Braid
 from airmuscle.library import catalogue, files, write
 from airmuscle.library.entry import Entry
 from airmuscle.library.location import Location
@@ -32,6 +28,10 @@ from airmuscle.library.models import model_class, model_names
 from airmuscle.library.plant_file import build_muscle
 from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import CreepElements, EndStop, LinearDamper, LinearSpring, PressureDamper, SwellingWall
+from airmuscle.muscle.characteristic.chou_hannaford1996 import ChouHannaford1996
+from airmuscle.muscle.characteristic.clamped import Clamped
+from airmuscle.muscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip, NoFriction, PrandtlIshlinskii
+from airmuscle.muscle.geometry.braid import Braid
 
 GOOD = """
 title = "A muscle of our own"

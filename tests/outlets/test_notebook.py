@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 
 import airmuscle as am
-from airmuscle.characteristic import ContractileSurface
 from airmuscle.core.axes import given_axes
 from airmuscle.core.errors import ParameterError
 from airmuscle.core.notebook import MAX_NOTES, MAX_ROWS, Card, NotebookDisplay, render_card
 from airmuscle.core.plotting import new_figure
 from airmuscle.core.short_repr import MAX_LINES, ShortRepr
+from airmuscle.muscle.characteristic import ContractileSurface
 from airmuscle.recording.panels import panels_of
 
 MAX_BYTES = 200_000

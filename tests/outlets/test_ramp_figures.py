@@ -15,11 +15,11 @@ import pytest
 from typer.testing import CliRunner
 
 from airmuscle import load
-from airmuscle.characteristic import ContractileSurface
 from airmuscle.cli.app import app
 from airmuscle.core.plotting import save
 from airmuscle.identify import Fit, fit
 from airmuscle.library.entry import Entry
+from airmuscle.muscle.characteristic import ContractileSurface
 from airmuscle.muscle.isobars import compute_isobars
 from airmuscle.recording import Recording
 from airmuscle.report.band_plot import band_plot

@@ -27,13 +27,13 @@ from airmuscle.core.errors import (
     UnitError,
     UnknownNameError,
 )
-from airmuscle.geometry import Braid
 from airmuscle.library.build import load_valve
 from airmuscle.library.catalogue import load
 from airmuscle.library.entry import Entry
 from airmuscle.library.write import save
 from airmuscle.mechanism import HangingMass, Isometric, WithLatch
 from airmuscle.muscle import LinearDamper
+from airmuscle.muscle.geometry import Braid
 from airmuscle.pneumatics import ClosedChamber
 from airmuscle.pneumatics.gas import Isothermal, Polytropic
 from airmuscle.report.run_chapter import _input_plot

@@ -9,8 +9,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from airmuscle.characteristic.borzikova import SAM_30X290
 from airmuscle.identify.surface.basis import LoadRange
+from airmuscle.muscle.characteristic.borzikova import SAM_30X290
 from airmuscle.report.chapter import DIFFERS, HOLDS, NOT_TESTABLE, Kind
 from airmuscle.reproduce import borzikova
 from airmuscle.reproduce import borzikova_muscle_claims as muscle_claims
@@ -24,6 +24,7 @@ from airmuscle.reproduce.borzikova_surfaces import (
     PRINTED,
     index_on_curves,
     round_contraction,
+    sample,
     surfaces,
     with_a02,
 )
@@ -146,21 +147,21 @@ def test_between_the_loads_both_surfaces_dip_below_zero(laws):
 
 
 def test_two_loads_change_the_verdict_on_the_coefficients():
-    data = CURVES.sample()
+    data = sample(CURVES)
     assert borzikova.rank_claim(data).verdict == HOLDS
     two = borzikova.rank_claim(data.rows(data["force"] > 50))
     assert (two.reproduced, two.verdict) == (10.0, DIFFERS)
 
 
 def test_on_rounded_curves_the_linearised_fit_is_not_least_squares():
-    data = round_contraction(CURVES.sample())
+    data = round_contraction(sample(CURVES))
     claim, _ = borzikova.procedure_claims(data, 0.40)
     assert claim.reproduced == pytest.approx(0.11175 / 0.10763, abs=1e-4)
     assert claim.verdict == DIFFERS
 
 
 def test_linearised_as_gauss_newton_the_fit_is_least_squares():
-    data = round_contraction(CURVES.sample())
+    data = round_contraction(sample(CURVES))
     _, claim = borzikova.procedure_claims(data, 0.40)
     assert claim.reproduced == pytest.approx(1.0, abs=1e-9)
     assert claim.verdict == HOLDS
@@ -195,7 +196,7 @@ def test_the_library_holds_the_monotone_fit_of_the_chapter(laws):
     from airmuscle.library.catalogue import load
 
     kept = load("borzikova-monotone").characteristic
-    data = CURVES.sample()
+    data = sample(CURVES)
     difference = kept.contraction(data["pressure"], data["force"]) - laws[MONOTONE].contraction(
         data["pressure"], data["force"]
     )

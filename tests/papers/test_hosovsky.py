@@ -7,12 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from airmuscle.analysis.equilibrium import find_equilibrium
-from airmuscle.characteristic.contractile_surface import ContractileSurface
 from airmuscle.control.inputs import ZERO_INPUT, SampledSignal
 from airmuscle.identify.static_fit import fit
 from airmuscle.mechanism import HangingMass, Isometric
 from airmuscle.muscle import CubicSeriesSpring, CubicSpring, LinearDamper, LinearSpring, Muscle, ViscoelasticWall
+from airmuscle.muscle.characteristic.contractile_surface import ContractileSurface
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import ClosedChamber, SubsonicIndexValve, Tube, Valve, VirialGas
 from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
@@ -35,6 +34,7 @@ from airmuscle.reproduce.hosovsky_plant import (
 )
 from airmuscle.reproduce.hosovsky_schedule import FILLING
 from airmuscle.simulation import simulate
+from airmuscle.simulation.equilibrium import find_equilibrium
 from airmuscle.simulation.integrators import DormandPrince8, RungeKutta4
 
 NUMBERS = UnpublishedParameters()

@@ -12,9 +12,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airmuscle.characteristic.martens_boblan2017 import MartensBoblan2017
 from airmuscle.core import ops
 from airmuscle.library import catalogue
+from airmuscle.muscle.characteristic.martens_boblan2017 import MartensBoblan2017
 from airmuscle.units import degree
 
 ROWS = {"dmsp-20-300": 126, "dmsp-10-250": 85}

@@ -1,6 +1,5 @@
-"""Analysis of a plant: equilibria and their stability, stiffness, linearisation, energy consistency."""
+"""Analysis of a plant: stiffness, linearisation, statics of joints; estimators and predictive controllers."""
 
-from .equilibrium import Equilibrium, find_equilibria, find_equilibrium
 from .extended_kalman_filter import ExtendedKalmanFilter
 from .filter_consistency import consistency_band, normalised_error_squared
 from .finite_control_set import FiniteControlSet
@@ -15,7 +14,6 @@ from .statics_of_joint import JointPoints, JointStatics, joint_statics
 from .unscented_kalman_filter import UnscentedKalmanFilter
 
 __all__ = [
-    "Equilibrium",
     "ExtendedKalmanFilter",
     "FiniteControlSet",
     "Innovation",
@@ -32,8 +30,6 @@ __all__ = [
     "consistency_band",
     "design_lqg",
     "design_predictive",
-    "find_equilibria",
-    "find_equilibrium",
     "joint_statics",
     "linearise",
     "normalised_error_squared",

@@ -17,7 +17,7 @@ from ..core.errors import AirmuscleError, ParameterError, suggestion
 from ..core.system import System
 from ..plant.state import check_system, state_vector
 from ..plant.units import column_units
-from .equilibrium import complete_inputs
+from ..simulation.equilibrium import complete_inputs
 from .static_stiffness import Stiffness, stiffness
 
 

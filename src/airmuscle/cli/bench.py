@@ -9,7 +9,6 @@ from typing import Annotated
 
 import typer
 
-from ..characteristic import ValidityRange
 from ..core.display import quantity_text
 from ..core.errors import ColumnError, IdentificationError
 from ..core.output_folder import atomic_folder, check_writable
@@ -18,6 +17,7 @@ from ..identify.experiment_design import BenchLimits
 from ..identify.recursive_fit import RecursiveFit
 from ..library.entry import Entry
 from ..library.write import save
+from ..muscle.characteristic import ValidityRange
 from ..recording.follow import RowReader, follow_lines
 from .options import Json, OptionalFolder
 from .reading_options import Columns, Constants, Length, Units, parse_pairs

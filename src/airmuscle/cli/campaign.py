@@ -12,12 +12,12 @@ import typer
 
 from ..core.errors import AirmuscleError, ColumnError, FileError, IdentificationError
 from ..core.output_folder import atomic_folder, check_writable
-from ..geometry import Geometry
 from ..identify.campaign import STAGES, Campaign, LeftOutStage, StaticStage, identify_campaign
 from ..library.campaign_entry import campaign_entry
 from ..library.entry import Entry
 from ..library.initial_law import resting_lengths
 from ..library.write import save
+from ..muscle.geometry import Geometry
 from ..recording import ColumnMapping, Recording
 from ..recording.reader import check_bench, find_files, read_file
 from ..report.campaign_chapters import UnreadFile, ValidationRow, campaign_chapters

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from ..core import leaves
-from ..friction import NoFriction
 from ..identify.campaign import (
     Campaign,
     CampaignRecord,
@@ -19,6 +18,7 @@ from ..identify.campaign import (
     ReleaseStage,
     StaticStage,
 )
+from ..muscle.friction import NoFriction
 from ..report.campaign_chapters import UnreadFile, ValidationRow
 from ..report.campaign_stages import USES, stage_result
 from ..scenario.campaign import RecordScenario

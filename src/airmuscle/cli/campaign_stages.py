@@ -15,9 +15,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..compile.cache.store import cache_folder, read_private
+from ..core.cache_folder import cache_folder, read_private
 from ..core.fingerprint import fingerprint, program_fingerprint
-from ..geometry import Geometry
+from ..muscle.geometry import Geometry
 from ..recording import Recording
 
 OMITTED_PACKAGES = ("cli", "export", "report", "reproduce", "studio", "environments", "sizing", "control")

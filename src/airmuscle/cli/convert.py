@@ -10,8 +10,6 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from ..characteristic import ValidityRange
-from ..characteristic.validity_range import validity_range_of
 from ..core import leaves
 from ..core.errors import ParameterError
 from ..core.units import quantity
@@ -22,6 +20,8 @@ from ..library.entry import Entry
 from ..library.initial_law import find_initial_law
 from ..library.law_file import load_law
 from ..library.write import save
+from ..muscle.characteristic import ValidityRange
+from ..muscle.characteristic.validity_range import validity_range_of
 from .completion import complete_law
 from .options import Json, Name
 from .terminal import echo, percent, print_json, print_table

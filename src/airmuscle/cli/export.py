@@ -10,6 +10,7 @@ import typer
 from ..core.output_folder import check_writable
 from ..export import (
     C99,
+    PRECISIONS,
     JavaScript,
     Octave,
     Target,
@@ -26,15 +27,12 @@ from ..export.microcontroller import PROCESSORS, run_in_emulator
 from ..export.platforms import PLATFORMS, Platform, find_platform
 from ..library.law_file import load_law
 from ..scenario.scenario import load_scenario
-from ..simulation.batch import Double, Precision, Single
 from .completion import complete_entry
 from .options import Folder, Json
 from .terminal import echo, print_json
 
 TARGETS: dict[str, Target] = {"c": C99(), "js": JavaScript(), "octave": Octave()}
 """Languages by the names of the option --to."""
-PRECISIONS: dict[str, Precision] = {"double": Double(), "float": Single()}
-"""Precisions by the names of the option --precision."""
 NAMES = (*TARGETS, "fmu", "mujoco", "modelica")
 """All values of the option --to."""
 DEFAULT_FOLDER = Path("export")

@@ -10,11 +10,11 @@ import typer
 
 from ..core.output_folder import check_writable
 from ..core.processes import available_cores
-from ..geometry import Geometry
 from ..identify import Candidate, Comparison, standard_candidates
 from ..identify.law_selection import LawSelection, select_law
 from ..library.entry import Entry
 from ..library.initial_law import InitialLaw, find_initial_law, resting_lengths
+from ..muscle.geometry import Geometry
 from ..recording import Recording
 from ..report.compare_chapter import compare_chapter
 from ..report.fit_files import fitted_entry, left_out_ratio, missing_geometry

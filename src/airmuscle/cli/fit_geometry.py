@@ -11,9 +11,9 @@ import typer
 from ..core import tree
 from ..core.errors import ParameterError
 from ..core.units import quantity
-from ..geometry import Braid, Geometry
 from ..library.entry import Entry
 from ..library.initial_law import resting_lengths
+from ..muscle.geometry import Braid, Geometry
 from ..recording import Recording
 
 _UNITS = {"radius": "m", "angle": "rad"}

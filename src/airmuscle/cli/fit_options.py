@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import typer
 
-from ..characteristic import Characteristic, ContractileSurface
 from ..core.errors import ParameterError
 from ..core.units import quantity
 from ..identify import (
@@ -34,6 +33,7 @@ from ..identify.length_errors import PRIOR_STD
 from ..identify.problem import fitted_quantity_of
 from ..identify.surface.shape import fit_shape_constrained, shape_violations_of_fit
 from ..library.entry import Entry
+from ..muscle.characteristic import Characteristic, ContractileSurface
 from ..recording import Recording
 from ..report.chapter import Chapter
 from ..report.shape_chapter import shape_chapter

@@ -9,9 +9,6 @@ from typing import Annotated, Any
 
 import typer
 
-from ..analysis.energy_defect import EnergyDefect, maxwell_defect
-from ..characteristic import ValidityRange
-from ..characteristic.validity_range import validity_range_of
 from ..core.declaration import parameters
 from ..core.errors import ParameterError, PhysicsError
 from ..core.output_folder import atomic_folder, check_writable
@@ -21,6 +18,9 @@ from ..library.entry import Entry
 from ..library.initial_law import resting_lengths
 from ..library.law_file import load_law
 from ..library.write import part_toml, save
+from ..muscle.characteristic import ValidityRange
+from ..muscle.characteristic.energy_defect import EnergyDefect, maxwell_defect
+from ..muscle.characteristic.validity_range import validity_range_of
 from ..recording import Recording
 from ..report.fit_files import list_files
 from ..report.volume_chapter import volume_chapter

@@ -9,7 +9,6 @@ from typing import Annotated, Any
 
 import typer
 
-from ..characteristic.base import ForceLaw
 from ..core.output_folder import atomic_folder, check_writable
 from ..identify.campaign import HeldCreep, fit_held_creep, free_of_creep
 from ..identify.hysteresis import (
@@ -24,6 +23,7 @@ from ..library.entry import Entry
 from ..library.law_file import load_law
 from ..library.uncertainty import without_parts
 from ..library.write import part_toml, save
+from ..muscle.characteristic.base import ForceLaw
 from ..recording import Recording
 from ..report.chapter import Chapter
 from ..report.hysteresis_chapter import hysteresis_chapters

@@ -7,7 +7,6 @@ import itertools
 import tomllib
 from pathlib import Path
 
-from ..characteristic import ForceLaw
 from ..library.files import (
     DATA,
     LAWS,
@@ -21,6 +20,7 @@ from ..library.files import (
     list_valves,
 )  # fmt: skip
 from ..library.models import model_class
+from ..muscle.characteristic import ForceLaw
 from .options import Json
 from .terminal import print_json, print_table
 

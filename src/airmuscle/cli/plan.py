@@ -7,13 +7,13 @@ from typing import Annotated, Any
 
 import typer
 
-from ..characteristic import ValidityRange
 from ..core.display import quantity_text
 from ..core.output_folder import atomic_folder, check_writable
 from ..core.units import quantity
 from ..identify.experiment_design import BenchLimits, ExperimentPlan, PlannedRun, optimal_design
 from ..library.files import is_path, read_toml
 from ..library.law_file import load_law
+from ..muscle.characteristic import ValidityRange
 from ..recording import write_csv
 from .options import Json, Name, OptionalFolder
 from .plan_records import describes_study, plan_records

@@ -9,21 +9,19 @@ from typing import Annotated, Any
 
 import typer
 
-from ..characteristic import Characteristic, ForceLaw, ValidityRange
-from ..characteristic.validity_range import validity_range_of
 from ..core import leaves
 from ..core.display import quantity_text
 from ..core.errors import AirmuscleWarning, GeometryLimitError, PhysicsError, RatingError, SolveError
 from ..core.output_folder import atomic_folder
 from ..core.plotting import save
-from ..core.units import quantity
+from ..core.units import check_above_vacuum, quantity
 from ..library.entry import Entry
 from ..library.law_file import load_law
 from ..library.scaling import scale_entry
 from ..muscle import Ratings
+from ..muscle.characteristic import Characteristic, ForceLaw, ValidityRange
+from ..muscle.characteristic.validity_range import validity_range_of
 from ..muscle.isobars import WorkingPoint, compute_isobars
-from ..pneumatics import Ambient
-from ..pneumatics.gas import check_above_vacuum
 from ..report.isobar_plot import describe_point, isobar_plot, isobar_table
 from ..report.write import save_table
 from .options import Diameter, Json, Name, OptionalFolder, RestingLength
@@ -85,7 +83,7 @@ def _solve(characteristic: Characteristic, texts: dict[str, str | None]) -> Work
     """The operating point. Raises SolveError, GeometryLimitError or UnitError."""
     values = {name: quantity(text, UNITS[name], where=f"--{name}") for name, text in texts.items() if text is not None}
     if "pressure" in values:
-        check_above_vacuum(values["pressure"], Ambient())
+        check_above_vacuum(values["pressure"])
     if "contraction" in values and isinstance(characteristic, ForceLaw):  # the other laws check it themselves
         _check_contraction(characteristic, values["contraction"])
     (unknown,) = UNITS.keys() - values.keys()

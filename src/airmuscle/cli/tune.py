@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ..control.control_loop import ControlLoop
 from ..core.output_folder import atomic_folder, check_writable
 from ..core.tree import leaves
 from ..report.chapter import Table
@@ -148,7 +147,6 @@ def _search(loaded: ScenarioLoop, ranges: Mapping[str, tuple[float, float]], req
 def _units(loaded: ScenarioLoop) -> dict[str, str]:
     """Units of the columns of the plant by name, and of the parameters of the controller by path."""
     scenario, loop = loaded.scenario, loaded.loop
-    assert isinstance(loop, ControlLoop)
     of_gains = {leaf.path: loaded.unit(leaf) for leaf in leaves(loop.controller)}
     return {**signal_units(scenario.plant, scenario.initial_state), **of_gains}
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from ..characteristic.tondu_lopez2000 import TONDU_LOPEZ_2000
 from ..core import autodiff, ops
 from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.reference import Reference
 from ..mechanism.base import Mechanism
+from ..muscle.characteristic.tondu_lopez2000 import TONDU_LOPEZ_2000
 from ..muscle.muscle import Muscle
 from .static_inverse import check_invertible, pressure_between, static_force
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-from ..characteristic.tondu_lopez2000 import TONDU_LOPEZ_2000
 from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.reference import Reference
+from ..muscle.characteristic.tondu_lopez2000 import TONDU_LOPEZ_2000
 from .open_loop_law import OpenLoopLaw
 
 DIFFERENCE = "difference"

@@ -8,7 +8,7 @@ from typing import ClassVar
 from ..core.declaration import model, parameter
 from ..core.ops import Value
 from ..core.reference import Reference
-from ..geometry.meridian import SAGA_2007
+from ..muscle.geometry.meridian import SAGA_2007
 from .open_loop_law import OpenLoopLaw
 from .static_inverse import StaticInverse
 

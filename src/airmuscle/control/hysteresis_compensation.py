@@ -10,7 +10,7 @@ from ..core.errors import ParameterError, suggestion
 from ..core.ops import Value
 from ..core.reference import Reference
 from ..core.variables import select_prefix, with_prefix
-from ..friction.prandtl_ishlinskii import KUHNEN2003
+from ..muscle.friction.prandtl_ishlinskii import KUHNEN2003
 from .control_law import ControlLaw
 from .controller import Measurement
 from .enclosing_law import EnclosingLaw

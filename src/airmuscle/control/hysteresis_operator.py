@@ -13,7 +13,7 @@ from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.reference import Reference
-from ..friction.prandtl_ishlinskii import KUHNEN2003
+from ..muscle.friction.prandtl_ishlinskii import KUHNEN2003
 
 
 @model

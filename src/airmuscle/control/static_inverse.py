@@ -6,13 +6,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..characteristic.base import ForceLaw
 from ..core import ops
 from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.reference import Reference
-from ..geometry.meridian import SAGA_2007
+from ..muscle.characteristic.base import ForceLaw
+from ..muscle.geometry.meridian import SAGA_2007
 from ..muscle.muscle import Muscle
 from ..muscle.series import ElasticSeriesElement
 

@@ -16,7 +16,7 @@ import re
 from typing import Any
 
 from .annotation import abridged
-from .errors import UnitError
+from .errors import ParameterError, UnitError
 
 AMBIENT_PRESSURE = 101_325.0
 """Standard atmosphere [Pa], subtracted from an absolute pressure unless another ambient pressure is given."""
@@ -226,3 +226,12 @@ def _suggest_unit(unit: str, target: str) -> str:
     if not matches or unit in _FACTORS or by_lower_case[matches[0]] == unit:
         return ""
     return f" Did you mean '{by_lower_case[matches[0]]}'?"
+
+
+def check_above_vacuum(pressure: float, ambient_pressure: float = AMBIENT_PRESSURE) -> None:
+    """Raise ParameterError for a gauge pressure [Pa] at or below absolute vacuum."""
+    if not pressure > -ambient_pressure:
+        raise ParameterError(
+            f"a gauge pressure of {pressure / 1e3:.6g} kPa is not above absolute vacuum "
+            f"({-ambient_pressure / 1e3:.6g} kPa gauge). Check the unit."
+        )

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from ..core import ops
 from ..core.declaration import model, parameter
 from ..core.ops import Value
+from ..core.units import bar
 from ..plant import Plant
-from ..units import bar
 from .task import EnvironmentTask, Observation
 
 

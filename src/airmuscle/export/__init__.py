@@ -1,6 +1,6 @@
 """Export of plants, laws and controllers as source text of other languages, as FMUs, and as MuJoCo plugins."""
 
-from .controller import write_controller
+from .controller import PRECISIONS, write_controller
 from .fmu import WrittenFmu, write_fmu
 from .identifiers import make_identifiers
 from .modelica import write_modelica
@@ -10,6 +10,7 @@ from .write import write_law, write_program
 
 __all__ = [
     "C99",
+    "PRECISIONS",
     "JavaScript",
     "MuscleActuator",
     "Octave",

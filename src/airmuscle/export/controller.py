@@ -15,6 +15,9 @@ from .printed_controller import check_control_law, check_single_precision, print
 from .targets import program_name
 from .write import checked_name, write_files
 
+PRECISIONS: dict[str, Precision] = {"double": Double(), "float": Single()}
+"""Precisions of the arithmetic of exported controllers, by the names of the type in C."""
+
 
 def write_controller(
     problem: Problem, folder: str | Path, *, name: str = "", title: str = "", tunable: Sequence[str] = (),

@@ -6,7 +6,6 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
-from ..characteristic import Characteristic, ContractionLaw, ForceLaw, PressureLaw
 from ..compile.functions import PARAMETERS, Printer
 from ..compile.ir.emission import TargetLanguage
 from ..compile.text.c import CLanguage
@@ -16,6 +15,7 @@ from ..core import autodiff
 from ..core.annotation import one_line
 from ..core.errors import ParameterError
 from ..core.tree import Leaf, leaves
+from ..muscle.characteristic import Characteristic, ContractionLaw, ForceLaw, PressureLaw
 from .c_text import c_array, c_strings
 from .javascript_module import to_json
 from .octave_functions import m_array, m_strings

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from ..characteristic import Characteristic
 from ..control.control_loop import ControlLoop
 from ..core.errors import ParameterError, suggestion
 from ..core.output_folder import atomic_folder
+from ..muscle.characteristic import Characteristic
 from ..simulation import Problem
 from .exported_loop import CONTROLLER, export_loop
 from .identifiers import make_identifier

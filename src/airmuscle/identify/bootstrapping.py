@@ -9,12 +9,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ..characteristic.base import Characteristic
 from ..core import tree
 from ..core.arrays import Array
 from ..core.errors import IdentificationError
 from ..core.hints import Hint
 from ..core.short_repr import ShortRepr
+from ..muscle.characteristic.base import Characteristic
 from ..recording import Recording
 from .cross_validation import GroupSplit, LevelSplit, default_split
 from .group_refits import GroupRefits, KnownMinima, RowIndices

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..characteristic.base import Characteristic
 from ..core.arrays import Array
 from ..core.errors import AirmuscleError
+from ..muscle.characteristic.base import Characteristic
 from ..recording import Recording
 from .candidates import Candidate
 from .compared_points import ComparedPoints, cause_of, residuals_of_rows

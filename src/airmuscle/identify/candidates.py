@@ -8,7 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..characteristic import (
+from ..core.short_repr import ShortRepr
+from ..muscle.characteristic import (
     ChouHannaford1996,
     ContractileSurface,
     EffectiveLength,
@@ -22,9 +23,8 @@ from ..characteristic import (
     Serres2009,
     TonduLopez2000,
 )
-from ..characteristic.base import Characteristic
-from ..core.short_repr import ShortRepr
-from ..geometry.braid import Braid
+from ..muscle.characteristic.base import Characteristic
+from ..muscle.geometry.braid import Braid
 from ..recording import Recording
 from .cross_validation import specimen_name
 

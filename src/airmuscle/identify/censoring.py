@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ..characteristic.base import Characteristic, ForceLaw
+from ..muscle.characteristic.base import Characteristic, ForceLaw
 from ..recording import Recording
 from ..recording.segment import estimate_sensors
 from .weights import sensor_deviations

@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ..characteristic import PooledLengthLaw
-from ..characteristic.base import Characteristic
 from ..core import tree
 from ..core.arrays import Array
 from ..core.errors import AirmuscleError, IdentificationError
 from ..core.hints import HintedText
+from ..muscle.characteristic import PooledLengthLaw
+from ..muscle.characteristic.base import Characteristic
 from ..recording import Recording
 from .candidates import Candidate
 from .cross_validation import Labels, specimen_name

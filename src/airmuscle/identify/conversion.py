@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from ..characteristic.base import Characteristic
-from ..characteristic.validity_range import ValidityRange
 from ..core.arrays import Array
 from ..core.errors import IdentificationError, SolveError
 from ..core.short_repr import ShortRepr
+from ..muscle.characteristic.base import Characteristic
+from ..muscle.characteristic.validity_range import ValidityRange
 from ..recording import Recording
 from .censoring import UNCENSORED
 from .static_fit import fit

@@ -14,10 +14,10 @@ from collections.abc import Collection, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ..characteristic.base import Characteristic
-from ..characteristic.validity_range import ValidityRange
 from ..core.arrays import Array
 from ..core.errors import IdentificationError, ParameterError
+from ..muscle.characteristic.base import Characteristic
+from ..muscle.characteristic.validity_range import ValidityRange
 from ..recording import Recording
 from .censoring import UNCENSORED
 from .identifiability import EXACT_RANK_TOLERANCE, UndeterminedCombination, analyse_identifiability

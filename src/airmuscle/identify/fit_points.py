@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..characteristic.base import Characteristic, ForceLaw
 from ..core.arrays import Array
 from ..core.errors import IdentificationError
+from ..muscle.characteristic.base import Characteristic, ForceLaw
 from ..recording import Recording
 from ..recording.segment import ISOBARIC, ISOMETRIC, find_runs
 from .censoring import Censoring, default_censoring, force_limits

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..characteristic.base import ContractionLaw, ForceLaw
 from ..core.arrays import Array
 from ..core.errors import IdentificationError, SolveError
 from ..core.hints import HintedText
+from ..muscle.characteristic.base import ContractionLaw, ForceLaw
 
 FORCE_GRID_POINTS = 801
 """Grid points between zero and the maximum force; the law is interpolated linearly between them."""

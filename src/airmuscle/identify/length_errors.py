@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..characteristic.base import Characteristic
 from ..core.arrays import Array
 from ..core.errors import IdentificationError, ParameterError
 from ..core.short_repr import ShortRepr
+from ..muscle.characteristic.base import Characteristic
 from ..recording import Recording
 from .candidates import blank_surface
 from .cross_validation import specimen_name

@@ -8,9 +8,9 @@ import pickle
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, as_completed
 
-from ..characteristic import PooledLengthLaw
 from ..core import tree
 from ..core.processes import check_running, process_pool
+from ..muscle.characteristic import PooledLengthLaw
 from .candidate_scores import RankedModel, Score, score_candidate
 from .candidates import Candidate
 from .compared_points import ComparedPoints

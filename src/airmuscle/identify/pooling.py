@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..characteristic import Characteristic, ContractileSurface, PooledLengthLaw
 from ..core.arrays import Array
 from ..core.errors import IdentificationError
+from ..muscle.characteristic import Characteristic, ContractileSurface, PooledLengthLaw
 from ..recording import Recording
 from .candidates import UNREACHED_FORCE
 from .correlation_index import correlation_index

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..characteristic import PooledLengthLaw
-from ..characteristic.base import Characteristic, ContractionLaw, ForceLaw, PressureLaw
 from ..core import autodiff, tree
 from ..core.arrays import Array
 from ..core.errors import IdentificationError, ParameterError, suggestion
 from ..core.hints import Hint
 from ..core.tree import Leaf
+from ..muscle.characteristic import PooledLengthLaw
+from ..muscle.characteristic.base import Characteristic, ContractionLaw, ForceLaw, PressureLaw
 from ..recording import Recording
 from ..recording.columns import QUANTITIES
 from .censoring import UNCENSORED, Censoring

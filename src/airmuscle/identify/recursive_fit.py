@@ -15,10 +15,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..characteristic import ContractileSurface
-from ..characteristic.contractile_surface import exponents
 from ..core.arrays import Array
 from ..core.errors import IdentificationError, ParameterError
+from ..core.short_repr import ShortRepr
+from ..muscle.characteristic import ContractileSurface
+from ..muscle.characteristic.contractile_surface import exponents
 from .experiment_design import LEVEL_COUNT, BenchLimits
 
 PRIOR = 1e-4
@@ -37,8 +38,8 @@ class NextPoint(NamedTuple):
     standard_error: float
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class RecursiveFit:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class RecursiveFit(ShortRepr):
     """Contractile surface fitted to the samples so far; `updated` returns it with one more sample.
 
     limits      range of the test rig, on which the surface is scaled, and its greatest force

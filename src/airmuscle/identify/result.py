@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..characteristic.base import Characteristic
-from ..characteristic.validity_range import ValidityRange
 from ..core.arrays import Array
 from ..core.display import contraction_text, in_display_unit, quantity_text
 from ..core.errors import ParameterError, suggestion
 from ..core.notebook import Card, NotebookDisplay
+from ..muscle.characteristic.base import Characteristic
+from ..muscle.characteristic.validity_range import ValidityRange
 from ..recording import Recording
 from .correlation_index import CorrelationIndex
 from .loss import Loss

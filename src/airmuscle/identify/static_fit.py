@@ -8,13 +8,13 @@ from collections.abc import Collection, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ..characteristic import PooledLengthLaw
-from ..characteristic.base import Characteristic
 from ..core import tree
 from ..core.annotation import one_line
 from ..core.arrays import Array
 from ..core.errors import IdentificationError, ParameterError
 from ..core.hints import Hint, HintedText
+from ..muscle.characteristic import PooledLengthLaw
+from ..muscle.characteristic.base import Characteristic
 from ..recording import Recording
 from .branch_residuals import branch_notes
 from .censoring import UNCENSORED, Censoring, default_censoring

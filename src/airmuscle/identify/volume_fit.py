@@ -15,7 +15,7 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.errors import ColumnError, IdentificationError, ParameterError
-from ..geometry import Braid, ChebyshevGeometry, Geometry
+from ..muscle.geometry import Braid, ChebyshevGeometry, Geometry
 from ..pneumatics.gas import GAS_CONSTANT
 from ..recording import Recording
 

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..core.errors import IdentificationError
-from ..friction import NoFriction
 from ..identify.campaign import Campaign, CreepStage, ReleaseStage, StaticStage
+from ..muscle.friction import NoFriction
 from .entry import Entry
 from .stated_band import StatedBand
 from .uncertainty import ParameterUncertainty

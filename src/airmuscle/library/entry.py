@@ -5,13 +5,13 @@ from __future__ import annotations
 import dataclasses
 import warnings
 
-from ..characteristic.base import Characteristic, ForceLaw
-from ..characteristic.validity_range import ValidityRange
 from ..core.errors import AirmuscleWarning, UnknownNameError
 from ..core.reference import Reference
-from ..friction.base import Friction
-from ..geometry.base import Geometry
 from ..muscle import CreepElements, Damper, Muscle, Ratings, SeriesElement, Spring, Stop, Wall
+from ..muscle.characteristic.base import Characteristic, ForceLaw
+from ..muscle.characteristic.validity_range import ValidityRange
+from ..muscle.friction.base import Friction
+from ..muscle.geometry.base import Geometry
 from .entry_display import EntryDisplay
 from .stated_band import StatedBand
 from .uncertainty import ParameterUncertainty

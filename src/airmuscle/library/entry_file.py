@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..characteristic.base import Characteristic
-from ..characteristic.validity_range import ValidityRange
 from ..core.errors import ParameterError, suggestion
-from ..friction.base import Friction
-from ..geometry.base import Geometry
 from ..muscle import CreepElements, Damper, SeriesElement, Spring, Stop, Wall
+from ..muscle.characteristic.base import Characteristic
+from ..muscle.characteristic.validity_range import ValidityRange
+from ..muscle.friction.base import Friction
+from ..muscle.geometry.base import Geometry
 from .build import TEXT_KEYS, build, read_entry_texts
 from .entry import Check, Entry
 from .location import Location, check_keys, check_type, read_finite_number, read_table_array, read_text

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 
-from ..characteristic.base import ForceLaw
 from ..core.errors import ParameterError
 from ..identify.campaign.rows import is_held
 from ..identify.compared_points import law_of_length
 from ..identify.cross_validation import specimen_name
 from ..identify.prediction import RecordPrediction, predict_static
 from ..identify.problem import fitted_quantity_of
+from ..muscle.characteristic.base import ForceLaw
 from ..recording import Recording
 from .entry import Entry
 from .length_scaling import LENGTH_TOLERANCE, scale_to_length

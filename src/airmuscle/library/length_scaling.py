@@ -5,10 +5,10 @@ from __future__ import annotations
 import dataclasses
 from typing import Any, TypeVar
 
-from ..characteristic import MartensBoblan2017
 from ..core import tree
 from ..core.errors import ParameterError
-from ..geometry import Braid, Geometry
+from ..muscle.characteristic import MartensBoblan2017
+from ..muscle.geometry import Braid, Geometry
 
 T = TypeVar("T")
 LENGTH_TOLERANCE = 1e-6

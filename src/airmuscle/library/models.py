@@ -11,8 +11,9 @@ import inspect
 from collections.abc import Mapping
 from typing import Any
 
-from .. import characteristic, control, friction, geometry, mechanism, muscle, plant, pneumatics, simulation
+from .. import control, mechanism, muscle, plant, pneumatics, simulation
 from ..core.errors import UnknownNameError, suggestion
+from ..muscle import characteristic, friction, geometry
 
 PACKAGES = (characteristic, control, friction, geometry, mechanism, muscle, plant, pneumatics, simulation)
 

@@ -19,10 +19,10 @@ from pathlib import Path
 from types import NoneType
 from typing import Any
 
-from ..characteristic.base import ForceLaw
 from ..core.errors import ParameterError
 from ..core.reference import Reference
 from ..muscle import Muscle
+from ..muscle.characteristic.base import ForceLaw
 from ..plant.plant import Plant
 from .build import TEXT_KEYS, build, read_entry_texts
 from .entry import MISSING_GEOMETRY, Entry, issue_warning

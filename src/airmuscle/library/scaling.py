@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 
-from ..characteristic import ChouHannaford1996, TonduLopez2000, VirtualWork
 from ..core import leaves
 from ..core.errors import ParameterError
 from ..core.units import quantity
-from ..geometry import Braid
+from ..muscle.characteristic import ChouHannaford1996, TonduLopez2000, VirtualWork
+from ..muscle.geometry import Braid
 from .entry import Entry
 from .length_scaling import scale_to_length
 

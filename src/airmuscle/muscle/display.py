@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from ..characteristic.base import Characteristic
-from ..characteristic.validity_range import ValidityRange, validity_range_of
 from ..core.arrays import Array
 from ..core.axes import given_axes
 from ..core.display import contraction_text, in_display_unit, quantity_text
 from ..core.plotting import new_figure
 from ..core.tree import leaves
+from .characteristic.base import Characteristic
+from .characteristic.validity_range import ValidityRange, validity_range_of
 from .isobars import compute_isobars, draw_isobars
 
 PARAMETERS = ("parameter", "symbol", "value", "unit", "meaning")

@@ -6,10 +6,6 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple
 
-from ..characteristic.base import Characteristic, ForceLaw
-from ..characteristic.contractile_surface import HOSOVSKY_HILL
-from ..characteristic.validity_range import ValidityRange
-from ..characteristic.virtual_work import VirtualWork
 from ..core import autodiff, ops
 from ..core.annotation import abridged
 from ..core.declaration import model
@@ -18,11 +14,15 @@ from ..core.notebook import Card, NotebookDisplay
 from ..core.ops import Value
 from ..core.reference import Reference
 from ..core.variables import StateVariable
-from ..friction.base import Friction, NoFriction
-from ..geometry.base import Geometry
+from .characteristic.base import Characteristic, ForceLaw
+from .characteristic.contractile_surface import HOSOVSKY_HILL
+from .characteristic.validity_range import ValidityRange
+from .characteristic.virtual_work import VirtualWork
 from .creep import CreepElements
 from .damper import Damper, LinearDamper
 from .display import component_rows, plot_isobars
+from .friction.base import Friction, NoFriction
+from .geometry.base import Geometry
 from .ratings import Ratings
 from .series import ElasticSeriesElement, RigidSeriesElement, SeriesElement
 from .series_equilibrium import solve_inner_contraction, without_derivative

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
-from ..characteristic.validity_range import CONTRACTION_BOUNDS, PRESSURE_BOUNDS
 from ..core.declaration import INFINITY, model, parameter, parameters
 from ..core.errors import ParameterError
+from .characteristic.validity_range import CONTRACTION_BOUNDS, PRESSURE_BOUNDS
 
 FORCE_BOUNDS = (0.0, 1e6)
 LENGTH_BOUNDS = (1e-3, 20.0)

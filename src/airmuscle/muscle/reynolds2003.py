@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from ..characteristic.reynolds2003 import REYNOLDS_2003
 from ..core import ops
 from ..core.declaration import model, parameter
 from ..core.ops import Value
 from ..core.reference import Reference
+from .characteristic.reynolds2003 import REYNOLDS_2003
 from .damper import Damper
 from .spring import Spring
 

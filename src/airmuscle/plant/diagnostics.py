@@ -12,8 +12,8 @@ from ..core.diagnostics import ColumnLimit, Columns, Diagnostic, DiagnosticCode
 from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.variables import select_prefix
-from ..friction import NoFriction
 from ..muscle import INNER_CONTRACTION, ElasticSeriesElement, Muscle
+from ..muscle.friction import NoFriction
 from ..pneumatics import Circuit
 
 MARGIN = 1e-3

@@ -11,10 +11,10 @@ import numpy as np
 from ..core.arrays import Array
 from ..core.errors import ParameterError
 from ..core.variables import select_prefix
-from ..geometry import Geometry
 from ..mechanism import AntagonisticJoint, Mechanism
 from ..mechanism.translation import Translation
 from ..mechanism.wrapper import MechanismWrapper
+from ..muscle.geometry import Geometry
 
 Row = Mapping[str, float]
 """Values of the columns of a recording at one time."""

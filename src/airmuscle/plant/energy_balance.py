@@ -10,8 +10,8 @@ from ..core.diagnostics import ColumnLimit, Columns, Diagnostic
 from ..core.ops import Value
 from ..core.system import System
 from ..core.variables import Input, StateVariable
-from ..friction import NoFriction
 from ..muscle import ElasticSeriesElement, Muscle
+from ..muscle.friction import NoFriction
 from .evaluation import PlantEvaluation
 from .muscle_state import MuscleState
 from .plant import Plant

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from ..core.ops import Value
 from ..core.variables import StateVariable
-from ..friction import NoFriction
 from ..muscle import Muscle
+from ..muscle.friction import NoFriction
 from ..pneumatics.gas import Air, Ambient, Gas, gauge_pressure
 
 _TYPICAL_CONTRACTION = 0.05

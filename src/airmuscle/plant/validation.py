@@ -7,14 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from ..characteristic.validity_range import ValidityRange
 from ..core.annotation import one_line
 from ..core.declaration import as_finite_float, check_structure, parameters
 from ..core.errors import ParameterError, TraceError
+from ..core.units import check_above_vacuum
 from ..mechanism import Mechanism
 from ..muscle import Muscle
+from ..muscle.characteristic.validity_range import ValidityRange
 from ..pneumatics import Circuit
-from ..pneumatics.gas import Ambient, Gas, check_above_vacuum
+from ..pneumatics.gas import Ambient, Gas
 from ..pneumatics.supply import check_not_shared
 
 
@@ -110,5 +111,5 @@ def check_pressures(pressure: float | tuple[float, ...], muscles: int, ambient: 
     if len(pressures) != muscles:
         raise ParameterError(f"Plant: {len(pressures)} pressures are given for {muscles} muscles.")
     for each in pressures:
-        check_above_vacuum(each, ambient)
+        check_above_vacuum(each, ambient.pressure)
     return pressures

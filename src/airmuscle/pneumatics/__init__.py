@@ -5,8 +5,22 @@ from .check_valve import CheckValve
 from .circuit import Circuit, CircuitFlows
 from .combination import in_parallel, in_series
 from .distributed_tube import DistributedTube
-from .fill_discharge import ClosedChamber, FillDischarge, ThreePositionValve
-from .gas import Air, Ambient, EnergyBalance, Flow, Gas, Isothermal, Polytropic, absolute_pressure, gauge_pressure
+from .fill_discharge import ClosedChamber, FillDischarge, ThreePositionValve, ambient_air
+from .flow import orifice_flow
+from .gas import (
+    GAS_CONSTANT,
+    REFERENCE_DENSITY,
+    REFERENCE_TEMPERATURE,
+    Air,
+    Ambient,
+    EnergyBalance,
+    Flow,
+    Gas,
+    Isothermal,
+    Polytropic,
+    absolute_pressure,
+    gauge_pressure,
+)
 from .manifold import Manifold, WithLeak
 from .orifice import Orifice
 from .proportional import ProportionalRegulator, ProportionalValve, SecondOrderLag
@@ -19,6 +33,9 @@ from .virial_gas import VirialGas
 from .with_tubes import WithTubes
 
 __all__ = [
+    "GAS_CONSTANT",
+    "REFERENCE_DENSITY",
+    "REFERENCE_TEMPERATURE",
     "Air",
     "AirSource",
     "Ambient",
@@ -52,8 +69,10 @@ __all__ = [
     "WithLeak",
     "WithTubes",
     "absolute_pressure",
+    "ambient_air",
     "conversion",
     "gauge_pressure",
     "in_parallel",
     "in_series",
+    "orifice_flow",
 ]

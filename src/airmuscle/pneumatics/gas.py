@@ -13,7 +13,6 @@ from typing import ClassVar, NamedTuple
 
 from ..core import autodiff, ops
 from ..core.declaration import model, parameter
-from ..core.errors import ParameterError
 from ..core.ops import Value
 from ..core.reference import Reference
 from ..core.units import ABSOLUTE, AMBIENT_PRESSURE
@@ -65,15 +64,6 @@ def absolute_pressure(pressure: Value, ambient: Ambient) -> Value:
 def gauge_pressure(pressure: Value, ambient: Ambient) -> Value:
     """Gauge pressure [Pa] from absolute pressure [Pa]."""
     return pressure - ambient.pressure
-
-
-def check_above_vacuum(pressure: float, ambient: Ambient) -> None:
-    """Raise ParameterError for a gauge pressure [Pa] at or below absolute vacuum."""
-    if not absolute_pressure(pressure, ambient) > 0:
-        raise ParameterError(
-            f"a gauge pressure of {pressure / 1e3:.6g} kPa is not above absolute vacuum "
-            f"({-ambient.pressure / 1e3:.6g} kPa gauge). Check the unit."
-        )
 
 
 class Air(NamedTuple):

@@ -5,6 +5,7 @@ from .csv_reader import read_csv
 from .csv_writer import write_csv
 from .data_frames import from_pandas, to_xarray
 from .downsampling import BlockMeans, Decimation
+from .follow import RowReader, follow_lines
 from .mapping import ColumnMapping
 from .reader import read
 from .recording import Recording
@@ -20,8 +21,10 @@ __all__ = [
     "Quantity",
     "RecordedTime",
     "Recording",
+    "RowReader",
     "TimeBase",
     "UniformTime",
+    "follow_lines",
     "from_pandas",
     "read",
     "read_csv",

@@ -6,9 +6,9 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-from ..characteristic import PooledLengthLaw
 from ..core.reference import Reference
 from ..identify import Fit
+from ..muscle.characteristic import PooledLengthLaw
 from .chapter import DisplayedEquation, Table
 from .equation import LawEquation, law_equation
 from .equation.source_code import REMARKS, displayed_lines, source_codes

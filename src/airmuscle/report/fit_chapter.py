@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ..analysis.energy_defect import maxwell_defect
 from ..core.errors import AirmuscleError
 from ..core.reference import cite
 from ..identify import Fit
 from ..identify.surface.shape import shape_violations_of_fit
 from ..library.entry import Entry
+from ..muscle.characteristic.energy_defect import maxwell_defect
 from ..muscle.isobars import compute_isobars
 from .band_plot import band_plot
 from .chapter import Chapter, Plot, Table

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from ..geometry import Geometry
 from ..identify import Fit
 from ..identify.candidate_scores import RankedModel
 from ..identify.prediction.result import LEVEL
 from ..library.entry import MISSING_GEOMETRY, Entry
 from ..library.stated_band import StatedBand
 from ..library.write import save
+from ..muscle.geometry import Geometry
 from ..recording import Recording
 from .chapter import Chapter
 from .fit_chapter import fit_chapter

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ..characteristic.base import Characteristic
-from ..characteristic.validity_range import ValidityRange
 from ..core import plotting
 from ..core.display import contraction_text, quantity_text
+from ..muscle.characteristic.base import Characteristic
+from ..muscle.characteristic.validity_range import ValidityRange
 from ..muscle.isobars import Isobars, WorkingPoint, force_axis_limit, forces_along, mask_slack
 from ..recording import Recording
 from .chapter import Plot, Table

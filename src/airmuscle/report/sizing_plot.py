@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ..characteristic.validity_range import validity_range_of
 from ..core import plotting
+from ..muscle.characteristic.validity_range import validity_range_of
 from ..muscle.isobars import compute_isobars
 from ..sizing import LiftRequirement, MuscleChoice
 from .chapter import Plot

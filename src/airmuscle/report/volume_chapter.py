@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.energy_defect import EnergyDefect
-from ..characteristic import Characteristic, ValidityRange
 from ..core import plotting
 from ..core.reference import cite
 from ..identify.volume_fit import VolumeFit
+from ..muscle.characteristic import Characteristic, ValidityRange
+from ..muscle.characteristic.energy_defect import EnergyDefect
 from .chapter import Chapter, Plot, Table
 
 LEVELS = 3

@@ -9,13 +9,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..characteristic.base import ContractionLaw
-from ..characteristic.borzikova import BORZIKOVA, SAM_30X290, PlaneCurves
+import airmuscle as am
+
 from ..core.arrays import Array
 from ..core.constants import STANDARD_GRAVITY
 from ..identify.surface.basis import Chebyshev, LoadRange, conditioning
 from ..identify.surface.exponential import SurfaceFit, SurfaceProblem, fit_linearised, fit_nonlinear
-from ..recording import Recording
+from ..muscle.characteristic.borzikova import BORZIKOVA, SAM_30X290, PlaneCurves
 from ..report.chapter import AtLeast, Chapter, Claim, Equal, Kind
 from ..report.formatting import format_number, typographic
 from .borzikova_figures import plots
@@ -28,6 +28,7 @@ from .borzikova_surfaces import (
     PRINTED,
     index_on_curves,
     round_contraction,
+    sample,
     surfaces,
 )
 from .borzikova_tables import tables
@@ -82,7 +83,7 @@ def curve_claims(curves: PlaneCurves) -> tuple[Claim, ...]:
     )
 
 
-def surface_claim(name: str, law: ContractionLaw, curves: PlaneCurves) -> Claim:
+def surface_claim(name: str, law: am.muscle.characteristic.ContractionLaw, curves: PlaneCurves) -> Claim:
     """Return the claim that a surface fits the plane curves as well as these fit the measurements (minimum index).
 
     The paper prints no index for the surface. If the index does not exist, the claim contains 1 - SSE/SST and says so.
@@ -104,7 +105,7 @@ def surface_claim(name: str, law: ContractionLaw, curves: PlaneCurves) -> Claim:
     )
 
 
-def rank_claim(recording: Recording) -> Claim:
+def rank_claim(recording: am.Recording) -> Claim:
     """Return the claim that the data determine the coefficients of equation (1)."""
     design = conditioning(recording, Chebyshev(LoadRange.from_recording(recording)))
     loads = np.unique(recording["force"]).size
@@ -120,7 +121,7 @@ def rank_claim(recording: Recording) -> Claim:
     )
 
 
-def procedure_claims(recording: Recording, saturation: float) -> tuple[Claim, ...]:
+def procedure_claims(recording: am.Recording, saturation: float) -> tuple[Claim, ...]:
     """Return the claim that the linearised fit minimises the sum of squares S(A), in both meanings of "linearised"."""
     by_logarithm, by_contraction = fit_linearised(recording, saturation), fit_nonlinear(recording, saturation)
     iterated = fit_gauss_newton(recording, saturation)
@@ -143,7 +144,7 @@ def procedure_claims(recording: Recording, saturation: float) -> tuple[Claim, ..
     )  # fmt: skip
 
 
-def fit_gauss_newton(recording: Recording, saturation: float) -> SurfaceFit:
+def fit_gauss_newton(recording: am.Recording, saturation: float) -> SurfaceFit:
     """Fit k by repeated linearisation of f in its coefficients, from the linear fit of the logarithm.
 
     Raises IdentificationError if the coefficients are not determined.
@@ -175,14 +176,14 @@ def load_claim() -> Claim:
     )
 
 
-def claims(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> tuple[Claim, ...]:
+def claims(curves: PlaneCurves, laws: Mapping[str, am.muscle.characteristic.ContractionLaw]) -> tuple[Claim, ...]:
     """Return all claims of the paper for these curves and surfaces."""
     evaluated = (AS_EXPONENT, PRINTED, MISPRINT_CORRECTED, CORRECTED, EXPONENTIAL)
     return (
         *curve_claims(curves),
         *(surface_claim(name, laws[name], curves) for name in evaluated),
-        rank_claim(curves.sample()),
-        *procedure_claims(round_contraction(curves.sample()), curves.curves[0].saturation),
+        rank_claim(sample(curves)),
+        *procedure_claims(round_contraction(sample(curves)), curves.curves[0].saturation),
         load_claim(),
         *catalogue_claims(curves),
         *characteristic_claims(curves),

@@ -7,19 +7,20 @@ from typing import Any
 
 import numpy as np
 
-from ..characteristic.base import ContractionLaw
-from ..characteristic.borzikova import PlaneCurves
+import airmuscle as am
+
 from ..core import autodiff
 from ..core.plotting import BLACK, BLUE, DASHES, LINES, MARKERS, ORANGE, RED, legend_outside, new_figure
 from ..core.units import bar
 from ..identify.surface.basis import LoadRange
+from ..muscle.characteristic.borzikova import PlaneCurves
 from ..report.chapter import Plot
-from .borzikova_surfaces import CORRECTED, EXPONENTIAL, MISPRINT_CORRECTED, MONOTONE
+from .borzikova_surfaces import CORRECTED, EXPONENTIAL, MISPRINT_CORRECTED, MONOTONE, sample
 
 PRESSURE, FORCE, CONTRACTION = "gauge pressure [bar]", "force [N]", "contraction [%]"
 
 
-def plots(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> tuple[Plot, ...]:
+def plots(curves: PlaneCurves, laws: Mapping[str, am.muscle.characteristic.ContractionLaw]) -> tuple[Plot, ...]:
     """Return all figures of the chapter."""
     return (
         dead_zone(curves),
@@ -83,7 +84,7 @@ def plane_curves(curves: PlaneCurves) -> Plot:
     return Plot("borzikova_plane_curves", caption, figure)
 
 
-def surface(curves: PlaneCurves, law: ContractionLaw) -> Plot:
+def surface(curves: PlaneCurves, law: am.muscle.characteristic.ContractionLaw) -> Plot:
     """Return Fig. 5: the surface."""
     figure, axes = new_figure(height=4.4, subplot_kw={"projection": "3d", "computed_zorder": False})
     pressure, force = LoadRange.from_law(law).grid(36, 31)
@@ -107,7 +108,7 @@ def surface(curves: PlaneCurves, law: ContractionLaw) -> Plot:
     return Plot("borzikova_surface", caption, figure)
 
 
-def residuals(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> Plot:
+def residuals(curves: PlaneCurves, laws: Mapping[str, am.muscle.characteristic.ContractionLaw]) -> Plot:
     """Return the residuals on the curves, and the difference of the two surfaces between them."""
     figure, (left, right) = new_figure(1, 2, width=7.6, height=3.3)
     pressures = _pressures(curves)
@@ -139,7 +140,7 @@ def residuals(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> Plot:
     return Plot("borzikova_residuals", caption, figure)
 
 
-def violations(laws: Mapping[str, ContractionLaw]) -> Plot:
+def violations(laws: Mapping[str, am.muscle.characteristic.ContractionLaw]) -> Plot:
     """Return the regions in which the surfaces increase with force or decrease with pressure."""
     names = (CORRECTED, EXPONENTIAL, MONOTONE)
     figure, panels = new_figure(1, 3, width=7.6, height=3.3, sharey=True)
@@ -176,7 +177,7 @@ def _violation_legend(figure: Any) -> None:
     figure.legend(handles=patches, loc="outside lower center", ncols=2, frameon=False, fontsize=8)
 
 
-def monotone_fit(curves: PlaneCurves, law: ContractionLaw) -> Plot:
+def monotone_fit(curves: PlaneCurves, law: am.muscle.characteristic.ContractionLaw) -> Plot:
     """Return the monotone fit and its errors on the plane curves."""
     figure, axes = new_figure()
     pressures = _pressures(curves)
@@ -187,7 +188,7 @@ def monotone_fit(curves: PlaneCurves, law: ContractionLaw) -> Plot:
     axes.axhline(0.0, color=BLACK, linewidth=0.6)
     axes.set(xlabel=PRESSURE, ylabel=CONTRACTION)
     legend_outside(axes)
-    data = curves.sample()
+    data = sample(curves)
     errors = np.asarray(law.contraction(data["pressure"], data["force"])) - data["contraction"]
     worst = int(np.abs(errors).argmax())
     caption = (
@@ -204,7 +205,7 @@ def _pressures(curves: PlaneCurves) -> np.ndarray:
 
 
 def _draw_points(axes: Any, curves: PlaneCurves) -> None:
-    data = curves.sample()
+    data = sample(curves)
     for curve, colour, marker in zip(curves.curves, LINES, MARKERS, strict=False):
         rows = data.rows(data["force"] == curve.force)
         x, y = rows["pressure"] / bar, 100 * rows["contraction"]

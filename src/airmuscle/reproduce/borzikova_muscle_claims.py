@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..characteristic.borzikova import PlaneCurves
+from ..muscle.characteristic.borzikova import PlaneCurves
 from ..report.chapter import AtLeast, Claim, Equal
 from ..report.formatting import format_number, typographic
 from .borzikova_tables import CATALOGUE_TABLE, CATALOGUE_TEXT

@@ -7,14 +7,14 @@ import warnings
 
 import numpy as np
 
-from ..characteristic.base import ContractionLaw
-from ..characteristic.borzikova import SAM_30X290, BorzikovaDirect, BorzikovaExponential, PlaneCurves
+import airmuscle as am
+
 from ..core.errors import AirmuscleWarning
 from ..identify.correlation_index import CorrelationIndex, correlation_index
 from ..identify.surface.basis import LoadRange
 from ..identify.surface.monotone import fit_monotone
 from ..library.law_file import load_law
-from ..recording import Recording
+from ..muscle.characteristic.borzikova import SAM_30X290, PlaneCurves
 
 MISPRINT_INDEX = 2
 """Index of a_02, whose exponent is misprinted, in the coefficients."""
@@ -28,45 +28,62 @@ EXPONENTIAL = "exponential (1), fitted here"
 MONOTONE = "exponential (1), monotone"
 
 
-def surfaces(curves: PlaneCurves = SAM_30X290) -> dict[str, ContractionLaw]:
+def surfaces(curves: PlaneCurves = SAM_30X290) -> dict[str, am.muscle.characteristic.ContractionLaw]:
     """Return all surfaces of the chapter by name."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AirmuscleWarning)  # the chapter shows the misprint
         printed = load_law("borzikova-direct-printed").characteristic
     corrected = load_law("borzikova-direct-repaired").characteristic
     exponential = load_law("borzikova-exponential").characteristic
-    assert isinstance(printed, BorzikovaDirect)
-    assert isinstance(corrected, BorzikovaDirect)
-    assert isinstance(exponential, BorzikovaExponential)
+    assert isinstance(printed, am.muscle.characteristic.BorzikovaDirect)
+    assert isinstance(corrected, am.muscle.characteristic.BorzikovaDirect)
+    assert isinstance(exponential, am.muscle.characteristic.BorzikovaExponential)
     saturation = curves.curves[0].saturation
     return {
-        AS_EXPONENT: BorzikovaExponential(printed.coefficients, *LoadRange.from_law(printed), saturation=saturation),
+        AS_EXPONENT: am.muscle.characteristic.BorzikovaExponential(
+            printed.coefficients, *LoadRange.from_law(printed), saturation=saturation
+        ),
         PRINTED: printed,
         MISPRINT_CORRECTED: with_a02(printed, CORRECTED_A02),
         CORRECTED: corrected,
         EXPONENTIAL: exponential,
-        MONOTONE: fit_monotone(curves.sample(), saturation).model,
+        MONOTONE: fit_monotone(sample(curves), saturation).model,
     }
 
 
-def with_a02(law: BorzikovaDirect, a02: float) -> BorzikovaDirect:
+def sample(curves: PlaneCurves, points: int = 15) -> am.Recording:
+    """Return a recording of `points` equidistant pressures from zero on every curve, curve after curve."""
+    pressures = np.linspace(0.0, curves.max_pressure, points)
+    return am.Recording(
+        {
+            "pressure": np.tile(pressures, len(curves.curves)),
+            "force": np.repeat([c.force for c in curves.curves], points),
+            "contraction": np.concatenate([c.contraction(pressures) for c in curves.curves]),
+        },
+        origin="plane curves of Borzíková et al., sampled",
+        constants={"specimen": "Shadow Air Muscle SAM 30 x 290", "resting_length": 0.29},
+        notes=("Curves fitted by the authors; the measured points are lost.",),
+    )
+
+
+def with_a02(law: am.muscle.characteristic.BorzikovaDirect, a02: float) -> am.muscle.characteristic.BorzikovaDirect:
     """Return the surface with another coefficient of F^2."""
     coefficients = (*law.coefficients[:MISPRINT_INDEX], a02, *law.coefficients[MISPRINT_INDEX + 1 :])
     return dataclasses.replace(law, coefficients=coefficients)
 
 
-def index_on_curves(law: ContractionLaw, curves: PlaneCurves) -> CorrelationIndex:
+def index_on_curves(law: am.muscle.characteristic.ContractionLaw, curves: PlaneCurves) -> CorrelationIndex:
     """Return the correlation index of a surface at 15 evenly spaced pressures of each plane curve."""
-    data = curves.sample()
+    data = sample(curves)
     return correlation_index(data["contraction"], law.contraction(data["pressure"], data["force"]))
 
 
-def round_contraction(recording: Recording, step: float = 0.005) -> Recording:
+def round_contraction(recording: am.Recording, step: float = 0.005) -> am.Recording:
     """Return the recording with contractions rounded to multiples of `step` [1]."""
     return recording.with_columns(contraction=np.round(recording["contraction"] / step) * step)
 
 
-def add_noise(recording: Recording, seed: int, deviation: float = 0.005) -> Recording:
+def add_noise(recording: am.Recording, seed: int, deviation: float = 0.005) -> am.Recording:
     """Return the recording with normally distributed noise on the contractions, of standard deviation [1]."""
     noise = deviation * np.random.default_rng(seed).standard_normal(len(recording))
     return recording.with_columns(contraction=recording["contraction"] + noise)

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from ..characteristic.base import ContractionLaw
-from ..characteristic.borzikova import PlaneCurves
+import airmuscle as am
+
 from ..core.units import bar, percent
 from ..identify.surface.basis import Basis, Chebyshev, LoadRange, Monomials, conditioning
 from ..identify.surface.exponential import SurfaceFit, fit_linearised, fit_nonlinear
 from ..identify.surface.monotone import find_monotonicity_violations
-from ..recording import Recording
+from ..muscle.characteristic.borzikova import PlaneCurves
 from ..report.chapter import Table
 from .borzikova_surfaces import (
     CORRECTED,
@@ -23,6 +23,7 @@ from .borzikova_surfaces import (
     add_noise,
     index_on_curves,
     round_contraction,
+    sample,
 )
 
 SEEDS = range(100)
@@ -45,9 +46,9 @@ CATALOGUE_TEXT = {
 }
 
 
-def tables(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> tuple[Table, ...]:
+def tables(curves: PlaneCurves, laws: Mapping[str, am.muscle.characteristic.ContractionLaw]) -> tuple[Table, ...]:
     """Return all tables of the chapter."""
-    data = curves.sample()
+    data = sample(curves)
     saturation = curves.curves[0].saturation
     return (
         curve_table(curves),
@@ -93,7 +94,7 @@ def curve_table(curves: PlaneCurves) -> Table:
 EXPLAINED = r"\(1 - \text{SSE}/\text{SST}\) [1]"
 
 
-def surface_table(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> Table:
+def surface_table(curves: PlaneCurves, laws: Mapping[str, am.muscle.characteristic.ContractionLaw]) -> Table:
     """Return the errors and correlation indices of all surfaces on the plane curves."""
     upper = _sample_above_quarter_bar(curves)
     columns: dict[str, list[Any]] = {"surface": [], **{f"rms error at {c.force:g} N [%]": [] for c in curves.curves}}
@@ -116,8 +117,8 @@ def surface_table(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> Ta
     )
 
 
-def _sample_above_quarter_bar(curves: PlaneCurves) -> Recording:
-    data = curves.sample(141)
+def _sample_above_quarter_bar(curves: PlaneCurves) -> am.Recording:
+    data = sample(curves, 141)
     return data.rows(data["pressure"] >= 0.25 * bar)
 
 
@@ -125,7 +126,7 @@ def _rms_text(errors: np.ndarray) -> str:
     return f"{100 * np.sqrt(np.mean(errors**2)):.3g}"
 
 
-def exponent_table(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> Table:
+def exponent_table(curves: PlaneCurves, laws: Mapping[str, am.muscle.characteristic.ContractionLaw]) -> Table:
     """Return the range of the exponent of equation (1) on the curves, and its range by the printed matrix."""
     pressures = np.linspace(0.0, curves.max_pressure, 351)
     printed, corrected = laws[PRINTED], laws[CORRECTED]
@@ -155,7 +156,7 @@ def _range_text(values: np.ndarray) -> str:
 def coefficient_table(curves: PlaneCurves) -> Table:
     """Return the exact coefficients of equation (1), and the deviations of both fitting procedures from them."""
     exact = curves.interpolate()
-    data, saturation = curves.sample(), curves.curves[0].saturation
+    data, saturation = sample(curves), curves.curves[0].saturation
     fits = [procedure(data, saturation).model.coefficients for procedure in (fit_linearised, fit_nonlinear)]
     powers = [(i, j) for i in range(exact.pressure_degree + 1) for j in range(exact.force_degree + 1)]
     return Table(
@@ -171,7 +172,7 @@ def coefficient_table(curves: PlaneCurves) -> Table:
     )
 
 
-def procedure_table(data: Recording, saturation: float) -> Table:
+def procedure_table(data: am.Recording, saturation: float) -> Table:
     """Return the errors of the paper's linearised fit and of least squares on k, for disturbed data."""
     cases = {
         "undisturbed": data,
@@ -200,11 +201,11 @@ def procedure_table(data: Recording, saturation: float) -> Table:
     )
 
 
-def _fit_both(recording: Recording, saturation: float) -> tuple[SurfaceFit, SurfaceFit]:
+def _fit_both(recording: am.Recording, saturation: float) -> tuple[SurfaceFit, SurfaceFit]:
     return fit_linearised(recording, saturation), fit_nonlinear(recording, saturation)
 
 
-def conditioning_table(data: Recording) -> Table:
+def conditioning_table(data: am.Recording) -> Table:
     """Return the rank and condition number of the 15 coefficients, in four scalings and without the largest load."""
     validity_range = LoadRange.from_recording(data)
     scalings: dict[str, Basis] = {
@@ -231,7 +232,7 @@ def _condition_text(condition: float) -> str:
     return "infinite" if np.isinf(condition) else f"{condition:.1e}"
 
 
-def violation_table(laws: Mapping[str, ContractionLaw]) -> Table:
+def violation_table(laws: Mapping[str, am.muscle.characteristic.ContractionLaw]) -> Table:
     """Return the regions in which a surface violates monotonicity."""
     by_surface = {name: find_monotonicity_violations(laws[name]) for name in USABLE}
     violations = [(name, b) for name, breaks in by_surface.items() for b in breaks]
@@ -252,7 +253,7 @@ def violation_table(laws: Mapping[str, ContractionLaw]) -> Table:
     )
 
 
-def minimum_table(curves: PlaneCurves, laws: Mapping[str, ContractionLaw]) -> Table:
+def minimum_table(curves: PlaneCurves, laws: Mapping[str, am.muscle.characteristic.ContractionLaw]) -> Table:
     """Return the minimum contraction of the surfaces between the two larger loads."""
     loads = sorted(c.force for c in curves.curves)[-2:]
     pressure, force = LoadRange(0.0, curves.max_pressure, loads[0], loads[1]).grid(351, 651)

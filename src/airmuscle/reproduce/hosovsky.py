@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..analysis.energy_defect import maxwell_defect
-from ..characteristic.base import Characteristic
-from ..characteristic.contractile_surface import exponents
+import airmuscle as am
+
 from ..core.reference import cite
-from ..geometry.base import Geometry
 from ..library import law_file
+from ..muscle.characteristic.contractile_surface import exponents
+from ..muscle.characteristic.energy_defect import maxwell_defect
 from ..report.chapter import Chapter, Plot, Table
 from . import hosovsky_effect_ranges as causing_over_ranges
 from . import hosovsky_effects as causing
@@ -118,7 +118,7 @@ def _plots(
 def maxwell_table(parameters: UnpublishedParameters) -> Table:
     """Return the Maxwell defects of the fitted surfaces and of the law of the measured muscles."""
     shape = muscle(parameters).geometry
-    laws: dict[str, tuple[Characteristic, Geometry]]
+    laws: dict[str, tuple[am.muscle.characteristic.Characteristic, am.muscle.geometry.Geometry]]
     laws = {f"surface fitted to {name}, without the limits": (surface_fit(name).model, shape) for name in FORCE_MAPS}
     for name in ("dmsp-20-300", "dmsp-10-250"):
         entry = law_file.load_law(name)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..characteristic.contractile_surface import exponents
-from ..identify import Fit
+import airmuscle as am
+
 from ..identify.censored_least_squares import uncensored_rank
+from ..muscle.characteristic.contractile_surface import exponents
 from ..report.chapter import AtMost, Claim, Equal, Kind
 from .hosovsky_effects import Effect
 from .hosovsky_plant import PAPER, SUPPLY_PRESSURE, VOLUME_FLOW_RATIO, surface
@@ -18,7 +19,7 @@ NEGLIGIBLE = 5.0
 """Pressure change [kPa] that is negligible: a tenth of that by heat transfer (chosen)."""
 
 
-def surface_claims(fit: Fit) -> tuple[Claim, ...]:
+def surface_claims(fit: am.Fit) -> tuple[Claim, ...]:
     """Return the checks of the contractile surface: number and rank of its coefficients, force limits."""
     law = surface()
     rank = uncensored_rank(fit.problem, fit.problem.jacobian(fit.values))

@@ -12,17 +12,12 @@ from typing import Any
 
 import numpy as np
 
+import airmuscle as am
+
 from ..core.arrays import Array
 from ..core.plotting import DASHES, LINES, new_figure
-from ..muscle import CubicSeriesSpring, CubicSpring, LinearSpring, SeriesElement, Spring, ViscoelasticWall, Wall
-from ..plant.plant import Plant
-from ..pneumatics import DistributedTube, Orifice, SubsonicIndexValve, Tube, TubeModel, Valve, VirialGas
-from ..pneumatics.gas import EnergyBalance, Gas, Polytropic
-from ..recording import Recording
 from ..report.chapter import Plot, Table
 from ..report.formula import to_mathtext
-from ..simulation import simulate
-from ..simulation.integrators import Rodas4
 from .hosovsky_plant import MATRIX, MATRIX_BY_VOLUME, ChosenValue, UnpublishedParameters, hanging_load, plant
 from .hosovsky_schedule import DISCHARGING, DURATION, FILLING, SCHEDULE
 
@@ -66,16 +61,16 @@ class Substitution:
 
     cause: str
     component: str
-    gas: Gas | None = None
-    spring: Spring | None = None
-    wall: Wall | None = None
-    valve: Orifice = MATRIX
-    tube: TubeModel | None = None
-    series: SeriesElement | None = None
+    gas: am.pneumatics.Gas | None = None
+    spring: am.muscle.Spring | None = None
+    wall: am.muscle.Wall | None = None
+    valve: am.pneumatics.Orifice = MATRIX
+    tube: am.pneumatics.TubeModel | None = None
+    series: am.muscle.SeriesElement | None = None
     braid_angle: float | None = None
     pressure_column: str = "pressure"
 
-    def plant(self, parameters: UnpublishedParameters) -> Plant:
+    def plant(self, parameters: UnpublishedParameters) -> am.Plant:
         """Return the plant with the substituted component."""
         if self.braid_angle is not None:
             parameters = parameters.with_value("braid_angle", self.braid_angle)
@@ -93,44 +88,47 @@ COMBINED = "combined"
 def substitutions(parameters: UnpublishedParameters, suspected: SuspectedCauses) -> tuple[Substitution, ...]:
     """Return all substitutions by cause; the last one combines one of each cause."""
     s, stiffness = suspected, parameters.stiffness.value
-    series = CubicSeriesSpring(s.series_stiffness.value, s.series_hardening.value)
+    series = am.muscle.CubicSeriesSpring(s.series_stiffness.value, s.series_hardening.value)
     length, diameter, dead = s.line_length.value, s.line_diameter.value, s.dead_volume.value
     critical = dataclasses.replace(MATRIX, critical_ratio=s.critical_ratio.value)
-    lumped, heat = Tube.from_dimensions(length, diameter), EnergyBalance(s.heat_transfer.value)
-    indexed = SubsonicIndexValve(MATRIX.conductance, MATRIX.critical_ratio, s.index.value)
+    lumped, heat = (
+        am.pneumatics.Tube.from_dimensions(length, diameter),
+        am.pneumatics.EnergyBalance(s.heat_transfer.value),
+    )
+    indexed = am.pneumatics.SubsonicIndexValve(MATRIX.conductance, MATRIX.critical_ratio, s.index.value)
     laminar = dataclasses.replace(MATRIX, laminar_ratio=s.laminar_ratio.value)
-    hardening = CubicSpring(stiffness, s.hardening.value)
-    wall = ViscoelasticWall(s.wall_compliance.value, s.wall_time_constant.value)
+    hardening = am.muscle.CubicSpring(stiffness, s.hardening.value)
+    wall = am.muscle.ViscoelasticWall(s.wall_compliance.value, s.wall_time_constant.value)
     angles = parameters.braid_angle
     return (
         Substitution("line", "volume and resistance", tube=lumped),
-        Substitution("line", "with inertia, 10 segments", tube=DistributedTube(length, diameter, 10)),
+        Substitution("line", "with inertia, 10 segments", tube=am.pneumatics.DistributedTube(length, diameter, 10)),
         Substitution("line", "pressure measured at the valve", tube=lumped, pressure_column="tube.pressure"),
         Substitution("flow law", rf"\(b = {s.critical_ratio.value:g}\)", valve=critical),
         Substitution("flow law", rf"\(m = {s.index.value:g}\)", valve=indexed),
         Substitution("flow law", f"laminar above {s.laminar_ratio.value:g}", valve=laminar),
-        *(Substitution("heat transfer", rf"first law, \(hA = {value:g}\) W/K", gas=EnergyBalance(value))
+        *(Substitution("heat transfer", rf"first law, \(hA = {value:g}\) W/K", gas=am.pneumatics.EnergyBalance(value))
           for value in (s.heat_transfer.low, s.heat_transfer.value, s.heat_transfer.high)),
-        Substitution("heat transfer", "first law, adiabatic", gas=EnergyBalance(0.0)),
-        Substitution("heat transfer", r"polytropic, \(n = 1.2\)", gas=Polytropic(1.2)),
-        Substitution("spring", "no spring", spring=LinearSpring(0.0)),
-        Substitution("spring", "three times the stiffness", spring=LinearSpring(3.0 * stiffness)),
+        Substitution("heat transfer", "first law, adiabatic", gas=am.pneumatics.EnergyBalance(0.0)),
+        Substitution("heat transfer", r"polytropic, \(n = 1.2\)", gas=am.Polytropic(1.2)),
+        Substitution("spring", "no spring", spring=am.LinearSpring(0.0)),
+        Substitution("spring", "three times the stiffness", spring=am.LinearSpring(3.0 * stiffness)),
         Substitution("spring", "hardening spring", spring=hardening),
         Substitution("spring", "nonlinear series spring", series=series),
         Substitution("volume", f"braid angle {angles.low:g} rad", braid_angle=angles.low),
         Substitution("volume", f"braid angle {angles.high:g} rad", braid_angle=angles.high),
         Substitution("volume", "viscoelastic wall", wall=wall),
         Substitution("volume", f"fittings of {dead * 1e6:g} cm³", tube=_dead_volume(dead)),
-        Substitution("gas law", "van der Waals, second virial coefficient", gas=VirialGas()),
+        Substitution("gas law", "van der Waals, second virial coefficient", gas=am.pneumatics.VirialGas()),
         Substitution("gas law", r"volume flow of (11), \(P_0 Q\)", valve=MATRIX_BY_VOLUME),
         Substitution(COMBINED, r"line, \(b\), first law, spring, wall", heat, hardening, wall,
                      critical, dataclasses.replace(lumped, gas=heat)),
     )  # fmt: skip
 
 
-def _dead_volume(volume: float) -> Tube:
+def _dead_volume(volume: float) -> am.pneumatics.Tube:
     """Return a volume with a wide opening to the muscle: a hundred times the conductance of the valve."""
-    return Tube(Valve(100.0 * MATRIX.conductance, 0.5), volume)
+    return am.pneumatics.Tube(am.Valve(100.0 * MATRIX.conductance, 0.5), volume)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -156,14 +154,14 @@ def compute_effects(parameters: UnpublishedParameters, suspected: SuspectedCause
     return tuple(effect_of(base, item, run_fill_of(item, parameters)) for item in substitutions(parameters, suspected))
 
 
-def run_fill_of(substitution: Substitution, parameters: UnpublishedParameters) -> Recording:
+def run_fill_of(substitution: Substitution, parameters: UnpublishedParameters) -> am.Recording:
     """Simulate fill and discharge of the plant with a substituted component."""
-    return simulate(
-        substitution.plant(parameters), SCHEDULE, duration=DURATION, integrator=Rodas4(1e-7), output_times=SPACING
+    return am.simulate(
+        substitution.plant(parameters), SCHEDULE, duration=DURATION, integrator=am.Rodas4(1e-7), output_times=SPACING
     )
 
 
-def effect_of(base: Recording, substitution: Substitution, run: Recording) -> Effect:
+def effect_of(base: am.Recording, substitution: Substitution, run: am.Recording) -> Effect:
     """Return the changes of a run with a substituted component relative to that of the printed plant."""
     pressure, contraction = (
         run[substitution.pressure_column] - base["pressure"],

@@ -7,13 +7,10 @@ import re
 
 import numpy as np
 
+import airmuscle as am
+
 from ..core.plotting import BLACK, LINES, new_figure
-from ..plant.plant import Plant
-from ..pneumatics import Valve
-from ..recording import Recording
 from ..report.chapter import AtMost, Claim, Equal, Kind, Plot
-from ..simulation import simulate
-from ..simulation.integrators import DormandPrince8, Integrator, Rodas4
 from .hosovsky_plant import MATRIX, PAPER, UnpublishedParameters, hanging_load, plant
 from .hosovsky_schedule import DISCHARGING, DURATION, FILLING, SCHEDULE
 
@@ -22,19 +19,19 @@ from .hosovsky_schedule import DISCHARGING, DURATION, FILLING, SCHEDULE
 class FillRun:
     """The simulation of Fig. 3 with the printed and with an adaptive integrator."""
 
-    plant: Plant
-    printed_method: Recording
-    adaptive: Recording
+    plant: am.Plant
+    printed_method: am.Recording
+    adaptive: am.Recording
 
 
-def run_fill(parameters: UnpublishedParameters, valve: Valve = MATRIX) -> FillRun:
+def run_fill(parameters: UnpublishedParameters, valve: am.Valve = MATRIX) -> FillRun:
     """Simulate 25 s with ode8 at 1e-4 s, as printed, and with Rodas4 at rtol = 1e-8."""
     system = plant(parameters, hanging_load(parameters), valve=valve)
-    return FillRun(system, _run(system, DormandPrince8(1e-4)), _run(system, Rodas4(1e-8)))
+    return FillRun(system, _run(system, am.DormandPrince8(1e-4)), _run(system, am.Rodas4(1e-8)))
 
 
-def _run(system: Plant, method: Integrator) -> Recording:
-    return simulate(system, SCHEDULE, duration=DURATION, integrator=method)
+def _run(system: am.Plant, method: am.simulation.Integrator) -> am.Recording:
+    return am.simulate(system, SCHEDULE, duration=DURATION, integrator=method)
 
 
 def figure_3(fill: FillRun) -> Plot:
@@ -55,7 +52,7 @@ def figure_3(fill: FillRun) -> Plot:
     )
 
 
-def valve_figure(valve: Valve, temperature: float) -> Plot:
+def valve_figure(valve: am.Valve, temperature: float) -> Plot:
     """Return the mass flow of the valve over the pressure ratio: choked, subsonic, laminar."""
     upstream = 650e3
     ratio = np.linspace(0.0, 1.0, 2001)
@@ -74,10 +71,10 @@ def valve_figure(valve: Valve, temperature: float) -> Plot:
     )
 
 
-def end_of_choked_flow(plant: Plant) -> tuple[float, float]:
+def end_of_choked_flow(plant: am.Plant) -> tuple[float, float]:
     """Return the absolute muscle pressure [Pa] at which the choked flow ends, and the pressure step of a row [Pa]."""
     instants = np.append(np.arange(FILLING[0], FILLING[0] + 1.0, 1e-4), DURATION)
-    run = simulate(plant, SCHEDULE, duration=DURATION, integrator=Rodas4(1e-8), output_times=instants)
+    run = am.simulate(plant, SCHEDULE, duration=DURATION, integrator=am.Rodas4(1e-8), output_times=instants)
     filling = (run["time"] >= FILLING[0]) & (run["time"] < FILLING[0] + 1.0)
     flow, pressure = run["mass_flow"][filling], run["pressure"][filling] + plant.ambient.pressure
     subsonic = int(np.argmax(flow < flow.max() * (1 - 1e-9)))

@@ -5,27 +5,23 @@ from __future__ import annotations
 import dataclasses
 import functools
 
-from ..characteristic.contractile_surface import ContractileSurface
+import airmuscle as am
+
 from ..core.reference import CHOSEN, Reference
-from ..geometry.braid import Braid
-from ..identify import Fit, fit
 from ..library import catalogue
-from ..mechanism import HangingMass, Mechanism, WithLatch
-from ..muscle import LinearDamper, LinearSpring, Muscle, RigidSeriesElement, RigidWall, SeriesElement, Spring, Wall
-from ..plant.plant import Plant
-from ..pneumatics import FillDischarge, Orifice, Supply, TubeModel, Valve, WithTubes
-from ..pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, Ambient, Gas, Isothermal
 from ..report.formatting import format_number, format_quantity, typographic
 
 PAPER = "hosovsky"
 FORCE_MAPS = ("dmsp-20-300", "festo-tool-dmsp-20")
 """Data of the contractile surface, which the paper does not print: a measured force map and the sizing-tool table."""
 
-MATRIX = Valve(2.6167e-9, 0.433)
+MATRIX = am.Valve(2.6167e-9, 0.433)
 """MATRIX EMX821.104C224: b = 0.433 and the digits of C are printed; the exponent e-9 is lost in our copy."""
 REFERENCE_PRESSURE = 100e3
 """Pressure P0 of the reference atmosphere of ISO 8778 [Pa]."""
-VOLUME_FLOW_RATIO = REFERENCE_PRESSURE / (GAS_CONSTANT * REFERENCE_TEMPERATURE * REFERENCE_DENSITY)
+VOLUME_FLOW_RATIO = REFERENCE_PRESSURE / (
+    am.pneumatics.GAS_CONSTANT * am.pneumatics.REFERENCE_TEMPERATURE * am.pneumatics.REFERENCE_DENSITY
+)
 """Ratio P0/(R T0 rho0) of the pressure rates by the volume flow of equation (11) and by the mass flow of ISO 6358 [1].
 
 The density rho0 of ISO 8778 is that of humid air and R that of dry air, so that R T0 rho0 = 99 716 Pa."""
@@ -91,55 +87,62 @@ class UnpublishedParameters:
 
 
 @functools.cache
-def surface_fit(data: str = FORCE_MAPS[0]) -> Fit:
+def surface_fit(data: str = FORCE_MAPS[0]) -> am.Fit:
     """Return the fit of the 21 coefficients to a force map of the library; rows clamped at zero force are censored."""
-    return fit(ContractileSurface.blank(5, max_force=1e5), catalogue.load_data(data))
+    return am.fit(am.muscle.characteristic.ContractileSurface.blank(5, max_force=1e5), catalogue.load_data(data))
 
 
-def surface(data: str = FORCE_MAPS[0]) -> ContractileSurface:
+def surface(data: str = FORCE_MAPS[0]) -> am.muscle.characteristic.ContractileSurface:
     """Return the fitted surface, limited to 0 to 1200 N by the force compensator of the paper."""
     fitted = surface_fit(data).model
-    assert isinstance(fitted, ContractileSurface)
+    assert isinstance(fitted, am.muscle.characteristic.ContractileSurface)
     return dataclasses.replace(fitted, max_force=1200.0)
 
 
-def muscle(parameters: UnpublishedParameters, data: str = FORCE_MAPS[0], spring: Spring | None = None) -> Muscle:
+def muscle(
+    parameters: UnpublishedParameters, data: str = FORCE_MAPS[0], spring: am.muscle.Spring | None = None
+) -> am.Muscle:
     """Return the Hill muscle of equation (1)."""
-    braid = Braid(0.010, parameters.braid_angle.value, parameters.length.value)
-    return Muscle(
-        surface(data), braid, spring or LinearSpring(parameters.stiffness.value), LinearDamper(parameters.damping.value)
+    braid = am.muscle.geometry.Braid(0.010, parameters.braid_angle.value, parameters.length.value)
+    return am.Muscle(
+        surface(data),
+        braid,
+        spring or am.LinearSpring(parameters.stiffness.value),
+        am.LinearDamper(parameters.damping.value),
     )
 
 
 def plant(
     parameters: UnpublishedParameters,
-    mechanism: Mechanism,
+    mechanism: am.Mechanism,
     *,
-    gas: Gas | None = None,
-    spring: Spring | None = None,
-    wall: Wall | None = None,
-    valve: Orifice = MATRIX,
-    tube: TubeModel | None = None,
-    series: SeriesElement | None = None,
+    gas: am.pneumatics.Gas | None = None,
+    spring: am.muscle.Spring | None = None,
+    wall: am.muscle.Wall | None = None,
+    valve: am.pneumatics.Orifice = MATRIX,
+    tube: am.pneumatics.TubeModel | None = None,
+    series: am.muscle.SeriesElement | None = None,
     data: str = FORCE_MAPS[0],
-) -> Plant:
+) -> am.Plant:
     """Return the plant: muscle, two valves with closed centre, load and gas.
 
     The defaults are those of the paper: isothermal gas, rigid wall, no line, no series spring.
     """
-    valves = FillDischarge(Supply(SUPPLY_PRESSURE), valve, valve)
+    valves = am.FillDischarge(am.Supply(SUPPLY_PRESSURE), valve, valve)
     actuator = dataclasses.replace(
-        muscle(parameters, data, spring), wall=wall or RigidWall(), series=series or RigidSeriesElement()
+        muscle(parameters, data, spring),
+        wall=wall or am.muscle.RigidWall(),
+        series=series or am.muscle.RigidSeriesElement(),
     )
-    circuit = valves if tube is None else WithTubes(valves, tube)
-    return Plant(actuator, circuit, mechanism, gas or Isothermal(), Ambient())
+    circuit = valves if tube is None else am.pneumatics.WithTubes(valves, tube)
+    return am.Plant(actuator, circuit, mechanism, gas or am.Isothermal(), am.Ambient())
 
 
-def hanging_load(parameters: UnpublishedParameters) -> HangingMass:
+def hanging_load(parameters: UnpublishedParameters) -> am.HangingMass:
     """Return the load during fill and discharge."""
-    return HangingMass(parameters.load.value)
+    return am.HangingMass(parameters.load.value)
 
 
-def latched_load() -> WithLatch:
+def latched_load() -> am.WithLatch:
     """Return the latched load of the quick release."""
-    return WithLatch(HangingMass(RELEASED_MASS))
+    return am.WithLatch(am.HangingMass(RELEASED_MASS))

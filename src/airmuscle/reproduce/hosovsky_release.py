@@ -9,17 +9,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..control.inputs import Schedule
+import airmuscle as am
+
 from ..core.plotting import DASHES, LINES, legend_below, new_figure
-from ..recording import Recording
 from ..report.chapter import AtLeast, AtMost, Claim, Plot, PublishedValue, Table
 from ..report.formatting import format_unit
-from ..simulation import simulate
-from ..simulation.integrators import Rodas4
 from .hosovsky_plant import FORCE_MAPS, PAPER, UnpublishedParameters, latched_load, plant
 
 RELEASED_AT, DURATION = 0.5, 6.0
-SCHEDULE = Schedule({"latched": ((0.0, 1.0), (RELEASED_AT, 0.0))})
+SCHEDULE = am.Schedule({"latched": ((0.0, 1.0), (RELEASED_AT, 0.0))})
 MAX_DAMPING_DIFFERENCE = 0.30
 """Maximum relative difference of comparable damping, as a fraction of the larger value (chosen)."""
 STATEMENTS: Mapping[str, PublishedValue] = {
@@ -43,7 +41,7 @@ class Release:
     """One release: the simulation and its characteristic values, SI units."""
 
     pressure: float
-    run: Recording
+    run: am.Recording
     initial_acceleration: float
     max_contraction: float
     damping_ratio: float
@@ -58,12 +56,12 @@ def release(
     The muscle is released `RELEASED_AT` seconds after the start; `duration` [s] includes that time.
     """
     system = plant(parameters, latched_load(), data=data)
-    run = simulate(
+    run = am.simulate(
         system,
         SCHEDULE,
         duration=duration,
         initial_state=system.state_at(pressure=pressure),
-        integrator=Rodas4(1e-9),
+        integrator=am.Rodas4(1e-9),
         output_times=1e-3,
     )
     free = run["time"] >= RELEASED_AT

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from ..geometry.circular_arc import FERRARESI_2001
-from ..geometry.meridian import SAGA_2007
-from ..geometry.pleated import DAERDEN_LEFEBER_2001
+from ..muscle.geometry.circular_arc import FERRARESI_2001
+from ..muscle.geometry.meridian import SAGA_2007
+from ..muscle.geometry.pleated import DAERDEN_LEFEBER_2001
 from ..report.chapter import Chapter
 from .saga2007_claims import ACCURACY_LIMIT, LOW_PRESSURE, all_claims
 from .saga2007_figures import plots

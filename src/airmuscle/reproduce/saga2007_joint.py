@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..characteristic.base import Characteristic
-from ..characteristic.rubber import RubberLine
+import airmuscle as am
+
 from ..core.arrays import Array
 from ..core.plotting import BLACK, DASHES, legend_outside, new_figure
 from ..core.plotting import LINES as COLOURS
@@ -43,7 +43,7 @@ GRID = 31
 """Angles of the search, between which the torque is interpolated by a cubic spline."""
 
 
-def models(line: RubberLine) -> dict[str, Characteristic]:
+def models(line: am.muscle.characteristic.RubberLine) -> dict[str, am.muscle.characteristic.Characteristic]:
     """Return the models that compute the pressures, by name, for one rubber line."""
     return {
         r"printed, \(w = 2\), \(q = 1\)": interpretation(line, 2.0, 1.0),
@@ -53,7 +53,7 @@ def models(line: RubberLine) -> dict[str, Characteristic]:
     }
 
 
-def commanded_pressures(law: Characteristic, tension: float) -> Array:
+def commanded_pressures(law: am.muscle.characteristic.Characteristic, tension: float) -> Array:
     """Return the pressures [Pa] (2, A) of both muscles for ANGLES at equal tensions [N]."""
     return np.array([pressure_along(law, OFFSET + sign * ANGLES * RADIUS / LENGTH, tension) for sign in (1.0, -1.0)])
 

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..characteristic.rubber import RubberLine
+import airmuscle as am
+
 from ..core.errors import ParameterError, SolveError
 from ..core.plotting import BLACK, DASHES, LINES, new_figure
-from ..geometry.circular_arc import CircularArc
 from ..report.chapter import AtLeast, Claim, Plot, Table
 from . import saga2007_pairs as pairs
 from .saga2007_muscle import DIAMETER, LENGTH, PAPER, PRESSURE, WALL, exact_meridian
@@ -50,7 +50,7 @@ class Ferraresi2001:
     Reference: Ferraresi et al. 2001, as quoted by Saga et al. 2007.
     """
 
-    rubber: RubberLine
+    rubber: am.muscle.characteristic.RubberLine
     fibre_length: float = LENGTH
     end_radius: float = DIAMETER / 2
     initial_radius: float = DIAMETER / 2
@@ -69,7 +69,7 @@ class Ferraresi2001:
 
     def circle(self, contraction: Any) -> Circle:
         """Radius [m] and half angle [rad] of the meridian at a contraction, from sin(phi)/phi = 1 - contraction."""
-        half_angle = np.sqrt(CircularArc().angle_squared(contraction))
+        half_angle = np.sqrt(am.muscle.geometry.CircularArc().angle_squared(contraction))
         return Circle(self.fibre_length / (2 * half_angle), half_angle)
 
     def middle_radius(self, contraction: Any) -> Any:

@@ -6,8 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from ..characteristic.saga2007 import RUBBER_TEST_STRAIN, Saga2007
+import airmuscle as am
+
 from ..core import autodiff
+from ..muscle.characteristic.saga2007 import RUBBER_TEST_STRAIN
 from ..report.chapter import Table
 from . import saga2007_pairs
 from .saga2007_claims import FIG_2
@@ -151,7 +153,7 @@ _VIRTUAL_WORK_TITLE = (
 )
 
 
-def virtual_work(law: Saga2007, pressure: float, contraction: Any) -> Any:
+def virtual_work(law: am.muscle.characteristic.Saga2007, pressure: float, contraction: Any) -> Any:
     """Return (p dV/deps - dU/deps)/L_0 [N] with the volume and the rubber energy of the law's outline."""
     tube = law.geometry
     energy = saga2007_pairs.SegmentEnergy(tube, law.rubber)

@@ -28,7 +28,6 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from ..analysis.equilibrium import find_equilibrium
 from ..control.control_loop import ControlLoop
 from ..control.inputs import InputSignal
 from ..core.errors import ParameterError, suggestion
@@ -40,6 +39,7 @@ from ..library.plant_file import SCENARIO_TABLES, build_plant, plant_tables
 from ..plant.plant import Plant
 from ..recording import Recording
 from ..simulation import Integrator, Problem, solve
+from ..simulation.equilibrium import find_equilibrium
 from .controller import build_control_loop, signal_units
 from .inputs import build_input_signal
 from .plant_uncertainty import read_plant_uncertainty

@@ -1,5 +1,6 @@
-"""Simulation: problems and their solutions, integrators, open-loop and closed-loop runs, forward sensitivities."""
+"""Simulation: equilibria, problems and their solutions, integrators, runs and control loops, forward sensitivities."""
 
+from .equilibrium import Equilibrium, find_equilibria, find_equilibrium
 from .integrators import DormandPrince8, ExplicitRungeKutta, Integrator, Rodas4, RungeKutta4
 from .jax_loop import loop_in_jax
 from .law_with_sensitivities import LawWithSensitivities
@@ -17,6 +18,7 @@ from .with_sensitivities import WithSensitivities, sensitivity
 
 __all__ = [
     "DormandPrince8",
+    "Equilibrium",
     "ExplicitRungeKutta",
     "Integrator",
     "LawWithSensitivities",
@@ -32,6 +34,8 @@ __all__ = [
     "WithSensitivities",
     "advance",
     "differentiate_loop",
+    "find_equilibria",
+    "find_equilibrium",
     "loop_in_jax",
     "sensitivity",
     "simulate",

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..analysis.equilibrium import find_equilibrium
 from ..compile.program import CompiledSystem, compile_system
 from ..control.control_loop import ControlLoop, ControlLoopState
 from ..control.inputs import InputSignal, check_input_signal
@@ -24,6 +23,7 @@ from ..core.errors import ParameterError
 from ..core.short_repr import ShortRepr
 from ..core.system import System
 from ..plant.state import check_system, state_vector
+from .equilibrium import find_equilibrium
 from .integrators import Integrator, default_integrator
 from .output_times import output_times
 

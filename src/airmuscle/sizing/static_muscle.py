@@ -9,9 +9,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..characteristic import Characteristic, ForceLaw
-from ..characteristic.base import ContractionLaw, PressureLaw
-from ..characteristic.validity_range import validity_range_of
 from ..core import leaves
 from ..core.arrays import Array
 from ..core.errors import ParameterError, SolveError
@@ -19,6 +16,9 @@ from ..core.short_repr import ShortRepr
 from ..library.entry import Entry
 from ..library.scaling import scale_entry
 from ..muscle import ElasticSeriesElement, Muscle
+from ..muscle.characteristic import Characteristic, ForceLaw
+from ..muscle.characteristic.base import ContractionLaw, PressureLaw
+from ..muscle.characteristic.validity_range import validity_range_of
 from ..muscle.ratings import LENGTH_BOUNDS
 from .requirement import SizingConditions
 

@@ -8,9 +8,10 @@ import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+import airmuscle as am
+
 from ..core.errors import AirmuscleError, AirmuscleWarning, ColumnError
 from ..core.units import AMBIENT_PRESSURE, quantity
-from ..recording import Decimation, Recording
 from ..recording.constants import parse_constant_name
 from ..recording.heading import Heading, parse_heading
 from ..recording.interpret import interpret, resolve_headings, unit_conversion
@@ -18,7 +19,6 @@ from ..recording.mapping import apply_mapping
 from ..recording.reader import read_tables
 from ..recording.segment import check_contents
 from ..recording.table import RawTable
-from ..recording.time_base import RecordedTime, TimeBase
 from ..recording.unit_consistency import check_unit_consistency
 from .fit_hints import as_field_error, in_page_words
 from .fit_settings import FieldError, FitSettings
@@ -56,7 +56,7 @@ class ReadSet:
 
     columns: dict[str, list[FileColumn]] = dataclasses.field(default_factory=dict)
     """Columns by the name of the file."""
-    recordings: list[Recording] = dataclasses.field(default_factory=list)
+    recordings: list[am.Recording] = dataclasses.field(default_factory=list)
     files: list[str] = dataclasses.field(default_factory=list)
     """The name of the file of each recording."""
     problems: list[FieldError] = dataclasses.field(default_factory=list)
@@ -133,19 +133,19 @@ def without_folder(text: str, folder: Path) -> str:
     return text
 
 
-def _time_base(settings: FitSettings) -> TimeBase:
+def _time_base(settings: FitSettings) -> am.recording.TimeBase:
     mapping = settings.mapping({})
-    return mapping.time_base if mapping.time else RecordedTime(True)
+    return mapping.time_base if mapping.time else am.recording.RecordedTime(True)
 
 
 def _tables(path: Path, settings: FitSettings) -> tuple[RawTable, ...]:
     """The tables of a file; columns without headings are named by their numbers."""
     try:
-        return read_tables(path, settings.mapping(), Decimation(MAX_ROWS))
+        return read_tables(path, settings.mapping(), am.recording.Decimation(MAX_ROWS))
     except ColumnError as error:
         if error.hint is None or error.hint.argument != "columns":
             raise
-        return read_tables(path, settings.mapping({**settings.columns, "1": ""}), Decimation(MAX_ROWS))
+        return read_tables(path, settings.mapping({**settings.columns, "1": ""}), am.recording.Decimation(MAX_ROWS))
 
 
 def _constants(path: Path, settings: FitSettings) -> dict[str, float | str]:
@@ -225,7 +225,7 @@ def _unit_text(column: FileColumn, heading: Heading, error: AirmuscleError) -> s
     return in_page_words(error.message).partition(": ")[2] or str(error.message)
 
 
-def _check_needed(recording: Recording, file: str, found: ReadSet) -> None:
+def _check_needed(recording: am.Recording, file: str, found: ReadSet) -> None:
     """Complain about each quantity that a static fit needs and the recording lacks."""
     for name in NEEDED:
         if name in recording:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from ..identify import Comparison, Fit
+import airmuscle as am
+
 from ..identify.law_selection import LawSelection
 from ..report.band_plot import band_curves
 from ..report.equation_section import equation_section
@@ -16,7 +17,7 @@ MAX_POINTS = 4000
 """Greatest number of points of the parity chart; of more rows every n-th one is shown (chosen)."""
 
 
-def result_sheet(selection: LawSelection, fit: Fit) -> dict[str, Any]:
+def result_sheet(selection: LawSelection, fit: am.Fit) -> dict[str, Any]:
     """The selection and the recommended fit as plain data."""
     best = selection.recommended
     return {
@@ -32,7 +33,7 @@ def result_sheet(selection: LawSelection, fit: Fit) -> dict[str, Any]:
     }
 
 
-def _comparison(comparison: Comparison) -> dict[str, Any]:
+def _comparison(comparison: am.identify.Comparison) -> dict[str, Any]:
     left_out = (*comparison.excluded, *comparison.unavailable)
     return {
         "purpose": comparison.purpose,
@@ -50,7 +51,7 @@ def _comparison(comparison: Comparison) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _fit(fit: Fit) -> dict[str, Any]:
+def _fit(fit: am.Fit) -> dict[str, Any]:
     return {
         "law": type(fit.model).__name__,
         "summary": [list(row) for row in fit.summary()],
@@ -67,7 +68,7 @@ def _fit(fit: Fit) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _equations(fit: Fit) -> list[dict[str, Any]]:
+def _equations(fit: am.Fit) -> list[dict[str, Any]]:
     shown, _ = equation_section(fit)
     return [
         {
@@ -78,7 +79,7 @@ def _equations(fit: Fit) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def _parity(fit: Fit) -> dict[str, Any]:
+def _parity(fit: am.Fit) -> dict[str, Any]:
     quantity = fit.fitted_quantity
     step = max(1, math.ceil(fit.rows_used / MAX_POINTS))
     rows = slice(None, None, step)
@@ -94,7 +95,7 @@ def _parity(fit: Fit) -> dict[str, Any]:
     }
 
 
-def _bands(fit: Fit) -> dict[str, Any] | None:
+def _bands(fit: am.Fit) -> dict[str, Any] | None:
     computed = band_curves(fit)
     if computed is None:
         return None

@@ -8,13 +8,14 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ..recording import Recording
+import airmuscle as am
+
 from .fit_settings import FieldError, Rule
 
 Mask = npt.NDArray[np.bool_]
 
 
-def inside(rule: Rule, recording: Recording) -> Mask:
+def inside(rule: Rule, recording: am.Recording) -> Mask:
     """The rows of a recording that a rule describes, shape (N,)."""
     mask = np.ones(len(recording), dtype=bool)
     if rule.rows is not None:
@@ -28,7 +29,7 @@ def inside(rule: Rule, recording: Recording) -> Mask:
     return mask
 
 
-def used_rows(recording: Recording, rules: Sequence[Rule]) -> Mask:
+def used_rows(recording: am.Recording, rules: Sequence[Rule]) -> Mask:
     """The rows of a recording that the rules leave, shape (N,). Raises FieldError for an unknown column."""
     used = np.ones(len(recording), dtype=bool)
     for rule in rules:
@@ -39,7 +40,7 @@ def used_rows(recording: Recording, rules: Sequence[Rule]) -> Mask:
     return used
 
 
-def selected(recordings: Sequence[Recording], rules: Sequence[Rule]) -> list[Recording]:
+def selected(recordings: Sequence[am.Recording], rules: Sequence[Rule]) -> list[am.Recording]:
     """The recordings reduced to the selected rows, with a note on what was left out; without those that are empty.
 
     Raises FieldError if no row is left.

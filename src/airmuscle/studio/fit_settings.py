@@ -10,11 +10,11 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+import airmuscle as am
+
 from ..core.errors import AirmuscleError, InputError
 from ..core.units import quantity
-from ..identify import BlockSplit, GroupSplit, LevelSplit, RunSplit, SpecimenSplit
 from ..library.files import list_laws
-from ..recording import QUANTITIES, ColumnMapping
 
 MAX_RULES = 200
 """Greatest number of selections of rows (chosen)."""
@@ -24,12 +24,16 @@ TEXTS = ("resting_length", "ambient", "file_name", "decimal", "delimiter", "shee
 """Fields with a text that applies to all files."""
 FILE_FACTS = ("resting_length", "length", "specimen")
 """Facts that may be stated for one file."""
-COLUMN_CHOICES = (*QUANTITIES, "resting_length", "ambient")
+COLUMN_CHOICES = (*am.recording.QUANTITIES, "resting_length", "ambient")
 """Quantities of a column."""
-SPLITS: Mapping[str, GroupSplit | None] = {
-    "": None, "run": RunSplit(), "specimen": SpecimenSplit(), "contraction": LevelSplit("contraction"),
-    "pressure": LevelSplit("pressure"), "block": BlockSplit(),
-}  # fmt: skip
+SPLITS: Mapping[str, am.identify.GroupSplit | None] = {
+    "": None,
+    "run": am.identify.RunSplit(),
+    "specimen": am.identify.SpecimenSplit(),
+    "contraction": am.identify.LevelSplit("contraction"),
+    "pressure": am.identify.LevelSplit("pressure"),
+    "block": am.identify.BlockSplit(),
+}
 """Groups that are left out in turn; by default those that the data allow."""
 _UNITS = {"resting_length": "m", "ambient": "Pa", "length": "m"}
 
@@ -74,14 +78,14 @@ class FitSettings:
     leave_out: str
     hysteresis: bool
 
-    def mapping(self, columns: Mapping[str, str] | None = None) -> ColumnMapping:
+    def mapping(self, columns: Mapping[str, str] | None = None) -> am.recording.ColumnMapping:
         """The interpretation of all files, with these columns in place of all. Raises FieldError."""
         texts = {name: text for name, text in self.texts.items() if text}
         constants: dict[str, float | str] = {
             name: texts.pop(name) for name in ("resting_length", "ambient") if name in texts
         }
         try:
-            mapping = ColumnMapping(self.columns if columns is None else columns, constants, **texts)
+            mapping = am.recording.ColumnMapping(self.columns if columns is None else columns, constants, **texts)
             _ = mapping.text_format  # checks delimiter and decimal mark
             return mapping
         except AirmuscleError as error:

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
+import airmuscle as am
+
 from ..core.errors import AirmuscleError
-from ..recording import Recording
 from ..recording.display_units import display_scale
 from ..recording.segment import Inspection, Run, inspect_all
 from .fit_hints import in_page_words
@@ -72,7 +73,9 @@ def _column(column: Any) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _recording(recording: Recording, file: str, inspection: Inspection | None, used: Any, step: int) -> dict[str, Any]:
+def _recording(
+    recording: am.Recording, file: str, inspection: Inspection | None, used: Any, step: int
+) -> dict[str, Any]:
     columns = [name for name in SHOWN if name in recording]
     return {
         "origin": recording.origin,
@@ -118,7 +121,7 @@ def _constant(name: str, value: float | str) -> str:
     return f"{value * factor:.5g} {unit}".strip() if isinstance(value, float | int) else str(value)
 
 
-def _range(name: str, recording: Recording) -> list[float]:
+def _range(name: str, recording: am.Recording) -> list[float]:
     factor, _ = display_scale(name)
     return [float(recording[name].min()) * factor, float(recording[name].max()) * factor]
 

@@ -16,17 +16,16 @@ from typing import Any
 
 import numpy as np
 
+import airmuscle as am
+
 from ..core.errors import AirmuscleError, AirmuscleWarning
 from ..core.output_folder import atomic_folder
-from ..geometry import Geometry
-from ..identify import Candidate, standard_candidates
 from ..identify.hysteresis import LoopFit, find_loops, fit_jointly, fit_loop, loops_not_joined
 from ..identify.hysteresis.selection import select_friction
 from ..identify.law_selection import LawSelection, select_law
 from ..library.entry import Entry
 from ..library.initial_law import find_initial_law
 from ..library.write import part_toml
-from ..recording import Recording
 from ..recording.segment import check_contents, motion_direction
 from ..report.compare_chapter import compare_chapter
 from ..report.fit_files import fitted_entry, left_out_ratio, missing_geometry, write_fit
@@ -82,7 +81,7 @@ def run_fit(folder: str, out: str, settings: FitSettings, report: Report) -> Non
         (staging / RESULT).write_text(as_json(sheet), encoding="utf-8")
 
 
-def _recordings(folder: Path, settings: FitSettings) -> tuple[list[Recording], list[Path]]:
+def _recordings(folder: Path, settings: FitSettings) -> tuple[list[am.Recording], list[Path]]:
     """The selected rows of all recordings, and the names of the files. Raises the first problem as FieldError."""
     found = read_set(folder, settings)
     if found.problems:
@@ -98,18 +97,18 @@ def _recordings(folder: Path, settings: FitSettings) -> tuple[list[Recording], l
 
 
 def _select(
-    recordings: Sequence[Recording], settings: FitSettings, report: Report
-) -> tuple[LawSelection, Geometry | None]:
+    recordings: Sequence[am.Recording], settings: FitSettings, report: Report
+) -> tuple[LawSelection, am.muscle.geometry.Geometry | None]:
     """The selected law, in the words of the page, and the geometry of the library entry if its law is selected."""
 
     def progress(name: str, fraction: float) -> None:
         report(SHARES[0] + (SHARES[1] - SHARES[0]) * fraction, f"comparison: {name}" if name else "comparison")
 
     named = find_initial_law(settings.entry, recordings, 5, "library entry") if settings.entry else None
-    candidates: list[Candidate] | None = None
+    candidates: list[am.identify.Candidate] | None = None
     if named is not None:
-        own = Candidate(f"{settings.entry} (named)", named.entry.characteristic, named.fixed)
-        candidates = [*standard_candidates(recordings), own]
+        own = am.identify.Candidate(f"{settings.entry} (named)", named.entry.characteristic, named.fixed)
+        candidates = [*am.identify.standard_candidates(recordings), own]
     selection = select_law(recordings, candidates, leave_out=SPLITS[settings.leave_out], progress=progress)
     is_named = candidates is not None and selection.recommended.candidate is candidates[-1]
     return _in_page_words(selection), named.entry.geometry if named is not None and is_named else None
@@ -128,7 +127,7 @@ def _in_page_words(selection: LawSelection) -> LawSelection:
     return dataclasses.replace(selection, comparisons=comparisons, recommended=dataclasses.replace(best, fit=fit))
 
 
-def _friction(recordings: Sequence[Recording], folder: Path, report: Report) -> dict[str, Any]:
+def _friction(recordings: Sequence[am.Recording], folder: Path, report: Report) -> dict[str, Any]:
     """The friction of the loops, with its report; the reason if there is no loop."""
 
     with warnings.catch_warnings(record=True) as caught:

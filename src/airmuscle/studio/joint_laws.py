@@ -10,23 +10,9 @@ import dataclasses
 import math
 from collections.abc import Sequence
 
-from ..analysis import JointStatics, joint_statics
-from ..control import (
-    PID,
-    AngleAndStiffness,
-    AntagonisticInverse,
-    Cascade,
-    CoContraction,
-    ControlLaw,
-    ProportionalFeedback,
-    SetpointCommand,
-    SigmaDelta,
-    SplitRange,
-    WithFeedForward,
-)
+import airmuscle as am
+
 from ..core.errors import ParameterError
-from ..plant.plant import Plant
-from ..pneumatics import FillDischarge, ProportionalRegulator, ProportionalValve
 
 BAR = 1e5
 SPARE = 0.02
@@ -66,8 +52,8 @@ class JointController:
     """
 
     key: str
-    law: ControlLaw
-    averaged: ControlLaw
+    law: am.control.ControlLaw
+    averaged: am.control.ControlLaw
     balance: str
     bias: str
     gains: tuple[Gain, ...]
@@ -85,32 +71,32 @@ class ValveSet:
     """
 
     pressures: tuple[str, str]
-    inner: ControlLaw | None
+    inner: am.control.ControlLaw | None
     switching: bool
     offsets: dict[str, float]
     limits: tuple[float, float] = (0.0, math.inf)
 
 
-def valve_set(plant: Plant) -> ValveSet:
+def valve_set(plant: am.Plant) -> ValveSet:
     """The valves of a joint. Raises ParameterError for a circuit that the tab does not know."""
     names, circuit = [muscle.name for muscle in plant.muscles], plant.circuits[0]
     first, second = names
     kinds = {type(each) for each in plant.circuits}
-    if kinds == {ProportionalRegulator} and isinstance(circuit, ProportionalRegulator):
+    if kinds == {am.pneumatics.ProportionalRegulator} and isinstance(circuit, am.pneumatics.ProportionalRegulator):
         pressures = (f"{first}.setpoint", f"{second}.setpoint")
         shift = OPENING * circuit.band
         offsets = {pressures[0]: shift, pressures[1]: -shift}
         highest = min(each.inputs[0].maximum for each in plant.circuits)
         return ValveSet(pressures, None, False, offsets, (shift, highest - shift))
     pressures = (f"{first}.pressure", f"{second}.pressure")
-    if kinds == {ProportionalValve} and isinstance(circuit, ProportionalValve):
+    if kinds == {am.pneumatics.ProportionalValve} and isinstance(circuit, am.pneumatics.ProportionalValve):
         commands = (f"{first}.command", f"{second}.command")
         shift = circuit.overlap + OPENING * (1.0 - circuit.overlap)
-        inner = ProportionalFeedback(pressures, commands, 3.0 / BAR)
+        inner = am.control.ProportionalFeedback(pressures, commands, 3.0 / BAR)
         return ValveSet(pressures, inner, False, {commands[0]: shift, commands[1]: -shift})
-    if kinds == {FillDischarge}:
-        valves = tuple(SplitRange(f"{name}.fill", f"{name}.discharge") for name in names)
-        inner = ProportionalFeedback(pressures, valves, 3.0 / BAR, 0.03 * BAR)
+    if kinds == {am.FillDischarge}:
+        valves = tuple(am.control.SplitRange(f"{name}.fill", f"{name}.discharge") for name in names)
+        inner = am.control.ProportionalFeedback(pressures, valves, 3.0 / BAR, 0.03 * BAR)
         offsets = {f"{first}.fill": OPENING, f"{second}.discharge": OPENING}
         return ValveSet(pressures, inner, True, offsets)
     raise ParameterError(
@@ -119,34 +105,38 @@ def valve_set(plant: Plant) -> ValveSet:
     )
 
 
-def statics_within_valves(plant: Plant) -> JointStatics:
+def statics_within_valves(plant: am.Plant) -> am.analysis.JointStatics:
     """The statics of a joint with pressures that its supply and its regulators can give. Raises ParameterError."""
-    statics, (low, high) = joint_statics(plant), valve_set(plant).limits
+    statics, (low, high) = am.analysis.joint_statics(plant), valve_set(plant).limits
     least, greatest = statics.pressure_range
     if low <= least and greatest <= high:
         return statics
-    return joint_statics(plant, (max(low, least), min(high, greatest)))
+    return am.analysis.joint_statics(plant, (max(low, least), min(high, greatest)))
 
 
-def joint_controllers(plant: Plant, statics: JointStatics) -> tuple[JointController, ...]:
+def joint_controllers(plant: am.Plant, statics: am.analysis.JointStatics) -> tuple[JointController, ...]:
     """The controllers of a joint, whose pressures are within the range of its statics less a part at both ends."""
     valves, (low, high) = valve_set(plant), statics.pressure_range
     pressure_range = (low + SPARE * (high - low), high - SPARE * (high - low))
     affine = all(function.affine for function in statics.unlimited)
     steps = 1 if affine else INVERSE_STEPS
-    inverse = AntagonisticInverse(plant.muscles, plant.mechanism, *pressure_range, steps=steps)
-    ahead = SetpointCommand(valves.pressures, AHEAD)
+    inverse = am.control.AntagonisticInverse(plant.muscles, plant.mechanism, *pressure_range, steps=steps)
+    ahead = am.control.SetpointCommand(valves.pressures, AHEAD)
     found = []
     for key, outer, gains, inside in (
         ("pid", _pid(), PID_GAINS, ""),
         ("cascade", _speed_cascade(), SPEED_GAINS, "inner."),
     ):
         half = 0.5 * (pressure_range[1] - pressure_range[0])
-        alone = Cascade(outer, CoContraction(valves.pressures, 0.0, "mean_pressure"), (-half,), (half,))
+        alone = am.control.Cascade(
+            outer, am.control.CoContraction(valves.pressures, 0.0, "mean_pressure"), (-half,), (half,)
+        )
         found.append(_with_valves(valves, pressure_range, key, alone, "outer.", inside, gains))
-        added = WithFeedForward(ahead, Cascade(outer, CoContraction(valves.pressures, 0.0), (-half,), (half,)))
+        added = am.control.WithFeedForward(
+            ahead, am.control.Cascade(outer, am.control.CoContraction(valves.pressures, 0.0), (-half,), (half,))
+        )
         found.append(_with_valves(valves, pressure_range, f"{key}-ahead", added, "feedback.outer.", inside, gains))
-    law = AngleAndStiffness(
+    law = am.control.AngleAndStiffness(
         inverse, valves.pressures, 15.0, 0.3, 0.5, speed_column="angular_speed",
         acceleration_setpoint="angular_acceleration",
     )  # fmt: skip
@@ -154,13 +144,13 @@ def joint_controllers(plant: Plant, statics: JointStatics) -> tuple[JointControl
     return tuple(found)
 
 
-def _pid() -> PID:
-    return PID("angle", DIFFERENCE, gain=2.0 * BAR, integral_time=0.3, derivative_time=0.05, derivative_filter=5.0)
+def _pid() -> am.PID:
+    return am.PID("angle", DIFFERENCE, gain=2.0 * BAR, integral_time=0.3, derivative_time=0.05, derivative_filter=5.0)
 
 
-def _speed_cascade() -> Cascade:
-    inner = PID("angular_speed", DIFFERENCE, gain=0.1 * BAR, integral_time=0.1)
-    return Cascade(PID("angle", "angular_speed", gain=6.0), inner, (-MAX_SPEED,), (MAX_SPEED,))
+def _speed_cascade() -> am.control.Cascade:
+    inner = am.PID("angular_speed", DIFFERENCE, gain=0.1 * BAR, integral_time=0.1)
+    return am.control.Cascade(am.PID("angle", "angular_speed", gain=6.0), inner, (-MAX_SPEED,), (MAX_SPEED,))
 
 
 PID_GAINS = (
@@ -184,7 +174,7 @@ PRESSURE_GAIN = Gain("inner.gain", "K_p", "gain of the pressures", "1/bar", 1.0 
 
 
 def _with_valves(
-    valves: ValveSet, limits: tuple[float, float], key: str, law: ControlLaw, path: str, inside: str,
+    valves: ValveSet, limits: tuple[float, float], key: str, law: am.control.ControlLaw, path: str, inside: str,
     gains: Sequence[Gain], *, bias: bool = True,
 ) -> JointController:  # fmt: skip
     """A law that commands pressures, with the inner control of the valves.
@@ -196,7 +186,7 @@ def _with_valves(
     balance, start = f"{path}{inside}integral", f"{path}{inside}initial_output" if bias and not ahead else ""
     if valves.inner is None:
         return JointController(key, law, law, balance, start, rows)
-    averaged = Cascade(law, valves.inner, (limits[0],) * 2, (limits[1],) * 2)
+    averaged = am.control.Cascade(law, valves.inner, (limits[0],) * 2, (limits[1],) * 2)
     rows = tuple(dataclasses.replace(gain, path=f"outer.{gain.path}") for gain in rows)
-    whole = SigmaDelta(averaged) if valves.switching else averaged
+    whole = am.control.SigmaDelta(averaged) if valves.switching else averaged
     return JointController(key, whole, averaged, f"outer.{balance}", start and f"outer.{start}", (*rows, PRESSURE_GAIN))

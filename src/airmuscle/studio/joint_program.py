@@ -15,13 +15,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import airmuscle as am
+
 from ..analysis.joint_torque import load_function, torque_functions
 from ..compile.functions import Printer, TracedSystem
 from ..compile.text.javascript import JavaScriptLanguage
-from ..control import ControlLaw
 from ..core import tree
 from ..core.errors import ParameterError
-from ..plant.plant import Plant
 from ..simulation.compiled_law import trace_sample
 
 PAIR = (
@@ -31,7 +31,7 @@ PAIR = (
 """Results of `pair`, in SI units: sums over both muscles, tensions, and the torque of weights and springs."""
 
 
-def law_program(law: ControlLaw, *, sample: bool, slopes: bool) -> str:
+def law_program(law: am.control.ControlLaw, *, sample: bool, slopes: bool) -> str:
     """The functions of a control law; its parameters are the vector p, in the order of its leaves."""
     import casadi
 
@@ -78,7 +78,7 @@ def linear_program(traced: TracedSystem, state_names: tuple[str, ...], columns: 
     return _module(printer, ["linear"])
 
 
-def pair_program(plant: Plant) -> str:
+def pair_program(plant: am.Plant) -> str:
     """The statics of a joint as a function of the angle and of both pressures, and the torque that a motion needs."""
     import casadi
 
@@ -101,7 +101,7 @@ def pair_program(plant: Plant) -> str:
     return _module(printer, ["pair", "needed"])
 
 
-def _needed_torque(plant: Plant, x: Any) -> Any:
+def _needed_torque(plant: am.Plant, x: Any) -> Any:
     """Torque [N m] of the muscles without their dampers for an angle, its speed and acceleration, and two pressures."""
     import casadi
 

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis import JointStatics
+import airmuscle as am
+
 from ..compile.program import compile_system
 from ..core.tree import leaves
 from ..library.files import list_plants
 from ..library.plant_file import plant_tables
-from ..plant.plant import Plant
 from ..scenario.scenario import TABLES, build_scenario
 from ..study.control_benchmark import STANDARD_TASKS, ControlTask
 from .joint_laws import JointController, joint_controllers, statics_within_valves, valve_set
@@ -71,7 +71,7 @@ def joint_tables(tables: Mapping[str, Any]) -> dict[str, Any]:
     return {**kept, "plant": plant, "input": {}, "run": {"duration": DURATION, "initial_state": run["initial_state"]}}
 
 
-def reachable_region(statics: JointStatics) -> dict[str, list[float]]:
+def reachable_region(statics: am.analysis.JointStatics) -> dict[str, list[float]]:
     """Least and greatest stiffness [N m/rad] at angles [rad] without a load, where both muscles are taut."""
     angles = np.linspace(*statics.angle_range, REGION_ANGLES)
     least, greatest = statics.stiffness_limits(angles)
@@ -80,7 +80,7 @@ def reachable_region(statics: JointStatics) -> dict[str, list[float]]:
             (("angle", angles), ("least", least), ("greatest", greatest))}  # fmt: skip
 
 
-def _programs(plant: Plant, controllers: tuple[JointController, ...], measured: tuple[str, ...]) -> dict[str, str]:
+def _programs(plant: am.Plant, controllers: tuple[JointController, ...], measured: tuple[str, ...]) -> dict[str, str]:
     """The programs of the tab as expressions of JavaScript, by name."""
     compiled = compile_system(plant)
     states = compiled.description.state_names

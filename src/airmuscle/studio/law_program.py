@@ -19,13 +19,13 @@ import dataclasses
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from ..characteristic import Characteristic
+import airmuscle as am
+
 from ..compile.functions import Printer
 from ..compile.text.javascript import JavaScriptLanguage
 from ..core import autodiff
 from ..core.errors import AirmuscleError, TraceError
-from ..geometry import Braid, Geometry
-from ..geometry.straight_fibre import FibreTube
+from ..muscle.geometry.straight_fibre import FibreTube
 
 DIRECTIONS = ("force", "contraction", "pressure")
 _UNTRACEABLE = (AirmuscleError, RuntimeError, TypeError, ValueError)
@@ -45,7 +45,7 @@ class LawProgram:
     limits: tuple[float, ...]
 
 
-def print_law(law: Characteristic, geometry: Geometry | None) -> LawProgram:
+def print_law(law: am.muscle.characteristic.Characteristic, geometry: am.muscle.geometry.Geometry | None) -> LawProgram:
     """The program of a traceable law, and of the outline where the geometry is in closed form.
 
     Parameters are the leaves of the law, then those of the geometry unless it is part of the law. Raises TraceError
@@ -61,7 +61,9 @@ def print_law(law: Characteristic, geometry: Geometry | None) -> LawProgram:
     return LawProgram(printer.module(), tuple(names), printer.held, tuple(map(float, _limits(law))))
 
 
-def _symbols(law: Characteristic, geometry: Geometry | None) -> tuple[tuple[Any, Any], Any]:
+def _symbols(
+    law: am.muscle.characteristic.Characteristic, geometry: am.muscle.geometry.Geometry | None
+) -> tuple[tuple[Any, Any], Any]:
     """The law and its geometry with symbols, and the vector of these."""
     if geometry is None or geometry == getattr(law, "geometry", None):
         model, p = autodiff.symbolic(law)
@@ -110,7 +112,7 @@ def _limits(model: Any) -> Sequence[Any]:
 
 def _outline(shape: Any, contraction: Any, t: Any) -> tuple[Any, Any]:
     """Axial position from the middle of a segment [m] and radius [m]. Raises TraceError for another geometry."""
-    if isinstance(shape, Braid):
+    if isinstance(shape, am.muscle.geometry.Braid):
         return t * shape.resting_length * (1.0 - contraction) / 2, shape.radius_at(contraction)
     if isinstance(shape, FibreTube) and shape.traceable:
         axial, radius = shape.profile(contraction, t)

@@ -11,17 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from ..characteristic import Characteristic, ContractionLaw, ForceLaw
-from ..characteristic.polynomial_surrogate import PolynomialSurrogate, as_force_law
-from ..characteristic.validity_range import validity_range_of
+import airmuscle as am
+
 from ..core import cite, leaves
 from ..core.errors import TraceError
 from ..core.tree import Leaf
 from ..core.units import conversion
-from ..geometry import Geometry
-from ..geometry.straight_fibre import FibreTube
 from ..library.entry import Entry
 from ..library.write import to_toml
+from ..muscle.characteristic.validity_range import validity_range_of
+from ..muscle.geometry.straight_fibre import FibreTube
 from .law_program import print_law
 from .toml_template import Template, toml_template
 
@@ -45,7 +44,13 @@ def law_sheet(entry: Entry) -> dict[str, Any]:
     law, errors = _in_closed_form(entry)
     geometry = entry.geometry
     program = print_law(law, geometry)
-    kind = "force" if isinstance(law, ForceLaw) else "contraction" if isinstance(law, ContractionLaw) else "pressure"
+    kind = (
+        "force"
+        if isinstance(law, am.muscle.characteristic.ForceLaw)
+        else "contraction"
+        if isinstance(law, am.muscle.characteristic.ContractionLaw)
+        else "pressure"
+    )
     rows = _parameter_leaves(law, geometry)
     limits = validity_range_of(law, entry.validity_range)
     sheet: dict[str, Any] = {
@@ -81,7 +86,7 @@ def script_text(identifier: str, text: str, functions: tuple[str, ...]) -> str:
     return f'"use strict";\nairmusclePrograms["{identifier}"] = (() => {{\n{text}\n{result}\n}})();\n'
 
 
-def _in_closed_form(entry: Entry) -> tuple[Characteristic, dict[str, Any] | None]:
+def _in_closed_form(entry: Entry) -> tuple[am.muscle.characteristic.Characteristic, dict[str, Any] | None]:
     """The law, or its approximation with its errors [N]."""
     law = entry.characteristic
     if law.traceable:
@@ -94,14 +99,16 @@ def _in_closed_form(entry: Entry) -> tuple[Characteristic, dict[str, Any] | None
         )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        approximation: PolynomialSurrogate = as_force_law(law, limits)
+        approximation: am.muscle.characteristic.PolynomialSurrogate = am.muscle.characteristic.as_force_law(law, limits)
     return approximation.surface, {
         "max_error": approximation.max_error, "rms_error": approximation.rms_error, "coverage": approximation.coverage,
         "degree": approximation.surface.degree,
     }  # fmt: skip
 
 
-def _parameter_leaves(law: Characteristic, geometry: Geometry | None) -> list[tuple[str, Leaf]]:
+def _parameter_leaves(
+    law: am.muscle.characteristic.Characteristic, geometry: am.muscle.geometry.Geometry | None
+) -> list[tuple[str, Leaf]]:
     """The parameters in the order of the program, each with its path in the file of the entry."""
     rows = [(f"characteristic.{leaf.path}", leaf) for leaf in leaves(law)]
     if geometry is not None and geometry != getattr(law, "geometry", None):
@@ -152,7 +159,7 @@ def _ratings(entry: Entry) -> dict[str, float]:
     return {} if entry.ratings is None else {name: getattr(entry.ratings, name) for name in entry.ratings.stated}
 
 
-def _geometry_sheet(geometry: Geometry, printed: bool) -> dict[str, Any]:
+def _geometry_sheet(geometry: am.muscle.geometry.Geometry, printed: bool) -> dict[str, Any]:
     """The outline of a geometry: the number of its segments, and radii on a grid where there is no closed form."""
     segments = geometry.segments if isinstance(geometry, FibreTube) else 1
     low, high = geometry.contraction_range

@@ -10,16 +10,14 @@ from typing import Any
 
 import numpy as np
 
+import airmuscle as am
+
 from ..core import cite
 from ..core.errors import ParameterError
 from ..core.tree import Leaf, leaves
-from ..export.targets import JavaScript
 from ..export.write import make_run
-from ..geometry import Geometry
 from ..library.location import Location
 from ..library.write import part_toml, tables_toml
-from ..mechanism import AntagonisticJoint, HangingMass
-from ..plant.plant import Plant
 from ..recording.display_units import display_scale
 from ..scenario.scenario import TABLES, Scenario, build_scenario, initial_pressure
 from .law_sheet import parameter_row, script_text
@@ -50,7 +48,7 @@ def sheet_of_tables(
             f"{MAX_DURATION:g} s."
         )
     program = make_run(scenario.problem, name="plant", title=scenario.title)
-    module = JavaScript().run_files(program)["plant.mjs"]
+    module = am.export.JavaScript().run_files(program)["plant.mjs"]
     plant = scenario.plant
     sheet: dict[str, Any] = {
         "plant": True,
@@ -88,7 +86,7 @@ def _script(identifier: str, module: str) -> str:
     return script_text(identifier, text, NAMES)
 
 
-def _parameter_rows(plant: Plant, sources: Mapping[str, str]) -> list[dict[str, Any]]:
+def _parameter_rows(plant: am.Plant, sources: Mapping[str, str]) -> list[dict[str, Any]]:
     """The parameters of a plant by their paths, with the places of their values; tables of coefficients are left out.
 
     A geometry that a muscle shares with its law is one parameter at two places.
@@ -118,7 +116,7 @@ def _source(leaf: Leaf, sources: Mapping[str, str]) -> str:
     return sources[max(found, key=len)] if found else "the model or its entry"
 
 
-def _input_rows(plant: Plant) -> list[dict[str, Any]]:
+def _input_rows(plant: am.Plant) -> list[dict[str, Any]]:
     return [
         {
             "name": variable.name,
@@ -144,7 +142,7 @@ def _column_rows(columns: Any, units: Mapping[str, str]) -> list[dict[str, Any]]
     return rows
 
 
-def _muscle_row(plant: Plant, index: int) -> dict[str, Any]:
+def _muscle_row(plant: am.Plant, index: int) -> dict[str, Any]:
     muscle, prefix = plant.muscles[index], plant.prefixes[index]
     paths = [leaf.path for leaf in leaves(plant)]
     start = "muscle" if not isinstance(plant.muscle, tuple) else f"muscle[{index}]"
@@ -155,7 +153,7 @@ def _muscle_row(plant: Plant, index: int) -> dict[str, Any]:
             "outline": _sampled_outline(muscle.geometry)}  # fmt: skip
 
 
-def _sampled_outline(geometry: Geometry) -> dict[str, Any]:
+def _sampled_outline(geometry: am.muscle.geometry.Geometry) -> dict[str, Any]:
     low, high = (float(limit) for limit in geometry.contraction_range)
     grid = np.linspace(max(low, -0.05), min(high, 0.45), OUTLINE_CONTRACTIONS)
     outlines = [geometry.outline(float(c), OUTLINE_POINTS) for c in grid]
@@ -163,16 +161,16 @@ def _sampled_outline(geometry: Geometry) -> dict[str, Any]:
     return {"contractions": grid.tolist(), "axial": [a for a, _ in rounded], "radius": [r for _, r in rounded]}
 
 
-def _mechanism_row(plant: Plant) -> dict[str, Any]:
+def _mechanism_row(plant: am.Plant) -> dict[str, Any]:
     """The kind of the drawing, and the coordinates."""
     mechanism: Any = plant.mechanism
     while hasattr(mechanism, "inner"):
         mechanism = mechanism.inner
     count = len(plant.muscles)
     kind = "muscles"
-    if isinstance(mechanism, AntagonisticJoint) and count == 2:
+    if isinstance(mechanism, am.mechanism.AntagonisticJoint) and count == 2:
         kind = "joint"
-    elif isinstance(mechanism, HangingMass) and count == 1:
+    elif isinstance(mechanism, am.HangingMass) and count == 1:
         kind = "lift"
     radius = getattr(mechanism, "radius", None)
     return {

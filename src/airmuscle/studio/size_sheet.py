@@ -9,22 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from ..characteristic.validity_range import validity_range_of
+import airmuscle as am
+
 from ..core.arrays import Array
 from ..core.errors import AirmuscleError, ParameterError, UnitError
 from ..core.units import quantity
+from ..muscle.characteristic.validity_range import validity_range_of
 from ..muscle.isobars import compute_isobars
 from ..report.sizing_chapter import choice_row
-from ..sizing import (
-    SORT_KEYS,
-    JointRequirement,
-    LiftRequirement,
-    MuscleChoice,
-    SizingConditions,
-    scenario_text,
-    size_muscles,
-)
-from ..sizing.choice import Requirement
 
 FIELDS = (
     "kind", "load", "stroke", "stiffness", "torque", "angle", "inertia", "supply", "safety", "cycle_time",
@@ -43,7 +35,7 @@ def size_sheet(text: str) -> dict[str, Any]:
     """The sheet of a request in JSON. Raises ParameterError, UnitError, or SolveError with what is reachable."""
     given = read_request(text)
     requirement, conditions = _requirement(given), _conditions(given)
-    result = size_muscles(requirement, conditions, sort=SORT_KEYS[given["sort"]])
+    result = am.sizing.size_muscles(requirement, conditions, sort=am.sizing.SORT_KEYS[given["sort"]])
     result.check_reachable()
     sheet: dict[str, Any] = {
         "tab": "size",
@@ -73,8 +65,8 @@ def read_request(text: str) -> dict[str, str]:
     fields = {name: given.get(name, "").strip() for name in FIELDS}
     if fields["kind"] not in ("lift", "joint"):
         raise ParameterError("kind must be lift or joint.")
-    if fields["sort"] not in SORT_KEYS:
-        raise ParameterError(f"sort must be one of {', '.join(SORT_KEYS)}.")
+    if fields["sort"] not in am.sizing.SORT_KEYS:
+        raise ParameterError(f"sort must be one of {', '.join(am.sizing.SORT_KEYS)}.")
     return fields
 
 
@@ -88,23 +80,25 @@ def _read(given: Mapping[str, str], name: str, unit: str, default: float | None 
     return quantity(given[name], unit, where=label)
 
 
-def _requirement(given: Mapping[str, str]) -> Requirement:
+def _requirement(given: Mapping[str, str]) -> am.sizing.Requirement:
     if given["kind"] == "joint":
         inertia = _read(given, "inertia", "kg m^2", 0.0)
-        return JointRequirement(_read(given, "angle", "rad"), _read(given, "torque", "N m"), inertia)
+        return am.sizing.JointRequirement(_read(given, "angle", "rad"), _read(given, "torque", "N m"), inertia)
     try:
         load = {"mass": _read(given, "load", "kg")}
     except UnitError:
         load = {"force": _read(given, "load", "N")}
-    return LiftRequirement(_read(given, "stroke", "m"), stiffness=_read(given, "stiffness", "N/m", 0.0), **load)
+    return am.sizing.LiftRequirement(
+        _read(given, "stroke", "m"), stiffness=_read(given, "stiffness", "N/m", 0.0), **load
+    )
 
 
-def _conditions(given: Mapping[str, str]) -> SizingConditions:
-    default = SizingConditions
+def _conditions(given: Mapping[str, str]) -> am.sizing.SizingConditions:
+    default = am.sizing.SizingConditions
     count = given["max_count"] or str(default.max_count)
     if not count.isascii() or not count.isdecimal():
         raise ParameterError(f"the greatest number of muscles is '{count}'; give a whole number.")
-    return SizingConditions(
+    return am.sizing.SizingConditions(
         _read(given, "supply", "Pa"),
         _read(given, "safety", "1", default.safety_factor),
         _read(given, "cycle_time", "s", default.cycle_time),
@@ -114,10 +108,10 @@ def _conditions(given: Mapping[str, str]) -> SizingConditions:
     )
 
 
-def _choice(choice: MuscleChoice) -> dict[str, Any]:
+def _choice(choice: am.sizing.MuscleChoice) -> dict[str, Any]:
     """A choice with its row of the table, its chart and its scenario, or the reason why it has none."""
     try:
-        scenario, reason = scenario_text(choice), ""
+        scenario, reason = am.sizing.scenario_text(choice), ""
     except AirmuscleError as error:
         scenario, reason = "", str(error.message)
     return {
@@ -130,7 +124,7 @@ def _choice(choice: MuscleChoice) -> dict[str, Any]:
     }
 
 
-def _chart(choice: MuscleChoice) -> dict[str, Any]:
+def _chart(choice: am.sizing.MuscleChoice) -> dict[str, Any]:
     """Isobars of one muscle, its capacity, the load and both end points; contractions as ratios, forces in N."""
     entry, muscle, design = choice.entry, choice.muscle, choice.design
     curves = compute_isobars(entry.characteristic, validity_range_of(entry.characteristic, entry.validity_range))
@@ -144,7 +138,7 @@ def _chart(choice: MuscleChoice) -> dict[str, Any]:
         "points": [{key: float(value) for key, value in point.items()} for point in points],
         "load": None,
     }
-    if isinstance(choice.requirement, LiftRequirement):
+    if isinstance(choice.requirement, am.sizing.LiftRequirement):
         displacement, load = choice.requirement.path
         contractions = design.extended.contraction + displacement / choice.length
         chart["load"] = {"contractions": _rounded(contractions), "forces": _rounded(load / choice.count),

@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.equilibrium import find_equilibrium_of_each
 from ..control.control_loop import ControlLoop
 from ..core.arrays import Array
 from ..core.declaration import parameters
@@ -26,6 +25,7 @@ from ..library.location import Location
 from ..library.models import model_class
 from ..scenario.controller import controller_number_paths
 from ..scenario.scenario import Scenario, build_scenario, initial_pressure, run_column_units
+from ..simulation.equilibrium import find_equilibrium_of_each
 
 Keys = tuple[str | int, ...]
 """Nested keys of a number in the tables of a scenario."""

@@ -1,9 +1,7 @@
-"""Kernel cache: machine code as files in a private folder of the user, verified before it is used.
+"""Kernel cache: machine code as files in the private cache folder of the user, verified before it is used.
 
-The folder is `AIRMUSCLE_CACHE_DIR`, or else `airmuscle/kernels` in the user's cache folder. It must belong to the user,
-and nobody else may write to it, because what is in it is executed; otherwise it is not used, and kernels are compiled
-anew in every process. A file begins with a hash of what it was compiled from and a hash of its contents, so that code
-of other sources or versions, or a damaged file, is compiled anew.
+Without such a folder, kernels are compiled anew in every process. A file begins with a hash of what it was compiled
+from and a hash of its contents, so that code of other sources or versions, or a damaged file, is compiled anew.
 """
 
 from __future__ import annotations
@@ -14,13 +12,10 @@ import hashlib
 import importlib.util
 import os
 import pathlib
-import stat
-import sys
 import threading
-import warnings
 from collections.abc import Sequence
 
-from ...core.errors import AirmuscleWarning
+from ...core.cache_folder import cache_folder, read_private, warn_not_stored
 
 _PACKAGE = pathlib.Path(__file__).parents[1]
 _SOURCES = [path for room in ("kernels", "cache", "llvm") for path in sorted((_PACKAGE / room).glob("*.py"))]
@@ -29,7 +24,6 @@ MAX_FILES = 4000
 not used for the longest time. Fewer than a program uses in turn would be stored in vain: each would go before it is
 used again."""
 _HASH = hashlib.sha256().digest_size
-_POSIX = hasattr(os, "getuid")
 
 
 def load(name: str, kinds: Sequence[str]) -> bytes | None:
@@ -59,7 +53,7 @@ def save(name: str, kinds: Sequence[str], code: bytes) -> bytes:
         os.replace(temporary, target)
         _remove_oldest(folder)
     except OSError as error:
-        _warn_once(f"{folder} cannot be written to ({error.strerror or error})")
+        warn_not_stored(f"{folder} cannot be written to ({error.strerror or error})")
     return code
 
 
@@ -71,52 +65,6 @@ def _remove_oldest(folder: pathlib.Path) -> None:
         files = sorted(folder.glob("*.code"), key=lambda path: path.stat().st_mtime)
         for path in files[: -(MAX_FILES - MAX_FILES // 10)]:
             path.unlink()
-
-
-def cache_folder() -> pathlib.Path | None:
-    """The folder of the kernel cache, created if it is missing; None, with one warning, if no folder is private."""
-    try:
-        folder = _chosen_folder()
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        state = folder.stat()
-    except (OSError, RuntimeError) as error:  # RuntimeError: the user has no home folder
-        _warn_once(f"there is no cache folder ({error})")
-        return None
-    if _POSIX and (state.st_uid != os.getuid() or state.st_mode & (stat.S_IWGRP | stat.S_IWOTH)):
-        _warn_once(f"other users may write to {folder}")
-        return None
-    return folder
-
-
-def _chosen_folder() -> pathlib.Path:
-    named = os.environ.get("AIRMUSCLE_CACHE_DIR")
-    if named:
-        return pathlib.Path(named)
-    defaults = {"win32": os.environ.get("LOCALAPPDATA"), "darwin": "~/Library/Caches"}
-    root = defaults.get(sys.platform) or os.environ.get("XDG_CACHE_HOME") or "~/.cache"
-    return pathlib.Path(root).expanduser() / "airmuscle" / "kernels"
-
-
-def read_private(path: pathlib.Path) -> bytes | None:
-    """The contents of a regular file that belongs to the user and that nobody else may write to."""
-    try:
-        with open(os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)), "rb") as file:
-            state = os.fstat(file.fileno())
-            private = not _POSIX or (state.st_uid == os.getuid() and not state.st_mode & (stat.S_IWGRP | stat.S_IWOTH))
-            return file.read() if private and stat.S_ISREG(state.st_mode) else None
-    except OSError:
-        return None
-
-
-@functools.cache
-def _warn_once(reason: str) -> None:
-    """Warn that compiled kernels are not stored."""
-    warnings.warn(
-        f"compiled kernels are not stored: {reason}. Every process compiles them anew, which takes some seconds. "
-        "Name a private folder in the environment variable AIRMUSCLE_CACHE_DIR.",
-        AirmuscleWarning,
-        stacklevel=2,
-    )
 
 
 @functools.cache

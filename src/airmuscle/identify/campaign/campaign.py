@@ -8,13 +8,13 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from ...characteristic.base import ForceLaw
 from ...core.arrays import Array
 from ...core.errors import IdentificationError
 from ...core.short_repr import ShortRepr
-from ...friction import Friction, NoFriction
-from ...geometry import Geometry
 from ...muscle import CreepElements, LinearDamper, Muscle
+from ...muscle.characteristic.base import ForceLaw
+from ...muscle.friction import Friction, NoFriction
+from ...muscle.geometry import Geometry
 from ...recording import Recording
 from ..compared_points import FORCE_MARGIN, law_of_length
 from .creep_stage import CreepStage, fit_creep_stage

@@ -11,9 +11,9 @@ from ...control.inputs import Schedule
 from ...core.arrays import Array
 from ...core.errors import AirmuscleError
 from ...core.short_repr import ShortRepr
-from ...geometry import Geometry, Vessel
 from ...mechanism import Isometric
 from ...muscle import Muscle
+from ...muscle.geometry import Geometry, Vessel
 from ...plant.plant import Plant
 from ...pneumatics import FillDischarge, Supply, Valve
 from ...pneumatics.gas import EnergyBalance

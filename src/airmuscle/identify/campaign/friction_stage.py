@@ -10,8 +10,8 @@ import numpy as np
 from ...core.arrays import Array
 from ...core.errors import AirmuscleError
 from ...core.short_repr import ShortRepr
-from ...friction import Friction, NoFriction
 from ...muscle import CreepElements
+from ...muscle.friction import Friction, NoFriction
 from ...recording import Recording
 from ...recording.segment.sensor import estimate_noise
 from ..hysteresis import HysteresisLoop, JointFit, LoopFit, find_loops, fit_jointly, fit_loop, identified_friction

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...characteristic.base import ForceLaw
 from ...core.arrays import Array
 from ...core.errors import AirmuscleError, IdentificationError
 from ...core.short_repr import ShortRepr
 from ...muscle import CreepElements
+from ...muscle.characteristic.base import ForceLaw
 from ...recording import Recording
 from ...recording.segment.runs import CONTRACTION_BAND
 from ..hysteresis import Hold, creep_elements, find_holds, fit_creep

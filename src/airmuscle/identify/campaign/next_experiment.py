@@ -5,9 +5,9 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 
-from ...characteristic.validity_range import ValidityRange
 from ...core.errors import AirmuscleError
 from ...core.short_repr import ShortRepr
+from ...muscle.characteristic.validity_range import ValidityRange
 from ..dynamic import rank_records
 from ..dynamic.record_ranking import MIN_GAIN
 from ..experiment_design import BenchLimits, ExperimentPlan, PlannedRun, optimal_design

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from ...core.arrays import Array
-from ...friction import Friction
 from ...muscle import CreepElements
+from ...muscle.friction import Friction
 from ...recording import Recording
 from ..force_evaluation import evaluate_force
 from .creep_stage import creep_force

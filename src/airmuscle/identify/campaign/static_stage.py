@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 
 from ...core.errors import AirmuscleError
 from ...core.short_repr import ShortRepr
-from ...friction import Friction
 from ...muscle import CreepElements
+from ...muscle.friction import Friction
 from ...recording import Recording
 from ..model_selection import Comparison, compare
 from ..result import Fit

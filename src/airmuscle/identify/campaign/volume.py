@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ...characteristic.base import ForceLaw
 from ...core.arrays import Array
 from ...core.errors import PhysicsError
-from ...geometry import ChebyshevGeometry
+from ...muscle.characteristic.base import ForceLaw
+from ...muscle.geometry import ChebyshevGeometry
 
 GRID = 25
 """Number of contractions, and of pressures, at which the slope of the force is evaluated (chosen)."""

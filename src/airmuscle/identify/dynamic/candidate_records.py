@@ -10,9 +10,9 @@ import numpy as np
 from ...control.inputs import Schedule
 from ...core import tree
 from ...core.arrays import Array
-from ...geometry import Vessel
 from ...mechanism import Isometric
 from ...muscle import Muscle
+from ...muscle.geometry import Vessel
 from ...plant.plant import Plant
 from ...pneumatics import FillDischarge, Valve
 from ...pneumatics.gas import EnergyBalance

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.equilibrium import find_equilibrium
 from ...compile.cache.kernel import newton
 from ...compile.function import Function
 from ...core import autodiff, tree
@@ -17,6 +16,7 @@ from ...core.errors import IdentificationError, ParameterError, suggestion
 from ...core.status import Status
 from ...core.system import System
 from ...plant.plant import Plant
+from ...simulation.equilibrium import find_equilibrium
 
 PRESSURE_STEP = 100.0
 """Increase of gauge pressure [Pa] by which states that depend on the pressure are detected."""

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from ...core.arrays import Array
-from ...friction import Friction
+from ...muscle.friction import Friction
 from ..model_evidence import effective_sample_size, f_test_p_value
 from .result import SIGNIFICANCE_LEVEL, HysteresisFit
 from .search import free_parameters

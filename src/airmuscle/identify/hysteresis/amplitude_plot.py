@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core.axes import given_axes, relabel_in_display_units
 from ...core.plotting import LINES, legend_below, new_figure
-from ...friction import Friction
+from ...muscle.friction import Friction
 from .agreement import RunAgreement
 
 

@@ -8,12 +8,12 @@ import dataclasses
 import numpy as np
 import numpy.typing as npt
 
-from ...characteristic.base import Characteristic
 from ...core.arrays import Array
 from ...core.declaration import model, parameter
 from ...core.errors import IdentificationError
 from ...core.hints import Hint
-from ...friction import BoucWen, Dahl, Friction, LuGre, MaxwellSlip, PrandtlIshlinskii
+from ...muscle.characteristic.base import Characteristic
+from ...muscle.friction import BoucWen, Dahl, Friction, LuGre, MaxwellSlip, PrandtlIshlinskii
 from ...recording import Recording
 from ...recording.segment import motion_direction
 from .axis import MILLIMETRES, Axis

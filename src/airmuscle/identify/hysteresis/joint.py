@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ...core.arrays import Array
-from ...friction import Friction, IdentifiedFriction, PressureScaledFriction
+from ...muscle.friction import Friction, IdentifiedFriction, PressureScaledFriction
 from ...recording.segment.runs import RELATIVE_BAND
 from ..identifiability import UndeterminedCombination
 from ..model_evidence import aicc, effective_sample_size, f_test_p_value

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core.notebook import Card, NotebookDisplay
 from ...core.tree import Leaf, leaves
-from ...friction import Friction, PressureScaledFriction
+from ...muscle.friction import Friction, PressureScaledFriction
 from ..identifiability import UndeterminedCombination
 from ..model_evidence import format_p_value
 from .agreement import RunAgreement

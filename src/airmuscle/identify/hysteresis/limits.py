@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from ...core.arrays import Array
 from ...core.tree import Leaf, leaves
-from ...friction import Friction
+from ...muscle.friction import Friction
 from ..identifiability import UndeterminedCombination
 from .axis import Axis
 

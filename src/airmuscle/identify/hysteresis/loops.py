@@ -8,10 +8,10 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from ...characteristic.base import Characteristic
 from ...core.errors import AirmuscleWarning, IdentificationError
 from ...core.hints import Hint, HintedText
 from ...core.short_repr import ShortRepr
+from ...muscle.characteristic.base import Characteristic
 from ...recording import Recording
 from ...recording.segment import (
     ISOBARIC,

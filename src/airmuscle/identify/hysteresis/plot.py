@@ -10,7 +10,7 @@ import numpy as np
 from ...core.arrays import Array
 from ...core.axes import given_axes, relabel_in_display_units
 from ...core.plotting import DASHES, LINES, legend_below, new_figure
-from ...friction import Friction
+from ...muscle.friction import Friction
 from .axis import MILLIMETRES, Axis
 from .series import LoopSeries
 

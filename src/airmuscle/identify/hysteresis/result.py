@@ -10,7 +10,7 @@ import numpy as np
 from ...core.arrays import Array
 from ...core.notebook import Card, NotebookDisplay
 from ...core.tree import leaves
-from ...friction import Friction
+from ...muscle.friction import Friction
 from ..identifiability import UndeterminedCombination
 from ..model_evidence import aicc, effective_sample_size, f_test_p_value, format_p_value
 from . import branches

@@ -11,7 +11,7 @@ import numpy as np
 from ...core import tree
 from ...core.arrays import Array
 from ...core.tree import Leaf
-from ...friction import Friction, PressureScaledFriction
+from ...muscle.friction import Friction, PressureScaledFriction
 from ..identifiability import UndeterminedCombination, analyse_identifiability
 from ..model_evidence import effective_sample_size
 from .limits import DataLimits, combine_limits

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ...friction import Friction
+from ...muscle.friction import Friction
 from .joint import identified_friction
 from .joint_result import JointFit
 from .loops import LoopFit

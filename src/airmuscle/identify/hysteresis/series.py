@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.arrays import Array
-from ...friction import Friction
+from ...muscle.friction import Friction
 from .axis import MILLIMETRES, Axis
 from .limits import DataLimits
 

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...characteristic.base import Characteristic, ForceLaw
-from ...characteristic.validity_range import ValidityRange
 from ...core.arrays import Array
 from ...core.errors import ColumnError
 from ...core.hints import Hint
-from ...friction import Friction, NoFriction
 from ...muscle import CreepElements
+from ...muscle.characteristic.base import Characteristic, ForceLaw
+from ...muscle.characteristic.validity_range import ValidityRange
+from ...muscle.friction import Friction, NoFriction
 from ...recording import Recording
 from ..campaign.predicted_force import predicted_force
 from ..compared_points import FORCE_MARGIN

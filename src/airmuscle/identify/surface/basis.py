@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev, polynomial
 
-from ...characteristic.base import Characteristic
 from ...core.arrays import Array
 from ...core.units import bar
+from ...muscle.characteristic.base import Characteristic
 from ...recording import Recording
 
 

@@ -10,9 +10,9 @@ import dataclasses
 
 import numpy as np
 
-from ...characteristic.borzikova import BorzikovaExponential
 from ...core.arrays import Array
 from ...core.errors import IdentificationError
+from ...muscle.characteristic.borzikova import BorzikovaExponential
 from ...recording import Recording
 from ..correlation_index import CorrelationIndex, correlation_index
 from .basis import Chebyshev, Conditioning, LoadRange

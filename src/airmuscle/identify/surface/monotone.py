@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from ...characteristic.base import ContractionLaw
 from ...core.arrays import Array
 from ...core.errors import IdentificationError
+from ...muscle.characteristic.base import ContractionLaw
 from ...recording import Recording
 from .basis import LoadRange
 from .bernstein import bernstein_coefficients, solve_constrained_least_squares

@@ -13,12 +13,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.polynomial import polynomial
 
-from ...characteristic.base import ForceLaw
-from ...characteristic.contractile_surface import ContractileSurface, exponents
-from ...characteristic.validity_range import ValidityRange
 from ...core.arrays import Array
 from ...core.errors import IdentificationError
 from ...core.short_repr import ShortRepr
+from ...muscle.characteristic.base import ForceLaw
+from ...muscle.characteristic.contractile_surface import ContractileSurface, exponents
+from ...muscle.characteristic.validity_range import ValidityRange
 from ...recording import Recording
 from ..result import Fit
 from ..static_fit import fit

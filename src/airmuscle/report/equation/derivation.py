@@ -7,9 +7,9 @@ import re
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 
-from ...characteristic.base import Characteristic
 from ...core.short_repr import ShortRepr
 from ...core.tree import Leaf, leaves
+from ...muscle.characteristic.base import Characteristic
 from .expression import ADD, COMPARISONS, NEGATIVE, PRODUCT, QUOTIENT, WHERE, Expressions, Node, in_order
 from .intervals import Bounds, within
 from .polynomial import assemble, coefficients_by_monomial, depends_on, expand, summands

@@ -7,12 +7,12 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import numpy.typing as npt
 
-from ...analysis.equilibrium import block_size, complete_inputs, find_equilibrium, find_equilibrium_of_each
 from ...compile.program import compile_system
 from ...core.arrays import Array
 from ...core.errors import AirmuscleError, ParameterError, PhysicsError, suggestion
 from ...core.system import System
 from ...plant.plant import Plant
+from ..equilibrium import block_size, complete_inputs, find_equilibrium, find_equilibrium_of_each
 from .variations import Column, Variations
 
 

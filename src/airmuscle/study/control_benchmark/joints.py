@@ -8,15 +8,14 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from ...analysis.equilibrium import find_equilibrium
 from ...control.driver import Driver, SolenoidDriver
 from ...control.sensors import ColumnSensor
 from ...core.errors import ParameterError
 from ...core.short_repr import ShortRepr
-from ...friction import Dahl, Friction, LuGre
 from ...library.law_file import load_law
 from ...mechanism import AntagonisticJoint, JointWithExternalTorque
 from ...muscle import LinearDamper, Muscle
+from ...muscle.friction import Dahl, Friction, LuGre
 from ...plant.plant import Plant
 from ...pneumatics import (
     EnergyBalance,
@@ -29,6 +28,7 @@ from ...pneumatics import (
     Valve,
     WithTubes,
 )
+from ...simulation.equilibrium import find_equilibrium
 from ..tuning import RobustObjective
 
 SIDES = ("left", "right")

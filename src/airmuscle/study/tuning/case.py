@@ -6,7 +6,6 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ...analysis.equilibrium import find_equilibrium
 from ...control.control_loop import ControlLoop
 from ...control.controller import Controller
 from ...core.annotation import abridged
@@ -14,6 +13,7 @@ from ...core.errors import ParameterError, PhysicsError
 from ...core.short_repr import ShortRepr
 from ...core.tree import leaves, structure, with_parameters
 from ...plant.plant import Plant
+from ...simulation.equilibrium import find_equilibrium
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
