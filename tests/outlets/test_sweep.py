@@ -149,7 +149,7 @@ def test_a_killed_study_is_resumed_with_bit_identical_results(folder: Path):
     process.wait()
     before = {p: p.stat().st_mtime_ns for p in (folder / "out" / "chunks").glob("*.npz")}
     assert 3 <= len(before) < 50
-    (folder / "out" / "chunks" / ".unfinished-1234").write_bytes(b"half a chunk")
+    (folder / "out" / "chunks" / ".00000.npz.1234-5.part").write_bytes(b"half a chunk")
     done = subprocess.run(command(folder), capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert f"resuming: {4 * len(before)} of 200 runs are already saved" in done.stderr
@@ -403,7 +403,7 @@ def test_a_chunk_is_written_atomically(folder: Path, monkeypatch: pytest.MonkeyP
     def refusing(*given):
         raise OSError(28, "no space left")
 
-    monkeypatch.setattr(chunk.os, "replace", refusing)
+    monkeypatch.setattr(Path, "replace", refusing)
     with pytest.raises(OSError, match="no space left"):
         chunk.write_chunk(chunk.compute_chunk(study, 0), folder / "chunk.npz")
     assert not {p.name for p in folder.iterdir()} - {"muscle.toml", "scenario.toml", "study.toml"}

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import os
 import pickle
 import time
 from collections.abc import Sequence
@@ -17,6 +16,7 @@ from typing import Any
 
 from ..core.cache_folder import cache_folder, read_private
 from ..core.fingerprint import fingerprint, program_fingerprint
+from ..core.output_folder import atomic_file
 from ..muscle.geometry import Geometry
 from ..recording import Recording
 
@@ -51,14 +51,10 @@ class KeptStages:
         """Keep the result of a finished stage; a result that cannot be stored is fitted again."""
         if self._folder is None:
             return
-        path = self._path(name)
-        unfinished = path.with_suffix(f".{os.getpid()}")
-        try:
+        with contextlib.suppress(Exception):  # CasADi raises none of the usual errors
             content = pickle.dumps(result, protocol=pickle.HIGHEST_PROTOCOL)
-            unfinished.write_bytes(hashlib.sha256(content).digest() + content)
-            os.replace(unfinished, path)
-        except Exception:  # CasADi raises none of the usual errors
-            unfinished.unlink(missing_ok=True)
+            with atomic_file(self._path(name)) as unfinished:
+                unfinished.write_bytes(hashlib.sha256(content).digest() + content)
 
     def remove(self, names: Sequence[str]) -> None:
         """Remove the stages of a campaign that is complete."""

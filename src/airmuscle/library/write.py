@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 
 from ..core.annotation import one_line
 from ..core.errors import FileError, ParameterError
+from ..core.output_folder import atomic_file
 from .build import TEXT_KEYS
 from .entry import OPTIONAL_PARTS, Check, Entry
 from .uncertainty import uncertainty_table
@@ -76,14 +76,10 @@ def save(entry: Entry, path: str | Path) -> Path:
 
 def write_text(path: Path, text: str) -> Path:
     """Write a text to a file, which is complete or unchanged; line ends are those of the text. Raises FileError."""
-    unfinished = path.with_name(f"{path.name}.part")
     try:
-        with unfinished.open("w", encoding="utf-8", newline="") as file:
-            file.write(text)
-        unfinished.replace(path)
+        with atomic_file(path) as unfinished:
+            unfinished.write_text(text, encoding="utf-8", newline="")
     except OSError as error:
-        with contextlib.suppress(OSError):
-            unfinished.unlink()
         raise FileError(f"{path}: cannot be written ({error.strerror}). Name a file in a writable folder.") from None
     return path
 

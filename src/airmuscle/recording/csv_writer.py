@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 from pathlib import Path
 from typing import TextIO
 
 from ..core.annotation import one_line
 from ..core.errors import FileError, ParameterError
+from ..core.output_folder import atomic_file
 from .constants import CONSTANT_UNITS
 from .recording import Recording, column_heading
 
@@ -29,19 +29,15 @@ def write_csv(recording: Recording, path: str | Path, *, comments: bool = True) 
     if not isinstance(path, str | Path):
         raise FileError(f"write_csv: {path!r} is not a path. Pass the name of a file.")
     path = Path(path)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        with temporary.open("w", encoding="utf-8", newline="") as file:
+        with atomic_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
             if comments:
                 _write_comments(recording, file)
             _write_table(recording, file)
-        temporary.replace(path)
     except OSError as reason:
         raise FileError(
             f"{path}: cannot be written ({reason.strerror or reason}). Choose an existing folder with write permission."
         ) from None
-    finally:
-        _discard(temporary)
     return path
 
 
@@ -62,10 +58,3 @@ def _write_table(recording: Recording, file: TextIO) -> None:
 
 def _one_line(text: str) -> str:
     return " ".join(text.split())
-
-
-def _discard(temporary: Path) -> None:
-    try:
-        temporary.unlink()
-    except OSError:
-        return  # already renamed, or never created

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import AirmuscleError, FileError
+from ..core.output_folder import atomic_file
 from .csv_writer import write_csv
 from .heading import split_unit
 from .optional_dependency import import_lab_package
@@ -28,10 +28,9 @@ def write(recording: Recording, path: str | Path) -> Path:
     writer = _WRITERS.get(path.suffix.lower())
     if writer is None:
         raise FileError(f"{path}: a recording cannot be written as '{path.suffix}'; allowed: {', '.join(EXTENSIONS)}.")
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        writer(recording, temporary, path)
-        temporary.replace(path)
+        with atomic_file(path) as temporary:
+            writer(recording, temporary, path)
     except AirmuscleError:
         raise
     except Exception as reason:  # each package raises its own exceptions
@@ -39,8 +38,6 @@ def write(recording: Recording, path: str | Path) -> Path:
         raise FileError(
             f"{path}: cannot be written ({text}). Choose an existing folder with write permission."
         ) from None
-    finally:
-        temporary.unlink(missing_ok=True)
     return path
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from ..core.errors import FileError, ParameterError
+from ..core.output_folder import atomic_file
 from .app import MAX_PAGE_SHEETS
 from .joint_sheet import joint_names, sheet_of_joint
 from .page import self_contained_page
@@ -51,12 +51,9 @@ def export_page(names: Sequence[str], path: str | Path) -> Path:
     state = first_state(sheets) | ({"joint": {"name": joints[0]["name"]}} if joints else {})
     text = self_contained_page((*sheets, *joints), state)
     path = Path(path)
-    unfinished = path.with_name(f"{path.name}.part")
     try:
-        unfinished.write_text(text, encoding="utf-8")
-        unfinished.replace(path)
+        with atomic_file(path) as unfinished:
+            unfinished.write_text(text, encoding="utf-8")
     except OSError as error:
-        with contextlib.suppress(OSError):
-            unfinished.unlink()
         raise FileError(f"{path}: cannot be written ({error.strerror}).") from None
     return path

@@ -8,8 +8,6 @@ computed.
 from __future__ import annotations
 
 import dataclasses
-import os
-import tempfile
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -20,6 +18,7 @@ import numpy.typing as npt
 from ..core.arrays import Array
 from ..core.errors import FileError
 from ..core.fingerprint import fingerprint, program_fingerprint
+from ..core.output_folder import atomic_file
 from ..core.processes import check_running
 from ..recording import Recording
 from ..scenario.scenario import Scenario
@@ -117,15 +116,9 @@ def _store(study: Study, recording: Recording, chunk: Chunk, row: int) -> None:
 
 def write_chunk(chunk: Chunk, path: Path) -> None:
     """Write a chunk to its file atomically."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=".unfinished-")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            series = {f"series:{name}": rows for name, rows in chunk.time_series.items()}
-            np.savez(file, scalars=chunk.scalars, failure_reasons=chunk.failure_reasons, **series)  # type: ignore[arg-type]
-        os.replace(temporary, path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+    series = {f"series:{name}": rows for name, rows in chunk.time_series.items()}
+    with atomic_file(path) as unfinished, unfinished.open("wb") as file:
+        np.savez(file, scalars=chunk.scalars, failure_reasons=chunk.failure_reasons, **series)  # type: ignore[arg-type]
 
 
 def read_chunk(path: Path) -> Chunk | None:

@@ -50,7 +50,7 @@ def run_study(
         write_chunk(chunk, files[index])
         done += len(study.chunk_runs(index))
         report(done, len(study))
-    for leftover in chunk_folder.glob(".unfinished-*"):  # of studies that were killed
+    for leftover in chunk_folder.glob(".*.part"):  # of studies that were killed
         leftover.unlink(missing_ok=True)
     return _combine(study, [_read_finished(file) for file in files], nominal)
 
