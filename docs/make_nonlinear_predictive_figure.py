@@ -51,7 +51,7 @@ def main() -> None:
             axes, (1e3 * (run["position"] - rest["position"]), run["speed"], run["command.fill"]), strict=True
         ):
             panel.plot(time, values, **style)
-        print(f"{name}: greatest speed {run['speed'].max():.4f} m/s, final error "
+        print(f"{name}: maximum speed {run['speed'].max():.4f} m/s, final error "
               f"{1e3 * (rest['position'] + STEP - run['position'][-1]):.3f} mm")  # fmt: skip
     axes[0].plot(
         [0.0, 0.1, 0.1, 1.2],

@@ -1,4 +1,4 @@
-"""A controller of one's own in the control benchmark of a joint: feed-forward with compensation of friction.
+"""A controller defined by the user in the control benchmark of a joint: feed-forward with compensation of friction.
 
 python examples/A10_own_controller.py        writes own_controller.png to the working directory
 

@@ -106,7 +106,7 @@ def pi_control(gain, integral_gain):
 
 
 def tuned_pi(sets=256, episodes=16):
-    """Gains [1/rad, 1/(rad s)] with the greatest mean return of training episodes, the same ones for all sets."""
+    """Gains [1/rad, 1/(rad s)] with the maximum mean return of training episodes, the same ones for all sets."""
     from scipy.stats import qmc
 
     points = qmc.scale(qmc.Sobol(d=2, seed=1).random(sets), *np.log([(0.5, 0.5), (30.0, 300.0)]))

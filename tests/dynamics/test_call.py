@@ -41,7 +41,7 @@ def lifting() -> Plant:
 
 
 @pytest.mark.parametrize("count", [0, 1, 2, 3, 4, 5, 7, 8, 250])
-def test_the_range_of_a_column_is_its_smallest_and_largest_number(count):
+def test_the_range_of_a_column_with_limits_is_its_smallest_and_largest_number(count):
     plant = lifting()
     compiled, rng = compile_system(plant), np.random.default_rng(count)
     start = np.array([plant.state_at(pressure=1e5)[s.name] for s in plant.states])
@@ -52,7 +52,10 @@ def test_the_range_of_a_column_is_its_smallest_and_largest_number(count):
     segments = PiecewiseLinear(ends, rng.random((3, 2)), rng.standard_normal((3, 2)))
     table = RowRecorder(compiled).evaluate(states, times, segments, 0.0)
     assert np.array_equal(table.inputs, segments.inputs_at(times, 0.0))
-    columns = np.hstack([states, table.inputs, table.outputs])
+    known = compiled.description
+    names = (*known.state_names, *known.output_names)
+    assert set(known.ranged_names) == {"air_mass", "volume", *(limit.column for limit in plant.column_limits)}
+    columns = np.hstack([states, table.outputs])[:, [names.index(name) for name in known.ranged_names]]
     assert table.lower == np.fmin.reduce(columns, axis=0, initial=np.inf).tolist()
     assert table.upper == np.fmax.reduce(columns, axis=0, initial=-np.inf).tolist()
     unfit = np.flatnonzero(~np.isfinite(table.outputs).all(axis=1))

@@ -223,7 +223,7 @@ def test_a_folder_that_is_not_private_is_not_used_and_one_warning_says_so(place,
         folder.mkdir()
         folder.chmod(0o777)
     monkeypatch.setenv("AIRMUSCLE_CACHE_DIR", str(folder))
-    kept._warn_once.cache_clear()
+    kept.warn_not_stored.cache_clear()
     with pytest.warns(AirmuscleWarning, match="compiled kernels are not stored: .*AIRMUSCLE_CACHE_DIR") as caught:
         stored = kept.save("evaluate", ("q",), b"code")
     assert stored == b"code"
@@ -234,7 +234,7 @@ def test_a_folder_that_is_not_private_is_not_used_and_one_warning_says_so(place,
     given = arguments()
     Kernel("evaluate")(*given)
     assert np.array_equal(given[-1], expected())
-    kept._warn_once.cache_clear()
+    kept.warn_not_stored.cache_clear()
 
 
 def test_a_link_in_place_of_a_kernel_is_not_followed(empty):

@@ -16,6 +16,7 @@ from control_plants import JOINT, LIFT
 from airmuscle.control.inputs import Schedule
 from airmuscle.core.errors import ParameterError, SimulationError
 from airmuscle.library import catalogue
+from airmuscle.plant.energy_balance import WithEnergyMeters
 from airmuscle.simulation import Rodas4, RungeKutta4, Stepper, simulate
 
 START = JOINT.state_at(pressure=2e5)
@@ -147,6 +148,15 @@ def test_leaving_the_validity_range_is_an_error_where_it_is_wanted():
     tolerant.restore(failed)
     tolerant.step({"left.fill": 1.0, "right.discharge": 1.0}, 0.05)
     assert tolerant["right.contraction"] < 0.01333
+
+
+def test_energy_meters_leave_the_check_of_the_validity_range_as_it_is():
+    plant = catalogue.load("joint-dmsp-20-matrix").plant
+    metered = WithEnergyMeters(plant)
+    assert list(metered.column_limits) == list(plant.column_limits)
+    strict = Stepper(metered, metered.extend_state(plant.state_at(pressure=2e5)), check_validity=True)
+    message, _, _ = repeat(strict, {"left.fill": 1.0, "right.discharge": 1.0}, 0.05)
+    assert "the validity range of right" in message
 
 
 def test_a_step_allocates_no_arrays():

@@ -1,4 +1,4 @@
-"""Which record to measure next: the Fisher information of a record adds to that of the fit, so that the expected standard
+"""Next record to measure: the Fisher information of a record adds to that of the fit, so that the expected standard
 errors are those of a joint fit with it, and a record that responds to one of two parameters alone separates them.
 """
 

@@ -91,8 +91,10 @@ def test_what_the_runs_cannot_tell_is_named():
 def test_a_bench_that_can_do_nothing_is_refused():
     with pytest.raises(IdentificationError, match="gives no force between 0 and 1e-06 N"):
         optimal_design(law(), BenchLimits(ValidityRange(50e3, 500e3, 0.0, 0.25), 1e-6))
-    with pytest.raises(ParameterError, match="optimal_design needs runs >= 1"):
+    with pytest.raises(ParameterError, match="runs is 0; it must be at least 1"):
         optimal_design(law(), BENCH, runs=0)
+    with pytest.raises(ParameterError, match="sigma is inf; it must be positive and finite"):
+        optimal_design(law(), BENCH, sigma=float("inf"))
     with pytest.raises(ParameterError, match="min_pressure"):
         BenchLimits(ValidityRange(5e5, 5e4, 0.0, 0.25), 100.0)
 

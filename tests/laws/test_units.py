@@ -65,7 +65,8 @@ def test_a_text_of_a_hundred_thousand_characters_is_no_unit():
 
 @pytest.mark.parametrize(
     ("text", "target", "example"), [("200", "m", "200 mm"), ("3", "Pa", "3 bar"), ("300", "Pa", "300 kPa"),
-                                    ("5", "kg", "5 kg"), ("20", "s", "20 ms"), ("7", "N", "7 N")]
+                                    ("5", "kg", "5 kg"), ("20", "s", "20 ms"), ("7", "N", "7 N"),
+                                    ("x", "N m", "5 N m"), ("", "kg", "10 kg"), ("nan", "kg m^2", "1 kg m\\^2")]
 )  # fmt: skip
 def test_a_hint_has_the_usual_unit(text: str, target: str, example: str):
     with pytest.raises(UnitError, match=f"write it like '{example}'"):

@@ -21,8 +21,9 @@ def test_a_benchmark_writes_its_report_tables_and_figures(tmp_path):
     assert result.exit_code == 0, result.output
     assert "PID" in result.stdout
     names = {path.relative_to(tmp_path / "compare").as_posix() for path in (tmp_path / "compare").rglob("*.*")}
-    tables = {f"data/{name}.csv" for name in ("ranking", "rmse", "greatest", "metrics", "gains")}
+    tables = {f"data/{name}.csv" for name in ("ranking", "rmse", "greatest", "metrics")}
     assert {"report.html", "figures/errors.png", "figures/runs.png", *tables} <= names
+    assert "data/gains.csv" not in names, "nothing was tuned"
     page = (tmp_path / "compare" / "report.html").read_text(encoding="utf-8")
     for text in ("LuGre", "12-bit encoder", "1e-08 m3/(s Pa)", "weight x 2"):
         assert text in page, text

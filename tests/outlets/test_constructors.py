@@ -11,15 +11,29 @@ import math
 import warnings
 from typing import Any
 
+import numpy as np
 import pytest
 from plants import EXAMPLES
 
-from airmuscle import control, load, mechanism, muscle, pneumatics
+from airmuscle import (
+    analysis,
+    control,
+    environments,
+    identify,
+    load,
+    mechanism,
+    muscle,
+    pneumatics,
+    recording,
+)
+from airmuscle.control import PID
 from airmuscle.core.errors import AirmuscleError, AirmuscleWarning, ParameterError, UnitError
+from airmuscle.identify import dynamic, prediction
 from airmuscle.library.files import list_laws
 from airmuscle.mechanism import HangingMass
 from airmuscle.muscle import characteristic, friction, geometry
 from airmuscle.pneumatics import Supply, Tank, Valve
+from airmuscle.study import control_benchmark, tuning
 
 FACES = (characteristic, control, friction, geometry, mechanism, muscle, pneumatics)
 MODELS = sorted(
@@ -31,9 +45,16 @@ MODELS = sorted(
     },
     key=lambda each: each.__name__,
 )
+
+
+class Unprintable:
+    def __repr__(self) -> str:
+        raise ZeroDivisionError
+
+
 JUNK: tuple[Any, ...] = (
     None, "abc", "", "3 furlongs", math.nan, math.inf, -1, -1.0, 10**400, 10**5000, [], (), {}, object(), True, int, ("a", None),
-    (object(),), ([],), [math.nan], b"1", 1j, lambda: 0, "9" * 100_000,
+    (object(),), ([],), [math.nan], b"1", 1j, lambda: 0, "9" * 100_000, Unprintable(), np.array("x"), ((object(),),),
 )  # fmt: skip
 
 
@@ -117,3 +138,44 @@ def test_a_supply_of_some_pascals_is_implausible():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert Supply(0.0).pressure == 0.0
+
+
+def settings() -> list[Any]:
+    """One instance of each dataclass that is a setting of a fit, a reader, a tuning, a benchmark or a learning task."""
+    step, plant = control_benchmark.StepMotion(0.1, 0.0), EXAMPLES["surface"]
+    return [
+        identify.Huber(1.0), identify.SoftL1(1.0), identify.LeastSquares(), identify.BlockSplit(),
+        identify.LevelSplit("pressure"), identify.Censoring(), dynamic.StartTime(0.1),
+        dynamic.InitialValue("pressure", 1.0), prediction.PlantUncertainty({"muscle.damping": 1.0}),
+        recording.BlockMeans(), recording.Decimation(), recording.RecordedTime(), recording.ColumnMapping(),
+        recording.Recording({"time": [0.0, 1.0]}, "two rows"),
+        environments.ValueRange(("mass",), 0.0, 1.0), environments.FactorRange(("mass",), 0.5, 2.0),
+        environments.Observation("angle", "rad", -1.0, 1.0),
+        tuning.FirstOrderDeadTime(1.0, 1.0, 0.1), tuning.IntegratorDeadTime(1.0, 0.1), tuning.UltimatePoint(1.0, 1.0),
+        tuning.Perturbations(), tuning.RobustObjective(), tuning.RootMeanSquareError(), tuning.RuleSettings("SIMC", 1, 1),
+        tuning.IntegralAbsoluteError(), tuning.IntegralTimeAbsoluteError(),
+        control_benchmark.StuckValve("left.fill", 1.0, 0.5), control_benchmark.ControlTask("step", step, 1.0), step,
+        control_benchmark.RampMotion(0.1, 0.0, 1.0), control_benchmark.SineMotion(0.1, 1.0),
+        control_benchmark.MinimumJerkMotion(0.1, 0.0, 1.0), control_benchmark.SumOfMotions((step, step)),
+        analysis.ExtendedKalmanFilter(plant, ("pressure",), 0.01, {}, {"pressure": 500.0}),
+        analysis.UnscentedKalmanFilter(plant, ("pressure",), 0.01, {}, {"pressure": 500.0}),
+        control.WithDrivers(control.Schedule({"fill": ((0, 1),)}), {"fill": control.PWM(50.0)}),
+        control.Schedule({"fill": ((0, 1),)}),
+        control_benchmark.Contender("PID", PID("angle", "difference", 1.0)),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("setting", settings(), ids=lambda each: type(each).__name__)
+def test_junk_in_a_setting_is_accepted_or_refused_but_never_a_foreign_exception(setting: Any):
+    for field in (f for f in dataclasses.fields(setting) if f.init):
+        for junk in (*JUNK, np.array([1.0, 2.0]), {"a": {"b": 1}}):
+            refusal_of(lambda f=field, j=junk: dataclasses.replace(setting, **{f.name: j}))
+        said = refusal_of(lambda f=field: dataclasses.replace(setting, **{f.name: Unprintable()}))
+        assert said is not None, field.name
+        names = type(setting).__name__ in said and field.name in said
+        assert names or isinstance(setting, control.InputSignal), said
+
+
+def test_an_array_without_dimension_is_no_list_of_numbers():
+    with pytest.raises(ParameterError, match=r"Lever.arms .* it must be several numbers"):
+        dataclasses.replace(INSTANCES[mechanism.Lever], arms=np.array("x"))

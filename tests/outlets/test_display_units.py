@@ -206,3 +206,26 @@ def test_the_code_of_the_page_runs():
     for block in re.findall(r"```python\n(.*?)```", page, re.DOTALL):
         exec(block, names)
     assert current_units() == ()
+
+
+def test_a_user_without_a_home_folder_has_no_configuration(config, monkeypatch: pytest.MonkeyPatch):
+    pwd = pytest.importorskip("pwd")
+
+    def unknown(uid: int) -> None:
+        raise KeyError(uid)
+
+    for name in ("HOME", "XDG_CONFIG_HOME", "AIRMUSCLE_CONFIG_DIR"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(pwd, "getpwuid", unknown)
+    assert module.chosen_scale("Pa", 1e-3, "kPa") == (1e-3, "kPa")
+
+
+def test_a_configuration_in_a_folder_of_another_user_is_not_read(config, monkeypatch: pytest.MonkeyPatch):
+    def denied(self: Path, *args: object, **options: object) -> str:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "read_text", denied)
+    with pytest.raises(FileError, match="cannot be read"):
+        module.chosen_scale("Pa", 1e-3, "kPa")
+    monkeypatch.setattr(module.os, "access", lambda folder, mode: False)
+    assert module.chosen_scale("Pa", 1e-3, "kPa") == (1e-3, "kPa")

@@ -107,3 +107,7 @@ def test_the_command_converts_one_file_and_several(tmp_path):
     assert (tmp_path / "plain.csv").read_text().startswith("time [s],")
     assert airmuscle("convert-data", tmp_path / "run0.csv", tmp_path / "a.h5", "--plain").exit_code == 2
     assert airmuscle("convert-data", tmp_path / "run0.csv", tmp_path / "a.xyz").exit_code == 1
+    before = (tmp_path / "run0.csv").read_bytes()
+    done = airmuscle("convert-data", tmp_path / "run0.csv", tmp_path / "run0.csv")
+    assert "run0.csv: is a file to be converted and would be lost" in done.stderr
+    assert (tmp_path / "run0.csv").read_bytes() == before

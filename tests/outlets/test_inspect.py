@@ -7,6 +7,7 @@ saturation. Files that a fit would reject are inspected, with the reason.
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -94,6 +95,9 @@ def test_the_text_output(tmp_path: Path):
     ):
         assert said in text
     assert "PROBLEM" not in text
+    digits = re.findall(r"(?<![\w.])\d+\.\d+(?![\w.])", text)
+    assert digits
+    assert all(len(number.replace(".", "").strip("0")) <= 4 for number in digits), digits
 
 
 def test_a_long_list_is_truncated_with_a_count(tmp_path: Path):

@@ -72,7 +72,7 @@ def test_a_quantity_without_unit_is_refused_with_the_line_that_states_it(bag, tm
 
 def test_a_bag_without_its_metadata_is_refused(bag):
     (bag / "metadata.yaml").unlink()
-    with pytest.raises(FileError, match=r"no metadata\.yaml beside it; copy the whole folder"):
+    with pytest.raises(FileError, match=r"no metadata\.yaml next to it; copy the whole folder"):
         read(bag)
 
 

@@ -213,6 +213,7 @@ def test_a_scenario_that_cannot_be_tuned_is_refused(scenario):
         (["--loads", "0.5;2"], "--loads is '0.5;2'; it must be factors with commas between them"),
         (["--loads", "0"], "loads contains 0; a factor must be positive"),
         (["--quantile", "2"], "quantile is 2.0; allowed range: 0 to 1"),
+        (["--budget", "9" * 30], "Invalid value for '--budget'"),
         (["--budget", "20"], "budget is 20; it must be a whole number of at least 80"),
     ],
 )

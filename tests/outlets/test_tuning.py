@@ -368,3 +368,14 @@ def test_bad_cases_are_refused():
 def test_impossible_settings_are_refused(make, message):
     with pytest.raises(ParameterError, match=message):
         make()
+
+
+def test_the_report_states_index_and_objective_in_words():
+    assert (
+        str(RobustObjective(air_weight=100.0)) == "mean + 1 x 0.9 quantile of the index + 100 x mean air drawn [kg/s]"
+    )
+    assert str(RobustObjective(quantile=1.0)) == "mean + 1 x 1 quantile of the index"
+    assert (
+        str(RootMeanSquareError({"angle": 0.1}, begin=0.5))
+        == "RootMeanSquareError, angle divided by 0.1 (SI), from 0.5 s"
+    )

@@ -15,6 +15,7 @@ from ..compile.program import compile_system
 from ..control.controller import Controller, Measurement
 from ..core.arrays import Array
 from ..core.errors import ParameterError, SolveError
+from ..core.field_types import check_field_types
 from ..core.reference import Reference
 from ..core.short_repr import ShortRepr
 from ..core.status import Status
@@ -31,7 +32,7 @@ QI2019 = Reference(
     note="enumeration of the modes of on/off valves over a short horizon, cost of switching",
 )
 MAX_SEQUENCES = 1_000_000
-"""Greatest number of sequences of modes (chosen)."""
+"""Maximum number of sequences of modes (chosen)."""
 _choose = Kernel("choose_mode", "finite_control_set")
 
 
@@ -89,6 +90,7 @@ class FiniteControlSet(ShortRepr, Controller):
     _searches: list[BoundSearch] = dataclasses.field(init=False, repr=False, default_factory=list)
 
     def __post_init__(self) -> None:
+        check_field_types(self)
         owner, known = "FiniteControlSet", compile_system(self.estimator.plant).description
         columns = self.estimator.plant_columns
         check_numbers(owner, "permitted", self.permitted, columns, ())
@@ -147,13 +149,13 @@ class FiniteControlSet(ShortRepr, Controller):
         search = self._searches.pop() if self._searches else self._bind()
         search.states[0], search.wanted[:], search.sequence[0] = state, wanted, mode
         status = Status(search.run())
-        found = tuple(int(k) for k in search.best[1:])
+        sequence = tuple(int(k) for k in search.best[1:])
         self._searches.append(search)
         if status is not Status.DONE:
             raise SolveError(
                 f"FiniteControlSet: no prediction succeeded, because {status.message}. Check the estimate."
             )
-        return found
+        return sequence
 
     @property
     def _mode_table(self) -> Array:

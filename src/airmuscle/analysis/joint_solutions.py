@@ -45,9 +45,9 @@ def affine_candidates(unlimited: Functions, pressures: Range, angle: Array, torq
     x, y = torque - q - other_q, stiffness - k - other_k
     with np.errstate(all="ignore"):
         determinant = a * d - b * c
-        found = np.stack([(d * x - b * y) / determinant, (a * y - c * x) / determinant], axis=1)
-        inside = _within(found, pressures)
-    return np.asarray(np.where(inside[:, None], np.clip(found, *pressures), np.nan)[:, None, :])
+        pairs = np.stack([(d * x - b * y) / determinant, (a * y - c * x) / determinant], axis=1)
+        inside = _within(pairs, pressures)
+    return np.asarray(np.where(inside[:, None], np.clip(pairs, *pressures), np.nan)[:, None, :])
 
 
 def general_candidates(limited: Functions, pressures: Range, angle: Array, torque: Array, stiffness: Array) -> Array:
@@ -65,18 +65,18 @@ def general_candidates(limited: Functions, pressures: Range, angle: Array, torqu
     work = lanes_array(3), lanes_array(5), lanes_array(5), np.zeros((2, 3, 2, CELLS))
     cells, points = np.zeros(CELLS**2 + LANES, dtype=np.int64), [np.array(v) for v in (angle, torque, stiffness)]
     while True:
-        found = np.full((angle.size, room, 2), np.nan)
+        pairs = np.full((angle.size, room, 2), np.nan)
         pair_solutions(
-            first.address, second.address, float(pressures[0]), float(pressures[1]), *points, padded, found, counts,
+            first.address, second.address, float(pressures[0]), float(pressures[1]), *points, padded, pairs, counts,
             *work, cells,
         )  # fmt: skip
         most = int(counts.max(initial=1))
         if most <= room:
             break
         room = most
-    found = found[:, : max(most, 1)]
-    order = np.argsort(found[..., 0], axis=1)
-    return np.asarray(np.take_along_axis(found, order[..., None], axis=1))
+    pairs = pairs[:, : max(most, 1)]
+    order = np.argsort(pairs[..., 0], axis=1)
+    return np.asarray(np.take_along_axis(pairs, order[..., None], axis=1))
 
 
 def balanced_angles(
@@ -98,10 +98,10 @@ def balanced_angles(
         for part in np.array_split(np.arange(load.size), 1 + load.size // CHUNK)
     ])  # fmt: skip
     row, step = np.nonzero((values[:, :-1] > 0.0) != (values[:, 1:] > 0.0))
-    found = _bracketed_root(excess, slope, row, grid[step], grid[step + 1], values[row, step] > 0.0)
+    roots = _bracketed_root(excess, slope, row, grid[step], grid[step + 1], values[row, step] > 0.0)
     count = np.bincount(row, minlength=load.size)
     table = np.full((load.size, max(1, int(count.max(initial=0)))), np.nan)
-    table[row, np.arange(row.size) - np.searchsorted(row, row)] = found
+    table[row, np.arange(row.size) - np.searchsorted(row, row)] = roots
     return table
 
 
@@ -126,9 +126,9 @@ def _bracketed_root(
     return x
 
 
-def _within(found: Array, pressures: Range) -> Mask:
+def _within(pairs: Array, pressures: Range) -> Mask:
     margin = _MARGIN * (pressures[1] - pressures[0])
-    return np.asarray(((found >= pressures[0] - margin) & (found <= pressures[1] + margin)).all(axis=1))
+    return np.asarray(((pairs >= pressures[0] - margin) & (pairs <= pressures[1] + margin)).all(axis=1))
 
 
 def are_balanced(first: Sequence[Array], second: Sequence[Array], torque: Array, stiffness: Array) -> Mask:

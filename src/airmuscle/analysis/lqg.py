@@ -22,7 +22,7 @@ def design_lqg(
     """The state feedback with observer that minimises a quadratic cost of a linearised plant at a sample time [s].
 
     measured, controlled    columns that the observer uses, and those with a set point; controlled ones are measured
-    permitted               greatest permitted deviation of states and inputs, for Bryson's rule: weight 1/d^2; every
+    permitted               maximum permitted deviation of states and inputs, for Bryson's rule: weight 1/d^2; every
                             input needs one, a state without one has the weight 0
     permitted_integral      the same for the integral of the error of every controlled column [unit s]
     process_noise           standard deviation of states after 1 s of noise; states without one have none

@@ -14,6 +14,7 @@ from ..control.linear_model_predictive import RAWLINGS2017
 from ..control.multivariable import MultivariableController, failure_notes
 from ..core.arrays import Array
 from ..core.errors import ParameterError
+from ..core.field_types import check_field_types
 from ..core.reference import Reference
 from ..core.short_repr import ShortRepr
 from .design_checks import check_known, check_numbers, check_sample_time
@@ -58,7 +59,7 @@ class NonlinearModelPredictive(ShortRepr, MultivariableController):
     operating_inputs   values of all inputs of the plant at the first estimate; those not commanded are held there
     controlled   columns with a set point
     commanded    inputs that the controller commands
-    permitted    greatest permitted deviation of states and commanded inputs; every commanded input needs one
+    permitted    maximum permitted deviation of states and commanded inputs; every commanded input needs one
     limits       minimum and maximum of columns, such as {"pressure": (0, 5e5)}
     slack_weight weight of the squared violation relative to the size of its range; infinity makes the limits hard
     horizon      number N of samples
@@ -83,6 +84,7 @@ class NonlinearModelPredictive(ShortRepr, MultivariableController):
     _programs: list[Programs] = dataclasses.field(init=False, repr=False, default_factory=list)
 
     def __post_init__(self) -> None:
+        check_field_types(self)
         owner, known = "NonlinearModelPredictive", compile_system(self.estimator.plant).description
         columns = self.estimator.plant_columns
         for argument, names, allowed in (
@@ -151,9 +153,9 @@ class NonlinearModelPredictive(ShortRepr, MultivariableController):
         variables  those of the last solution, from which the search starts
         """
         programs = self._programs.pop() if self._programs else self._built()
-        found = programs.solve(state, wanted, low, high, variables)
+        solution = programs.solve(state, wanted, low, high, variables)
         self._programs.append(programs)
-        return found
+        return solution
 
     def _all_inputs(self, commanded: Array) -> list[float]:
         """The inputs of the plant in its order."""

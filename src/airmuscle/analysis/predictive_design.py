@@ -16,7 +16,7 @@ from .riccati import discretised, observer_gain, regulator
 from .state_estimator import DISTURBANCE
 
 MAX_HORIZON = 200
-"""Greatest number of samples of a horizon, whose matrices have the square of it (chosen)."""
+"""Maximum number of samples of a horizon, whose matrices have the square of it (chosen)."""
 SLACK_WEIGHT = 1e4
 """Weight of the slack of a limited column, relative to the permitted deviation of 1 (chosen)."""
 
@@ -31,7 +31,7 @@ def design_predictive(
 
     measured, controlled    columns that the observer uses, and those with a set point; controlled ones are measured
     disturbed               states to whose rate an unknown disturbance is added: as many as measured columns
-    permitted               greatest permitted deviation of states and inputs, for Bryson's rule: weight 1/d^2; every
+    permitted               maximum permitted deviation of states and inputs, for Bryson's rule: weight 1/d^2; every
                             input needs one, a state without one has the weight 0
     process_noise           standard deviation of states after 1 s of noise, also of disturbances ("speed.disturbance")
     measurement_noise       standard deviation of every measured column

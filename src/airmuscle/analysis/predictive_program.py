@@ -12,7 +12,7 @@ from ..core.arrays import Array
 from ..core.system import System
 
 MAX_HORIZON = 200
-"""Greatest number of samples of a horizon, and of steps of a sample (chosen)."""
+"""Maximum number of samples of a horizon, and of steps of a sample (chosen)."""
 MAX_ITERATIONS = 100
 """Iterations after which a search has no solution (chosen)."""
 TARGET_WEIGHT = 1e8
@@ -73,8 +73,8 @@ class PredictiveProgram:
         """Scaled rates with disturbances [SI]."""
         import casadi
 
-        found = self.plant.rates(*self._named(x, u))
-        rows = [found[s.name] for s in self.plant.states]
+        rates = self.plant.rates(*self._named(x, u))
+        rows = [rates[s.name] for s in self.plant.states]
         for i, place in enumerate(self.disturbed):
             rows[place] = rows[place] + d[i]
         return casadi.vertcat(*[row / float(size) for row, size in zip(rows, self.scale, strict=True)])
@@ -165,11 +165,11 @@ class Programs:
         bounds, free = (low / p.sizes, high / p.sizes), np.full(n, np.inf)
         operating = np.array([p.inputs[name] for name in p.commanded]) / p.sizes
         guess = np.concatenate([x, operating]) if variables is None else variables[: n + m]
-        found = self.target(
+        solution = self.target(
             x0=guess, p=np.concatenate([d, wanted]), lbg=0.0, ubg=0.0,
             lbx=np.concatenate([-free, bounds[0]]), ubx=np.concatenate([free, bounds[1]]),
         )  # fmt: skip
-        aim = np.array(found["x"]).ravel()
+        aim = np.array(solution["x"]).ravel()
         if not (self.target.stats()["success"] and np.isfinite(aim).all()):
             return None, None
         start = self._start(x, aim, variables)
@@ -181,13 +181,13 @@ class Programs:
         slack = np.zeros(p.slacks)
         under, over = np.tile([-np.inf, 0.0], (p.horizon, 1)), np.tile([1.0, np.inf], (p.horizon, 1))
         width = len(p.limits)
-        found = self.planner(
+        solution = self.planner(
             x0=start, p=np.concatenate([x, d, aim]),
             lbx=np.concatenate([each[0], slack]), ubx=np.concatenate([each[1], slack + np.inf]),
             lbg=np.concatenate([np.zeros(steps), np.repeat(under, width, axis=1).ravel()[: 2 * rows]]),
             ubg=np.concatenate([np.zeros(steps), np.repeat(over, width, axis=1).ravel()[: 2 * rows]]),
         )  # fmt: skip
-        z = np.array(found["x"]).ravel()
+        z = np.array(solution["x"]).ravel()
         if not (self.planner.stats()["success"] and np.isfinite(z).all()):
             return None, None
         inputs = z[: p.horizon * (n + m)].reshape(p.horizon, n + m)[:, n:]

@@ -16,6 +16,7 @@ from ..control.control_loop import COMMAND
 from ..core import tree
 from ..core.arrays import Array
 from ..core.errors import ParameterError, SolveError
+from ..core.field_types import check_field_types
 from ..core.short_repr import ShortRepr
 from ..core.status import Status
 from ..core.system import System
@@ -94,6 +95,7 @@ class StateEstimator(ShortRepr, abc.ABC):
 
     def __post_init__(self) -> None:
         owner = type(self).__name__
+        check_field_types(self)
         check_system(owner, self.plant)
         compiled = compile_system(self.plant)
         object.__setattr__(self, "_compiled", compiled)

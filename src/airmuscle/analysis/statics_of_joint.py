@@ -75,9 +75,9 @@ class JointStatics(ShortRepr):
         torque = self.load(angle, names=("torque",))[0] + load
         affine = all(function.affine for function in self.unlimited)
         solve, functions = (affine_candidates, self.unlimited) if affine else (general_candidates, self.torques)
-        found = solve(functions, self.pressure_range, angle, torque, stiffness)
-        angles = np.broadcast_to(angle[:, None], found.shape[:2])
-        return self._points(angles, found, torque[:, None], stiffness[:, None])
+        pairs = solve(functions, self.pressure_range, angle, torque, stiffness)
+        angles = np.broadcast_to(angle[:, None], pairs.shape[:2])
+        return self._points(angles, pairs, torque[:, None], stiffness[:, None])
 
     def angles(self, pressures: tuple[Any, Any], load: Any = 0.0) -> JointPoints:
         """All equilibria at gauge pressures [Pa] of both muscles under a load [N m], by ascending angle.
@@ -86,9 +86,9 @@ class JointStatics(ShortRepr):
         are defined are searched in 128 steps and refined by bisection to rounding.
         """
         first, second, load = _as_points("pressures and load", *pressures, load)
-        found = balanced_angles(self.torques, self.load, self.angle_range, (first, second), load)
-        both = np.stack([np.broadcast_to(p[:, None], found.shape) for p in (first, second)], axis=2)
-        return self._points(found, np.where(np.isnan(found)[..., None], np.nan, both))
+        balanced = balanced_angles(self.torques, self.load, self.angle_range, (first, second), load)
+        both = np.stack([np.broadcast_to(p[:, None], balanced.shape) for p in (first, second)], axis=2)
+        return self._points(balanced, np.where(np.isnan(balanced)[..., None], np.nan, both))
 
     def with_columns(self, recording: Recording) -> Recording:
         """A recording of the plant with torque, stiffness, shut_valves_stiffness and cocontraction as further columns.

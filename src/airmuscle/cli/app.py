@@ -83,7 +83,7 @@ class LazyCommands(TyperGroup):
         check_interrupted()
         command = typer.Typer(**SETTINGS)
         command.command(row.name)(function)
-        return typer.main.get_command(command)
+        return _without_types(typer.main.get_command(command))
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         if args[0] not in _ROWS:
@@ -104,6 +104,14 @@ class LazyCommands(TyperGroup):
             warnings.showwarning = functools.partial(_show_warning, ctx, warnings.showwarning)
             with _exit_codes(ctx), _printable_usage_errors(), deferred_sigint():
                 return super().invoke(ctx)
+
+
+def _without_types(command: Any) -> Any:
+    """The command, whose help shows no Python type after the name of an argument."""
+    for each in command.params:
+        if each.param_type_name == "argument":
+            each.display_type_rich = lambda ctx: ""
+    return command
 
 
 @contextlib.contextmanager

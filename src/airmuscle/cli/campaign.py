@@ -113,8 +113,8 @@ def _read_each(
             except AirmuscleError as error:
                 unread.append(UnreadFile(path.name, in_options(error.message, "campaign")))
     if not recordings:
-        reasons = " ".join(f"{each.name}: {each.reason}" for each in unread)
-        raise FileError(f"none of the {len(files)} files of the campaign could be read. {reasons}")
+        reasons = (x.reason if x.name in x.reason else f"{x.name}: {x.reason}" for x in unread)
+        raise FileError(f"no file of the campaign could be read. {' '.join(reasons)}")
     return recordings, unread
 
 

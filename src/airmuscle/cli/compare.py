@@ -59,7 +59,9 @@ def compare(
     budget: Annotated[
         int, typer.Option(min=0, max=1_000_000, metavar="N", help="Simulated loops to tune each controller; 0: none.")
     ] = DEFAULT_BUDGET,
-    seed: Annotated[int, typer.Option(min=0, max=1_000_000, help="Seed of the optimiser and of the noise.")] = 1,
+    seed: Annotated[
+        int, typer.Option(min=0, max=1_000_000, metavar="N", help="Seed of the optimiser and of the noise.")
+    ] = 1,
     trials: Annotated[
         int, typer.Option(min=0, max=1000, metavar="N", help="Trials of iterative learning at 2 Hz; 0: none.")
     ] = 0,
@@ -92,7 +94,9 @@ def compare(
         print_json(_to_dict(result, curves))
     else:
         _print(ranking_table(result))
-        _print(error_table(result, "rmse"))
+        errors = error_table(result, "rmse")
+        echo(f"\n{errors.title}")
+        _print(errors)
     if not any(run.metrics for run in result.runs.values()):
         raise SimulationError(f"all runs failed; reason of the first: {next(iter(result.runs.values())).reason}")
     if not json:

@@ -10,6 +10,7 @@ import typer
 from ..core.errors import FileError
 from ..recording import Recording, read, write
 from ..recording.csv_writer import write_csv
+from ..recording.reader import find_files
 from ..recording.writer import EXTENSIONS
 from .options import Json
 from .terminal import echo, print_json
@@ -42,6 +43,7 @@ def convert_data(
         raise FileError(f"{target}: the extension must be one of {', '.join(EXTENSIONS)}.")
     recordings = read(source, mapping=mapping)
     paths = [_path(target, i, len(recordings)) for i in range(len(recordings))]
+    _check_no_source(paths, source)
     for recording, path in zip(recordings, paths, strict=True):
         _write(recording, path, plain)
     if json:
@@ -49,6 +51,14 @@ def convert_data(
         return
     for recording, path in zip(recordings, paths, strict=True):
         echo(f"file: {path}: {len(recording)} rows of {', '.join(recording)}")
+
+
+def _check_no_source(targets: list[Path], source: str) -> None:
+    """Raise FileError if a file to be written is one of those that were read."""
+    sources = {path.resolve() for path in find_files(source)}
+    for target in targets:
+        if target.resolve() in sources:
+            raise FileError(f"{target}: is a file to be converted and would be lost. Choose another target.")
 
 
 def _path(target: Path, number: int, count: int) -> Path:

@@ -66,10 +66,10 @@ def with_braid(entry: Entry, size: BraidSize | None, recordings: Sequence[Record
 def check_one_length(lengths: Sequence[float]) -> None:
     """Raise ParameterError unless there is exactly one resting length [m] for the braid of --braid."""
     if len(lengths) != 1:
-        found = ", ".join(f"{length:.4g} m" for length in lengths) or "none"
+        stated = ", ".join(f"{length:.4g} m" for length in lengths) or "none"
         raise ParameterError(
-            f"--braid: a braid has exactly one resting length; the data state {found}. Give --resting-length, or files "
-            "of one muscle."
+            f"--braid: a braid has exactly one resting length; the data state {stated}. Give --resting-length, or "
+            "files of one muscle."
         )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..recording.display_units import display_scale
 from ..recording.segment import Inspection, Outlier, Run, Sampling
+from ..report.formatting import MISSING
 from .option_hints import in_options
 
 COLUMNS = ("column", "unit in file", "min", "max", "unit", "resolution", "noise", "saturated at")
@@ -25,13 +26,13 @@ def column_rows(inspection: Inspection) -> Iterator[tuple[str, ...]]:
         limits = (sensor.lower_limit, sensor.upper_limit) if sensor else ()
         yield (
             name,
-            recording.units.get(name, ""),
-            f"{values.min():.5g}",
-            f"{values.max():.5g}",
-            unit,
-            f"{sensor.resolution * factor:.3g}" if sensor and sensor.resolution else "",
-            f"{sensor.noise * factor:.2g}" if sensor and sensor.noise else "",
-            ", ".join(f"{limit * factor:.4g}" for limit in limits if np.isfinite(limit)),
+            unit_in_file if (unit_in_file := recording.units.get(name, "")) != "1" else "",
+            f"{values.min():.4g}",
+            f"{values.max():.4g}",
+            unit if unit != "-" else "",
+            f"{sensor.resolution * factor:.3g}" if sensor and sensor.resolution else MISSING,
+            f"{sensor.noise * factor:.2g}" if sensor and sensor.noise else MISSING,
+            ", ".join(f"{limit * factor:.4g}" for limit in limits if np.isfinite(limit)) or MISSING,
         )
 
 
@@ -39,7 +40,7 @@ def summary(inspection: Inspection) -> Iterator[str]:
     """Constants, sampling, runs, branches, plateaus, outliers, notes and findings, one line each."""
     for name, value in inspection.recording.constants.items():
         factor, unit = display_scale("length" if name == "resting_length" else "pressure" if name == "ambient" else "")
-        yield f"{name}: {value * factor:.6g} {unit}" if isinstance(value, float) and unit else f"{name}: {value}"
+        yield f"{name}: {value * factor:.4g} {unit}" if isinstance(value, float) and unit else f"{name}: {value}"
     if inspection.sampling:
         yield f"sampling: {_describe_sampling(inspection.sampling)}"
     yield f"runs: {_shorten([_describe_run(run) for run in inspection.runs])}"

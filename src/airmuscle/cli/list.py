@@ -105,6 +105,6 @@ def _data_row(path: Path) -> ListRow:
         comments = list(itertools.takewhile(lambda line: line.startswith("#"), file))
     text = " ".join(line.lstrip("# ").strip() for line in comments)
     title = comments[0].lstrip("# ").strip() if comments else ""
-    secondary = "secondary source" in text or "second hand" in text
+    secondary = "secondary source" in text
     provenance = "secondary source" if secondary else "measured" if "measured" in text else ""
     return ListRow(path.stem, title, "data set", provenance)

@@ -133,7 +133,7 @@ def _print(design: ExperimentPlan) -> None:
     print_table(("run", "constant", "sweep", "points", "expected force"), rows, right=("run", "points"))
     parameters = zip(design.names, design.values, design.standard_errors, strict=True)
     headers = ("parameter", "present value", "expected 2 stderr")
-    print_table(headers, [(n, f"{v:.5g}", f"{2 * d:.2g}") for n, v, d in parameters], right=headers[1:])
+    print_table(headers, [(n, f"{v:.4g}", f"{2 * d:.2g}") for n, v, d in parameters], right=headers[1:])
     echo(
         f"relative D-efficiency {design.relative_d_efficiency:.2f}, compared with the same number of evenly spaced runs"
     )

@@ -76,7 +76,7 @@ def predict(
     \b
     A muscle predicts slow records from pressure and contraction, with its friction and creep along the motion. A
     scenario of fit-dynamic or campaign predicts transient records by simulation of its input.
-    Prints rms error, greatest error and the share of rows within the stated 95 % band. Writes DIR/report.html with
+    Prints rms error, maximum error and the share of rows within the stated 95 % band. Writes DIR/report.html with
     figures and data.
 
     \b
@@ -152,8 +152,8 @@ def _print(predictions: Sequence[RecordPrediction], band: str) -> None:
             compared = str(int(item.compared.sum()))
             rms, half = with_unit(item.rms, item.name), describe_band(item)
             rows.append((each.origin, item.name, compared, rms, greatest, half, share))
-    headers = ("record", "quantity", "rows", "rms error", "greatest error", "95 % band", "within")
-    print_table(headers, rows, right=("rows", "rms error", "greatest error", "95 % band", "within"))
+    headers = ("record", "quantity", "rows", "rms error", "maximum error", "95 % band", "within")
+    print_table(headers, rows, right=("rows", "rms error", "maximum error", "95 % band", "within"))
     if band:
         echo(f"band: {band}")
     for each in predictions:

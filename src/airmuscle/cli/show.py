@@ -143,7 +143,8 @@ def _shorten(parameters: list[dict[str, Any]]) -> list[dict[str, Any]]:
         if count <= MAX_VALUES or position in (0, 1, count - 1):
             rows.append(parameter)
         elif position == 2:
-            rows.append({**parameter, "name": f"... {count - 3} more", "value": "", "meaning": ""})
+            empty = dict.fromkeys(("symbol", "value", "unit", "meaning"), "")
+            rows.append({**parameter, **empty, "name": f"... {count - 3} more", "bounds": [None, None]})
     return rows
 
 

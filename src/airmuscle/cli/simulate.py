@@ -80,7 +80,8 @@ def _ranges(recording: Recording) -> dict[str, dict[str, float | str]]:
 
 def _print(scenario: Scenario, recording: Recording) -> None:
     echo(f"{scenario.title}: {len(recording)} rows over {scenario.problem.duration:g} s")
-    rows = [tuple(format_number(value) for value in column.values()) for column in _ranges(recording).values()]
+    rows = [tuple(map(format_number, column.values())) for column in _ranges(recording).values()]
+    rows = [(heading.removesuffix(" [1]"), *values) for heading, *values in rows]
     print_table(("column", "min", "max", "last"), rows, right=("min", "max", "last"))
     for note in recording.notes:
         echo(f"note: {note}")

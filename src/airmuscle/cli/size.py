@@ -66,9 +66,9 @@ def size(
     inertia: Inertia = None,
     safety: Annotated[float, typer.Option(metavar="NUMBER", help="Factor on the load that is held.")] = 1.5,
     cycle_time: Annotated[str, typer.Option(metavar="QUANTITY", help="Time of a cycle, there and back.")] = "2 s",
-    max_length: Annotated[str | None, typer.Option(metavar="QUANTITY", help="Greatest nominal length.")] = None,
-    max_diameter: Annotated[str | None, typer.Option(metavar="QUANTITY", help="Greatest outer diameter.")] = None,
-    max_count: Annotated[int, typer.Option(metavar="N", help="Greatest number of muscles in parallel.")] = 3,
+    max_length: Annotated[str | None, typer.Option(metavar="QUANTITY", help="Maximum nominal length.")] = None,
+    max_diameter: Annotated[str | None, typer.Option(metavar="QUANTITY", help="Maximum outer diameter.")] = None,
+    max_count: Annotated[int, typer.Option(metavar="N", help="Maximum number of muscles in parallel.")] = 3,
     count: Annotated[int | None, typer.Option(metavar="N", help="Exact number of muscles in parallel.")] = None,
     muscle: Muscles = None,
     sort: Annotated[str, typer.Option(metavar="KEY", help=f"Criterion of ranking: {', '.join(SORT_KEYS)}.")] = "air",
@@ -147,7 +147,7 @@ def _requirement(
         return LiftRequirement(_read("stroke", stroke, "m"), stiffness=spring, **_load(load))
     assert torque is not None
     assert angle is not None
-    turned = _read("inertia", inertia, "kg m^2") if inertia else 0.0
+    turned = _read("inertia", inertia, "kg m^2") if inertia is not None else 0.0
     return JointRequirement(_read("angle", angle, "rad"), _read("torque", torque, "N m"), turned)
 
 

@@ -23,9 +23,10 @@ def studio(
             autocompletion=complete_law,
         ),
     ] = None,
-    port: Annotated[int, typer.Option(help="Port of the server; 0 stands for any free one.")] = 8765,
+    port: Annotated[int, typer.Option(metavar="N", help="Port of the server; 0 stands for any free one.")] = 8765,
     host: Annotated[
-        str, typer.Option(help="Address of the server. Other machines are admitted with a token only.")
+        str,
+        typer.Option(metavar="ADDRESS", help="Address of the server. Other machines are admitted with a token only."),
     ] = "127.0.0.1",
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
     export: Annotated[

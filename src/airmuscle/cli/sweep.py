@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from pathlib import Path
@@ -116,6 +117,9 @@ def _print(result: StudyResult) -> None:
 
 
 def _print_table(table: Table) -> None:
+    if "unit" in table.columns:
+        units = ["" if unit == "1" else unit for unit in table.columns["unit"]]
+        table = dataclasses.replace(table, columns={**table.columns, "unit": units})
     rows = [
         tuple(value if isinstance(value, str) else _round(format_number(value)) for value in r)
         for r in table_rows(table)

@@ -97,7 +97,7 @@ def tune(
 
     \b
     Differential evolution minimises the mean plus a high quantile of a tracking index over the nominal plant and plants
-    with another load, supply pressure, leak, delay and drawn parameters. Writes SCENARIO-tuned.toml beside the
+    with another load, supply pressure, leak, delay and drawn parameters. Writes SCENARIO-tuned.toml next to the
     scenario, the same file with the new gains, and DIR/report.html, DIR/history.csv and DIR/figures/. Ctrl-C ends the
     search; the best gains so far are written.
 

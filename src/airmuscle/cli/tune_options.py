@@ -46,12 +46,12 @@ Draws = Annotated[
 Rules = Annotated[
     bool, typer.Option("--rules", help="Start from SIMC and AMIGO settings by a simulated step (PID only).")
 ]
-Budget = Annotated[int, typer.Option(min=8, metavar="N", help="Maximum number of simulated loops.")]
+Budget = Annotated[int, typer.Option(min=8, max=10_000_000, metavar="N", help="Maximum number of simulated loops.")]
 Seed = Annotated[int, typer.Option(min=0, metavar="N", help="Seed of the optimiser and of the draws.")]
 Save = Annotated[
     Path | None,
     typer.Option(
-        metavar="FILE.toml", help="Scenario with the tuned gains; default: SCENARIO-tuned.toml beside the scenario."
+        metavar="FILE.toml", help="Scenario with the tuned gains; default: SCENARIO-tuned.toml next to the scenario."
     ),
 ]
 

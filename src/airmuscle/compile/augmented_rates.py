@@ -76,6 +76,6 @@ def _by_row(matrix: Any) -> Any:
 
 def states_and_outputs(functions: AugmentedRates, count: int, states: Array, inputs: Array, outputs: int) -> Array:
     """States and outputs (M, n + k) at augmented states (M, N) under inputs (M, m); `count` is n, `outputs` is k."""
-    found = np.empty((len(states), outputs))
-    evaluate(functions.outputs, functions.constants, np.ascontiguousarray(states), np.ascontiguousarray(inputs), found)
-    return np.hstack([states[:, :count], found])
+    values = np.empty((len(states), outputs))
+    evaluate(functions.outputs, functions.constants, np.ascontiguousarray(states), np.ascontiguousarray(inputs), values)
+    return np.hstack([states[:, :count], values])

@@ -43,7 +43,7 @@ class EventIndicators:
         return [block.stored["z", i] for i in range(self.count)]
 
     def scales(self, x: Array, u: Array, p: Array, sizes: Array) -> list[float]:
-        """The magnitude of each indicator: its greatest change if one state changes by its nominal size, else 1."""
+        """The magnitude of each indicator: its largest change if one state changes by its nominal size, else 1."""
         at = self.values(x, u, p)
         greatest = [0.0] * self.count
         for i, size in enumerate(sizes):

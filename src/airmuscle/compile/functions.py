@@ -190,8 +190,8 @@ def rates_module(
 
 def _rates_and_slopes(t: TracedSystem, code: Code) -> tuple[Code, tuple[tuple[int, int], ...], tuple[int, ...]]:
     """The rates and the distinct non-zeros of their Jacobian; its places, and which non-zero stands in each."""
-    tape, found = Tape(code.body), {index: operand for _, index, operand in code.outputs}
-    rates = [found.get(i, ZERO) for i in range(t.x.numel())]
+    tape, by_index = Tape(code.body), {index: operand for _, index, operand in code.outputs}
+    rates = [by_index.get(i, ZERO) for i in range(t.x.numel())]
     rows = derivatives(tape, rates, [("in", 0, j) for j in range(t.x.numel())])
     slopes = {(i, j): row[x] for i, row in enumerate(rows) for j in range(len(rows)) if (x := ("in", 0, j)) in row}
     distinct = list(dict.fromkeys(slopes.values()))

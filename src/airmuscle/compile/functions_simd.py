@@ -80,8 +80,8 @@ class _Step:
         for operand, place in self.held.items():
             given[operand] = self._load(f"c{stage}", place)
         values = emission.run(self.block, self.items, (), {}, given)
-        found = {i: emission.value_of(self.block, operand, (), {}, values) for _, i, operand in self.outputs}
-        return [found[i] for i in range(self.states)]
+        by_index = {i: emission.value_of(self.block, operand, (), {}, values) for _, i, operand in self.outputs}
+        return [by_index[i] for i in range(self.states)]
 
     def _load(self, array: str, index: int) -> str:
         return self.block.load(array, index * self.groups)

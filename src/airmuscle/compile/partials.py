@@ -28,8 +28,8 @@ def partials(t: TracedSystem) -> Partials:
     """The partial derivatives of a traced system."""
     code = recorded([t.x, t.u, t.p], [t.f, t.o])
     n, m = t.x.numel(), t.u.numel()
-    tape, found = Tape(code.body), {(k, index): operand for k, index, operand in code.outputs}
-    results = [found.get((0, i), ZERO) for i in range(n)] + [found.get((1, i), ZERO) for i in range(t.o.numel())]
+    tape, operands = Tape(code.body), {(k, index): operand for k, index, operand in code.outputs}
+    results = [operands.get((0, i), ZERO) for i in range(n)] + [operands.get((1, i), ZERO) for i in range(t.o.numel())]
     columns = [("in", 0, j) for j in range(n)] + [("in", 1, j) for j in range(m)]
     rows = derivatives(tape, results, columns)
     values = {(i, j): row[x] for i, row in enumerate(rows) for j, x in enumerate(columns) if x in row}

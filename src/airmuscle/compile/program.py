@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import dataclasses
 import functools
+import math
 import threading
 import weakref
 from collections.abc import Callable, Sequence
@@ -26,6 +27,8 @@ Tableau = tuple[tuple[tuple[float, ...], ...], tuple[float, ...]]
 """Rows of an explicit Runge-Kutta tableau below its first, and its weights."""
 INPUT_TOLERANCE = 1e-9
 """Part of an input's range by which it may be exceeded through rounding."""
+LEAST_POSITIVE = math.ulp(0.0)
+"""The smallest number above zero."""
 _FUNCTIONS = ("rhs", "jac", "factor", "solve", "stage", "df_dt", "outputs")
 
 
@@ -135,14 +138,11 @@ class Description:
         self.recorders: list[Any] = []
         """Kernels of the rows bound to this system that no run uses at present."""
         self._name_columns()
+        self._name_ranges(system)
 
     def _name_columns(self) -> None:
         """The columns of a run, their order, and the limits of states and inputs by their names."""
         self.column_names = (*self.state_names, *self.input_names, *self.output_names)
-        first_output = len(self.state_names) + len(self.input_names)
-        self.positive_columns = [first_output + i for i in self.positive_outputs.tolist()]
-        """The columns among `column_names` that must be positive."""
-        self.column_places = {name: i for i, name in enumerate(self.column_names)}
         self.recorded_names = ("time", *self.state_names, *self.output_names, *self.input_names)
         """The columns of a recording, in their order."""
         self.remark_texts = tuple(remark.message for remark in self.remarks)
@@ -151,6 +151,20 @@ class Description:
         limits = zip(self.input_lower_limits.tolist(), self.input_upper_limits.tolist(), strict=True)
         self.input_limits = dict(zip(self.input_names, enumerate(limits), strict=True))
         """The index and the limits, with their tolerance, of each input by its name."""
+
+    def _name_ranges(self, system: System) -> None:
+        """The states and outputs that have a limit, with which their range in a run is compared."""
+        names, bounds = (*self.state_names, *self.output_names), self.lower_bounds.tolist()
+        bounded = {name: low for name, low in zip(self.state_names, bounds, strict=True) if low > -math.inf}
+        positive = [self.output_names[i] for i in self.positive_outputs.tolist()]
+        limited = [limit.column for limit in system.column_limits if limit.column in names]
+        self.ranged_names = tuple(dict.fromkeys((*bounded, *positive, *limited)))
+        self.range_places = {name: i for i, name in enumerate(self.ranged_names)}
+        """The place of each of them among the ranges of a run."""
+        self.ranged_columns = np.array([names.index(name) for name in self.ranged_names], dtype=np.int64)
+        """Their places among the states and, after these, the outputs."""
+        self.range_floors = [*bounded.values(), *(LEAST_POSITIVE for _ in positive)]
+        """The smallest possible values of the first of them: those of states, then of outputs that must be positive."""
 
 
 _programs: dict[tree.Structure, Program] = {}

@@ -58,11 +58,11 @@ def tangent_system(system: SensitivitySystem) -> TangentSystem:
     import casadi
 
     inner, names = trace_system(system.inner), [s.name for s in system.inner.states]
-    found = {
+    outputs = {
         **{n: inner.x[i] for i, n in enumerate(names)},
         **{n: inner.o[i] for i, n in enumerate(inner.output_names)},
     }
-    observed = casadi.densify(casadi.vertcat(casadi.SX(0, 1), *(found[n] for n in system.observed_names)))
+    observed = casadi.densify(casadi.vertcat(casadi.SX(0, 1), *(outputs[n] for n in system.observed_names)))
     traced = dataclasses.replace(inner, o=observed)
     return TangentSystem(traced, system.parameter_indices, system.output_names, system.input_indices)
 
@@ -100,8 +100,8 @@ class Values:
         """Append the instructions that some operands need to a function; the values of the operands."""
         distinct = tuple(dict.fromkeys(wanted))
         code = finished(Code(tuple(self.tape.body), tuple((0, i, operand) for i, operand in enumerate(distinct))))
-        found = printer.compute(block, code, names, given)
-        return {operand: LlvmValue(block, found[0, i]) for i, operand in enumerate(distinct)}
+        results = printer.compute(block, code, names, given)
+        return {operand: LlvmValue(block, results[0, i]) for i, operand in enumerate(distinct)}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -121,7 +121,7 @@ class DirectionalDerivative:
         self, values: Mapping[Operand, LlvmValue], s: Sequence[LlvmValue], v: Sequence[LlvmValue]
     ) -> list[LlvmValue]:
         """The change of each operand, a column, from the values of the parts and the rows of S and V."""
-        found = []
+        rows_along = []
         for states, inputs, columns in zip(self.by_state, self.by_input, self.by_column, strict=True):
             direct = {k: values[part].name for k, part in columns.items()}
             row = packed(s[0].block, direct, s[0].lanes)
@@ -129,19 +129,19 @@ class DirectionalDerivative:
                 row = row + s[j] * values[part]
             for j, part in inputs.items():
                 row = row + v[j] * values[part]
-            found.append(row)
-        return found
+            rows_along.append(row)
+        return rows_along
 
     def along_inputs(self, values: Mapping[Operand, LlvmValue], v: Sequence[LlvmValue]) -> list[LlvmValue | None]:
         """The part of each change that is due to the inputs alone; None without one."""
-        found: list[LlvmValue | None] = []
+        totals: list[LlvmValue | None] = []
         for inputs in self.by_input:
             total: LlvmValue | None = None
             for j, part in inputs.items():
                 term = v[j] * values[part]
                 total = term if total is None else total + term
-            found.append(total)
-        return found
+            totals.append(total)
+        return totals
 
 
 def stored(values: Sequence[LlvmValue], array: str) -> None:
@@ -191,14 +191,14 @@ def _print_along(
     To the derivatives, those of `moving` along the slopes in time of V are added.
     """
     t, block, along = values.t, FunctionBody(), values.along(values.results)
-    found = values.compute(printer, block, [*values.results, *along.parts], arguments)
-    columns = along.rows(found, t.rows(block, "x"), t.input_rows(block))
+    computed = values.compute(printer, block, [*values.results, *along.parts], arguments)
+    columns = along.rows(computed, t.rows(block, "x"), t.input_rows(block))
     if moving is not None and t.inputs:
         further = moving.along(moving.results)
         parts = moving.compute(printer, block, [part for row in further.by_input for part in row.values()], arguments)
         added = further.along_inputs(parts, t.input_rows(block, "w"))
         columns = [row if more is None else row + more for row, more in zip(columns, added, strict=True)]
-    rows = [found[v] for v in values.results] + columns
+    rows = [computed[v] for v in values.results] + columns
     if last is not None:
         final = last.compute(printer, block, last.results)
         rows += [final[v] for v in last.results]
@@ -239,18 +239,18 @@ class _Step:
         printer.end("rhs", POINT, ["f"], block)
         block = FunctionBody()
         wanted = [*self.rates.results, *s.parts, *self.bends.parts]
-        found, rows, v = self.rates.compute(printer, block, wanted), t.rows(block, "x"), t.input_rows(block)
-        stored([found[f] for f in self.rates.results] + s.rows(found, rows, v), "f")
-        bends = self.bends.rows(found, rows, v)
-        stored([found[part] for part in self.jacobian] + [bends[q] for q in self.moving], "J")
+        computed, rows, v = self.rates.compute(printer, block, wanted), t.rows(block, "x"), t.input_rows(block)
+        stored([computed[f] for f in self.rates.results] + s.rows(computed, rows, v), "f")
+        bends = self.bends.rows(computed, rows, v)
+        stored([computed[part] for part in self.jacobian] + [bends[q] for q in self.moving], "J")
         printer.end("jac", POINT, ["f", "J"], block)
 
     def print_factor(self, printer: Printer) -> None:
         """factor(J, d, A)."""
         code, block = finished(recorded([self.lu.j, self.lu.d], [self.lu.values])), FunctionBody(["d"])
-        found = printer.compute(block, code, ["J", "d"])
+        computed = printer.compute(block, code, ["J", "d"])
         bends = self._bends(block, "J", len(self.jacobian))
-        stored([LlvmValue(block, found[0, i]) for i in range(self.lu.values.numel())] + list(bends.values()), "A")
+        stored([LlvmValue(block, computed[0, i]) for i in range(self.lu.values.numel())] + list(bends.values()), "A")
         printer.end("factor", ["J", "d"], ["A"], block)
 
     def print_solve(self, printer: Printer) -> None:
@@ -263,9 +263,9 @@ class _Step:
     def print_stage(self, printer: Printer) -> None:
         """stage(x, u, c, A, g, k)."""
         t, block = self.t, FunctionBody()
-        found = self.rates.compute(printer, block, [*self.rates.results, *self.slopes.parts])
-        right = [found[f] + loaded(block, "g", i) for i, f in enumerate(self.rates.results)]
-        slopes = self.slopes.rows(found, t.rows(block, "x"), t.input_rows(block))
+        computed = self.rates.compute(printer, block, [*self.rates.results, *self.slopes.parts])
+        right = [computed[f] + loaded(block, "g", i) for i, f in enumerate(self.rates.results)]
+        slopes = self.slopes.rows(computed, t.rows(block, "x"), t.input_rows(block))
         columns = [d + more for d, more in zip(slopes, t.rows(block, "g"), strict=True)]
         stored(self._solved(block, right, columns), "k")
         printer.end("stage", [*POINT, "A", "g"], ["k"], block)

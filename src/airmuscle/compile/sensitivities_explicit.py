@@ -75,11 +75,11 @@ def _after(
     row: Sequence[float], begin: Sequence[LlvmValue], slopes: Sequence[Sequence[LlvmValue]], h: LlvmValue
 ) -> list[LlvmValue]:
     """States, or S, after the stages so far, each with its weight."""
-    found = list(begin)
+    advanced = list(begin)
     for weight, slope in zip(row, slopes, strict=True):
         if weight:
-            found = [value + d * _times(h, weight) for value, d in zip(found, slope, strict=True)]
-    return found
+            advanced = [value + d * _times(h, weight) for value, d in zip(advanced, slope, strict=True)]
+    return advanced
 
 
 def _input_rows(t: TangentSystem, block: FunctionBody, h: LlvmValue, node: float) -> list[LlvmValue]:

@@ -127,11 +127,11 @@ class InverseHysteresisOperator:
     def output(self, path: Any) -> Array:
         """Inputs (N,) of the operator that give a path of wanted outputs (N,)."""
         memory: Mapping[str, Value] = self.initial_memory
-        found = []
+        outputs = []
         for wanted in np.asarray(path, dtype=float).tolist():
             value, memory = self.step(memory, wanted)
-            found.append(float(value))
-        return np.array(found)
+            outputs.append(float(value))
+        return np.array(outputs)
 
 
 def superposed(value: Value, thresholds: tuple[Value, ...], weights: tuple[Value, ...]) -> Value:
@@ -154,8 +154,8 @@ def _inverted(thresholds: Sequence[float], weights: Sequence[float]) -> tuple[li
 
 
 def _play_along(path: Any, threshold: float) -> list[float]:
-    found, z = [], 0.0
+    outputs, z = [], 0.0
     for x in np.asarray(path, dtype=float).tolist():
         z = max(x - threshold, min(x + threshold, z))
-        found.append(z)
-    return found
+        outputs.append(z)
+    return outputs

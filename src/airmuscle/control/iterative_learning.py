@@ -32,7 +32,7 @@ BRISTOW2006 = Reference(
     note="robustness filter Q, condition of monotonic convergence",
 )
 MAX_SAMPLES = 4000
-"""Greatest number of samples of a trial, whose matrices have the square of it (chosen)."""
+"""Maximum number of samples of a trial, whose matrices have the square of it (chosen)."""
 
 
 @model

@@ -43,10 +43,10 @@ def with_designed_laws(law: Controller) -> Controller:
     """
     if not isinstance(law, ControlLaw) or structure(law) in _without_design:
         return law
-    found: Controller = _designed(law)
-    if found is law:
+    designed: Controller = _designed(law)
+    if designed is law:
         _without_design.add(structure(law))
-    return found
+    return designed
 
 
 def _designed(part: Any) -> Any:
@@ -58,8 +58,8 @@ def _designed(part: Any) -> Any:
     if not isinstance(part, Controller) or not dataclasses.is_dataclass(part):
         return part
     fields = {field.name: getattr(part, field.name) for field in dataclasses.fields(part) if field.init}
-    found = {name: _designed(value) for name, value in fields.items()}
-    changed = {name: value for name, value in found.items() if value is not fields[name]}
+    designed_fields = {name: _designed(value) for name, value in fields.items()}
+    changed = {name: value for name, value in designed_fields.items() if value is not fields[name]}
     return dataclasses.replace(part, **changed) if changed else part
 
 

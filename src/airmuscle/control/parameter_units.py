@@ -23,16 +23,16 @@ def parameter_units(controller: Any, units: Mapping[str, str]) -> dict[str, str]
     """
     named = named_signal_units(controller)
     known = {**named, **{name: unit or named.get(name, "") for name, unit in units.items()}}
-    found: dict[str, str] = {}
+    unit_of_each: dict[str, str] = {}
     for path, part in _parts(controller, ""):
         for declared in parameters(part):
             name = f"{path}.{declared.name}" if path else declared.name
             value = getattr(part, declared.name)
             if isinstance(value, tuple):
-                found |= {f"{name}[{i}]": _unit_or_one(part, declared, i, known) for i in range(len(value))}
+                unit_of_each |= {f"{name}[{i}]": _unit_or_one(part, declared, i, known) for i in range(len(value))}
             else:
-                found[name] = _unit_or_one(part, declared, 0, known)
-    return found
+                unit_of_each[name] = _unit_or_one(part, declared, 0, known)
+    return unit_of_each
 
 
 def unit_of(part: Any, declared: Parameter, index: int, units: Mapping[str, str]) -> str:

@@ -17,7 +17,7 @@ from .enclosing_law import EnclosingLaw
 from .random_numbers import LECUYER1999, STATE, drawn_normal, seeded
 
 MAX_DELAY = 1000
-"""Greatest delay of a sensor in samples (chosen)."""
+"""Maximum delay of a sensor in samples (chosen)."""
 
 
 @model

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.annotation import abridged
 from ..core.errors import ParameterError
 from ..core.short_repr import ShortRepr
 from .driver import Driver
@@ -33,12 +34,14 @@ class WithDrivers(ShortRepr, InputSignal):
     def __post_init__(self) -> None:
         check_input_signal(self.inner)
         if not isinstance(self.drivers, Mapping):
-            raise ParameterError(f"the drivers are {self.drivers!r}; name the inputs: {{'fill': SolenoidDriver(...)}}.")
+            raise ParameterError(
+                f"the drivers are {abridged(self.drivers)}; name the inputs: {{'fill': SolenoidDriver(...)}}."
+            )
         for name, chain in self.chains.items():
             for driver in chain:
                 if not isinstance(driver, Driver):
                     raise ParameterError(
-                        f"the driver of '{name}' is {driver!r}; write SolenoidDriver(...), PWM(...) or several."
+                        f"the driver of '{name}' is {abridged(driver)}; write SolenoidDriver(...), PWM(...) or several."
                     )
 
     @property

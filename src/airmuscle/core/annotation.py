@@ -6,6 +6,7 @@ import functools
 import numbers
 import types
 import typing
+from collections.abc import Callable
 from typing import Any
 
 _NAMES = {int: "an integer", str: "a text", types.NoneType: "None"}
@@ -53,14 +54,18 @@ def describe(hint: Any) -> str:
 
 def abridged(value: Any) -> str:
     """The representation of a value, with at most 80 characters."""
-    try:
-        text = repr(value)
-    except ValueError:  # Python does not print an integer of more than 4300 digits
-        return "an integer of thousands of digits"
-    return text if len(text) <= 80 else f"{text[:77]}..."
+    return _shortened(repr, value)
 
 
 def one_line(value: Any) -> str:
     """The text of a value for a message, on one line with at most 80 characters."""
-    text = " ".join(str(value).split())
+    return _shortened(lambda each: " ".join(str(each).split()), value)
+
+
+def _shortened(write: Callable[[Any], str], value: Any) -> str:
+    try:
+        text = write(value)
+    except Exception:  # an integer of more than 4300 digits, or a class that cannot be printed
+        is_integer = isinstance(value, int)
+        return "an integer of thousands of digits" if is_integer else f"an instance of {type(value).__name__}"
     return text if len(text) <= 80 else f"{text[:77]}..."

@@ -26,6 +26,10 @@ _MAX_CHARACTERS = 200
 """Maximum length of a text in a model, such as a name (chosen)."""
 
 
+_EXPECTED = ("one number", "several numbers, such as (1.0, 2.0)", "rows of numbers, such as ((1.0, 2.0), (3.0, 4.0))")
+"""What a field of numbers must be, by the depth of its annotation."""
+
+
 @dataclasses.dataclass(frozen=True)
 class Parameter:
     """Declaration of one parameter of a model."""
@@ -96,11 +100,11 @@ def _validate(obj: Any) -> None:
     """Check every field, then the conditions of `check`. Raises ParameterError or UnitError."""
     if not getattr(obj, "checks_structure", False):
         _check_annotations(obj)
-    lists = {f.name for f in dataclasses.fields(obj) if "tuple" in str(f.type)}
+    depths = {f.name: str(f.type).count("tuple[") for f in dataclasses.fields(obj)}
     for declared in parameters(obj):
         value = getattr(obj, declared.name)
-        if isinstance(value, tuple | list | np.ndarray) != (declared.name in lists):
-            expected = "several numbers, such as (1.0, 2.0)" if declared.name in lists else "one number"
+        if not _has_depth(value, depths[declared.name]):
+            expected = _EXPECTED[depths[declared.name]]
             raise ParameterError(
                 f"{type(obj).__name__}.{declared.name} ({declared.symbol}, {declared.meaning}) is "
                 f"{abridged(value)}; it must be {expected}."
@@ -110,12 +114,23 @@ def _validate(obj: Any) -> None:
         obj.check()
 
 
+def _has_depth(value: Any, depth: int) -> bool:
+    """Whether a value is a number (depth 0), a list of numbers (1) or a list of such lists (2)."""
+    if not _is_list(value):
+        return depth == 0
+    return depth > 0 and all(_has_depth(each, depth - 1) for each in value)
+
+
+def _is_list(value: Any) -> bool:
+    return isinstance(value, tuple | list) or (isinstance(value, np.ndarray) and value.ndim > 0)
+
+
 def _check_value(owner: str, declared: Parameter, value: Any) -> Any:
     """Return the value as float or tuple of floats; a text with a unit is converted to SI units.
 
     Raises ParameterError if it is not finite or out of bounds, UnitError if the unit has another dimension.
     """
-    if isinstance(value, tuple | list | np.ndarray):
+    if _is_list(value):
         return tuple(_check_value(owner, declared, v) for v in value)
     low, high = declared.bounds
     unit = "" if declared.unit == "1" else f" {declared.unit}"

@@ -102,7 +102,7 @@ def chosen_scale(si_unit: str, factor: float, label: str) -> tuple[float, str]:
 
     Raises FileError or UnitError for an invalid configuration file.
     """
-    choice = _choice_here() or _configured(str(config_folder() / CONFIG_FILE))
+    choice = _choice_here() or _of_user()
     return choice.scale(si_unit) or (factor, label)
 
 
@@ -135,9 +135,9 @@ def heading_scale(heading: str) -> tuple[float, str]:
     The factor is 1 if no other unit is chosen. A ratio is converted only if it is a contraction.
     """
     match = _HEADING.fullmatch(heading)
-    if match is None or (found := _known(match["unit"])) is None:
+    if match is None or (unit_and_factor := _known(match["unit"])) is None:
         return 1.0, heading
-    si_unit, factor = found
+    si_unit, factor = unit_and_factor
     if si_unit == "1" and "contraction" not in match["name"].lower():
         return 1.0, heading
     scale, unit = chosen_scale(si_unit, 1.0 / factor, match["unit"])
@@ -157,8 +157,8 @@ def _known(unit: str) -> tuple[str, float] | None:
     plain = unit.translate(_SUPERSCRIPTS)
     if plain in SI_UNITS:
         return plain, 1.0
-    found = known_factor(plain, None)
-    return None if found is None else next(((si, found) for si in SI_UNITS if _converts(plain, si)), None)
+    factor = known_factor(plain, None)
+    return None if factor is None else next(((si, factor) for si in SI_UNITS if _converts(plain, si)), None)
 
 
 def _converts(unit: str, si_unit: str) -> bool:
@@ -188,28 +188,39 @@ def _si_unit_and_factor(unit: str, where: str) -> tuple[str, float]:
     reason = ""
     for si_unit in SI_UNITS:
         try:
-            found = conversion(unit, si_unit)
+            converted = conversion(unit, si_unit)
         except UnitError as error:
             reason = reason or ("" if "measures another" in error.message else f" {error.message}")
             continue
-        if re.search(r"a$|\(a\)|abs", unit) and si_unit == "Pa" and found.offset:
+        if re.search(r"a$|\(a\)|abs", unit) and si_unit == "Pa" and converted.offset:
             raise UnitError(f"{where}: '{unit}' is absolute, but displayed pressures are gauge pressures; write 'bar'.")
-        if math.isfinite(found.factor) and found.factor > 0.0 and not found.offset:
-            return si_unit, found.factor
+        if math.isfinite(converted.factor) and converted.factor > 0.0 and not converted.offset:
+            return si_unit, converted.factor
     raise UnitError(
         f"{where}: '{unit}' cannot be chosen.{reason} Allowed are units of {', '.join(SI_UNITS)}, such as 'bar' "
         "or 'mm'."
     )
 
 
-def config_folder() -> pathlib.Path:
-    """The folder of the configuration file: AIRMUSCLE_CONFIG_DIR, or airmuscle in the user's configuration folder."""
+def _of_user() -> DisplayUnits:
+    folder = config_folder()
+    return DisplayUnits(()) if folder is None else _configured(str(folder / CONFIG_FILE))
+
+
+def config_folder() -> pathlib.Path | None:
+    """The folder of the configuration file: AIRMUSCLE_CONFIG_DIR, or airmuscle in the user's configuration folder.
+
+    None for a user who has no home folder.
+    """
     named = os.environ.get("AIRMUSCLE_CONFIG_DIR")
     if named:
         return pathlib.Path(named)
     import platformdirs
 
-    return pathlib.Path(platformdirs.user_config_dir("airmuscle", appauthor=False))
+    try:
+        return pathlib.Path(platformdirs.user_config_dir("airmuscle", appauthor=False))
+    except RuntimeError:
+        return None
 
 
 @functools.cache
@@ -220,6 +231,8 @@ def _configured(file: str) -> DisplayUnits:
     except (FileNotFoundError, NotADirectoryError):
         return DisplayUnits(())
     except OSError as error:
+        if not os.access(os.path.dirname(file), os.X_OK):  # the folder of another user, as after `su` without a login
+            return DisplayUnits(())
         raise FileError(f"{file}: cannot be read ({error.strerror}).") from None
     except (ValueError, RecursionError) as error:  # not TOML, or not UTF-8
         raise FileError(f"{file}: is not valid TOML: {error}.") from None

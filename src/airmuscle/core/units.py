@@ -53,6 +53,11 @@ _USUAL_UNITS: dict[str, tuple[tuple[float, str], ...]] = {
     "kg": ((500.0, "kg"), (math.inf, "g")), "m3/(s Pa)": ((1e-5, "m3/(s Pa)"), (math.inf, "dm3/(s bar)")),
 }  # fmt: skip
 """Units in which a number below a limit is usually written, by SI unit (chosen), for the examples in messages."""
+_EXAMPLES = {
+    "m": "300 mm", "Pa": "6 bar", ABSOLUTE: "1 bara", "N": "200 N", "kg": "10 kg", "s": "2 s", "rad": "60 deg",
+    "1": "12 %", "m3": "500 cm3", "m3/(s Pa)": "0.3 dm3/(s bar)", "N m": "5 N m", "K": "293 K",
+}  # fmt: skip
+"""Numbers with a unit that is usual for an SI unit (chosen), for the examples in messages."""
 _MAX_CHARACTERS = 200
 """Maximum number of characters of a text with a unit (chosen)."""
 
@@ -179,6 +184,11 @@ def usual_unit(number: float, target: str) -> str:
     return next((unit for limit, unit in candidates if abs(number) < limit), target.replace(ABSOLUTE, "Pa(a)"))
 
 
+def _example(target: str) -> str:
+    """A number with a unit of the dimension of `target`, for messages."""
+    return _EXAMPLES.get(target, f"1 {target}")
+
+
 _NUMBER = re.compile(r"^\s*(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<unit>.*?)\s*$")
 
 
@@ -196,11 +206,11 @@ def quantity(value: float | str, target: str, *, ambient: float = AMBIENT_PRESSU
     if isinstance(value, str) and len(value) > _MAX_CHARACTERS:
         raise UnitError(
             f"{prefix}a text of {len(value)} characters is not a number with a unit; at most {_MAX_CHARACTERS} are "
-            "allowed. Write it like '6 bar' or '300 mm'."
+            f"allowed. Write it like '{_example(target)}'."
         )
     match = _NUMBER.match(value) if isinstance(value, str) else None
     if not isinstance(value, str) or not match:
-        raise UnitError(f"{prefix}{abridged(value)} is not a number with a unit; write it like '6 bar' or '300 mm'.")
+        raise UnitError(f"{prefix}{abridged(value)} is not a number with a unit; write it like '{_example(target)}'.")
     if re.match(r",\s*\d", match["unit"]):
         corrected = value.replace(",", ".", 1)
         raise UnitError(f"{prefix}'{value}' contains a comma; write a decimal point, '{corrected}'.")

@@ -67,7 +67,7 @@ def check_actions(actions: tuple[Action, ...]) -> None:
 
 def all_commands(actions: tuple[Action, ...], inputs: Mapping[str, Value]) -> dict[str, Value]:
     """All inputs of the plant from the actions by name."""
-    found: dict[str, Value] = {}
+    commands: dict[str, Value] = {}
     for action in actions:
-        found |= action.commands(inputs[f"action.{action.name}"])
-    return found
+        commands |= action.commands(inputs[f"action.{action.name}"])
+    return commands

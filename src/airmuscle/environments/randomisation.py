@@ -12,9 +12,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core import tree
-from ..core.annotation import one_line
+from ..core.annotation import abridged, one_line
 from ..core.arrays import Array
 from ..core.errors import ParameterError, suggestion
+from ..core.field_types import check_field_types
 from ..core.short_repr import ShortRepr
 from ..library.uncertainty import ParameterUncertainty
 from .task import EnvironmentTask
@@ -51,8 +52,9 @@ class UniformRange(Randomisation):
 
     def __post_init__(self) -> None:
         name = type(self).__name__
-        if isinstance(self.paths, str) or not self.paths:
-            raise ParameterError(f"{name}: paths are {self.paths!r}; give a tuple of one path or more.")
+        if isinstance(self.paths, str) or (isinstance(self.paths, tuple | list) and not self.paths):
+            raise ParameterError(f"{name}: paths are {abridged(self.paths)}; give a tuple of one path or more.")
+        check_field_types(self)
         if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low <= self.high):
             raise ParameterError(
                 f"{name} of {self.paths[0]}: the range is {self.low} to {self.high}; it must be finite and rise."
@@ -101,6 +103,7 @@ class FitUncertainty(ShortRepr, Randomisation):
                 f"FitUncertainty: uncertainty is {one_line(self.uncertainty)}; give that of a muscle file with a table "
                 "[uncertainty]: am.load(PATH).uncertainty."
             )
+        check_field_types(self)
 
     @property
     def paths(self) -> tuple[str, ...]:  # type: ignore[override]

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from ..core import ops
+from ..core.field_types import check_field_types
 from ..core.ops import Value
 from ..core.system import System
 from ..core.variables import Input, StateVariable
@@ -28,6 +29,9 @@ class Observation:
     low: float
     high: float
     meaning: str = ""
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
 
 
 class EnvironmentTask(System):

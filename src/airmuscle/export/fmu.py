@@ -188,19 +188,19 @@ def _indices(name: str, values: Sequence[int]) -> str:
 
 def _limits(system: object, columns: Sequence[str]) -> list[tuple[int, float, float, str]]:
     """The ranges of columns: number of the column, lowest and highest value, text."""
-    found: list[tuple[int, float, float, str]] = []
+    limits: list[tuple[int, float, float, str]] = []
     plant = getattr(system, "equilibrium_plant", None)
     if isinstance(plant, Plant):
         for limit in column_limits(plant.muscles, plant.prefixes):
             if limit.column in columns:
                 low, high = limit.bounds
                 slack = 1e-9 * max(abs(x) for x in (low, high) if abs(x) < float("inf"))
-                found.append((columns.index(limit.column), low - slack, high + slack, describe_limit(limit)))
+                limits.append((columns.index(limit.column), low - slack, high + slack, describe_limit(limit)))
     for given in getattr(system, "input_variables", ()):
         slack = 1e-9 * (given.maximum - given.minimum)
         text = f"the input {given.name} is outside its range, {given.minimum:.4g} to {given.maximum:.4g} {given.unit}"
-        found.append((columns.index(given.name), given.minimum - slack, given.maximum + slack, text))
-    return found
+        limits.append((columns.index(given.name), given.minimum - slack, given.maximum + slack, text))
+    return limits
 
 
 def _binaries(

@@ -37,7 +37,7 @@ def make_identifiers(names: Sequence[str]) -> tuple[str, ...]:
     equal identifiers a number. The same names give the same identifiers.
     """
     taken: set[str] = set()
-    found = []
+    identifiers = []
     for name in names:
         word = _shortened(_word(name), name)
         candidate, number = word, 1
@@ -45,8 +45,8 @@ def make_identifiers(names: Sequence[str]) -> tuple[str, ...]:
             number += 1
             candidate = f"{word[: LONGEST - 8]}_{number}"
         taken.add(candidate.casefold())
-        found.append(candidate)
-    return tuple(found)
+        identifiers.append(candidate)
+    return tuple(identifiers)
 
 
 def make_identifier(name: str) -> str:

@@ -94,7 +94,7 @@ def _variables(program: ExportedRun) -> tuple[list[ModelicaVariable], ...]:
         [(f"p.{leaf.path}", "parameter Real", leaf.declared.unit, repr(float(leaf.value))) for leaf in leaves],
     )
     words = iter(_identifiers([name for group in groups for name, *_ in group]))
-    found: list[list[ModelicaVariable]] = []
+    variable_groups: list[list[ModelicaVariable]] = []
     for group in groups:
         variables = []
         for name, kind, unit, value in group:
@@ -103,8 +103,8 @@ def _variables(program: ExportedRun) -> tuple[list[ModelicaVariable], ...]:
             text += [value] if value and not binding else []
             label = name.replace("\\", " ").replace('"', "'")
             variables.append(ModelicaVariable(word, f'    {kind} {word}({", ".join(text)}){binding} "{label}";'))
-        found.append(variables)
-    return tuple(found)
+        variable_groups.append(variables)
+    return tuple(variable_groups)
 
 
 def _identifiers(names: Sequence[str]) -> list[str]:

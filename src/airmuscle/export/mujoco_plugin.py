@@ -124,8 +124,8 @@ class MuscleActuator(ShortRepr):
         state = open_plant(plant, (shortening,)).state_at(pressure=pressure)
         first = int(model.actuator_actadr[which])
         data.act[first : first + len(state)] = list(state.values())
-        found: Array = data.act[first : first + len(state)]
-        return found
+        initial: Array = data.act[first : first + len(state)]
+        return initial
 
     @functools.cached_property
     def parameters(self) -> dict[str, float]:

@@ -104,7 +104,7 @@ class PrintedController:
         return {**self.source_files(), "main.c": filled("replay.c", places, self.name)}
 
     def ranges_of(self, samples: ReplayedSamples) -> Array:
-        """The width of the range of each command (c,); of one without limits its greatest size in the run."""
+        """The width of the range of each command (c,); of one without limits its largest size in the run."""
         largest = np.abs(samples.commands).max(axis=0, initial=0.0)
         width = np.array([high - low for low, high in self.ranges], dtype=float)
         return np.where(np.isfinite(width), width, np.where(largest > 0.0, largest, 1.0))

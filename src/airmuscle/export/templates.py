@@ -13,7 +13,7 @@ def filled(name: str, values: Mapping[str, str], prefix: str) -> str:
     Values are inserted as they are: what stands in them is not replaced.
     """
     text = template(name).replace("model_", f"{prefix}_").replace("MODEL_", f"{prefix.upper()}_")
-    return re.sub(r"@(\w+)@", lambda found: values[found.group(1)], text)
+    return re.sub(r"@(\w+)@", lambda mark: values[mark.group(1)], text)
 
 
 def template(name: str) -> str:

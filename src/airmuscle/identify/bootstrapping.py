@@ -154,8 +154,8 @@ def _refit_iteratively(
     for i, counts in enumerate(draws):
         if progress is not None:
             progress(i / len(draws))
-        found = None if near is None else near.refit(counts, known.best(counts))
-        values[i] = _search(fit, counts[group], near is not None) if found is None else found
+        refitted = None if near is None else near.refit(counts, known.best(counts))
+        values[i] = _search(fit, counts[group], near is not None) if refitted is None else refitted
         if np.isfinite(values[i]).all():
             known.add(values[i])
     return values

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from ..core.field_types import check_field_types
 from ..muscle.characteristic.base import Characteristic, ForceLaw
 from ..recording import Recording
 from ..recording.segment import estimate_sensors
@@ -27,6 +28,9 @@ class Censoring:
 
     min_force: float = 0.0
     max_force: float = math.inf
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
 
     def signs(self, force: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """By row: 0 uncensored, 1 censored below (the true force is at most the limit), -1 censored above."""

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core.errors import IdentificationError, ParameterError
+from ..core.field_types import check_field_types
 from ..core.hints import Hint, HintedText
 from ..recording import Recording
 
@@ -79,6 +80,9 @@ class LevelSplit(GroupSplit):
     group_name: ClassVar[str] = "level"
     purpose: ClassVar[str] = "levels between the measured ones and one step beyond"
 
+    def __post_init__(self) -> None:
+        check_field_types(self)
+
     def labels(self, recordings: Sequence[Recording]) -> list[Labels]:
         values = np.concatenate([run[self.quantity] for run in recordings])
         ordered = np.sort(values[np.isfinite(values)])
@@ -110,6 +114,7 @@ class BlockSplit(GroupSplit):
     purpose: ClassVar[str] = "the measured muscles and contractions, within the measured range"
 
     def __post_init__(self) -> None:
+        check_field_types(self)
         if self.folds < 2:
             raise ParameterError(f"BlockSplit.folds is {self.folds}; it must be 2 or more.")
 

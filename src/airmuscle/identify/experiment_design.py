@@ -9,6 +9,7 @@ Reference: Fedorov, V. V., Theory of Optimal Experiments, Academic Press, 1972.
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Collection, Sequence
 
 import numpy as np
@@ -106,11 +107,12 @@ def optimal_design(
 
     Raises IdentificationError where no run is feasible, ParameterError for invalid arguments.
     """
-    if runs < 1 or points < MIN_POINTS or not sigma > 0 or not bench.max_force > 0:
-        raise ParameterError(
-            f"optimal_design needs runs >= 1, points >= {MIN_POINTS}, sigma > 0 and a maximum force > 0; given are "
-            f"{runs}, {points}, {sigma:g} and {bench.max_force:g}."
-        )
+    for name, value, minimum in (("runs", runs, 1), ("points", points, MIN_POINTS)):
+        if value < minimum:
+            raise ParameterError(f"design of experiments: {name} is {value}; it must be at least {minimum}.")
+    for name, number in (("sigma", sigma), ("maximum force", bench.max_force)):
+        if not 0 < number < math.inf:
+            raise ParameterError(f"design of experiments: {name} is {number:g}; it must be positive and finite.")
     candidates = candidate_runs(characteristic, bench, points)
     names, values, jacobians = _jacobians(characteristic, candidates, fixed)
     information = np.array([jacobian.T @ jacobian for jacobian in jacobians])

@@ -85,11 +85,11 @@ def _first_crossing(law: Any, pressure: Array, contraction: Array, forces: Array
     first force of the row where it is not negative there, the last one where it is negative everywhere."""
     deficit = _deficit(law, pressure[:, None], contraction[:, None], forces)
     crossed = np.asarray(deficit >= 0)
-    found, rows = crossed.any(axis=1), np.arange(pressure.size)
-    first = np.where(found, crossed.argmax(axis=1), forces.shape[1] - 1)
+    crosses, rows = crossed.any(axis=1), np.arange(pressure.size)
+    first = np.where(crosses, crossed.argmax(axis=1), forces.shape[1] - 1)
     previous = np.maximum(first - 1, 0)
     high, low = deficit[rows, first], deficit[rows, previous]
     with np.errstate(all="ignore"):
-        fraction = np.where((first > 0) & found, -low / (high - low), 1.0)
+        fraction = np.where((first > 0) & crosses, -low / (high - low), 1.0)
     start = forces[rows, previous]
     return np.asarray(start + fraction * (forces[rows, first] - start))

@@ -145,8 +145,8 @@ class GroupRefits:
         problem = self._problem.rows(drawn)
         problem = dataclasses.replace(problem, weights=problem.weights * np.sqrt(repeats[drawn]))
         first = FirstStep(self._basis, step, float(counts @ self._sums.squares)) if start is None else None
-        found = gauss_newton(problem, self._solution.values if start is None else start, first, RELATIVE_STEP)
-        return None if found is None else found[0]
+        solution = gauss_newton(problem, self._solution.values if start is None else start, first, RELATIVE_STEP)
+        return None if solution is None else solution[0]
 
 
 def _norms(matrix: Array) -> Array:

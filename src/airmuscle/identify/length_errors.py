@@ -157,10 +157,10 @@ def find_length_errors(model: Characteristic, recordings: Sequence[Recording]) -
         separate = _separate_rmse(recordings, names)
         if _rmse(model, recordings) <= MIN_MISFIT * separate:
             return ()
-        found = [estimate_length_error(model, recordings, name) for name in names]
+        estimates = [estimate_length_error(model, recordings, name) for name in names]
     except IdentificationError:
         return ()
-    return tuple(sorted((e for e in found if e.explains(separate)), key=lambda e: abs(e.offset)))
+    return tuple(sorted((e for e in estimates if e.explains(separate)), key=lambda e: abs(e.offset)))
 
 
 def _rmse(model: Characteristic, recordings: Sequence[Recording]) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.errors import ParameterError
+from ..core.field_types import check_field_types
 
 
 class Loss(abc.ABC):
@@ -27,6 +28,9 @@ class LeastSquares(Loss):
 
     scale: float = 1.0
 
+    def __post_init__(self) -> None:
+        check_field_types(self)
+
     def rho(self, z: Array) -> Array:
         return np.stack([z, np.ones_like(z), np.zeros_like(z)])
 
@@ -42,6 +46,7 @@ class Huber(Loss):
     scale: float
 
     def __post_init__(self) -> None:
+        check_field_types(self)
         _check_scale(self)
 
     def rho(self, z: Array) -> Array:
@@ -57,6 +62,7 @@ class SoftL1(Loss):
     scale: float
 
     def __post_init__(self) -> None:
+        check_field_types(self)
         _check_scale(self)
 
     def rho(self, z: Array) -> Array:

@@ -37,17 +37,17 @@ def score_candidates(
     """
     late = [i for i, each in enumerate(candidates) if can_exclude and is_fitted_by_projection(each)]
     early = [i for i in range(len(candidates)) if i not in late]
-    found: dict[int, tuple[Score, ...]] = {}
+    scores_of: dict[int, tuple[Score, ...]] = {}
     with process_pool(workers, one_thread_each=True) as pool:
         for indices in (early, late):
-            lowest = _lowest_errors(found.values(), len(splits)) if indices is late else ()
+            lowest = _lowest_errors(scores_of.values(), len(splits)) if indices is late else ()
             for position, scores in _results(pool, splits, loss, [_Task(candidates[i], lowest) for i in indices]):
-                found[indices[position]] = scores
+                scores_of[indices[position]] = scores
                 if progress is not None:
-                    progress(candidates[indices[position]].name, (len(found) - 1) / len(candidates))
+                    progress(candidates[indices[position]].name, (len(scores_of) - 1) / len(candidates))
     if progress is not None:
         progress("", 1.0)
-    return [found[i] for i in range(len(candidates))]
+    return [scores_of[i] for i in range(len(candidates))]
 
 
 def is_fitted_by_projection(candidate: Candidate) -> bool:

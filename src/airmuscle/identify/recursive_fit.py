@@ -17,6 +17,7 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.errors import IdentificationError, ParameterError
+from ..core.short_repr import ShortRepr
 from ..muscle.characteristic import ContractileSurface
 from ..muscle.characteristic.contractile_surface import exponents
 from .experiment_design import LEVEL_COUNT, BenchLimits
@@ -37,11 +38,11 @@ class NextPoint(NamedTuple):
     standard_error: float
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class RecursiveFit:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class RecursiveFit(ShortRepr):
     """Contractile surface fitted to the samples so far; `updated` returns it with one more sample.
 
-    limits      range of the test rig, on which the surface is scaled, and its greatest force
+    limits      range of the test rig, on which the surface is scaled, and its maximum force
     degree      degree of the polynomial; (degree + 1)(degree + 2)/2 coefficients
     sigma       standard deviation of a force [N], used until the residuals determine it
     forgetting  weight of the information of all former samples at each sample, 1 for none lost; less follows a muscle

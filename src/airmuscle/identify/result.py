@@ -229,7 +229,7 @@ def estimate_rows(estimates: Sequence[Estimate]) -> list[tuple[str, ...]]:
     for e in estimates:
         value, unit = in_display_unit(e.value, e.unit)
         shown = dataclasses.replace(e, value=value, stderr=in_display_unit(e.stderr, e.unit)[0], unit=unit)
-        rows.append((e.name, e.label, f"{value:.6g}", shown.format_interval(), shown.display_unit, e.meaning))
+        rows.append((e.name, e.label, f"{value:.4g}", shown.format_interval(), shown.display_unit, e.meaning))
     return rows
 
 

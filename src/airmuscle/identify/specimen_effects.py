@@ -98,7 +98,7 @@ def predict_effects(sums: Sums, specimens: tuple[str, ...]) -> SpecimenEffects:
 
 
 def _variance_ratio(within: Array, gradient: Array, squares: float, freedom: int) -> tuple[float, float]:
-    """The ratio of variances with the greatest restricted likelihood, and the standard deviation of the residuals.
+    """The ratio of variances with the largest restricted likelihood, and the standard deviation of the residuals.
 
     `within` and `gradient` are the normal matrix and the right-hand side of the effects, orthogonal to the population.
     """

@@ -85,8 +85,8 @@ def _folded(name: str) -> str:
 def _names_with(part: str, known: Iterable[str]) -> str:
     """A sentence with up to three names that contain `part` or one of its words; empty if there are none."""
     words = [word for word in (part, *part.split("-")) if len(word) > 2]
-    found = list(dict.fromkeys(name for word in words for name in known if word in name.lower()))[:3]
-    return f" Did you mean {' or '.join(repr(name) for name in found)}?" if found else ""
+    similar = list(dict.fromkeys(name for word in words for name in known if word in name.lower()))[:3]
+    return f" Did you mean {' or '.join(repr(name) for name in similar)}?" if similar else ""
 
 
 def is_path(name_or_path: str | Path) -> bool:

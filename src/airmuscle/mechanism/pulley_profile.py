@@ -72,11 +72,11 @@ class PolynomialProfile(PulleyProfile):
 class CrankProfile(PulleyProfile):
     """Crank with a muscle that stays parallel to itself: f = cos(theta - theta_m)/cos theta_m.
 
-    theta_m angle of the greatest moment arm. F = (sin(theta - theta_m) + sin theta_m)/cos theta_m.
+    theta_m angle of the maximum moment arm. F = (sin(theta - theta_m) + sin theta_m)/cos theta_m.
     """
 
     maximum_angle: float = parameter(
-        "rad", "theta_m", "angle of the greatest moment arm", bounds=(-1.5, 1.5), default=0.0
+        "rad", "theta_m", "angle of the maximum moment arm", bounds=(-1.5, 1.5), default=0.0
     )
 
     def ratio(self, angle: Value) -> Value:

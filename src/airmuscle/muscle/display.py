@@ -23,7 +23,7 @@ PARAMETERS = ("parameter", "symbol", "value", "unit", "meaning")
 CHART_PRESSURES = 6
 """Number of isobars in the chart of a law without a validity range."""
 CHART_MAX_PRESSURE = 6e5
-"""Greatest gauge pressure [Pa] in the chart of a law without a validity range (chosen)."""
+"""Maximum gauge pressure [Pa] in the chart of a law without a validity range (chosen)."""
 
 
 def plot_isobars(

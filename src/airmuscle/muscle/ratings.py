@@ -64,18 +64,16 @@ class Ratings:
     """
 
     max_force: float = _upper_limit("N", "F_max", "permitted force", FORCE_BOUNDS)
-    min_pressure: float = _lower_limit("Pa", "p_min", "least permitted gauge pressure", PRESSURE_BOUNDS)
-    max_pressure: float = _upper_limit("Pa", "p_max", "greatest permitted gauge pressure", PRESSURE_BOUNDS)
-    max_contraction: float = _upper_limit(
-        "1", "eps_max", "greatest permitted contraction", (0.0, CONTRACTION_BOUNDS[1])
-    )
+    min_pressure: float = _lower_limit("Pa", "p_min", "minimum permitted gauge pressure", PRESSURE_BOUNDS)
+    max_pressure: float = _upper_limit("Pa", "p_max", "maximum permitted gauge pressure", PRESSURE_BOUNDS)
+    max_contraction: float = _upper_limit("1", "eps_max", "maximum permitted contraction", (0.0, CONTRACTION_BOUNDS[1]))
     max_prestretch: float = _upper_limit(
-        "1", "eps_pre", "greatest permitted elongation beyond the resting length", (0.0, -CONTRACTION_BOUNDS[0])
+        "1", "eps_pre", "maximum permitted elongation beyond the resting length", (0.0, -CONTRACTION_BOUNDS[0])
     )
-    min_length: float = _lower_limit("m", "L_min", "least nominal length", LENGTH_BOUNDS)
-    max_length: float = _upper_limit("m", "L_max", "greatest nominal length", LENGTH_BOUNDS)
-    min_temperature: float = _lower_limit("K", "T_min", "least permitted ambient temperature", TEMPERATURE_BOUNDS)
-    max_temperature: float = _upper_limit("K", "T_max", "greatest permitted ambient temperature", TEMPERATURE_BOUNDS)
+    min_length: float = _lower_limit("m", "L_min", "minimum nominal length", LENGTH_BOUNDS)
+    max_length: float = _upper_limit("m", "L_max", "maximum nominal length", LENGTH_BOUNDS)
+    min_temperature: float = _lower_limit("K", "T_min", "minimum permitted ambient temperature", TEMPERATURE_BOUNDS)
+    max_temperature: float = _upper_limit("K", "T_max", "maximum permitted ambient temperature", TEMPERATURE_BOUNDS)
 
     def check(self) -> None:
         for name in ("pressure", "length", "temperature"):

@@ -67,7 +67,7 @@ class Scene(abc.ABC):
         """Distance [m] of a muscle from the middle at which it does not touch another one."""
 
     def make_room(self, contractions: Sequence[float]) -> None:
-        """Set the spacing for the greatest contraction of each muscle."""
+        """Set the spacing for the maximum contraction of each muscle."""
         widths = [
             float(muscle_outline(g, max(c, 0.0))[:, 0].max())
             for g, c in zip(self.geometries, contractions, strict=True)

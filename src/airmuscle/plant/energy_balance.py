@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 from ..core.declaration import model
-from ..core.diagnostics import Columns, Diagnostic
+from ..core.diagnostics import ColumnLimit, Columns, Diagnostic
 from ..core.ops import Value
 from ..core.system import System
 from ..core.variables import Input, StateVariable
@@ -83,6 +83,11 @@ class WithEnergyMeters(System):
     def positive_outputs(self) -> Sequence[str]:
         """The plant's volumes."""
         return self.plant.positive_outputs
+
+    @property
+    def column_limits(self) -> Sequence[ColumnLimit]:
+        """The limits of the plant."""
+        return self.plant.column_limits
 
     @property
     def constants(self) -> Mapping[str, float | str]:

@@ -264,7 +264,7 @@ class Plant(PlantDisplay, System):
     def describe(self) -> tuple[Diagnostic, ...]:
         """The gas and the friction."""
         friction = Diagnostic(DiagnosticCode.MODEL, "friction", diagnostics.describe_friction(self.muscles))
-        return Diagnostic(DiagnosticCode.MODEL, "gas", f"gas: {self.gas}"), friction
+        return Diagnostic(DiagnosticCode.MODEL, "gas", f"gas: {str(self.gas).removesuffix('()')}"), friction
 
     def diagnose(self, columns: Columns) -> list[Diagnostic]:
         """Extrapolation of characteristics, limits of geometries, components beyond the validity of their model."""

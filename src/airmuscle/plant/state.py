@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..core.annotation import one_line
+from ..core.annotation import abridged, one_line
 from ..core.arrays import Array
 from ..core.declaration import as_float
 from ..core.errors import ParameterError, suggestion
@@ -28,7 +28,7 @@ def state_vector(system: System, state: Mapping[str, float]) -> Array:
     names = [s.name for s in system.states]
     if not isinstance(state, Mapping):
         raise ParameterError(
-            f"the initial state is {state!r}; give a value for each name, as plant.state_at(...) and "
+            f"the initial state is {abridged(state)}; give a value for each name, as plant.state_at(...) and "
             "find_equilibrium(...) do."
         )
     if len(state) != len(names) or any(name not in state for name in names):

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core.errors import ParameterError
+from ..core.field_types import check_field_types
 from .table import Cells, RawTable
 
 
@@ -20,6 +21,7 @@ class Downsampling(abc.ABC):
     max_rows: int = 2_000_000
 
     def __post_init__(self) -> None:
+        check_field_types(self)
         if self.max_rows < 1:
             raise ParameterError(f"max_rows is {self.max_rows}; it must be at least 1.")
 

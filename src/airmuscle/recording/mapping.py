@@ -27,6 +27,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import ColumnError, FileError, ParameterError, suggestion
+from ..core.field_types import check_field_types
 from .columns import QUANTITIES
 from .constants import parse_constant_name
 from .file_kind import check_regular_file
@@ -64,6 +65,7 @@ class ColumnMapping:
     time: str | None = None
 
     def __post_init__(self) -> None:
+        check_field_types(self)
         if self.time is not None and self.time not in TIME_BASES:
             raise ColumnError(f"mapping: time is '{self.time}'; allowed range: {', '.join(TIME_BASES)}.")
         for name in self.constants:

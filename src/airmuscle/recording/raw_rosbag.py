@@ -27,7 +27,7 @@ def read_rosbag_tables(path: Path, group: str | None = None) -> tuple[RawTable, 
     highlevel = import_lab_package("rosbags.highlevel", path)
     folder = path if path.suffix == ".bag" else path.parent
     if path.suffix != ".bag" and not (folder / "metadata.yaml").exists():
-        raise FileError(f"{path}: there is no metadata.yaml beside it; copy the whole folder of the ROS 2 bag.")
+        raise FileError(f"{path}: there is no metadata.yaml next to it; copy the whole folder of the ROS 2 bag.")
     if path.suffix != ".bag" and path != min(p for p in folder.iterdir() if p.suffix == path.suffix):
         return ()
 
@@ -47,14 +47,14 @@ def read_rosbag_tables(path: Path, group: str | None = None) -> tuple[RawTable, 
 def _messages(bag: Any, group: str | None) -> dict[str, list[tuple[float, dict[str, float]]]]:
     """Time [s] and numbers of every message, by topic."""
     chosen = [c for c in bag.connections if group is None or c.topic.strip("/") == group.strip("/")]
-    found: dict[str, list[tuple[float, dict[str, float]]]] = {}
+    messages: dict[str, list[tuple[float, dict[str, float]]]] = {}
     for connection, stamp, raw in bag.messages(connections=chosen) if chosen else ():
         message = bag.deserialize(raw, connection.msgtype)
         numbers = dict(_numbers(message, ""))
         if numbers:
             topic = connection.topic.strip("/").replace("/", ".")
-            found.setdefault(topic, []).append(((stamp - bag.start_time) * 1e-9, numbers))
-    return found
+            messages.setdefault(topic, []).append(((stamp - bag.start_time) * 1e-9, numbers))
+    return messages
 
 
 def _numbers(value: Any, path: str) -> Iterator[tuple[str, float]]:

@@ -12,6 +12,7 @@ import numpy as np
 from ..core.annotation import one_line
 from ..core.arrays import Array
 from ..core.errors import ColumnError, ParameterError, suggestion
+from ..core.field_types import check_field_types
 from ..core.notebook import Card, NotebookDisplay
 from ..core.units import conversion
 from .columns import quantity_of
@@ -44,7 +45,8 @@ class Recording(NotebookDisplay):
     units: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        arrays = {name: np.asarray(values, dtype=float) for name, values in self.columns.items()}
+        check_field_types(self)
+        arrays = {name: self._vector(name, values) for name, values in self.columns.items()}
         sizes = {name: values.shape for name, values in arrays.items()}
         if len(set(sizes.values())) > 1 or any(len(shape) != 1 for shape in sizes.values()):
             raise ColumnError(f"{self.origin}: columns must be vectors of equal length; their shapes are {sizes}.")
@@ -52,6 +54,14 @@ class Recording(NotebookDisplay):
         for values in arrays.values():
             values.setflags(write=False)
         object.__setattr__(self, "columns", arrays)
+
+    def _vector(self, name: str, values: Any) -> Array:
+        try:
+            return np.asarray(values, dtype=float)
+        except (TypeError, ValueError, OverflowError):
+            raise ColumnError(
+                f"{self.origin}: column '{one_line(name)}' is {one_line(values)}; it must be an array of numbers."
+            ) from None
 
     @classmethod
     def from_arrays(

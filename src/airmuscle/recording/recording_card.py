@@ -15,7 +15,7 @@ from .plot import plot_columns
 MAX_PANELS = 4
 """Maximum number of panels of the chart."""
 ROUNDING = 1e-12
-"""Values below this fraction of the greatest one of a column are shown as 0 (chosen)."""
+"""Values below this fraction of the largest one of a column are shown as 0 (chosen)."""
 MAX_POINTS = 20_000
 """Maximum number of rows of the chart; of more, every n-th row is drawn."""
 

@@ -88,8 +88,8 @@ def _ask(worker: subprocess.Popen[bytes], request: tuple[Any, ...]) -> Any:
 
 def _answer(module: str, function: str, path: Path, arguments: tuple[Any, ...], answers: IO[bytes]) -> None:
     try:
-        found = getattr(importlib.import_module(module), function)(path, *arguments), None
-        content = pickle.dumps(found, protocol=pickle.HIGHEST_PROTOCOL)
+        result = getattr(importlib.import_module(module), function)(path, *arguments), None
+        content = pickle.dumps(result, protocol=pickle.HIGHEST_PROTOCOL)
     except Exception as error:  # raised by the caller
         content = pickle.dumps((None, error))
     answers.write(content)

@@ -25,11 +25,11 @@ SET_POINT, SET_POINT_TOLERANCE = 1e5, 20.0
 MIN_RISE = 50e3
 """Minimum range of the pressure of a run that begins at ambient pressure [Pa] (chosen)."""
 SLACK_FORCE = 0.03
-"""Maximum force at ambient pressure, as a fraction of the greatest force (chosen)."""
+"""Maximum force at ambient pressure, as a fraction of the maximum force (chosen)."""
 NEAR_REST = 0.02
 """Contraction near the resting length, at which a muscle under pressure pulls (chosen)."""
 MAX_OFFSET = 0.05
-"""Maximum negative force, as a fraction of the greatest force (chosen): a muscle cannot push."""
+"""Maximum negative force, as a fraction of the maximum force (chosen): a muscle cannot push."""
 REVERSED = 3.0
 """Ratio of negative to positive values from which a sign is taken for reversed (chosen)."""
 MAX_STRETCH = 0.05
@@ -37,7 +37,7 @@ MAX_STRETCH = 0.05
 MAX_PRESSURE = 1e6
 """Highest pressure of pneumatic muscles [Pa] (chosen: makers permit 0.6 to 0.8 MPa)."""
 AREAS = (1e-7, 5e-2)
-"""Range of the greatest force divided by the highest pressure [m2] (chosen: 1e-5 to 1e-2 of muscles on sale)."""
+"""Range of the maximum force divided by the highest pressure [m2] (chosen: 1e-5 to 1e-2 of muscles on sale)."""
 SMALL_CONTRACTION = 0.01
 """Contraction in percent below which the numbers may be ratios (chosen)."""
 
@@ -155,7 +155,7 @@ def _scales(recordings: Sequence[Recording]) -> Iterator[str]:
     area = greatest / highest
     if not AREAS[0] <= area <= AREAS[1]:
         yield (
-            f"the greatest force, {greatest:.4g} N, divided by the highest pressure, {highest / 1e3:.4g} kPa, is "
+            f"the maximum force, {greatest:.4g} N, divided by the highest pressure, {highest / 1e3:.4g} kPa, is "
             f"{area:.3g} m2; allowed range: {AREAS[0]:g} to {AREAS[1]:g} m2 for pneumatic muscles. The unit of force "
             "or pressure is probably wrong."
         )

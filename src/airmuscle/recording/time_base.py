@@ -12,6 +12,7 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.errors import ColumnError
+from ..core.field_types import check_field_types
 from ..core.hints import Hint, HintedText
 from .table import RawTable
 
@@ -36,6 +37,9 @@ class RecordedTime(TimeBase):
     """The recorded time stamps; they may repeat or decrease unless they are `ordered`."""
 
     ordered: bool = True
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
 
     def apply(self, table: RawTable, time: Array) -> tuple[Array | None, str]:
         return time, ""

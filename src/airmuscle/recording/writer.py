@@ -46,11 +46,11 @@ def write(recording: Recording, path: str | Path) -> Path:
 
 def _columns(recording: Recording) -> list[tuple[str, str, Any]]:
     """Name, unit and values of every column."""
-    found = []
+    columns = []
     for name in recording:
         plain, unit = split_unit(column_heading(name))
-        found.append((plain if unit else name, unit or "", np.asarray(recording[name])))
-    return found
+        columns.append((plain if unit else name, unit or "", np.asarray(recording[name])))
+    return columns
 
 
 def _write_parquet(recording: Recording, temporary: Path, path: Path) -> None:

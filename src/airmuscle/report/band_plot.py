@@ -55,15 +55,15 @@ class BandCurve:
 
 def band_curves(fit: Fit) -> tuple[CurveAxes, tuple[BandCurve, ...]] | None:
     """Return the fitted curves at measured levels with their bands; None if no band can be computed."""
-    curve, found = _curve_axes(fit), []
+    curve, curves = _curve_axes(fit), []
     for level in levels_of(fit.recording[curve.constant], MAX_CURVES):
         points = _curve_points(fit, curve, float(level))
         try:
             bands = [confidence_band(fit, points, level=LEVEL, prediction=further) for further in (False, True)]
         except IdentificationError:
             return None
-        found.append(BandCurve(float(level), points[curve.varying], *bands))
-    return curve, tuple(found)
+        curves.append(BandCurve(float(level), points[curve.varying], *bands))
+    return curve, tuple(curves)
 
 
 def band_plot(fit: Fit, name: str = "bands") -> Plot | None:

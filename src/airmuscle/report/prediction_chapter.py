@@ -53,7 +53,7 @@ def _overview(model: str, thing: Any, predictions: Sequence[RecordPrediction], b
         "quantity": [quantity.name for _, quantity in pairs],
         "rows": [int(quantity.compared.sum()) for _, quantity in pairs],
         "rms error": [with_unit(quantity.rms, quantity.name) for _, quantity in pairs],
-        "greatest error": [with_unit(quantity.max_error, quantity.name) for _, quantity in pairs],
+        "maximum error": [with_unit(quantity.max_error, quantity.name) for _, quantity in pairs],
         "95 % band": [describe_band(quantity) for _, quantity in pairs],
         "rows within the band [%]": [None if share is None else 100.0 * share for share in shares],
     }
@@ -85,7 +85,7 @@ def _record(number: int, prediction: RecordPrediction) -> Chapter:
             columns[f"half width of the band of {heading}"] = quantity.half_width
         columns[f"compared {quantity.name}"] = quantity.compared.astype(int)
     errors = "; ".join(
-        f"{quantity.name}: rms error {with_unit(quantity.rms, quantity.name)}, greatest error "
+        f"{quantity.name}: rms error {with_unit(quantity.rms, quantity.name)}, maximum error "
         f"{with_unit(quantity.max_error, quantity.name)} in row {quantity.worst_row + 1}"
         for quantity in prediction.quantities
     )

@@ -56,7 +56,7 @@ def choice_row(choice: MuscleChoice) -> dict[str, Any]:
         row |= {
             "radius [mm]": 1e3 * choice.design.radius,
             "least radius at 1.1 L [mm]": 1e3 * low,
-            "greatest radius at 1.1 L [mm]": 1e3 * high,
+            "maximum radius at 1.1 L [mm]": 1e3 * high,
         }
     return row
 
@@ -73,8 +73,7 @@ def choice_tables(result: SizingResult) -> tuple[Table, Table]:
     points = {header: values for header, values in columns.items() if header.startswith((*COMMON, *ends))}
     others = {header: values for header, values in columns.items() if not header.startswith(ends)}
     note = (
-        "Long and short: the end points of each muscle. Reserve: force beyond the load at the greatest working "
-        "pressure."
+        "Long and short: the end points of each muscle. Reserve: force beyond the load at the largest working pressure."
     )
     air = (
         "Air: that of all muscles, at the reference atmosphere of ISO 8778, without tubes; – where the law has no "
@@ -88,7 +87,7 @@ def unsuitable_table(result: SizingResult) -> Table:
     """The muscles that do not meet the requirement, with the reason."""
     columns: dict[str, list[Any]] = {
         "muscle": [item.name for item in result.unsuitable],
-        "greatest number tried": [item.count or None for item in result.unsuitable],
+        "maximum number tried": [item.count or None for item in result.unsuitable],
         "reason": [item.reason for item in result.unsuitable],
     }
     return Table("unsuitable", "Muscles that do not meet the requirement", columns)
@@ -109,7 +108,7 @@ def _settings(result: SizingResult) -> tuple[tuple[str, str, str], ...]:
         "safety_factor": ("safety factor on the load", f"{conditions.safety_factor:.4g}"),
         "cycle_time": ("cycle time", f"{conditions.cycle_time:.4g} s"),
         "min_pressure": ("least working pressure", f"{conditions.min_pressure / 1e5:.4g} bar"),
-        "max_count": ("greatest number in parallel", str(conditions.max_count)),
+        "max_count": ("maximum number in parallel", str(conditions.max_count)),
     }
     sources = {name: "chosen" if getattr(conditions, name) == getattr(SizingConditions, name) else "given"
                for name in rows}  # fmt: skip

@@ -32,7 +32,7 @@ def sizing_plot(choice: MuscleChoice) -> Plot:
     plotting.legend_outside(axes)
     caption = (
         f"Force of one {entry.name} over its contraction at constant gauge pressures, with both working points. The "
-        "capacity is the force at the greatest working pressure within the permitted force."
+        "capacity is the force at the maximum working pressure within the permitted force."
     )
     return Plot("working_points", caption, plot.figure)
 
@@ -46,7 +46,7 @@ def _draw_limits(axes: Any, choice: MuscleChoice) -> None:
         axes.axhline(muscle.max_force, color=plotting.BLACK, linestyle=":", linewidth=1.0, label="permitted force")
     permitted = muscle.contraction_range[1]
     if 100 * permitted < axes.get_xlim()[1]:
-        axes.axvline(100 * permitted, color=plotting.BLACK, linestyle="-.", linewidth=1.0, label="greatest contraction")
+        axes.axvline(100 * permitted, color=plotting.BLACK, linestyle="-.", linewidth=1.0, label="maximum contraction")
 
 
 def _draw_load(axes: Any, choice: MuscleChoice) -> None:

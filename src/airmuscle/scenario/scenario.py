@@ -30,7 +30,7 @@ from typing import Any
 
 from ..control.control_loop import ControlLoop
 from ..control.inputs import InputSignal
-from ..core.errors import ParameterError, suggestion
+from ..core.errors import FileError, ParameterError, suggestion
 from ..identify.prediction import PlantUncertainty
 from ..library.build import build
 from ..library.files import is_path, list_plants, read_toml
@@ -94,6 +94,8 @@ def load_scenario(path: str | Path) -> Scenario:
     if str(path) in list_plants() and not is_path(str(path)) and not file.exists():
         tables, location = plant_tables(str(path))
         return build_scenario({key: tables[key] for key in TABLES if key in tables}, location)
+    if not is_path(str(path)) and not file.exists():
+        raise FileError(f"{path}: there is no such file, and no such plant; plants are {', '.join(list_plants())}.")
     return build_scenario(read_toml(file), Location(str(file), "", file.parent))
 
 

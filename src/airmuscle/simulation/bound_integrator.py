@@ -188,8 +188,8 @@ class BoundIntegrator:
     def _continue(self, status: int, max_steps: int, check: Callable[[Array, float], Status] | None = None) -> int:
         """Go on where the kernel paused so that an interruption or an impossible state can be noticed."""
         while status == _PAUSED:
-            if check is not None and (found := check(self.state, self._clock_view[0])) != Status.DONE:
-                return found.value
+            if check is not None and (outcome := check(self.state, self._clock_view[0])) != Status.DONE:
+                return outcome.value
             left = max_steps - int(self._count[2])
             if left <= 0:
                 return _TOO_MANY

@@ -30,7 +30,7 @@ def are_known(loop: ControlLoop) -> bool:
 
 
 def greatest_capacity(prepared: SampledLoop) -> int:
-    """The greatest number of segments of an input within an interval, before and after each of its drivers."""
+    """The maximum number of segments of an input within an interval, before and after each of its drivers."""
     duration = float(np.diff(prepared.instants).max())
     pieces = int(np.diff(prepared.first_segments).max())
     return max((_capacity(chain, pieces, duration) for chain in _chains(prepared.loop).values()), default=pieces)

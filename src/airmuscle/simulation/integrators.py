@@ -9,6 +9,7 @@ from typing import ClassVar
 from ..compile.cache.kernel import fixed_step, rodas4
 from ..compile.program import CompiledSystem, Tableau
 from ..control.piecewise_linear import PiecewiseLinear
+from ..core.annotation import abridged
 from ..core.arrays import Array
 from ..core.declaration import model, parameter
 from ..core.errors import ParameterError
@@ -107,7 +108,7 @@ def default_integrator(integrator: Integrator | None) -> Integrator:
         return _default()
     if not isinstance(integrator, Integrator):
         raise ParameterError(
-            f"the integrator is {integrator!r}; give Rodas4(), RungeKutta4(step) or DormandPrince8(step)."
+            f"the integrator is {abridged(integrator)}; give Rodas4(), RungeKutta4(step) or DormandPrince8(step)."
         )
     return integrator
 

@@ -97,7 +97,7 @@ class LawWithSensitivities(ControlLaw):
         names, remembered = law.measured_columns, tuple(law.initial_memory)
         limited = casadi.fmin(casadi.fmax(sample.commands, sample.minimum), sample.maximum)
         results = casadi.vertcat(limited, sample.later)
-        found = [casadi.vertcat(sample.commands, sample.later)]
+        parts = [casadi.vertcat(sample.commands, sample.later)]
         for k in range(len(self.columns)):
             seed = casadi.vertcat(
                 casadi.SX(0, 1),
@@ -106,8 +106,8 @@ class LawWithSensitivities(ControlLaw):
                 self._direction(k),
             )
             variables = casadi.vertcat(sample.measured, sample.memory, sample.parameters)
-            found.append(casadi.jtimes(results, variables, seed))
-        columns = _evaluated(casadi.horzcat(*found), sample, self.law, memory, measurement, dt)
+            parts.append(casadi.jtimes(results, variables, seed))
+        columns = _evaluated(casadi.horzcat(*parts), sample, self.law, memory, measurement, dt)
         count = len(law.inputs)
         commands = dict(zip(law.inputs, columns[0], strict=False))
         later = dict(zip(remembered, columns[0][count:], strict=True))
@@ -137,6 +137,6 @@ def _evaluated(
         sample.measured, sample.setpoints, sample.memory, sample.minimum, sample.maximum, sample.sample_time,
         sample.parameters,
     )  # fmt: skip
-    found = casadi.substitute(casadi.cse(matrix), free, casadi.vertcat(*values))
-    columns = [[found[i, k] for i in range(found.shape[0])] for k in range(found.shape[1])]
+    values_along = casadi.substitute(casadi.cse(matrix), free, casadi.vertcat(*values))
+    columns = [[values_along[i, k] for i in range(values_along.shape[0])] for k in range(values_along.shape[1])]
     return columns if ops.is_symbol(*values) else [[float(v) for v in column] for column in columns]

@@ -204,7 +204,7 @@ def _check_within(compiled: CompiledSystem, segments: PiecewiseLinear, start: fl
             continue
         low, high = known.input_lower_limits, known.input_upper_limits
         row, column = np.argwhere(~((table >= low) & (table <= high)))[0]
-        _refuse_input(compiled, int(column), table[row, column], f"before {segments.ends[row]:g} s")
+        _raise_for_input(compiled, int(column), table[row, column], f"before {segments.ends[row]:g} s")
 
 
 def check_inputs(compiled: CompiledSystem, values: Array, when: str) -> None:
@@ -212,10 +212,10 @@ def check_inputs(compiled: CompiledSystem, values: Array, when: str) -> None:
     known = compiled.description
     outside = np.flatnonzero(~((values >= known.input_lower_limits) & (values <= known.input_upper_limits)))
     if outside.size:
-        _refuse_input(compiled, int(outside[0]), values[outside[0]], when)
+        _raise_for_input(compiled, int(outside[0]), values[outside[0]], when)
 
 
-def _refuse_input(compiled: CompiledSystem, column: int, value: float, when: str) -> None:
+def _raise_for_input(compiled: CompiledSystem, column: int, value: float, when: str) -> None:
     variable = compiled.system.input_variables[column]
     unit = "" if variable.unit in ("", "1") else f" {variable.unit}"
     raise ParameterError(

@@ -27,7 +27,10 @@ _GENERAL_HINT = "Check the last state: a parameter may be far from physical, or 
 
 
 class RowTable(NamedTuple):
-    """Inputs (N, m) and outputs (N, k) of a run, the range of each column, and the first row that is not finite."""
+    """Inputs (N, m) and outputs (N, k) of a run, the ranges of its columns with limits, the first row not finite.
+
+    lower, upper   smallest and largest values of the `ranged_names` of the system's description
+    """
 
     inputs: Array
     outputs: Array
@@ -40,13 +43,13 @@ class RowRecorder:
     """The kernel of the rows, bound to a compiled system. For one thread at a time."""
 
     def __init__(self, compiled: CompiledSystem) -> None:
-        self.sizes = sizes = compiled.sizes
-        self._ranges = np.empty((2, sizes.states + sizes.inputs + sizes.outputs))
+        self.sizes, columns = compiled.sizes, compiled.description.ranged_columns
+        sizes, self._ranges = self.sizes, np.empty((2, columns.size))
         states, inputs, outputs = (np.empty((0, width)) for width in (sizes.states, sizes.inputs, sizes.outputs))
         none, nothing = np.empty(0), np.empty((0, sizes.inputs))
         self._kernel = record.bind(
             compiled.address["outputs"], compiled.precomputed, states, none, 0.0, none, nothing, nothing, inputs,
-            outputs, *self._ranges,
+            outputs, columns, *self._ranges,
         )  # fmt: skip
 
     def adopt(self, compiled: CompiledSystem) -> None:
@@ -94,13 +97,9 @@ def truncate_at_invalid_row(
 
     A fixed step can end in numbers that are far off; isothermal air has a pressure, below vacuum, in a negative volume.
     """
-    known, lower = compiled.description, table.lower
+    known = compiled.description
     positive = known.positive_outputs
-    if (
-        table.first_invalid == raw.reached
-        and all(map(operator.ge, lower, known.state_limits.values()))
-        and all(lower[i] > 0.0 for i in known.positive_columns)
-    ):
+    if table.first_invalid == raw.reached and all(map(operator.ge, table.lower, known.range_floors)):
         return raw, table
     reasons: dict[Status, Any] = {
         Status.NOT_FINITE: ~np.isfinite(table.outputs).all(axis=1),
@@ -114,7 +113,8 @@ def truncate_at_invalid_row(
     status = next(status for status, rows in reasons.items() if rows[row])
     raw = raw._replace(reached=row, time=float(times[row]), state=raw.rows[row], status=status)
     inputs, outputs = table.inputs[:row], table.outputs[:row]
-    columns = np.hstack([raw.rows[:row], inputs, outputs]) if row else np.full((1, len(lower)), np.nan)
+    shown = np.hstack([raw.rows[:row], outputs]) if row else np.full((1, outputs.shape[1] + raw.state.size), np.nan)
+    columns = shown[:, known.ranged_columns]
     return raw, RowTable(inputs, outputs, columns.min(axis=0).tolist(), columns.max(axis=0).tolist(), row)
 
 
@@ -152,7 +152,7 @@ def make_recording(
     diagnostics += known.remarks
     later: list[Diagnostic] = []
     if reached:
-        later += compiled.system.diagnose(Columns(columns, known.column_places, table.lower, table.upper))
+        later += compiled.system.diagnose(Columns(columns, known.range_places, table.lower, table.upper))
     if raw.status != Status.DONE:
         later.append(early_end(compiled, raw, end))
     notes += [diagnostic.message for diagnostic in later]

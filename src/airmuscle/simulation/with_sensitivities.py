@@ -164,8 +164,8 @@ class WithSensitivities(SensitivitySystem):
             + sum((by_leaf[:, place[path]] for path in group), casadi.SX(vector.numel(), 1))
             for k, group in enumerate(self.columns)
         ]
-        found = traced.put_in(casadi.horzcat(vector, *directions), state, inputs, self.inner)
-        columns = [dict(zip(values, found[k], strict=True)) for k in range(len(found))]
+        derivatives = traced.put_in(casadi.horzcat(vector, *directions), state, inputs, self.inner)
+        columns = [dict(zip(values, derivatives[k], strict=True)) for k in range(len(derivatives))]
         return columns[0], columns[1:]
 
     def _slopes(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
@@ -210,6 +210,6 @@ class _Symbols:
         values = [state[n] for n in self.names] + [inputs[n] for n in self.input_names]
         values += [leaf.value for leaf in tree.leaves(inner)]
         free = casadi.vertcat(self.x, self.u, self.p)
-        found = casadi.substitute(casadi.cse(matrix), free, casadi.vertcat(*values))
-        columns = [[found[i, k] for i in range(found.shape[0])] for k in range(found.shape[1])]
+        evaluated = casadi.substitute(casadi.cse(matrix), free, casadi.vertcat(*values))
+        columns = [[evaluated[i, k] for i in range(evaluated.shape[0])] for k in range(evaluated.shape[1])]
         return columns if ops.is_symbol(*values) else [[float(v) for v in column] for column in columns]

@@ -25,7 +25,7 @@ class MuscleDesign(ShortRepr):
     contracted  end point at which the muscle is short
     reserve     least capacity divided by the need, minus 1; at least the safety factor minus 1
     radius      pulley radius [m] of a joint; None for a lift
-    radii       least and greatest pulley radius [m] of a muscle that is a tenth longer; None for a lift
+    radii       minimum and maximum pulley radius [m] of a muscle that is a tenth longer; None for a lift
     """
 
     extended: EndPoint
@@ -100,7 +100,7 @@ class MuscleChoice(ShortRepr):
 
     @property
     def diameter(self) -> float | None:
-        """Greatest outer diameter at the contracted end point [m], without the wall; None without a geometry."""
+        """Maximum outer diameter at the contracted end point [m], without the wall; None without a geometry."""
         return self.muscle.diameter(self.design.contracted.contraction)
 
 
@@ -139,12 +139,12 @@ def by_count(choice: MuscleChoice) -> float | None:
 
 
 def by_reserve(choice: MuscleChoice) -> float | None:
-    """Force reserve, greatest first."""
+    """Force reserve, largest first."""
     return -choice.design.reserve
 
 
 def by_diameter(choice: MuscleChoice) -> float | None:
-    """Greatest outer diameter [m]."""
+    """Maximum outer diameter [m]."""
     return choice.diameter
 
 

@@ -104,7 +104,7 @@ class JointSearch:
         return float(extended[least]), float(contracted[least])
 
     def radii(self, muscle: StaticMuscle, length: float) -> tuple[float, float]:
-        """Least and greatest pulley radius [m] with this length [m], on the grid of contractions."""
+        """Minimum and maximum pulley radius [m] with this length [m], on the grid of contractions."""
         extended, contracted = self._pairs(muscle, length)
         if not extended.size:
             _, *pair = self._best(muscle)

@@ -25,7 +25,7 @@ ROUNDING = 1e-9
 GROWTH = 1.02
 """Ratio of the lengths that are tried where the load limits the muscle between the ends (chosen)."""
 MAX_GROWTH = 50.0
-"""Greatest ratio of the length to that of the end points alone (chosen)."""
+"""Maximum ratio of the length to that of the end points alone (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,7 +48,7 @@ class LiftSearch:
 
     @functools.lru_cache(maxsize=256)  # noqa: B019 - a search and its muscles are small
     def end_limits(self, muscle: StaticMuscle) -> tuple[float, float]:
-        """Least contraction at the start and greatest at the end. Raises SolveError, with the reason."""
+        """Minimum contraction at the start and maximum at the end. Raises SolveError, with the reason."""
         start, end = self._loads
         grid = np.linspace(*muscle.contraction_range, GRID)
         possible = [np.flatnonzero(self.margin(muscle, grid, load) >= 0.0) for load in (start, end)]

@@ -13,7 +13,7 @@ from ..core.errors import ParameterError
 from ..pneumatics.gas import Ambient
 
 MAX_COUNT = 20
-"""Greatest number of muscles in parallel that is tried (chosen)."""
+"""Maximum number of muscles in parallel that is tried (chosen)."""
 PATH_POINTS = 33
 """Points of a stroke at which the load is compared with the muscle (chosen)."""
 
@@ -89,7 +89,7 @@ class JointRequirement:
         if not self.torque > 0.0:
             raise ParameterError(
                 "JointRequirement: the torque of the load is 0 N m; it must be greater than 0: with it the joint holds "
-                "the ends of its range. Give the greatest torque of weight, friction or disturbance."
+                "the ends of its range. Give the maximum torque of weight, friction or disturbance."
             )
 
     def acceleration_torque(self, cycle_time: float) -> float:
@@ -127,13 +127,13 @@ class SizingConditions:
         "1", "S_F", "factor on the load that the muscle must hold", bounds=(1.05, 20.0), default=1.5
     )
     cycle_time: float = parameter("s", "T", "time of a cycle, there and back", bounds=(0.02, 1e4), default=2.0)
-    max_length: float = parameter("m", "L_max", "greatest nominal length", bounds=(1e-3, 20.0), default=20.0)
-    max_diameter: float = parameter("m", "D_max", "greatest outer diameter", bounds=(1e-3, 1.0), default=1.0)
+    max_length: float = parameter("m", "L_max", "maximum nominal length", bounds=(1e-3, 20.0), default=20.0)
+    max_diameter: float = parameter("m", "D_max", "maximum outer diameter", bounds=(1e-3, 1.0), default=1.0)
     min_pressure: float = parameter(
         "Pa", "p_min", "least working pressure; discharge to 0 takes an infinite time", bounds=(0.0, 1e6), default=1e4
     )
     max_count: int = 3
-    """Greatest number of muscles in parallel; with a joint, on each side."""
+    """Maximum number of muscles in parallel; with a joint, on each side."""
     min_count: int = 1
     """Least number of muscles in parallel."""
     ambient: Ambient = Ambient()

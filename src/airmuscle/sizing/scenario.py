@@ -114,7 +114,7 @@ def _joint_text(choice: MuscleChoice) -> str:
     if choice.count > 1:
         raise SolveError(
             f"{choice.entry.name}: the joint of a scenario has one muscle on each side, not {choice.count}. Give a "
-            "greatest number of 1."
+            "maximum number of 1."
         )
     design, half = choice.design, 0.5 * requirement.angle
     fill, discharge = scenario_valves(choice)  # raises for a choice without a geometry

@@ -65,20 +65,20 @@ class SizingResult(ShortRepr):
         return f"Reachable: {' or '.join(parts)}."
 
     def _greatest(self, what: str, entries: list[Entry]) -> str:
-        """The greatest fraction of a load or travel that one of the entries reaches, as text; empty if there is none.
+        """The largest fraction of a load or travel that one of the entries reaches, as text; empty if there is none.
 
         Bisection: it is assumed that every smaller fraction is reachable, too.
         """
-        found: MuscleChoice | None = None
+        best: MuscleChoice | None = None
         low, high = 0.0, 1.0
         for _ in range(BISECTIONS):
             fraction = 0.5 * (low + high)
             choice = _any_choice(_reduced(self.requirement, what, fraction), self.conditions, entries)
-            low, high, found = (low, fraction, found) if choice is None else (fraction, high, choice)
-        if found is None:
+            low, high, best = (low, fraction, best) if choice is None else (fraction, high, choice)
+        if best is None:
             return ""
-        size = f"{found.total_count} x {found.entry.name} of {1e3 * found.length:.4g} mm"
-        return f"{found.requirement.describe()} ({size})"
+        size = f"{best.total_count} x {best.entry.name} of {1e3 * best.length:.4g} mm"
+        return f"{best.requirement.describe()} ({size})"
 
 
 def catalogue() -> tuple[Entry, ...]:
@@ -129,9 +129,9 @@ def size_muscles(
     for done, entry in enumerate(entries):
         if progress is not None:
             progress(done / len(entries))
-        found, failed = _choices_of(entry, requirement, conditions)
-        choices += found
-        unsuitable += [] if found else [failed]
+        choices_of_entry, failed = _choices_of(entry, requirement, conditions)
+        choices += choices_of_entry
+        unsuitable += [] if choices_of_entry else [failed]
     unsuitable.sort(key=lambda item: item.count == 0)
     others = products_without_law() if muscles is None else ()
     return SizingResult(requirement, conditions, rank(choices, sort), (*unsuitable, *others), entries)
@@ -140,11 +140,11 @@ def size_muscles(
 def _choices_of(
     entry: Entry, requirement: Requirement, conditions: SizingConditions
 ) -> tuple[list[MuscleChoice], UnsuitableMuscle]:
-    """The choices of an entry, and the reason of the greatest number that does not suffice.
+    """The choices of an entry, and the reason of the maximum number that does not suffice.
 
     A number is left out if fewer muscles are as short and take as little air.
     """
-    found: list[MuscleChoice] = []
+    choices: list[MuscleChoice] = []
     failed = UnsuitableMuscle(entry.name, 0, "")
     for count in range(conditions.min_count, conditions.max_count + 1):
         try:
@@ -153,8 +153,8 @@ def _choices_of(
             reason = str(error).removeprefix(f"{entry.name}: ").rstrip(".")
             failed = UnsuitableMuscle(entry.name, count if isinstance(error, SolveError) else 0, reason)
         else:
-            found += [] if any(_is_dominated(choice, other) for other in found) else [choice]
-    return found, failed
+            choices += [] if any(_is_dominated(choice, other) for other in choices) else [choice]
+    return choices, failed
 
 
 def _is_dominated(choice: MuscleChoice, other: MuscleChoice) -> bool:
@@ -184,7 +184,7 @@ def choose(entry: Entry, requirement: Requirement, conditions: SizingConditions,
 
 
 def _shortest_length(entry: Entry, search: Search, lengths: LengthRange) -> float:
-    """The shortest length of the range that suffices, or the greatest of the range."""
+    """The shortest length of the range that suffices, or the largest of the range."""
 
     def needed(length: float) -> float:
         return search.required_length(static_muscle(at_length(entry, length), search.conditions))
@@ -253,7 +253,7 @@ def _reduced(requirement: Requirement, what: str, fraction: float) -> Requiremen
 def _any_choice(
     requirement: Requirement | None, conditions: SizingConditions, entries: list[Entry]
 ) -> MuscleChoice | None:
-    """A choice of any of the entries, with the greatest number of muscles or with one; None if there is none."""
+    """A choice of any of the entries, with the maximum number of muscles or with one; None if there is none."""
     if requirement is None:
         return None
     for entry in entries:

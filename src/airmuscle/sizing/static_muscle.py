@@ -37,7 +37,7 @@ class LengthRange(NamedTuple):
 
 class EndPoint(NamedTuple):
     """End point of a motion for one muscle: gauge pressure [Pa], contraction [1], tension [N], and the tension [N] of
-    which the muscle is capable there at its greatest pressure."""
+    which the muscle is capable there at its maximum pressure."""
 
     pressure: float
     contraction: float
@@ -72,7 +72,7 @@ class StaticMuscle(ShortRepr):
         return _solve_for_force(self.entry.characteristic, pressure, contraction)
 
     def capacity(self, contraction: Any) -> Any:
-        """Greatest permitted tension [N] at a contraction [1]: that at the greatest pressure, or that of the maker."""
+        """Maximum permitted tension [N] at a contraction [1]: that at the maximum pressure, or that of the maker."""
         return np.minimum(self.force(self.pressure_range[1], contraction), self.max_force)
 
     def floor(self, contraction: Any) -> Any:
@@ -105,7 +105,7 @@ class StaticMuscle(ShortRepr):
         return float(self.muscle.volume(contraction, self.muscle.steady_state(pressure, contraction)))
 
     def diameter(self, contraction: float) -> float | None:
-        """Greatest outer diameter of the enclosed volume [m], without the wall; None without a geometry."""
+        """Maximum outer diameter of the enclosed volume [m], without the wall; None without a geometry."""
         if self.entry.geometry is None:
             return None
         _, radii = self.entry.geometry.outline(contraction)
@@ -145,8 +145,8 @@ def static_muscle(entry: Entry, conditions: SizingConditions) -> StaticMuscle:
 def own_length(entry: Entry) -> float | None:
     """Resting length [m] of the law or geometry of an entry; None if it has none."""
     parts = (part for part in (entry.characteristic, entry.geometry) if part is not None)
-    found = (leaf.value for part in parts for leaf in leaves(part) if leaf.declared.name == "resting_length")
-    return next((float(length) for length in found), None)
+    lengths = (leaf.value for part in parts for leaf in leaves(part) if leaf.declared.name == "resting_length")
+    return next((float(length) for length in lengths), None)
 
 
 def length_range(entry: Entry, max_length: float) -> LengthRange:

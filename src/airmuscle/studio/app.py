@@ -41,9 +41,9 @@ LIBRARY_LIMIT = 120.0
 MAX_SHEETS = 100
 """Number of sheets that the server keeps (chosen)."""
 MAX_PAGE = 256 * 1024
-"""Greatest size of a request for a self-contained page [bytes] (chosen)."""
+"""Largest size of a request for a self-contained page [bytes] (chosen)."""
 MAX_PAGE_SHEETS = 12
-"""Greatest number of muscles and plants in a self-contained page (chosen)."""
+"""Maximum number of muscles and plants in a self-contained page (chosen)."""
 
 
 class Sheets:
@@ -211,9 +211,9 @@ class Handlers:
         from starlette.responses import Response
 
         wanted = read_page_request(decoded(await limited_body(request, MAX_PAGE)))
-        found = [self._sheets.get(identifier) for identifier in wanted["sheets"]]
-        sheets = [sheet for sheet in found if sheet is not None]
-        if len(sheets) < len(found):
+        named = [self._sheets.get(identifier) for identifier in wanted["sheets"]]
+        sheets = [sheet for sheet in named if sheet is not None]
+        if len(sheets) < len(named):
             raise BadRequest("a program is no longer kept; reload the page.", 404)
         return Response(self_contained_page(sheets, wanted["state"]), media_type="text/html")
 

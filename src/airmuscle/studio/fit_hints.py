@@ -39,5 +39,7 @@ def in_page_words(text: str) -> str:
 def as_field_error(error: AirmuscleError, field: str = "") -> FieldError:
     """The error with its field: its own, that of its hint, or else `field`."""
     own = getattr(error, "field", "")
-    hinted = next((found[0] for hint in error.message.hints if (found := _INSTRUCTIONS.get(hint.argument))), "")
+    hinted = next(
+        (instruction[0] for hint in error.message.hints if (instruction := _INSTRUCTIONS.get(hint.argument))), ""
+    )
     return FieldError(in_page_words(error.message), own or hinted or field)

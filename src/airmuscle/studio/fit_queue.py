@@ -20,11 +20,11 @@ from .requests import BadRequest
 from .worker import LimitError, Worker
 
 FIT_WORKERS = 2
-"""Greatest number of fits at a time (chosen)."""
+"""Maximum number of fits at a time (chosen)."""
 TIME_LIMIT = 1800.0
 """Limit [s] of a fit (chosen)."""
 MAX_WAITING = 20
-"""Greatest number of fits that wait (chosen)."""
+"""Maximum number of fits that wait (chosen)."""
 MAX_TASKS = 200
 """Number of tasks whose state and result the server keeps (chosen)."""
 WAITING, RUNNING, DONE, FAILED, CANCELLED = "waiting", "running", "done", "failed", "cancelled"

@@ -25,9 +25,9 @@ from .fit_settings import FieldError, FitSettings
 from .fit_uploads import FILES
 
 MAX_ROWS = 200_000
-"""Greatest number of rows of a file that are used; of a longer file every n-th one (chosen)."""
+"""Maximum number of rows of a file that are used; of a longer file every n-th one (chosen)."""
 MAX_COLUMNS = 400
-"""Greatest number of columns that are shown (chosen)."""
+"""Maximum number of columns that are shown (chosen)."""
 NEEDED = ("pressure", "contraction", "force")
 """Quantities of a static fit."""
 
@@ -71,56 +71,56 @@ class ReadSet:
 
 def read_set(folder: Path, settings: FitSettings) -> ReadSet:
     """The recordings of the files of a set, as `recording.read` reads them with the same mapping."""
-    found = ReadSet()
+    read = ReadSet()
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", AirmuscleWarning)
         for path in sorted((folder / FILES).iterdir()):
-            _read_file(path, settings, found)
+            _read_file(path, settings, read)
         try:
-            check_unit_consistency(found.recordings)
+            check_unit_consistency(read.recordings)
         except AirmuscleError as error:
-            found.complain(error, "columns")
-    found.remarks += dict.fromkeys(in_page_words(str(each.message)) for each in caught)
-    for recording, file in zip(found.recordings, found.files, strict=True):
-        _check_needed(recording, file, found)
-    if not found.problems and found.recordings:
+            read.complain(error, "columns")
+    read.remarks += dict.fromkeys(in_page_words(str(each.message)) for each in caught)
+    for recording, file in zip(read.recordings, read.files, strict=True):
+        _check_needed(recording, file, read)
+    if not read.problems and read.recordings:
         try:
-            check_contents(found.recordings)
+            check_contents(read.recordings)
         except AirmuscleError as error:
-            found.complain(error, "files")
-    return found
+            read.complain(error, "files")
+    return read
 
 
-def _read_file(path: Path, settings: FitSettings, found: ReadSet) -> None:
+def _read_file(path: Path, settings: FitSettings, read: ReadSet) -> None:
     field = f"file:{path.name}"
     try:
         tables = _tables(path, settings)
         constants = _constants(path, settings)
     except AirmuscleError as error:
         problem = as_field_error(error, field)
-        found.complain(FieldError(without_folder(problem.message, path.parent), problem.field))
+        read.complain(FieldError(without_folder(problem.message, path.parent), problem.field))
         return
     for table in tables:
         columns = list(_columns(table, settings))[:MAX_COLUMNS]
-        listed = found.columns.setdefault(path.name, [])
+        listed = read.columns.setdefault(path.name, [])
         listed += [each for each in columns if all(each.key != other.key for other in listed)]
         try:
             mapped = apply_mapping(table, settings.mapping(_chosen(table, settings)))
         except AirmuscleError as error:
-            found.complain(error, "columns")
+            read.complain(error, "columns")
             continue
         problems = list(_unit_problems(mapped, columns, constants))
         for problem in problems:
-            found.complain(problem)
+            read.complain(problem)
         if problems:
             continue
         try:
             recording = interpret(mapped, units={}, constants=constants, time_base=_time_base(settings))
         except AirmuscleError as error:
-            found.complain(error, field)
+            read.complain(error, field)
             continue
-        found.recordings.append(recording)
-        found.files.append(path.name)
+        read.recordings.append(recording)
+        read.files.append(path.name)
 
 
 def without_folder(text: str, folder: Path) -> str:
@@ -225,20 +225,20 @@ def _unit_text(column: FileColumn, heading: Heading, error: AirmuscleError) -> s
     return in_page_words(error.message).partition(": ")[2] or str(error.message)
 
 
-def _check_needed(recording: am.Recording, file: str, found: ReadSet) -> None:
+def _check_needed(recording: am.Recording, file: str, read: ReadSet) -> None:
     """Complain about each quantity that a static fit needs and the recording lacks."""
     for name in NEEDED:
         if name in recording:
             continue
         if name == "contraction" and "length" in recording.columns:
             text = f"{recording.origin}: the resting length is not known, which converts the length to a contraction."
-            found.complain(
+            read.complain(
                 FieldError(f"{text} Write it into the field 'Resting length', such as 300 mm.", "resting_length")
             )
         elif name == "contraction":
             text = f"{recording.origin}: there is neither a contraction nor a length. Select its column, or write the "
-            found.complain(
+            read.complain(
                 FieldError(f"{text}length at which the muscle was held into the row of the file.", f"file:{file}")
             )
         else:
-            found.complain(FieldError(f"{recording.origin}: no column is a {name}. Select its column.", "columns"))
+            read.complain(FieldError(f"{recording.origin}: no column is a {name}. Select its column.", "columns"))

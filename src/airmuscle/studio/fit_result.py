@@ -14,7 +14,7 @@ from ..report.formula import to_display_mathml
 from .fit_hints import in_page_words
 
 MAX_POINTS = 4000
-"""Greatest number of points of the parity chart; of more rows every n-th one is shown (chosen)."""
+"""Maximum number of points of the parity chart; of more rows every n-th one is shown (chosen)."""
 
 
 def result_sheet(selection: LawSelection, fit: am.Fit) -> dict[str, Any]:

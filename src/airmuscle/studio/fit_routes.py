@@ -22,7 +22,7 @@ from .fit_uploads import UploadStore, check_file_name
 from .requests import BadRequest, decoded, json_answer, limited_body
 
 MAX_SETTINGS = 256 * 1024
-"""Greatest size of the settings [bytes] (chosen)."""
+"""Largest size of the settings [bytes] (chosen)."""
 READING_LIMIT = 90.0
 """Limit [s] of the reading of a set (chosen)."""
 _TYPES = {"html": "text/html", "toml": "application/toml", "zip": "application/zip", "json": "application/json"}

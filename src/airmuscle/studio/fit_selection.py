@@ -45,15 +45,15 @@ def selected(recordings: Sequence[am.Recording], rules: Sequence[Rule]) -> list[
 
     Raises FieldError if no row is left.
     """
-    found = []
+    kept = []
     for recording in recordings:
         used = used_rows(recording, rules)
         count = int(np.count_nonzero(~used))
         note = f"{recording.origin}: {count} of {len(recording)} rows are left out, as specified by the user."
         if used.all():
-            found.append(recording)
+            kept.append(recording)
         elif used.any():
-            found.append(dataclasses.replace(recording.rows(used), notes=(*recording.notes, note)))
-    if recordings and not found:
+            kept.append(dataclasses.replace(recording.rows(used), notes=(*recording.notes, note)))
+    if recordings and not kept:
         raise FieldError("no row is left; remove a selection.", "rules")
-    return found
+    return kept

@@ -17,9 +17,9 @@ from ..core.units import quantity
 from ..library.files import list_laws
 
 MAX_RULES = 200
-"""Greatest number of selections of rows (chosen)."""
+"""Maximum number of selections of rows (chosen)."""
 MAX_CHOICES = 500
-"""Greatest number of corrected columns, or of files with facts of their own (chosen)."""
+"""Maximum number of corrected columns, or of files with facts of their own (chosen)."""
 TEXTS = ("resting_length", "ambient", "file_name", "decimal", "delimiter", "sheet", "group", "time")
 """Fields with a text that applies to all files."""
 FILE_FACTS = ("resting_length", "length", "specimen")

@@ -21,9 +21,9 @@ from .fit_settings import FieldError, FitSettings, Rule
 from .fit_uploads import FILES
 
 MAX_POINTS = 9000
-"""Greatest number of points of the chart; of more rows every n-th one is shown (chosen)."""
+"""Maximum number of points of the chart; of more rows every n-th one is shown (chosen)."""
 MAX_LISTED = 60
-"""Greatest number of runs, outliers or findings of a recording that are listed (chosen)."""
+"""Maximum number of runs, outliers or findings of a recording that are listed (chosen)."""
 DIGITS = 7
 """Significant digits of a point of the chart (chosen)."""
 SHOWN = ("time", "pressure", "contraction", "length", "force")
@@ -31,37 +31,37 @@ SHOWN = ("time", "pressure", "contraction", "length", "force")
 
 def sheet_of_files(folder: str, settings: FitSettings) -> dict[str, Any]:
     """What was understood of the files of a set; problems are part of the sheet, and no exception."""
-    found = read_set(Path(folder), settings)
+    read = read_set(Path(folder), settings)
     names = sorted(path.name for path in (Path(folder) / FILES).iterdir())
-    used = _selected_rows(found, settings.rules)
-    inspections: Sequence[Inspection | None] = [None] * len(found.recordings)
+    used = _selected_rows(read, settings.rules)
+    inspections: Sequence[Inspection | None] = [None] * len(read.recordings)
     try:
-        inspections = inspect_all(found.recordings) if found.recordings else ()
+        inspections = inspect_all(read.recordings) if read.recordings else ()
     except AirmuscleError as error:
-        found.complain(error, "files")
-    step = max(1, math.ceil(sum(map(len, found.recordings)) / MAX_POINTS))
-    rows = zip(found.recordings, found.files, inspections, used, strict=True)
+        read.complain(error, "files")
+    step = max(1, math.ceil(sum(map(len, read.recordings)) / MAX_POINTS))
+    rows = zip(read.recordings, read.files, inspections, used, strict=True)
     return {
-        "files": [{"name": name, "columns": [_column(each) for each in found.columns.get(name, [])]} for name in names],
+        "files": [{"name": name, "columns": [_column(each) for each in read.columns.get(name, [])]} for name in names],
         "recordings": [_recording(recording, file, each, rule, step) for recording, file, each, rule in rows],
-        "problems": [{"field": each.field, "text": str(each.message)} for each in found.problems],
-        "remarks": found.remarks,
+        "problems": [{"field": each.field, "text": str(each.message)} for each in read.problems],
+        "remarks": read.remarks,
         "step": step,
-        "ready": bool(found.recordings) and not found.problems,
+        "ready": bool(read.recordings) and not read.problems,
     }
 
 
-def _selected_rows(found: ReadSet, rules: Sequence[Rule]) -> list[Any]:
+def _selected_rows(read: ReadSet, rules: Sequence[Rule]) -> list[Any]:
     """The used rows of each recording; all where a rule is not possible, which becomes a problem."""
     used = []
-    for recording in found.recordings:
+    for recording in read.recordings:
         try:
             used.append(used_rows(recording, rules))
         except FieldError as error:
-            found.complain(error)
+            read.complain(error)
             used.append(np.ones(len(recording), dtype=bool))
     if used and not any(rows.any() for rows in used):
-        found.complain(FieldError("no row is left; remove a selection.", "rules"))
+        read.complain(FieldError("no row is left; remove a selection.", "rules"))
     return used
 
 

@@ -51,7 +51,7 @@ GEOMETRY = (
 FRICTION_LAWS = 4
 """Number of friction laws that are fitted to each loop and to all loops together, for the progress."""
 MAX_POINTS = 2000
-"""Greatest number of points of a loop that the page draws (chosen)."""
+"""Maximum number of points of a loop that the page draws (chosen)."""
 
 
 def run_fit(folder: str, out: str, settings: FitSettings, report: Report) -> None:
@@ -83,17 +83,17 @@ def run_fit(folder: str, out: str, settings: FitSettings, report: Report) -> Non
 
 def _recordings(folder: Path, settings: FitSettings) -> tuple[list[am.Recording], list[Path]]:
     """The selected rows of all recordings, and the names of the files. Raises the first problem as FieldError."""
-    found = read_set(folder, settings)
-    if found.problems:
-        raise found.problems[0]
-    if not found.recordings:
+    read = read_set(folder, settings)
+    if read.problems:
+        raise read.problems[0]
+    if not read.recordings:
         raise FieldError("there is no file; drop a measurement file first.", "files")
-    recordings = selected(found.recordings, settings.rules)
+    recordings = selected(read.recordings, settings.rules)
     try:
         check_contents(recordings)
     except AirmuscleError as error:
         raise as_field_error(error, "rules" if settings.rules else "files") from None
-    return recordings, [Path(name) for name in dict.fromkeys(found.files)]
+    return recordings, [Path(name) for name in dict.fromkeys(read.files)]
 
 
 def _select(

@@ -23,17 +23,17 @@ from ..recording.reader import EXTENSIONS
 from .requests import BadRequest
 
 MAX_FILE = 32 * 10**6
-"""Greatest size of a measurement file [bytes] (chosen)."""
+"""Largest size of a measurement file [bytes] (chosen)."""
 MAX_SET = 64 * 10**6
-"""Greatest size of all files of a set [bytes] (chosen)."""
+"""Largest size of all files of a set [bytes] (chosen)."""
 MAX_FILES = 60
-"""Greatest number of files of a set (chosen)."""
+"""Maximum number of files of a set (chosen)."""
 MAX_SETS = 40
-"""Greatest number of sets that the server keeps (chosen)."""
+"""Maximum number of sets that the server keeps (chosen)."""
 MAX_IDLE = 3600.0
 """Time [s] without a request after which a set may be removed for the sake of another one (chosen)."""
 MAX_NAME = 120
-"""Greatest length of the name of a file (chosen)."""
+"""Maximum length of the name of a file (chosen)."""
 FILES = "files"
 _PREFIX = "airmuscle-studio-"
 _IDENTIFIER = re.compile(r"[A-Za-z0-9_-]{22}")

@@ -23,7 +23,7 @@ AHEAD = ("first_ahead", "second_ahead")
 INVERSE_STEPS = 3
 """Newton steps of the inverse for torque and stiffness (chosen); one is exact for laws that are affine in pressure."""
 MAX_SPEED = 20.0
-"""Greatest angular speed that the outer law of the cascade commands [rad/s] (chosen)."""
+"""Largest angular speed that the outer law of the cascade commands [rad/s] (chosen)."""
 OPENING = 0.1
 """Opening of the valves at which the joint is linearised (chosen): at closed valves the derivatives are one-sided."""
 
@@ -122,7 +122,7 @@ def joint_controllers(plant: am.Plant, statics: am.analysis.JointStatics) -> tup
     steps = 1 if affine else INVERSE_STEPS
     inverse = am.control.AntagonisticInverse(plant.muscles, plant.mechanism, *pressure_range, steps=steps)
     ahead = am.control.SetpointCommand(valves.pressures, AHEAD)
-    found = []
+    controllers = []
     for key, outer, gains, inside in (
         ("pid", _pid(), PID_GAINS, ""),
         ("cascade", _speed_cascade(), SPEED_GAINS, "inner."),
@@ -131,17 +131,19 @@ def joint_controllers(plant: am.Plant, statics: am.analysis.JointStatics) -> tup
         alone = am.control.Cascade(
             outer, am.control.CoContraction(valves.pressures, 0.0, "mean_pressure"), (-half,), (half,)
         )
-        found.append(_with_valves(valves, pressure_range, key, alone, "outer.", inside, gains))
+        controllers.append(_with_valves(valves, pressure_range, key, alone, "outer.", inside, gains))
         added = am.control.WithFeedForward(
             ahead, am.control.Cascade(outer, am.control.CoContraction(valves.pressures, 0.0), (-half,), (half,))
         )
-        found.append(_with_valves(valves, pressure_range, f"{key}-ahead", added, "feedback.outer.", inside, gains))
+        controllers.append(
+            _with_valves(valves, pressure_range, f"{key}-ahead", added, "feedback.outer.", inside, gains)
+        )
     law = am.control.AngleAndStiffness(
         inverse, valves.pressures, 15.0, 0.3, 0.5, speed_column="angular_speed",
         acceleration_setpoint="angular_acceleration",
     )  # fmt: skip
-    found.append(_with_valves(valves, pressure_range, "stiffness", law, "", "", TORQUE_GAINS, bias=False))
-    return tuple(found)
+    controllers.append(_with_valves(valves, pressure_range, "stiffness", law, "", "", TORQUE_GAINS, bias=False))
+    return tuple(controllers)
 
 
 def _pid() -> am.PID:

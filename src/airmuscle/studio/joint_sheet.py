@@ -72,7 +72,7 @@ def joint_tables(tables: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def reachable_region(statics: am.analysis.JointStatics) -> dict[str, list[float]]:
-    """Least and greatest stiffness [N m/rad] at angles [rad] without a load, where both muscles are taut."""
+    """Minimum and maximum stiffness [N m/rad] at angles [rad] without a load, where both muscles are taut."""
     angles = np.linspace(*statics.angle_range, REGION_ANGLES)
     least, greatest = statics.stiffness_limits(angles)
     inside = np.isfinite(least) & np.isfinite(greatest)

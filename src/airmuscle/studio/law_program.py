@@ -75,23 +75,23 @@ def _functions(model: Any, shape: Any) -> list[tuple[str, dict[str, Any], Any]]:
     """Name, arguments and results of every function that can be traced."""
     import casadi
 
-    found = []
+    functions = []
     a, b = casadi.SX.sym("a"), casadi.SX.sym("b")
     for name in DIRECTIONS:
         value = _traced(getattr(model, name), a, b)
         if value is not None:
             x = casadi.vertcat(a, b)
-            found.append((name, {"x": x}, casadi.vertcat(value, casadi.jacobian(value, x).T)))
+            functions.append((name, {"x": x}, casadi.vertcat(value, casadi.jacobian(value, x).T)))
     limits = _traced(lambda: casadi.vertcat(*_limits(model)))
     if limits is not None:
-        found.append(("limits", {}, limits))
+        functions.append(("limits", {}, limits))
     volume = _traced(shape.volume, a) if shape is not None and shape.traceable else None
     if volume is not None:
-        found.append(("volume", {"x": a}, casadi.vertcat(volume, casadi.jacobian(volume, a))))
+        functions.append(("volume", {"x": a}, casadi.vertcat(volume, casadi.jacobian(volume, a))))
     outline = _traced(lambda: casadi.vertcat(*_outline(shape, a, b))) if shape is not None else None
     if outline is not None:
-        found.append(("outline", {"x": casadi.vertcat(a, b)}, outline))
-    return [(name, inputs, casadi.densify(casadi.cse(outputs))) for name, inputs, outputs in found]
+        functions.append(("outline", {"x": casadi.vertcat(a, b)}, outline))
+    return [(name, inputs, casadi.densify(casadi.cse(outputs))) for name, inputs, outputs in functions]
 
 
 def _traced(function: Callable[..., Any], *arguments: Any) -> Any:

@@ -25,7 +25,7 @@ from .law_program import print_law
 from .toml_template import Template, toml_template
 
 MAX_PARAMETERS = 60
-"""Greatest number of parameters with a slider; a law with more, such as a table, has none (chosen)."""
+"""Maximum number of parameters with a slider; a law with more, such as a table, has none (chosen)."""
 SHOWN_UNITS: dict[str, tuple[tuple[float, str], ...]] = {
     "m": ((1.0, "mm"),), "rad": ((math.inf, "deg"),), "s": ((0.5, "ms"),), "m3": ((1.0, "cm3"),), "kg": ((0.1, "g"),),
     "Pa": ((1e3, "Pa"), (1e6, "kPa"), (math.inf, "MPa")), "m3/(s Pa)": ((math.inf, "dm3/(s bar)"),),

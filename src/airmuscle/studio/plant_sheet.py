@@ -30,7 +30,7 @@ NAMES = (
 MAX_DURATION = 1000.0
 """Longest run in the page [s] (chosen)."""
 MAX_PARAMETERS = 120
-"""Greatest number of parameters with a slider (chosen)."""
+"""Maximum number of parameters with a slider (chosen)."""
 OUTLINE_CONTRACTIONS, OUTLINE_POINTS = 31, 25
 """Grid of an outline (chosen)."""
 _EXPORT = re.compile(r"^export ", re.MULTILINE)
@@ -112,8 +112,8 @@ def _parameter_rows(plant: am.Plant, sources: Mapping[str, str]) -> list[dict[st
 def _source(leaf: Leaf, sources: Mapping[str, str]) -> str:
     """The source of a number: the longest path in [sources] that its path begins with."""
     path = re.sub(r"\[\d+\]", "", leaf.path)
-    found = [key for key in sources if path == key or path.startswith(f"{key}.")]
-    return sources[max(found, key=len)] if found else "the model or its entry"
+    matching = [key for key in sources if path == key or path.startswith(f"{key}.")]
+    return sources[max(matching, key=len)] if matching else "the model or its entry"
 
 
 def _input_rows(plant: am.Plant) -> list[dict[str, Any]]:

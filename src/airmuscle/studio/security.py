@@ -37,7 +37,7 @@ HEADERS = (
 COOKIE = "airmuscle_token"
 READING = ("GET", "HEAD")
 MAX_TARGET = 2048
-"""Greatest length of the path of a request (chosen)."""
+"""Maximum length of the path of a request (chosen)."""
 
 
 def is_loopback(host: str) -> bool:

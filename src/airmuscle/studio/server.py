@@ -16,7 +16,7 @@ from .worker import WorkerPool
 
 PACKAGES = ("starlette", "uvicorn")
 MAX_CONNECTIONS = 64
-"""Greatest number of requests at a time (chosen)."""
+"""Maximum number of requests at a time (chosen)."""
 
 
 def check_packages() -> None:

@@ -14,7 +14,7 @@ from .page import self_contained_page
 from .tasks import sheet_of_any
 
 MAX_MUSCLES = 6
-"""Greatest number of muscles in one chart (chosen)."""
+"""Maximum number of muscles in one chart (chosen)."""
 
 
 def open_sheets(names: Sequence[str]) -> tuple[dict[str, Any], ...]:

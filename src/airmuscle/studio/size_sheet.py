@@ -24,9 +24,9 @@ FIELDS = (
 )  # fmt: skip
 """Fields of a request; each is a text as a user types it, and may be empty where it is optional."""
 MAX_CHOICES = 30
-"""Greatest number of choices that the page receives (chosen)."""
+"""Maximum number of choices that the page receives (chosen)."""
 MAX_FIELD = 60
-"""Greatest length of a field (chosen)."""
+"""Maximum length of a field (chosen)."""
 POINTS = 81
 """Points of a curve (chosen)."""
 
@@ -97,7 +97,7 @@ def _conditions(given: Mapping[str, str]) -> am.sizing.SizingConditions:
     default = am.sizing.SizingConditions
     count = given["max_count"] or str(default.max_count)
     if not count.isascii() or not count.isdecimal():
-        raise ParameterError(f"the greatest number of muscles is '{count}'; give a whole number.")
+        raise ParameterError(f"the maximum number of muscles is '{count}'; give a whole number.")
     return am.sizing.SizingConditions(
         _read(given, "supply", "Pa"),
         _read(given, "safety", "1", default.safety_factor),

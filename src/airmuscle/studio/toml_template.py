@@ -28,9 +28,9 @@ def toml_template(write: Callable[[Any], str], model: Any, count: int) -> Templa
     text = write(tree.unflatten(model, marks))
     template: Template = []
     end = 0
-    for found in _MARK.finditer(text):
-        template += [text[end : found.start()], place[found.group()]]
-        end = found.end()
+    for match in _MARK.finditer(text):
+        template += [text[end : match.start()], place[match.group()]]
+        end = match.end()
     template.append(text[end:])
     missing = set(range(count)) - {item for item in template if isinstance(item, int)}
     if missing:

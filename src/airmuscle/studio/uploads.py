@@ -15,7 +15,7 @@ from ..core.errors import FileError, ParameterError
 from ..library.files import is_path
 
 MAX_TEXT = 64 * 1024
-"""Greatest size of a muscle or scenario file [bytes] (chosen)."""
+"""Largest size of a muscle or scenario file [bytes] (chosen)."""
 FILE_KEYS = ("file", "mapping")
 """Keys whose value is a path."""
 TEXT_KEYS = ("title", "provenance", "note", "warning", "source", "sources", "reference")

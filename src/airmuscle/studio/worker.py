@@ -22,7 +22,7 @@ from typing import Any
 from ..core.errors import AirmuscleError, InputError, printable
 
 MEMORY = 4 * 2**30
-"""Greatest data memory of a worker [bytes] (chosen); it is not limited on Windows and macOS."""
+"""Largest data memory of a worker [bytes] (chosen); it is not limited on Windows and macOS."""
 Report = Callable[[float, str], None]
 """Receives the progress of a task: the completed fraction and what is being done."""
 _END = 5.0

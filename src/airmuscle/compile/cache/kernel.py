@@ -124,7 +124,9 @@ class BoundKernel:
 
     def replace_input(self, index: int, array: Any) -> None:
         """Take another array in place of number `index`, which the kernel only reads; it may be read-only."""
-        if array.flags.writeable or self._arguments[index] is array:
+        if self._arguments[index] is array:
+            return
+        if array.flags.writeable:
             self.replace(index, array)
         elif not array.flags.c_contiguous or _kind(array) != self._kinds[index]:
             raise TypeError(f"argument {index} must be a C-contiguous array of kind {self._kinds[index]}")

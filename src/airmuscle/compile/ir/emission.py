@@ -29,11 +29,11 @@ class FunctionBlock(abc.ABC):
 
     def put(self, expression: str) -> str:
         """The name of the value of `expression`; the instruction is appended unless it exists already."""
-        if expression not in self._known:
-            name = self.new_name()
+        name = self._known.get(expression)
+        if name is None:
+            name = self._known[expression] = self.new_name()
             self.lines.append(self.assignment(name, expression))
-            self._known[expression] = name
-        return self._known[expression]
+        return name
 
     def new_name(self) -> str:
         """A name that no value has."""

@@ -40,7 +40,7 @@ def in_order(code: Code, apart: IndependentGroup, early: frozenset[Operand]) -> 
     A value that is computed long before its use would be spilled to memory. Instructions in `early` do not share a
     block with others.
     """
-    items = _Pieces(code, apart, early).found()
+    items = _Pieces(code, apart, early).items()
     owner = {result: k for k, item in enumerate(items) for result in _results(item)}
     waits = [{owner[o] for o in _needs(item) if o in owner} - {k} for k, item in enumerate(items)]
     ahead: list[list[int]] = [[] for _ in items]
@@ -103,61 +103,86 @@ class _Pieces:
         for line in code.body:
             for operand in line.arguments:
                 self._users.setdefault(operand, []).append(line.result)
-        self._done: set[Operand] = set()
-        self._results = {line.result for line in code.body}
+        self._place = {line.result: k for k, line in enumerate(code.body)}
+        self._pending = set(self._place)
+        """The results that no item computes as yet."""
+        self._blockers: dict[_Piece, Operand] = {}
+        """A pending result for which each piece was last found to wait."""
 
-    def found(self) -> list[Item]:
+    def items(self) -> list[Item]:
         """All instructions and blocks, in an executable order."""
         items: list[Item] = []
-        left = list(self._code.body)
-        while left:
-            left = self._straight(left, items)
-            ready = self._ready(left)
-            if left and not ready:
+        straight, pieces = self._sorted()
+        while straight or pieces:
+            straight = self._straight(straight, items)
+            ready = self._ready(pieces)
+            if not ready and (straight or pieces):
                 raise TraceError(
                     "the instructions have a cyclic dependence; this is an error in airmuscle, please report it."
                 )
-            for (gates, _), body in ready.items():
-                items.append(ConditionalBlock(gates, tuple(body), self._seen(body)))
-                self._done.update(line.result for line in body)
-            left = [line for line in left if line.result not in self._done]
+            for piece, body in ready:
+                items.append(ConditionalBlock(piece[0], tuple(body), self._seen(body)))
+                self._pending.difference_update(line.result for line in body)
+                pieces[piece] = [line for line in pieces[piece] if line.result in self._pending]
+            pieces = {piece: lines for piece, lines in pieces.items() if lines}
         return items
 
-    def _available(self, operands: Iterable[Operand]) -> bool:
-        return all(operand in self._done or operand not in self._results for operand in operands)
+    def _sorted(self) -> tuple[list[Instruction], dict[_Piece, list[Instruction]]]:
+        """The unconditional instructions, and those of each piece: the same gates, separately for early ones."""
+        straight: list[Instruction] = []
+        pieces: dict[_Piece, list[Instruction]] = {}
+        for line in self._code.body:
+            gates = self._apart.gates.get(line.result)
+            if gates is None:
+                straight.append(line)
+            else:
+                pieces.setdefault((gates, line.result in self._early), []).append(line)
+        return straight, pieces
 
     def _straight(self, left: Sequence[Instruction], items: list[Item]) -> list[Instruction]:
         """Append the unconditional instructions whose operands are available; return the remaining ones."""
         waiting = []
         for line in left:
-            if line.result in self._apart.gates or not self._available(line.arguments):
-                waiting.append(line)
-            else:
+            if self._pending.isdisjoint(line.arguments):
                 items.append(line)
-                self._done.add(line.result)
+                self._pending.discard(line.result)
+            else:
+                waiting.append(line)
         return waiting
 
-    def _ready(self, left: Sequence[Instruction]) -> dict[_Piece, list[Instruction]]:
-        """The blocks that are executable completely; if there are none, the executable part of one block.
+    def _ready(self, pieces: dict[_Piece, list[Instruction]]) -> list[tuple[_Piece, list[Instruction]]]:
+        """The pieces that are executable completely; if there are none, the executable part of the first one."""
+        whole = [(piece, lines) for piece, lines in pieces.items() if self._is_executable(piece, lines)]
+        parts = whole or [(piece, part) for piece, lines in pieces.items() if (part := self._part(piece, lines))]
+        parts.sort(key=lambda entry: self._place[entry[1][0].result])
+        return whole or parts[:1]
 
-        A block contains the remaining instructions with the same gates, separately for early ones.
-        """
-        rest: dict[_Piece, int] = {}
-        parts: dict[_Piece, list[Instruction]] = {}
-        within: dict[_Piece, set[Operand]] = {}
-        for line in left:
-            gates = self._apart.gates.get(line.result)
-            if gates is None:
-                continue
-            piece = gates, line.result in self._early
-            rest[piece] = rest.get(piece, 0) + 1
-            own = within.setdefault(piece, set())
-            instead = self._apart.instead.get(line.result, ZERO)
-            if self._available([*gates, instead, *(a for a in line.arguments if a not in own)]):
+    def _is_executable(self, piece: _Piece, lines: Sequence[Instruction]) -> bool:
+        """Whether all instructions of a piece can be executed now."""
+        if self._blockers.get(piece) in self._pending:
+            return False
+        own: set[Operand] = set()
+        for line in lines:
+            for operand in (*piece[0], self._instead(line), *(a for a in line.arguments if a not in own)):
+                if operand in self._pending:
+                    self._blockers[piece] = operand
+                    return False
+            own.add(line.result)
+        return True
+
+    def _part(self, piece: _Piece, lines: Sequence[Instruction]) -> list[Instruction]:
+        """The instructions of a piece that can be executed now."""
+        own: set[Operand] = set()
+        part = []
+        for line in lines:
+            if self._pending.isdisjoint((*piece[0], self._instead(line), *(a for a in line.arguments if a not in own))):
                 own.add(line.result)
-                parts.setdefault(piece, []).append(line)
-        whole = {piece: body for piece, body in parts.items() if len(body) == rest[piece]}
-        return whole or dict(list(parts.items())[:1])
+                part.append(line)
+        return part
+
+    def _instead(self, line: Instruction) -> Operand:
+        """The value of a conditional result if its block is skipped."""
+        return self._apart.instead.get(line.result, ZERO)
 
     def _seen(self, body: Sequence[Instruction]) -> tuple[tuple[Operand, Operand], ...]:
         """The results of a block that other instructions use, with their values if the block is skipped."""

@@ -40,8 +40,8 @@ class Factors:
             a[place] = a.get(place, casadi.SX(0)) - self.j[slot]
         self.order = _order(a, size)
         _factorise(a, self.order)
-        self.values, found = distinct(list(a.values()))
-        self._slots = dict(zip(a, found, strict=True))
+        self.values, slot_of_each = distinct(list(a.values()))
+        self._slots = dict(zip(a, slot_of_each, strict=True))
 
     def solved(self, factors: Any, right: Sequence[Any]) -> list[Any]:
         """x with (d I - J) x = right; `factors[k]` is the k-th of the distinct factors."""

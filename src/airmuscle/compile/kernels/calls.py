@@ -6,7 +6,9 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 from numba.extending import intrinsic
+from numba.np import arrayobj
 
 
 @intrinsic
@@ -33,6 +35,21 @@ def pointer(typing_context: Any, array: Any) -> Any:
         return builder.ptrtoint(data, ir.IntType(64))
 
     return signature, generate
+
+
+@intrinsic
+def as_vector(typing_context: Any, table: Any) -> Any:
+    """The numbers of a C-contiguous table as one vector that shares its memory."""
+    vector = types.Array(table.dtype, 1, "C")
+
+    def generate(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+        given = context.make_array(sig.args[0])(context, builder, values[0])
+        flat = context.make_array(vector)(context, builder)
+        shape, strides = (cgutils.pack_array(builder, [each]) for each in (given.nitems, given.itemsize))
+        arrayobj.populate_array(flat, given.data, shape, strides, given.itemsize, given.meminfo)
+        return arrayobj.impl_ret_borrowed(context, builder, vector, flat._getvalue())
+
+    return vector(table), generate
 
 
 @intrinsic

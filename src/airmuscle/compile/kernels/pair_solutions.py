@@ -97,26 +97,26 @@ def is_solution(q: Any, k: Any, lane: Any, values: Any, other_values: Any) -> An
 
 
 @PART
-def store_new(n: Any, x: Any, y: Any, span: Any, found: Any, stored: Any) -> Any:
+def store_new(n: Any, x: Any, y: Any, span: Any, solutions: Any, stored: Any) -> Any:
     """Store a solution unless it is known; the number of solutions."""
     known = False
-    for k in range(min(stored, found.shape[1])):
-        distance = max(abs(found[n, k, 0] - x), abs(found[n, k, 1] - y))
+    for k in range(min(stored, solutions.shape[1])):
+        distance = max(abs(solutions[n, k, 0] - x), abs(solutions[n, k, 1] - y))
         known = known or distance <= 1e-7 * span
     if not known:
-        if stored < found.shape[1]:
-            found[n, stored, 0] = x
-            found[n, stored, 1] = y
+        if stored < solutions.shape[1]:
+            solutions[n, stored, 0] = x
+            solutions[n, stored, 1] = y
         stored += 1
     return stored
 
 
 @numba.njit(error_model="numpy", nogil=True)
 def pair_solutions(
-    first: Any, second: Any, low: Any, high: Any, point: Any, wanted_q: Any, wanted_k: Any, levels: Any, found: Any,
+    first: Any, second: Any, low: Any, high: Any, point: Any, wanted_q: Any, wanted_k: Any, levels: Any, solutions: Any,
     counts: Any, arguments: Any, values: Any, other_values: Any, ends: Any, cells: Any,
 ) -> None:  # fmt: skip
-    """Write up to R solutions of every point (N,) into `found` (N, R, 2), and their numbers into `counts` (N,).
+    """Write up to R solutions of every point (N,) into `solutions` (N, R, 2), and their numbers into `counts` (N,).
 
     first, second  addresses of functions in lanes, (t, x) -> (q, k, dq/dx, dk/dx, s); s > 0 at a solution
     levels         (G, LANES): boundaries of the cells in x and in y, in ascending order; after the last one repeated
@@ -150,5 +150,5 @@ def pair_solutions(
                 done = largest <= 1e-15 * span or (iteration > 3 and largest <= 1e-13 * span)
             for lane in range(used):
                 if is_solution(q, k, lane, values, other_values):
-                    stored = store_new(n, x[lane], y[lane], span, found, stored)
+                    stored = store_new(n, x[lane], y[lane], span, solutions, stored)
         counts[n] = stored

@@ -25,6 +25,8 @@ _CALLS = {
     Operation.EXPM1: "expm1",
 }  # fmt: skip
 _COMPARISONS = {Operation.LESS_EQUAL: "ole", Operation.LESS: "olt", Operation.EQUAL: "oeq", Operation.NOT_EQUAL: "une"}
+_EXTREMES = {Operation.FMIN: "olt", Operation.FMAX: "ogt", Operation.MINIMUM: "olt", Operation.MAXIMUM: "ogt"}
+"""Strict comparison, as in the processor's instruction: of two equal values either may be returned."""
 _OF_ONE = (*sorted(_CALLS.values()), *(DOUBLE.intrinsic(name) for name in _INTRINSICS.values()))
 DECLARED = "".join(f"declare double @{name}(double)\n" for name in _OF_ONE) + "declare double @pow(double, double)\n"
 """Declarations of the functions that printed code may call."""
@@ -47,7 +49,8 @@ class FunctionBody(FunctionBlock):
         return f"  {name} = {expression}"
 
     def new_name(self) -> str:
-        return f"%{super().new_name()}"
+        self._named += 1
+        return f"%v{self._named}"
 
     def constant(self, value: float) -> str:
         """A constant; in lanes a splat, which LLVM recognises as a constant."""
@@ -147,40 +150,44 @@ class FunctionBody(FunctionBlock):
 
     def operate(self, operation: Operation, x: Sequence[str]) -> str:
         """The value of one operation, whose instructions are appended; raises TraceError for an unknown operation."""
-        kind, one, zero = self.number.text, self.constant(1.0), self.constant(0.0)
         if operation in _BINARY:
-            return self.put(f"{_BINARY[operation]} {FLAGS} {kind} {x[0]}, {x[1]}")
+            return self.put(f"{_BINARY[operation]} {FLAGS} {self.number.text} {x[0]}, {x[1]}")
         if operation in _INTRINSICS:
             return self.intrinsic(_INTRINSICS[operation], x[:1])
         if operation in _CALLS:
             return self.call(_CALLS[operation], x[:1])
         if operation in _COMPARISONS:
-            return self.choose(_COMPARISONS[operation], x[0], x[1], one, zero)
-        simple = {
-            Operation.NEGATE: lambda: self.put(f"fneg {FLAGS} {kind} {x[0]}"),
-            Operation.SQUARE: lambda: self.put(f"fmul {FLAGS} {kind} {x[0]}, {x[0]}"),
-            Operation.TWICE: lambda: self.put(f"fadd {FLAGS} {kind} {x[0]}, {x[0]}"),
-            Operation.INVERSE: lambda: self.put(f"fdiv {FLAGS} {kind} {one}, {x[0]}"),
-            Operation.POWER: lambda: self.power(x[0], x[1]),
-            Operation.CONSTANT_POWER: lambda: self.power(x[0], x[1]),
-            Operation.NOT: lambda: self.choose("oeq", x[0], zero, one, zero),
-            Operation.AND: lambda: self.put(f"fmul {kind} {x[0]}, {x[1]}"),
-            Operation.OR: lambda: self.choose("une", self.put(f"fadd {kind} {x[0]}, {x[1]}"), zero, one, zero),
-            Operation.FMIN: lambda: self.choose("olt", x[0], x[1], x[0], x[1]),
-            Operation.FMAX: lambda: self.choose("ogt", x[0], x[1], x[0], x[1]),
-            # strict comparison, as in the processor's instruction: of two equal values either may be returned
-            Operation.MINIMUM: lambda: self.choose("olt", x[0], x[1], x[0], x[1]),
-            Operation.MAXIMUM: lambda: self.choose("ogt", x[0], x[1], x[0], x[1]),
-            Operation.MASK: lambda: self.choose("une", x[0], zero, x[1], zero),
-            Operation.SIGN: lambda: self.choose(
-                "ogt", x[0], zero, one, self.choose("olt", x[0], zero, self.constant(-1.0), zero)
-            ),
-            Operation.SELECT: lambda: self.choose("une", x[0], zero, x[1], x[2]),
-            Operation.ASSIGN: lambda: x[0],
-        }  # fmt: skip
-        if operation not in simple:
+            return self.choose(_COMPARISONS[operation], x[0], x[1], self.constant(1.0), self.constant(0.0))
+        if operation in _EXTREMES:
+            return self.choose(_EXTREMES[operation], x[0], x[1], x[0], x[1])
+        if operation not in _OTHERS:
             raise unknown_operation(operation, "LLVM")
-        return simple[operation]()
+        return _OTHERS[operation](self, x, self.constant(0.0))
+
+    def sign(self, x: str, zero: str) -> str:
+        """1, 0 or -1, as the sign of a value."""
+        negative = self.choose("olt", x, zero, self.constant(-1.0), zero)
+        return self.choose("ogt", x, zero, self.constant(1.0), negative)
+
+
+_OTHERS: dict[Operation, Callable[[FunctionBody, Sequence[str], str], str]] = {
+    Operation.NEGATE: lambda to, x, zero: to.put(f"fneg {FLAGS} {to.number.text} {x[0]}"),
+    Operation.SQUARE: lambda to, x, zero: to.put(f"fmul {FLAGS} {to.number.text} {x[0]}, {x[0]}"),
+    Operation.TWICE: lambda to, x, zero: to.put(f"fadd {FLAGS} {to.number.text} {x[0]}, {x[0]}"),
+    Operation.INVERSE: lambda to, x, zero: to.put(f"fdiv {FLAGS} {to.number.text} {to.constant(1.0)}, {x[0]}"),
+    Operation.POWER: lambda to, x, zero: to.power(x[0], x[1]),
+    Operation.CONSTANT_POWER: lambda to, x, zero: to.power(x[0], x[1]),
+    Operation.NOT: lambda to, x, zero: to.choose("oeq", x[0], zero, to.constant(1.0), zero),
+    Operation.AND: lambda to, x, zero: to.put(f"fmul {to.number.text} {x[0]}, {x[1]}"),
+    Operation.OR: lambda to, x, zero: to.choose(
+        "une", to.put(f"fadd {to.number.text} {x[0]}, {x[1]}"), zero, to.constant(1.0), zero
+    ),
+    Operation.MASK: lambda to, x, zero: to.choose("une", x[0], zero, x[1], zero),
+    Operation.SELECT: lambda to, x, zero: to.choose("une", x[0], zero, x[1], x[2]),
+    Operation.SIGN: lambda to, x, zero: to.sign(x[0], zero),
+    Operation.ASSIGN: lambda to, x, zero: x[0],
+}  # fmt: skip
+"""The operations that are neither one instruction of two values nor a call, of arguments and zero."""
 
 
 @dataclasses.dataclass(frozen=True)

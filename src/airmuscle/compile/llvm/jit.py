@@ -9,6 +9,18 @@ from .emit import DECLARED
 
 LEVEL = 2
 """Optimisation level of printed modules."""
+STRAIGHT_PASSES = (
+    "simplify_cfg",
+    "instruction_combine",
+    "new_gvn",
+    "simplify_cfg",
+    "reassociate",
+    "instruction_combine",
+    "new_gvn",
+    "simplify_cfg",
+)
+"""Passes for a function without loops, memory of its own, and calls to other printed functions: those of the standard
+pipeline that change it, in half the time of the pipeline (measured)."""
 
 
 def object_code(text: str) -> bytes:
@@ -17,12 +29,27 @@ def object_code(text: str) -> bytes:
 
     machine = native(LEVEL)
     module = llvm.parse_assembly(DECLARED + text)
-    options = llvm.create_pipeline_tuning_options(speed_level=LEVEL)
-    options.slp_vectorization = False
-    passes = llvm.create_pass_builder(machine, options)
-    passes.getModulePassManager().run(module, passes)
+    _optimise(module, machine)
     code: bytes = machine.emit_object(module)
     return code
+
+
+def _optimise(module: Any, machine: Any) -> None:
+    """Optimise a module: with the standard pipeline if it has functions to inline, else each function by itself."""
+    import llvmlite.binding as llvm
+
+    options = llvm.create_pipeline_tuning_options(speed_level=LEVEL)
+    options.slp_vectorization = False
+    builder = llvm.create_pass_builder(machine, options)
+    functions = [function for function in module.functions if not function.is_declaration]
+    if any(function.linkage == llvm.Linkage.internal for function in functions):
+        builder.getModulePassManager().run(module, builder)
+        return
+    passes = llvm.create_new_function_pass_manager()
+    for name in STRAIGHT_PASSES:
+        getattr(passes, f"add_{name}_pass")()
+    for function in functions:
+        passes.run(function, builder)
 
 
 def engine_of(code: bytes) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import struct
 
 
@@ -18,7 +19,7 @@ class LlvmType:
         """LLVM name of the element type."""
         return "double" if self.bits == 64 else "float"
 
-    @property
+    @functools.cached_property
     def text(self) -> str:
         """LLVM name of the type."""
         return self._of(self.element)

@@ -61,7 +61,7 @@ class CreepStage(ShortRepr):
 def fit_creep_stage(records: Sequence[CampaignRecord]) -> CreepStage | LeftOutStage:
     """Fit Maxwell elements to the holds at constant length and pressure.
 
-    The number of elements is the greatest that the F test justifies in a hold. Relaxation times and stiffnesses are
+    The number of elements is the largest that the F test justifies in a hold. Relaxation times and stiffnesses are
     common to all holds, each hold has its own initial force.
     """
     if not records:

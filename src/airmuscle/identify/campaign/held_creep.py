@@ -44,10 +44,10 @@ def fit_held_creep(recordings: Sequence[Recording], law: ForceLaw | None = None)
     Holds at a constant length are fitted together along the recorded motion; without any, the longest hold under a
     constant load gives the elements. A hold without a motion before it has a course but no stiffness.
     """
-    found = [(each, _longest(each)) for each in recordings]
+    holds = [(each, _longest(each)) for each in recordings]
     sentences, reasons = [], list[str]()
     held, loaded = list[tuple[str, HeldRows]](), list[tuple[float, str, CreepElements]]()
-    for recording, hold in found:
+    for recording, hold in holds:
         sentences.append(_sentence(recording, hold))
         if hold is None:
             continue

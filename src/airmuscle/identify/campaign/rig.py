@@ -15,7 +15,7 @@ LEVEL_TOLERANCE = 0.03
 MAX_RATIO = 1.5
 """Maximum ratio of the forces of two records at the same pressure, contraction and length (chosen)."""
 MAX_SCALE = 10.0
-"""Maximum ratio of the greatest forces by pressure of two isobaric records of one length (chosen)."""
+"""Maximum ratio of the maximum forces by pressure of two isobaric records of one length (chosen)."""
 MIN_FORCE = 0.1
 """Minimum force of the compared rows, as a fraction of the maximum force (chosen)."""
 REMEDY = "Give the files of one muscle and one rig in a folder of their own"

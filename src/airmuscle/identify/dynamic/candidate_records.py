@@ -34,7 +34,7 @@ PULSE_SHARE = 0.5
 VALVE_PARAMETERS = ("conductance", "critical_ratio")
 """Parameters of a valve that its flow depends on, by the last part of their paths."""
 MAX_CONTRACTION = 0.2
-"""Greatest held contraction of a candidate (chosen)."""
+"""Maximum held contraction of a candidate (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -64,14 +64,14 @@ def candidate_records(fit: DynamicFit) -> tuple[CandidateRecord, ...]:
     experiment, start = model.experiment, model.start_time(fit.values)
     begun = dataclasses.replace(experiment, plant=plant, start_time=0.0)
     times = model.times - start
-    found = [CandidateRecord("a repeat of the record", _with_times(begun, times, model.names))]
+    candidates = [CandidateRecord("a repeat of the record", _with_times(begun, times, model.names))]
     pressure = float(experiment.initial_conditions.known.get("pressure", 0.0))
     identified = frozenset(path for unknown in fit.unknowns for path in unknown.paths)
     context = _Context(plant, begun, times, model.names, pressure, identified)
-    found += [*context.longer(), *context.supplies(), *context.lengths()]
+    candidates += [*context.longer(), *context.supplies(), *context.lengths()]
     if isinstance(plant.circuit, FillDischarge) and len(plant.muscles) == 1:
-        found += [*context.valve_records(plant.circuit), *context.tank(plant.circuit)]
-    return tuple(found)
+        candidates += [*context.valve_records(plant.circuit), *context.tank(plant.circuit)]
+    return tuple(candidates)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -26,7 +26,7 @@ class CrossPrediction:
 
     @property
     def ratio(self) -> float:
-        """Greatest ratio of the rms error to the rms residual of the joint fit."""
+        """Maximum ratio of the rms error to the rms residual of the joint fit."""
         return max(self.rms[name] / max(self.fitted[name], 1e-300) for name in self.rms)
 
     def __str__(self) -> str:
@@ -72,7 +72,7 @@ def describe_cross_predictions(predictions: Sequence[CrossPrediction]) -> str:
     worst = max(predictions, key=lambda each: each.ratio)
     if worst.ratio <= MAX_RATIO:
         return (
-            f"The records predict each other: the greatest rms error is {worst.ratio:.3g} times the residual of the "
+            f"The records predict each other: the maximum rms error is {worst.ratio:.3g} times the residual of the "
             "joint fit."
         )
     return (

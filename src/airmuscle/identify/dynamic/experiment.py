@@ -11,6 +11,7 @@ from ...compile import System
 from ...control.inputs import InputSignal, check_input_signal
 from ...core import tree
 from ...core.errors import ParameterError, suggestion
+from ...core.field_types import check_field_types
 from ...core.hints import Hint
 from ...core.short_repr import ShortRepr
 from ...recording import Recording
@@ -43,6 +44,9 @@ class StartTime:
     margin: float
     """Maximum deviation from the start time of the experiment [s]."""
 
+    def __post_init__(self) -> None:
+        check_field_types(self)
+
     def __str__(self) -> str:
         return "start time"
 
@@ -54,6 +58,9 @@ class InitialValue:
     name: str
     margin: float
     """Maximum deviation from the value of the experiment [SI]."""
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
 
     def __str__(self) -> str:
         return f"initial {self.name}"

@@ -50,7 +50,7 @@ class DynamicProfile:
 
     def __str__(self) -> str:
         low, high = (f"{end:.4g}" if np.isfinite(end) else "unbounded" for end in self.interval)
-        rows = "".join(f"\n  {v:.5g}: {c:.3g}" for v, c in zip(self.values, self.cost_increase, strict=True))
+        rows = "".join(f"\n  {v:.4g}: {c:.3g}" for v, c in zip(self.values, self.cost_increase, strict=True))
         better = (
             "\n  a better fit was found on the profile: fit again from there"
             if self.cost_increase.min() < -MIN_IMPROVEMENT

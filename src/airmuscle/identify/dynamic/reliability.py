@@ -63,18 +63,18 @@ def distinct_optima(values: Array, costs: Array, scales: Array) -> tuple[Optimum
     Two searches ended at one optimum if their sums of squares and all unknowns, relative to `scales` (P,), agree.
     Searches without a result are left out.
     """
-    found: list[Optimum] = []
+    optima: list[Optimum] = []
     for point, cost in zip(values, costs, strict=True):
         if not np.isfinite(cost):
             continue
-        for i, optimum in enumerate(found):
+        for i, optimum in enumerate(optima):
             near = np.abs(point - optimum.values) <= SAME_VALUE * np.maximum(np.abs(optimum.values), 1e-3 * scales)
             if cost <= (1 + SAME_COST) * optimum.cost + 1e-9 and near.all():
-                found[i] = dataclasses.replace(optimum, searches=optimum.searches + 1)
+                optima[i] = dataclasses.replace(optimum, searches=optimum.searches + 1)
                 break
         else:
-            found.append(Optimum(point, float(cost), 1))
-    return tuple(found)
+            optima.append(Optimum(point, float(cost), 1))
+    return tuple(optima)
 
 
 def searches_at_lowest(costs: Array) -> int:
@@ -110,15 +110,15 @@ def _count(number: int) -> str:
 
 def _differences(other: Optimum, estimates: Sequence[Estimate]) -> list[str]:
     """The unknowns that differ by more than their standard errors contain, the largest relative difference first."""
-    found = []
+    differences = []
     for estimate, value in zip(estimates, other.values, strict=True):
         change = abs(value - estimate.value)
         contained = MIN_STANDARD_ERRORS * estimate.stderr if np.isfinite(estimate.stderr) else 0.0
         relative = change / max(abs(estimate.value), 1e-300)
         if change > contained and relative > SAME_VALUE:
             unit = f" {estimate.display_unit}" if estimate.display_unit else ""
-            found.append((relative, f"{estimate.name} {value:.3g} instead of {estimate.value:.3g}{unit}"))
-    return [text for _, text in sorted(found, reverse=True)[:MAX_NAMES]]
+            differences.append((relative, f"{estimate.name} {value:.3g} instead of {estimate.value:.3g}{unit}"))
+    return [text for _, text in sorted(differences, reverse=True)[:MAX_NAMES]]
 
 
 def describe_flatness(estimates: Sequence[Estimate], degrees_of_freedom: int) -> list[str]:
@@ -168,13 +168,13 @@ def describe_bounds(
 
 def _moved(estimates: Sequence[Estimate], shifts: Array) -> list[str]:
     """The unknowns that a shift of a bound moves by more than a standard error, the largest relative change first."""
-    found = []
+    described_shifts = []
     for estimate, shift in zip(estimates, shifts, strict=True):
         if np.isfinite(shift) and np.isfinite(estimate.stderr) and abs(shift) > estimate.stderr:
             unit = f" {estimate.display_unit}" if estimate.display_unit else ""
             text = f"{estimate.name} by {shift:+.2g}{unit} ({abs(shift) / estimate.stderr:.2g} standard errors)"
-            found.append((abs(shift) / max(abs(estimate.value), 1e-300), text))
-    return [text for _, text in sorted(found, reverse=True)[:MAX_NAMES]]
+            described_shifts.append((abs(shift) / max(abs(estimate.value), 1e-300), text))
+    return [text for _, text in sorted(described_shifts, reverse=True)[:MAX_NAMES]]
 
 
 def _consequence(name: str) -> str:

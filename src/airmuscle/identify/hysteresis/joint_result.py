@@ -53,7 +53,7 @@ class JointFit(NotebookDisplay):
 
     @property
     def limits(self) -> DataLimits:
-        """Greatest force and range of the speed of all runs."""
+        """Maximum force and range of the speed of all runs."""
         return combine_limits(tuple(run.limits for run in self.series))
 
     @property
@@ -136,7 +136,7 @@ class JointFit(NotebookDisplay):
 
     def __str__(self) -> str:
         lines = [
-            f"{leaf.path:<24}{leaf.declared.symbol:<9}{leaf.value:<12.6g}{_unit_text(leaf)}".rstrip()
+            f"{leaf.path:<24}{leaf.declared.symbol:<9}{leaf.value:<12.4g}{_unit_text(leaf)}".rstrip()
             for leaf in leaves(self.friction)
         ]
         return "\n".join([f"{self.name} fitted to {len(self.series)} runs", *lines, self.verdict])

@@ -1,4 +1,4 @@
-"""Limits of friction parameters that follow from the data: greatest force, and lowest and highest speed."""
+"""Limits of friction parameters that follow from the data: maximum force, and lowest and highest speed."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MIN_SPEED_RATIO = 3.0
 
 @dataclasses.dataclass(frozen=True)
 class DataLimits:
-    """Greatest force [N], and lowest and highest speed [m/s] of the data; the speeds are NaN without a time."""
+    """Maximum force [N], and lowest and highest speed [m/s] of the data; the speeds are NaN without a time."""
 
     force: float
     low_speed: float
@@ -39,7 +39,7 @@ class DataLimits:
     def bounds(self, leaf: Leaf) -> tuple[float, float]:
         """Bounds of a parameter: the declared ones, narrowed by what a muscle of this force and speed can show.
 
-        A force is at most the greatest force, a viscous force at the highest speed likewise, and a characteristic
+        A force is at most the maximum force, a viscous force at the highest speed likewise, and a characteristic
         speed is between the lowest and the highest speed.
         """
         low, high = leaf.declared.bounds
@@ -112,7 +112,7 @@ def limit_reservations(
     """Reasons, as sentences, against a friction: a force on its limit, or terms of speed that are not determined."""
     declared = {leaf.path: leaf.declared for leaf in leaves(friction)}
     reasons = [
-        f"{name} is on its limit, the greatest force in the data ({limits.force:.4g} N)."
+        f"{name} is on its limit, the maximum force in the data ({limits.force:.4g} N)."
         for name in parameters_on_bounds(friction, limits)
         if declared[name].unit == "N" and limits.force < declared[name].bounds[1]
     ]

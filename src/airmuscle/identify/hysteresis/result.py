@@ -158,7 +158,7 @@ class HysteresisFit(NotebookDisplay):
 
     def __str__(self) -> str:
         lines = [
-            f"{path:<16}{symbol:<9}{value:<12.6g}{unit}".rstrip()
+            f"{path:<16}{symbol:<9}{value:<12.4g}{unit}".rstrip()
             for path, symbol, value, unit, _ in self.displayed_parameters
         ]
         return "\n".join([f"{type(self.friction).__name__} fitted to {self.series.origin}", *lines, self.verdict])

@@ -46,7 +46,7 @@ def _fit_stiffnesses(
 ) -> Friction:
     """Stiffnesses of elements with given limits, by bounded linear least squares; `factors` scale the forces.
 
-    No element slides at a greater force than the greatest one of the data.
+    No element slides at a greater force than the largest one of the data.
     """
     from scipy.linalg import block_diag
     from scipy.optimize import lsq_linear

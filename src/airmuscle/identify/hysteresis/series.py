@@ -32,7 +32,7 @@ class LoopSeries:
     direction: Array
     """1 where the path rises, -1 where it falls."""
     limits: DataLimits
-    """Greatest force and range of the speed of the fitted rows."""
+    """Maximum force and range of the speed of the fitted rows."""
     pressure: Array | None = None
     """Gauge pressure [Pa], shape (N,), of a friction that depends on the pressure; None if it is not recorded."""
     axis: Axis = MILLIMETRES

@@ -10,6 +10,7 @@ import numpy as np
 from ...compile import System
 from ...core.arrays import Array
 from ...core.errors import IdentificationError, ParameterError
+from ...core.field_types import check_field_types
 from ...core.short_repr import ShortRepr
 from ...simulation.integrators import Integrator, Rodas4
 from ..dynamic.experiment import Experiment, ParameterPaths, RecordUnknown, StartTime, Unknown, make_unknowns
@@ -37,6 +38,9 @@ class PlantUncertainty(ShortRepr):
     deviations: Mapping[str, float]
     parameters: tuple[ParameterPaths, ...] = ()
     covariance: Array = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
 
 
 def predict_dynamic(
@@ -68,7 +72,7 @@ def predict_dynamic(
         fit = fit_dynamic(plant, [experiment], free=(), per_record=own, observed=deviations, method=method)
         plant, experiment = fit.plant(), _with_estimates(fit, experiment)
         values = ", ".join(
-            f"{e.name.removesuffix(' of record 1')} {e.value:.5g} {e.display_unit}".rstrip() for e in fit.estimates
+            f"{e.name.removesuffix(' of record 1')} {e.value:.4g} {e.display_unit}".rstrip() for e in fit.estimates
         )
         notes.append(f"estimated from the record itself: {values} (SI)")
     modelled, unknowns = _simulate(plant, experiment, deviations, uncertainty, method or Rodas4())

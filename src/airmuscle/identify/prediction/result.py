@@ -41,12 +41,12 @@ class QuantityPrediction(ShortRepr):
 
     @property
     def worst_row(self) -> int:
-        """Index of the compared row with the greatest error."""
+        """Index of the compared row with the maximum error."""
         return int(np.argmax(np.where(self.compared, np.abs(self.errors), -1.0)))
 
     @property
     def max_error(self) -> float:
-        """Predicted minus measured value of greatest magnitude [SI]."""
+        """Predicted minus measured value of largest magnitude [SI]."""
         return float(self.errors[self.worst_row])
 
     @property

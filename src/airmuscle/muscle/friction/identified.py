@@ -24,7 +24,7 @@ class IdentifiedFriction(FrictionWrapper):
         "Pa", "p_high", "upper limit of the gauge pressure in the data", bounds=(-101325.0, 1e7), fitted=False
     )
     max_speed: float = parameter(
-        "m/s", "v_high", "greatest speed in the data; 100 m/s where it is not known", bounds=(1e-9, 100.0),
+        "m/s", "v_high", "maximum speed in the data; 100 m/s where it is not known", bounds=(1e-9, 100.0),
         fitted=False, default=100.0,
     )  # fmt: skip
 

@@ -18,20 +18,20 @@ Polynomial = dict[Monomial, Fraction]
 
 def expand(root: Node, atoms: Collection[Node]) -> Polynomial | None:
     """An expression as a polynomial in these atoms with exact coefficients; None if it is none, or is too long."""
-    found: dict[Node, Polynomial | None] = {}
+    expanded: dict[Node, Polynomial | None] = {}
     for node in in_order(root):
-        found[node] = _expand_one(node, atoms, found)
-    return found[root]
+        expanded[node] = _expand_one(node, atoms, expanded)
+    return expanded[root]
 
 
-def _expand_one(node: Node, atoms: Collection[Node], found: Mapping[Node, Polynomial | None]) -> Polynomial | None:
+def _expand_one(node: Node, atoms: Collection[Node], expanded: Mapping[Node, Polynomial | None]) -> Polynomial | None:
     if node in atoms:
         return {((node, 1),): Fraction(1)}
     if is_number(node):
         return {(): Fraction(node.number)} if node.number else {}
     if node.kind not in ("add", "neg", "mul", "div", "pow"):
         return None
-    first, last = found[node.arguments[0]], found[node.arguments[-1]]
+    first, last = expanded[node.arguments[0]], expanded[node.arguments[-1]]
     if first is None or last is None:
         return None
     if node.kind == "add":

@@ -63,7 +63,7 @@ def _line(one: Statics, x: Array) -> str:
     plant = one.separate[0]
     states = plant.muscle_states(one.state(one.place(x)))
     pulls = ", ".join(
-        f"{m.name} pulls {float(state.tension) + 0.0:.6g} N at {round(float(state.pressure) / 1e3, 6) + 0.0:.6g} kPa "
+        f"{m.name} pulls {float(state.tension) + 0.0:.4g} N at {round(float(state.pressure) / 1e3, 6) + 0.0:.4g} kPa "
         f"and a contraction of {float(state.contraction):.1%}"
         for m, state in zip(plant.muscles, states, strict=True)
     )
@@ -91,4 +91,4 @@ def _required_tension(one: Statics, x: Array) -> str:
             float(mechanism.acceleration(state, state, forces, inputs)[one.plants.mechanism.coordinates[0].name])
         )
     slope = accelerations[1] - accelerations[0]
-    return f" The load requires a tension of {-accelerations[0] / slope:.6g} N." if slope else ""
+    return f" The load requires a tension of {-accelerations[0] / slope:.4g} N." if slope else ""

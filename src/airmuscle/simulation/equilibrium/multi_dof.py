@@ -12,7 +12,7 @@ STARTS = 60
 """Number of start points, spread evenly over the permitted contractions of the muscles (chosen)."""
 ITERATIONS = 40
 RESIDUAL_TOLERANCE = 1e-8
-"""Residual acceleration of an equilibrium, relative to the greatest at the start points (chosen)."""
+"""Residual acceleration of an equilibrium, relative to the largest at the start points (chosen)."""
 DISTINCT = 1e-6
 """Equilibria closer than this fraction of the nominal sizes of the coordinates are the same (chosen)."""
 

@@ -41,13 +41,13 @@ def balances(plants: SingleDofPlants, x: Array, f: Array) -> tuple[Rows, Array]:
         crossing = f[:, :-1] * f[:, 1:] < 0.0
         nearing = _nears_zero(f)
     rows, i = np.nonzero(exact)
-    found = [(rows, x[rows, i])]
+    root_parts = [(rows, x[rows, i])]
     rows, i = np.nonzero(crossing)
-    found.append(_roots(plants, f, rows, x[rows, i], x[rows, i + 1]))
+    root_parts.append(_roots(plants, f, rows, x[rows, i], x[rows, i + 1]))
     rows, i = np.nonzero(nearing)
     around = np.stack([x[rows, i + k] for k in range(3)])
-    found += _pairs(plants, f, rows, around, np.sign(f[rows, i + 1]))
-    row, place = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    root_parts += _pairs(plants, f, rows, around, np.sign(f[rows, i + 1]))
+    row, place = (np.concatenate(parts) for parts in zip(*root_parts, strict=True))
     order = np.lexsort((place, row))
     return row[order], place[order]
 
@@ -69,11 +69,11 @@ def between(plants: SingleDofPlants, low: Array, high: Array) -> Array:
     """The roots between points (R,) of different sign by the false position method (Illinois variant)."""
     search = _Search(np.arange(low.size), low, high, plants.accelerations(low), plants.accelerations(high), low)
     close = np.maximum(CLOSE * (high - low), np.spacing(np.maximum(np.abs(low), np.abs(high))))
-    found, ended = low.copy(), np.zeros(low.size, dtype=bool)
+    roots, ended = low.copy(), np.zeros(low.size, dtype=bool)
     for _ in range(200):
         middle = search.middle()
         at = plants.accelerations(middle)
-        found[search.rows] = np.where(ended, found[search.rows], middle)
+        roots[search.rows] = np.where(ended, roots[search.rows], middle)
         inside = (search.low < middle) & (middle < search.high)
         ended |= (at == 0.0) | (np.abs(middle - search.last) <= close[search.rows]) | ~inside
         if ended.all():
@@ -82,7 +82,7 @@ def between(plants: SingleDofPlants, low: Array, high: Array) -> Array:
         if 2 * ended.sum() > ended.size:  # continue with the unfinished rows only
             kept = np.flatnonzero(~ended)
             plants, search, ended = plants.of(kept), search.of(kept), ended[kept]
-    return found
+    return roots
 
 
 class _Search(NamedTuple):

@@ -26,8 +26,8 @@ def equilibria_of_one_coordinate(statics: Statics) -> tuple[Rows, Array]:
     plain = np.flatnonzero(((f != 0.0) & np.isfinite(f)).any(axis=1))
     if not plain.size:
         return plain, np.empty((0, 1))
-    found, place = balances(line if plain.size == len(f) else line.of(plain), x[plain], f[plain])
-    return plain[found], place[:, None]
+    balanced, place = balances(line if plain.size == len(f) else line.of(plain), x[plain], f[plain])
+    return plain[balanced], place[:, None]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

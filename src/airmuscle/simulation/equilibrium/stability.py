@@ -13,7 +13,7 @@ from ...core.arrays import Array
 from ...plant.plant import Plant
 
 MARGIN = 1e-9
-"""Real part of an eigenvalue, relative to the greatest eigenvalue, up to which it counts as zero (chosen)."""
+"""Real part of an eigenvalue, relative to the largest eigenvalue, up to which it counts as zero (chosen)."""
 _functions: weakref.WeakKeyDictionary[Program, Any] = weakref.WeakKeyDictionary()
 
 

@@ -17,7 +17,7 @@ from .tracking_metrics import BONE2019, RATED_STROKES, SETTLING_BAND, STEADY_TIM
 
 HEADERS = {
     "rmse": "rms error [deg]",
-    "greatest": "greatest error [deg]",
+    "greatest": "maximum error [deg]",
     "itae": "ITAE [deg s^2]",
     "settling": "settling time [s]",
     "overshoot": "overshoot [%]",
@@ -38,7 +38,8 @@ def write_benchmark(result: BenchmarkResult, folder: Path | str, curves: Sequenc
 def benchmark_chapter(result: BenchmarkResult, curves: Sequence[LearningCurve] = ()) -> Chapter:
     """The chapter of a benchmark: ranking, errors, all metrics, gains, figures."""
     tables = [ranking_table(result), error_table(result, "rmse"), error_table(result, "greatest")]
-    tables += [metrics_table(result), gains_table(result)]
+    tables += [metrics_table(result)]
+    tables += [gains] if (gains := gains_table(result)) else []
     tables += [learning_table(curves)] if curves else []
     tables += [failures] if (failures := failure_table(result)) else []
     return Chapter(
@@ -84,7 +85,11 @@ def error_table(result: BenchmarkResult, metric: str) -> Table:
     names = [each.name for each in result.contenders]
     columns: dict[str, list[str] | list[float]] = {"task": [task.name for task in result.tasks]}
     columns |= {name: [result.metric(name, task.name, metric) for task in result.tasks] for name in names}
-    return Table(metric, HEADERS[metric].capitalize(), columns, "From the beginning of the judged time of each task.")
+    return Table(metric, _title(HEADERS[metric]), columns, "From the beginning of the judged time of each task.")
+
+
+def _title(heading: str) -> str:
+    return heading[0].upper() + heading[1:] if not heading.startswith("rms") else f"RMS{heading[3:]}"
 
 
 def metrics_table(result: BenchmarkResult) -> Table:
@@ -106,8 +111,8 @@ def metrics_table(result: BenchmarkResult) -> Table:
     )
 
 
-def gains_table(result: BenchmarkResult) -> Table:
-    """The gains that tuning found, in SI units."""
+def gains_table(result: BenchmarkResult) -> Table | None:
+    """The gains that tuning found, in SI units; None if nothing was tuned."""
     rows = [
         (
             each.name,
@@ -120,6 +125,8 @@ def gains_table(result: BenchmarkResult) -> Table:
         if each.tuning is not None
         for path, value in each.tuning.gains.items()
     ]
+    if not rows:
+        return None
     names = ("controller", "gain", "value [SI]", "remark", "objective [deg]")
     return Table(
         "gains", "Tuned gains", {name: [row[i] for row in rows] for i, name in enumerate(names)},
@@ -151,11 +158,15 @@ def failure_table(result: BenchmarkResult) -> Table | None:
     return Table("failed", "Runs that ended early", {n: [row[i] for row in failed] for i, n in enumerate(names)})
 
 
+def _counted(number: int, noun: str) -> str:
+    return f"{number} {noun}{'s' if number != 1 else ''}"
+
+
 def _summary(result: BenchmarkResult) -> list[str]:
     joint, best = result.joint, next(iter(result.scores()))
     return [
-        f"{len(result.contenders)} controllers, {len(result.tasks)} tasks. Smallest score: {best}. "
-        f"Valves: {joint.valve}. Sampled every {joint.sample_time * 1e3:g} ms.",
+        f"{_counted(len(result.contenders), 'controller')}, {_counted(len(result.tasks), 'task')}. "
+        f"Smallest score: {best}. Valves: {joint.valve}. Sampled every {joint.sample_time * 1e3:g} ms.",
         "Every controller was tuned by the same optimiser with the same budget for perturbed models. The plant on "
         "which it is judged differs from these models in kind: another characteristic, LuGre friction, tubes, heat "
         "transfer, another valve law, and other numbers. The measurements have the resolution of a 12-bit encoder, "
@@ -165,10 +176,10 @@ def _summary(result: BenchmarkResult) -> list[str]:
 
 def _references(result: BenchmarkResult) -> tuple[Reference, ...]:
     sources = [result.joint.model, result.joint.truth, *(each.law for each in result.contenders)]
-    found = {reference.key: reference for reference in (*cite(tuple(sources)), BONE2019)}
+    references = {reference.key: reference for reference in (*cite(tuple(sources)), BONE2019)}
     for each in result.contenders:
-        found |= {reference.key: reference for reference in (each.tuning.references if each.tuning else ())}
-    return tuple(found.values())
+        references |= {reference.key: reference for reference in (each.tuning.references if each.tuning else ())}
+    return tuple(references.values())
 
 
 def _settings(result: BenchmarkResult) -> tuple[tuple[str, str, str], ...]:

@@ -48,8 +48,8 @@ def identify_gains(
                 return tracking_error(joint, with_gains(law, {**gains, path: float(value)}), task)
 
             options = {"maxiter": RUNS, "xatol": RESOLUTION * (high - low)}
-            found = minimize_scalar(error, bounds=(low, high), method="bounded", options=options)
-            gains[paths[name]], runs = float(found.x), runs + int(found.nfev)
+            optimum = minimize_scalar(error, bounds=(low, high), method="bounded", options=options)
+            gains[paths[name]], runs = float(optimum.x), runs + int(optimum.nfev)
     return gains, runs
 
 

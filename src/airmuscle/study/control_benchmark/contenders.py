@@ -25,7 +25,9 @@ from ...control.sliding_mode import SlidingMode
 from ...control.split_range import SplitRange
 from ...control.super_twisting import SuperTwisting
 from ...control.with_feed_forward import WithFeedForward
+from ...core.annotation import one_line
 from ...core.errors import ParameterError
+from ...core.field_types import check_field_types
 from ...core.tree import leaves
 from .called_contender import COMMANDED, SensedController, sensed
 from .designed_controllers import AlongMotion, DeviationLaw, PredictiveDesign, QuadraticDesign, joint_design_model
@@ -62,9 +64,10 @@ class Contender:
     def __post_init__(self) -> None:
         if not isinstance(self.law, Controller):
             raise ParameterError(
-                f"contender '{self.name}': its law is a {type(self.law).__name__}; give a ControlLaw or another "
-                "Controller."
+                f"Contender '{one_line(self.name)}': its law is a {type(self.law).__name__}; give a ControlLaw or "
+                "another Controller."
             )
+        check_field_types(self)
         known = [leaf.path for leaf in leaves(self.law)]
         for purpose, bounds in (("tuned", self.bounds), ("identified", self.identified)):
             if unknown := [path for path in bounds if path not in known]:

@@ -123,8 +123,8 @@ class QuadraticDesign(JointDesign, LawDesign):
     @functools.cached_property
     def law(self) -> ControlLaw:
         """The state feedback with its observer."""
-        found: StateFeedback = self.designed(design_lqg, {}, permitted_integral={READING: self.permitted_integral})
-        return found
+        feedback: StateFeedback = self.designed(design_lqg, {}, permitted_integral={READING: self.permitted_integral})
+        return feedback
 
 
 @model
@@ -144,10 +144,10 @@ class PredictiveDesign(JointDesign):
     def controller(self) -> LinearModelPredictive:
         """The predictive controller with its observer of the disturbance."""
         disturbance = {"angular_speed.disturbance": self.disturbance_noise}
-        found: LinearModelPredictive = self.designed(
+        predictive: LinearModelPredictive = self.designed(
             design_predictive, disturbance, disturbed=("angular_speed",), horizon=HORIZON
         )
-        return found
+        return predictive
 
 
 @model

@@ -11,6 +11,7 @@ from typing import Any
 from ...control.driver import Driver, SolenoidDriver
 from ...control.sensors import ColumnSensor
 from ...core.errors import ParameterError
+from ...core.field_types import check_field_types
 from ...core.short_repr import ShortRepr
 from ...library.law_file import load_law
 from ...mechanism import AntagonisticJoint, JointWithExternalTorque
@@ -72,6 +73,7 @@ class BenchmarkJoint(ShortRepr):
     objective: RobustObjective = RobustObjective(air_weight=100.0)
 
     def __post_init__(self) -> None:
+        check_field_types(self)
         check_truth_differs(self.model, self.truth)
         if not self.family:
             raise ParameterError(f"joint '{self.name}': the family of models is empty; give at least the model.")
@@ -84,7 +86,7 @@ class BenchmarkJoint(ShortRepr):
 
     @property
     def pressure_span(self) -> float:
-        """Greatest half difference of the pressures [Pa] at the mean pressure."""
+        """Maximum half difference of the pressures [Pa] at the mean pressure."""
         return min(self.mean_pressure - self.min_pressure, self.max_pressure - self.mean_pressure)
 
     def start(self, plant: Plant) -> dict[str, float]:

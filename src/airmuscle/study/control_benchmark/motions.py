@@ -10,11 +10,15 @@ import numpy as np
 
 from ...core.arrays import Array
 from ...core.errors import ParameterError
+from ...core.field_types import check_field_types
 
 
 @dataclasses.dataclass(frozen=True)
 class JointMotion(abc.ABC):
     """A wanted motion of a joint angle (interface)."""
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
 
     @abc.abstractmethod
     def at(self, time: Array) -> Array:

@@ -6,6 +6,7 @@ import dataclasses
 import math
 
 from ...core.errors import ParameterError, suggestion
+from ...core.field_types import check_field_types
 from .motions import JointMotion, MinimumJerkMotion, RampMotion, SineMotion, StepMotion, SumOfMotions
 
 DEGREE = math.pi / 180.0
@@ -21,6 +22,9 @@ class StuckValve:
     input: str
     time: float
     opening: float
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,6 +51,7 @@ class ControlTask:
     stuck: StuckValve | None = None
 
     def __post_init__(self) -> None:
+        check_field_types(self)
         if not 0 < self.duration < math.inf:
             raise ParameterError(f"task '{self.name}': duration is {self.duration!r} s; it must be positive, finite.")
         if not 0 <= self.begin < self.duration:

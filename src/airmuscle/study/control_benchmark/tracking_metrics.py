@@ -37,10 +37,10 @@ RATED_STROKES = 5e8
 class TrackingMetrics:
     """Metrics of one run of a task; NaN where a metric does not exist for the task.
 
-    rmse, greatest      root mean square and greatest magnitude of the error r - y [degree], from the task's begin on
+    rmse, largest      root mean square and largest magnitude of the error r - y [degree], from the task's begin on
     itae                integral of (t - t_begin) |e| [degree s^2]
     settling            time from the event until the error remains within 0.5 degrees [s]; infinite if it does not
-    overshoot           greatest excess over the final set point [%] of the motion's change
+    overshoot           largest excess over the final set point [%] of the motion's change
     steady              mean magnitude of the error over the last 0.3 s [degree]; NaN for a sine
     air                 air that enters the muscles, as litres of reference atmosphere per second [l/s (ANR)]
     strokes             opening travel of all valves [full strokes/s]; for on/off valves openings and closings

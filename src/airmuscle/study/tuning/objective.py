@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from ...core.arrays import Array
 from ...core.errors import ParameterError
+from ...core.field_types import check_field_types
 from ...core.short_repr import ShortRepr
 
 
@@ -56,11 +57,17 @@ class RobustObjective:
     switching_weight: float = 0.0
 
     def __post_init__(self) -> None:
+        check_field_types(self)
         if not 0 <= self.quantile <= 1:
             raise ParameterError(f"RobustObjective: quantile is {self.quantile}; allowed range: 0 to 1.")
         for name in ("quantile_weight", "air_weight", "switching_weight"):
             if not 0 <= getattr(self, name) < math.inf:
                 raise ParameterError(f"RobustObjective: {name} is {getattr(self, name)}; it must be 0 or positive.")
+
+    def __str__(self) -> str:
+        weights = ((self.air_weight, "mean air drawn [kg/s]"), (self.switching_weight, "mean switchings [1/s]"))
+        parts = [f" + {weight:.4g} x {what}" for weight, what in weights if weight]
+        return f"mean + {self.quantile_weight:.4g} x {self.quantile:.4g} quantile of the index{''.join(parts)}"
 
     def __call__(self, metrics: CaseMetrics) -> Array:
         """The objective (E,) of E sets of gains."""

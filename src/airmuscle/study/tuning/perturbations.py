@@ -13,7 +13,9 @@ import numpy as np
 from ...control.control_law import ControlLaw
 from ...control.control_loop import ControlLoop
 from ...control.sensors import MAX_DELAY, ColumnSensor, WithSensors
+from ...core.annotation import abridged
 from ...core.errors import AirmuscleError, ParameterError
+from ...core.field_types import check_field_types
 from ...core.tree import Leaf, leaves, with_parameters
 from ...library.location import located_errors
 from ...library.uncertainty import ParameterUncertainty
@@ -50,6 +52,11 @@ class Perturbations:
     draws: int = 4
 
     def __post_init__(self) -> None:
+        for name, greatest in (("delay", MAX_DELAY), ("draws", 10_000)):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= greatest:
+                raise ParameterError(f"Perturbations: {name} is {abridged(value)}; allowed range: 0 to {greatest}.")
+        check_field_types(self)
         for name in ("loads", "supplies"):
             for factor in getattr(self, name):
                 if not 0 < factor < math.inf or factor == 1.0:
@@ -58,10 +65,6 @@ class Perturbations:
                     )
         if not 0 <= self.leak <= 1:
             raise ParameterError(f"Perturbations: leak is {self.leak:g}; allowed range: 0 to 1.")
-        for name, greatest in (("delay", MAX_DELAY), ("draws", 10_000)):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= greatest:
-                raise ParameterError(f"Perturbations: {name} is {value!r}; allowed range: 0 to {greatest}.")
 
 
 class PerturbedFamily(NamedTuple):

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from ...core.arrays import Array
 from ...core.errors import ParameterError
+from ...core.field_types import check_field_types
 from ...core.reference import Reference
 
 SMITH1972 = Reference(
@@ -44,6 +45,7 @@ class FirstOrderDeadTime:
     dead_time: float
 
     def __post_init__(self) -> None:
+        check_field_types(self)
         _check(self, "gain", self.gain, math.isfinite(self.gain) and self.gain != 0.0)
         _check(self, "time_constant", self.time_constant, 0 < self.time_constant < math.inf)
         _check(self, "dead_time", self.dead_time, 0 <= self.dead_time < math.inf)
@@ -62,6 +64,7 @@ class IntegratorDeadTime:
     dead_time: float
 
     def __post_init__(self) -> None:
+        check_field_types(self)
         _check(self, "rate", self.rate, math.isfinite(self.rate) and self.rate != 0.0)
         _check(self, "dead_time", self.dead_time, 0 <= self.dead_time < math.inf)
 
@@ -83,6 +86,7 @@ class UltimatePoint:
     period: float
 
     def __post_init__(self) -> None:
+        check_field_types(self)
         _check(self, "gain", self.gain, math.isfinite(self.gain) and self.gain != 0.0)
         _check(self, "period", self.period, 0 < self.period < math.inf)
 

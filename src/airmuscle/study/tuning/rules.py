@@ -7,6 +7,7 @@ import math
 from typing import ClassVar
 
 from ...core.errors import ParameterError
+from ...core.field_types import check_field_types
 from ...core.reference import Reference
 from .process_models import FirstOrderDeadTime, IntegratorDeadTime, ProcessModel
 
@@ -38,6 +39,9 @@ class RuleSettings:
     derivative_time: float = 0.0
     setpoint_weight: float = 1.0
     references: ClassVar[tuple[Reference, ...]] = (SKOGESTAD2003, ASTROM_HAGGLUND2004)
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
 
     @property
     def as_gains(self) -> dict[str, float]:

@@ -94,7 +94,7 @@ class ScenarioLoop(ShortRepr):
     def bounds(self, given: Sequence[str] = ()) -> dict[str, tuple[float, float]]:
         """The ranges [SI] of the tuned gains: those given as `gain=5 1/m:500 1/m`, or the default ranges.
 
-        By default every gain (unit u/y) that is not 0 and every time (unit s) beside it that is not 0 and no filter is
+        By default every gain (unit u/y) that is not 0 and every time (unit s) next to it that is not 0 and no filter is
         tuned, from a tenth of its present value to ten times it, within the declared range. Of a controller without
         such a gain, every parameter in the unit of the command or of the measured column that is not 0.
         """

@@ -81,7 +81,7 @@ def _range(case: LoopCase, pid: PID) -> tuple[float, float]:
 
 def _best_model(time: Array, output: Array, step: float) -> ProcessModel:
     """The model with the smaller sum of squared residuals; the other one if one of them does not exist."""
-    found: list[tuple[float, ProcessModel]] = []
+    models: list[tuple[float, ProcessModel]] = []
     reasons = []
     for identify in (first_order_of_step, integrator_of_step):
         try:
@@ -89,10 +89,10 @@ def _best_model(time: Array, output: Array, step: float) -> ProcessModel:
         except AirmuscleError as error:
             reasons.append(str(error))
         else:
-            found.append((float(np.sum((output[0] + step * model.step_response(time) - output) ** 2)), model))
-    if not found:
+            models.append((float(np.sum((output[0] + step * model.step_response(time) - output) ** 2)), model))
+    if not models:
         raise ParameterError(f"step_experiment: {' '.join(reasons)}")
-    return min(found, key=lambda pair: pair[0])[1]
+    return min(models, key=lambda pair: pair[0])[1]
 
 
 def _with_delay(model: ProcessModel, delay: float) -> ProcessModel:

@@ -13,6 +13,7 @@ import numpy as np
 from ...control.control_loop import SETPOINT
 from ...core.arrays import Array
 from ...core.errors import ParameterError, suggestion
+from ...core.field_types import check_field_types
 from ...core.reference import Reference
 
 GRAHAM_LATHROP1953 = Reference(
@@ -43,11 +44,17 @@ class TrackingIndex(abc.ABC):
     begin: float = 0.0
 
     def __post_init__(self) -> None:
+        check_field_types(self)
         for name, scale in self.scales.items():
             if not 0 < scale < math.inf:
                 raise ParameterError(f"{type(self).__name__}: scale of '{name}' is {scale}; it must be positive.")
         if not 0 <= self.begin < math.inf:
             raise ParameterError(f"{type(self).__name__}: begin is {self.begin} s; it must be 0 or positive.")
+
+    def __str__(self) -> str:
+        scales = [f"{name} divided by {scale:.4g} (SI)" for name, scale in self.scales.items()]
+        begin = [f"from {self.begin:.4g} s"] if self.begin else []
+        return ", ".join([type(self).__name__, *scales, *begin])
 
     def scales_for(self, setpoints: Sequence[str], columns: Sequence[str]) -> dict[str, float]:
         """The controlled columns with their scales, for the set points of a loop and the columns of a plant."""

@@ -121,7 +121,7 @@
     begin(sheet) {
       const { angle, least, greatest } = sheet.region, x = angle.map((q) => q / DEGREE), low = Math.min(...least), high = Math.max(...greatest), spare = 0.06 * (high - low);
       this.step = 0.01 * (high - low);
-      this.chart.show([{ values: least, colour: "c1", dash: [], width: 1.8, label: "least" }, { values: greatest, colour: "c1", dash: [], width: 1.8, label: "greatest" }], x, { x: [x[0] - 1, x.at(-1) + 1], y: [low - spare, high + spare] });
+      this.chart.show([{ values: least, colour: "c1", dash: [], width: 1.8, label: "minimum" }, { values: greatest, colour: "c1", dash: [], width: 1.8, label: "maximum" }], x, { x: [x[0] - 1, x.at(-1) + 1], y: [low - spare, high + spare] });
       this.sheet = sheet;
     }
 

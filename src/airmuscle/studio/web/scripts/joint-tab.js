@@ -208,7 +208,7 @@
 
     showFacts(status, time) {
       const { columns } = this.result, errors = columns.time.flatMap((t, i) => (t >= this.task.begin ? [(columns.angle[i] - columns["setpoint.angle"][i]) / DEGREE] : [])), rms = Math.sqrt(errors.reduce((s, e) => s + e * e, 0) / Math.max(1, errors.length));
-      const rows = [["rms error", `${shortText(rms, 3)}°`], ["greatest error", `${shortText(Math.max(...errors.map(Math.abs)), 3)}°`], ["computed in", `${shortText(this.taken, 2)} ms, ${this.result.steps} steps`]];
+      const rows = [["rms error", `${shortText(rms, 3)}°`], ["maximum error", `${shortText(Math.max(...errors.map(Math.abs)), 3)}°`], ["computed in", `${shortText(this.taken, 2)} ms, ${this.result.steps} steps`]];
       if (status) rows.push(["ended", `at ${shortText(time)} s: ${status === 2 ? "the step became too small" : "a value is not finite"}`]);
       this.facts.replaceChildren(...rows.flatMap(([name, text]) => [element("dt", {}, name), element("dd", {}, text)]));
     }

@@ -43,7 +43,7 @@
       this.picture.setAttribute("viewBox", `0 0 ${WIDTH} ${height.toFixed(0)}`);
       this.picture.replaceChildren(...parts);
       const mm = (value) => `${airmuscle.shortText(1000 * value)} mm`;
-      const radius = now ? `, greatest radius ${mm(widest(now))}` : ", without a geometry (drawn as a bar)";
+      const radius = now ? `, maximum radius ${mm(widest(now))}` : ", without a geometry (drawn as a bar)";
       this.text.textContent = `Length ${mm(current)} of ${mm(length)}${radius}. Dashed: at rest.`;
       this.picture.setAttribute("aria-label", `Outline of the muscle. ${this.text.textContent}`);
     }
