@@ -147,6 +147,7 @@ def settings() -> list[Any]:
         identify.Huber(1.0), identify.SoftL1(1.0), identify.LeastSquares(), identify.BlockSplit(),
         identify.LevelSplit("pressure"), identify.Censoring(), dynamic.StartTime(0.1),
         dynamic.InitialValue("pressure", 1.0), prediction.PlantUncertainty({"muscle.damping": 1.0}),
+        identify.RecursiveFit(identify.BenchLimits(muscle.characteristic.ValidityRange(0.0, 6e5, 0.0, 0.25), 1e3)),
         recording.BlockMeans(), recording.Decimation(), recording.RecordedTime(), recording.ColumnMapping(),
         recording.Recording({"time": [0.0, 1.0]}, "two rows"),
         environments.ValueRange(("mass",), 0.0, 1.0), environments.FactorRange(("mass",), 0.5, 2.0),
@@ -174,6 +175,12 @@ def test_junk_in_a_setting_is_accepted_or_refused_but_never_a_foreign_exception(
         assert said is not None, field.name
         names = type(setting).__name__ in said and field.name in said
         assert names or isinstance(setting, control.InputSignal), said
+
+
+def test_the_mappings_of_a_row_reader_are_checked():
+    for junk in (3, "time", [1], object()):
+        with pytest.raises(ParameterError, match="RowReader: units must be a mapping or None"):
+            recording.RowReader("log.csv", units=junk)  # type: ignore[arg-type]
 
 
 def test_an_array_without_dimension_is_no_list_of_numbers():

@@ -636,9 +636,7 @@ def test_a_plant_that_cannot_rest_names_muscle_and_forces(tmp_path: Path):
     ) as raised:
         load_scenario(heavy)
     assert re.search(r"arm pulls \d+(\.\d+)? N at 100 kPa and a contraction of", str(raised.value))
-    assert re.search(
-        r"requires a tension of 4903\.\d+ N\. Change the load, the pressure or the parallel", str(raised.value)
-    )
+    assert re.search(r"requires a tension of 4903 N\. Change the load, the pressure or the parallel", str(raised.value))
 
 
 def test_a_command_that_is_no_table(tmp_path: Path):

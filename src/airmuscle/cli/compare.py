@@ -45,6 +45,11 @@ class Valves(enum.StrEnum):
     ON_OFF = "on-off"
 
 
+Seed = Annotated[
+    int, typer.Option(min=0, max=1_000_000, metavar="N", help="Seed of the optimiser and of the noise.")
+]  # fmt: skip
+
+
 def compare(
     valves: Annotated[Valves, typer.Option(help="Valves of the joint.")] = Valves.PROPORTIONAL,
     controller: Annotated[
@@ -59,9 +64,7 @@ def compare(
     budget: Annotated[
         int, typer.Option(min=0, max=1_000_000, metavar="N", help="Simulated loops to tune each controller; 0: none.")
     ] = DEFAULT_BUDGET,
-    seed: Annotated[
-        int, typer.Option(min=0, max=1_000_000, metavar="N", help="Seed of the optimiser and of the noise.")
-    ] = 1,
+    seed: Seed = 1,
     trials: Annotated[
         int, typer.Option(min=0, max=1000, metavar="N", help="Trials of iterative learning at 2 Hz; 0: none.")
     ] = 0,
@@ -94,9 +97,7 @@ def compare(
         print_json(_to_dict(result, curves))
     else:
         _print(ranking_table(result))
-        errors = error_table(result, "rmse")
-        echo(f"\n{errors.title}")
-        _print(errors)
+        _print(error_table(result, "rmse"), titled=True)
     if not any(run.metrics for run in result.runs.values()):
         raise SimulationError(f"all runs failed; reason of the first: {next(iter(result.runs.values())).reason}")
     if not json:
@@ -139,7 +140,9 @@ def _progress() -> Iterator[Callable[[str, int, int], None]]:
         yield show
 
 
-def _print(table: Table) -> None:
+def _print(table: Table, titled: bool = False) -> None:
+    if titled:
+        echo(f"\n{table.title}")
     rows = [tuple(v if isinstance(v, str) else format_number(v) for v in row) for row in table_rows(table)]
     numeric = [header.strip() for header, values in table.columns.items() if not isinstance(next(iter(values)), str)]
     print_table([header.strip() for header in table.columns], rows, right=numeric)

@@ -26,7 +26,10 @@ def check_field_types(obj: Any) -> None:
     """
     hints = type_hints(type(obj))
     for field in dataclasses.fields(obj):
-        hint, value = hints.get(field.name), getattr(obj, field.name, None)
+        hint = hints.get(field.name)
+        value: Any = getattr(obj, field.name, None)
+        if type(value) is hint and (hint is not int or abs(value) < _MAX_INTEGER):  # most often so, and fast
+            continue
         if field.init and not _conforms(value, hint):
             raise ParameterError(
                 f"{type(obj).__name__}: {field.name} must be {_describe(hint)}; it is {abridged(value)}."

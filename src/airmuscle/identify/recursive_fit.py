@@ -15,8 +15,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..core.annotation import abridged
 from ..core.arrays import Array
 from ..core.errors import IdentificationError, ParameterError
+from ..core.field_types import check_field_types
 from ..core.short_repr import ShortRepr
 from ..muscle.characteristic import ContractileSurface
 from ..muscle.characteristic.contractile_surface import exponents
@@ -60,6 +62,9 @@ class RecursiveFit(ShortRepr):
     """Triangular factor of the normal equations with the right-hand side, shape (P + 1, P + 1)."""
 
     def __post_init__(self) -> None:
+        check_field_types(self)
+        if not isinstance(self.factor, np.ndarray):
+            raise ParameterError(f"RecursiveFit: factor must be an array; it is {abridged(self.factor)}.")
         if not 0 <= self.degree <= 9:
             raise ParameterError(f"RecursiveFit: the degree is {self.degree}; allowed range: 0 to 9.")
         if not self.sigma > 0 or not 0.5 < self.forgetting <= 1.0 or not self.limits.max_force > 0:

@@ -10,7 +10,8 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from ..core.errors import ColumnError, FileError
+from ..core.annotation import abridged
+from ..core.errors import ColumnError, FileError, ParameterError
 from ..core.units import AMBIENT_PRESSURE, UnitConversion
 from .header import is_number
 from .heading import find_quantity_name
@@ -41,6 +42,9 @@ class RowReader:
         self, origin: str, *, columns: Mapping[str, str] | None = None, units: Mapping[str, str] | None = None,
         constants: Mapping[str, float | str] | None = None,
     ) -> None:  # fmt: skip
+        for name, given in (("columns", columns), ("units", units), ("constants", constants)):
+            if not (given is None or isinstance(given, Mapping)):
+                raise ParameterError(f"RowReader: {name} must be a mapping or None; it is {abridged(given)}.")
         self.origin, self.skipped = origin, 0
         self.notes: tuple[str, ...] = ()
         self._names, self._units, self._constants = dict(columns or {}), dict(units or {}), dict(constants or {})
