@@ -395,8 +395,8 @@ SCALES = (1000.0, 10.0, 1.0, 0.1, 0.01)
 def differs_in_kind(name: str, degree: int, kind: type, scale: float) -> bool:
     """Every loss; scales beyond all residuals, among them and below them all; both degrees."""
     if name == "dmsp-20-300":
-        return scale in ((1000.0, 1.0, 0.01) if kind is Huber else (1.0,))
-    return name == "festo-tool-dmsp-20" and kind is SoftL1 and scale == 0.01
+        return (kind, scale) in ((Huber, 1000.0), (Huber, 0.01), (SoftL1, 1.0))
+    return name == "festo-tool-dmsp-20" and (kind, scale) in ((Huber, 1.0), (SoftL1, 1.0), (SoftL1, 0.01))
 
 
 @pytest.mark.parametrize(
