@@ -14,7 +14,10 @@ from widths import widened
 
 from airmuscle.core.errors import ParameterError
 from airmuscle.library import write
+from airmuscle.library.files import read_toml
+from airmuscle.library.location import Location
 from airmuscle.library.models import model_class, model_names
+from airmuscle.library.plant_file import build_plant
 from airmuscle.scenario.scenario import load_scenario
 
 
@@ -25,15 +28,16 @@ def text_of(plant):
     return f'{tables}\n[run]\nduration = "20 ms"\noutput_times = "5 ms"\n{start}\n'
 
 
-def read(name, folder):
+def written(name, folder):
     file = folder / "plant.toml"
     file.write_text(text_of(EXAMPLES[name]), encoding="utf-8")
-    return load_scenario(file)
+    return file
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_a_plant_in_a_file_is_the_plant(name, tmp_path):
-    assert read(name, tmp_path).plant == EXAMPLES[name]
+    file = written(name, tmp_path)
+    assert build_plant(read_toml(file)["plant"], Location(str(file), "plant", tmp_path)) == EXAMPLES[name]
 
 
 DIFFERENT = {
@@ -45,7 +49,9 @@ DIFFERENT = {
 
 @pytest.mark.parametrize("name", widened(EXAMPLES, lambda name: name in DIFFERENT))
 def test_a_plant_in_a_file_runs(name, tmp_path):
-    run = read(name, tmp_path).simulate()
+    scenario = load_scenario(written(name, tmp_path))
+    assert scenario.plant == EXAMPLES[name]
+    run = scenario.simulate()
     assert run["time"][-1] == pytest.approx(0.02)
     assert all(np.isfinite(run[column]).all() for column in run)
 
