@@ -22,6 +22,8 @@ class _Step(NamedTuple):
     operation: Callable[..., Any]
     target: int
     sources: tuple[int, ...]
+    released: tuple[int, ...] = ()
+    """Registers that no later step reads, and that are no output: their memory is used again while it is cached."""
 
 
 class ArrayProgram(NamedTuple):
@@ -45,8 +47,10 @@ class ArrayProgram(NamedTuple):
         for register, argument, element in self.inputs:
             registers[register] = arguments[argument] if argument < len(arguments) else parameters[element]
         with np.errstate(all="ignore"):
-            for operation, target, sources in self.steps:
+            for operation, target, sources, released in self.steps:
                 registers[target] = operation(*[registers[i] for i in sources])
+                for register in released:
+                    registers[register] = None
         result = np.zeros((count, arguments[0].size))
         for column, register in self.outputs:
             result[column] = registers[register]
@@ -97,8 +101,8 @@ def _without_unused(program: ArrayProgram) -> ArrayProgram:
     steps = []
     for step in reversed(program.steps):
         if step.target in used:
+            steps.append(step._replace(released=tuple(set(step.sources) - used)))
             used.update(step.sources)
-            steps.append(step)
     return program._replace(
         constants=_of(used, program.constants), inputs=_of(used, program.inputs), steps=tuple(reversed(steps))
     )
