@@ -112,7 +112,8 @@ def _validate(obj: Any) -> None:
     """Check every field, then the conditions of `check`. Raises ParameterError or UnitError."""
     if not getattr(obj, "checks_structure", False):
         _check_annotations(obj)
-    depths = _depths_of(type(obj))
+    kind: Any = type(obj)
+    depths = _depths_of(kind)
     for declared in parameters(obj):
         value = getattr(obj, declared.name)
         if not _has_depth(value, depths[declared.name]):

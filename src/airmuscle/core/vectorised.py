@@ -112,6 +112,14 @@ def _of(used: Collection[int], entries: tuple[Any, ...]) -> tuple[Any, ...]:
     return tuple(entry for entry in entries if entry[0] in used)
 
 
+def _if_else_zero(condition: Any, x: Any) -> Any:
+    """`x` where the condition holds, else 0; one number where it holds nowhere, as in most extrapolation terms."""
+    holds = np.not_equal(condition, 0.0)
+    if holds.all():
+        return x
+    return np.where(holds, x, 0.0) if holds.any() else 0.0
+
+
 @functools.cache
 def _operations() -> dict[int, Callable[..., Any]]:
     """NumPy functions by CasADi's number of the operation."""
@@ -129,6 +137,6 @@ def _operations() -> dict[int, Callable[..., Any]]:
         "EQ": lambda a, b: np.equal(a, b) * 1.0, "NE": lambda a, b: np.not_equal(a, b) * 1.0,
         "NOT": lambda a: np.equal(a, 0.0) * 1.0, "AND": lambda a, b: np.logical_and(a, b) * 1.0,
         "OR": lambda a, b: np.logical_or(a, b) * 1.0,
-        "IF_ELSE_ZERO": lambda condition, x: np.where(np.not_equal(condition, 0.0), x, 0.0),
+        "IF_ELSE_ZERO": _if_else_zero,
     }  # fmt: skip
     return {getattr(casadi, f"OP_{name}"): operation for name, operation in named.items()}

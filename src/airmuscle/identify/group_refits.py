@@ -17,7 +17,6 @@ from .censored_least_squares import RANK_TOLERANCE
 from .gauss_newton import (
     MIN_EIGENVALUE,
     FirstStep,
-    StepBasis,
     gauss_newton,
     held_on_bounds,
     normal_equations,
