@@ -14,6 +14,13 @@ FEW = 64
 """Numbers up to which a Python loop is faster than NumPy (measured)."""
 
 
+def as_slice(rows: npt.NDArray[np.intp]) -> slice | npt.NDArray[np.intp]:
+    """Ascending indices as a slice where they are successive, which copies no rows."""
+    if rows.size and rows[-1] - rows[0] + 1 == rows.size:
+        return slice(int(rows[0]), int(rows[-1]) + 1)
+    return rows
+
+
 def all_finite(values: Array) -> bool:
     """Whether all numbers of an array are finite."""
     if values.size > FEW:

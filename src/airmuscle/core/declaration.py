@@ -7,6 +7,7 @@ Any other field is structure: another model, a tuple of models, an integer or a 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 import warnings
 from typing import Any, TypeVar, dataclass_transform
@@ -91,16 +92,28 @@ def model(cls: type[T]) -> type[T]:
 
 def parameters(obj: Any) -> tuple[Parameter, ...]:
     """Return the declared parameters of a model or model class, in order, without those of nested models."""
+    return _parameters_of(obj if isinstance(obj, type) else type(obj))
+
+
+@functools.cache
+def _parameters_of(cls: type[Any]) -> tuple[Parameter, ...]:
     return tuple(
-        Parameter(name=f.name, default=f.default, **f.metadata) for f in dataclasses.fields(obj) if "unit" in f.metadata
+        Parameter(name=f.name, default=f.default, **f.metadata) for f in dataclasses.fields(cls) if "unit" in f.metadata
     )
+
+
+@functools.cache
+def _depths_of(cls: type[Any]) -> dict[str, int]:
+    """The depth of the annotation of each field: 0 for one number, 1 for a list of numbers, 2 for a list of lists."""
+    return {f.name: str(f.type).count("tuple[") for f in dataclasses.fields(cls)}
 
 
 def _validate(obj: Any) -> None:
     """Check every field, then the conditions of `check`. Raises ParameterError or UnitError."""
     if not getattr(obj, "checks_structure", False):
         _check_annotations(obj)
-    depths = {f.name: str(f.type).count("tuple[") for f in dataclasses.fields(obj)}
+    kind: Any = type(obj)
+    depths = _depths_of(kind)
     for declared in parameters(obj):
         value = getattr(obj, declared.name)
         if not _has_depth(value, depths[declared.name]):
@@ -130,9 +143,11 @@ def _check_value(owner: str, declared: Parameter, value: Any) -> Any:
 
     Raises ParameterError if it is not finite or out of bounds, UnitError if the unit has another dimension.
     """
+    low, high = declared.bounds
+    if type(value) is float and low <= value <= high and (value == 0.0 or declared.plausible <= abs(value) < math.inf):
+        return value
     if _is_list(value):
         return tuple(_check_value(owner, declared, v) for v in value)
-    low, high = declared.bounds
     unit = "" if declared.unit == "1" else f" {declared.unit}"
     label = f"{owner}.{declared.name} ({declared.symbol}, {declared.meaning})"
     if isinstance(value, str) and is_known_unit(declared.unit):

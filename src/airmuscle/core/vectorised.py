@@ -22,6 +22,8 @@ class _Step(NamedTuple):
     operation: Callable[..., Any]
     target: int
     sources: tuple[int, ...]
+    released: tuple[int, ...] = ()
+    """Registers that no later step reads, and that are no output: their memory is used again while it is cached."""
 
 
 class ArrayProgram(NamedTuple):
@@ -45,8 +47,10 @@ class ArrayProgram(NamedTuple):
         for register, argument, element in self.inputs:
             registers[register] = arguments[argument] if argument < len(arguments) else parameters[element]
         with np.errstate(all="ignore"):
-            for operation, target, sources in self.steps:
+            for operation, target, sources, released in self.steps:
                 registers[target] = operation(*[registers[i] for i in sources])
+                for register in released:
+                    registers[register] = None
         result = np.zeros((count, arguments[0].size))
         for column, register in self.outputs:
             result[column] = registers[register]
@@ -97,8 +101,8 @@ def _without_unused(program: ArrayProgram) -> ArrayProgram:
     steps = []
     for step in reversed(program.steps):
         if step.target in used:
+            steps.append(step._replace(released=tuple(set(step.sources) - used)))
             used.update(step.sources)
-            steps.append(step)
     return program._replace(
         constants=_of(used, program.constants), inputs=_of(used, program.inputs), steps=tuple(reversed(steps))
     )
@@ -106,6 +110,14 @@ def _without_unused(program: ArrayProgram) -> ArrayProgram:
 
 def _of(used: Collection[int], entries: tuple[Any, ...]) -> tuple[Any, ...]:
     return tuple(entry for entry in entries if entry[0] in used)
+
+
+def _if_else_zero(condition: Any, x: Any) -> Any:
+    """`x` where the condition holds, else 0; one number where it holds nowhere, as in most extrapolation terms."""
+    holds = np.not_equal(condition, 0.0)
+    if holds.all():
+        return x
+    return np.where(holds, x, 0.0) if holds.any() else 0.0
 
 
 @functools.cache
@@ -125,6 +137,6 @@ def _operations() -> dict[int, Callable[..., Any]]:
         "EQ": lambda a, b: np.equal(a, b) * 1.0, "NE": lambda a, b: np.not_equal(a, b) * 1.0,
         "NOT": lambda a: np.equal(a, 0.0) * 1.0, "AND": lambda a, b: np.logical_and(a, b) * 1.0,
         "OR": lambda a, b: np.logical_or(a, b) * 1.0,
-        "IF_ELSE_ZERO": lambda condition, x: np.where(np.not_equal(condition, 0.0), x, 0.0),
+        "IF_ELSE_ZERO": _if_else_zero,
     }  # fmt: skip
     return {getattr(casadi, f"OP_{name}"): operation for name, operation in named.items()}

@@ -17,7 +17,6 @@ from .censored_least_squares import RANK_TOLERANCE
 from .gauss_newton import (
     MIN_EIGENVALUE,
     FirstStep,
-    StepBasis,
     gauss_newton,
     held_on_bounds,
     normal_equations,
@@ -98,7 +97,9 @@ class GroupRefits:
         step = normal_step(normal, gradient)
         if step is None:
             return None
-        return self._solve_linear(counts, step, self._basis) if self._linear else self._iterate(counts, step, start)
+        if not self._linear:
+            return self._iterate(counts, step, start)
+        return self._solve_linear(counts, step, normal, gradient)
 
     def _sum_groups(self, residuals: Array, count: int) -> _Sums:
         masked = self._rows * self._active[:, None]
@@ -118,20 +119,26 @@ class GroupRefits:
         lowest = float(np.linalg.eigvalsh(np.tensordot(counts, self._sums.uncensored, 1))[0])
         return lowest > MIN_EIGENVALUE and np.sqrt(lowest) * self._smallest > _RANK_MARGIN * RANK_TOLERANCE
 
-    def _solve_linear(self, counts: Array, step: Array, basis: StepBasis) -> Array | None:
-        """Newton steps of the one-sided squares: the rows whose bound is violated are those of the previous step."""
-        problem, solution = self._problem, self._solution
+    def _solve_linear(self, counts: Array, step: Array, normal: Array, gradient: Array) -> Array | None:
+        """Newton steps of the one-sided squares: the rows whose bound is violated are those of the previous step.
+
+        The normal equations of the rows that are active in the fit to all rows are corrected for those that change.
+        """
+        assert self._basis is not None
+        problem, solution, directions = self._problem, self._solution, self._basis.directions
         if not problem.censoring.any():
-            return np.asarray(solution.values + basis.directions @ step)
+            return np.asarray(solution.values + directions @ step)
         repeats, previous = counts[self._group], self._active
         difference = problem.weights * (solution.modelled - problem.target)
         for _ in range(_MAX_ITERATIONS):
             modelled = solution.modelled + (self._rows @ step) / problem.weights
             active = problem.active_rows(modelled)
             if np.array_equal(active[repeats > 0], previous[repeats > 0]):
-                return np.asarray(solution.values + basis.directions @ step)
-            weight = np.sqrt(repeats * active)
-            next_step = normal_step(*normal_equations(self._rows * weight[:, None], difference * weight))
+                return np.asarray(solution.values + directions @ step)
+            changed = np.flatnonzero(active != self._active)
+            rows = self._rows[changed]
+            added = rows * np.where(active[changed], repeats[changed], -repeats[changed])[:, None]
+            next_step = normal_step(normal + rows.T @ added, gradient + added.T @ difference[changed])
             if next_step is None:
                 return None
             step, previous = next_step, active

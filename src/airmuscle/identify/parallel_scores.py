@@ -74,7 +74,8 @@ def _results(
             yield position, score_candidate(task.candidate, splits, loss, task.lowest)
         return
     shared = pickle.dumps((tuple(splits), loss))
-    futures = {pool.submit(_score_in_worker, shared, task): i for i, task in enumerate(tasks)}
+    largest_first = sorted(range(len(tasks)), key=lambda i: -sum(1 for _ in tree.leaves(tasks[i].candidate.law)))
+    futures = {pool.submit(_score_in_worker, shared, tasks[i]): i for i in largest_first}
     for future in as_completed(futures):
         yield futures[future], future.result()
 

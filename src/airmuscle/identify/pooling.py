@@ -82,15 +82,11 @@ class Pooling:
         used = problem.active_rows(modelled) & (np.ones(len(modelled), dtype=bool) if rows is None else rows)
         ranges = [(float(x[used].min()), float(x[used].max())) for x in (pressure, contraction)]
         surface = self.effect.with_validity_range(*ranges)
-        weights = problem.weights[used]
-        basis = np.array(surface.basis(pressure[used], contraction[used])).T
-        sums = Sums.of(
-            weights[:, None] * matrix[used],
-            weights[:, None] * basis,
-            weights * (problem.target - modelled)[used],
-            self.specimens.member[used],
-            len(self.specimens.names),
-        )
+        weights = np.where(used, problem.weights, 0.0)  # no sum changes with a row of zeros
+        basis = (weights * np.array(surface.basis(pressure, contraction))).T
+        residuals = weights * (problem.target - modelled)
+        members = self.specimens.member, len(self.specimens.names)
+        sums = Sums.of(weights[:, None] * matrix, basis, residuals, *members, int(np.count_nonzero(used)))
         return predict_effects(sums, self.specimens.names), surface
 
     @property

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ..core import autodiff, tree
-from ..core.arrays import Array
+from ..core.arrays import Array, as_slice
 from ..core.errors import IdentificationError, ParameterError, suggestion
 from ..core.hints import Hint
 from ..core.tree import Leaf
@@ -152,16 +152,24 @@ class FitProblem:
 
     def predict(self, values: Array) -> Array:
         """The fitted quantity at every row with these parameters [SI]; shape (N,)."""
-        law = tree.unflatten(self.law, self.leaf_values(values))
+        method = self.fitted_quantity.method
         with np.errstate(all="ignore"):  # non-finite values raise an error at the start; later the search backtracks
-            return self._join(
-                [getattr(of_length(law, length), self.fitted_quantity.method)(*x) for length, _, x in self._points]
-            )
+            return self._join([getattr(law, method)(*x) for law, x in self._laws(values)])
+
+    def _laws(self, values: Array) -> Iterator[tuple[Any, tuple[Array, ...]]]:
+        """The law of each resting length with these parameters, not validated, and the arguments of its rows."""
+        leaf_values = self.leaf_values(values)
+        which = [i for i, leaf in enumerate(self.leaves) if leaf.path == RESTING_LENGTH]
+        for length, _, arguments in self._points:
+            if length is not None:
+                for i in which:
+                    leaf_values[i] = length
+            yield tree.unflatten(self.law, leaf_values), arguments
 
     @functools.cached_property
-    def _points(self) -> list[tuple[float | None, npt.NDArray[np.intp], tuple[Array, ...]]]:
+    def _points(self) -> list[tuple[float | None, slice | npt.NDArray[np.intp], tuple[Array, ...]]]:
         """Each resting length with its rows and their arguments."""
-        groups = rows_by_length(self.law, self.data)
+        groups = [(length, as_slice(rows)) for length, rows in rows_by_length(self.law, self.data)]
         return [(length, rows, tuple(x[rows] for x in self.arguments)) for length, rows in groups]
 
     def _join(self, parts: Sequence[Any]) -> Array:
@@ -191,14 +199,8 @@ class FitProblem:
     def partial_jacobian(self, values: Array, which: Sequence[int]) -> Array:
         """The columns of `jacobian` of these free parameters, shape (N, len(which))."""
         if _is_traceable(self.law):
-            law, leaves = tree.unflatten(self.law, self.leaf_values(values)), [self.free[i] for i in which]
-            method = self.fitted_quantity.method
-            return self._join(
-                [
-                    autodiff.parameter_derivatives(of_length(law, length), method, x, leaves)
-                    for length, _, x in self._points
-                ]
-            )
+            leaves, method = [self.free[i] for i in which], self.fitted_quantity.method
+            return self._join([autodiff.parameter_derivatives(law, method, x, leaves) for law, x in self._laws(values)])
         return self._finite_differences(values, which)
 
     def _finite_differences(self, values: Array, which: Sequence[int]) -> Array:

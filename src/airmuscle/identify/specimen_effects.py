@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ..core.arrays import Array
+from ..core.arrays import Array, as_slice
 
 RATIO_RANGE = (-8.0, 10.0)
 """Decimal logarithms of the ratios of the residual variance to that of the effects that are searched (chosen)."""
@@ -65,15 +65,28 @@ class Sums(NamedTuple):
     rows: int
 
     @classmethod
-    def of(cls, matrix: Array, basis: Array, residuals: Array, member: npt.NDArray[np.intp], count: int) -> Sums:
-        """The sums for a basis (N, K); the rows of each specimen, `member` (N,), have their own coefficients."""
+    def of(
+        cls,
+        matrix: Array,
+        basis: Array,
+        residuals: Array,
+        member: npt.NDArray[np.intp],
+        count: int,
+        rows: int | None = None,
+    ) -> Sums:
+        """The sums for a basis (N, K); the rows of each specimen, `member` (N,), have their own coefficients.
+
+        `rows` is the number of rows that count, by default all; the others are zero.
+        """
         size = basis.shape[1]
         xz, zz, zr = np.zeros((matrix.shape[1], count * size)), np.zeros((count * size,) * 2), np.zeros(count * size)
         for i in range(count):
-            rows, own = member == i, slice(i * size, (i + 1) * size)
-            xz[:, own], zz[own, own] = matrix[rows].T @ basis[rows], basis[rows].T @ basis[rows]
-            zr[own] = basis[rows].T @ residuals[rows]
-        return cls(matrix.T @ matrix, xz, zz, zr, float(residuals @ residuals), len(residuals))
+            part, own = as_slice(np.flatnonzero(member == i)), slice(i * size, (i + 1) * size)
+            xz[:, own], zz[own, own] = matrix[part].T @ basis[part], basis[part].T @ basis[part]
+            zr[own] = basis[part].T @ residuals[part]
+        return cls(
+            matrix.T @ matrix, xz, zz, zr, float(residuals @ residuals), len(residuals) if rows is None else rows
+        )
 
 
 def predict_effects(sums: Sums, specimens: tuple[str, ...]) -> SpecimenEffects:
