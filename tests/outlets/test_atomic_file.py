@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from airmuscle.core.output_folder import atomic_file
+from airmuscle.core.atomic_output import atomic_file
 from airmuscle.library.write import write_text
 
 

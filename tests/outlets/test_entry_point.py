@@ -7,6 +7,7 @@ import os
 import pytest
 
 from airmuscle.cli import entry_point
+from airmuscle.core import processes
 
 
 @pytest.mark.parametrize(("given", "threads"), [(None, "1"), ("4", "4")])
@@ -27,3 +28,8 @@ def test_linear_algebra_uses_one_thread_unless_the_user_says_otherwise(
     with pytest.raises(SystemExit, match="130"):
         entry_point.main()
     assert seen == [threads]
+
+
+def test_the_command_and_its_workers_limit_the_same_libraries():
+    """The names stand twice, because the command line sets them before it imports anything that loads NumPy."""
+    assert entry_point._BLAS_THREADS == processes._BLAS_THREADS

@@ -14,9 +14,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from ..core.atomic_output import atomic_file
 from ..core.cache_folder import cache_folder, read_private
 from ..core.fingerprint import fingerprint, program_fingerprint
-from ..core.output_folder import atomic_file
 from ..muscle.geometry import Geometry
 from ..recording import Recording
 

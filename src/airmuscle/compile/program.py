@@ -27,7 +27,7 @@ Tableau = tuple[tuple[tuple[float, ...], ...], tuple[float, ...]]
 """Rows of an explicit Runge-Kutta tableau below its first, and its weights."""
 INPUT_TOLERANCE = 1e-9
 """Part of an input's range by which it may be exceeded through rounding."""
-LEAST_POSITIVE = math.ulp(0.0)
+SMALLEST_POSITIVE = math.ulp(0.0)
 """The smallest number above zero."""
 _FUNCTIONS = ("rhs", "jac", "factor", "solve", "stage", "df_dt", "outputs")
 
@@ -163,7 +163,7 @@ class Description:
         """The place of each of them among the ranges of a run."""
         self.ranged_columns = np.array([names.index(name) for name in self.ranged_names], dtype=np.int64)
         """Their places among the states and, after these, the outputs."""
-        self.range_floors = [*bounded.values(), *(LEAST_POSITIVE for _ in positive)]
+        self.range_floors = [*bounded.values(), *(SMALLEST_POSITIVE for _ in positive)]
         """The smallest possible values of the first of them: those of states, then of outputs that must be positive."""
 
 

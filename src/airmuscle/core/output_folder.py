@@ -1,4 +1,4 @@
-"""Atomic output: the files of a command appear completely or not at all, a single file is complete or unchanged."""
+"""Atomic output folders: the files of a command appear completely or not at all."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import os
 import shutil
 import socket
 import tempfile
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,27 +15,9 @@ from .errors import FileError
 
 _UNFINISHED = f".unfinished-{socket.gethostname().replace('/', '')}-"
 """Beginning of the name of a temporary folder, with the machine, because folders may be shared; a process follows."""
-_MAX_NAME = 100
-"""Number of characters of the name of a file that its temporary file has (chosen); file systems limit names to 255."""
 FULL = (errno.ENOSPC, errno.EDQUOT)
 """Numbers of the errors of a full disk and of an exhausted quota."""
 REMEDY_WHERE_FULL = "Free space there, or specify another folder."
-
-
-@contextlib.contextmanager
-def atomic_file(path: Path) -> Iterator[Path]:
-    """Yield the path of a temporary file next to `path`, which replaces it when the block ends without an exception.
-
-    If the block raises, `path` is unchanged and the temporary file is removed. Its name is that of the process and the
-    thread, so that several writers do not meet. Errors of the operating system are those of `open` and `os.replace`.
-    """
-    temporary = path.with_name(f".{path.name[:_MAX_NAME]}.{os.getpid()}-{threading.get_ident()}.part")
-    try:
-        yield temporary
-        temporary.replace(path)
-    finally:
-        with contextlib.suppress(OSError):  # renamed, or never created
-            temporary.unlink()
 
 
 @contextlib.contextmanager

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from ..core.annotation import one_line
+from ..core.atomic_output import atomic_file
 from ..core.errors import FileError, ParameterError
-from ..core.output_folder import atomic_file
 from .build import TEXT_KEYS
 from .entry import OPTIONAL_PARTS, Check, Entry
 from .uncertainty import uncertainty_table

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TextIO
 
 from ..core.annotation import one_line
+from ..core.atomic_output import atomic_file
 from ..core.errors import FileError, ParameterError
-from ..core.output_folder import atomic_file
 from .constants import CONSTANT_UNITS
 from .recording import Recording, column_heading
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ..core.atomic_output import atomic_file
 from ..core.errors import AirmuscleError, FileError
-from ..core.output_folder import atomic_file
 from .csv_writer import write_csv
 from .heading import split_unit
 from .optional_dependency import import_lab_package

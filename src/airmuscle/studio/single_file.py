@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from ..core.atomic_output import atomic_file
 from ..core.errors import FileError, ParameterError
-from ..core.output_folder import atomic_file
 from .app import MAX_PAGE_SHEETS
 from .joint_sheet import joint_names, sheet_of_joint
 from .page import self_contained_page

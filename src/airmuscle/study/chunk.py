@@ -16,9 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core.arrays import Array
+from ..core.atomic_output import atomic_file
 from ..core.errors import FileError
 from ..core.fingerprint import fingerprint, program_fingerprint
-from ..core.output_folder import atomic_file
 from ..core.processes import check_running
 from ..recording import Recording
 from ..scenario.scenario import Scenario

@@ -12,9 +12,9 @@ import hashlib
 import importlib.util
 import os
 import pathlib
-import threading
 from collections.abc import Sequence
 
+from ...core.atomic_output import atomic_file
 from ...core.cache_folder import cache_folder, read_private, warn_not_stored
 
 _PACKAGE = pathlib.Path(__file__).parents[1]
@@ -46,11 +46,9 @@ def save(name: str, kinds: Sequence[str], code: bytes) -> bytes:
     folder = cache_folder()
     if folder is None:
         return code
-    target = folder / _file_name(name, kinds)
-    temporary = target.with_suffix(f".{os.getpid()}.{threading.get_ident()}")
     try:
-        temporary.write_bytes(_origin() + hashlib.sha256(code).digest() + code)
-        os.replace(temporary, target)
+        with atomic_file(folder / _file_name(name, kinds)) as unfinished:
+            unfinished.write_bytes(_origin() + hashlib.sha256(code).digest() + code)
         _remove_oldest(folder)
     except OSError as error:
         warn_not_stored(f"{folder} cannot be written to ({error.strerror or error})")
