@@ -169,10 +169,30 @@ def test_refits_without_a_group_are_searches_on_the_other_rows(name):
         )
 
 
+def test_a_refit_follows_the_rows_whose_bound_becomes_violated_or_kept():
+    """Slack rows, of which the force is at most zero, count only where the surface predicts a tension."""
+    runs = [run(0.3, held, seed) for seed, held in enumerate((0.0, 0.06, 0.12, 0.18, 0.22, 0.25, 0.28, 0.31))]
+    fit = am.fit(blank_surface(2), runs)
+    modelled = fit.problem.predict(fit.values)
+    solution = LeastSquaresSolution(fit.values, modelled, fit.problem.jacobian(fit.values))
+    group, before = np.repeat(np.arange(8), 60), fit.problem.active_rows(modelled)
+    refits, gained, lost = GroupRefits(fit.problem, solution, group, 8), 0, 0
+    for repeats in np.random.default_rng(2).multinomial(8, np.full(8, 1 / 8), size=24):
+        drawn = fit.problem.rows(np.repeat(np.arange(480), repeats[group]))
+        refitted, plain = refits.refit(repeats.astype(float)), solve(drawn, fit.loss).values
+        assert refitted is not None
+        assert drawn.predict(refitted) == pytest.approx(drawn.predict(plain), abs=1e-6 * fit.problem.target.max())
+        after = fit.problem.active_rows(fit.problem.predict(plain))[repeats[group] > 0]
+        gained += np.count_nonzero(after & ~before[repeats[group] > 0])
+        lost += np.count_nonzero(~after & before[repeats[group] > 0])
+    assert gained > 5
+    assert lost > 5
+
+
 def test_a_group_that_alone_determines_a_parameter_has_no_certain_refit():
     runs = [each for each in bench() if each.constants["resting_length"] == 0.3][:2]
     fit = am.fit(blank_surface(1), runs)
-    solution = LeastSquaresSolution(fit.values, fit.modelled, fit.problem.jacobian(fit.values))
+    solution = LeastSquaresSolution(fit.values, fit.problem.predict(fit.values), fit.problem.jacobian(fit.values))
     held = dataclasses.replace(fit.problem, data=fit.problem.data.with_columns(contraction=np.repeat([0.0, 0.06], 60)))
     exact = LeastSquaresSolution(fit.values, held.predict(fit.values), held.jacobian(fit.values))
     assert GroupRefits(fit.problem, solution, np.repeat([0, 1], 60), 2).refit(np.ones(2)) is not None
