@@ -94,6 +94,11 @@ def test_the_reserve_is_that_of_the_worst_position_of_the_stroke(name: str, requ
     assert choice.design.reserve == pytest.approx(np.min(capacity / load) - 1.0, abs=2e-3)
 
 
+@pytest.mark.parametrize("name", ["dmsp-10-250", "dmsp-20-300"])
+def test_the_reserve_of_a_lift_is_the_safety_factor_where_an_end_limits_the_length(name: str):
+    assert choose(am.load(name), LIFT, SIX_BAR).design.reserve == pytest.approx(SIX_BAR.safety_factor - 1.0, abs=1e-9)
+
+
 @pytest.mark.parametrize("inertia", [0.05, 20.0])
 def test_the_reserve_of_a_joint_is_the_safety_factor_where_the_length_is_the_shortest(inertia: float):
     for safety_factor in (1.5, 2.0):
