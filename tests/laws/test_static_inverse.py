@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import airmuscle as am
-from airmuscle.control import AngleAndStiffness, StaticInverse
+from airmuscle.control import AngleAndStiffness, StaticFeedForward, StaticInverse
 from airmuscle.core import autodiff
 from airmuscle.core.errors import ParameterError
 from airmuscle.library.files import LAWS as LAW_FILES
@@ -65,6 +65,19 @@ def test_the_inverse_of_a_muscle_includes_its_parallel_spring_and_its_end_stop(c
     carried = spring + 1e6 * (max(contraction - 0.1, 0.0) * length) ** 1.5
     tension = muscle.contractile.force(pressure, contraction) - carried
     assert StaticInverse(muscle).pressure(contraction, tension) == pytest.approx(pressure, rel=1e-9)
+
+
+@pytest.mark.parametrize(("named", "load"), [("", 120.0), ("load", 200.0)])
+@pytest.mark.parametrize("acceleration", [-1.5, 0.0, 4.0])
+def test_the_feed_forward_pressure_carries_the_load_and_accelerates_the_mass_at_the_wanted_position(
+    named, load, acceleration
+):
+    law = StaticFeedForward(
+        StaticInverse(MUSCLES[0]), "pressure", 0.3, load=120.0, mass=8.0, offset=0.04, load_setpoint=named,
+        acceleration_setpoint="acceleration",
+    )  # fmt: skip
+    pressure = law.command({"position": 0.02, "acceleration": acceleration, "load": load})["pressure"]
+    assert MUSCLES[0].tension(pressure, 0.04 + 0.02 / 0.3) == pytest.approx(load + 8.0 * acceleration, rel=1e-9)
 
 
 def test_the_inverse_of_an_approximated_law_errs_by_no_more_than_its_stated_error():
