@@ -104,14 +104,17 @@ def relate_volumes(
         return None
     matrix = np.column_stack([relative, -np.ones(relative.size)])
     target = np.asarray(change(contractions))
-    (scale, volume), *_ = np.linalg.lstsq(matrix, target, rcond=None)
+    inverse = np.linalg.pinv(matrix)
+    scale, volume = inverse @ target
     if not (scale > 0 and volume > 0):
         return None
     residuals = matrix @ np.array([scale, volume]) - target
     freedom = relative.size - 2
-    variance = np.maximum((scale * standard_errors) ** 2, float(residuals @ residuals) / freedom if freedom else 0.0)
-    inverse = np.linalg.inv(matrix.T @ (matrix / variance[:, None]))
-    errors = np.sqrt(np.diag(inverse))
+    variance = (scale * standard_errors) ** 2
+    if freedom:  # what the fills do not explain is an error of the curve, equal for all of them
+        explained = float(variance @ (1.0 - np.sum(matrix * inverse.T, axis=1)))
+        variance = variance + max(float(residuals @ residuals) - explained, 0.0) / freedom
+    errors = np.sqrt(np.square(inverse) @ variance)
     rms = float(np.sqrt(np.mean(residuals**2))) if freedom else 0.0
     return VolumeEstimate(float(scale), float(errors[0]), float(volume), float(errors[1]), rms)
 
