@@ -61,6 +61,21 @@ def integrated(law, ends, speed=1e-3):
     return law.force(bristles, v), bristles
 
 
+@pytest.mark.parametrize("law", EXACT_STOPS, ids=name)
+def test_the_force_of_stops_is_steady_from_the_presliding_distance_on(law):
+    distance = law.presliding_distance
+    before, at, beyond = law.force_along(np.array([0.0, 0.98, 1.0, 5.0]) * distance)[1:]
+    assert before < at == pytest.approx(beyond, rel=1e-12)
+
+
+@pytest.mark.parametrize("law", [DAHL, BOUC_WEN, LUGRE], ids=name)
+def test_the_presliding_distance_of_a_smooth_law_is_that_of_its_initial_stiffness_to_its_limit(law):
+    distance = law.presliding_distance
+    slope = law.force_along(np.array([0.0, 1e-6 * distance]))[1] / (1e-6 * distance)
+    limit = law.force_along(np.linspace(0.0, 60.0 * distance, 6001))[-1]
+    assert slope * distance == pytest.approx(limit, rel=1e-5)
+
+
 def yielded(law, ends):
     """Bristles at the end of a path, by integration of the rates, with steps within the smallest transition."""
     names, longest = [s.name for s in law.states], 0.5 * law.transition * min(law.limits)

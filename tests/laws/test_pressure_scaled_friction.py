@@ -74,3 +74,11 @@ def test_the_range_of_the_data_belongs_to_the_law_and_changes_no_force():
     assert NoFriction().identified_range is None
     with pytest.raises(ParameterError, match="min_pressure 500000 must be less than max_pressure 100000"):
         IdentifiedFriction(LAWS[0], 5e5, 1e5)
+
+
+@pytest.mark.parametrize("pressure", [0.0, 2e5, 6e5, 2.5e6])
+def test_one_scale_within_another_multiplies_them(pressure):
+    inner = PressureScaledFriction(LAWS[0], 0.5, 3e5)
+    for outer in (PressureScaledFriction(inner, 1.4, 4e5), IdentifiedFriction(inner, 0.0, 6e5)):
+        own = max(1.4 - 0.4 * pressure / 4e5, 0.0) if isinstance(outer, PressureScaledFriction) else 1.0
+        assert outer.pressure_factor(pressure) == pytest.approx(own * (0.5 + 0.5 * pressure / 3e5))
