@@ -76,7 +76,7 @@ def _resample(
     low = max(float(c.time[0]) for c in channels if c.time is not None)
     high = min(float(c.time[-1]) for c in channels if c.time is not None)
     assert leader.time is not None
-    rounding = 1e-9 * max(abs(low), abs(high))  # equal times may differ by rounding
+    rounding = _rounding(leader.time)
     time = leader.time[(leader.time >= low - rounding) & (leader.time <= high + rounding)]
     if not len(time):
         raise ColumnError(f"{origin}: the time ranges of the channels do not overlap. Select one group of channels.")
@@ -95,9 +95,14 @@ def _interpolate(channel: Channel, time: Array) -> Any:
     assert channel.time is not None
     values = np.asarray(channel.values)
     if values.dtype.kind in "biuUSO":
-        at_or_before = np.searchsorted(channel.time, time * (1.0 + 1e-9), side="right") - 1
+        at_or_before = np.searchsorted(channel.time, time + _rounding(time), side="right") - 1
         return values[np.clip(at_or_before, 0, None)]
     return np.interp(time, channel.time, values)
+
+
+def _rounding(time: Array) -> float:
+    """The difference [s] by which equal times may differ through rounding; times may count from 1970."""
+    return float(1e-9 * np.ptp(time) + 8.0 * np.spacing(np.max(np.abs(time))))
 
 
 def _make_table(

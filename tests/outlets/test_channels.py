@@ -1,0 +1,31 @@
+"""Channels with their own times on common rows: linear between samples, integers held until their next sample."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from airmuscle.recording.channels import Channel, merge_channels
+
+OFFSETS = pytest.mark.parametrize("offset", [0.0, -3.0, 1.7e9], ids=["from 0", "before 0", "from 1970"])
+
+
+@OFFSETS
+def test_a_valve_switches_at_its_own_instants_whatever_the_origin_of_time(offset):
+    fine, coarse = offset + np.arange(400) * 0.01, offset + np.arange(8) * 0.5
+    table = merge_channels(
+        "made", [Channel("pressure", np.sin(fine - offset), fine), Channel("valve", np.arange(8), coarse)], {}
+    )
+    columns = dict(zip(table.headings, table.columns, strict=True))
+    rows = np.arange(351)  # until the last sample of the valve
+    assert np.array_equal(columns["valve"], rows // 50)
+    assert columns["time"] == pytest.approx(0.01 * rows, abs=1e-6)
+
+
+@OFFSETS
+def test_rows_that_a_channel_does_not_cover_are_left_out(offset):
+    fine, coarse = offset + np.arange(200) * 0.01, offset + 0.5 + np.arange(11) * 0.1
+    channels = [Channel("pressure", np.ones(200), fine), Channel("force", 3.0 * (coarse - offset), coarse)]
+    columns = dict(zip(("time", "pressure", "force"), merge_channels("made", channels, {}).columns, strict=True))
+    assert len(columns["time"]) == 101
+    assert columns["force"] == pytest.approx(3.0 * np.linspace(0.5, 1.5, 101), abs=1e-5)
