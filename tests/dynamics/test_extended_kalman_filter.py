@@ -193,6 +193,16 @@ def test_a_disturbance_is_estimated_as_the_rate_that_the_plant_lacks():
     assert estimated["speed.disturbance"][-1] == pytest.approx(-0.3 * 9.80665, rel=0.02)
 
 
+def test_a_recording_whose_time_counts_from_1970_is_estimated_as_one_from_0():
+    judged, time = the_filter(), H * np.arange(20.0)
+    first = judged.start(START, DEVIATIONS)
+    found = [
+        judged.estimate(am.Recording({"time": time + begin, "pressure": np.full(20, 2e5)}, "test"), first)["force"]
+        for begin in (0.0, 1.7e9)
+    ]
+    assert np.array_equal(*found)
+
+
 def test_rows_at_other_intervals_are_refused():
     judged = the_filter()
     record = am.Recording({"time": np.array([0.0, H, 3 * H]), "pressure": np.full(3, 2e5)}, "test")

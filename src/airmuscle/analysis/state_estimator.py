@@ -237,7 +237,8 @@ class StateEstimator(ShortRepr, abc.ABC):
         an input without a column is 0. Raises ParameterError for other times.
         """
         time = np.asarray(recording["time"], dtype=float)
-        if time.size < 2 or np.abs(np.diff(time) - self.sample_time).max() > 1e-6 * self.sample_time:
+        rounding = 1e-6 * self.sample_time + 2.0 * np.spacing(np.abs(time).max(initial=0.0))
+        if time.size < 2 or np.abs(np.diff(time) - self.sample_time).max() > rounding:
             raise ParameterError(
                 f"{type(self).__name__}.estimate: the rows must be {self.sample_time:g} s apart; simulate or resample "
                 "with this interval."
