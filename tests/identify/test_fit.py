@@ -22,7 +22,7 @@ import airmuscle
 from airmuscle.core import ops
 from airmuscle.core.declaration import model, parameter
 from airmuscle.core.errors import IdentificationError, ParameterError
-from airmuscle.identify import UNCENSORED, Censoring, Fit, Huber, LeastSquares, Loss, SoftL1, fit
+from airmuscle.identify import UNCENSORED, Censoring, Fit, Huber, LeastSquares, Loss, SoftL1, confidence_band, fit
 from airmuscle.library.catalogue import load, load_data
 from airmuscle.muscle.characteristic.base import ContractionLaw, PressureLaw
 from airmuscle.muscle.characteristic.clamped import Clamped
@@ -593,6 +593,13 @@ def test_a_parameter_on_its_bound_is_flagged_and_has_no_deviation():
     assert np.isnan(estimate.stderr)
     assert np.isfinite(found["geometry.braid_angle"].stderr)
     assert "end_correction is on its bound; its value is not determined by the data." in found.notes
+    known = fit(
+        dataclasses.replace(found.model, end_correction=1.0), shorter, fixed=("geometry.radius", "end_correction")
+    )
+    places = points(truth.force, high=0.2, n=5)
+    bands = [confidence_band(each, places) for each in (found, known)]  # a parameter on its bound is taken as known
+    widths = [band.high - band.low for band in bands]
+    assert widths[0] == pytest.approx(widths[1], rel=0.02)
 
 
 def test_as_many_points_as_parameters_leave_the_deviations_unknown():
