@@ -110,14 +110,14 @@ def test_damping_and_inertia_are_balanced_along_the_wanted_motion():
     }
 
 
-@pytest.mark.parametrize(("stuck_time", "samples"), [(0.0, 0), (0.03, 3), (0.035, 4)])
+@pytest.mark.parametrize(("stuck_time", "samples"), [(0.0, 0), (0.03, 3), (0.032, 4), (0.035, 4), (0.07, 7)])
 def test_a_valve_sticks_from_its_time_on(stuck_time, samples):
     law = WithStuckValve(ProportionalFeedback(("y",), ("u",), 1.0), "u", stuck_time, 0.25)
     memory, told = None, []
-    for _ in range(6):
+    for _ in range(10):
         commands, memory = stepped(law, {"y": 1.0}, {"y": 0.0}, {"u": (0.0, 1.0)}, memory)
         told.append(commands["u"])
-    assert told == [1.0] * samples + [0.25] * (6 - samples)
+    assert told == [1.0] * samples + [0.25] * (10 - samples)
 
 
 def test_the_other_valves_and_the_memory_of_the_law_are_untouched():

@@ -43,6 +43,6 @@ class WithStuckValve(EnclosingLaw):
         self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
     ) -> tuple[dict[str, Value], dict[str, Value]]:
         wanted, later = self.law.step(select_prefix("law.", memory), measurement, dt)
-        sticks = (memory["samples"] + 0.5) * dt > self.stuck_time  # half a sample: the product is rounded
+        sticks = (memory["samples"] + 1e-6) * dt > self.stuck_time  # the product is rounded
         held = ops.where(sticks, self.stuck_opening, wanted[self.stuck_input])
         return {**wanted, self.stuck_input: held}, {"samples": memory["samples"] + 1.0, **with_prefix("law.", later)}
