@@ -104,7 +104,7 @@ class SensedController(Controller):
         commands, own = self.controller.step(memory.controller, seen, dt)
         points = {**measurement.setpoints, **{f"{COMMANDED}{name}": value for name, value in commands.items()}}
         valves, actuation = act.step(memory.actuation, seen._replace(setpoints=points), dt)
-        if self.stuck is not None and (memory.samples + 0.5) * dt > self.stuck.time:
+        if self.stuck is not None and (memory.samples + 1e-6) * dt > self.stuck.time:
             valves = {**valves, self.stuck.input: self.stuck.opening}
         return valves, SensedMemory(sensors, own, actuation, memory.samples + 1)
 
