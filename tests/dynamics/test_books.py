@@ -150,7 +150,7 @@ def test_a_run_says_when_and_how_far_it_left_what_was_measured():
     run = simulate(plant, Schedule({"fill": ((0.5, 1.0),)}), duration=4.0, initial_state=start)
     (pressure, contraction) = [note for note in run.notes if "outside the validity range" in note]
     assert re.search(
-        r"was outside the validity range of its characteristic in pressure \(35 to 675 kPa\) in \d+% of the rows, by at most 35 kPa",
+        r"was outside the validity range of its characteristic in pressure \(35 to 675 kPa\) in \d+ % of the rows, by at most 35 kPa",
         pressure,
     )
     assert re.search(r"in contraction \(1\.333 to 26 %\).*values there are extrapolated", contraction)

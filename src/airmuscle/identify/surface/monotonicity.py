@@ -49,12 +49,12 @@ class MonotonicityViolation:
         (p0, p1), (low, high) = self.pressure, (self._format_second(v) for v in self.second_argument)
         return (
             f"{self.rule.description} between {p0 / 1e3:.4g} and {p1 / 1e3:.4g} kPa, {low} and {high} "
-            f"({self.area_fraction:.1%} of the validity range), most at {self.worst_point[0] / 1e3:.4g} kPa and "
-            f"{self._format_second(self.worst_point[1])}"
+            f"({100 * self.area_fraction:.1f} % of the validity range), most at {self.worst_point[0] / 1e3:.4g} kPa "
+            f"and {self._format_second(self.worst_point[1])}"
         )
 
     def _format_second(self, value: float) -> str:
-        return f"{value:.2%}" if self.rule.quantity == "force" else f"{value:.0f} N"
+        return f"{100 * value:.2f} %" if self.rule.quantity == "force" else f"{value:.0f} N"
 
 
 def find_violations(
