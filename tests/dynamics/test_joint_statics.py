@@ -65,6 +65,21 @@ def test_pressures_for_angle_and_stiffness_give_them_back_to_1e_9(muscle, mechan
     np.testing.assert_allclose(back.constant_pressure[rows, nearest], wanted, rtol=1e-9)
 
 
+@pytest.mark.parametrize("swapped", [False, True])
+def test_two_muscles_of_different_laws_have_the_angle_and_the_stiffness_of_the_inverse(swapped):
+    """One law is affine in the pressure and the other is not, so that there is no closed form."""
+    muscles = (MUSCLES["quadratic"], DMSP) if swapped else (DMSP, MUSCLES["quadratic"])
+    left, right = (replace(muscle, name=name) for muscle, name in zip(muscles, ("left", "right"), strict=True))
+    statics = joint_statics(replace(pair(mechanism=SHAPED), muscle=(left, right)))
+    assert [function.affine for function in statics.unlimited] == [not swapped, swapped]
+    angle, wanted = reachable(statics, 10, 1.0)
+    points = statics.pressures(angle, wanted, 1.0)
+    first, second = points.pressures[:, 0].T
+    torques = [f(angle, p, "torque", "stiffness") for f, p in zip(statics.torques, (first, second), strict=True)]
+    np.testing.assert_allclose(torques[0][1] + torques[1][1], wanted, rtol=1e-9)
+    np.testing.assert_allclose(torques[0][0] + torques[1][0], statics.load(angle)[0] + 1.0, atol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("plant", "affine", "bound"),
     [(pair(), True, 15e-3), (am.load("joint-sam-30x290").plant, False, 25e-3)],
