@@ -23,9 +23,11 @@ from airmuscle.cli.app import app
 from airmuscle.cli.fit_options import parse_split
 from airmuscle.core.errors import IdentificationError, ParameterError
 from airmuscle.identify import BlockSplit, Candidate, LevelSplit, RunSplit, SpecimenSplit, compare, standard_candidates
+from airmuscle.identify.candidate_scores import FoldScore
 from airmuscle.identify.candidates import blank_surface
 from airmuscle.identify.cross_validation import ALWAYS_FITTED, default_split
 from airmuscle.identify.force_evaluation import evaluate_force
+from airmuscle.identify.model_selection import excess_error, recommend
 from airmuscle.muscle.characteristic import ContractileSurface, Hunt2017, InverseLength, TonduLopez2000
 from airmuscle.muscle.geometry.braid import Braid
 from airmuscle.recording import Recording, write_csv
@@ -99,6 +101,18 @@ def test_of_laws_that_are_as_good_the_simplest_is_taken():
     held = Candidate("braid, true ends", TonduLopez2000(START.geometry, 1.2), ("end_correction",))
     found = compare(exact, [free, held], leave_out=RunSplit())
     assert found.recommended.candidate.name == "braid, true ends"
+
+
+def test_a_law_that_fails_at_one_part_only_is_not_recommended_for_its_large_standard_error():
+    """The difference of 178 N at one of nine parts has a standard error as large as its mean."""
+    found = compare(bench(), CANDIDATES[:2], leave_out=RunSplit())
+    simple, rich = found["braid"], found["surface of degree 2"]
+    good = [FoldScore(f"run {i}", 6.9, 30) for i in range(9)]
+    failed = [*(FoldScore(f"run {i}", 6.8, 30) for i in range(8)), FoldScore("run 8", 178.0, 30)]
+    best = dataclasses.replace(rich, fold_scores=tuple(good), cross_validated_rmse=6.9)
+    poor = dataclasses.replace(simple, fold_scores=tuple(failed), cross_validated_rmse=59.7)
+    assert excess_error(poor, best) < 0
+    assert recommend([best, poor], RunSplit())[0] is best
 
 
 def test_aicc_is_hurvich_and_tsais():
