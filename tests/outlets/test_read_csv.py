@@ -317,6 +317,13 @@ def test_an_invalid_resting_length(bench):
     assert "has no unit" in refusal(bench(PLAIN), UnitError, resting_length="300")
 
 
+def test_a_resting_length_in_millimetres_and_an_ambient_pressure_in_kilopascals_without_a_unit_are_refused(bench):
+    message = refusal(bench(PLAIN), ColumnError, resting_length=250)
+    assert "resting_length is 250 m; allowed range: 0.001 to 20 m. Check the unit; a number without a unit" in message
+    message = refusal(bench(PLAIN), ColumnError, ambient=98)
+    assert "ambient is 98 Pa; allowed range: 1000 to 200000 Pa" in message
+
+
 def test_a_missing_column(bench):
     with pytest.raises(
         ColumnError, match=r"bench\.csv: no column 'presure'; the columns are .*Did you mean 'pressure'\?"
