@@ -73,7 +73,8 @@ def _with_rows(text: str, part: Any) -> str:
 
 def _describe_sampling(sampling: Sampling) -> str:
     gaps = f", {len(sampling.gaps)} gaps" if sampling.gaps else ""
-    return f"{sampling.rate:.4g} rows per second over {sampling.duration:.4g} s, jitter {sampling.jitter:.1%}{gaps}"
+    regularity = "time stamps repeat" if sampling.rounded else f"jitter {sampling.jitter:.1%}"
+    return f"{sampling.rate:.4g} rows per second over {sampling.duration:.4g} s, {regularity}{gaps}"
 
 
 def _describe_run(run: Run) -> str:
