@@ -69,7 +69,7 @@ def analyse_sampling(recording: Recording) -> Sampling | None:
 
 
 def _sample_time(steps: Array) -> float:
-    """The median step that is not zero, of rounded time stamps the mean step outside gaps; 0 where time stands still."""
+    """The median step that is not zero, of rounded time stamps the mean step outside gaps; 0 if time stands still."""
     if not (steps > 0).any():
         return 0.0
     median = float(np.median(steps[steps > 0]))
