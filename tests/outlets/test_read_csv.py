@@ -72,12 +72,29 @@ FORMS = {
     "spaces": PLAIN.replace(",", " , "),
     "a delimiter at each end": PLAIN.replace("\n", ",\n"),
     "rows of nothing": PLAIN + ",,,\n,,,\n",
+    "title above the headings": "Run of 12.03.2026\n" + PLAIN,
+    "settings above headings and unit row": "Rig,3\nSensor,1,2\noperator\n\ntime,pressure,length,force\ns,kPa,mm,N\n"
+    + PLAIN.partition("\n")[2],
+    "padded title": "Messung vom 12.03.2026;;;\nPrüfstand 3;;;\n" + GERMAN,
+    "separator line of Excel": "sep=;\n" + GERMAN,
 }
 
 
 @pytest.mark.parametrize("form", FORMS)
 def test_every_format_gives_the_same_recording(bench, form: str):
     same(read_csv(bench(FORMS[form])))
+
+
+@pytest.mark.parametrize("line", ["Ruhelänge;250 mm", "Resting length;250;mm", "resting_length: 250 mm", "L0 [mm];250"])
+def test_a_constant_above_the_headings_is_read(bench, line: str):
+    recording = read_csv(bench(f"Rig 3\n{line}\n" + GERMAN))
+    same(recording)
+    assert recording.constants["resting_length"] == pytest.approx(0.25)
+
+
+def test_rows_of_numbers_are_never_taken_for_lines_above_the_headings(bench):
+    said = refusal(bench("pressure [kPa],force [N]\n1,2,3\n4,5,6\nbad,row,x\n7,8,9\n"), ColumnError)
+    assert "bench.csv, line 2: the line must have 2 cells" in said
 
 
 def test_latin_1_is_read(bench):
