@@ -139,6 +139,7 @@ def test_levels_are_what_was_held():
     labels = [array.tolist() for array in LevelSplit("contraction").labels(runs)]
     assert all(len(set(names)) == 1 for names in labels)
     assert len({names[0] for names in labels}) == 7
+    assert [labels[0][0], labels[-1][0]] == ["contraction 0 %", "contraction 20 %"]
     with pytest.raises(IdentificationError, match="one run"):
         compare(runs[0], CANDIDATES, leave_out=RunSplit())
 
