@@ -421,7 +421,7 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
             FILL,
             'model = "Shedule"',
             UnknownNameError,
-            r"\[input\], model: no model 'Shedule'.*Did you mean 'Schedule'\?",
+            r"\[input\], model: no model 'Shedule'; there are SampledSignal, Schedule\. Did you mean 'Schedule'\?",
         ),
         (
             FILL,

@@ -234,4 +234,5 @@ def _read_columns(table: Mapping[str, Any], known: Sequence[str], location: Loca
 
 
 def _build_model(value: Any, kind: type[Any], location: Location) -> Any:
-    return check_type(build({"model": value} if isinstance(value, str) else value, location), kind, location)
+    table = {"model": value} if isinstance(value, str) else value
+    return check_type(build(table, location, kind=kind), kind, location)
