@@ -258,6 +258,9 @@ def test_plain_bar_is_gauge_and_bara_is_absolute():
 
 
 def test_the_chart_and_its_data_stand_in_the_folder(tmp_path: Path):
+    text = airmuscle("solve", MUSCLE, "--pressure=3.00125 bar", "--contraction=.1").output
+    assert "300.125 kPa" in text
+    assert re.search(r"force +\d{3}(\.\d)? N +solved", text), text
     result = airmuscle("solve", MUSCLE, "--pressure=3 bar", "--force=100 N", "--out", tmp_path / "chart")
     assert result.exit_code == 0
     assert sorted(path.name for path in (tmp_path / "chart").iterdir()) == ["isobars.csv", "isobars.png"]

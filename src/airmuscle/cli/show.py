@@ -108,7 +108,7 @@ def _print(entry: dict[str, Any]) -> None:
     echo("components: " + ", ".join(f"{part} {model}" for part, model in entry["models"].items()) + "\n")
     rows = [
         (p["name"], p["symbol"], format_number(p["value"]), _unit(p["unit"]), p["meaning"], _bounds(p["bounds"]))
-        for p in map(_displayed, _shorten(entry["parameters"]))
+        for p in map(_displayed, _with_meanings_once(_shorten(entry["parameters"])))
     ]
     print_table(("parameter", "symbol", "value", "unit", "meaning", "bounds"), rows, right=("value",))
     if "laws" in entry:
@@ -131,6 +131,13 @@ def _print(entry: dict[str, Any]) -> None:
     echo()
     for reference in entry["references"]:
         echo(f"- {reference}")
+
+
+def _with_meanings_once(parameters: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The parameters, of which the values of a list state their meaning once."""
+    stems = [p["name"].partition("[")[0] for p in parameters]
+    pairs = zip(parameters, stems, ["", *stems], strict=False)
+    return [{**p, "meaning": ""} if stem == previous else p for p, stem, previous in pairs]
 
 
 def _shorten(parameters: list[dict[str, Any]]) -> list[dict[str, Any]]:
