@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import pickle
+import re
 from pathlib import Path
 
 import numpy as np
@@ -67,6 +68,8 @@ def test_the_order_in_sample_is_not_the_order_on_what_was_left_out():
     assert found["surface of degree 5"].cross_validated_rmse > 2 * found["braid"].cross_validated_rmse
     assert found.recommended.candidate.name == "braid"
     assert "3 parameters" in found.reason
+    assert re.search(r"AICc excess$", str(found), re.MULTILINE)
+    assert min(float(line.rpartition(" ")[2]) for line in str(found).splitlines()[3:6]) == 0.0
     assert [c.cross_validated_rmse for c in found.ranking] == sorted(c.cross_validated_rmse for c in found.ranking)
 
 

@@ -58,10 +58,11 @@ class Comparison(ShortRepr):
             f"{self.purpose}."
         )
         width = max(40, *(len(m.candidate.name) + 1 for m in self.ranking))
-        head = f"{'law':<{width}}{'parameters':>11}{'in sample':>12}{'left out':>12}{'AICc':>12}"
+        head = f"{'law':<{width}}{'parameters':>11}{'in sample':>12}{'left out':>12}{'AICc excess':>13}"
+        lowest = min(m.aicc for m in self.ranking)
         rows = [
             f"{m.candidate.name:<{width}}{m.parameter_count:>11}{m.in_sample_rmse:>10.4g} N"
-            f"{m.cross_validated_rmse:>10.4g} N{m.aicc:>12.1f}"
+            f"{m.cross_validated_rmse:>10.4g} N{m.aicc - lowest:>13.1f}"
             for m in self.ranking
         ]
         notes = [f"note: {note}" for note in self.notes]
