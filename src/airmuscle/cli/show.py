@@ -7,6 +7,7 @@ from typing import Any
 
 from ..core import cite, leaves
 from ..core.display import in_display_unit
+from ..core.listed_names import continues_list
 from ..library.catalogue import load
 from ..library.entry import Entry
 from ..library.files import entries_of_product
@@ -135,9 +136,8 @@ def _print(entry: dict[str, Any]) -> None:
 
 def _with_meanings_once(parameters: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """The parameters, of which the values of a list state their meaning once."""
-    stems = [p["name"].partition("[")[0] for p in parameters]
-    pairs = zip(parameters, stems, ["", *stems], strict=False)
-    return [{**p, "meaning": ""} if stem == previous else p for p, stem, previous in pairs]
+    pairs = zip(parameters, continues_list([p["name"] for p in parameters]), strict=True)
+    return [{**p, "meaning": ""} if continued else p for p, continued in pairs]
 
 
 def _shorten(parameters: list[dict[str, Any]]) -> list[dict[str, Any]]:

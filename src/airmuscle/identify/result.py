@@ -12,6 +12,7 @@ import numpy.typing as npt
 from ..core.arrays import Array
 from ..core.display import contraction_text, in_display_unit, quantity_text
 from ..core.errors import ParameterError, suggestion
+from ..core.listed_names import continues_list
 from ..core.notebook import Card, NotebookDisplay
 from ..muscle.characteristic.base import Characteristic
 from ..muscle.characteristic.validity_range import ValidityRange
@@ -230,12 +231,10 @@ def estimate_rows(estimates: Sequence[Estimate]) -> list[tuple[str, ...]]:
     The values of a list, coefficients[0], coefficients[1], ..., state their meaning once.
     """
     rows: list[tuple[str, ...]] = [("parameter", "", "value", "2 SE", "unit", "meaning")]
-    stem = ""
-    for e in estimates:
+    for e, continued in zip(estimates, continues_list([e.name for e in estimates]), strict=True):
         value, unit = in_display_unit(e.value, e.unit)
         shown = dataclasses.replace(e, value=value, stderr=in_display_unit(e.stderr, e.unit)[0], unit=unit)
-        previous, stem = stem, e.name.partition("[")[0]
-        meaning = "" if stem == previous else e.meaning
+        meaning = "" if continued else e.meaning
         rows.append((e.name, e.label, f"{value:.4g}", shown.format_interval(), shown.display_unit, meaning))
     return rows
 
