@@ -12,6 +12,10 @@ from ..core.units import conversion
 from .constants import parse_constant_name
 from .heading import parse_heading
 
+COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
+"""A number with a decimal comma, without thousands separators."""
+POINT_NUMBER = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
+"""A number with a decimal point, without thousands separators."""
 _CONSTANT_COMMENT = re.compile(r"[#%]\s*(?P<name>[^\W\d][\w -]*?)(?:\s*\[(?P<unit>[^\]]*)\])?\s*[=:]\s*(?P<value>.+)")
 _TEXT_CONSTANTS = ("resting_length", "ambient", "specimen", "run")
 

@@ -10,7 +10,16 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import ColumnError, FileError, suggestion
-from .header import are_headings, count_cells, missing_header_error, parse_constant_cells, parse_unit_row
+from .header import (
+    COMMA_NUMBER,
+    POINT_NUMBER,
+    are_headings,
+    count_cells,
+    is_number,
+    missing_header_error,
+    parse_constant_cells,
+    parse_unit_row,
+)
 from .optional_dependency import import_lab_package, run_reader
 from .table import Cells, RawTable
 
@@ -105,9 +114,12 @@ def _find_heading_row(rows: Rows) -> int:
 
 
 def _is_numeric(row: list[Any]) -> bool:
-    """Whether more than half of the cells of a row are numbers; the others may be texts such as the operator's name."""
+    """Whether more than half of the cells of a row are numbers, also as texts; the others may be names."""
     cells = [c for c in row if c not in (None, "")]
-    numbers = sum(isinstance(c, float | int | datetime.date | datetime.time) for c in cells)
+    numbers = sum(
+        isinstance(c, float | int | datetime.date | datetime.time) or (isinstance(c, str) and is_number(c))
+        for c in cells
+    )
     return 2 * numbers > len(cells)
 
 
@@ -132,9 +144,13 @@ def _text(cell: Any) -> str:
 
 
 def _column(cells: list[Any]) -> Cells:
+    """A column of numbers, also of numbers that are stored as texts with one decimal sign; otherwise of texts."""
     if all(isinstance(cell, float | int) and not isinstance(cell, bool) for cell in cells):
         return np.array(cells, dtype=float)
     texts = [_text(cell) for cell in cells]
+    stored = [cell for cell in cells if isinstance(cell, str)]
+    if not any(POINT_NUMBER.fullmatch(text.strip()) for text in stored):
+        texts = [text.replace(",", ".") if COMMA_NUMBER.fullmatch(text) else text for text in texts]
     try:
         return np.array([float(text) for text in texts])
     except ValueError:
