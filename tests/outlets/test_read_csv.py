@@ -71,6 +71,16 @@ FORMS = {
     + PLAIN.partition("\n")[2].partition("\n")[2],
     "spaces": PLAIN.replace(",", " , "),
     "a delimiter at each end": PLAIN.replace("\n", ",\n"),
+    "blanks between numbers": PLAIN.partition("\n")[0].replace(",", "   ")
+    + "\n"
+    + PLAIN.partition("\n")[2].replace(",", "  "),
+    "blanks, unit row and margin": "time pressure length force\n[s] [kPa] [mm] [N]\n"
+    + "\n".join(f"   {line}" for line in PLAIN.partition("\n")[2].replace(",", " ").splitlines()),
+    "blanks and decimal comma": GERMAN.partition("\n")[0].replace(";", " ")
+    + "\n"
+    + GERMAN.partition("\n")[2].replace(";", " "),
+    "blanks and a commented heading": "% rig 3\n% time [s] pressure [kPa] length [mm] force [N]\n"
+    + PLAIN.partition("\n")[2].replace(",", " "),
     "rows of nothing": PLAIN + ",,,\n,,,\n",
     "title above the headings": "Run of 12.03.2026\n" + PLAIN,
     "settings above headings and unit row": "Rig,3\nSensor,1,2\noperator\n\ntime,pressure,length,force\ns,kPa,mm,N\n"

@@ -372,6 +372,7 @@ def test_a_table_without_headings_is_mapped_by_numbers(tmp_path: Path):
     same(only(read(tmp_path / "run.txt", columns=dict(enumerate(HEADINGS, 1)))))
     np.savetxt(tmp_path / "blanks.txt", TABLE)
     same(only(read(tmp_path / "blanks.txt", columns=dict(enumerate(HEADINGS, 1)), delimiter=" ")))
+    same(only(read(tmp_path / "blanks.txt", columns=dict(enumerate(HEADINGS, 1)))))
 
 
 def test_a_given_decimal_sign_resolves_thousands_separators(tmp_path: Path):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import csv
 import dataclasses
+import re
 from collections.abc import Mapping
 
 from ..core.errors import FileError, ParameterError
@@ -50,8 +51,19 @@ class TextFormat:
             raise ParameterError("delimiter and decimal are both ','; they must differ. Export the table with ';'.")
 
     def detect_delimiter(self, line: str) -> str:
-        """The given delimiter, otherwise the one detected in the first line of the table."""
-        return self.delimiter or next((d for d in "\t;" if d in line), ",")
+        """The given delimiter, otherwise the one detected in a line of the table; blanks only between numbers."""
+        return self.delimiter or next((d for d in "\t;" if d in line), " " if _are_numbers_and_blanks(line) else ",")
+
+    def with_blanks(self, body: NumberedLines) -> TextFormat:
+        """The format with blanks as the delimiter, if none is given and they separate the first numbers of a table."""
+        if self.delimiter is None:
+            for _, line in body:
+                delimiter = self.detect_delimiter(line)
+                if delimiter == " ":
+                    return dataclasses.replace(self, delimiter=delimiter)
+                if delimiter != "," or _is_numeric(split_cells(line, delimiter)):
+                    break
+        return self
 
 
 @dataclasses.dataclass(frozen=True)
@@ -88,7 +100,9 @@ def has_content(line: str) -> bool:
 
 
 def split_cells(line: str, delimiter: str) -> list[str]:
-    """The cells of a line."""
+    """The cells of a line; a blank before a unit in brackets, `time [s] force [N]`, does not separate cells."""
+    if delimiter == " " and '"' not in line:
+        return re.split(r"(?<=[\])])\s+|\s+(?![\[(])", line.strip())
     return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))]
 
 
@@ -100,6 +114,7 @@ def parse_header(origin: str, lines: NumberedLines, text_format: TextFormat) -> 
         raise FileError(
             f"{origin}: the file contains no table. A table consists of a row of headings and rows of numbers."
         )
+    text_format = text_format.with_blanks(body)
     above = _lines_above_headings(body, text_format)
     preamble, body = body[:above], body[above:]
     delimiter = text_format.detect_delimiter(body[0][1])
@@ -136,6 +151,12 @@ def _lines_above_headings(body: NumberedLines, text_format: TextFormat) -> int:
     last = len(rows) - 1
     units = last > 0 and rows[-2][0] == delimiter and parse_unit_row(rows[-2][1], rows[-1][1])
     return last - 1 if units else last
+
+
+def _are_numbers_and_blanks(line: str) -> bool:
+    """Whether a line consists of two numbers or more between blanks."""
+    cells = line.split()
+    return len(cells) > 1 and all(is_number(cell) and not cell.endswith(",") for cell in cells)
 
 
 def _is_numeric(cells: list[str]) -> bool:
