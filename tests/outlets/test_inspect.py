@@ -147,6 +147,15 @@ def test_a_file_that_a_fit_rejects_is_inspected(tmp_path: Path):
     assert "is less than the time of the previous row" in fitted.stderr
 
 
+def test_rounded_time_stamps_are_told_from_the_rate_of_the_rows_and_name_the_option(tmp_path: Path):
+    rows = [f"{i // 2 / 10:.1f},{i * 10},{0.3 - 1e-4 * i},{2 * i}" for i in range(60)]
+    path = tmp_path / "rounded.csv"
+    path.write_text("\n".join(["time [s],pressure [kPa],length [m],force [N]", *rows]))
+    text = airmuscle("inspect", path).stdout
+    assert "sampling: 20.34 rows per second over 2.9 s, time stamps repeat" in text
+    assert "For stamps that the logger rounded, use --time uniform." in text
+
+
 def test_options_and_mapping_are_equivalent(tmp_path: Path):
     path = tmp_path / "run.txt"
     np.savetxt(path, np.column_stack([np.arange(9.0), np.linspace(2, 6, 9), np.linspace(290, 250, 9)]), delimiter="\t")

@@ -73,8 +73,8 @@ def _with_rows(text: str, part: Any) -> str:
 
 def _describe_sampling(sampling: Sampling) -> str:
     gaps = f", {len(sampling.gaps)} gaps" if sampling.gaps else ""
-    rate, jitter = f"{sampling.rate:.4g} rows per second", f"jitter {100 * sampling.jitter:.1f} %"
-    return f"{rate} over {sampling.duration:.4g} s, {jitter}{gaps}"
+    regularity = "time stamps repeat" if sampling.rounded else f"jitter {100 * sampling.jitter:.1f} %"
+    return f"{sampling.rate:.4g} rows per second over {sampling.duration:.4g} s, {regularity}{gaps}"
 
 
 def _describe_run(run: Run) -> str:

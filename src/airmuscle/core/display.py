@@ -120,6 +120,19 @@ def contraction_text(value: Any, decimals: int = 2, digits: int = 4) -> str:
     return f"{value * choice[0]:.{digits}g} {'' if choice[1] == '1' else choice[1]}".rstrip()
 
 
+def level_text(quantity: str, level: float, span: float) -> str:
+    """A level of a measured quantity as text, rounded to a thousandth of a span of levels [SI].
+
+    The median of noisy contractions, -6e-6, is so written as the level that was set, 0 %.
+    """
+    step = 10.0 ** math.floor(math.log10(span / 1e3)) if span > 0 else 0.0
+    rounded = round(level / step) * step + 0.0 if step else level
+    if quantity == "contraction":
+        return f"{100 * rounded:.4g} %"
+    units = {"pressure": ("Pa", "kPa"), "force": ("N", "N"), "length": ("m", "mm")}.get(quantity)
+    return quantity_text(rounded, *units) if units else f"{rounded:.4g}"
+
+
 def in_display_unit(value: Any, unit: str) -> tuple[Any, str]:
     """A value in a declared SI unit, with that unit; in the chosen display unit if there is one.
 

@@ -103,10 +103,15 @@ def _excess(time: Array, values: Array, limit: ColumnLimit) -> Diagnostic:
     where, meaning = _MEANINGS[code]
     text = (
         f"{subject} was outside {where} in {quantity.replace('_', ' ')} ({_span(low / scale, high / scale)} "
-        f"{unit}) in {100 * rows / values.size:.0f} % of the rows, by at most {excess[worst] / scale:.4g} {unit} at "
-        f"{time[worst]:.4g} s; {meaning}"
+        f"{unit}) in {percent_of_rows(rows / values.size)} of the rows, by at most {excess[worst] / scale:.4g} {unit} "
+        f"at {time[worst]:.4g} s; {meaning}"
     )
     return Diagnostic(code, subject, text, rows)
+
+
+def percent_of_rows(share: float) -> str:
+    """A share of the rows that is not 0 as text, with one digit below one percent."""
+    return f"{100 * share:.0f} %" if share >= 0.01 else f"{100 * share:.1g} %"
 
 
 def describe_limit(limit: ColumnLimit) -> str:
