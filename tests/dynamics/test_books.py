@@ -15,6 +15,7 @@ from airmuscle.core.errors import EquilibriumError, ParameterError
 from airmuscle.library.catalogue import load
 from airmuscle.mechanism import HangingMass, Isometric, WithLatch
 from airmuscle.muscle import LinearDamper
+from airmuscle.plant.diagnostics import percent_of_rows
 from airmuscle.plant.energy_balance import WithEnergyMeters
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import ClosedChamber, FillDischarge, Supply, Valve
@@ -140,6 +141,10 @@ def test_an_unknown_coordinate_or_input_is_refused_with_what_there_is():
         simulate(plant, Schedule({"fil": ((0.0, 1.0),)}), duration=1.0, initial_state=plant.state_at(pressure=0.0))
 
 
+def test_a_small_share_of_rows_outside_a_range_is_not_told_as_zero():
+    assert [percent_of_rows(share) for share in (0.004, 0.01, 0.313, 1.0)] == ["0.4 %", "1 %", "31 %", "100 %"]
+
+
 def test_a_run_says_when_and_how_far_it_left_what_was_measured():
     """A fitted surface carries its validity range, a library muscle that of its file; inside it nothing is said."""
     muscle = load("dmsp-20-300").muscle
@@ -150,7 +155,7 @@ def test_a_run_says_when_and_how_far_it_left_what_was_measured():
     run = simulate(plant, Schedule({"fill": ((0.5, 1.0),)}), duration=4.0, initial_state=start)
     (pressure, contraction) = [note for note in run.notes if "outside the validity range" in note]
     assert re.search(
-        r"was outside the validity range of its characteristic in pressure \(35 to 675 kPa\) in \d+% of the rows, by at most 35 kPa",
+        r"was outside the validity range of its characteristic in pressure \(35 to 675 kPa\) in \d+ % of the rows, by at most 35 kPa",
         pressure,
     )
     assert re.search(r"in contraction \(1\.333 to 26 %\).*values there are extrapolated", contraction)

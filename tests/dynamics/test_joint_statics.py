@@ -24,7 +24,7 @@ from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
 from airmuscle.simulation import find_equilibria, find_equilibrium
 
 DMSP = am.load("dmsp-20-300").muscle
-BRAID = am.muscle.geometry.Braid(0.01, 0.4363, 0.3)
+BRAID = am.geometry.Braid(0.01, 0.4363, 0.3)
 JOINT = AntagonisticJoint(0.04, 0.05, 0.2, 2.0, 0.11, min_angle=-1.0, max_angle=1.0)
 SHAPED = replace(JOINT, profile=CrankProfile(0.2), weight_angle=0.5)
 VALVE = am.Valve(2.6e-9, 0.433)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import pickle
+import re
 from pathlib import Path
 
 import numpy as np
@@ -23,9 +24,11 @@ from airmuscle.cli.app import app
 from airmuscle.cli.fit_options import parse_split
 from airmuscle.core.errors import IdentificationError, ParameterError
 from airmuscle.identify import BlockSplit, Candidate, LevelSplit, RunSplit, SpecimenSplit, compare, standard_candidates
+from airmuscle.identify.candidate_scores import FoldScore
 from airmuscle.identify.candidates import blank_surface
 from airmuscle.identify.cross_validation import ALWAYS_FITTED, default_split
 from airmuscle.identify.force_evaluation import evaluate_force
+from airmuscle.identify.model_selection import excess_error, recommend
 from airmuscle.muscle.characteristic import ContractileSurface, Hunt2017, InverseLength, TonduLopez2000
 from airmuscle.muscle.geometry.braid import Braid
 from airmuscle.recording import Recording, write_csv
@@ -65,6 +68,8 @@ def test_the_order_in_sample_is_not_the_order_on_what_was_left_out():
     assert found["surface of degree 5"].cross_validated_rmse > 2 * found["braid"].cross_validated_rmse
     assert found.recommended.candidate.name == "braid"
     assert "3 parameters" in found.reason
+    assert re.search(r"AICc excess$", str(found), re.MULTILINE)
+    assert min(float(line.rpartition(" ")[2]) for line in str(found).splitlines()[3:6]) == 0.0
     assert [c.cross_validated_rmse for c in found.ranking] == sorted(c.cross_validated_rmse for c in found.ranking)
 
 
@@ -101,6 +106,18 @@ def test_of_laws_that_are_as_good_the_simplest_is_taken():
     assert found.recommended.candidate.name == "braid, true ends"
 
 
+def test_a_law_that_fails_at_one_part_only_is_not_recommended_for_its_large_standard_error():
+    """The difference of 178 N at one of nine parts has a standard error as large as its mean."""
+    found = compare(bench(), CANDIDATES[:2], leave_out=RunSplit())
+    simple, rich = found["braid"], found["surface of degree 2"]
+    good = [FoldScore(f"run {i}", 6.9, 30) for i in range(9)]
+    failed = [*(FoldScore(f"run {i}", 6.8, 30) for i in range(8)), FoldScore("run 8", 178.0, 30)]
+    best = dataclasses.replace(rich, fold_scores=tuple(good), cross_validated_rmse=6.9)
+    poor = dataclasses.replace(simple, fold_scores=tuple(failed), cross_validated_rmse=59.7)
+    assert excess_error(poor, best) < 0
+    assert recommend([best, poor], RunSplit())[0] is best
+
+
 def test_aicc_is_hurvich_and_tsais():
     contender = compare(bench(), CANDIDATES[:1], leave_out=RunSplit()).recommended
     n, k = 210, 4
@@ -125,6 +142,7 @@ def test_levels_are_what_was_held():
     labels = [array.tolist() for array in LevelSplit("contraction").labels(runs)]
     assert all(len(set(names)) == 1 for names in labels)
     assert len({names[0] for names in labels}) == 7
+    assert [labels[0][0], labels[-1][0]] == ["contraction 0 %", "contraction 20 %"]
     with pytest.raises(IdentificationError, match="one run"):
         compare(runs[0], CANDIDATES, leave_out=RunSplit())
 

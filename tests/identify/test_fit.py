@@ -321,6 +321,22 @@ def test_points_at_the_upper_clamp_are_bounds_too():
     assert found.model.polynomial(clean["pressure"], clean["contraction"]) == pytest.approx(clean["force"], abs=1e-8)
 
 
+def test_a_blank_surface_does_not_limit_the_force_of_a_strong_muscle_and_a_limited_one_says_so():
+    recording = points(lambda p, c: 20.0 * surface(2).polynomial(p, c))
+    assert recording["force"].max() > 5000.0
+    free = fit(ContractileSurface.blank(2), recording)
+    assert free.modelled == pytest.approx(recording["force"], abs=1e-6)
+    limit = float(np.quantile(recording["force"], 0.7))
+    limited = fit(ContractileSurface.blank(2, max_force=limit), recording)
+    (note,) = [note for note in limited.notes if "the law gives no greater force" in note]
+    assert note.startswith("60 rows are above the upper limit of the force of the law, max_force")
+
+
+def test_the_meaning_of_a_list_of_coefficients_is_stated_once():
+    text = str(fit(ContractileSurface.blank(2), points(surface(2).force)))
+    assert text.count("coefficients of the polynomial") == 1
+
+
 def test_the_resolution_of_the_sensor_may_be_where_it_is_cut_off():
     truth, recording = slack_and_taut()
     offset = recording.with_columns(force=np.where(recording["force"] < 2.0, 1.3, recording["force"]))

@@ -70,7 +70,7 @@ def test_points_that_are_chosen_one_by_one_determine_more_than_points_on_a_path(
         path = path.updated(1e4 * i, 0.004 * i, float(truth(1e4 * i, 0.004 * i)))
     assert chosen.determined > 0.9
     assert path.determined < 0.5
-    with pytest.raises(IdentificationError, match=r"the samples determine the force on \d+% of the range"):
+    with pytest.raises(IdentificationError, match=r"the samples determine the force on \d+ % of the range"):
         _ = path.model
 
 

@@ -373,6 +373,17 @@ def test_rate_jitter_gaps_repeated_and_decreasing_times():
     assert texts[2].startswith("1 gap in time, the longest of 2 s after row 101")
 
 
+def test_the_rate_of_rounded_time_stamps_is_that_of_the_rows():
+    clock = np.concatenate([STEP * np.arange(200), 30.0 + STEP * np.arange(200)])
+    rounded = np.floor(clock / 0.1 + 1e-9) * 0.1
+    seen = analyse_sampling(Recording({"time": rounded}, "logger"))
+    assert seen.rounded
+    assert seen.rate == pytest.approx(20.0, rel=0.01)
+    assert [gap.row for gap in seen.gaps] == [199]
+    texts = [f.text for f in inspect(timed(np.linspace(0, 6e5, 400)).with_columns(time=rounded)).findings]
+    assert "For stamps that the logger rounded, use time_base=UniformTime() of read." in texts[0]
+
+
 def test_a_record_shorter_than_its_dynamics_is_reported():
     rise = 6e5 * (1 - np.exp(-np.arange(200) * STEP / 1.0))
     assert not any("may be shorter" in f.text for f in inspect(timed(rise)).findings)

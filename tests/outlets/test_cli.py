@@ -199,6 +199,13 @@ def test_a_unique_beginning_of_a_name_is_enough_and_others_are_refused():
     assert_failed(airmuscle("show", "dmsp"), "'dmsp' is ambiguous: dmsp-10-250, dmsp-20-300")
     assert_failed(airmuscle("show", "dmps-20-300"), r".*Did you mean 'dmsp-20-300'\?")
     assert_failed(airmuscle("show", "no/such.toml"), "no/such.toml: there is no such file")
+
+
+def test_a_folder_in_the_place_of_its_muscle_file_names_the_file(tmp_path: Path, monkeypatch):
+    (tmp_path / "fit").mkdir()
+    (tmp_path / "fit" / "muscle.toml").touch()
+    monkeypatch.chdir(tmp_path)
+    assert_failed(airmuscle("show", "fit"), ".* 'fit' is a folder; write fit/muscle.toml")
     assert_failed(
         airmuscle("export", "dmsp-20-300", "--to", "c"), "dmsp-20-300: there is no such file, .* plants are arm-"
     )
@@ -251,6 +258,9 @@ def test_plain_bar_is_gauge_and_bara_is_absolute():
 
 
 def test_the_chart_and_its_data_stand_in_the_folder(tmp_path: Path):
+    text = airmuscle("solve", MUSCLE, "--pressure=3.00125 bar", "--contraction=.1").output
+    assert "300.125 kPa" in text
+    assert re.search(r"force +\d{3}(\.\d)? N +solved", text), text
     result = airmuscle("solve", MUSCLE, "--pressure=3 bar", "--force=100 N", "--out", tmp_path / "chart")
     assert result.exit_code == 0
     assert sorted(path.name for path in (tmp_path / "chart").iterdir()) == ["isobars.csv", "isobars.png"]
@@ -361,7 +371,12 @@ def test_fit_starts_from_a_library_entry_and_keeps_what_is_fixed(tmp_path: Path)
     ("rows", "options", "message"),
     [
         (36, ("--characteristic", "Saga2007"), "--characteristic: Saga2007 needs initial values"),
-        (36, ("--characteristic", "ContractileSurfac"), "no muscle or law 'ContractileSurfac'"),
+        (
+            36,
+            ("--characteristic", "ContractileSurfac"),
+            "no muscle or law 'ContractileSurfac'.* Or name a law: Borz.*, TonduLopez2000, .*mean 'ContractileSurface'",
+        ),
+        (36, ("--characteristic", "Braid"), "--characteristic: Braid is not a characteristic; there are Borz"),
         (
             20,
             ("--characteristic", "ContractileSurface"),

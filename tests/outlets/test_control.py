@@ -208,7 +208,7 @@ PID_TABLE = ('commanded = "fill"', 'commanded = {{ model = "SplitRange", positiv
         (SETPOINT, f'{SETPOINT}\ncontroller = 3', ParameterError, r"a controller is allowed only in a scenario"),
         (SETPOINT, 'file = "none.csv"', AirmuscleError, r"none.csv"),
         ('model = "PID"', 'model = "Valve"', ParameterError, r"\[input.controller\]: Valve is not a controller; there are AngleAndStiffness, Cascade, .*OnOffController, PID"),
-        ('model = "PID"', 'model = "PDI"', UnknownNameError, r"no model 'PDI'"),
+        ('model = "PID"', 'model = "PDI"', UnknownNameError, r"no model 'PDI'; there are AngleAndStiffness, .*, PID, .*WithStuckValve\. Did you mean 'PID'"),
         ('model = "PID"\n', "", ParameterError, r"\[input.controller\]: the model is not named"),
         ("[input]\n", '[input]\nfill = [["0.1 s", 1]]\n', ParameterError, r"'fill' is commanded by the controller and by other_inputs"),
         ("[input]\n", '[input]\ndischarge = [["0.1 s", 2]]\n', ParameterError, r"\[input\]: the input 'discharge' is 2 before"),

@@ -20,6 +20,7 @@ from airmuscle.core.display import (
     display,
     heading_scale,
     in_display_unit,
+    level_text,
     quantity_text,
     scaled_numbers,
 )
@@ -63,8 +64,14 @@ def test_a_plot_is_in_the_chosen_units_and_the_values_are_not():
 
 def test_without_a_choice_the_units_are_the_usual_ones():
     assert labels(run().plot()) == ["angle\n[rad]", "pressure\n[kPa]", "contraction\n[%]"]
-    assert (quantity_text(3e5, "Pa", "kPa"), contraction_text(0.125)) == ("300 kPa", "12.50%")
+    assert (quantity_text(3e5, "Pa", "kPa"), contraction_text(0.125)) == ("300 kPa", "12.50 %")
     assert heading_scale("pressure [kPa]") == (1.0, "pressure [kPa]")
+
+
+def test_a_level_of_noisy_values_is_written_as_the_level_that_was_set():
+    assert [level_text("contraction", each, 0.24) for each in (-6e-6, 0.03001, 0.1195)] == ["0 %", "3 %", "11.95 %"]
+    assert level_text("pressure", 299_987.0, 6e5) == "300 kPa"
+    assert level_text("length", 0.2, 0.0) == "200 mm"
 
 
 def test_a_call_replaces_the_previous_choice_and_no_units_are_the_usual_ones():

@@ -107,6 +107,15 @@ def test_the_command_converts_one_file_and_several(tmp_path):
     assert (tmp_path / "plain.csv").read_text().startswith("time [s],")
     assert airmuscle("convert-data", tmp_path / "run0.csv", tmp_path / "a.h5", "--plain").exit_code == 2
     assert airmuscle("convert-data", tmp_path / "run0.csv", tmp_path / "a.xyz").exit_code == 1
+    (tmp_path / "rounded.csv").write_text("time [s],length [mm]\n" + "".join(f"{i // 2},{290 - i}\n" for i in range(9)))
+    done = airmuscle("convert-data", tmp_path / "rounded.csv", tmp_path / "bare.csv")
+    assert "For stamps that the logger rounded, use --time uniform." in done.stderr
+    options = ("--time", "uniform", "--resting-length", "300 mm")
+    done = airmuscle("convert-data", tmp_path / "rounded.csv", tmp_path / "bare.csv", *options)
+    assert done.exit_code == 0, done.output
+    (recording,) = read(tmp_path / "bare.csv")
+    assert recording["time"][1] == 0.5
+    assert recording["contraction"][0] == pytest.approx(1 / 30)
     before = (tmp_path / "run0.csv").read_bytes()
     done = airmuscle("convert-data", tmp_path / "run0.csv", tmp_path / "run0.csv")
     assert "run0.csv: is a file to be converted and would be lost" in done.stderr

@@ -86,12 +86,12 @@ def test_the_text_output(tmp_path: Path):
     for said in (
         "run.csv: 400 rows",
         "resting_length: 300 mm",
-        "sampling: 20 rows per second over 19.95 s, jitter 0.0%",
+        "sampling: 20 rows per second over 19.95 s, jitter 0.0 %",
         "runs: isometric at contraction 10 %, rows 1 to 400",
         "branches: inflating, rows 1 to 200; deflating, rows 201 to 400",
         "plateaus: 40 with",
         "suspected outliers: 1, not removed: force in row 96",
-        "force sensor saturates at its lower limit, -5 N, in 160 rows (40%)",
+        "force sensor saturates at its lower limit, -5 N, in 160 rows (40 %)",
     ):
         assert said in text
     assert "PROBLEM" not in text
@@ -145,6 +145,15 @@ def test_a_file_that_a_fit_rejects_is_inspected(tmp_path: Path):
     fitted = airmuscle("fit", path, "--characteristic", "ContractileSurface", "--out", tmp_path / "fit")
     assert fitted.exit_code == 1
     assert "is less than the time of the previous row" in fitted.stderr
+
+
+def test_rounded_time_stamps_are_told_from_the_rate_of_the_rows_and_name_the_option(tmp_path: Path):
+    rows = [f"{i // 2 / 10:.1f},{i * 10},{0.3 - 1e-4 * i},{2 * i}" for i in range(60)]
+    path = tmp_path / "rounded.csv"
+    path.write_text("\n".join(["time [s],pressure [kPa],length [m],force [N]", *rows]))
+    text = airmuscle("inspect", path).stdout
+    assert "sampling: 20.34 rows per second over 2.9 s, time stamps repeat" in text
+    assert "For stamps that the logger rounded, use --time uniform." in text
 
 
 def test_options_and_mapping_are_equivalent(tmp_path: Path):

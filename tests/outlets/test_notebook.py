@@ -20,6 +20,7 @@ from airmuscle.core.notebook import MAX_NOTES, MAX_ROWS, Card, NotebookDisplay, 
 from airmuscle.core.plotting import new_figure
 from airmuscle.core.short_repr import MAX_LINES, ShortRepr
 from airmuscle.muscle.characteristic import ContractileSurface
+from airmuscle.muscle.display import parameter_rows
 from airmuscle.recording.panels import panels_of
 
 MAX_BYTES = 200_000
@@ -66,6 +67,14 @@ def test_texts_of_the_user_are_escaped(displayed: dict[str, NotebookDisplay]):
     html = displayed["recording"]._repr_html_()
     assert "&lt;script&gt;alert(&#x27;1&#x27;)&lt;/script&gt; &amp; &quot;quoted&quot;.csv" in html
     assert "a &lt;b&gt;note&lt;/b&gt;" in html
+
+
+def test_a_table_states_the_meaning_of_a_list_once_and_the_default_name_of_a_muscle_once():
+    law = ContractileSurface.blank(2)
+    assert [row[-1] != "" for row in parameter_rows({"characteristic": law})] == [True, *5 * [False], *6 * [True]]
+    muscle, valve = am.load("dmsp-20-300").muscle, am.load("matrix-821").valve
+    plant = am.Plant(muscle, am.FillDischarge(am.Supply(6e5), valve, valve), am.HangingMass(5.0))
+    assert ("muscle", "MartensBoblan2017, 300 mm") in [row[:2] for row in plant._card().table]
 
 
 def test_a_card_counts_what_it_leaves_out():

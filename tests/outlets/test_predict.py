@@ -143,6 +143,18 @@ def test_a_law_is_scaled_to_the_resting_length_of_the_record_with_a_note():
     assert "scaled from 300 mm to 200 mm" in " ".join(predict_with_entry(entry, moved).notes)
 
 
+def test_a_length_without_a_resting_length_is_that_of_the_muscle_or_refused():
+    entry, run = am.load("dmsp-20-300"), sweep(3e5, 1)
+    columns = {**{name: run[name] for name in ("time", "pressure", "force")}, "length": run["length"]}
+    (note,) = predict_with_entry(entry, Recording(columns, "own", {})).notes
+    assert (
+        note == "the record states no resting length; with that of the muscle, 300 mm, its contraction is 2 to 19.94 %"
+    )
+    longer = Recording({**columns, "length": 1.7 * columns["length"]}, "longer", {})
+    with pytest.raises(ColumnError, match=r"its contraction is -66.6 to -36.1 %, which is impossible.*resting_length="):
+        predict_with_entry(entry, longer)
+
+
 @pytest.mark.parametrize(
     ("columns", "message"),
     [

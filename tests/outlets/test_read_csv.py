@@ -71,13 +71,40 @@ FORMS = {
     + PLAIN.partition("\n")[2].partition("\n")[2],
     "spaces": PLAIN.replace(",", " , "),
     "a delimiter at each end": PLAIN.replace("\n", ",\n"),
+    "blanks between numbers": PLAIN.partition("\n")[0].replace(",", "   ")
+    + "\n"
+    + PLAIN.partition("\n")[2].replace(",", "  "),
+    "blanks, unit row and margin": "time pressure length force\n[s] [kPa] [mm] [N]\n"
+    + "\n".join(f"   {line}" for line in PLAIN.partition("\n")[2].replace(",", " ").splitlines()),
+    "blanks and decimal comma": GERMAN.partition("\n")[0].replace(";", " ")
+    + "\n"
+    + GERMAN.partition("\n")[2].replace(";", " "),
+    "blanks and a commented heading": "% rig 3\n% time [s] pressure [kPa] length [mm] force [N]\n"
+    + PLAIN.partition("\n")[2].replace(",", " "),
     "rows of nothing": PLAIN + ",,,\n,,,\n",
+    "title above the headings": "Run of 12.03.2026\n" + PLAIN,
+    "settings above headings and unit row": "Rig,3\nSensor,1,2\noperator\n\ntime,pressure,length,force\ns,kPa,mm,N\n"
+    + PLAIN.partition("\n")[2],
+    "padded title": "Messung vom 12.03.2026;;;\nPrüfstand 3;;;\n" + GERMAN,
+    "separator line of Excel": "sep=;\n" + GERMAN,
 }
 
 
 @pytest.mark.parametrize("form", FORMS)
 def test_every_format_gives_the_same_recording(bench, form: str):
     same(read_csv(bench(FORMS[form])))
+
+
+@pytest.mark.parametrize("line", ["Ruhelänge;250 mm", "Resting length;250;mm", "resting_length: 250 mm", "L0 [mm];250"])
+def test_a_constant_above_the_headings_is_read(bench, line: str):
+    recording = read_csv(bench(f"Rig 3\n{line}\n" + GERMAN))
+    same(recording)
+    assert recording.constants["resting_length"] == pytest.approx(0.25)
+
+
+def test_rows_of_numbers_are_never_taken_for_lines_above_the_headings(bench):
+    said = refusal(bench("pressure [kPa],force [N]\n1,2,3\n4,5,6\nbad,row,x\n7,8,9\n"), ColumnError)
+    assert "bench.csv, line 2: the line must have 2 cells" in said
 
 
 def test_latin_1_is_read(bench):
@@ -315,6 +342,13 @@ def test_a_length_in_the_wrong_unit(bench):
 def test_an_invalid_resting_length(bench):
     assert "resting_length is -1 m; it must be positive" in refusal(bench(PLAIN), ColumnError, resting_length=-1.0)
     assert "has no unit" in refusal(bench(PLAIN), UnitError, resting_length="300")
+
+
+def test_a_resting_length_in_millimetres_and_an_ambient_pressure_in_kilopascals_without_a_unit_are_refused(bench):
+    message = refusal(bench(PLAIN), ColumnError, resting_length=250)
+    assert "resting_length is 250 m; allowed range: 0.001 to 20 m. Check the unit; a number without a unit" in message
+    message = refusal(bench(PLAIN), ColumnError, ambient=98)
+    assert "ambient is 98 Pa; allowed range: 1000 to 200000 Pa" in message
 
 
 def test_a_missing_column(bench):

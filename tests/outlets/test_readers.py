@@ -83,6 +83,17 @@ def test_excel_with_a_preamble_a_unit_row_and_a_sheet_of_texts(tmp_path: Path):
     assert recording.origin == "run.xlsx"
 
 
+@pytest.mark.parametrize("sign", [".", ","])
+def test_numbers_that_a_worksheet_stores_as_texts_are_read(tmp_path: Path, sign: str):
+    """As spreadsheets of another language store them; a sheet of them was left out in silence."""
+    texts = [[str(value).replace(".", sign) for value in row] for row in TABLE.tolist()]
+    same(only(read(excel(tmp_path / "run.xlsx", {"Data": [list(HEADINGS), *texts]}))))
+    texts[3][1] = "1.234,5"
+    said = refusal(ColumnError, excel(tmp_path / "run.xlsx", {"Data": [list(HEADINGS), *texts]}))
+    assert "run.xlsx, row 5: " in said
+    assert "is not a number" in said
+
+
 def test_every_sheet_with_a_table_is_a_run_and_one_can_be_selected(tmp_path: Path):
     rows = [list(HEADINGS), *TABLE.tolist()]
     path = excel(tmp_path / "runs.xlsx", {"First": rows, "Second": [rows[0], *rows[3:]]})
@@ -361,6 +372,7 @@ def test_a_table_without_headings_is_mapped_by_numbers(tmp_path: Path):
     same(only(read(tmp_path / "run.txt", columns=dict(enumerate(HEADINGS, 1)))))
     np.savetxt(tmp_path / "blanks.txt", TABLE)
     same(only(read(tmp_path / "blanks.txt", columns=dict(enumerate(HEADINGS, 1)), delimiter=" ")))
+    same(only(read(tmp_path / "blanks.txt", columns=dict(enumerate(HEADINGS, 1)))))
 
 
 def test_a_given_decimal_sign_resolves_thousands_separators(tmp_path: Path):

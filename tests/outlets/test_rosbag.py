@@ -63,10 +63,10 @@ def test_the_command_converts_a_bag(bag, tmp_path):
         assert written[name].tolist() == run[name].tolist()
 
 
-def test_a_quantity_without_unit_is_refused_with_the_line_that_states_it(bag, tmp_path):
+def test_a_quantity_without_unit_is_refused_with_the_option_that_states_it(bag, tmp_path):
     done = CliRunner().invoke(app, ["convert-data", str(bag), str(tmp_path / "run.csv")])
     assert done.exit_code == 1
-    assert '"pressure" = "pressure [...]" under [columns] in a --mapping file' in " ".join(done.output.split())
+    assert "To state the unit, use --unit 'pressure=...'." in " ".join(done.output.split())
     assert not (tmp_path / "run.csv").exists()
 
 

@@ -62,6 +62,18 @@ def test_a_run_that_ended_at_once_still_shows_what_was_commanded():
     assert chapter.plots[-1].figure.axes[0].lines[0].get_xdata()[-1] == 25.0
 
 
+def test_a_setting_that_the_scenario_does_not_state_has_the_source_default(tmp_path):
+    lines = EXAMPLE.read_text(encoding="utf-8").splitlines()
+    for name, added in (("plain", []), ("stated", ['initial_state = { pressure = "1 bar" }', 'integrator = "Rodas4"'])):
+        place = lines.index("[run]") + 1
+        (tmp_path / f"{name}.toml").write_text("\n".join([*lines[:place], *added, *lines[place:]]), encoding="utf-8")
+        scenario = load_scenario(tmp_path / f"{name}.toml")
+        sources = {what: source for what, _, source in run_chapter(scenario, scenario.simulate()).chosen}
+        state = "scenario" if added else "default: equilibrium at ambient pressure"
+        integrator = "scenario" if added else "default"
+        assert sources == {"integrator": integrator, "initial state (SI)": state, "inputs": "scenario"}
+
+
 JOINT = """
 [[plant.muscle]]
 library = "dmsp-20-300"

@@ -421,7 +421,7 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
             FILL,
             'model = "Shedule"',
             UnknownNameError,
-            r"\[input\], model: no model 'Shedule'.*Did you mean 'Schedule'\?",
+            r"\[input\], model: no model 'Shedule'; there are SampledSignal, Schedule\. Did you mean 'Schedule'\?",
         ),
         (
             FILL,
@@ -637,6 +637,8 @@ def test_a_plant_that_cannot_rest_names_muscle_and_forces(tmp_path: Path):
         load_scenario(heavy)
     assert re.search(r"arm pulls \d+(\.\d+)? N at 100 kPa and a contraction of", str(raised.value))
     assert re.search(r"requires a tension of 4903 N\. Change the load, the pressure or the parallel", str(raised.value))
+    assert 'In [run], initial_state = { pressure = "2 bar" } is the equilibrium at another' in str(raised.value)
+    assert "WithEndStops" in str(raised.value)
 
 
 def test_a_command_that_is_no_table(tmp_path: Path):

@@ -604,6 +604,9 @@ def test_the_report_shows_design_statistics_and_figures(folder: Path):
     assert [p.name for p in chapter.plots] == [
         "histograms", "scatter-pressure", "scatter-reached", "sensitivities", "time-series-course",
     ]  # fmt: skip
+    (scatter,) = chapter.plots[1].figure.axes[0].lines
+    assert scatter.get_markersize() >= 5.0, "few points are drawn large"
+    assert all(tick == round(tick) for tick in chapter.plots[0].figure.axes[0].get_yticks())
     statistics = result.statistics().columns
     assert statistics["mean"][0] == pytest.approx(result["pressure"].mean())
     assert statistics["median"][1] == pytest.approx(np.median(result["reached"]))
@@ -657,7 +660,7 @@ BAD = [
     ('model = "MonteCarlo"', 'model = "Saltelli"', "Use 16 or 32."),
     ('model = "MonteCarlo"\ncount = 22\nseed = 3', 'model = "Grid"', "has no levels; give a list or a Range"),
     ('model = "MonteCarlo"', 'model = "Random"', "no model 'Random'; there are Grid, LatinHypercube"),
-    ('[design]\nmodel = "MonteCarlo"\ncount = 22\nseed = 3', "", "[design] is missing"),
+    ('[design]\nmodel = "MonteCarlo"\ncount = 22\nseed = 3', "", '[design] is missing; it must contain at least one entry, such as model = "Grid".'),
     ('"2 bar"', '"2 mm"', "cannot be converted to 'Pa'"),
     ('"2 bar"', "inf", "it must be finite"),
     ('model = "Final", column = "pressure"', 'model = "Final", column = "presure"', "a run has no column 'presure'"),

@@ -94,10 +94,19 @@ def test_the_command_writes_the_same_file_with_other_gains_and_a_report(scenario
     assert {path.name for path in out.iterdir()} >= {"report.html", "history.csv", "figures"}
     assert {path.stem for path in (out / "figures").glob("*.png")} == {"convergence", "pareto", "response"}
     report = (out / "report.html").read_text(encoding="utf-8")
-    for text in ("Storn", "Skogestad", "drawn 1", "load x 0.5", "Pareto", "RootMeanSquareError"):
+    for text in (
+        "Storn",
+        "Skogestad",
+        "drawn 1",
+        "load x 0.5",
+        "Pareto",
+        "RootMeanSquareError",
+        "index, tuned gains [Pa]",
+    ):
         assert text in report
     assert len((out / "history.csv").read_text(encoding="utf-8").splitlines()) == 1 + 8
     assert "objective" in result.stdout
+    assert "gains [Pa]" in result.stdout
     assert run("simulate", tuned, "--out", scenario.parent / "run").exit_code == 0
 
 

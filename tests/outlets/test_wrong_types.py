@@ -20,6 +20,7 @@ from airmuscle.control.with_drivers import WithDrivers
 from airmuscle.core.errors import AirmuscleError, ColumnError, FileError, ParameterError, UnknownNameError
 from airmuscle.mechanism import HangingMass, WithOffsets
 from airmuscle.muscle import LinearDamper, Muscle
+from airmuscle.muscle.characteristic import ContractileSurface
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve, in_parallel, in_series
 from airmuscle.recording import Recording
@@ -98,6 +99,8 @@ CASES = {
     "motion as text": (lambda: spline_trajectory("a", "b"), "spline_trajectory: 'a' and 'b' are not times"),
     "sources of a name": (lambda: cite("dmsp-20-300"), r"cite: 'dmsp-20-300' is not a model; .*cite\(load\("),
     "fit of a name": (lambda: fit("Sarosi2012", RUN), "fit: Sarosi2012 is not a characteristic"),
+    "fit of a class": (lambda: fit(ContractileSurface, RUN), r"fit: the class ContractileSurface is not a characteristic\. Give one, for example an object of the class, ContractileSurface\.blank\(degree=5\)\."),
+    "fit to a file": (lambda: fit(MUSCLE.contractile, "run.csv"), "fit: run.csv is not a Recording"),
     "fit to nothing": (lambda: fit(MUSCLE.contractile, None), "fit: None is not a Recording. Give one, as returned by read"),
     "save a plant": (lambda: save(PLANT, "muscle.toml"), "save: Plant.* is not an Entry"),
     "write a plant": (lambda: write_csv(PLANT, "run.csv"), "write_csv: Plant.* is not a Recording"),

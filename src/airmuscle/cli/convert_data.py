@@ -13,18 +13,17 @@ from ..recording.csv_writer import write_csv
 from ..recording.reader import find_files
 from ..recording.writer import EXTENSIONS
 from .options import Json
+from .reading_options import NO_OPTIONS, ReadingOptions, with_reading_options
 from .terminal import echo, print_json
 
 Source = Annotated[str, typer.Argument(metavar="FILE", help="A file, folder or glob pattern, as for inspect.")]
 Target = Annotated[Path, typer.Argument(metavar="TARGET", help=f"The file to write: {', '.join(EXTENSIONS)}.")]
-MappingFile = Annotated[
-    Path | None, typer.Option("--mapping", metavar="FILE", help="TOML file with what the files do not state.")
-]
 Plain = Annotated[bool, typer.Option("--plain", help="CSV without comments, as pandas and spreadsheets expect it.")]
 
 
+@with_reading_options
 def convert_data(
-    source: Source, target: Target, mapping: MappingFile = None, plain: Plain = False, json: Json = False
+    source: Source, target: Target, plain: Plain = False, reading: ReadingOptions = NO_OPTIONS, json: Json = False
 ) -> None:
     """Write measurement files as CSV, Parquet or HDF5.
 
@@ -35,13 +34,14 @@ def convert_data(
     Examples:
       airmuscle convert-data bench.tdms bench.parquet
       airmuscle convert-data "runs/*.csv" runs.h5 --mapping rig.toml
+      airmuscle convert-data logger.csv run.parquet --time uniform --resting-length "300 mm"
       airmuscle convert-data run/recording.csv plain.csv --plain
     """
     if plain and target.suffix.lower() != ".csv":
         raise typer.BadParameter("--plain belongs to a target that ends in .csv.")
     if target.suffix.lower() not in EXTENSIONS:
         raise FileError(f"{target}: the extension must be one of {', '.join(EXTENSIONS)}.")
-    recordings = read(source, mapping=mapping)
+    recordings = read(source, mapping=reading.column_mapping(), units=reading.units)
     paths = [_path(target, i, len(recordings)) for i in range(len(recordings))]
     _check_no_source(paths, source)
     for recording, path in zip(recordings, paths, strict=True):

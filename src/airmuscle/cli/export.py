@@ -97,9 +97,9 @@ def export(
     """Export to C, JavaScript, MATLAB, FMU, MuJoCo or Modelica.
 
     \b
-    The program contains the equations of the plant, the integrator, and a run of the scenario that writes CSV; in C and
-    JavaScript also the controller and its drivers. Nothing of Python or airmuscle is needed to run it. Each file states
-    version, hash of the model, parameters, references and licence; the same scenario gives the same files.
+    The program contains the equations of the plant, the integrator, and a run of the scenario that writes CSV; in C,
+    JavaScript and MATLAB also the controller and its drivers. Nothing of Python or airmuscle is needed to run it. Each
+    file states version, hash of the model, parameters, references and licence; the same scenario gives the same files.
 
     \b
     Examples:

@@ -70,7 +70,8 @@ def fit_dynamic(
     check_writable(out)
     findings = _findings(loaded)
     if not json:
-        echo(f"  {len(loaded.experiments)} records, {loaded.starts} starts", err=True)
+        counts = ((len(loaded.experiments), "record"), (loaded.starts, "start"))
+        echo("  " + ", ".join(f"{count} {noun}{'s' * (count != 1)}" for count, noun in counts), err=True)
     fit = loaded.fit()
     cross = loaded.cross_predictions(fit)
     profiles = [fit.profile(name, points) for name in _profiled_names(fit, profile or [])]

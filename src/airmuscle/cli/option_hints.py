@@ -66,21 +66,6 @@ _RECORDS: Mapping[str, Instruction] = {
     "decimal": lambda hint: f"write decimal = {json.dumps(hint.value)} in the record's mapping file",
     "resting_length": lambda hint: 'write resting_length = "..." under [[record]]',
 }
-
-
-def _in_mapping(line: Callable[[Hint], str]) -> Instruction:
-    return lambda hint: f"write {line(hint)} in a --mapping file"
-
-
-_CONVERTED: Mapping[str, Instruction] = {
-    "units": _in_mapping(
-        lambda hint: ", ".join(f'"{name}" = "{name} [...]"' for name in hint.value) + " under [columns]"
-    ),
-    "columns": _in_mapping(_toml_table),
-    "decimal": _in_mapping(lambda hint: f"decimal = {json.dumps(hint.value)}"),
-    "file_name": _in_mapping(lambda hint: f"file_name = {json.dumps(hint.value)}"),
-    "resting_length": _in_mapping(lambda hint: 'resting_length = "..."'),
-}
 INSTRUCTIONS: Mapping[str, Mapping[str, Instruction]] = {
     "inspect": _FILES,
     "fit": {
@@ -99,7 +84,7 @@ INSTRUCTIONS: Mapping[str, Mapping[str, Instruction]] = {
     },
     "campaign": _FILES,
     "predict": _FILES,
-    "convert-data": _CONVERTED,
+    "convert-data": _FILES,
     "plan": {"fixed": _fix},
     "fit-dynamic": {**_RECORDS, "free": lambda hint: f"write free = {json.dumps(list(hint.value))} under [fit]"},
 }

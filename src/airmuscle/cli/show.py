@@ -7,6 +7,7 @@ from typing import Any
 
 from ..core import cite, leaves
 from ..core.display import in_display_unit
+from ..core.listed_names import continues_list
 from ..library.catalogue import load
 from ..library.entry import Entry
 from ..library.files import entries_of_product
@@ -108,7 +109,7 @@ def _print(entry: dict[str, Any]) -> None:
     echo("components: " + ", ".join(f"{part} {model}" for part, model in entry["models"].items()) + "\n")
     rows = [
         (p["name"], p["symbol"], format_number(p["value"]), _unit(p["unit"]), p["meaning"], _bounds(p["bounds"]))
-        for p in map(_displayed, _shorten(entry["parameters"]))
+        for p in map(_displayed, _with_meanings_once(_shorten(entry["parameters"])))
     ]
     print_table(("parameter", "symbol", "value", "unit", "meaning", "bounds"), rows, right=("value",))
     if "laws" in entry:
@@ -131,6 +132,12 @@ def _print(entry: dict[str, Any]) -> None:
     echo()
     for reference in entry["references"]:
         echo(f"- {reference}")
+
+
+def _with_meanings_once(parameters: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The parameters, of which the values of a list state their meaning once."""
+    pairs = zip(parameters, continues_list([p["name"] for p in parameters]), strict=True)
+    return [{**p, "meaning": ""} if continued else p for p, continued in pairs]
 
 
 def _shorten(parameters: list[dict[str, Any]]) -> list[dict[str, Any]]:

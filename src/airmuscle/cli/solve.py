@@ -150,10 +150,11 @@ def _resting_length(entry: Entry) -> float | None:
 
 
 def _rows(entry: Entry, point: WorkingPoint, unknown: str) -> list[tuple[str, str, str]]:
+    digits = {name: 4 if name == unknown else 6 for name in point._fields}  # a given value is repeated as it was given
     values = {
-        "pressure": quantity_text(point.pressure, "Pa", "kPa", 6),
+        "pressure": quantity_text(point.pressure, "Pa", "kPa", digits["pressure"]),
         "contraction": percent(point.contraction),
-        "force": quantity_text(point.force, "N", "N", 6),
+        "force": quantity_text(point.force, "N", "N", digits["force"]),
     }
     remarks = {"pressure": "gauge"}
     length = _resting_length(entry)

@@ -170,7 +170,7 @@ def _print(result: TuneResult, *files: str) -> None:
     echo(f"{result.loaded.scenario.title}: objective {tuning.objective:.4g}{before}")
     echo(f"{tuning.simulated_loops} loops: {len(tuning.history)} sets of gains in {len(tuning.cases)} cases")
     _print_table(gain_table(tuning, _units(result.loaded)))
-    _print_table(case_table(tuning))
+    _print_table(case_table(tuning, _units(result.loaded)))
     if result.rules:
         _print_table(rule_table(result.rules))
     for note in result.notes:

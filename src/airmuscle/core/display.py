@@ -112,12 +112,25 @@ def quantity_text(value: Any, si_unit: str, default: str, digits: int = 4) -> st
     return f"{value * factor:.{digits}g} {'' if unit == '1' else unit}".rstrip()
 
 
-def contraction_text(value: Any, default: str = ".2%", digits: int = 4) -> str:
-    """A contraction as text: in the format `default`, or to significant digits in the chosen unit."""
+def contraction_text(value: Any, decimals: int = 2, digits: int = 4) -> str:
+    """A contraction as text: in per cent with so many decimals, or to significant digits in the chosen unit."""
     choice = chosen_scale("1", 0.0, "")
     if not choice[1]:
-        return f"{value:{default}}"
+        return f"{100 * value:.{decimals}f} %"
     return f"{value * choice[0]:.{digits}g} {'' if choice[1] == '1' else choice[1]}".rstrip()
+
+
+def level_text(quantity: str, level: float, span: float) -> str:
+    """A level of a measured quantity as text, rounded to a thousandth of a span of levels [SI].
+
+    The median of noisy contractions, -6e-6, is so written as the level that was set, 0 %.
+    """
+    step = 10.0 ** math.floor(math.log10(span / 1e3)) if span > 0 else 0.0
+    rounded = round(level / step) * step + 0.0 if step else level
+    if quantity == "contraction":
+        return f"{100 * rounded:.4g} %"
+    units = {"pressure": ("Pa", "kPa"), "force": ("N", "N"), "length": ("m", "mm")}.get(quantity)
+    return quantity_text(rounded, *units) if units else f"{rounded:.4g}"
 
 
 def in_display_unit(value: Any, unit: str) -> tuple[Any, str]:

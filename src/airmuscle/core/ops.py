@@ -63,16 +63,16 @@ def where(condition: Value, when_true: Value, when_false: Value) -> Value:
 
 
 def maximum(a: Value, b: Value) -> Value:
-    """The larger of two values; traced as a comparison whose derivative at equality is that of `a`."""
+    """The larger of two values, or NaN; traced as a comparison whose derivative at equality is that of `a`."""
     if type(a) in _PLAIN and type(b) in _PLAIN:
-        return a if a >= b else b
+        return b if b > a or b != b else a
     return np.maximum(a, b) if _library(a, b) is np else where(a >= b, a, b)
 
 
 def minimum(a: Value, b: Value) -> Value:
-    """The smaller of two values; traced as a comparison whose derivative at equality is that of `b`."""
+    """The smaller of two values, or NaN; traced as a comparison whose derivative at equality is that of `b`."""
     if type(a) in _PLAIN and type(b) in _PLAIN:
-        return b if a >= b else a
+        return b if a >= b or b != b else a
     return np.minimum(a, b) if _library(a, b) is np else where(a >= b, b, a)
 
 

@@ -121,10 +121,11 @@ def _cross_validate(
 
 
 def _excess_error(name: str, rmse: float, lowest: float) -> ExcludedModel:
-    cause = f"its error on the rows of the fit, {rmse:.4g} N, is more than {MAX_EXCESS:g} times the lowest error"
+    error = f"error on the rows of the fit, {rmse:.4g} N, is more than {MAX_EXCESS:g} times the lowest error on rows"
+    cause = f"its cross-validation takes long, and its {error} left out, {lowest:.4g} N"
     reason = (
-        f"{cause[0].upper()}{cause[1:]} of another law on rows left out, {lowest:.4g} N, so it was not "
-        "cross-validated. To cross-validate it, give it as a candidate."
+        f"Its {error} left out of another law, {lowest:.4g} N, and its cross-validation takes long, so it was omitted. "
+        "To cross-validate it, give it as a candidate."
     )
     return ExcludedModel(name, reason, cause)
 

@@ -14,6 +14,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from ..core.display import level_text
 from ..core.errors import IdentificationError, ParameterError
 from ..core.field_types import check_field_types
 from ..core.hints import Hint, HintedText
@@ -94,7 +95,7 @@ class LevelSplit(GroupSplit):
             nearest = int(np.argmin(np.diff(centres)))
             centres = np.delete(centres, nearest)
         edges = (centres[1:] + centres[:-1]) / 2
-        names = np.array([f"{self.quantity} {centre:.4g}" for centre in centres])
+        names = np.array([f"{self.quantity} {level_text(self.quantity, float(each), span)}" for each in centres])
         return [names[np.searchsorted(edges, run[self.quantity])] for run in recordings]
 
 

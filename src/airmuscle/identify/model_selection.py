@@ -18,6 +18,9 @@ from .length_errors import find_length_errors, length_notes
 from .loss import LeastSquares, Loss
 from .parallel_scores import score_candidates
 
+MAX_EXCESS = 0.25
+"""Maximum excess of the error of a recommended law over the lowest one (chosen)."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Comparison(ShortRepr):
@@ -55,10 +58,11 @@ class Comparison(ShortRepr):
             f"{self.purpose}."
         )
         width = max(40, *(len(m.candidate.name) + 1 for m in self.ranking))
-        head = f"{'law':<{width}}{'parameters':>11}{'in sample':>12}{'left out':>12}{'AICc':>12}"
+        head = f"{'law':<{width}}{'parameters':>11}{'in sample':>12}{'left out':>12}{'AICc excess':>13}"
+        lowest = min(m.aicc for m in self.ranking)
         rows = [
             f"{m.candidate.name:<{width}}{m.parameter_count:>11}{m.in_sample_rmse:>10.4g} N"
-            f"{m.cross_validated_rmse:>10.4g} N{m.aicc:>12.1f}"
+            f"{m.cross_validated_rmse:>10.4g} N{m.aicc - lowest:>13.1f}"
             for m in self.ranking
         ]
         notes = [f"note: {note}" for note in self.notes]
@@ -89,7 +93,8 @@ def compare(
 
     The recommended law is the one with the fewest parameters among those whose error is not larger than the lowest one
     by more than one standard error of the difference (Breiman et al., Classification and Regression Trees (1984),
-    section 3.4.3). Raises IdentificationError where no candidate is determined.
+    section 3.4.3), and by at most a quarter (chosen): where one group dominates the difference, its standard error is
+    as large as the difference. Raises IdentificationError where no candidate is determined.
     """
     runs = [recordings] if isinstance(recordings, Recording) else list(recordings)
     splits = (leave_out or default_split(runs),)
@@ -124,15 +129,19 @@ def _comparison(
         reasons = [part for e in excluded for part in (f"\n{e.name}: ", e.reason)]
         raise IdentificationError(HintedText(f"the data determine none of the {len(excluded)} candidates.", *reasons))
     ranking.sort(key=lambda m: (m.cross_validated_rmse, m.parameter_count))
-    recommended, reason = _recommend(ranking, split)
+    recommended, reason = recommend(ranking, split)
     remarks = length_notes(find_length_errors(recommended.fit.model, runs))
     return Comparison(tuple(ranking), excluded, split, recommended, reason, unavailable, remarks)
 
 
-def _recommend(ranking: Sequence[RankedModel], split: GroupSplit) -> tuple[RankedModel, str]:
-    """The model by the one-standard-error rule, and the reason as a sentence with the numbers."""
+def recommend(ranking: Sequence[RankedModel], split: GroupSplit) -> tuple[RankedModel, str]:
+    """The model by the one-standard-error rule within `MAX_EXCESS`, and the reason as a sentence with the numbers.
+
+    ranking  models with the folds of one split, lowest cross-validated error first
+    """
     best = ranking[0]
-    equivalent = [m for m in ranking if excess_error(m, best) <= 0]
+    limit = (1 + MAX_EXCESS) * best.cross_validated_rmse
+    equivalent = [m for m in ranking if m.cross_validated_rmse <= limit and excess_error(m, best) <= 0]
     recommended = min(equivalent, key=lambda m: (m.parameter_count, m.cross_validated_rmse))
     text = (
         f"Recommended for {split.purpose}: {recommended.candidate.name} with {recommended.parameter_count} parameters, "

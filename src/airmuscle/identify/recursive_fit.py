@@ -130,8 +130,8 @@ class RecursiveFit(ShortRepr):
         share = float(np.mean(variance < DETERMINED))
         if share < 1.0:
             raise IdentificationError(
-                f"the samples determine the force on {share:.0%} of the range of the test rig. Measure more points, "
-                "reduce the range, or choose a smaller degree."
+                f"the samples determine the force on {100 * share:.0f} % of the range of the test rig. Measure more "
+                "points, reduce the range, or choose a smaller degree."
             )
         span = self.limits.validity_range
         return ContractileSurface(

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from ..core.arrays import Array
 from ..core.display import contraction_text, in_display_unit, quantity_text
 from ..core.errors import ParameterError, suggestion
+from ..core.listed_names import continues_list
 from ..core.notebook import Card, NotebookDisplay
 from ..muscle.characteristic.base import Characteristic
 from ..muscle.characteristic.validity_range import ValidityRange
@@ -61,8 +62,9 @@ class WorstPoint:
 class Fit(NotebookDisplay):
     """A fitted characteristic with its data and statistics; `print` it, or `.plot()` it.
 
-    Residuals are in the fitted quantity. `rmse`, `correlation_index` and `sigma` are over the uncensored rows,
-    `max_error` over all rows; a censored row has a residual only where the law violates its bound.
+    Residuals are in the fitted quantity. `rmse` and `correlation_index` are over the uncensored rows, `max_error` over
+    all rows; a censored row has a residual only where the law violates its bound. `sigma` is over the rows that
+    determine the parameters: uncensored rows where the law is not slack, and violated bounds.
     """
 
     model: Characteristic
@@ -203,7 +205,7 @@ class Fit(NotebookDisplay):
         if self.fitted_quantity == FORCE:
             return quantity_text(residual, "N", "N")
         if self.fitted_quantity == CONTRACTION:
-            return contraction_text(residual, ".4%")
+            return contraction_text(residual, 4)
         return quantity_text(residual, "Pa", "kPa")
 
     def _card(self) -> Card:
@@ -224,12 +226,16 @@ def _range_text(low: float, high: float, si_unit: str, default: str) -> str:
 
 
 def estimate_rows(estimates: Sequence[Estimate]) -> list[tuple[str, ...]]:
-    """The rows of a table of estimates in display units, with its header; SE is the standard error."""
+    """The rows of a table of estimates in display units, with its header; SE is the standard error.
+
+    The values of a list, coefficients[0], coefficients[1], ..., state their meaning once.
+    """
     rows: list[tuple[str, ...]] = [("parameter", "", "value", "2 SE", "unit", "meaning")]
-    for e in estimates:
+    for e, continued in zip(estimates, continues_list([e.name for e in estimates]), strict=True):
         value, unit = in_display_unit(e.value, e.unit)
         shown = dataclasses.replace(e, value=value, stderr=in_display_unit(e.stderr, e.unit)[0], unit=unit)
-        rows.append((e.name, e.label, f"{value:.4g}", shown.format_interval(), shown.display_unit, e.meaning))
+        meaning = "" if continued else e.meaning
+        rows.append((e.name, e.label, f"{value:.4g}", shown.format_interval(), shown.display_unit, meaning))
     return rows
 
 

@@ -9,9 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core import tree
-from ..core.annotation import one_line
 from ..core.arrays import Array
-from ..core.errors import IdentificationError, ParameterError
+from ..core.errors import IdentificationError
 from ..core.hints import Hint, HintedText
 from ..muscle.characteristic import PooledLengthLaw
 from ..muscle.characteristic.base import Characteristic
@@ -19,6 +18,7 @@ from ..recording import Recording
 from .branch_residuals import branch_notes
 from .censoring import UNCENSORED, Censoring, default_censoring
 from .correlation_index import correlation_index
+from .fit_arguments import check_arguments
 from .fit_points import POINT_COLUMNS, FitPoints
 from .gauss_newton import gauss_newton
 from .loss import LeastSquares, Loss
@@ -59,7 +59,7 @@ def fit(
     within their declared bounds. Raises IdentificationError where the data do not determine the parameters, and names
     these.
     """
-    _check_types(characteristic, recording)
+    check_arguments(characteristic, recording)
     points = FitPoints.from_recordings(recording)
     return fit_to_points(characteristic, points, loss=loss, censoring=censoring, sigma=sigma, fixed=fixed)
 
@@ -113,19 +113,6 @@ def refit(
     check_determined(problem, solution)
     model: Characteristic = tree.with_parameters(problem.law, problem.leaf_values(solution.values))
     return model
-
-
-def _check_types(characteristic: object, recording: object) -> None:
-    if not isinstance(characteristic, Characteristic):
-        raise ParameterError(
-            f"fit: {one_line(characteristic)} is not a characteristic. Give one, for example load(...).characteristic."
-        )
-    runs = recording if isinstance(recording, Sequence) else [recording]
-    for run in runs:
-        if not isinstance(run, Recording):
-            raise ParameterError(
-                f"fit: {one_line(run)} is not a Recording. Give one, as returned by read, read_csv or simulate."
-            )
 
 
 def _weighting_notes(by_recording: Array | None, problem: FitProblem) -> list[str]:
@@ -212,6 +199,7 @@ def _row_notes(problem: FitProblem, statistics: FitStatistics, dropped: int) -> 
                 Hint("To treat them as measured values", "censoring", UNCENSORED, constant="UNCENSORED"),
             )
         )
+    notes += _clamp_notes(problem)
     if statistics.uncensored_rank < statistics.rank:
         notes.append(
             f"The uncensored rows determine {statistics.uncensored_rank} of {statistics.rank} parameters; the others "
@@ -223,6 +211,18 @@ def _row_notes(problem: FitProblem, statistics: FitStatistics, dropped: int) -> 
         text = f"{at_zero} rows at zero force or below are treated as measured values."
         notes.append(HintedText(text, *([slack] if can_be_slack else [])))
     return notes
+
+
+def _clamp_notes(problem: FitProblem) -> list[str]:
+    """A remark on rows above the upper limit of the law, which a fit does not change."""
+    limit = default_censoring(problem.law).max_force
+    above = int(np.count_nonzero((problem.data["force"] > limit) & (problem.censoring == -1)))
+    if not above:
+        return []
+    return [
+        f"{above} rows are above the upper limit of the force of the law, max_force {limit:.4g} N, which the fit does "
+        "not change: the law gives no greater force. Give a law with a greater max_force."
+    ]
 
 
 def _collect_notes(problem: FitProblem, statistics: FitStatistics, loss: Loss, dropped: int) -> tuple[str, ...]:

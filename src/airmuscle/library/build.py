@@ -63,12 +63,14 @@ def build(
     *,
     classes: Mapping[str, type[Any]] | None = None,
     unit: str = "1",
+    kind: Any = Any,
 ) -> Any:
     """The model that a table describes. Raises ParameterError, UnitError or UnknownNameError with the location.
 
     given    fields that are models already and are not in the table
     classes  the allowed classes by name; by default all registered models
     unit     contextual unit of the fields declared with `custom_field`
+    kind     annotation of the place of the model; an unknown name is answered with the models that it allows
     """
     if not isinstance(table, Mapping):
         raise ParameterError(
@@ -79,7 +81,7 @@ def build(
     if not isinstance(table.get("model"), str):
         choice = f"one of {', '.join(classes)}" if classes else 'such as model = "Braid"'
         raise ParameterError(f'{location}: the model is not named; write model = "...", {choice}, and its parameters.')
-    cls = model_class(table["model"], f"{location}, model", classes)
+    cls = model_class(table["model"], f"{location}, model", classes, kind)
     fields = {key: value for key, value in table.items() if key != "model"}
     for key in fields:
         with located_errors(location):
@@ -104,11 +106,11 @@ def _build_part(value: Any, hint: Any, key: str, location: Location) -> Any:
     """A structural field: a model, a tuple of models, an integer, a text, true or false."""
     inner = location.inside(key)
     if isinstance(value, Mapping):
-        part = build(value, inner)
+        part = build(value, inner, kind=hint)
     elif isinstance(value, list):
         part = tuple(_build_part(v, item_type(hint), f"{key}[{i}]", location) for i, v in enumerate(value))
     elif isinstance(value, str) and not accepts(hint, value):
-        part = build({"model": value}, inner)
+        part = build({"model": value}, inner, kind=hint)
     else:
         part = value
     if not accepts(hint, part):
@@ -166,7 +168,7 @@ def read_entry_texts(tables: Mapping[str, Any], location: Location) -> dict[str,
 
 
 def _build_orifice(table: Any, location: Location) -> Any:
-    return check_type(build(table, location), Orifice, location)
+    return check_type(build(table, location, kind=Orifice), Orifice, location)
 
 
 def _read_switching_times(tables: Mapping[str, Any], location: Location) -> SwitchingTimes | None:

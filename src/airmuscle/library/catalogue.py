@@ -39,8 +39,8 @@ def load(name_or_path: str | Path) -> Entry | ValveEntry | PlantEntry | ProductE
     file by its path.
 
     In a plant, write `.muscle` of an Entry, and `.valve` or `.exhaust` of a ValveEntry; a PlantEntry contains a
-    `.plant`. Raises UnknownNameError,
-    FileError, ParameterError or UnitError with the location. A warning of the entry is issued as an AirmuscleWarning.
+    `.plant`. Raises UnknownNameError, FileError, ParameterError or UnitError with the location. A warning of the entry
+    is issued as an AirmuscleWarning.
     """
     if is_path(name_or_path):
         path = file = Path(name_or_path)

@@ -52,7 +52,7 @@ def build_entry(tables: Mapping[str, Any], name: str, file: Path, folder: Path) 
             f"{location}: the table [characteristic] is missing; it names a force law and its parameters."
         )
     parts = {
-        key: check_type(build(tables[key], location.inside(key)), kind, location.inside(key))
+        key: check_type(build(tables[key], location.inside(key), kind=kind), kind, location.inside(key))
         for key, kind in PARTS.items()
         if key in tables
     }

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 
-from ..core.errors import ParameterError
+import numpy as np
+
+from ..core.errors import ColumnError, ParameterError
+from ..core.hints import Hint
 from ..identify.campaign.rows import is_held
 from ..identify.compared_points import law_of_length
 from ..identify.cross_validation import specimen_name
@@ -12,6 +15,7 @@ from ..identify.prediction import RecordPrediction, predict_static
 from ..identify.problem import fitted_quantity_of
 from ..muscle.characteristic.base import ForceLaw
 from ..recording import Recording
+from ..recording.plausibility import CONTRACTION_RANGE
 from .entry import Entry
 from .length_scaling import LENGTH_TOLERANCE, scale_to_length
 
@@ -22,9 +26,9 @@ UNUSED_PARTS = ("damper", "wall", "series", "stop")
 def predict_with_entry(entry: Entry, recording: Recording) -> RecordPrediction:
     """Predict a slow record by the law of an entry, its friction and its creep elements, with its stated 95 % band.
 
-    Law and geometry are scaled to the resting length that the record states; without one, friction and creep take that
-    of the geometry. Raises ParameterError for an entry that cannot be scaled or has a spring, and ColumnError for a
-    record without pressure, contraction and force.
+    Law and geometry are scaled to the resting length that the record states; without one, that of the geometry is used.
+    Raises ParameterError for an entry that cannot be scaled or has a spring, and ColumnError for a record without
+    pressure, contraction and force, or whose contractions are impossible with the resting length of the geometry.
     """
     if entry.spring is not None:
         raise ParameterError(
@@ -36,9 +40,8 @@ def predict_with_entry(entry: Entry, recording: Recording) -> RecordPrediction:
     law = law_of_length(entry.characteristic, length, specimen_name(recording))
     notes = []
     if length is None and entry.geometry is not None:
-        recording = dataclasses.replace(
-            recording, constants={**recording.constants, "resting_length": float(entry.geometry.resting_length)}
-        )
+        recording, remarks = _with_resting_length(recording, float(entry.geometry.resting_length))
+        notes += remarks
     elif length is not None:
         law = scale_to_length(law, length, f"{recording.origin}, resting length")
     left_out = [part for part in UNUSED_PARTS if getattr(entry, part) is not None]
@@ -56,6 +59,23 @@ def predict_with_entry(entry: Entry, recording: Recording) -> RecordPrediction:
         validity_range=entry.validity_range,
     )  # fmt: skip
     return dataclasses.replace(result, notes=(*result.notes, *notes))
+
+
+def _with_resting_length(recording: Recording, length: float) -> tuple[Recording, list[str]]:
+    """The recording with the resting length of the muscle, and a note if its contraction depends on it."""
+    constants = {**recording.constants, "resting_length": length}
+    completed = dataclasses.replace(recording, constants=constants)
+    if "contraction" in recording or "length" not in recording:
+        return completed, []
+    what = f"the record states no resting length; with that of the muscle, {1e3 * length:.4g} mm"
+    low, high = (float(f(completed["contraction"])) for f in (np.nanmin, np.nanmax))
+    if not CONTRACTION_RANGE[0] < low <= high < CONTRACTION_RANGE[1]:
+        raise ColumnError(
+            f"{recording.origin}: {what}, its contraction is {100 * low:.4g} to {100 * high:.4g} %, which is "
+            "impossible.",
+            hint=Hint("To state the length", "resting_length", "400 mm"),
+        )
+    return completed, [f"{what}, its contraction is {100 * low:.4g} to {100 * high:.4g} %"]
 
 
 def _half_width(entry: Entry, quantity: str, recording: Recording) -> float | None:

@@ -72,9 +72,16 @@ def complete_name(name: str, known: Iterable[str], kind: str) -> str:
     if len(matches) > 1:
         raise UnknownNameError(f"'{name}' is ambiguous: {', '.join(matches)}. Write more of the name.")
     if not matches:
-        hint = suggestion(folded, known) or _names_with(folded, known)
+        hint = _file_in_folder(name) or suggestion(folded, known) or _names_with(folded, known)
         raise UnknownNameError(f"no {kind} '{name}'; there are {', '.join(known)}.{hint}")
     return matches[0]
+
+
+def _file_in_folder(name: str) -> str:
+    """A sentence with the muscle file or the scenario in a folder of this name; empty if there is none."""
+    files = (Path(name) / file for file in ("muscle.toml", "scenario.toml"))
+    found = next((file.as_posix() for file in files if name and file.is_file()), "")
+    return f" '{name}' is a folder; write {found}." if found else ""
 
 
 def _folded(name: str) -> str:

@@ -6,10 +6,13 @@ import dataclasses
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ..core.errors import ParameterError
+from ..core.errors import ParameterError, UnknownNameError, suggestion
+from ..core.hints import HintedText
 from ..identify import standard_candidates
+from ..muscle.characteristic.base import Characteristic
 from ..recording import Recording
 from .entry import Entry
+from .files import is_path
 from .law_file import load_law
 from .length_scaling import scale_to_length
 from .models import model_class, model_names
@@ -31,8 +34,10 @@ def find_initial_law(
     initial values cannot be estimated, and for an entry that cannot be scaled.
     """
     if name not in model_names():
-        return InitialLaw(_at_length_of(load_law(name), recordings, f"{option} {name}"))
+        return InitialLaw(_at_length_of(_load_law(name), recordings, f"{option} {name}"))
     cls = model_class(name, option)
+    if not issubclass(cls, Characteristic):
+        raise ParameterError(f"{option}: {name} is not a characteristic; there are {', '.join(_law_names())}.")
     if hasattr(cls, "blank"):
         # An upper limit of twice the measured force clamps no measured point, and still limits the extrapolation.
         max_force = 2.0 * max(1.0, *(float(run["force"].max()) for run in recordings))
@@ -46,6 +51,21 @@ def find_initial_law(
         f"{option}: {name} needs initial values, which cannot be estimated from these data. Give a library entry of "
         f"this model (see airmuscle list) or a muscle file with initial values.{length}"
     )
+
+
+def _law_names() -> tuple[str, ...]:
+    return model_names(Characteristic)
+
+
+def _load_law(name: str) -> Entry:
+    """A library entry or muscle file; the error for another name also lists the laws."""
+    try:
+        return load_law(name)
+    except UnknownNameError as error:
+        if is_path(name):
+            raise
+        laws = f" Or name a law: {', '.join(_law_names())}.{suggestion(name, _law_names())}"
+        raise UnknownNameError(HintedText(error.message, laws)) from None
 
 
 def resting_lengths(recordings: Sequence[Recording]) -> tuple[float, ...]:

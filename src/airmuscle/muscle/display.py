@@ -12,6 +12,7 @@ import numpy as np
 from ..core.arrays import Array
 from ..core.axes import given_axes
 from ..core.display import contraction_text, in_display_unit, quantity_text
+from ..core.listed_names import continues_list
 from ..core.plotting import new_figure
 from ..core.tree import leaves
 from .characteristic.base import Characteristic
@@ -62,7 +63,8 @@ def parameter_rows(parts: dict[str, Any], last: Sequence[str] = ()) -> list[tupl
             rows.append(
                 (name, leaf.declared.symbol, f"{value:.4g}", "" if unit == "1" else unit, leaf.declared.meaning)
             )
-    return rows
+    continued = continues_list([row[0] for row in rows])
+    return [(*row[:-1], "") if further else row for row, further in zip(rows, continued, strict=True)]
 
 
 def component_rows(muscle: Any) -> list[tuple[str, ...]]:

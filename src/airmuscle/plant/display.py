@@ -31,7 +31,8 @@ class PlantDisplay(NotebookDisplay):
         rows = [("component", "value")]
         for muscle in plant.muscles:
             length = quantity_text(muscle.geometry.resting_length, "m", "mm")
-            rows.append((f"muscle {muscle.name}", f"{type(muscle.contractile).__name__}, {length}"))
+            label = "muscle" if muscle.name == "muscle" else f"muscle {muscle.name}"
+            rows.append((label, f"{type(muscle.contractile).__name__}, {length}"))
         rows += [
             (f"circuit {p}".rstrip("."), _brief(c)) for p, c in zip(plant.circuit_prefixes, plant.circuits, strict=True)
         ]

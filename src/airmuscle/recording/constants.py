@@ -15,6 +15,8 @@ from .table import RawTable
 
 CONSTANT_UNITS = {"resting_length": "m", "ambient": "Pa"}
 """The SI units of the constants that have a unit."""
+CONSTANT_RANGES = {"resting_length": (1e-3, 20.0), "ambient": (1e3, 2e5)}
+"""The allowed ranges in SI units, those of the parameters of a geometry and of the ambient air."""
 _NAMES = {
     "resting_length": ("resting_length", "rest_length", "initial_length", "original_length", "l0", "l_0", "ruhelänge"),
     "ambient": ("ambient", "ambient_pressure", "atmospheric_pressure", "barometer"),
@@ -49,9 +51,20 @@ def collect_constants(table: RawTable, user_constants: Mapping[str, float | str]
     for name, unit in CONSTANT_UNITS.items():
         if name in constants:
             constants[name] = quantity(constants[name], unit, ambient=0.0, where=f"{table.origin}: {name}")
-            if not constants[name] > 0:
-                raise ColumnError(f"{table.origin}: {name} is {constants[name]:g} {unit}; it must be positive.")
     return constants
+
+
+def check_constants(table: RawTable, constants: Mapping[str, Any]) -> None:
+    """Raise ColumnError for a constant that is not positive, or outside its allowed range."""
+    for name, (low, high) in CONSTANT_RANGES.items():
+        value, unit = constants.get(name, low), CONSTANT_UNITS[name]
+        if not value > 0:
+            raise ColumnError(f"{table.origin}: {name} is {value:g} {unit}; it must be positive.")
+        if not low <= value <= high:
+            raise ColumnError(
+                f"{table.origin}: {name} is {value:g} {unit}; allowed range: {low:g} to {high:g} {unit}. Check the "
+                "unit; a number without a unit is in SI units."
+            )
 
 
 def constant_from_column(table: RawTable, heading: str, unit: str | None, values: Array) -> tuple[str, float] | None:

@@ -9,9 +9,14 @@ from collections.abc import Sequence
 from ..core.errors import ColumnError, UnitError
 from ..core.hints import Hint
 from ..core.units import conversion
+from .constants import parse_constant_name
 from .heading import parse_heading
 
-_CONSTANT_COMMENT = re.compile(r"[#%]\s*(?P<name>[A-Za-z_]\w*)(?:\s*\[(?P<unit>[^\]]*)\])?\s*[=:]\s*(?P<value>.+)")
+COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
+"""A number with a decimal comma, without thousands separators."""
+POINT_NUMBER = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
+"""A number with a decimal point, without thousands separators."""
+_CONSTANT_COMMENT = re.compile(r"[#%]\s*(?P<name>[^\W\d][\w -]*?)(?:\s*\[(?P<unit>[^\]]*)\])?\s*[=:]\s*(?P<value>.+)")
 _TEXT_CONSTANTS = ("resting_length", "ambient", "specimen", "run")
 
 
@@ -50,6 +55,19 @@ def parse_unit_row(headings: Sequence[str], cells: Sequence[str]) -> tuple[str, 
     return tuple(bare) if any(_is_unit(text, cell) for text, cell in candidates) else None
 
 
+def count_cells(cells: Sequence[object]) -> int:
+    """The number of cells with content."""
+    return sum(cell not in (None, "") for cell in cells)
+
+
+def parse_constant_cells(cells: Sequence[str]) -> tuple[str, float | str] | None:
+    """A constant in two cells (`resting_length | 300 mm`), in three (`resting_length | 300 | mm`), or as a comment."""
+    filled = [cell for cell in cells if cell]
+    name, value = (filled[0].rstrip(" :="), " ".join(filled[1:])) if len(filled) > 1 else (filled[0], "")
+    text = f"{name} = {value}" if value else name
+    return parse_constant_comment(text if text[0] in "#%" else f"# {text}")
+
+
 def _is_unit(heading: str, cell: str) -> bool:
     """Whether a cell is a unit of the quantity in its heading."""
     target = parse_heading(heading).target
@@ -62,16 +80,19 @@ def _is_unit(heading: str, cell: str) -> bool:
 def parse_constant_comment(line: str) -> tuple[str, float | str] | None:
     """Name and value in `# resting_length [mm] = 300` or `# resting_length: 300 mm`; None for any other comment.
 
-    Any number or quoted text (JSON) is a constant of the run; an unquoted text only after a known name.
+    Any number or quoted text (JSON) after one word is a constant of the run; another text only after a known name.
     """
     match = _CONSTANT_COMMENT.fullmatch(line.strip())
     if not match:
         return None
     name, text = match["name"], match["value"].strip()
+    known = name in _TEXT_CONSTANTS or parse_constant_name(name) is not None
+    if not known and not name.isidentifier():
+        return None
     try:
         value = json.loads(text)
     except json.JSONDecodeError:
-        return (name, text) if name in _TEXT_CONSTANTS else None
+        return (name, text) if known else None
     if not isinstance(value, float | int | str) or isinstance(value, bool):
         return None
     return name, f"{text} {match['unit']}" if match["unit"] else value

@@ -17,7 +17,7 @@ from ..core.hints import Hint, HintedText
 from ..core.units import AMBIENT_PRESSURE, UnitConversion, conversion, quantity
 from .clock import seconds_from_clock
 from .columns import QUANTITIES
-from .constants import collect_constants, constant_from_column, parse_constant_name
+from .constants import check_constants, collect_constants, constant_from_column, parse_constant_name
 from .heading import UNIT_SPELLINGS, Heading, find_quantity_name, parse_heading
 from .plausibility import check_plausible
 from .recording import Recording
@@ -43,6 +43,7 @@ def interpret(
         if not heading.known and not isinstance(cells, list):
             constant = constant_from_column(table, heading.text, heading.unit, cells)
             run_constants = {constant[0]: constant[1], **run_constants} if constant else run_constants
+    check_constants(table, run_constants)
     ambient = float(run_constants.get("ambient", AMBIENT_PRESSURE))
     columns: dict[str, Array] = {}
     notes: list[str] = [*table.notes, *_override_notes(table, headings)]

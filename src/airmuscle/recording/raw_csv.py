@@ -10,6 +10,7 @@ import numpy as np
 from ..core.errors import ColumnError, FileError
 from ..core.hints import Hint
 from .file_kind import check_text_file
+from .header import COMMA_NUMBER, POINT_NUMBER
 from .table import Cells, RawTable
 from .text_format import (
     NumberedLines,
@@ -21,9 +22,6 @@ from .text_format import (
     parse_header,
     split_cells,
 )
-
-_COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
-_POINT_NUMBER = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
 
 
 def read_csv_table(path: str | Path, text_format: TextFormat = TextFormat()) -> RawTable:
@@ -86,7 +84,7 @@ def _parse_by_cell(
 def _with_decimal_point(cell: str, decimal: str | None) -> str:
     """A number with a decimal point; if the decimal sign is given, the other sign separates thousands."""
     if decimal is None:
-        return cell.replace(",", ".") if _COMMA_NUMBER.fullmatch(cell) else cell
+        return cell.replace(",", ".") if COMMA_NUMBER.fullmatch(cell) else cell
     thousands = "." if decimal == "," else ","
     plain = cell.replace(thousands, "").replace(",", ".")
     return plain if re.fullmatch(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?", plain) else cell
@@ -104,7 +102,7 @@ def _check_decimal_sign(origin: str, body: NumberedLines, rows: list[list[str]])
     first_use: dict[str, tuple[int, str]] = {}
     for (line, _), row in zip(body, rows, strict=True):
         for cell in row:
-            sign = "," if _COMMA_NUMBER.fullmatch(cell) else "." if _POINT_NUMBER.fullmatch(cell) else ""
+            sign = "," if COMMA_NUMBER.fullmatch(cell) else "." if POINT_NUMBER.fullmatch(cell) else ""
             first_use.setdefault(sign, (line, cell))
     if "," in first_use and "." in first_use:
         (line, cell), (other, example) = first_use[","], first_use["."]

@@ -10,7 +10,16 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import ColumnError, FileError, suggestion
-from .header import are_headings, missing_header_error, parse_constant_comment, parse_unit_row
+from .header import (
+    COMMA_NUMBER,
+    POINT_NUMBER,
+    are_headings,
+    count_cells,
+    is_number,
+    missing_header_error,
+    parse_constant_cells,
+    parse_unit_row,
+)
 from .optional_dependency import import_lab_package, run_reader
 from .table import Cells, RawTable
 
@@ -71,7 +80,9 @@ def _contains_table(rows: Rows) -> bool:
 def _parse_table(origin: str, rows: Rows, headerless: bool) -> RawTable:
     """The table of a worksheet; rows above the headings may state constants."""
     start = _find_heading_row(rows)
-    constants = dict(constant for _, row in rows[:start] if (constant := _parse_constant(row)))
+    constants = dict(
+        constant for _, row in rows[:start] if (constant := parse_constant_cells([_text(cell) for cell in row]))
+    )
     first, cells = rows[start]
     used = [j for j, cell in enumerate(cells) if cell not in (None, "")]
     if are_headings([_text(c) for c in cells]):
@@ -93,8 +104,8 @@ def _parse_table(origin: str, rows: Rows, headerless: bool) -> RawTable:
 def _find_heading_row(rows: Rows) -> int:
     """The index of the last row above the numbers that is as wide as they are, or of the row above the unit row."""
     numeric = next((i for i, (_, row) in enumerate(rows) if _is_numeric(row)), 0)
-    width = sum(c not in (None, "") for c in rows[numeric][1])
-    above = [i for i in range(numeric) if sum(c not in (None, "") for c in rows[i][1]) >= width]
+    width = count_cells(rows[numeric][1])
+    above = [i for i in range(numeric) if count_cells(rows[i][1]) >= width]
     if not above:
         return numeric
     adjacent = len(above) > 1 and above[-2] == above[-1] - 1
@@ -103,18 +114,13 @@ def _find_heading_row(rows: Rows) -> int:
 
 
 def _is_numeric(row: list[Any]) -> bool:
-    """Whether more than half of the cells of a row are numbers; the others may be texts such as the operator's name."""
+    """Whether more than half of the cells of a row are numbers, also as texts; the others may be names."""
     cells = [c for c in row if c not in (None, "")]
-    numbers = sum(isinstance(c, float | int | datetime.date | datetime.time) for c in cells)
+    numbers = sum(
+        isinstance(c, float | int | datetime.date | datetime.time) or (isinstance(c, str) and is_number(c))
+        for c in cells
+    )
     return 2 * numbers > len(cells)
-
-
-def _parse_constant(row: list[Any]) -> tuple[str, float | str] | None:
-    """A constant in two cells (`resting_length | 300 mm`), in three (`resting_length | 300 | mm`), or as a comment."""
-    cells = [_text(c) for c in row if c not in (None, "")]
-    name, value = (cells[0].rstrip(" :="), " ".join(cells[1:])) if len(cells) > 1 else (cells[0], "")
-    text = f"{name} = {value}" if value else name
-    return parse_constant_comment(text if text[0] in "#%" else f"# {text}")
 
 
 def _cell(row: list[Any], j: int) -> Any:
@@ -138,9 +144,13 @@ def _text(cell: Any) -> str:
 
 
 def _column(cells: list[Any]) -> Cells:
+    """A column of numbers, also of numbers that are stored as texts with one decimal sign; otherwise of texts."""
     if all(isinstance(cell, float | int) and not isinstance(cell, bool) for cell in cells):
         return np.array(cells, dtype=float)
     texts = [_text(cell) for cell in cells]
+    stored = [cell for cell in cells if isinstance(cell, str)]
+    if not any(POINT_NUMBER.fullmatch(text.strip()) for text in stored):
+        texts = [text.replace(",", ".") if COMMA_NUMBER.fullmatch(text) else text for text in texts]
     try:
         return np.array([float(text) for text in texts])
     except ValueError:

@@ -5,10 +5,19 @@ from __future__ import annotations
 import codecs
 import csv
 import dataclasses
+import re
 from collections.abc import Mapping
 
 from ..core.errors import FileError, ParameterError
-from .header import are_headings, missing_header_error, parse_constant_comment, parse_unit_row
+from .header import (
+    are_headings,
+    count_cells,
+    is_number,
+    missing_header_error,
+    parse_constant_cells,
+    parse_constant_comment,
+    parse_unit_row,
+)
 
 NumberedLines = list[tuple[int, str]]
 """Lines of a file with their numbers, counted from 1."""
@@ -42,8 +51,19 @@ class TextFormat:
             raise ParameterError("delimiter and decimal are both ','; they must differ. Export the table with ';'.")
 
     def detect_delimiter(self, line: str) -> str:
-        """The given delimiter, otherwise the one detected in the first line of the table."""
-        return self.delimiter or next((d for d in "\t;" if d in line), ",")
+        """The given delimiter, otherwise the one detected in a line of the table; blanks only between numbers."""
+        return self.delimiter or next((d for d in "\t;" if d in line), " " if _are_numbers_and_blanks(line) else ",")
+
+    def with_blanks(self, body: NumberedLines) -> TextFormat:
+        """The format with blanks as the delimiter, if none is given and they separate the first numbers of a table."""
+        if self.delimiter is None:
+            for _, line in body:
+                delimiter = self.detect_delimiter(line)
+                if delimiter == " ":
+                    return dataclasses.replace(self, delimiter=delimiter)
+                if delimiter != "," or _is_numeric(split_cells(line, delimiter)):
+                    break
+        return self
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,7 +75,7 @@ class TextHeader:
     constants: Mapping[str, float | str]
     delimiter: str
     header_lines: int
-    """Number of lines of the table, without comments, above the numbers: 0, 1 or 2."""
+    """Number of lines, without comments, above the numbers: headings, unit row, and lines above the headings."""
 
 
 def detect_encoding(content: bytes) -> str:
@@ -80,7 +100,9 @@ def has_content(line: str) -> bool:
 
 
 def split_cells(line: str, delimiter: str) -> list[str]:
-    """The cells of a line."""
+    """The cells of a line; a blank before a unit in brackets, `time [s] force [N]`, does not separate cells."""
+    if delimiter == " " and '"' not in line:
+        return re.split(r"(?<=[\])])\s+|\s+(?![\[(])", line.strip())
     return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))]
 
 
@@ -92,6 +114,9 @@ def parse_header(origin: str, lines: NumberedLines, text_format: TextFormat) -> 
         raise FileError(
             f"{origin}: the file contains no table. A table consists of a row of headings and rows of numbers."
         )
+    text_format = text_format.with_blanks(body)
+    above = _lines_above_headings(body, text_format)
+    preamble, body = body[:above], body[above:]
     delimiter = text_format.detect_delimiter(body[0][1])
     headings, count = _find_headings(origin, comments, body, delimiter, text_format.headerless)
     below = split_cells(body[count][1], delimiter) if len(body) > count else []
@@ -99,8 +124,46 @@ def parse_header(origin: str, lines: NumberedLines, text_format: TextFormat) -> 
     count += 1 if units else 0
     if len(body) <= count:
         raise FileError(f"{origin}: no rows of numbers below the headings ({', '.join(headings)}).")
-    constants = dict(constant for _, line in comments if (constant := parse_constant_comment(line)))
-    return TextHeader(tuple(headings), units, constants, delimiter, count)
+    cells = [parse_constant_cells(split_cells(line, delimiter)) for _, line in preamble]
+    constants = dict(
+        constant for constant in (*cells, *(parse_constant_comment(line) for _, line in comments)) if constant
+    )
+    return TextHeader(tuple(headings), units, constants, delimiter, above + count)
+
+
+def _lines_above_headings(body: NumberedLines, text_format: TextFormat) -> int:
+    """The number of lines above the headings, such as the title and the settings of a logger.
+
+    The headings are the line above the first row of numbers that has as many cells, or the line above the unit row.
+    """
+    rows: list[tuple[str, list[str]]] = []
+    for _, line in body:
+        delimiter = text_format.detect_delimiter(line)
+        cells = split_cells(line, delimiter)
+        if _is_numeric(cells):
+            if not rows or _is_numeric(rows[-1][1]):
+                return 0  # no heading is found above the first rows of numbers
+            if rows[-1][0] == delimiter and count_cells(rows[-1][1]) >= count_cells(cells):
+                break
+        rows.append((delimiter, cells))
+    else:
+        return 0
+    last = len(rows) - 1
+    units = last > 0 and rows[-2][0] == delimiter and parse_unit_row(rows[-2][1], rows[-1][1])
+    return last - 1 if units else last
+
+
+def _are_numbers_and_blanks(line: str) -> bool:
+    """Whether a line consists of two numbers or more between blanks."""
+    cells = line.split()
+    return len(cells) > 1 and all(is_number(cell) and not cell.endswith(",") for cell in cells)
+
+
+def _is_numeric(cells: list[str]) -> bool:
+    """Whether a row has two cells or more, and more than half of them are numbers, clock times or dates."""
+    filled = [cell for cell in cells if cell]
+    numbers = sum(is_number(cell) or not any(map(str.isalpha, cell)) for cell in filled)
+    return len(filled) > 1 and 2 * numbers > len(filled)
 
 
 def _find_headings(

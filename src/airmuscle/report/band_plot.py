@@ -9,6 +9,7 @@ import numpy as np
 
 from ..core import plotting
 from ..core.arrays import Array
+from ..core.display import level_text
 from ..core.errors import IdentificationError
 from ..identify import Band, Fit, confidence_band
 from ..recording import Recording
@@ -78,9 +79,9 @@ def band_plot(fit: Fit, name: str = "bands") -> Plot | None:
         confidence, prediction = each.confidence, each.prediction
         colour = plotting.LINES[i % len(plotting.LINES)]
         x = x_factor * np.where(confidence.value < 0 if quantity == "force" else False, np.nan, each.points)
-        scale, level_unit = _DISPLAY_UNITS[curve.constant]
+        label = level_text(curve.constant, each.level, max(abs(other.level) for other in curves))
         style = {"color": colour, "linestyle": plotting.DASHES[i % 5]}
-        left.plot(x, factor * confidence.value, label=f"{scale * each.level:.4g} {level_unit}", **style)
+        left.plot(x, factor * confidence.value, label=label, **style)
         left.fill_between(x, factor * prediction.low, factor * prediction.high, color=colour, alpha=0.15, linewidth=0)
         left.fill_between(x, factor * confidence.low, factor * confidence.high, color=colour, alpha=0.35, linewidth=0)
         right.plot(x, factor * (confidence.high - confidence.value), **style)

@@ -65,7 +65,7 @@ def _ranking(comparison: Comparison) -> Table:
             "parameters": [c.parameter_count for c in contenders],
             "in-sample rms error [N]": [c.in_sample_rmse for c in contenders],
             "cross-validation rms error [N]": [c.cross_validated_rmse for c in contenders],
-            "AICc": [c.aicc for c in contenders],
+            "AICc above the lowest": [c.aicc - min(other.aicc for other in contenders) for c in contenders],
         },
     )
 
@@ -125,6 +125,8 @@ def correlation_figure(fit: Fit) -> Any:
         labels = [to_mathtext(symbol_formula(estimate.label)) for estimate in fit.estimates]
         axes.set_xticks(range(size), labels, rotation=90)
         axes.set_yticks(range(size), labels)
+    else:
+        axes.set(xlabel="number of the parameter", ylabel="number of the parameter")
     axes.grid(False)
     figure.colorbar(image, ax=axes, label="correlation")
     return figure

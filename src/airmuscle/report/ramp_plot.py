@@ -8,6 +8,7 @@ import numpy as np
 
 from ..core import plotting
 from ..core.arrays import Array
+from ..core.display import level_text
 from ..identify import Fit
 from ..identify.force_evaluation import evaluate_force
 from ..recording import Recording
@@ -60,7 +61,7 @@ def _draw_panel(axes: Any, fit: Fit, data: Recording, length: float | None) -> N
         colour, marker = plotting.LINES[i % len(plotting.LINES)], plotting.MARKERS[i % len(plotting.MARKERS)]
         points = {"linestyle": "none", "marker": marker, "markersize": 2.2, "alpha": 0.45, "markeredgewidth": 0.5}
         axes.plot(rows["pressure"] / 1e3, rows["force"], color=colour, **points)
-        label = f"{100 * level:.3g} %" if abs(level) > 1e-9 else "0 %"
+        label = level_text("contraction", float(level), float(np.abs(levels).max()))
         style = {"linestyle": plotting.DASHES[i % len(plotting.DASHES)], "linewidth": 1.6}
         axes.plot(pressure / 1e3, force, color=colour, label=label, **style)
     axes.set(xlabel="gauge pressure [kPa]")

@@ -98,9 +98,10 @@ def _input_plot(scenario: Scenario, recording: Recording) -> Plot:
 
 def _settings(scenario: Scenario) -> tuple[tuple[str, str, str], ...]:
     start = ", ".join(f"{name} {typographic(format_number(value))}" for name, value in scenario.initial_state.items())
+    own = {key: "scenario" for key in ("integrator", "initial_state") if key not in scenario.defaults}
     return (
-        ("integrator", str(scenario.problem.integrator), "scenario"),
-        ("initial state (SI)", start, "scenario"),
+        ("integrator", str(scenario.problem.integrator), own.get("integrator", "default")),
+        ("initial state (SI)", start, own.get("initial_state", "default: equilibrium at ambient pressure")),
         ("inputs", describe_input(scenario.problem.input), "scenario"),
     )
 

@@ -107,7 +107,7 @@ def _settings(result: SizingResult) -> tuple[tuple[str, str, str], ...]:
     rows = {
         "safety_factor": ("safety factor on the load", f"{conditions.safety_factor:.4g}"),
         "cycle_time": ("cycle time", f"{conditions.cycle_time:.4g} s"),
-        "min_pressure": ("least working pressure", f"{conditions.min_pressure / 1e5:.4g} bar"),
+        "min_pressure": ("minimum working pressure", f"{conditions.min_pressure / 1e5:.4g} bar"),
         "max_count": ("maximum number in parallel", str(conditions.max_count)),
     }
     sources = {name: "chosen" if getattr(conditions, name) == getattr(SizingConditions, name) else "given"

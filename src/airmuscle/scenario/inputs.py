@@ -64,7 +64,8 @@ def build_input_signal(
 
 
 def _signal_class(table: Mapping[str, Any], location: Location) -> type[Schedule] | type[SampledSignal]:
-    cls = model_class(table.get("model", "SampledSignal" if "file" in table else "Schedule"), f"{location}, model")
+    name = table.get("model", "SampledSignal" if "file" in table else "Schedule")
+    cls = model_class(name, f"{location}, model", kind=Schedule | SampledSignal)
     if not issubclass(cls, Schedule | SampledSignal):
         raise ParameterError(
             f"{location}: {cls.__name__} is not an input signal; there are Schedule and SampledSignal."
@@ -136,7 +137,7 @@ def _build_driver(value: Any, location: Location) -> Driver:
         check_keys(value, ("library",), location)
         return _library_driver(read_text(value, "library", location, needed=True), location)
     table = {"model": value} if isinstance(value, str) else value
-    driver: Driver = check_type(build(table, location), Driver, location)
+    driver: Driver = check_type(build(table, location, kind=Driver), Driver, location)
     return driver
 
 

@@ -43,10 +43,10 @@ def build_law(table: Mapping[str, Any], plant: Plant, units: Mapping[str, str], 
     Raises ParameterError, UnitError or UnknownNameError with the location.
     """
     if isinstance(table.get("model"), str):
-        cls = model_class(table["model"], f"{location}, model")
+        cls = model_class(table["model"], f"{location}, model", kind=Controller)
         if not issubclass(cls, Controller):
-            known = [n for n in model_names() if issubclass(model_class(n, ""), Controller)]
-            raise ParameterError(f"{location}: {cls.__name__} is not a controller; there are {', '.join(known)}.")
+            known = ", ".join(model_names(Controller))
+            raise ParameterError(f"{location}: {cls.__name__} is not a controller; there are {known}.")
     outline = _LawTable(plant, None).model(table, location)
     with located_errors(location):
         check_present(outline, [name for name in units if name not in plant.inputs], plant.inputs)
@@ -63,11 +63,11 @@ class _LawTable:
     plant: Plant
     units: Mapping[str, str] | None
 
-    def model(self, table: Any, location: Location) -> Any:
+    def model(self, table: Any, location: Location, kind: Any = Controller) -> Any:
         """The model of a table; one that does not depend on signals is built as in any other table."""
-        cls = self._class(table, location)
+        cls = self._class(table, location, kind)
         if not issubclass(cls, SignalRelated) and not _contains_plant(cls):
-            return build(table, location)
+            return build(table, location, kind=kind)
         hints = typing.get_type_hints(cls)
         fields = {key: value for key, value in table.items() if key != "model"}
         for key in fields:
@@ -86,10 +86,10 @@ class _LawTable:
         with located_errors(location):
             return cls(**parts, **numbers)
 
-    def _class(self, table: Any, location: Location) -> type[Any]:
+    def _class(self, table: Any, location: Location, kind: Any) -> type[Any]:
         if not isinstance(table, Mapping) or not isinstance(table.get("model"), str):
             build(table, location)  # raises the error of a table without a model
-        return model_class(table["model"], f"{location}, model")
+        return model_class(table["model"], f"{location}, model", kind=kind)
 
     def _of_plant(self, cls: type[Any], hints: Mapping[str, Any]) -> dict[str, Any]:
         """Muscles and mechanism of the plant, for the fields of a static inverse that need them."""
@@ -105,9 +105,9 @@ class _LawTable:
         if _is_muscle(hint, value):
             part = build_muscle(value, inner)
         elif isinstance(value, Mapping):
-            part = self.model(value, inner)
+            part = self.model(value, inner, hint)
         elif isinstance(value, str) and not accepts(hint, value):
-            part = self.model({"model": value}, inner)
+            part = self.model({"model": value}, inner, hint)
         if not accepts(hint, part):
             what = type(part).__name__ if dataclasses.is_dataclass(part) else repr(part)
             raise ParameterError(f"{location}: {key} is {what}; it must be {describe_type(hint)}.")

@@ -30,7 +30,8 @@ from typing import Any
 
 from ..control.control_loop import ControlLoop
 from ..control.inputs import InputSignal
-from ..core.errors import FileError, ParameterError, suggestion
+from ..core.errors import EquilibriumError, FileError, ParameterError, suggestion
+from ..core.hints import HintedText
 from ..identify.prediction import PlantUncertainty
 from ..library.build import build
 from ..library.files import is_path, list_plants, read_toml
@@ -49,6 +50,12 @@ RUN = ("duration", "start_time", "output_times", "initial_state", "integrator")
 OUTPUT = ("columns",)
 DEFAULT_INITIAL_STATE: Mapping[str, Any] = MappingProxyType({"pressure": 0.0})
 """Default initial state of a run: equilibrium at ambient pressure."""
+START_REMEDY = (
+    ' In [run], initial_state = { pressure = "2 bar" } is the equilibrium at another pressure, and '
+    '{ position = "0 mm" } a state at rest that need not be one; a load that rests on a stop is a '
+    "mechanism within WithEndStops."
+)
+"""What to do where a scenario begins in an equilibrium that does not exist."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,6 +68,8 @@ class Scenario:
     """Columns of the recording besides time; all if empty."""
     uncertainty: PlantUncertainty | None = None
     """That of the fit of the plant, for predictions; a simulation does not use it."""
+    defaults: tuple[str, ...] = ()
+    """Keys of [run] that the file does not state."""
 
     @property
     def plant(self) -> Plant:
@@ -139,6 +148,7 @@ def build_scenario(
         uncertainty=read_plant_uncertainty(tables["uncertainty"], plant, location.inside("uncertainty"))
         if "uncertainty" in tables
         else None,
+        defaults=tuple(key for key in RUN if key not in run),
     )
 
 
@@ -202,7 +212,10 @@ def _build_initial_state(
     with located_errors(location):
         if values:
             return plant.state_at(pressure=pressure, **values)
-        return find_equilibrium(plant, pressure=pressure) if equilibrium is None else equilibrium
+        try:
+            return find_equilibrium(plant, pressure=pressure) if equilibrium is None else equilibrium
+        except EquilibriumError as error:
+            raise EquilibriumError(HintedText(error.message, START_REMEDY)) from None
 
 
 def _read_columns(table: Mapping[str, Any], known: Sequence[str], location: Location) -> tuple[str, ...]:
@@ -221,4 +234,5 @@ def _read_columns(table: Mapping[str, Any], known: Sequence[str], location: Loca
 
 
 def _build_model(value: Any, kind: type[Any], location: Location) -> Any:
-    return check_type(build({"model": value} if isinstance(value, str) else value, location), kind, location)
+    table = {"model": value} if isinstance(value, str) else value
+    return check_type(build(table, location, kind=kind), kind, location)

@@ -130,7 +130,7 @@ class SizingConditions:
     max_length: float = parameter("m", "L_max", "maximum nominal length", bounds=(1e-3, 20.0), default=20.0)
     max_diameter: float = parameter("m", "D_max", "maximum outer diameter", bounds=(1e-3, 1.0), default=1.0)
     min_pressure: float = parameter(
-        "Pa", "p_min", "least working pressure; discharge to 0 takes an infinite time", bounds=(0.0, 1e6), default=1e4
+        "Pa", "p_min", "minimum working pressure; discharge to 0 takes an infinite time", bounds=(0.0, 1e6), default=1e4
     )
     max_count: int = 3
     """Maximum number of muscles in parallel; with a joint, on each side."""

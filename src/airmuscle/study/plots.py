@@ -17,6 +17,8 @@ from .sensitivity import SobolIndices
 PANELS_PER_ROW = 3
 MAX_POINTS = 2000
 """Maximum number of points of a scatter plot; of more runs, an equidistant subset is drawn."""
+FEW_POINTS = 50
+"""Number of points of a scatter plot up to which they are drawn large (chosen)."""
 MAX_LABEL_LENGTH = 28
 """Number of letters that fit below a panel."""
 _DISPLAY_UNITS = {
@@ -67,6 +69,7 @@ def _histograms(result: StudyResult) -> Plot:
         factor, _ = _display_scale(study.units[name])
         values = result[name][np.isfinite(result[name])] * factor
         axis.set(xlabel=_axis_label(name, study.units[name]), ylabel="runs")
+        axis.yaxis.get_major_locator().set_params(integer=True)
         if values.size:
             axis.hist(values, bins=_bin_count(values), color=SKY, edgecolor="white", linewidth=0.4)
         else:
@@ -89,7 +92,9 @@ def _scatter(result: StudyResult, name: str) -> Plot:
     factor, _ = _display_scale(study.units[name])
     finite = np.flatnonzero(np.isfinite(result[name]))
     drawn = finite[:: max(1, -(-finite.size // MAX_POINTS))]
-    style = {"marker": "o", "linestyle": "none", "markersize": 2.4, "alpha": 0.5, "markeredgewidth": 0, "color": BLUE}
+    few = drawn.size <= FEW_POINTS
+    style = {"marker": "o", "linestyle": "none", "markersize": 5.0 if few else 2.4, "alpha": 0.9 if few else 0.5,
+             "markeredgewidth": 0, "color": BLUE}  # fmt: skip
     for i, (parameter, axis) in enumerate(zip(study.parameters, panels, strict=True)):
         parameter_factor, _ = _display_scale(parameter.unit)
         axis.plot(study.values[drawn, i] * parameter_factor, result[name][drawn] * factor, **style)

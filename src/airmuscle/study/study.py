@@ -167,11 +167,21 @@ def _read_scenario(value: Any, location: Location) -> ScenarioTemplate:
     return ScenarioTemplate(value, location.inside("scenario"), build_scenario(value, location.inside("scenario")))
 
 
+_EXAMPLES = {
+    "vary": '"mechanism.mass" = ["5 kg", "10 kg"]',
+    "design": 'model = "Grid"',
+    "metrics": 'highest = { model = "Maximum", column = "position" }',
+}
+"""An entry of each table that a study needs."""
+
+
 def _require_table(tables: Mapping[str, Any], key: str, location: Location) -> Mapping[str, Any]:
     table = tables.get(key)
     if not isinstance(table, Mapping) or not table:
         problem = "is missing" if table is None else "is empty" if table == {} else f"is {table!r}, not a table"
-        raise ParameterError(f"{location}: [{key}] {problem}; it must contain at least one entry.")
+        raise ParameterError(
+            f"{location}: [{key}] {problem}; it must contain at least one entry, such as {_EXAMPLES[key]}."
+        )
     return table
 
 

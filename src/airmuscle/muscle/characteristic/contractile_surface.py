@@ -74,8 +74,11 @@ class ContractileSurface(ForceLaw):
                 raise ParameterError(f"ContractileSurface: min_{name} {low:g} must be less than max_{name} {high:g}.")
 
     @classmethod
-    def blank(cls, degree: int = 5, *, min_force: float = 0.0, max_force: float = 1200.0) -> ContractileSurface:
-        """Return a surface with zero coefficients as the initial model of `fit`, which sets the validity range."""
+    def blank(cls, degree: int = 5, *, min_force: float = 0.0, max_force: float = 1e5) -> ContractileSurface:
+        """Return a surface with zero coefficients as the initial model of `fit`, which sets the validity range.
+
+        The fitted surface is limited to `min_force` and `max_force`; the default limit is above the force of a muscle.
+        """
         size = len(exponents(degree))
         return cls((0.0,) * size, 0.0, 1.0, 0.0, 1.0, min_force, max_force, degree)
 

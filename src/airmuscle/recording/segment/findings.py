@@ -11,6 +11,7 @@ from ...core.errors import ColumnError
 from ...core.hints import Hint, HintedText
 from ..columns import quantity_of
 from ..recording import Recording
+from ..time_base import UNIFORM, WITHOUT_TIME
 from .quasi_static import quasi_static_rows
 from .runs import AT_REST, FREE, KINDS, Run, moved_column
 from .sampling import Sampling
@@ -61,11 +62,9 @@ def _time_findings(recording: Recording, sampling: Sampling | None) -> Iterator[
         return
     for rows, verb in ((sampling.repeated_rows, "repeats"), (sampling.backward_rows, "decreases")):
         if rows:
-            yield Finding(
-                f"time {verb} in {_count(len(rows), 'row')}, first in row {rows[0] + 1}. Sort the rows, delete "
-                "duplicates, or write two runs to two files.",
-                serious=True,
-            )
+            hints = (UNIFORM, WITHOUT_TIME) if sampling.rounded else (WITHOUT_TIME,)
+            text = f"time {verb} in {_count(len(rows), 'row')}, first in row {rows[0] + 1}. Sort the rows, delete "
+            yield Finding(HintedText(f"{text}duplicates, or write two runs to two files.", *hints), serious=True)
     if sampling.gaps:
         longest = max(sampling.gaps, key=lambda gap: gap.duration)
         yield Finding(
@@ -86,7 +85,7 @@ def _sensor_findings(recording: Recording, sensors: Mapping[str, Sensor]) -> Ite
             if count:
                 yield Finding(
                     f"the {name} sensor saturates at its {adjective} limit, {limit:.4g}{unit}, in "
-                    f"{_count(count, 'row')} ({fraction:.0%}). These rows are bounds (censored), not values.",
+                    f"{_count(count, 'row')} ({100 * fraction:.0f} %). These rows are bounds (censored), not values.",
                     serious=fraction >= MAX_SATURATED_FRACTION,
                 )
 

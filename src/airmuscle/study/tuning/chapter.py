@@ -30,8 +30,7 @@ def tuning_chapter(
     units  of the gains by path, and of the columns of the plant by name
     rules  settings of tuning rules that were among the starts
     """
-    column = next(iter(tuning.scales))
-    unit = "1" if tuning.index.scales else units.get(column) or "1"
+    column, unit = next(iter(tuning.scales)), _error_unit(tuning, units)
     runs = _runs(tuning, integrator)
     plots = [
         Plot(
@@ -48,7 +47,7 @@ def tuning_chapter(
         paper="tuning",
         title=title,
         summary="\n\n".join([_summary(tuning), *(f"{note[:1].upper()}{note[1:]}." for note in notes)]),
-        tables=(gain_table(tuning, units), case_table(tuning), *([rule_table(rules)] if rules else [])),
+        tables=(gain_table(tuning, units), case_table(tuning, units), *([rule_table(rules)] if rules else [])),
         plots=tuple(plots),
         references=(*tuning.references, *cite(tuple(rules))),
         chosen=_settings(tuning),
@@ -101,16 +100,26 @@ def gain_table(tuning: Tuning, units: Mapping[str, str]) -> Table:
     return Table("gains", "Gains", columns, "Values in SI units.")
 
 
-def case_table(tuning: Tuning) -> Table:
-    """The metrics of every case with the present gains, if these were simulated, and with the tuned gains."""
+def _error_unit(tuning: Tuning, units: Mapping[str, str]) -> str:
+    """The unit of the tracking error [SI], that of its first column."""
+    return "1" if tuning.index.scales else units.get(next(iter(tuning.scales))) or "1"
+
+
+def case_table(tuning: Tuning, units: Mapping[str, str]) -> Table:
+    """The metrics of every case with the present gains, if these were simulated, and with the tuned gains.
+
+    units  of the columns of the plant by name
+    """
+    unit = tuning.index.unit(_error_unit(tuning, units))
+    shown = "" if unit == "1" else f" [{unit}]"
     metrics, best = tuning.history.metrics, tuning.best
     columns: dict[str, Any] = {"case": [case.name for case in tuning.cases]}
     if tuning.start:
-        columns["index, present gains"] = metrics.index[0].tolist()
-    columns["index, tuned gains"] = metrics.index[best].tolist()
+        columns[f"index, present gains{shown}"] = metrics.index[0].tolist()
+    columns[f"index, tuned gains{shown}"] = metrics.index[best].tolist()
     columns["air drawn [g/s]"] = (1e3 * metrics.air[best]).tolist()
     columns["switchings [1/s]"] = metrics.switchings[best].tolist()
-    return Table("cases", "Cases", columns, f"Index: {type(tuning.index).__name__}, SI units.")
+    return Table("cases", "Cases", columns, f"Index: {type(tuning.index).__name__}.")
 
 
 def history_table(tuning: Tuning) -> Table:
