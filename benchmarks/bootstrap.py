@@ -21,7 +21,7 @@ TEXT = (
 
 def refit_library(runs: list[am.Recording]) -> np.ndarray:
     """Coefficients of every refit with the library, including the initial fit."""
-    initial = am.fit(am.muscle.characteristic.ContractileSurface.blank(), runs, censoring=am.identify.UNCENSORED)
+    initial = am.fit(am.characteristic.ContractileSurface.blank(), runs, censoring=am.identify.UNCENSORED)
     return am.identify.bootstrap(initial, runs, refits=REFITS, by=am.identify.RunSplit(), seed=0).values
 
 

@@ -57,7 +57,7 @@ REASONS = (
     ),
 )
 """Beginning of the name of a target, and the reason where it was missed in the run of CONTROL.md."""
-FURTHER = {"greatest": "Greatest error [degree]", "strokes": "Valve strokes [1/s]", "air": "Air [l/s (ANR)]"}
+FURTHER = {"max_error": "Maximum error [degree]", "strokes": "Valve strokes [1/s]", "air": "Air [l/s (ANR)]"}
 PUBLISHED = (
     (
         "Hofer, Spannagl, D'Andrea: two-bellows arm, on/off valves, norm-optimal learning",
@@ -116,11 +116,11 @@ def targets(results: Mapping[str, Any]) -> list[tuple[str, str, str, bool]]:
     bound = f"rises ≤ {results['spread']:.3f}° (noise)"
     rows.append(("learning, monotone to 30 trials", bound, "yes" if monotone else "no", monotone))
     for name in ON_OFF:
-        error, rest = (value(results["on/off"], name, "hold", metric) for metric in ("greatest", "strokes"))
+        error, rest = (value(results["on/off"], name, "hold", metric) for metric in ("max_error", "strokes"))
         met = error <= HOLD_TARGET and rest <= REST_TARGET
         bound = f"≤ {HOLD_TARGET:g}° and ≤ {REST_TARGET:g} 1/s"
         rows.append((f"on/off valves at rest, {name}", bound, f"{error:.2f}° and {rest:.1f} 1/s", met))
-    angle = 100.0 * value(data, BOTH, "stiffness change", "greatest") / 10.0
+    angle = 100.0 * value(data, BOTH, "stiffness change", "max_error") / 10.0
     stiffness = value(data, BOTH, "stiffness change", "stiffness_error")
     met = max(angle, stiffness) <= SHARE_TARGET
     rows.append((BOTH, f"both ≤ {SHARE_TARGET:g} %", f"angle {angle:.1f} %, stiffness {stiffness:.1f} %", met))
@@ -175,14 +175,14 @@ def own_figure(results: Mapping[str, Any], key: str) -> str:
     if key == "learning":
         return f"{errors[0]:.2f} to {errors[10]:.3f} degrees after 10 trials"
     if key == "hold":
-        tracked = 100.0 * (1.0 - value(data, FORWARD, "hold", "greatest") / 10.0)
+        tracked = 100.0 * (1.0 - value(data, FORWARD, "hold", "max_error") / 10.0)
         return f"held within {tracked:.1f} % of 10 degrees, {FORWARD}"
     if key == "forward":
         return f"{results['forward']:.1f} % of the pressure range, rms over a slow sine of 20 degrees, without friction"
     if key == "open":
         low, high = (value(data, "feed-forward", f"sine {f:g} Hz", "rmse") for f in (0.5, 2.0))
         return f"{low:.1f} to {high:.1f} degrees rms, 0.5 to 2 Hz"
-    error = value(data, "feed-forward + sliding mode", "sine 0.5 Hz", "greatest") * math.pi / 180.0
+    error = value(data, "feed-forward + sliding mode", "sine 0.5 Hz", "max_error") * math.pi / 180.0
     return f"{error:.3f} rad at most at 0.5 Hz"
 
 

@@ -50,7 +50,7 @@ def make_calls(ready: CompiledSystem, start: Mapping[str, float], count: int = C
 def chou_hannaford_muscles() -> am.Plant:
     """The same plant with the characteristic of Chou and Hannaford (1996), the simplest one."""
     plant = many_muscles()
-    law = am.muscle.characteristic.ChouHannaford1996(BRAID)
+    law = am.characteristic.ChouHannaford1996(BRAID)
     return dataclasses.replace(plant, muscle=tuple(dataclasses.replace(m, contractile=law) for m in plant.muscles))
 
 

@@ -22,7 +22,7 @@ from airmuscle.core.system import System
 Array = npt.NDArray[np.float64]
 DURATION = 25.0
 SPACING = 0.01
-BRAID = am.muscle.geometry.Braid(0.01, 0.4363, 0.3)
+BRAID = am.geometry.Braid(0.01, 0.4363, 0.3)
 BOX = ((-1e4, 6e5), (-0.05, 0.35))
 """Validity range of the surface: gauge pressure [Pa] and contraction [1]. It starts below ambient pressure, so that a
 muscle at rest is inside and the compared codes need no extrapolation there."""
@@ -48,9 +48,9 @@ def measured_force(pressure: Array, contraction: Array) -> Array:
 
 
 @functools.cache
-def surface() -> am.muscle.characteristic.ContractileSurface:
+def surface() -> am.characteristic.ContractileSurface:
     """The polynomial of degree five fitted to `measured_force` on a grid over its validity range."""
-    blank = am.muscle.characteristic.ContractileSurface.blank().with_validity_range(*BOX)
+    blank = am.characteristic.ContractileSurface.blank().with_validity_range(*BOX)
     p, eps = (grid.ravel() for grid in np.meshgrid(*(np.linspace(*ends, 41) for ends in BOX)))
     columns = np.column_stack([np.asarray(c) for c in blank.basis(p, eps)])
     coefficients = np.linalg.lstsq(columns, measured_force(p, eps))[0]
@@ -140,7 +140,7 @@ def runs() -> dict[int, Run]:
     }
 
 
-def stretch_factor(braid: am.muscle.geometry.Braid) -> tuple[float, float]:
+def stretch_factor(braid: am.geometry.Braid) -> tuple[float, float]:
     """k and c of the volume V = k s (1 - (c s)^2), s = 1 - eps, for hand-written equations."""
     k = ops.pi * braid.radius**2 * braid.resting_length / ops.sin(braid.braid_angle) ** 2
     return float(k), float(ops.cos(braid.braid_angle))

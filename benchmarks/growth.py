@@ -46,9 +46,9 @@ class Case:
 
     def kernel(self, rtol: float | None = None) -> Callable[[], Array]:
         """A call of the kernel, with another tolerance for the reference."""
-        ready, method, state = compile_system(self.run.system), am.Rodas4(rtol or self.rtol), self.run.vector
+        bound, state = am.Rodas4(rtol or self.rtol).bind(compile_system(self.run.system)), self.run.vector
         times = np.linspace(0.0, self.duration, round(self.duration / SPACING) + 1)
-        return lambda: method.run(ready, self.segments, 0.0, state, times)
+        return lambda: bound.run(self.segments, 0.0, state, times)
 
 
 def measure_cases(cases: list[Case], rounds: int, preparation: Mapping[str, float]) -> list[Row]:

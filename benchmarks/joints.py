@@ -22,9 +22,9 @@ SIDES = (("left", 1.0), ("right", -1.0))
 
 def chosen_muscle() -> am.Muscle:
     """A braided muscle of diameter 20 mm and length 200 mm with limited force, spring and damper."""
-    braid = am.muscle.geometry.Braid(0.01, 0.4363, 0.2)
+    braid = am.geometry.Braid(0.01, 0.4363, 0.2)
     return am.Muscle(
-        am.muscle.characteristic.Clamped(am.muscle.characteristic.VirtualWork(braid), 0.0, 1200.0),
+        am.characteristic.Clamped(am.characteristic.VirtualWork(braid), 0.0, 1200.0),
         braid,
         am.LinearSpring(3000.0),
         am.LinearDamper(150.0),

@@ -30,7 +30,7 @@ def log_lines() -> list[str]:
 def measure() -> dict[str, np.ndarray]:
     """Times [s] of each step, shape (ROWS,)."""
     fit = am.identify.RecursiveFit(
-        am.identify.BenchLimits(am.muscle.characteristic.ValidityRange(0.0, 6e5, 0.0, 0.25), 1500.0)
+        am.identify.BenchLimits(am.characteristic.ValidityRange(0.0, 6e5, 0.0, 0.25), 1500.0)
     )
     reader = am.recording.RowReader("log")
     times: dict[str, list[float]] = {"row read": [], "surface updated": [], "next point": []}

@@ -49,9 +49,9 @@ class Timing(NamedTuple):
     result: Any
 
 
-def muscle(length: float) -> am.muscle.characteristic.TonduLopez2000:
+def muscle(length: float) -> am.characteristic.TonduLopez2000:
     """The law of the active part of a muscle between its ends."""
-    return am.muscle.characteristic.TonduLopez2000(am.muscle.geometry.Braid(0.01, 0.45, length - END_LENGTH), 1.15)
+    return am.characteristic.TonduLopez2000(am.geometry.Braid(0.01, 0.45, length - END_LENGTH), 1.15)
 
 
 def add_noise(columns: dict[str, np.ndarray], seed: int) -> dict[str, np.ndarray]:
@@ -91,7 +91,7 @@ def make_loops(rows: int = 2000) -> list[am.Recording]:
         stroke = np.where(seconds < 60.0, 0.06, 0.03)
         contraction = 0.08 - stroke * np.cos(2 * np.pi * seconds / 30.0) * 0.9
         held = np.full(rows, pressure)
-        friction = am.muscle.friction.Dahl(2e4, 12.0).force_along(contraction * 0.3, seconds)
+        friction = am.friction.Dahl(2e4, 12.0).force_along(contraction * 0.3, seconds)
         force = muscle(0.3).force(held, contraction * 0.3 / (0.3 - END_LENGTH)) - friction
         columns = add_noise({"time": seconds, "pressure": held, "contraction": contraction, "force": force}, 200 + i)
         loops.append(am.Recording(columns, f"loop at {pressure / 1e3:.0f} kPa", {"resting_length": 0.3}))

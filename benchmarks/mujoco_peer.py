@@ -107,7 +107,8 @@ def measure(muscles: int, rounds: int) -> tuple[tuple[tuple[str, ...], ...], tup
     library_name, mujoco_name = "DormandPrince8(1e-4), kernel", "MuJoCo RK4(1e-4), C callbacks"
 
     def kernel_call(method: am.simulation.Integrator) -> Callable[[], Array]:
-        return lambda: method.run(ready, segments, 0.0, state, times).rows
+        bound = method.bind(ready)
+        return lambda: bound.run(segments, 0.0, state, times).rows
 
     variants = {library_name: kernel_call(am.DormandPrince8(STEP))}
     variants |= {

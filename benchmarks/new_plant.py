@@ -75,7 +75,7 @@ def with_meters() -> am.plant.WithEnergyMeters:
     """Four muscles with friction, creep and a lagging wall, heat and tubes of two volumes, and all energy meters."""
     plant, tube = hanging(4), am.pneumatics.Tube(am.pneumatics.TubeOrifice(1.0, 3e-3), 1e-5, 2)
     parts = (
-        am.muscle.friction.LuGre(5e4, 15.0, 5.0, 0.01, 50.0, 20.0),
+        am.friction.LuGre(5e4, 15.0, 5.0, 0.01, 50.0, 20.0),
         am.muscle.CreepElements((2e4, 1e4), (0.1, 2.0)),
         am.muscle.ViscoelasticWall(2e-11, 0.05),
     )

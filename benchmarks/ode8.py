@@ -123,11 +123,9 @@ def measure(muscles: int, rounds: int) -> tuple[tuple[tuple[str, ...], ...], tup
     run = lifting_run(muscles)
     ready = compile_system(run.system)
     reference = kernel(run, ready, am.Rodas4(1e-11))()
-    method, segments, times, state = am.DormandPrince8(STEP), run.segments, run.times, run.vector
+    bound, segments, times, state = am.DormandPrince8(STEP).bind(ready), run.segments, run.times, run.vector
     library_name = "DormandPrince8(1e-4), kernel"
-    variants: dict[str, Callable[[], Array]] = {
-        library_name: lambda: method.run(ready, segments, 0.0, state, times).rows
-    }
+    variants: dict[str, Callable[[], Array]] = {library_name: lambda: bound.run(segments, 0.0, state, times).rows}
     with tempfile.TemporaryDirectory() as folder:
         libraries = compile_libraries(pathlib.Path(folder), muscles)
         variants |= {name: make_c_run(run, library) for name, library in libraries.items()}

@@ -187,12 +187,12 @@ def in_c(folder: Path) -> Callable[[], object]:
 def rows_of(case: Run, folder: Path, rounds: int) -> tuple[list[tuple[str, ...]], list[Target]]:
     """The rows of one plant."""
     name, problem = f"{len(case.system.states)} states", problem_of(case)
-    ready, method = compile_system(case.system), am.Rodas4(1e-6)
+    bound = am.Rodas4(1e-6).bind(compile_system(case.system))
     end, state = np.array([DURATION]), case.vector
     am.export.write_program(problem, folder / "c", am.export.C99(), name="plant")
     (folder / "c" / "driver.c").write_text(RUNS)
     times = time_variants(
-        {"kernel": lambda: method.run(ready, case.segments, 0.0, state, end), "C": in_c(folder / "c")}, 5 * rounds
+        {"kernel": lambda: bound.run(case.segments, 0.0, state, end), "C": in_c(folder / "c")}, 5 * rounds
     )
     kernel, ratio = times["kernel"].minimum, times["C"].ratio_to(times["kernel"])
     rows = [(f"{name}: kernel", format_time(kernel), "1", "")]

@@ -70,7 +70,7 @@ class Model:
 def make_plant(gas: am.pneumatics.Gas, growth: float, lag: float, line: bool) -> am.Plant:
     """An unloaded muscle of unknown length behind a valve, with a supply tube if `line`."""
     muscle = dataclasses.replace(
-        am.Muscle.ideal(am.muscle.geometry.Vessel(REST_VOLUME)), wall=am.muscle.SwellingWall(growth, 150e3, 5e4, lag)
+        am.Muscle.ideal(am.geometry.Vessel(REST_VOLUME)), wall=am.muscle.SwellingWall(growth, 150e3, 5e4, lag)
     )
     valves = am.FillDischarge(am.Supply(625e3), am.Valve(5e-10, 0.4), am.Valve(0.0, 0.3))
     circuit = (

@@ -93,9 +93,9 @@ def odeint_lsoda(run: Run, rates: Callable[[Array], Any], rtol: float = RTOL) ->
 
 
 def kernel(run: Run, ready: CompiledSystem, method: am.Rodas4 | None = None) -> Callable[[], Array]:
-    """A function that runs the kernel alone on the compiled plant."""
-    method, segments, times, state = method or am.Rodas4(RTOL), run.segments, run.times, run.vector
-    return lambda: method.run(ready, segments, 0.0, state, times).rows
+    """A function that runs the kernel alone on the compiled plant; all preparation is done before, as for the peers."""
+    bound, segments, times, state = (method or am.Rodas4(RTOL)).bind(ready), run.segments, run.times, run.vector
+    return lambda: bound.run(segments, 0.0, state, times).rows
 
 
 def make_simulation(run: Run) -> Callable[[], Any]:

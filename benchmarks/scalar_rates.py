@@ -40,7 +40,7 @@ def valve_flow(valve: am.Valve, temperature: float) -> Scalar:
     return flow
 
 
-def extrapolate(law: am.muscle.characteristic.ContractileSurface) -> Scalar:
+def extrapolate(law: am.characteristic.ContractileSurface) -> Scalar:
     """Extrapolation of the surface by its tangent beyond the validity range, in scaled arguments."""
     (a00, a10, a20, a30, a40, a50, a01, a11, a21, a31, a41, a02, a12, a22, a32, a03, a13, a23, a04, a14, a05) = (
         law.coefficients

@@ -35,8 +35,8 @@ def design_matrix(data: am.Recording) -> Array:
 
 def fit_library(data: am.Recording) -> Array:
     """The coefficients fitted by the library, without censoring."""
-    model = am.fit(am.muscle.characteristic.ContractileSurface.blank(), data, censoring=am.identify.UNCENSORED).model
-    assert isinstance(model, am.muscle.characteristic.ContractileSurface)
+    model = am.fit(am.characteristic.ContractileSurface.blank(), data, censoring=am.identify.UNCENSORED).model
+    assert isinstance(model, am.characteristic.ContractileSurface)
     return np.array(model.coefficients)
 
 

@@ -10,10 +10,10 @@ from airmuscle.core import plotting
 from airmuscle.units import bar, kPa
 
 bench = am.load_data("dmsp-20-300")
-result = am.fit(am.muscle.characteristic.ContractileSurface.blank(5, max_force=1e5), bench)
+result = am.fit(am.characteristic.ContractileSurface.blank(5, max_force=1e5), bench)
 print(result)
 
-braid = am.muscle.geometry.Braid(radius=0.010, braid_angle=0.426, resting_length=0.300)
+braid = am.geometry.Braid(radius=0.010, braid_angle=0.426, resting_length=0.300)
 muscle = am.Muscle(result.model, braid, damper=am.LinearDamper(200.0))
 valve = am.Valve(conductance=2.6167e-9, critical_ratio=0.433)
 plant = am.Plant(muscle, am.FillDischarge(am.Supply(5.5 * bar), valve, valve), am.HangingMass(10.0))

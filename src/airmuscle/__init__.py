@@ -1,7 +1,8 @@
 """Pneumatic artificial muscles: from a bench file to a fitted muscle, from a muscle to a plant with valves and load.
 
 Nouns are frozen models, verbs are functions. Everything inside is SI, pressure is gauge, contraction is
-(L0 - L)/L0, pulling is positive. The laws are in `airmuscle.muscle.characteristic`, the units in `airmuscle.units`.
+(L0 - L)/L0, pulling is positive. The laws are in `airmuscle.characteristic`, short for
+`airmuscle.muscle.characteristic`, the units in `airmuscle.units`.
 
 Each name is imported from its package when it is first used (PEP 562), so that `import airmuscle` takes no time.
 Type checkers read the same names in `__init__.pyi`.
@@ -35,9 +36,10 @@ _MODULES = {
 }
 """The module of each public name."""
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names.split()}
+_PARTS_OF_A_MUSCLE = ("characteristic", "friction", "geometry")
 _SUBPACKAGES = (
-    "analysis", "control", "environments", "export", "identify", "library", "mechanism", "muscle", "plant",
-    "pneumatics", "recording", "simulation", "sizing", "study", "units",
+    *_PARTS_OF_A_MUSCLE, "analysis", "control", "environments", "export", "identify", "library", "mechanism", "muscle",
+    "plant", "pneumatics", "recording", "simulation", "sizing", "study", "units",
 )  # fmt: skip
 
 __all__ = sorted([*_MODULE_OF, "units"])  # noqa: PLE0605
@@ -46,7 +48,7 @@ __all__ = sorted([*_MODULE_OF, "units"])  # noqa: PLE0605
 def __getattr__(name: str) -> object:
     """Import the module of a public name, or a subpackage, when it is first used."""
     if name in _SUBPACKAGES:
-        return _importlib.import_module(f".{name}", __name__)
+        return _importlib.import_module(f".muscle.{name}" if name in _PARTS_OF_A_MUSCLE else f".{name}", __name__)
     if name not in _MODULE_OF:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = getattr(_importlib.import_module(f".{_MODULE_OF[name]}", __name__), name)

@@ -36,6 +36,9 @@ from .mechanism import WithLatch as WithLatch
 from .muscle import LinearDamper as LinearDamper
 from .muscle import LinearSpring as LinearSpring
 from .muscle import Muscle as Muscle
+from .muscle import characteristic as characteristic
+from .muscle import friction as friction
+from .muscle import geometry as geometry
 from .plant import Plant as Plant
 from .pneumatics import Circuit as Circuit
 from .pneumatics import FillDischarge as FillDischarge

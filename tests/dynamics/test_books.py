@@ -142,7 +142,7 @@ def test_an_unknown_coordinate_or_input_is_refused_with_what_there_is():
 
 
 def test_a_small_share_of_rows_outside_a_range_is_not_told_as_zero():
-    assert [percent_of_rows(share) for share in (0.004, 0.01, 0.313, 1.0)] == ["0.4%", "1%", "31%", "100%"]
+    assert [percent_of_rows(share) for share in (0.004, 0.01, 0.313, 1.0)] == ["0.4 %", "1 %", "31 %", "100 %"]
 
 
 def test_a_run_says_when_and_how_far_it_left_what_was_measured():
@@ -155,7 +155,7 @@ def test_a_run_says_when_and_how_far_it_left_what_was_measured():
     run = simulate(plant, Schedule({"fill": ((0.5, 1.0),)}), duration=4.0, initial_state=start)
     (pressure, contraction) = [note for note in run.notes if "outside the validity range" in note]
     assert re.search(
-        r"was outside the validity range of its characteristic in pressure \(35 to 675 kPa\) in \d+% of the rows, by at most 35 kPa",
+        r"was outside the validity range of its characteristic in pressure \(35 to 675 kPa\) in \d+ % of the rows, by at most 35 kPa",
         pressure,
     )
     assert re.search(r"in contraction \(1\.333 to 26 %\).*values there are extrapolated", contraction)

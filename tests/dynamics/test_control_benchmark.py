@@ -154,7 +154,7 @@ def metrics_of(task, error, **further):
 def test_errors_are_judged_from_the_beginning_of_the_task_on():
     time = np.linspace(0.0, 1.0, 501)
     found = metrics_of(SHORT, np.where(time < 0.49, 7.0, 2.0))
-    assert (found.rmse, found.greatest) == pytest.approx((2.0, 2.0))
+    assert (found.rmse, found.max_error) == pytest.approx((2.0, 2.0))
     assert found.itae == pytest.approx(2.0 * 0.5**2 / 2)
     assert math.isnan(found.settling)
     assert math.isnan(found.overshoot)

@@ -272,7 +272,7 @@ def test_a_joint_whose_muscles_cannot_both_be_mounted_is_refused():
 
 
 def test_air_that_no_pressure_holds_names_the_muscle():
-    with pytest.raises(EquilibriumError, match=r"muscle cannot hold 10 kg of air at a contraction of 10.0%"):
+    with pytest.raises(EquilibriumError, match=r"muscle cannot hold 10 kg of air at a contraction of 10.0 %"):
         find_equilibrium(PLANTS["isometric"], air_mass=10.0)
 
 

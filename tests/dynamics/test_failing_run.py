@@ -269,7 +269,7 @@ def test_the_response_at_a_pole_is_infinite():
 def test_a_run_says_where_no_muscle_can_be():
     """A load thrown up far beyond the muscle's own length is no muscle any more; isothermal numbers would go on."""
     plant = isothermal()
-    thrown = r"because a muscle volume became zero or negative.* contraction of 10\d\.\d+%, a limit of its geometry"
+    thrown = r"because a muscle volume became zero or negative.* contraction of 10\d\.\d+ %, a limit of its geometry"
     with pytest.raises(SimulationError, match=thrown) as caught:
         simulate(plant, Schedule({}), duration=0.1, initial_state={**STATE, "speed": 100.0})
     assert (caught.value.recording["volume"] > 0).all()

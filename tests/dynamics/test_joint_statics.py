@@ -24,7 +24,7 @@ from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
 from airmuscle.simulation import find_equilibria, find_equilibrium
 
 DMSP = am.load("dmsp-20-300").muscle
-BRAID = am.muscle.geometry.Braid(0.01, 0.4363, 0.3)
+BRAID = am.geometry.Braid(0.01, 0.4363, 0.3)
 JOINT = AntagonisticJoint(0.04, 0.05, 0.2, 2.0, 0.11, min_angle=-1.0, max_angle=1.0)
 SHAPED = replace(JOINT, profile=CrankProfile(0.2), weight_angle=0.5)
 VALVE = am.Valve(2.6e-9, 0.433)
@@ -63,6 +63,21 @@ def test_pressures_for_angle_and_stiffness_give_them_back_to_1e_9(muscle, mechan
     rows = np.arange(angle.size)
     np.testing.assert_allclose(back.angle[rows, nearest], angle, atol=1e-9)
     np.testing.assert_allclose(back.constant_pressure[rows, nearest], wanted, rtol=1e-9)
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_two_muscles_of_different_laws_have_the_angle_and_the_stiffness_of_the_inverse(swapped):
+    """One law is affine in the pressure and the other is not, so that there is no closed form."""
+    muscles = (MUSCLES["quadratic"], DMSP) if swapped else (DMSP, MUSCLES["quadratic"])
+    left, right = (replace(muscle, name=name) for muscle, name in zip(muscles, ("left", "right"), strict=True))
+    statics = joint_statics(replace(pair(mechanism=SHAPED), muscle=(left, right)))
+    assert [function.affine for function in statics.unlimited] == [not swapped, swapped]
+    angle, wanted = reachable(statics, 10, 1.0)
+    points = statics.pressures(angle, wanted, 1.0)
+    first, second = points.pressures[:, 0].T
+    torques = [f(angle, p, "torque", "stiffness") for f, p in zip(statics.torques, (first, second), strict=True)]
+    np.testing.assert_allclose(torques[0][1] + torques[1][1], wanted, rtol=1e-9)
+    np.testing.assert_allclose(torques[0][0] + torques[1][0], statics.load(angle)[0] + 1.0, atol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -58,6 +58,23 @@ def test_the_stiffness_with_shut_valves_is_that_of_a_simulated_pull(gas, exponen
     assert found.shut_valves > 1.2 * found.constant_pressure
 
 
+@pytest.mark.parametrize("warmer", [0.9, 1.0, 1.3])
+def test_air_that_is_warmer_or_colder_than_its_wall_is_as_stiff_as_without_heat_transfer(warmer):
+    """A fast motion is adiabatic: dp/deps = -gamma p_abs/V dV/deps, whatever heat flows meanwhile."""
+    found = []
+    for heat_transfer in (0.0, 5.0):
+        plant = Plant(MUSCLE, ClosedChamber(), Isometric(0.12), EnergyBalance(heat_transfer))
+        state = plant.state_at(pressure=3e5)
+        found.append(
+            stiffness(plant, {**state, "internal_energy": warmer * state["internal_energy"]}).muscles["muscle"]
+        )
+    pressure = warmer * absolute_pressure(3e5, plant.ambient)
+    area, growth = VirtualWork(BRAID).effective_area(0.12), BRAID.volume_derivative(0.12)
+    following = area * HEAT_CAPACITY_RATIO * pressure / BRAID.volume(0.12) * growth
+    assert found[0].shut_valves - found[0].constant_pressure == pytest.approx(following, rel=1e-9)
+    assert found[1] == pytest.approx(found[0], rel=1e-12)
+
+
 @by_gas
 @given(st.floats(2e5, 6e5), st.floats(0.0, 0.15))
 @settings(max_examples=20, deadline=None)

@@ -43,7 +43,7 @@ def test_its_work_is_the_energy_of_the_load(plant):
 
 def test_the_exact_meridian_cannot_be_traced_and_says_what_can():
     exact = am.load("saga2007-exact").characteristic
-    braid = am.muscle.geometry.Braid(0.01, 0.4, 0.3)
+    braid = am.geometry.Braid(0.01, 0.4, 0.3)
     with pytest.raises(TraceError, match=r"ExactMeridian of muscle is not closed-form.*as_force_law"):
         am.Plant(am.Muscle(exact, braid), am.FillDischarge(am.Supply(1e5), VALVE, VALVE), am.HangingMass(1.0))
 

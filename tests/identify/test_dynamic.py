@@ -32,8 +32,8 @@ from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Tube, Valve, WithLeak, WithTubes
 from airmuscle.pneumatics.gas import EnergyBalance, Polytropic
 from airmuscle.simulation import simulate
+from airmuscle.simulation.bound_integrator import BoundIntegrator
 from airmuscle.simulation.equilibrium import find_equilibrium
-from airmuscle.simulation.integrators import Rodas4
 
 FILL = Schedule({"fill": ((0.1, 1.0), (1.0, 0.0)), "discharge": ((1.3, 1.0),)})
 SENSORS = {"pressure": 500.0, "position": 5e-5}
@@ -445,13 +445,13 @@ def test_a_start_left_after_a_first_look_goes_on_as_if_it_had_not_been(monkeypat
 def test_a_run_of_far_more_steps_than_the_best_is_not_waited_for(monkeypatch):
     """The first run may take what it takes; where any further one takes too many steps the search stays where it is."""
     plant, path, allowed = rigid_plant(), "circuit.fill.conductance", []
-    guess, record, whole = changed(plant, circuit__fill__conductance=1.3), rigid_fill(plant), Rodas4.run
+    guess, record, whole = changed(plant, circuit__fill__conductance=1.3), rigid_fill(plant), BoundIntegrator.run
 
     def noted(*arguments):
         allowed.append(arguments[-1])
         return whole(*arguments)
 
-    monkeypatch.setattr(Rodas4, "run", noted)
+    monkeypatch.setattr(BoundIntegrator, "run", noted)
     found = fit_dynamic(guess, [record], free=(path,), observed={"pressure": 300.0})
     assert found[path].value == pytest.approx(truth(plant, path), rel=0.01)
     assert allowed == [1_000_000, *[10_000] * (len(allowed) - 2), 1_000_000]  # the last is that of the result
@@ -464,8 +464,8 @@ def test_a_run_of_far_more_steps_than_the_best_is_not_waited_for(monkeypatch):
 def test_an_interrupted_run_ends_the_fit(monkeypatch):
     """A start whose run is interrupted is not one that failed."""
     plant, record = rigid_plant(), rigid_fill(rigid_plant())
-    whole = Rodas4.run
-    monkeypatch.setattr(Rodas4, "run", lambda *a, **k: whole(*a, **k)._replace(status=Status.INTERRUPTED))
+    whole = BoundIntegrator.run
+    monkeypatch.setattr(BoundIntegrator, "run", lambda *a, **k: whole(*a, **k)._replace(status=Status.INTERRUPTED))
     with pytest.raises(KeyboardInterrupt):
         fit_dynamic(plant, [record], free=("circuit.fill.conductance",), observed={"pressure": 300.0})
 

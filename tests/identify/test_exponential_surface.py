@@ -171,8 +171,8 @@ def test_breaks_are_named_with_their_places():
     assert falls_at_the_end.second_argument == pytest.approx((94, 249), abs=1.5)
     assert falls_at_the_end.pressure == pytest.approx((3.22e5, 3.5e5), abs=0.02e5)
     assert rises.worst_slope > 0 > falls.worst_slope
-    assert "rises with force between 8.75 and 350 kPa, 202 N and 260 N (16.1% of the validity range)" in str(rises)
-    assert "(less than 0.1% of the validity range)" in str(dataclasses.replace(rises, area_fraction=1e-4))
+    assert "rises with force between 8.75 and 350 kPa, 202 N and 260 N (16.1 % of the validity range)" in str(rises)
+    assert "(less than 0.1 % of the validity range)" in str(dataclasses.replace(rises, area_fraction=1e-4))
 
 
 def test_a_box_without_a_break_has_none():

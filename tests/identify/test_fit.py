@@ -379,6 +379,17 @@ def test_no_other_coefficients_are_better(seed: int, degree: int, loss: Loss):
 
 
 @pytest.mark.parametrize("loss", [LeastSquares(), Huber(5.0), SoftL1(5.0)])
+@given(z=st.floats(0.0, 30.0).filter(lambda z: abs(z - 1.0) > 1e-3))
+def test_a_loss_is_the_squared_residual_near_zero_and_its_derivatives_are_consistent(loss: Loss, z: float):
+    """rho(0) = 0 and rho'(0) = 1; beyond, rho' and rho'' are the slopes of rho and rho'."""
+    assert loss.rho(np.zeros(1))[:2, 0] == pytest.approx([0.0, 1.0])
+    step = 1e-4
+    values = loss.rho(np.array([z + step, z + 2 * step, z + 3 * step]))
+    slopes = (values[:, 2] - values[:, 0]) / (2 * step)
+    assert slopes[:2] == pytest.approx(values[1:, 1], abs=1e-7)
+
+
+@pytest.mark.parametrize("loss", [LeastSquares(), Huber(5.0), SoftL1(5.0)])
 def test_both_solvers_find_the_same_robust_and_censored_fit(loss):
     """A surface inside Clamped is not known to be linear and goes through the iterating solver."""
     _, recording = slack_and_taut(noise=8.0)

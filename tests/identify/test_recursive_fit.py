@@ -70,7 +70,7 @@ def test_points_that_are_chosen_one_by_one_determine_more_than_points_on_a_path(
         path = path.updated(1e4 * i, 0.004 * i, float(truth(1e4 * i, 0.004 * i)))
     assert chosen.determined > 0.9
     assert path.determined < 0.5
-    with pytest.raises(IdentificationError, match=r"the samples determine the force on \d+% of the range"):
+    with pytest.raises(IdentificationError, match=r"the samples determine the force on \d+ % of the range"):
         _ = path.model
 
 
@@ -91,6 +91,22 @@ def test_forgetting_follows_a_muscle_that_changes():
         kept, forgetting = (r.updated(float(p), float(c), float(f) + 50.0) for r in (kept, forgetting))
     changed = float(truth(3e5, 0.1)) + 50.0
     assert abs(forgetting.force(3e5, 0.1)[0] - changed) < 0.4 * abs(kept.force(3e5, 0.1)[0] - changed)
+
+
+@pytest.mark.parametrize("forgetting", [1.0, 0.99, 0.97])
+def test_the_standard_deviation_of_a_force_does_not_depend_on_how_much_is_forgotten(forgetting):
+    noises = []
+    for seed in range(4):
+        result, rng = RecursiveFit(LIMITS, degree=2, sigma=70.0, forgetting=forgetting), np.random.default_rng(seed)
+        for p, c in zip(rng.uniform(0, 6e5, 500), rng.uniform(0, 0.25, 500), strict=True):
+            result = result.updated(p, c, 1e-3 * p - 400 * c + SIGMA * rng.standard_normal())
+        noises.append(result.noise)
+    assert np.mean(noises) == pytest.approx(SIGMA, rel=0.12)
+
+
+def test_samples_that_are_soon_forgotten_do_not_determine_their_standard_deviation():
+    """With a factor of 0.9 the weights add up to 10 at most, less than twice the 6 coefficients."""
+    assert fitted(300, degree=2, forgetting=0.9, sigma=70.0).noise == 70.0
 
 
 def test_samples_outside_the_limits_are_counted_and_left_out():

@@ -87,7 +87,7 @@ def test_the_maxwell_defect_of_a_force_from_this_volume_is_zero_and_of_another_v
     [
         (Recording({"time": np.arange(3.0), "pressure": np.arange(3.0), "contraction": np.zeros(3)}, "x"), "neither a column 'volume'"),
         (Recording({"pressure": [0.0, 1e4], "air_mass": [0.0, 1e-5], "contraction": [0.1, 0.1]}, "x"), "the pressure rises by 10 kPa"),
-        (Recording({"pressure": [0.0, 4e5], "air_mass": [0.0, 1e-5], "contraction": [0.1, 0.2]}, "x"), "varies by 10.00% during the fill"),
+        (Recording({"pressure": [0.0, 4e5], "air_mass": [0.0, 1e-5], "contraction": [0.1, 0.2]}, "x"), "varies by 10.00 % during the fill"),
     ],
 )  # fmt: skip
 def test_a_record_that_determines_no_volume_is_refused(recording: Recording, message: str):

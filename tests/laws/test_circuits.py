@@ -38,7 +38,8 @@ from airmuscle.pneumatics import (
     WithLeak,
     WithTubes,
 )
-from airmuscle.pneumatics.gas import Ambient, EnergyBalance, Isothermal
+from airmuscle.pneumatics.flow import orifice_flow
+from airmuscle.pneumatics.gas import GAS_CONSTANT, NO_FLOW, Air, Ambient, EnergyBalance, Flow, Isothermal
 from airmuscle.simulation import simulate
 from airmuscle.simulation.integrators import Rodas4
 
@@ -317,6 +318,20 @@ def test_a_manifold_books_what_its_branches_draw():
 def test_what_cannot_be_is_refused_with_what_can(make, message):
     with pytest.raises(ParameterError, match=message):
         make()
+
+
+def test_an_orifice_without_a_command_is_fully_open():
+    """A leak and the feed of a tank pass the flow of their orifice at an opening of 1; air carries c_p T."""
+    inside, outside = Air(4e5, 310.0), Air(AMBIENT.pressure, AMBIENT.temperature)
+    flow = NARROW.mass_flow(4e5, AMBIENT.pressure, 1.0, 310.0)
+    leaking = WithLeak(ClosedChamber(), NARROW).compute_flows((inside,), {}, {}, AMBIENT)
+    assert leaking.flows[0].mass == pytest.approx(-flow)
+    assert leaking.exhausted.enthalpy == pytest.approx(1.4 / 0.4 * GAS_CONSTANT * 310.0 * flow)
+    assert tank().feed_flow(inside, outside, AMBIENT) == orifice_flow(NARROW, inside, outside, 1.0)
+
+
+def test_a_flow_and_the_opposite_flow_cancel():
+    assert Flow(2e-3, 600.0) + (-Flow(2e-3, 600.0)) == NO_FLOW
 
 
 def test_a_muscle_that_leaks_empties_to_the_surroundings_and_rests_there():

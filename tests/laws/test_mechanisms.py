@@ -269,6 +269,27 @@ def test_a_stop_begins_without_a_jump(speed):
     assert push == pytest.approx([0.0, 0.0, 0.0], abs=1e-4)
 
 
+def test_stops_of_a_named_joint_act_on_this_joint():
+    """Only joint 2 is beyond its stop: the torque on it is R F(R (q - q_high)), and the others have none."""
+    stops = JointWithEndStops(ARM, -0.1, 0.2, 0.05, CONTACT, "joint2.angle")
+    q = {"joint1.angle": 0.5, "joint2.angle": 0.3, "joint3.angle": -0.4}
+    v = {c.speed: 0.0 for c in ARM.coordinates}
+    torque = -0.05 * 1e7 * (0.05 * 0.1) ** 1.5
+    pushed = ARM.acceleration(q, v, {**dict.fromkeys(q, 0.0), "joint2.angle": torque}, {})
+    assert stops.acceleration(q, v, dict.fromkeys(q, 0.0), {}) == pytest.approx(pushed)
+
+
+@pytest.mark.parametrize(
+    "joint", [JOINT, SHAPED, replace(SHAPED, profile=CrankProfile(0.1))], ids=("round", "", "crank")
+)
+@pytest.mark.parametrize("angle", [-0.7, 0.0, 0.4])
+def test_a_moment_arm_is_the_shortening_of_its_muscle_per_angle(joint, angle):
+    step = 1e-6
+    ends = [joint.contractions({"angle": angle + h}, LENGTHS[:2]) for h in (-step, step)]
+    shortening = [length * (b - a) / (2 * step) for length, a, b in zip(LENGTHS, *ends, strict=False)]
+    assert joint.moment_arms(angle) == pytest.approx(shortening, rel=1e-8)
+
+
 # What cannot be
 
 

@@ -83,6 +83,17 @@ def test_the_dampers_of_the_papers_have_their_printed_values():
     assert above - below < 1.0
 
 
+@given(p=pressures, speed=st.floats(1e-3, 2))
+def test_a_direction_dependent_damper_has_one_line_over_pressure_for_each_direction(p, speed):
+    """b = max(b_0 + b_p p, 0): where a falling line would be negative there is no damping."""
+    for damper, shortening, lengthening in (
+        (DirectionalDamper(300.0, 150.0, 1e-3, -1e-3), 300.0 + 1e-3 * p, 150.0 - 1e-3 * p),
+        (DirectionalDamper(150.0, 300.0, -1e-3, 2e-3), 150.0 - 1e-3 * p, 300.0 + 2e-3 * p),
+    ):
+        assert damper.force(p, 0.1, speed) == pytest.approx(max(shortening, 0.0) * speed)
+        assert damper.force(p, 0.1, -speed) == pytest.approx(-max(lengthening, 0.0) * speed)
+
+
 @given(p=st.floats(0, 8e5), eps=st.floats(-0.05, 0.3))
 def test_the_springs_of_the_papers_are_those_of_their_characteristics(p, eps):
     """Contractile force less spring is the characteristic."""

@@ -80,10 +80,49 @@ def test_the_law_holds_the_load_at_both_ends_of_the_stroke(name: str, requiremen
     assert choice.design.reserve >= SIX_BAR.safety_factor - 1.0 - 1e-9
 
 
+@pytest.mark.parametrize("name", MUSCLES)
+@pytest.mark.parametrize("requirement", [LIFT, SPRING, FALLING])
+def test_the_reserve_is_that_of_the_worst_position_of_the_stroke(name: str, requirement: LiftRequirement):
+    """The capacity is convex in the contraction, so that a falling load can come closest to it between the ends."""
+    choice = choose(am.load(name), requirement, SIX_BAR)
+    first, last = choice.design.extended.contraction, choice.design.contracted.contraction
+    eps = np.linspace(first, last, 301)
+    load = np.linspace(requirement.load(0.0), requirement.load(requirement.stroke), 301)
+    capacity = np.minimum(
+        [force(choice, choice.muscle.pressure_range[1], each) for each in eps], choice.muscle.max_force
+    )
+    assert choice.design.reserve == pytest.approx(np.min(capacity / load) - 1.0, abs=2e-3)
+
+
+@pytest.mark.parametrize("name", ["dmsp-10-250", "dmsp-20-300"])
+def test_the_reserve_of_a_lift_is_the_safety_factor_where_an_end_limits_the_length(name: str):
+    assert choose(am.load(name), LIFT, SIX_BAR).design.reserve == pytest.approx(SIX_BAR.safety_factor - 1.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("inertia", [0.05, 20.0])
+def test_the_reserve_of_a_joint_is_the_safety_factor_where_the_length_is_the_shortest(inertia: float):
+    for safety_factor in (1.5, 2.0):
+        conditions = dataclasses.replace(SIX_BAR, safety_factor=safety_factor)
+        choice = choose(am.load("dmsp-20-300"), dataclasses.replace(JOINT, inertia=inertia), conditions)
+        assert choice.design.reserve == pytest.approx(safety_factor - 1.0, rel=1e-6)
+
+
 def test_the_load_is_the_weight_plus_force_and_spring():
     both = LiftRequirement(stroke=0.02, mass=3.0, force=10.0, stiffness=500.0)
     assert both.load(0.02) == 3.0 * STANDARD_GRAVITY + 10.0 + 500.0 * 0.02
     assert both.work == pytest.approx((3.0 * STANDARD_GRAVITY + 10.0) * 0.02 + 0.5 * 500.0 * 0.02**2)
+
+
+@pytest.mark.parametrize(("load", "travel"), [(0.5, 1.0), (1.0, 0.25), (0.3, 0.4)])
+def test_a_reduced_requirement_has_the_fraction_of_load_and_motion(load: float, travel: float):
+    full = LiftRequirement(stroke=0.03, mass=4.0, force=80.0, stiffness=4000.0)
+    lift, joint = full.reduced(load, travel), JOINT.reduced(load, travel)
+    assert lift.stroke == pytest.approx(travel * full.stroke)
+    assert lift.load(0.0) == pytest.approx(load * full.load(0.0))
+    assert lift.load(lift.stroke) == pytest.approx(load * full.load(full.stroke))
+    assert (joint.torque, joint.inertia, joint.angle) == pytest.approx(
+        (load * JOINT.torque, load * JOINT.inertia, travel * JOINT.angle)
+    )
 
 
 @pytest.mark.parametrize("name", MUSCLES)

@@ -18,7 +18,8 @@ from airmuscle.control import AngleAndStiffness, StaticInverse
 from airmuscle.core import autodiff
 from airmuscle.core.errors import ParameterError
 from airmuscle.library.files import LAWS as LAW_FILES
-from airmuscle.muscle import SeriesSpring
+from airmuscle.mechanism.contact import HuntCrossley
+from airmuscle.muscle import CubicSpring, EndStop, SeriesSpring
 from airmuscle.muscle.characteristic import ForceLaw, ValidityRange, as_force_law
 
 
@@ -52,6 +53,18 @@ def test_a_force_beyond_the_range_gives_the_nearer_limit():
     inverse = StaticInverse(MUSCLES[0], min_pressure=1e4, max_pressure=4e5)
     assert inverse.pressure(0.1, 1e6) == 4e5
     assert inverse.pressure(0.1, -1e6) == 1e4
+
+
+@pytest.mark.parametrize("contraction", [0.04, 0.12])
+def test_the_inverse_of_a_muscle_includes_its_parallel_spring_and_its_end_stop(contraction):
+    """In front of the stop and behind it, where the stop carries a part of the tension."""
+    stop = EndStop(0.1, HuntCrossley(1e6))
+    muscle = dataclasses.replace(MUSCLES[0], spring=CubicSpring(2000.0, 20.0), stop=stop)
+    pressure, length = np.linspace(2e5, 5e5, 7), muscle.geometry.resting_length
+    spring = 2000.0 * contraction * length * (1.0 + 20.0 * contraction**2)
+    carried = spring + 1e6 * (max(contraction - 0.1, 0.0) * length) ** 1.5
+    tension = muscle.contractile.force(pressure, contraction) - carried
+    assert StaticInverse(muscle).pressure(contraction, tension) == pytest.approx(pressure, rel=1e-9)
 
 
 def test_the_inverse_of_an_approximated_law_errs_by_no_more_than_its_stated_error():

@@ -213,7 +213,7 @@ def test_without_pressure_a_closed_form_bears_no_load(name: str):
 def test_an_answer_that_no_muscle_can_be_is_refused(tmp_path: Path):
     said = refused(tmp_path, "solve", "borzikova-direct-repaired", "--pressure=9 MPa", "--force=100 N")
     assert re.search(
-        r"the solution 9000 kPa, 328\.\d+%, 100 N is not physical.*nearer to the validity range of the", said
+        r"the solution 9000 kPa, 328\.\d+ %, 100 N is not physical.*nearer to the validity range of the", said
     )
 
 

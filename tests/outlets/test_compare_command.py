@@ -21,7 +21,7 @@ def test_a_benchmark_writes_its_report_tables_and_figures(tmp_path):
     assert result.exit_code == 0, result.output
     assert "PID" in result.stdout
     names = {path.relative_to(tmp_path / "compare").as_posix() for path in (tmp_path / "compare").rglob("*.*")}
-    tables = {f"data/{name}.csv" for name in ("ranking", "rmse", "greatest", "metrics")}
+    tables = {f"data/{name}.csv" for name in ("ranking", "rmse", "max_error", "metrics")}
     assert {"report.html", "figures/errors.png", "figures/runs.png", *tables} <= names
     assert "data/gains.csv" not in names, "nothing was tuned"
     page = (tmp_path / "compare" / "report.html").read_text(encoding="utf-8")
@@ -35,7 +35,7 @@ def test_json_contains_every_metric_of_every_run(tmp_path):
     assert content["scores"] == {"PID": 1.0}
     (row,) = content["runs"]
     assert (row["controller"], row["task"], row["reason"]) == ("PID", "step", "")
-    assert 0 < row["rmse"] < row["greatest"] < 30
+    assert 0 < row["rmse"] < row["max_error"] < 30
     assert row["settling"] is None or row["settling"] >= 0
     assert content["gains"] == {}, "nothing was tuned"
 

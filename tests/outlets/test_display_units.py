@@ -64,7 +64,7 @@ def test_a_plot_is_in_the_chosen_units_and_the_values_are_not():
 
 def test_without_a_choice_the_units_are_the_usual_ones():
     assert labels(run().plot()) == ["angle\n[rad]", "pressure\n[kPa]", "contraction\n[%]"]
-    assert (quantity_text(3e5, "Pa", "kPa"), contraction_text(0.125)) == ("300 kPa", "12.50%")
+    assert (quantity_text(3e5, "Pa", "kPa"), contraction_text(0.125)) == ("300 kPa", "12.50 %")
     assert heading_scale("pressure [kPa]") == (1.0, "pressure [kPa]")
 
 

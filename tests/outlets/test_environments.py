@@ -229,6 +229,17 @@ def test_the_covariance_of_a_fit_is_that_of_the_draws():
     )  # fmt: skip
 
 
+def test_parameters_of_very_different_size_keep_their_standard_errors_and_correlations():
+    """A force [N], a conductance [m3/(s Pa)] and a stiffness [N/m] of one fit differ by 14 powers of ten."""
+    told = ParameterUncertainty(
+        ("offset", "conductance", "stiffness", "volume"), (1.0, 1e-11, 1e3, 1e-7),
+        ((1.0, 0.5, 0.3, 0.0), (0.5, 1.0, 0.4, 0.2), (0.3, 0.4, 1.0, 0.0), (0.0, 0.2, 0.0, 1.0)),
+    )  # fmt: skip
+    draws = FitUncertainty(told).values(np.zeros(4), np.random.default_rng(0).random((20000, 4)))
+    np.testing.assert_allclose(draws.std(axis=0), told.standard_errors, rtol=0.03)
+    np.testing.assert_allclose(np.corrcoef(draws.T), told.correlations, atol=0.03)
+
+
 def test_the_uncertainty_of_a_muscle_file_varies_its_law():
     name = "contractile.max_force"
     told = ParameterUncertainty((name.replace("contractile", "characteristic"),), (5.0,), ((1.0,),))

@@ -241,10 +241,10 @@ def test_friction_on_the_pressure_is_reported_and_not_written(tmp_path):
     columns = {"time": 0.2 * np.arange(600), "pressure": pressure, "contraction": np.full(600, 0.05), "force": force}
     write_csv(Recording(columns, "ramp"), tmp_path / "ramp.csv")
     result = airmuscle("hysteresis", tmp_path / "ramp.csv", *LENGTH, "--degree", 1, "--out", tmp_path / "out")
-    assert "isometric at 5.00%" in result.stdout
+    assert "isometric at 5.00 %" in result.stdout
     slightly_negative = columns | {"contraction": np.full(600, -6e-6)}
     (loop,) = find_loops([Recording(slightly_negative, "ramp", {"resting_length": 0.3})])
-    assert loop.description == "isometric at 0.00%"
+    assert loop.description == "isometric at 0.00 %"
     assert "a plant cannot use it" in result.stdout
     assert not list((tmp_path / "out").glob("*.toml"))
 

@@ -165,7 +165,7 @@ def test_logs_with_lengths_in_their_names_are_inspected_and_fitted_by_options(tm
     law = ("--characteristic", "ContractileSurface", "--degree", "2")
     fitted = airmuscle("fit", *files, *options, *law, "--out", tmp_path / "fit")
     assert fitted.exit_code == 0, fitted.stderr
-    assert "0.00% to 10.00%" in fitted.stdout
+    assert "0.00 % to 10.00 %" in fitted.stdout
 
 
 def test_fit_takes_columns_and_constants_by_options(tmp_path: Path) -> None:

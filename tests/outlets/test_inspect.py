@@ -86,12 +86,12 @@ def test_the_text_output(tmp_path: Path):
     for said in (
         "run.csv: 400 rows",
         "resting_length: 300 mm",
-        "sampling: 20 rows per second over 19.95 s, jitter 0.0%",
+        "sampling: 20 rows per second over 19.95 s, jitter 0.0 %",
         "runs: isometric at contraction 10 %, rows 1 to 400",
         "branches: inflating, rows 1 to 200; deflating, rows 201 to 400",
         "plateaus: 40 with",
         "suspected outliers: 1, not removed: force in row 96",
-        "force sensor saturates at its lower limit, -5 N, in 160 rows (40%)",
+        "force sensor saturates at its lower limit, -5 N, in 160 rows (40 %)",
     ):
         assert said in text
     assert "PROBLEM" not in text

@@ -133,6 +133,7 @@ def test_muscles_are_compared_and_own_files_are_read(muscle, tmp_path):
 def test_a_plant_runs_by_schedule_and_by_hand_and_is_simulated_from_its_file(browser, address, tmp_path):
     with opened(browser, address) as page:
         page.get_by_role("tab", name="Muscle").press("ArrowRight")
+        page.get_by_role("tab", name="Fit").press("ArrowRight")
         wait_for(page, "plant", "lift")
         assert "steps" in page.locator("#panel-plant").inner_text()
         page.locator("#panel-plant .parameter", has_text="fill").first.get_by_role("button", name="1").click()

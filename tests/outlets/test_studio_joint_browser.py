@@ -133,7 +133,7 @@ def test_muscles_are_found_shown_and_simulated_from_their_file(browser, address,
     with opened(browser, address) as page:
         panel = shown(page, "Size")
         panel.get_by_label("Load", exact=True).fill("15 kg")
-        panel.get_by_label("Greatest length").fill("350 mm")
+        panel.get_by_label("Maximum length").fill("350 mm")
         panel.get_by_role("button", name="Find muscles").click()
         page.wait_for_selector('#panel-size[data-shown^="147.1 N"]', timeout=WAIT)
         names = panel.locator(".choices tbody tr td:first-child").all_inner_texts()

@@ -192,8 +192,10 @@ def test_a_run_of_the_page_is_that_of_the_library(name, tmp_path):
         scenario.plant, scenario.problem.input, duration=scenario.problem.duration,
         initial_state=dict(scenario.initial_state), output_times=times, integrator=scenario.problem.integrator,
     )  # fmt: skip
+    shown = np.isin(recording["time"], times)  # the page does not show the instants of the input between its rows
+    assert shown.sum() == times.size
     for column in recording:
-        wanted = recording[column]
+        wanted = recording[column][shown]
         np.testing.assert_allclose(
             columns[column], wanted, atol=1e-10 * max(1e-300, np.abs(wanted).max()) + 1e-13, err_msg=column
         )

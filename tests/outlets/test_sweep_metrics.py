@@ -70,6 +70,13 @@ def test_a_falling_column_reaches_its_level_too():
     assert SettlingTime("x").value(TIME, -RAMP) == pytest.approx(1.96)
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_column_that_crosses_its_band_between_two_rows_settles_where_the_straight_line_enters_it(sign):
+    """The line falls from 2 at 1 s to -1 at 4 s; half the band is 1.5, a tenth of the change from 15 to 0."""
+    time, values = np.array([0.0, 1.0, 4.0, 5.0]), sign * np.array([15.0, 2.0, -1.0, 0.0])
+    assert SettlingTime("x", band=0.1).value(time, values) == pytest.approx(1.5, rel=1e-12)
+
+
 @pytest.mark.parametrize("zeta", [0.2, 0.5, 0.7])
 @pytest.mark.parametrize("sign", [1.0, -4.0])
 def test_the_step_response_of_second_order(zeta, sign):

@@ -9,6 +9,8 @@ from .joint_torque import TorqueFunction
 
 LEVELS = 129
 """Number of pressures of each muscle at which the reachable stiffnesses are evaluated (chosen)."""
+BISECTIONS = 50
+"""Bisections of the pressure at which a muscle becomes taut; they reach rounding precision."""
 
 
 def taut_branch(function: TorqueFunction, angle: Array, levels: Array) -> tuple[Array, Array]:
@@ -16,16 +18,23 @@ def taut_branch(function: TorqueFunction, angle: Array, levels: Array) -> tuple[
     (tension,) = function(angle[:, None], levels, "tension")
     taut = tension > 0.0
     slack = np.where(taut.any(axis=1), taut.argmax(axis=1), 0)
-    rows = np.arange(angle.size)
-    before = np.maximum(slack - 1, 0)
-    force, next_force = tension[rows, before], tension[rows, slack]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.where(slack > 0, -force / (next_force - force), 0.0)
-    start = levels[before] + share * (levels[slack] - levels[before])
+    start = _first_taut(function, angle, levels[np.maximum(slack - 1, 0)], levels[slack])
     inner = start[:, None] + np.linspace(0.0, 1.0, LEVELS) * (levels[-1] - start)[:, None]
     torque, stiffness = function(angle[:, None], inner, "torque", "stiffness")
     invalid = (~taut.any(axis=1)).reshape(-1, 1)
     return np.where(invalid, np.nan, torque), np.where(invalid, np.nan, stiffness)
+
+
+def _first_taut(function: TorqueFunction, angle: Array, low: Array, high: Array) -> Array:
+    """Least pressure (N,) at which a muscle is taut, by bisection from a slack one to a taut one.
+
+    It is on the taut side, because the stiffness of a slack muscle is zero.
+    """
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        taut = function(angle, middle, "tension")[0] > 0.0
+        low, high = np.where(taut, low, middle), np.where(taut, middle, high)
+    return high
 
 
 def stiffness_range(pairs: list[tuple[Array, Array]], row: int, torque: float) -> tuple[float, float]:

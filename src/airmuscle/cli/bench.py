@@ -117,8 +117,8 @@ def _report(fit: RecursiveFit, json: bool) -> None:
         echo(dumps(report))  # one line for each report, for a program that reads them as they come
         return
     echo(
-        f"{fit.samples} samples, rms residual {fit.rmse:.4g} N, force determined on {fit.determined:.0%} of the range; "
-        f"next: {quantity_text(point.pressure, 'Pa', 'kPa')}, {percent(point.contraction)} (expected "
+        f"{fit.samples} samples, rms residual {fit.rmse:.4g} N, force determined on {100 * fit.determined:.0f} % of "
+        f"the range; next: {quantity_text(point.pressure, 'Pa', 'kPa')}, {percent(point.contraction)} (expected "
         f"{point.force:.4g} ± {2 * point.standard_error:.2g} N)"
     )
 

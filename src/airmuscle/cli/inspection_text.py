@@ -48,10 +48,10 @@ def summary(inspection: Inspection) -> Iterator[str]:
         order = "" if inspection.sampling else " (if the rows are in order of time)"
         yield f"branches{order}: {_shorten([_with_rows(b.name, b) for b in inspection.branches])}"
     if inspection.branch_agreement is not None:
-        yield f"agreement with the branch column of the file: {inspection.branch_agreement:.1%} of the rows"
+        yield f"agreement with the branch column of the file: {100 * inspection.branch_agreement:.1f} % of the rows"
     if inspection.sampling:
         count = sum(len(plateau.interval) for plateau in inspection.plateaus)
-        share = f"{inspection.quasi_static:.0%} of all rows are quasi-static"
+        share = f"{100 * inspection.quasi_static:.0f} % of all rows are quasi-static"
         yield f"plateaus: {len(inspection.plateaus)} with {count} rows; {share}"
     if inspection.outliers:
         outliers = _shorten([_describe_outlier(outlier) for outlier in inspection.outliers])
@@ -73,7 +73,7 @@ def _with_rows(text: str, part: Any) -> str:
 
 def _describe_sampling(sampling: Sampling) -> str:
     gaps = f", {len(sampling.gaps)} gaps" if sampling.gaps else ""
-    regularity = "time stamps repeat" if sampling.rounded else f"jitter {sampling.jitter:.1%}"
+    regularity = "time stamps repeat" if sampling.rounded else f"jitter {100 * sampling.jitter:.1f} %"
     return f"{sampling.rate:.4g} rows per second over {sampling.duration:.4g} s, {regularity}{gaps}"
 
 

@@ -9,7 +9,7 @@ import math
 import threading
 import weakref
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,6 +32,15 @@ SMALLEST_POSITIVE = math.ulp(0.0)
 _FUNCTIONS = ("rhs", "jac", "factor", "solve", "stage", "df_dt", "outputs")
 
 
+class _ExplicitStep(NamedTuple):
+    """The address of a compiled step, its `prepare`, how many values that gives, and the owner of the machine code."""
+
+    address: int
+    prepare: Callable[[Array, int], Array]
+    size: int
+    engine: Any
+
+
 class Program:
     """The compiled functions of one structure; it owns the machine code and cannot be pickled."""
 
@@ -48,7 +57,8 @@ class Program:
         self._engine = load_module(text)
         self.address = {name: int(self._engine.get_function_address(name)) for name in _FUNCTIONS}
         self._prepare = prepare_function(self._engine)
-        self._steps: dict[Any, tuple[Any, int]] = {}
+        self._steps: dict[Any, _ExplicitStep] = {}
+        self._lane_modules: dict[Any, tuple[Any, int]] = {}
         self._compiling = threading.Lock()  # of two threads that need a step, one compiles it: an engine must stay
 
     @functools.cached_property
@@ -65,9 +75,11 @@ class Program:
         with self._compiling:
             if tableau not in self._steps:
                 text, size = self._step_module(tableau)
-                self._steps[tableau] = load_module(text), size
-        engine, size = self._steps[tableau]
-        return int(engine.get_function_address("step")), prepare_function(engine)(parameters, size)
+                engine = load_module(text)
+                address = int(engine.get_function_address("step"))
+                self._steps[tableau] = _ExplicitStep(address, prepare_function(engine), size, engine)
+        step = self._steps[tableau]
+        return step.address, step.prepare(parameters, step.size)
 
     def _step_module(self, tableau: Tableau) -> tuple[str, int]:
         if isinstance(self._form, sensitivities.TangentSystem):
@@ -77,10 +89,10 @@ class Program:
     def lanes(self, tableau: Tableau, number: LlvmType) -> tuple[tuple[int, int, int], int]:
         """The addresses of `prepare`, the explicit step and `outputs` in lanes, and the length of `c`."""
         with self._compiling:
-            if (tableau, number) not in self._steps:
+            if (tableau, number) not in self._lane_modules:
                 text, size = lanes_module(self.traced, *tableau, number)
-                self._steps[tableau, number] = load_module(text), size
-        engine, size = self._steps[tableau, number]
+                self._lane_modules[tableau, number] = load_module(text), size
+        engine, size = self._lane_modules[tableau, number]
         prepare, step, outputs = (int(engine.get_function_address(n)) for n in ("prepare", "step", "outputs"))
         return (prepare, step, outputs), size
 
@@ -94,7 +106,7 @@ def prepare_function(engine: Any) -> Callable[[Array, int], Array]:
 
     def prepare(parameters: Array, size: int) -> Array:
         values = np.zeros(max(size, 1))
-        function(parameters.ctypes.data, values.ctypes.data)
+        function(parameters.ctypes.data, address_of(values))
         return values
 
     return prepare

@@ -112,11 +112,11 @@ def quantity_text(value: Any, si_unit: str, default: str, digits: int = 4) -> st
     return f"{value * factor:.{digits}g} {'' if unit == '1' else unit}".rstrip()
 
 
-def contraction_text(value: Any, default: str = ".2%", digits: int = 4) -> str:
-    """A contraction as text: in the format `default`, or to significant digits in the chosen unit."""
+def contraction_text(value: Any, decimals: int = 2, digits: int = 4) -> str:
+    """A contraction as text: in per cent with so many decimals, or to significant digits in the chosen unit."""
     choice = chosen_scale("1", 0.0, "")
     if not choice[1]:
-        return f"{value:{default}}"
+        return f"{100 * value:.{decimals}f} %"
     return f"{value * choice[0]:.{digits}g} {'' if choice[1] == '1' else choice[1]}".rstrip()
 
 

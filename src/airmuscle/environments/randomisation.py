@@ -118,9 +118,7 @@ class FitUncertainty(ShortRepr, Randomisation):
     def values(self, nominal: Array, uniform: Array) -> Array:
         from scipy.special import ndtri
 
-        spread, directions = np.linalg.eigh(self.uncertainty.covariance)
-        root = directions * np.sqrt(np.maximum(spread, 0.0))
-        draws = ndtri(np.clip(uniform, 1e-12, 1.0 - 1e-12)) @ root.T
+        draws = self.uncertainty.deviations(ndtri(np.clip(uniform, 1e-12, 1.0 - 1e-12)))
         values: Array = nominal + np.tile(draws, len(self.muscles))
         return values
 

@@ -39,7 +39,7 @@ class ModelConversion(ShortRepr):
     def __str__(self) -> str:
         return (
             f"{type(self.model).__name__}: rms error {self.rmse:.4g} N, maximum error {self.max_error:.4g} N at "
-            f"{self.max_error_pressure / 1e3:.4g} kPa and {self.max_error_contraction:.2%}"
+            f"{self.max_error_pressure / 1e3:.4g} kPa and {100 * self.max_error_contraction:.2f} %"
         )
 
 
@@ -62,8 +62,8 @@ def convert(characteristic: Characteristic, other: Characteristic, validity_rang
         p, c = check_points["pressure"][missing[0]], check_points["contraction"][missing[0]]
         raise IdentificationError(
             f"the fitted {type(other).__name__} has no force at {missing.size} of {len(check_points)} points where "
-            f"{type(characteristic).__name__} has one, the first at {p / 1e3:.4g} kPa and {c:.2%}. Choose a smaller "
-            "validity range."
+            f"{type(characteristic).__name__} has one, the first at {p / 1e3:.4g} kPa and {100 * c:.2f} %. Choose a "
+            "smaller validity range."
         )
     worst = int(np.argmax(np.abs(difference)))
     return ModelConversion(

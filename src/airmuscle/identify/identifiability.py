@@ -66,7 +66,7 @@ class UndeterminedCombination:
     def _describe_error(self) -> str:
         if not np.isfinite(self.relative_stderr):
             return "not determined at all"
-        return f"poorly determined (relative standard error {self.relative_stderr:.0%})"
+        return f"poorly determined (relative standard error {100 * self.relative_stderr:.0f} %)"
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

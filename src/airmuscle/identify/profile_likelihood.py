@@ -35,7 +35,8 @@ class ProfileLikelihood:
     def __str__(self) -> str:
         ends = [f"{end:.4g}" if np.isfinite(end) else "unbounded" for end in (self.low, self.high)]
         unit = "" if self.unit == "1" else f" {self.unit}"
-        return f"{self.name} {self.value:.4g}{unit}, {self.level:.0%} confidence interval {ends[0]} to {ends[1]}"
+        interval = f"{100 * self.level:.0f} % confidence interval {ends[0]} to {ends[1]}"
+        return f"{self.name} {self.value:.4g}{unit}, {interval}"
 
 
 def weakly_determined(fit: Fit) -> tuple[str, ...]:

@@ -101,18 +101,27 @@ class RecursiveFit(ShortRepr):
     @property
     def rmse(self) -> float:
         """Root mean square of the residuals [N]; NaN before the first sample."""
-        weight = self.samples if self.forgetting == 1.0 else self._effective_samples
-        return float(abs(self.factor[-1, -1]) / np.sqrt(weight)) if self.samples else np.nan
+        return float(abs(self.factor[-1, -1]) / np.sqrt(self._weights[0])) if self.samples else np.nan
 
     @property
-    def _effective_samples(self) -> float:
-        return (1.0 - self.forgetting**self.samples) / (1.0 - self.forgetting)
+    def _weights(self) -> tuple[float, float]:
+        """Sum of the weights of the samples, of which the last has 1, and sum of their squares."""
+        kept, count = self.forgetting, self.samples
+        if kept == 1.0:
+            return float(count), float(count)
+        return (1.0 - kept**count) / (1.0 - kept), (1.0 - kept ** (2 * count)) / (1.0 - kept**2)
 
     @property
     def noise(self) -> float:
-        """Standard deviation of a force [N]: of the residuals once there are twice as many samples as coefficients."""
-        free = self.samples - self.coefficients.size
-        return self.sigma if free < self.coefficients.size else float(abs(self.factor[-1, -1]) / np.sqrt(free))
+        """Standard deviation of a force [N]: of the residuals once their weights add up to twice the coefficients.
+
+        The weighted sum of squares has the expectation sigma^2 (W_1 - P W_2/W_1), with the sums W_1 of the weights and
+        W_2 of their squares, for P coefficients and points that do not change over time.
+        """
+        (total, squares), count = self._weights, self.coefficients.size
+        if total < 2 * count:
+            return self.sigma
+        return float(abs(self.factor[-1, -1]) / np.sqrt(total - count * squares / total))
 
     @property
     def model(self) -> ContractileSurface:
@@ -121,8 +130,8 @@ class RecursiveFit(ShortRepr):
         share = float(np.mean(variance < DETERMINED))
         if share < 1.0:
             raise IdentificationError(
-                f"the samples determine the force on {share:.0%} of the range of the test rig. Measure more points, "
-                "reduce the range, or choose a smaller degree."
+                f"the samples determine the force on {100 * share:.0f} % of the range of the test rig. Measure more "
+                "points, reduce the range, or choose a smaller degree."
             )
         span = self.limits.validity_range
         return ContractileSurface(

@@ -205,7 +205,7 @@ class Fit(NotebookDisplay):
         if self.fitted_quantity == FORCE:
             return quantity_text(residual, "N", "N")
         if self.fitted_quantity == CONTRACTION:
-            return contraction_text(residual, ".4%")
+            return contraction_text(residual, 4)
         return quantity_text(residual, "Pa", "kPa")
 
     def _card(self) -> Card:

@@ -90,8 +90,9 @@ def _held_contraction(recording: Recording) -> Array:
     contraction = recording["contraction"]
     if np.ptp(contraction) > HELD:
         raise ColumnError(
-            f"{recording.origin}: the contraction varies by {np.ptp(contraction):.2%} during the fill; it must be held "
-            f"within {HELD:.1%}. Hold the muscle, or measure the volume in a water column (a column 'volume')."
+            f"{recording.origin}: the contraction varies by {100 * np.ptp(contraction):.2f} % during the fill; it "
+            f"must be held within {100 * HELD:.1f} %. Hold the muscle, or measure the volume in a water column "
+            "(a column 'volume')."
         )
     return contraction
 

@@ -49,6 +49,17 @@ class ParameterUncertainty:
         errors = np.array(self.standard_errors)
         return np.asarray(np.array(self.correlations) * np.outer(errors, errors))
 
+    def deviations(self, normal: Array) -> Array:
+        """Deviations of the parameters [SI] with this covariance, from independent normal deviates (..., P).
+
+        They follow from the root of the correlation matrix: that of the covariance would lose the small standard
+        errors, because those in SI units differ by many powers of ten.
+        """
+        count = len(self.parameters)
+        variances, directions = np.linalg.eigh(np.array(self.correlations).reshape(count, count))
+        root = directions * np.sqrt(np.maximum(variances, 0.0))
+        return np.asarray(normal @ root.T * np.array(self.standard_errors))
+
 
 def read_uncertainty(table: Any, location: Location) -> ParameterUncertainty:
     """The uncertainty of a table [uncertainty]. Raises ParameterError with the location."""

@@ -111,7 +111,7 @@ def _excess(time: Array, values: Array, limit: ColumnLimit) -> Diagnostic:
 
 def percent_of_rows(share: float) -> str:
     """A share of the rows that is not 0 as text, with one digit below one percent."""
-    return f"{share:.0%}" if share >= 0.01 else f"{100 * share:.1g}%"
+    return f"{100 * share:.0f} %" if share >= 0.01 else f"{100 * share:.1g} %"
 
 
 def describe_limit(limit: ColumnLimit) -> str:
@@ -199,7 +199,7 @@ def check_enclosures(given: Sequence[Enclosure]) -> None:
         if not volume > 0.0:
             raise ParameterError(
                 f"the initial state: the volume of {muscle.name} is {volume:.4g} m3 at a contraction of "
-                f"{contraction:.2%}; choose a contraction further within its range."
+                f"{100 * contraction:.2f} %; choose a contraction further within its range."
             )
 
 
@@ -211,9 +211,9 @@ def geometry_limit_hint(enclosure: Enclosure) -> str:
     if low + margin < inner < high - margin:
         return ""
     return (
-        f"{muscle.name} reached a contraction of {inner:.2%}, a limit of its geometry ({low:.2%} to {high:.2%}). Keep "
-        "the load from moving it so far: wrap the mechanism in WithEndStops, or choose a higher pressure or a smaller "
-        "load."
+        f"{muscle.name} reached a contraction of {100 * inner:.2f} %, a limit of its geometry ({100 * low:.2f} % to "
+        f"{100 * high:.2f} %). Keep the load from moving it so far: wrap the mechanism in WithEndStops, or choose a "
+        "higher pressure or a smaller load."
     )
 
 

@@ -69,5 +69,5 @@ def _draw_points(axes: Any, choice: MuscleChoice) -> None:
         axes.plot(
             [100 * point.contraction], [point.force], marker=marker, markersize=7, markerfacecolor="white",
             markeredgecolor=plotting.RED, markeredgewidth=1.8, linestyle="none", zorder=4, clip_on=False,
-            label=f"{name}: {point.pressure / 1e3:.4g} kPa,\n{point.contraction:.2%}, {point.force:.4g} N",
+            label=f"{name}: {point.pressure / 1e3:.4g} kPa,\n{100 * point.contraction:.2f} %, {point.force:.4g} N",
         )  # fmt: skip

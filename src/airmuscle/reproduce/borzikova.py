@@ -83,7 +83,7 @@ def curve_claims(curves: PlaneCurves) -> tuple[Claim, ...]:
     )
 
 
-def surface_claim(name: str, law: am.muscle.characteristic.ContractionLaw, curves: PlaneCurves) -> Claim:
+def surface_claim(name: str, law: am.characteristic.ContractionLaw, curves: PlaneCurves) -> Claim:
     """Return the claim that a surface fits the plane curves as well as these fit the measurements (minimum index).
 
     The paper prints no index for the surface. If the index does not exist, the claim contains 1 - SSE/SST and says so.
@@ -176,7 +176,7 @@ def load_claim() -> Claim:
     )
 
 
-def claims(curves: PlaneCurves, laws: Mapping[str, am.muscle.characteristic.ContractionLaw]) -> tuple[Claim, ...]:
+def claims(curves: PlaneCurves, laws: Mapping[str, am.characteristic.ContractionLaw]) -> tuple[Claim, ...]:
     """Return all claims of the paper for these curves and surfaces."""
     evaluated = (AS_EXPONENT, PRINTED, MISPRINT_CORRECTED, CORRECTED, EXPONENTIAL)
     return (

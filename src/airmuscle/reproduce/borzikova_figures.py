@@ -20,7 +20,7 @@ from .borzikova_surfaces import CORRECTED, EXPONENTIAL, MISPRINT_CORRECTED, MONO
 PRESSURE, FORCE, CONTRACTION = "gauge pressure [bar]", "force [N]", "contraction [%]"
 
 
-def plots(curves: PlaneCurves, laws: Mapping[str, am.muscle.characteristic.ContractionLaw]) -> tuple[Plot, ...]:
+def plots(curves: PlaneCurves, laws: Mapping[str, am.characteristic.ContractionLaw]) -> tuple[Plot, ...]:
     """Return all figures of the chapter."""
     return (
         dead_zone(curves),
@@ -84,7 +84,7 @@ def plane_curves(curves: PlaneCurves) -> Plot:
     return Plot("borzikova_plane_curves", caption, figure)
 
 
-def surface(curves: PlaneCurves, law: am.muscle.characteristic.ContractionLaw) -> Plot:
+def surface(curves: PlaneCurves, law: am.characteristic.ContractionLaw) -> Plot:
     """Return Fig. 5: the surface."""
     figure, axes = new_figure(height=4.4, subplot_kw={"projection": "3d", "computed_zorder": False})
     pressure, force = LoadRange.from_law(law).grid(36, 31)
@@ -108,7 +108,7 @@ def surface(curves: PlaneCurves, law: am.muscle.characteristic.ContractionLaw) -
     return Plot("borzikova_surface", caption, figure)
 
 
-def residuals(curves: PlaneCurves, laws: Mapping[str, am.muscle.characteristic.ContractionLaw]) -> Plot:
+def residuals(curves: PlaneCurves, laws: Mapping[str, am.characteristic.ContractionLaw]) -> Plot:
     """Return the residuals on the curves, and the difference of the two surfaces between them."""
     figure, (left, right) = new_figure(1, 2, width=7.6, height=3.3)
     pressures = _pressures(curves)
@@ -140,7 +140,7 @@ def residuals(curves: PlaneCurves, laws: Mapping[str, am.muscle.characteristic.C
     return Plot("borzikova_residuals", caption, figure)
 
 
-def violations(laws: Mapping[str, am.muscle.characteristic.ContractionLaw]) -> Plot:
+def violations(laws: Mapping[str, am.characteristic.ContractionLaw]) -> Plot:
     """Return the regions in which the surfaces increase with force or decrease with pressure."""
     names = (CORRECTED, EXPONENTIAL, MONOTONE)
     figure, panels = new_figure(1, 3, width=7.6, height=3.3, sharey=True)
@@ -177,7 +177,7 @@ def _violation_legend(figure: Any) -> None:
     figure.legend(handles=patches, loc="outside lower center", ncols=2, frameon=False, fontsize=8)
 
 
-def monotone_fit(curves: PlaneCurves, law: am.muscle.characteristic.ContractionLaw) -> Plot:
+def monotone_fit(curves: PlaneCurves, law: am.characteristic.ContractionLaw) -> Plot:
     """Return the monotone fit and its errors on the plane curves."""
     figure, axes = new_figure()
     pressures = _pressures(curves)

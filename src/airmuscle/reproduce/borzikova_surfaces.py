@@ -28,19 +28,19 @@ EXPONENTIAL = "exponential (1), fitted here"
 MONOTONE = "exponential (1), monotone"
 
 
-def surfaces(curves: PlaneCurves = SAM_30X290) -> dict[str, am.muscle.characteristic.ContractionLaw]:
+def surfaces(curves: PlaneCurves = SAM_30X290) -> dict[str, am.characteristic.ContractionLaw]:
     """Return all surfaces of the chapter by name."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AirmuscleWarning)  # the chapter shows the misprint
         printed = load_law("borzikova-direct-printed").characteristic
     corrected = load_law("borzikova-direct-repaired").characteristic
     exponential = load_law("borzikova-exponential").characteristic
-    assert isinstance(printed, am.muscle.characteristic.BorzikovaDirect)
-    assert isinstance(corrected, am.muscle.characteristic.BorzikovaDirect)
-    assert isinstance(exponential, am.muscle.characteristic.BorzikovaExponential)
+    assert isinstance(printed, am.characteristic.BorzikovaDirect)
+    assert isinstance(corrected, am.characteristic.BorzikovaDirect)
+    assert isinstance(exponential, am.characteristic.BorzikovaExponential)
     saturation = curves.curves[0].saturation
     return {
-        AS_EXPONENT: am.muscle.characteristic.BorzikovaExponential(
+        AS_EXPONENT: am.characteristic.BorzikovaExponential(
             printed.coefficients, *LoadRange.from_law(printed), saturation=saturation
         ),
         PRINTED: printed,
@@ -66,13 +66,13 @@ def sample(curves: PlaneCurves, points: int = 15) -> am.Recording:
     )
 
 
-def with_a02(law: am.muscle.characteristic.BorzikovaDirect, a02: float) -> am.muscle.characteristic.BorzikovaDirect:
+def with_a02(law: am.characteristic.BorzikovaDirect, a02: float) -> am.characteristic.BorzikovaDirect:
     """Return the surface with another coefficient of F^2."""
     coefficients = (*law.coefficients[:MISPRINT_INDEX], a02, *law.coefficients[MISPRINT_INDEX + 1 :])
     return dataclasses.replace(law, coefficients=coefficients)
 
 
-def index_on_curves(law: am.muscle.characteristic.ContractionLaw, curves: PlaneCurves) -> CorrelationIndex:
+def index_on_curves(law: am.characteristic.ContractionLaw, curves: PlaneCurves) -> CorrelationIndex:
     """Return the correlation index of a surface at 15 evenly spaced pressures of each plane curve."""
     data = sample(curves)
     return correlation_index(data["contraction"], law.contraction(data["pressure"], data["force"]))

@@ -46,7 +46,7 @@ CATALOGUE_TEXT = {
 }
 
 
-def tables(curves: PlaneCurves, laws: Mapping[str, am.muscle.characteristic.ContractionLaw]) -> tuple[Table, ...]:
+def tables(curves: PlaneCurves, laws: Mapping[str, am.characteristic.ContractionLaw]) -> tuple[Table, ...]:
     """Return all tables of the chapter."""
     data = sample(curves)
     saturation = curves.curves[0].saturation
@@ -94,7 +94,7 @@ def curve_table(curves: PlaneCurves) -> Table:
 EXPLAINED = r"\(1 - \text{SSE}/\text{SST}\) [1]"
 
 
-def surface_table(curves: PlaneCurves, laws: Mapping[str, am.muscle.characteristic.ContractionLaw]) -> Table:
+def surface_table(curves: PlaneCurves, laws: Mapping[str, am.characteristic.ContractionLaw]) -> Table:
     """Return the errors and correlation indices of all surfaces on the plane curves."""
     upper = _sample_above_quarter_bar(curves)
     columns: dict[str, list[Any]] = {"surface": [], **{f"rms error at {c.force:g} N [%]": [] for c in curves.curves}}
@@ -126,7 +126,7 @@ def _rms_text(errors: np.ndarray) -> str:
     return f"{100 * np.sqrt(np.mean(errors**2)):.3g}"
 
 
-def exponent_table(curves: PlaneCurves, laws: Mapping[str, am.muscle.characteristic.ContractionLaw]) -> Table:
+def exponent_table(curves: PlaneCurves, laws: Mapping[str, am.characteristic.ContractionLaw]) -> Table:
     """Return the range of the exponent of equation (1) on the curves, and its range by the printed matrix."""
     pressures = np.linspace(0.0, curves.max_pressure, 351)
     printed, corrected = laws[PRINTED], laws[CORRECTED]
@@ -232,7 +232,7 @@ def _condition_text(condition: float) -> str:
     return "infinite" if np.isinf(condition) else f"{condition:.1e}"
 
 
-def violation_table(laws: Mapping[str, am.muscle.characteristic.ContractionLaw]) -> Table:
+def violation_table(laws: Mapping[str, am.characteristic.ContractionLaw]) -> Table:
     """Return the regions in which a surface violates monotonicity."""
     by_surface = {name: find_monotonicity_violations(laws[name]) for name in USABLE}
     violations = [(name, b) for name, breaks in by_surface.items() for b in breaks]
@@ -253,7 +253,7 @@ def violation_table(laws: Mapping[str, am.muscle.characteristic.ContractionLaw])
     )
 
 
-def minimum_table(curves: PlaneCurves, laws: Mapping[str, am.muscle.characteristic.ContractionLaw]) -> Table:
+def minimum_table(curves: PlaneCurves, laws: Mapping[str, am.characteristic.ContractionLaw]) -> Table:
     """Return the minimum contraction of the surfaces between the two larger loads."""
     loads = sorted(c.force for c in curves.curves)[-2:]
     pressure, force = LoadRange(0.0, curves.max_pressure, loads[0], loads[1]).grid(351, 651)

@@ -118,7 +118,7 @@ def _plots(
 def maxwell_table(parameters: UnpublishedParameters) -> Table:
     """Return the Maxwell defects of the fitted surfaces and of the law of the measured muscles."""
     shape = muscle(parameters).geometry
-    laws: dict[str, tuple[am.muscle.characteristic.Characteristic, am.muscle.geometry.Geometry]]
+    laws: dict[str, tuple[am.characteristic.Characteristic, am.geometry.Geometry]]
     laws = {f"surface fitted to {name}, without the limits": (surface_fit(name).model, shape) for name in FORCE_MAPS}
     for name in ("dmsp-20-300", "dmsp-10-250"):
         entry = law_file.load_law(name)

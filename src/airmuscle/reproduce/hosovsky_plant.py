@@ -89,13 +89,13 @@ class UnpublishedParameters:
 @functools.cache
 def surface_fit(data: str = FORCE_MAPS[0]) -> am.Fit:
     """Return the fit of the 21 coefficients to a force map of the library; rows clamped at zero force are censored."""
-    return am.fit(am.muscle.characteristic.ContractileSurface.blank(5, max_force=1e5), catalogue.load_data(data))
+    return am.fit(am.characteristic.ContractileSurface.blank(5, max_force=1e5), catalogue.load_data(data))
 
 
-def surface(data: str = FORCE_MAPS[0]) -> am.muscle.characteristic.ContractileSurface:
+def surface(data: str = FORCE_MAPS[0]) -> am.characteristic.ContractileSurface:
     """Return the fitted surface, limited to 0 to 1200 N by the force compensator of the paper."""
     fitted = surface_fit(data).model
-    assert isinstance(fitted, am.muscle.characteristic.ContractileSurface)
+    assert isinstance(fitted, am.characteristic.ContractileSurface)
     return dataclasses.replace(fitted, max_force=1200.0)
 
 
@@ -103,7 +103,7 @@ def muscle(
     parameters: UnpublishedParameters, data: str = FORCE_MAPS[0], spring: am.muscle.Spring | None = None
 ) -> am.Muscle:
     """Return the Hill muscle of equation (1)."""
-    braid = am.muscle.geometry.Braid(0.010, parameters.braid_angle.value, parameters.length.value)
+    braid = am.geometry.Braid(0.010, parameters.braid_angle.value, parameters.length.value)
     return am.Muscle(
         surface(data),
         braid,

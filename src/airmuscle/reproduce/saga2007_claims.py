@@ -45,22 +45,18 @@ def _claim(text: str, printed: PublishedValue, reproduced: float | None, unit: s
     return Claim(PAPER, text, printed, reproduced, unit, note, name)
 
 
-def contraction_claim(law: am.muscle.characteristic.Characteristic, name: str) -> Claim:
+def contraction_claim(law: am.characteristic.Characteristic, name: str) -> Claim:
     """Return claim 1: contraction above 35 % at 0.11 MPa, evaluated without load."""
     reached = contraction_at(law, PRESSURE, 0.0)
     at_end = reached >= law.contraction_range[1] * (1 - 1e-6)
     note = "The load is not stated; assumed to be zero. "
     note += "The model needs less than 0.11 MPa over its whole range, so the value is its end." if at_end else ""
-    note += (
-        "Even the exact meridian does not reach 35 %."
-        if isinstance(law, am.muscle.characteristic.ExactMeridian)
-        else ""
-    )
+    note += "Even the exact meridian does not reach 35 %." if isinstance(law, am.characteristic.ExactMeridian) else ""
     text = "1. Without rings, the contraction exceeds 35 % at 0.11 MPa"
     return _claim(text, AtLeast(35.0), 100 * reached, "%", name, note.strip())
 
 
-def lifting_claim(law: am.muscle.characteristic.Characteristic, name: str) -> Claim:
+def lifting_claim(law: am.characteristic.Characteristic, name: str) -> Claim:
     """Return claim 2: 200 N at 0.11 MPa and a contraction of 35 % or more together, as in the introduction."""
     reached = contraction_at(law, PRESSURE, 200.0)
     note = "Contraction at 0.11 MPa under a load of 200 N."
@@ -79,7 +75,7 @@ def force_limit_claim() -> Claim:
     return _claim("2. About 200 N at 0.11 MPa and 35 % or more", AtLeast(200.0), max_tension, "N", case, note)
 
 
-def initial_pressure_claims(law: am.muscle.characteristic.Saga2007, name: str) -> tuple[Claim, Claim]:
+def initial_pressure_claims(law: am.characteristic.Saga2007, name: str) -> tuple[Claim, Claim]:
     """Return claim 3, low initial pressure, and the paper's contradicting sentence, high initial pressure."""
     first, later = (float(law.equilibrium_pressure(c, 0.0)) for c in (0.01, 0.10))
     needed = max(law.threshold_pressure, first)
@@ -104,7 +100,7 @@ def initial_pressure_claims(law: am.muscle.characteristic.Saga2007, name: str) -
     return low, high
 
 
-def ring_claim(law: am.muscle.characteristic.Saga2007, name: str, force: float) -> Claim:
+def ring_claim(law: am.characteristic.Saga2007, name: str, force: float) -> Claim:
     """Return claim 4: rings reduce the contraction at a given pressure, or raise the pressure for a contraction."""
     contraction = np.geomspace(1e-7, 0.35, 200)
     pressures = [np.asarray(pressure_along(with_rings(law, n), contraction, force)) for n in (0, 1, 2)]
@@ -115,12 +111,12 @@ def ring_claim(law: am.muscle.characteristic.Saga2007, name: str, force: float) 
     return _claim(text, AtLeast(1.0, derived=True), ratio, "1", f"{name}, {force:g} N", note)
 
 
-def _stability_note(law: am.muscle.characteristic.Saga2007, force: float) -> str:
+def _stability_note(law: am.characteristic.Saga2007, force: float) -> str:
     falling = any(with_rings(law, n).snap_through_load > force for n in (1, 2))
     return " Where the pressure falls with contraction, equal segments contract unequally." if falling else ""
 
 
-def strength_claims(law: am.muscle.characteristic.Saga2007, name: str, force: float) -> tuple[Claim, ...]:
+def strength_claims(law: am.characteristic.Saga2007, name: str, force: float) -> tuple[Claim, ...]:
     """Return claim 4, second part: rings raise the pressure that the muscle withstands, by strain and fibre tension."""
     text = "4. Rings raise the pressure that the muscle withstands: ratio of the {} with two rings and without"
     case = f"{name}, {force:g} N"
@@ -157,7 +153,7 @@ def accuracy_claims() -> tuple[Claim, ...]:
     )
 
 
-def accuracy_findings(law: am.muscle.characteristic.Saga2007, name: str) -> tuple[Claim, ...]:
+def accuracy_findings(law: am.characteristic.Saga2007, name: str) -> tuple[Claim, ...]:
     """Return the errors relative to the exact meridian with the same rubber, up to 20 % and above."""
     reference = exact_meridian(law.rubber, law.geometry.rings)
     low, high = np.linspace(0.01, 0.20, 20), np.linspace(0.25, 0.40, 16)
@@ -178,7 +174,7 @@ def accuracy_findings(law: am.muscle.characteristic.Saga2007, name: str) -> tupl
     )
 
 
-def rubber_test_finding(law: am.muscle.characteristic.Saga2007) -> Claim:
+def rubber_test_finding(law: am.characteristic.Saga2007) -> Claim:
     """Return the contraction at which the rubber reaches the end of its test, as a possible cause of claim 5."""
     end = 100 * law.contraction_at_strain(RUBBER_TEST_STRAIN)
     note = "Contraction at which the rubber in the middle reaches a strain of 3, the end of the rubber test, "
@@ -187,7 +183,7 @@ def rubber_test_finding(law: am.muscle.characteristic.Saga2007) -> Claim:
     return replace(claim, kind=Kind.FINDING)
 
 
-def outline_claim(law: am.muscle.characteristic.Saga2007) -> Claim:
+def outline_claim(law: am.characteristic.Saga2007) -> Claim:
     """Return claim 6: the outlines of Fig. 2 lie within its axis."""
     radii = [1e3 * float(law.geometry.segment(c).max_radius) for c in FIG_2]
     radii_text = ", ".join(f"{r:.2f}" for r in radii)
@@ -197,7 +193,7 @@ def outline_claim(law: am.muscle.characteristic.Saga2007) -> Claim:
     )
 
 
-def feed_forward_claim(law: am.muscle.characteristic.Saga2007, name: str, force: float) -> Claim:
+def feed_forward_claim(law: am.characteristic.Saga2007, name: str, force: float) -> Claim:
     """Return claim 7: the fraction of target contractions that the pressure of the formula produces from rest."""
     targets = np.linspace(0.01, 0.35, 35)
     pressures = law.equilibrium_pressure(targets, force)
@@ -209,21 +205,21 @@ def feed_forward_claim(law: am.muscle.characteristic.Saga2007, name: str, force:
     return _claim(text, AtLeast(1.0, derived=True), met / targets.size, "1", f"{name}, {force:g} N", note.strip())
 
 
-def _reaches_target(law: am.muscle.characteristic.Saga2007, pressure: float, force: float, target: float) -> bool:
+def _reaches_target(law: am.characteristic.Saga2007, pressure: float, force: float, target: float) -> bool:
     try:
         return abs(float(law.contraction(pressure, force)) - target) < 1e-9
     except SolveError:
         return False
 
 
-def axis_claim(law: am.muscle.characteristic.Saga2007, name: str, force: float) -> Claim:
+def axis_claim(law: am.characteristic.Saga2007, name: str, force: float) -> Claim:
     """Return the claim of Fig. 8: pressures up to 0.16 MPa for contractions up to 40 %, at an assumed load."""
     max_pressure = float(np.max(law.equilibrium_pressure(np.linspace(0.0, 0.4, 81), force))) / 1e6
     note = "Maximum pressure of the formula for 0 to 40 %; the load of Fig. 8 is not stated."
     return _claim("Fig. 8 extends to 0.16 MPa", AtLeast(0.16), max_pressure, "MPa", f"{name}, {force:g} N", note)
 
 
-def claims_of(law: am.muscle.characteristic.Saga2007, name: str) -> tuple[Claim, ...]:
+def claims_of(law: am.characteristic.Saga2007, name: str) -> tuple[Claim, ...]:
     """Return all claims that depend on the model, for one interpretation."""
     return (
         contraction_claim(law, name),

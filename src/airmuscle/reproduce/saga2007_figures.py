@@ -85,7 +85,7 @@ def rubber() -> Plot:
     )
 
 
-def _draw_contraction(axes: Any, law: am.muscle.characteristic.Saga2007, force: float, i: int, label: str) -> None:
+def _draw_contraction(axes: Any, law: am.characteristic.Saga2007, force: float, i: int, label: str) -> None:
     """Draw contraction over pressure at one load: thin where the pressure falls with contraction (unstable)."""
     required = pressure_along(law, CONTRACTION, force) * MPA
     rising = np.append(np.diff(required) > 0, True)
@@ -166,7 +166,7 @@ def snap_through() -> Plot:
     )
 
 
-def _draw_pressure(axes: Any, law: am.muscle.characteristic.Saga2007, force: float, i: int, label: str) -> None:
+def _draw_pressure(axes: Any, law: am.characteristic.Saga2007, force: float, i: int, label: str) -> None:
     contraction = np.concatenate([np.geomspace(1e-5, 0.01, 40), np.linspace(0.011, 0.5, 200)])
     required = law.equilibrium_pressure(contraction, force) * MPA
     axes.plot(100 * contraction, required, ls=DASHES[i], color=LINES[i], label=label)

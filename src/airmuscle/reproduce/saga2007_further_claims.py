@@ -26,7 +26,7 @@ from .saga2007_muscle import (
 )
 from .saga2007_pairs import EVEN_SPREAD
 
-Law = am.muscle.characteristic.Saga2007 | am.muscle.characteristic.ExactMeridian
+Law = am.characteristic.Saga2007 | am.characteristic.ExactMeridian
 
 LAWS: Mapping[str, Law] = {
     interpretation_name(2, 1, "B"): DEFAULT,
@@ -59,7 +59,7 @@ def further_claims() -> tuple[Claim, ...]:
 
 def tension(law: Law, pressure: float, contraction: np.ndarray | float) -> np.ndarray:
     """Return the tension [N] at a gauge pressure [Pa] and contractions [1]."""
-    if isinstance(law, am.muscle.characteristic.Saga2007):
+    if isinstance(law, am.characteristic.Saga2007):
         return np.asarray(law.force(pressure, contraction))
     return np.asarray(law.shape_at_pressure(pressure, contraction).force)
 
@@ -98,9 +98,7 @@ def ring_force_claims() -> tuple[Claim, ...]:
     for name, law in LAWS.items():
         if "exact mechanics" in name:
             continue
-        ringed = (
-            with_rings(law, 1) if isinstance(law, am.muscle.characteristic.Saga2007) else exact_meridian(law.rubber, 1)
-        )
+        ringed = with_rings(law, 1) if isinstance(law, am.characteristic.Saga2007) else exact_meridian(law.rubber, 1)
         plain, more = (float(tension(one, PRESSURE, 0.05)) for one in (law, ringed))
         text, bound = "4. Rings increase the force", AtLeast(1.0, derived=True)
         claims.append(Claim(PAPER, text, bound, more / plain, "1", note, name))
@@ -147,7 +145,7 @@ def dimension_claims() -> tuple[Claim, ...]:
 def _pressure_ratio(law: Law, wall: float = WALL, diameter: float = DIAMETER) -> float:
     """Return the pressure for 5 % without load with other dimensions, relative to that of the muscle of Table 1."""
     other: Law
-    if isinstance(law, am.muscle.characteristic.Saga2007):
+    if isinstance(law, am.characteristic.Saga2007):
         other = replace(law, geometry=replace(law.geometry, end_diameter=diameter), wall_thickness=wall)
     else:
         other = replace(law, geometry=replace(law.geometry, end_diameter=diameter), wall_thickness=wall)
@@ -178,9 +176,7 @@ def _thinning_finding(contraction: float) -> Claim:
     return Claim(PAPER, text, AtLeast(15.0, chosen=True), 100 * (1 - thinned / nominal), "%", note, case, Kind.FINDING)
 
 
-def pressure_with_wall(
-    law: am.muscle.characteristic.Saga2007, contraction: float, force: float, thinned: bool
-) -> float:
+def pressure_with_wall(law: am.characteristic.Saga2007, contraction: float, force: float, thinned: bool) -> float:
     """Return the pressure [Pa] of the interpretation of exact mechanics, with the initial or the thinned wall."""
     segment = law.geometry.segment(contraction)
     nodes, weights = np.polynomial.legendre.leggauss(60)

@@ -43,7 +43,7 @@ GRID = 31
 """Angles of the search, between which the torque is interpolated by a cubic spline."""
 
 
-def models(line: am.muscle.characteristic.RubberLine) -> dict[str, am.muscle.characteristic.Characteristic]:
+def models(line: am.characteristic.RubberLine) -> dict[str, am.characteristic.Characteristic]:
     """Return the models that compute the pressures, by name, for one rubber line."""
     return {
         r"printed, \(w = 2\), \(q = 1\)": interpretation(line, 2.0, 1.0),
@@ -53,7 +53,7 @@ def models(line: am.muscle.characteristic.RubberLine) -> dict[str, am.muscle.cha
     }
 
 
-def commanded_pressures(law: am.muscle.characteristic.Characteristic, tension: float) -> Array:
+def commanded_pressures(law: am.characteristic.Characteristic, tension: float) -> Array:
     """Return the pressures [Pa] (2, A) of both muscles for ANGLES at equal tensions [N]."""
     return np.array([pressure_along(law, OFFSET + sign * ANGLES * RADIUS / LENGTH, tension) for sign in (1.0, -1.0)])
 

@@ -24,13 +24,11 @@ from ..report.chapter import Table
 from .saga2007_muscle import DIAMETER, LENGTH, LINES, WALL, exact_meridian
 
 OUTLINES: dict[str, FibreTube] = {
-    "parabola (3)": am.muscle.geometry.StraightFibre(LENGTH, DIAMETER, meridian=am.muscle.geometry.Parabola()),
-    "parabola, true arc": am.muscle.geometry.StraightFibre(
-        LENGTH, DIAMETER, meridian=am.muscle.geometry.TrueArcParabola()
-    ),
-    "catenary": am.muscle.geometry.StraightFibre(LENGTH, DIAMETER, meridian=am.muscle.geometry.Catenary()),
-    "circle": am.muscle.geometry.StraightFibre(LENGTH, DIAMETER, meridian=am.muscle.geometry.CircularArc()),
-    "exact without rubber": am.muscle.geometry.PleatedTube(LENGTH, DIAMETER),
+    "parabola (3)": am.geometry.StraightFibre(LENGTH, DIAMETER, meridian=am.geometry.Parabola()),
+    "parabola, true arc": am.geometry.StraightFibre(LENGTH, DIAMETER, meridian=am.geometry.TrueArcParabola()),
+    "catenary": am.geometry.StraightFibre(LENGTH, DIAMETER, meridian=am.geometry.Catenary()),
+    "circle": am.geometry.StraightFibre(LENGTH, DIAMETER, meridian=am.geometry.CircularArc()),
+    "exact without rubber": am.geometry.PleatedTube(LENGTH, DIAMETER),
 }
 CONTRACTIONS = np.array([0.01, 0.05, 0.10, 0.20, 0.30, 0.40])
 EVEN_SPREAD = 1 / np.pi
@@ -50,17 +48,17 @@ class ForceBalance(NamedTuple):
 class SegmentEnergy:
     """Elastic energy of the rubber of one segment as a function of contraction."""
 
-    tube: am.muscle.geometry.StraightFibre
-    rubber: am.muscle.characteristic.RubberLine
+    tube: am.geometry.StraightFibre
+    rubber: am.characteristic.RubberLine
 
     def energy(self, contraction: Value) -> Value:
         segment = self.tube.segment(contraction)
         return WALL * self.rubber.energy(segment.arc_excess, segment.arc_excess_squared, segment.end_radius)
 
 
-def _energy_derivative(tube: FibreTube, rubber: am.muscle.characteristic.RubberLine, contraction: Array) -> Array:
+def _energy_derivative(tube: FibreTube, rubber: am.characteristic.RubberLine, contraction: Array) -> Array:
     """Return dU/deps [J] of one segment; for the exact outline, which is not closed-form, by finite differences."""
-    if isinstance(tube, am.muscle.geometry.StraightFibre):
+    if isinstance(tube, am.geometry.StraightFibre):
         return np.asarray(autodiff.derivative(SegmentEnergy(tube, rubber), "energy", contraction))
 
     if not (rubber.slope or rubber.intercept):
@@ -82,9 +80,9 @@ def _moment_balance(segment: Segment, sine_or_slope: Value, radius: Value, rubbe
 
 def force_balances(
     tube: FibreTube,
-    rubber: am.muscle.characteristic.RubberLine,
+    rubber: am.characteristic.RubberLine,
     contraction: Array,
-    along: RubberIntegral = am.muscle.characteristic.ArcIntegral(),
+    along: RubberIntegral = am.characteristic.ArcIntegral(),
 ) -> dict[str, ForceBalance]:
     """Return the three closures of one outline over contraction, with w = 1 and M = m/pi.
 
@@ -108,7 +106,7 @@ def balance_pressure(balance: ForceBalance, force: float) -> Array:
 
 @functools.lru_cache(maxsize=16)
 def _all_balances(
-    rubber: am.muscle.characteristic.RubberLine, contraction: tuple[float, ...]
+    rubber: am.characteristic.RubberLine, contraction: tuple[float, ...]
 ) -> dict[tuple[str, str], ForceBalance]:
     """Return the balances of all 15 pairs (outline, closure); cached, as they do not depend on the load."""
     contractions = np.array(contraction)
@@ -119,9 +117,7 @@ def _all_balances(
     }
 
 
-def pressures(
-    rubber: am.muscle.characteristic.RubberLine, force: float, contraction: Array
-) -> dict[tuple[str, str], Array]:
+def pressures(rubber: am.characteristic.RubberLine, force: float, contraction: Array) -> dict[tuple[str, str], Array]:
     """Return the pressure [Pa] of each of the 15 pairs (outline, closure)."""
     return {
         pair: balance_pressure(balance, force) for pair, balance in _all_balances(rubber, tuple(contraction)).items()
@@ -130,14 +126,12 @@ def pressures(
 
 def ideal_errors(contraction: Array) -> dict[tuple[str, str], Array]:
     """Return the relative error of F/p of each pair, compared with the exact meridian, both without rubber [1]."""
-    reference = np.asarray(am.muscle.geometry.PleatedTube(LENGTH, DIAMETER).effective_area(contraction))
-    balances = _all_balances(am.muscle.characteristic.RubberLine(0.0, 0.0), tuple(contraction))
+    reference = np.asarray(am.geometry.PleatedTube(LENGTH, DIAMETER).effective_area(contraction))
+    balances = _all_balances(am.characteristic.RubberLine(0.0, 0.0), tuple(contraction))
     return {pair: balance.area / reference - 1 for pair, balance in balances.items()}
 
 
-def errors(
-    rubber: am.muscle.characteristic.RubberLine, force: float, contraction: Array
-) -> dict[tuple[str, str], Array]:
+def errors(rubber: am.characteristic.RubberLine, force: float, contraction: Array) -> dict[tuple[str, str], Array]:
     """Return the relative pressure error of each pair, compared with the exact meridian with rubber [1].
 
     NaN where either of the two is undefined.

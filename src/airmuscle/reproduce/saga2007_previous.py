@@ -50,7 +50,7 @@ class Ferraresi2001:
     Reference: Ferraresi et al. 2001, as quoted by Saga et al. 2007.
     """
 
-    rubber: am.muscle.characteristic.RubberLine
+    rubber: am.characteristic.RubberLine
     fibre_length: float = LENGTH
     end_radius: float = DIAMETER / 2
     initial_radius: float = DIAMETER / 2
@@ -69,7 +69,7 @@ class Ferraresi2001:
 
     def circle(self, contraction: Any) -> Circle:
         """Radius [m] and half angle [rad] of the meridian at a contraction, from sin(phi)/phi = 1 - contraction."""
-        half_angle = np.sqrt(am.muscle.geometry.CircularArc().angle_squared(contraction))
+        half_angle = np.sqrt(am.geometry.CircularArc().angle_squared(contraction))
         return Circle(self.fibre_length / (2 * half_angle), half_angle)
 
     def middle_radius(self, contraction: Any) -> Any:

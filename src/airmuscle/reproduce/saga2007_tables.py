@@ -153,7 +153,7 @@ _VIRTUAL_WORK_TITLE = (
 )
 
 
-def virtual_work(law: am.muscle.characteristic.Saga2007, pressure: float, contraction: Any) -> Any:
+def virtual_work(law: am.characteristic.Saga2007, pressure: float, contraction: Any) -> Any:
     """Return (p dV/deps - dU/deps)/L_0 [N] with the volume and the rubber energy of the law's outline."""
     tube = law.geometry
     energy = saga2007_pairs.SegmentEnergy(tube, law.rubber)

@@ -120,7 +120,9 @@ class LiftSearch:
         extended, contracted = (
             muscle.end_point(eps, load) for eps, load in zip(contractions, self._loads, strict=True)
         )
-        reserve = min(point.capacity / point.force for point in (extended, contracted)) - 1.0
+        displacement, load = self.requirement.path
+        along = np.minimum(start + displacement / length, muscle.contraction_range[1])
+        reserve = float(np.min(muscle.capacity(along) / (load / self.count))) - 1.0
         return MuscleDesign(extended, contracted, reserve)
 
     def shortfall(self, muscle: StaticMuscle, length: float) -> str:

@@ -69,9 +69,9 @@ class Sheets:
             self._of_library[key] = known["id"]
         return known
 
-    def of_text(self, task: Callable[[str], dict[str, Any]], text: str, limit: float = TIME_LIMIT) -> dict[str, Any]:
-        """The sheet that a task makes of a text, within a limit of time [s]."""
-        return self.keep(self._pool.call(task, text, limit=limit))
+    def of_text(self, task: Callable[[str], dict[str, Any]], text: str, limit: float | None = None) -> dict[str, Any]:
+        """The sheet that a task makes of a text, within a limit of time [s], by default TIME_LIMIT."""
+        return self.keep(self._pool.call(task, text, limit=TIME_LIMIT if limit is None else limit))
 
     def keep(self, sheet: dict[str, Any]) -> dict[str, Any]:
         """The sheet, which is kept."""

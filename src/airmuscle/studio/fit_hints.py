@@ -17,8 +17,8 @@ _INSTRUCTIONS: Mapping[str, tuple[str, Callable[[Hint], str]]] = {
     "ordered": ("time", lambda hint: "select the time base 'unordered'"),
     "decimal": ("decimal", lambda hint: "select the decimal mark"),
     "resting_length": ("resting_length", lambda hint: "write it into the field 'Resting length'"),
-    "by": ("leave_out", lambda hint: f"select {hint.value.quantity} in the field 'Left out in turn'"),
-    "leave_out": ("leave_out", lambda hint: f"select {hint.value.quantity} in the field 'Left out in turn'"),
+    "by": ("leave_out", lambda hint: f"select {hint.value.quantity} in the field 'Cross-validation leaves out'"),
+    "leave_out": ("leave_out", lambda hint: f"select {hint.value.quantity} in the field 'Cross-validation leaves out'"),
     "identify.hysteresis.fit_hysteresis": ("hysteresis", lambda hint: "mark 'Friction from both branches'"),
 }
 """Field and instruction by the argument of a hint, or by its function."""

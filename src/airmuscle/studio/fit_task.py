@@ -98,7 +98,7 @@ def _recordings(folder: Path, settings: FitSettings) -> tuple[list[am.Recording]
 
 def _select(
     recordings: Sequence[am.Recording], settings: FitSettings, report: Report
-) -> tuple[LawSelection, am.muscle.geometry.Geometry | None]:
+) -> tuple[LawSelection, am.geometry.Geometry | None]:
     """The selected law, in the words of the page, and the geometry of the library entry if its law is selected."""
 
     def progress(name: str, fraction: float) -> None:

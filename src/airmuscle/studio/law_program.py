@@ -45,7 +45,7 @@ class LawProgram:
     limits: tuple[float, ...]
 
 
-def print_law(law: am.muscle.characteristic.Characteristic, geometry: am.muscle.geometry.Geometry | None) -> LawProgram:
+def print_law(law: am.characteristic.Characteristic, geometry: am.geometry.Geometry | None) -> LawProgram:
     """The program of a traceable law, and of the outline where the geometry is in closed form.
 
     Parameters are the leaves of the law, then those of the geometry unless it is part of the law. Raises TraceError
@@ -62,7 +62,7 @@ def print_law(law: am.muscle.characteristic.Characteristic, geometry: am.muscle.
 
 
 def _symbols(
-    law: am.muscle.characteristic.Characteristic, geometry: am.muscle.geometry.Geometry | None
+    law: am.characteristic.Characteristic, geometry: am.geometry.Geometry | None
 ) -> tuple[tuple[Any, Any], Any]:
     """The law and its geometry with symbols, and the vector of these."""
     if geometry is None or geometry == getattr(law, "geometry", None):
@@ -112,7 +112,7 @@ def _limits(model: Any) -> Sequence[Any]:
 
 def _outline(shape: Any, contraction: Any, t: Any) -> tuple[Any, Any]:
     """Axial position from the middle of a segment [m] and radius [m]. Raises TraceError for another geometry."""
-    if isinstance(shape, am.muscle.geometry.Braid):
+    if isinstance(shape, am.geometry.Braid):
         return t * shape.resting_length * (1.0 - contraction) / 2, shape.radius_at(contraction)
     if isinstance(shape, FibreTube) and shape.traceable:
         axial, radius = shape.profile(contraction, t)

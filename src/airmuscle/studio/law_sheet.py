@@ -46,9 +46,9 @@ def law_sheet(entry: Entry) -> dict[str, Any]:
     program = print_law(law, geometry)
     kind = (
         "force"
-        if isinstance(law, am.muscle.characteristic.ForceLaw)
+        if isinstance(law, am.characteristic.ForceLaw)
         else "contraction"
-        if isinstance(law, am.muscle.characteristic.ContractionLaw)
+        if isinstance(law, am.characteristic.ContractionLaw)
         else "pressure"
     )
     rows = _parameter_leaves(law, geometry)
@@ -86,7 +86,7 @@ def script_text(identifier: str, text: str, functions: tuple[str, ...]) -> str:
     return f'"use strict";\nairmusclePrograms["{identifier}"] = (() => {{\n{text}\n{result}\n}})();\n'
 
 
-def _in_closed_form(entry: Entry) -> tuple[am.muscle.characteristic.Characteristic, dict[str, Any] | None]:
+def _in_closed_form(entry: Entry) -> tuple[am.characteristic.Characteristic, dict[str, Any] | None]:
     """The law, or its approximation with its errors [N]."""
     law = entry.characteristic
     if law.traceable:
@@ -99,7 +99,7 @@ def _in_closed_form(entry: Entry) -> tuple[am.muscle.characteristic.Characterist
         )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        approximation: am.muscle.characteristic.PolynomialSurrogate = am.muscle.characteristic.as_force_law(law, limits)
+        approximation: am.characteristic.PolynomialSurrogate = am.characteristic.as_force_law(law, limits)
     return approximation.surface, {
         "max_error": approximation.max_error, "rms_error": approximation.rms_error, "coverage": approximation.coverage,
         "degree": approximation.surface.degree,
@@ -107,7 +107,7 @@ def _in_closed_form(entry: Entry) -> tuple[am.muscle.characteristic.Characterist
 
 
 def _parameter_leaves(
-    law: am.muscle.characteristic.Characteristic, geometry: am.muscle.geometry.Geometry | None
+    law: am.characteristic.Characteristic, geometry: am.geometry.Geometry | None
 ) -> list[tuple[str, Leaf]]:
     """The parameters in the order of the program, each with its path in the file of the entry."""
     rows = [(f"characteristic.{leaf.path}", leaf) for leaf in leaves(law)]
@@ -159,7 +159,7 @@ def _ratings(entry: Entry) -> dict[str, float]:
     return {} if entry.ratings is None else {name: getattr(entry.ratings, name) for name in entry.ratings.stated}
 
 
-def _geometry_sheet(geometry: am.muscle.geometry.Geometry, printed: bool) -> dict[str, Any]:
+def _geometry_sheet(geometry: am.geometry.Geometry, printed: bool) -> dict[str, Any]:
     """The outline of a geometry: the number of its segments, and radii on a grid where there is no closed form."""
     segments = geometry.segments if isinstance(geometry, FibreTube) else 1
     low, high = geometry.contraction_range

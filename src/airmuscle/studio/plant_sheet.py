@@ -153,7 +153,7 @@ def _muscle_row(plant: am.Plant, index: int) -> dict[str, Any]:
             "outline": _sampled_outline(muscle.geometry)}  # fmt: skip
 
 
-def _sampled_outline(geometry: am.muscle.geometry.Geometry) -> dict[str, Any]:
+def _sampled_outline(geometry: am.geometry.Geometry) -> dict[str, Any]:
     low, high = (float(limit) for limit in geometry.contraction_range)
     grid = np.linspace(max(low, -0.05), min(high, 0.45), OUTLINE_CONTRACTIONS)
     outlines = [geometry.outline(float(c), OUTLINE_POINTS) for c in grid]

@@ -174,15 +174,16 @@ class SettlingTime(Scalar):
             raise ParameterError(f"SettlingTime: band is {self.band:g}; it must be between 0 and 1.")
 
     def _evaluate(self, window: Window) -> float:
-        last, begin = window.values[-1], float(window.time[0])
-        half_width = self.band * abs(last - window.values[0])
-        outside = np.flatnonzero(np.abs(window.values - last) > half_width)
+        error, begin = window.values - window.values[-1], float(window.time[0])
+        half_width = self.band * abs(float(error[0]))
+        outside = np.flatnonzero(np.abs(error) > half_width)
         if half_width == 0.0:
             return 0.0 if outside.size == 0 else math.nan
         if outside.size == 0:
             return 0.0
-        entry = Window(window.time[outside[-1] :][:2], np.abs(window.values - last)[outside[-1] :][:2])
-        return _first_crossing(entry, half_width) - begin
+        i = int(outside[-1])
+        entry = Window(window.time[i : i + 2], error[i : i + 2])
+        return _first_crossing(entry, math.copysign(half_width, error[i])) - begin
 
     def unit(self, column_unit: str) -> str:
         return "s"

@@ -41,6 +41,14 @@ def _is_finite(table: Any) -> Any:
     return defects == 0
 
 
+@PART
+def _rows_before(times: Any, row: Any, end: Any) -> Any:
+    """The first row from `row` on that is not before `end`."""
+    while row < times.shape[0] and times[row] < end:
+        row += 1
+    return row
+
+
 @numba.njit(error_model="numpy", nogil=True)
 def record(
     function: Any, c: Any, states: Any, times: Any, begin: Any, ends: Any, values: Any, slopes: Any,
@@ -56,15 +64,18 @@ def record(
     Returns N where all outputs are finite.
     """
     count, n, m, k = times.shape[0], states.shape[1], values.shape[1], outputs.shape[1]
-    segment, last = 0, ends.shape[0] - 1
-    start = begin
-    for row in range(count):
+    segment, last, start, row = 0, ends.shape[0] - 1, begin, 0
+    while row < count:
         while segment < last and ends[segment] <= times[row]:
             start = ends[segment]
             segment += 1
+        first, row = row, _rows_before(times, row + 1, ends[segment]) if segment < last else count
         for i in range(m):
-            inputs[row, i] = values[segment, i] + (times[row] - start) * slopes[segment, i]
-        if k > 0:
+            value, slope = values[segment, i], slopes[segment, i]
+            for each in range(first, row):
+                inputs[each, i] = value + (times[each] - start) * slope
+    if k > 0:
+        for row in range(count):
             invoke(function, (pointer(states[row]), pointer(inputs[row]), pointer(c), pointer(outputs[row])))
     for place in range(columns.shape[0]):
         column = columns[place]

@@ -9,13 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from ...compile.cache.kernel import evaluate
-from ...compile.program import compile_system
+from ...compile.program import CompiledSystem, compile_system
 from ...control.piecewise_linear import PiecewiseLinear
 from ...core import tree
 from ...core.arrays import Array
 from ...core.errors import IdentificationError, ParameterError
 from ...core.status import Status
 from ...core.system import System
+from ...simulation.bound_integrator import BoundIntegrator
 from ...simulation.integrators import Integrator
 from ...simulation.with_sensitivities import WithSensitivities
 from .experiment import Experiment, InitialValue, StartTime, Unknown
@@ -69,6 +70,8 @@ class RecordModel:
         self._state_nominal = np.array([s.nominal for s in self.plant.states])
         self._guess = np.array([experiment.initial_conditions.guess[s.name] for s in self.plant.states])
         self._last_grid: _TimeGrid | None = None
+        self._idle: list[BoundIntegrator] = []
+        """Bound integrators that no simulation uses at present."""
 
     def __reduce__(self) -> tuple[type[RecordModel], tuple[Any, ...]]:
         """Compiled functions are not stored; a loaded model compiles them again."""
@@ -132,7 +135,8 @@ class RecordModel:
         full_state[: state.size] = state
         if self.sensitivity_indices:
             full_state[state.size :] = derivatives.ravel()
-        solution = self.method.run(system, grid.segments, 0.0, full_state, grid.times, max_steps)
+        bound = self._bound_integrator(system)
+        solution = bound.run(grid.segments, 0.0, full_state, grid.times, max_steps)
         if solution.status == Status.INTERRUPTED:
             raise KeyboardInterrupt
         if solution.status != Status.DONE:
@@ -141,7 +145,17 @@ class RecordModel:
             )
         results = np.empty((grid.times.size, system.sizes.outputs))
         evaluate(system.address["outputs"], system.precomputed, solution.rows, grid.inputs, results)
+        self._idle.append(bound)  # only now: another thread that takes it overwrites the precomputed values
         return results, grid.before_start, solution.steps
+
+    def _bound_integrator(self, system: CompiledSystem) -> BoundIntegrator:
+        """The integrator at a system, an idle one if there is any: binding takes a twentieth of a simulation."""
+        try:
+            bound = self._idle.pop()
+        except IndexError:  # none, or another thread was quicker
+            return self.method.bind(system)
+        bound.rebind(self.method.binding(system))
+        return bound
 
     def _time_grid(self, start_time: float) -> _TimeGrid:
         """The rows relative to the start of the run; the last result is kept, as the start time rarely changes."""
@@ -212,10 +226,11 @@ def stack_residuals(
     Also the Jacobian (R, P) by the scaled unknowns, and the steps of the longest simulation.
     """
     residuals, jacobians, longest = [], [], 0
+    factors = scales / deviations[:, None]
     for model in models:
         modelled, jacobian, steps = model.evaluate(values, max_steps)
         residual = (modelled - model.measured) / deviations
-        jacobian = jacobian * (scales / deviations[:, None])
+        jacobian = jacobian * factors
         longest = max(longest, steps)
         residuals.append(residual.ravel() if model.all_valid else residual[model.valid])
         jacobians.append(jacobian.reshape(-1, scales.size) if model.all_valid else jacobian[model.valid])

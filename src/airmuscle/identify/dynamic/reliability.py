@@ -92,8 +92,8 @@ def describe_optima(optima: Sequence[Optimum], estimates: Sequence[Estimate], co
             continue
         notes.append(
             f"the problem has several optima: {_count(other.searches)} of {costs.size} ended where the rms residual is "
-            f"only {increase:.1%} greater, with {', '.join(differences)}; the standard errors describe one optimum and "
-            "do not contain this difference"
+            f"only {100 * increase:.1f} % greater, with {', '.join(differences)}; the standard errors describe one "
+            "optimum and do not contain this difference"
         )
         break
     if searches_at_lowest(costs) == 1 and costs.size >= MIN_SEARCHES:
@@ -137,8 +137,8 @@ def describe_flatness(estimates: Sequence[Estimate], degrees_of_freedom: int) ->
         for _, e in sorted(wide, key=lambda item: -item[0])[:MAX_NAMES]
     ]
     return [
-        f"an rms residual that is {SMALL_RMS:.0%} greater allows {', '.join(texts)}; with model error, other bounds or "
-        "another start can give any value in such a range, whatever the standard error"
+        f"an rms residual that is {100 * SMALL_RMS:.0f} % greater allows {', '.join(texts)}; with model error, other "
+        "bounds or another start can give any value in such a range, whatever the standard error"
     ]
 
 
@@ -157,7 +157,8 @@ def describe_bounds(
         bound = estimates[k]
         shifts = -inverse @ (jacobian[:, inner].T @ jacobian[:, k]) * scales[inner] / scales[k]
         moved = _moved([estimates[int(i)] for i in inner], shifts * BOUND_SHIFT * (abs(bound.value) or scales[k]))
-        effect = f" If the bound were {BOUND_SHIFT:.0%} greater, it would move {', '.join(moved)}." if moved else ""
+        greater = f"{100 * BOUND_SHIFT:.0f} % greater"
+        effect = f" If the bound were {greater}, it would move {', '.join(moved)}." if moved else ""
         value = f"{bound.value:.4g} {bound.display_unit}".rstrip()
         notes.append(
             f"{bound.name} is on its bound, {value}, and has no standard error; the standard errors of the others hold "

@@ -38,7 +38,7 @@ class SensorLocation:
     def __str__(self) -> str:
         rms = (
             f"rms residual {self.rms_in_muscle / 1e3:.2f} kPa for a growing volume with the sensor in the muscle "
-            f"({self.rms_in_muscle / self.pressure_rise:.1%} of the pressure rise), "
+            f"({100 * self.rms_in_muscle / self.pressure_rise:.1f} % of the pressure rise), "
             f"{self.rms_in_line / 1e3:.2f} kPa for a line and a muscle"
         )
         if self.is_upstream:

@@ -45,7 +45,7 @@ class RunAgreement:
         return (
             f"{self.origin} ({self.description}): {self.amplitude:.3g} N (standard error "
             f"{self.amplitude_stderr:.2g} N) from this run, {self.joint_amplitude:.3g} N from all runs, deviation "
-            f"{self.deviation:.0%}"
+            f"{100 * self.deviation:.0f} %"
         )
 
 

@@ -60,7 +60,7 @@ class HysteresisLoop(ShortRepr):
         if self.run.constant_column is None or self.run.constant_value is None:
             return self.run.kind.name
         levels = {"pressure": f"{self.run.constant_value / 1e3:.4g} kPa", "force": f"{self.run.constant_value:.4g} N",
-                  "contraction": f"{round(self.run.constant_value, 4) + 0.0:.2%}"}  # fmt: skip
+                  "contraction": f"{100 * (round(self.run.constant_value, 4) + 0.0):.2f} %"}  # fmt: skip
         return f"{self.run.kind.name} at {levels.get(self.run.constant_column, f'{self.run.constant_value:.4g} m')}"
 
 

@@ -37,7 +37,7 @@ class SurfaceFit:
     def __str__(self) -> str:
         dropped = f", {self.points_dropped} of them not used (k >= k_max)" if self.points_dropped else ""
         return (
-            f"{self.procedure}: rms error {self.rmse:.4%}, maximum error {self.max_error:.4%}, "
+            f"{self.procedure}: rms error {100 * self.rmse:.4f} %, maximum error {100 * self.max_error:.4f} %, "
             f"correlation index {self.correlation_index} over {self.points} points{dropped}; {self.conditioning}"
         )
 

@@ -47,7 +47,7 @@ class MonotonicityViolation:
 
     def __str__(self) -> str:
         (p0, p1), (low, high) = self.pressure, (self._format_second(v) for v in self.second_argument)
-        share = f"{self.area_fraction:.1%}" if self.area_fraction >= 5e-4 else "less than 0.1%"
+        share = f"{100 * self.area_fraction:.1f} %" if self.area_fraction >= 5e-4 else "less than 0.1 %"
         return (
             f"{self.rule.description} between {p0 / 1e3:.4g} and {p1 / 1e3:.4g} kPa, {low} and {high} "
             f"({share} of the validity range), most at {self.worst_point[0] / 1e3:.4g} kPa and "
@@ -55,7 +55,7 @@ class MonotonicityViolation:
         )
 
     def _format_second(self, value: float) -> str:
-        return f"{value:.2%}" if self.rule.quantity == "force" else f"{value:.0f} N"
+        return f"{100 * value:.2f} %" if self.rule.quantity == "force" else f"{value:.0f} N"
 
 
 def find_violations(

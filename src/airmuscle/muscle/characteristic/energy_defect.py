@@ -32,8 +32,8 @@ class EnergyDefect:
 
     def __str__(self) -> str:
         return (
-            f"{self.worst:.4g} {self.unit} ({self.relative:.2%}) at {self.pressure / 1e3:.4g} kPa and "
-            f"{self.contraction:.2%} of contraction; slack on {self.slack:.0%} of the validity range"
+            f"{self.worst:.4g} {self.unit} ({100 * self.relative:.2f} %) at {self.pressure / 1e3:.4g} kPa and "
+            f"{100 * self.contraction:.2f} % of contraction; slack on {100 * self.slack:.0f} % of the validity range"
         )
 
 

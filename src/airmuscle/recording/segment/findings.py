@@ -85,7 +85,7 @@ def _sensor_findings(recording: Recording, sensors: Mapping[str, Sensor]) -> Ite
             if count:
                 yield Finding(
                     f"the {name} sensor saturates at its {adjective} limit, {limit:.4g}{unit}, in "
-                    f"{_count(count, 'row')} ({fraction:.0%}). These rows are bounds (censored), not values.",
+                    f"{_count(count, 'row')} ({100 * fraction:.0f} %). These rows are bounds (censored), not values.",
                     serious=fraction >= MAX_SATURATED_FRACTION,
                 )
 

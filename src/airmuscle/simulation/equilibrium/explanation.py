@@ -51,7 +51,7 @@ def _without_coordinates(one: Statics) -> str:
     contractions = plant.mechanism.contractions({}, plant.resting_lengths)
     if one.shut:
         texts = ", ".join(
-            f"{m.name} cannot hold {mass:g} kg of air at a contraction of {float(eps):.1%}"
+            f"{m.name} cannot hold {mass:g} kg of air at a contraction of {100 * float(eps):.1f} %"
             for m, mass, eps in zip(plant.muscles, one.air, contractions, strict=True)
         )
         return f"{texts}: no pressure below {MAX_PRESSURE:g} Pa belongs to it."
@@ -64,7 +64,7 @@ def _line(one: Statics, x: Array) -> str:
     states = plant.muscle_states(one.state(one.place(x)))
     pulls = ", ".join(
         f"{m.name} pulls {float(state.tension) + 0.0:.4g} N at {round(float(state.pressure) / 1e3, 6) + 0.0:.4g} kPa "
-        f"and a contraction of {float(state.contraction):.1%}"
+        f"and a contraction of {100 * float(state.contraction):.1f} %"
         for m, state in zip(plant.muscles, states, strict=True)
     )
     accelerations = one.accelerations(x[None, None])[0, 0]

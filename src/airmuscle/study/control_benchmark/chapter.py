@@ -17,7 +17,7 @@ from .tracking_metrics import BONE2019, RATED_STROKES, SETTLING_BAND, STEADY_TIM
 
 HEADERS = {
     "rmse": "rms error [deg]",
-    "greatest": "maximum error [deg]",
+    "max_error": "maximum error [deg]",
     "itae": "ITAE [deg s^2]",
     "settling": "settling time [s]",
     "overshoot": "overshoot [%]",
@@ -37,7 +37,7 @@ def write_benchmark(result: BenchmarkResult, folder: Path | str, curves: Sequenc
 
 def benchmark_chapter(result: BenchmarkResult, curves: Sequence[LearningCurve] = ()) -> Chapter:
     """The chapter of a benchmark: ranking, errors, all metrics, gains, figures."""
-    tables = [ranking_table(result), error_table(result, "rmse"), error_table(result, "greatest")]
+    tables = [ranking_table(result), error_table(result, "rmse"), error_table(result, "max_error")]
     tables += [metrics_table(result)]
     tables += [gains] if (gains := gains_table(result)) else []
     tables += [learning_table(curves)] if curves else []

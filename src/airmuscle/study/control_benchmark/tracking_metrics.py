@@ -37,7 +37,7 @@ RATED_STROKES = 5e8
 class TrackingMetrics:
     """Metrics of one run of a task; NaN where a metric does not exist for the task.
 
-    rmse, largest      root mean square and largest magnitude of the error r - y [degree], from the task's begin on
+    rmse, max_error    root mean square and largest magnitude of the error r - y [degree], from the task's begin on
     itae                integral of (t - t_begin) |e| [degree s^2]
     settling            time from the event until the error remains within 0.5 degrees [s]; infinite if it does not
     overshoot           largest excess over the final set point [%] of the motion's change
@@ -49,7 +49,7 @@ class TrackingMetrics:
     """
 
     rmse: float
-    greatest: float
+    max_error: float
     itae: float
     settling: float
     overshoot: float
@@ -71,7 +71,7 @@ def track(joint: BenchmarkJoint, task: ControlTask, signals: TaskSignals, record
     strokes = _strokes(joint, record, judged)
     return TrackingMetrics(
         rmse=math.sqrt(float(np.mean(error[judged] ** 2))),
-        greatest=float(magnitude.max()),
+        max_error=float(magnitude.max()),
         itae=float(np.trapezoid((t - t[0]) * magnitude, t)),
         settling=_settling(task, time, error),
         overshoot=_overshoot(task, wanted, angle, judged),

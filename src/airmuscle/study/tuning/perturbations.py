@@ -178,8 +178,8 @@ def _drawn(plant: Plant, uncertainties: Sequence[ParameterUncertainty | None], r
             if uncertainty is None:
                 continue
             if uncertainty not in deviations:
-                zero = np.zeros(len(uncertainty.parameters))
-                deviations[uncertainty] = random.multivariate_normal(zero, uncertainty.covariance, check_valid="ignore")
+                deviates = random.standard_normal(len(uncertainty.parameters))
+                deviations[uncertainty] = uncertainty.deviations(deviates)
             prefix = f"muscle[{i}]." if isinstance(plant.muscle, tuple) else "muscle."
             shifts |= dict(zip(muscle_paths(uncertainty, prefix), deviations[uncertainty].tolist(), strict=True))
         _check_known(shifts, known)

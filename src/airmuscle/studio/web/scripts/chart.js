@@ -14,7 +14,7 @@
       this.ranges = { x: [0, 1], y: [0, 1] };
       host.classList.add("chart");
       new ResizeObserver(() => this.resize()).observe(host);
-      document.addEventListener("themechange", () => { this.styles = ""; this.show(this.curves || [], this.data[0], this.ranges); });
+      document.addEventListener("themechange", () => { this.styles = ""; if (this.curves) this.show(this.curves, this.data[0], this.ranges); });
     }
 
     /* curves: [{values, colour, dash, width, label, spanned}] over the grid x; ranges: {x: [low, high], y: [low, high]} */

@@ -5,7 +5,7 @@
   const { element, source, fitSource, say, problemOf } = airmuscle;
   const PAUSE = 800;
   const TEXTS = ["resting_length", "file_name", "ambient", "decimal", "delimiter", "time", "sheet", "group"];
-  const SPLITS = [["", "by the data"], ["run", "runs"], ["specimen", "specimens"], ["contraction", "levels of contraction"], ["pressure", "levels of pressure"], ["block", "blocks within each run"]];
+  const SPLITS = [["", "automatic"], ["run", "one run at a time"], ["specimen", "one specimen at a time"], ["contraction", "one level of contraction"], ["pressure", "one level of pressure"], ["block", "blocks within each run"]];
   const empty = () => ({ columns: {}, files: {}, rules: [], entry: "", leave_out: "", hysteresis: false, ...Object.fromEntries(TEXTS.map((name) => [name, ""])) });
 
   class FitTab {
@@ -58,7 +58,7 @@
         element("div.stack", {},
           card("Files", airmuscle.dropArea((files) => this.upload(files)), this.message, this.places.files, hosts.files),
           card("Muscle", this.text("resting_length", "Resting length, without pressure and load", { placeholder: "300 mm" }), this.choice("entry", "Also compare an entry of the library", laws), this.further),
-          card("Fit", this.choice("leave_out", "Left out in turn for the ranking", SPLITS), element("label.row", { for: "fit-hysteresis" }, this.fields.hysteresis, "Friction from both branches (takes longer)"),
+          card("Fit", this.choice("leave_out", "Cross-validation leaves out", SPLITS), element("label.row", { for: "fit-hysteresis" }, this.fields.hysteresis, "Friction from both branches (takes longer)"),
             this.places.fit, element("div.row", {}, this.startButton, this.cancelButton), this.bar, this.progressText)),
         element("div.stack", {}, this.columnsCard, this.dataCard, this.resultHost)));
       this.list = new airmuscle.FileList(hosts.files, { remove: (name) => this.remove(name), stated: (name, key, value) => { this.settings.files[name] = { ...this.settings.files[name], [key]: value }; this.read(); } });

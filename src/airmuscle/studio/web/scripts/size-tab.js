@@ -6,7 +6,7 @@
   const FIELDS = {
     lift: [["load", "Load", "20 kg", "mass or force"], ["stroke", "Stroke", "40 mm", ""], ["stiffness", "Stiffness of a spring", "", "optional: 2 N/mm"]],
     joint: [["torque", "Torque in either direction", "5 N m", ""], ["angle", "Range of the angle", "60 deg", ""], ["inertia", "Moment of inertia", "", "optional: 0.05 kg m^2"]],
-    all: [["supply", "Supply pressure", "6 bar", "gauge"], ["safety", "Safety factor", "1.5", "on the load"], ["cycle_time", "Cycle time", "2 s", "there and back"], ["max_length", "Greatest length", "400 mm", "optional"], ["max_diameter", "Greatest diameter", "", "optional: 60 mm"], ["max_count", "Greatest number in parallel", "3", ""]],
+    all: [["supply", "Supply pressure", "6 bar", "gauge"], ["safety", "Safety factor", "1.5", "on the load"], ["cycle_time", "Cycle time", "2 s", "there and back"], ["max_length", "Maximum length", "400 mm", "optional"], ["max_diameter", "Maximum diameter", "", "optional: 60 mm"], ["max_count", "Maximum number in parallel", "3", ""]],
   };
   const SORTS = [["air", "air of a cycle"], ["length", "length"], ["count", "number of muscles"], ["reserve", "force reserve"], ["diameter", "diameter"]];
   const COLUMNS = [["muscle", "muscle"], ["number", "number"], ["length [mm]", "length [mm]"], ["radius [mm]", "pulley radius [mm]"], ["pressure, short [bar]", "pressure [bar]"], ["contraction, short [%]", "contraction [%]"], ["reserve [%]", "reserve [%]"], ["air a cycle [l (ANR)]", "air a cycle [l\u00a0(ANR)]"], ["efficiency [%]", "efficiency [%]"], ["diameter [mm]", "diameter [mm]"]];
