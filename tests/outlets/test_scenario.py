@@ -652,6 +652,11 @@ def test_a_plant_that_cannot_rest_names_muscle_and_forces(tmp_path: Path):
     assert "WithEndStops" in str(raised.value)
 
 
+def test_an_unknown_input_is_named_before_a_missing_equilibrium(tmp_path: Path):
+    with pytest.raises(ParameterError, match="the plant has no input 'fil'"):
+        load_scenario(written(tmp_path, ('"5 kg"', '"500 kg"'), (FILL, "fil = [[0, 1]]")))
+
+
 def test_a_command_that_is_no_table(tmp_path: Path):
     path = written(tmp_path, (f"[input]\n{FILL}", ""), ('title = "A small one"', "input = [1]"))
     with pytest.raises(ParameterError, match=r"scenario\.toml: the table \[input\] is \[1\]; it must be a table"):
