@@ -285,6 +285,7 @@ def test_air_that_no_pressure_holds_names_the_muscle():
         ({"air_mass": -1e-4}, "must be greater than 0"),
         ({"air_mass": float("nan")}, "must be a finite number in kg"),
         ({"pressure": "3 bar"}, "must be a finite number in Pa"),
+        ({"pressure": {"left": 2e5, "right": 3e5}}, "in Pa, or a tuple with the values of left, right"),
         ({"pressure": -2e5}, "not above absolute vacuum"),
         ({"pressure": 1e5, "inputs": {"hold": 1.0}}, "no input 'hold'"),
     ],

@@ -67,6 +67,12 @@ def test_equal_steps_give_equal_bits_and_a_snapshot_repeats_them():
     assert outputs is second.outputs
 
 
+def test_a_stepper_is_represented_by_its_time_and_present_state():
+    stepper = Stepper(LIFT, {"air_mass": 1e-4, "position": 0.01, "speed": 0.0}, start_time=2.0)
+    shown = "Stepper(Plant at 2 s: air_mass 0.0001, position 0.01, speed 0; Rodas4(rtol=1e-06))"
+    assert repr(stepper) == shown
+
+
 def test_values_are_read_by_name_and_those_of_the_inputs_are_the_last_ones():
     stepper = Stepper(JOINT, START)
     stepper.step({"left.fill": 0.5}, 0.01)

@@ -32,6 +32,7 @@ from airmuscle.identify.model_selection import excess_error, recommend
 from airmuscle.muscle.characteristic import ContractileSurface, Hunt2017, InverseLength, TonduLopez2000
 from airmuscle.muscle.geometry.braid import Braid
 from airmuscle.recording import Recording, write_csv
+from airmuscle.report.compare_chapter import compare_chapter
 
 TRUTH = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.2)
 START = TonduLopez2000(Braid(0.012, 0.4, 0.3), 1.0)
@@ -116,6 +117,19 @@ def test_a_law_that_fails_at_one_part_only_is_not_recommended_for_its_large_stan
     poor = dataclasses.replace(simple, fold_scores=tuple(failed), cross_validated_rmse=59.7)
     assert excess_error(poor, best) < 0
     assert recommend([best, poor], RunSplit())[0] is best
+
+
+def test_the_figure_of_the_folds_is_sorted_by_level_and_names_the_quantity_once():
+    levels = (0.2, 0.04, 0.0, 0.12, 0.08, 0.16, 0.1)
+    runs = [isometric(contraction, seed=i) for i, contraction in enumerate(levels)]
+    comparison = compare(runs, CANDIDATES[:2], leave_out=LevelSplit("contraction"))
+    plots = {plot.name: plot for plot in compare_chapter(comparison).plots}
+    (axes,) = plots["left-out"].figure.axes
+    labels = [label.get_text() for label in axes.get_xticklabels()]
+    assert labels == ["0 %", "4 %", "8 %", "10 %", "12 %", "16 %", "20 %"]
+    assert axes.get_xlabel() == "contraction"
+    errors = {score.fold: score.rmse for score in comparison.ranking[0].fold_scores}
+    assert axes.lines[0].get_ydata().tolist() == [errors[f"contraction {label}"] for label in labels]
 
 
 def test_aicc_is_hurvich_and_tsais():

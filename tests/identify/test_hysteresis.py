@@ -285,5 +285,5 @@ def test_figures_show_units_and_what_was_fitted():
     )
     fit = fit_hysteresis(start_of(SLIP), isobaric(SLIP), static_curve=CURVE)
     upper, lower = fit.plot().axes
-    assert (upper.get_ylabel(), lower.get_ylabel()) == ("force [N]", "residual (measured - model) [N]")
+    assert (upper.get_ylabel(), lower.get_ylabel()) == ("force [N]", "residual (model - measured) [N]")
     assert "MaxwellSlip fitted to loop" in str(fit)

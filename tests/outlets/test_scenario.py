@@ -209,6 +209,17 @@ def test_the_command_of_the_page_runs(tmp_path: Path):
     assert np.count_nonzero(np.diff(run["discharge"]) > 0) == 15, "a pulse in each period of the carrier"
 
 
+def test_an_input_that_columns_does_not_name_takes_the_column_of_its_name(tmp_path: Path):
+    """It was 0 for the whole run, without a message."""
+    named = load_scenario(driven(tmp_path)).problem.input
+    partly = load_scenario(driven(tmp_path, ('fill = "fill", discharge', "discharge"))).problem.input
+    assert partly == named
+    beside = ('columns = { fill = "fill", discharge = "valve" }', 'columns = { discharge = "valve" }\nfill = [[0, 1]]')
+    assert load_scenario(driven(tmp_path, beside)).problem.input.inner.inner.points["fill"] == ((0.0, 1.0),)
+    exchanged = ('columns = { fill = "fill", discharge = "valve" }', 'columns = { discharge = "fill" }')
+    assert "fill" not in load_scenario(driven(tmp_path, exchanged)).problem.input.inner.inner.points
+
+
 def test_a_recorded_command_may_be_held_and_rows_may_stand_beside_it(tmp_path: Path):
     (tmp_path / "data").mkdir()
     (tmp_path / "data" / "bench.csv").write_text(OPENINGS, encoding="utf-8")
@@ -639,6 +650,11 @@ def test_a_plant_that_cannot_rest_names_muscle_and_forces(tmp_path: Path):
     assert re.search(r"requires a tension of 4903 N\. Change the load, the pressure or the parallel", str(raised.value))
     assert 'In [run], initial_state = { pressure = "2 bar" } is the equilibrium at another' in str(raised.value)
     assert "WithEndStops" in str(raised.value)
+
+
+def test_an_unknown_input_is_named_before_a_missing_equilibrium(tmp_path: Path):
+    with pytest.raises(ParameterError, match="the plant has no input 'fil'"):
+        load_scenario(written(tmp_path, ('"5 kg"', '"500 kg"'), (FILL, "fil = [[0, 1]]")))
 
 
 def test_a_command_that_is_no_table(tmp_path: Path):

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..core.annotation import one_line
 from ..core.atomic_output import atomic_file
-from ..core.errors import FileError, ParameterError
+from ..core.errors import FileError
 from .build import TEXT_KEYS
 from .entry import OPTIONAL_PARTS, Check, Entry
+from .saved_entry import Savable, entry_of
 from .uncertainty import uncertainty_table
 
 
@@ -65,10 +65,13 @@ def scenario_toml(
     return comments + _to_text({"title": title, "plant": model_table(plant), "input": input_table, "run": run, **last})
 
 
-def save(entry: Entry, path: str | Path) -> Path:
-    """Write an entry to a file that `load` reads; the file is complete or unchanged. Raises FileError."""
-    if not isinstance(entry, Entry):
-        raise ParameterError(f"save: {one_line(entry)} is not an Entry; build one with Entry, or load and replace one.")
+def save(entry: Savable, path: str | Path) -> Path:
+    """Write a muscle, a characteristic, a fit or a library entry to a muscle file that `load` reads.
+
+    The file is complete or unchanged. A fit without a geometry gives a characteristic; for a muscle, write
+    `Muscle(fit.model, geometry)`. Raises FileError, and ParameterError for anything else.
+    """
+    entry = entry_of(entry)
     if not isinstance(path, str | Path):
         raise FileError(f"save: {path!r} is not a path; give a text or a Path.")
     return write_text(Path(path), to_toml(entry))

@@ -50,7 +50,10 @@ def _check_names(names: list[str], state: Mapping[str, float]) -> None:
     for name in state:
         if name not in names:
             near = suggestion(str(name), names)
-            raise ParameterError(f"the plant has no state '{name}'; there are {', '.join(names)}.{near}")
+            raise ParameterError(
+                f"the plant has no state '{one_line(name)}'; there are {', '.join(names)}.{near} "
+                "plant.state_at(pressure=...) gives the state with a pressure."
+            )
     missing = [name for name in names if name not in state]
     raise ParameterError(
         f"the initial state lacks {', '.join(missing)}; use plant.state_at(pressure=...) or find_equilibrium."

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -90,14 +92,28 @@ def _fold_table(comparison: Comparison) -> Table:
 
 def _fold_figure(comparison: Comparison) -> Any:
     figure, axes = new_figure(width=7.0, height=3.6)
+    folds = sorted((part.fold for part in comparison.ranking[0].fold_scores), key=_natural_order)
     for i, contender in enumerate(comparison.ranking[:_MAX_CURVES]):
-        errors = [part.rmse for part in contender.fold_scores]
+        error_of = {part.fold: part.rmse for part in contender.fold_scores}
+        errors = [error_of[fold] for fold in folds]
         axes.plot(errors, MARKERS[i], color=LINES[i], linestyle=":", linewidth=0.8, label=contender.candidate.name)
-    names = [part.fold for part in comparison.ranking[0].fold_scores]
-    axes.set_xticks(range(len(names)), [_shorten(name) for name in names], rotation=30, ha="right")
-    axes.set(ylabel=f"rms error, {comparison.leave_out.group_name} left out [N]", yscale="log")
+    common = _common_word(folds)
+    axes.set_xticks(range(len(folds)), [_shorten(name[len(common) :]) for name in folds], rotation=30, ha="right")
+    axes.set(xlabel=common.strip(), ylabel=f"rms error, {comparison.leave_out.group_name} left out [N]", yscale="log")
     legend_outside(axes)
     return figure
+
+
+def _natural_order(name: str) -> list[str | float]:
+    """A key that sorts names by the numbers in them: contraction 3 % before contraction 12 %."""
+    parts = re.split(r"(\d+(?:\.\d+)?)", name)
+    return [float(part) if i % 2 else part for i, part in enumerate(parts)]
+
+
+def _common_word(names: Sequence[str]) -> str:
+    """The first word of the names with the blank behind it, if all have the same; otherwise an empty text."""
+    word = names[0].partition(" ")[0] + " "
+    return word if all(name.startswith(word) for name in names) else ""
 
 
 def _shorten(name: str) -> str:

@@ -52,7 +52,8 @@ def _specimen_effects(fit: Fit, validity: str) -> tuple[list[DisplayedEquation],
 
 
 def _displayed(equation: LawEquation, name: str, validity: str) -> DisplayedEquation:
-    unit_of = ", ".join(f"{each.meaning} {each.name} [{each.unit}]" for each in (equation.result, *equation.arguments))
+    quantities = (equation.result, *equation.arguments)
+    unit_of = ", ".join(f"{q.meaning} {q.name}{'' if q.unit == '1' else f' [{q.unit}]'}" for q in quantities)
     texts = {f"{language} ({REMARKS[language]})": text for language, text in source_codes(equation, validity).items()}
     note = f"{unit_of[0].upper()}{unit_of[1:]}. {validity}"
     return DisplayedEquation(name, equation.title, tuple(displayed_lines(equation)), note, texts)

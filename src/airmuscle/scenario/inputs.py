@@ -5,7 +5,7 @@ fill = [["5 s", 1], ["15 s", 0]]            an input: instants, and the value fr
 model = "SampledSignal"                     optional: linear interpolation between the points; Schedule by default
 period = "2 s"                              optional: the first 2 s are repeated
 file = "bench.csv"                          optional: columns of a data file; then SampledSignal is the default
-columns = { fill = "valve [%]" }            optional: the column of each input, by default the one of the same name
+columns = { fill = "valve [%]" }            optional: the column of an input, by default the one of the same name
 [input.drivers]
 fill = { model = "SolenoidDriver", opening_delay = "5 ms" }     optional: one driver, or a list in signal order
 """
@@ -97,9 +97,10 @@ def _read_file_points(table: Mapping[str, Any], units: Mapping[str, str], locati
     path = read_text(table, "file", location, needed=True)
     with located_errors(location):
         recording = read_csv(location.folder / path)
+        names = {*recording, *(split_unit(heading)[0] for heading in recording)}
+        same = {name: name for name in inputs if name in names}
         if columns is None:
-            names = {*recording, *(split_unit(heading)[0] for heading in recording)}
-            columns = {name: name for name in inputs if name in names}
+            columns = same
             if not columns:
                 raise ColumnError(
                     f"{path} has no column with the name of an input ({', '.join(inputs)}); its columns are "
@@ -107,6 +108,8 @@ def _read_file_points(table: Mapping[str, Any], units: Mapping[str, str], locati
                 )
     if not isinstance(columns, Mapping) or not all(isinstance(column, str) for column in columns.values()):
         raise ParameterError(f'{location}, columns is {columns!r}; it must be a table such as {{ fill = "valve" }}.')
+    used = {*columns.values(), *(split_unit(heading)[0] for heading in columns.values()), *table}
+    columns = {**{name: name for name in same if name not in used}, **columns}
     with located_errors(location):
         check_input_names(list(columns), inputs)
         values = {name: recording.in_unit(column, units[name]) for name, column in columns.items()}

@@ -128,16 +128,19 @@ def build_scenario(
     if "duration" not in run:
         raise ParameterError(f"{in_run}: 'duration' is missing; write it as duration = \"25 s\".")
     duration = _read_duration(run, "duration", in_run)
+    in_input, input_table = location.inside("input"), _check_table(tables.get("input", {}), "input", location)
+    open_loop = _build_input_signal(input_table, plant, in_input)  # before the search for an equilibrium
     initial_state = _build_initial_state(
         run.get("initial_state", DEFAULT_INITIAL_STATE), plant, in_run.inside("initial_state"), equilibrium
     )
-    in_input, input_table = location.inside("input"), _check_table(tables.get("input", {}), "input", location)
     integrator = (
         _build_model(run["integrator"], Integrator, in_run.inside("integrator")) if "integrator" in run else None
     )
     start_time = read_finite_number(run.get("start_time", 0.0), "s", f"{in_run}, start_time")
     output_times = _read_duration(run, "output_times", in_run) if "output_times" in run else None
-    signal = _build_input(input_table, plant, initial_state, in_input)
+    signal: InputSignal | ControlLoop | None = open_loop
+    if signal is None:
+        signal = build_control_loop(input_table, plant, signal_units(plant, initial_state), in_input)
     with located_errors(in_input):
         problem = Problem(plant, signal, duration, initial_state, start_time, output_times, integrator)
     output_table = _check_table(tables.get("output", {}), "output", location)
@@ -159,12 +162,9 @@ def _check_table(value: Any, key: str, location: Location) -> Mapping[str, Any]:
     return value
 
 
-def _build_input(
-    table: Mapping[str, Any], plant: Plant, initial_state: Mapping[str, float], location: Location
-) -> InputSignal | ControlLoop:
-    if "controller" not in table:
-        return build_input_signal(table, plant.input_variables, location)
-    return build_control_loop(table, plant, signal_units(plant, initial_state), location)
+def _build_input_signal(table: Mapping[str, Any], plant: Plant, location: Location) -> InputSignal | None:
+    """The input signal of a table; None if the table has a controller, whose units follow from the initial state."""
+    return None if "controller" in table else build_input_signal(table, plant.input_variables, location)
 
 
 def run_column_units(problem: Problem) -> dict[str, str]:

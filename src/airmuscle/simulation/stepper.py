@@ -172,6 +172,10 @@ class Stepper:
         """The plant."""
         return self._compiled.system
 
+    def __repr__(self) -> str:
+        present = _listed(self.state_names, self.state)
+        return f"Stepper({type(self.plant).__name__} at {self.time:.6g} s: {present}; {self.integrator})"
+
     def _bind(self, compiled: CompiledSystem) -> None:
         """Bind integrator and kernels to a plant; `_next` and `_given` are the state and the inputs of a step."""
         self._compiled, self._bound = compiled, self.integrator.bind(compiled)

@@ -73,9 +73,9 @@ def plot_hysteresis(series: LoopSeries, friction: Friction, coefficients: Array,
     upper.plot(path, force, color=LINES[1], label=f"{type(friction).__name__}, whole path")
     upper.set_ylabel("force [N]")
     if lower is not None:
-        lower.plot(path[rows], (measured - force)[rows], **points)
+        lower.plot(path[rows], (force - measured)[rows], **points)
         lower.axhline(0.0, color=LINES[1])
-        lower.set_ylabel("residual (measured - model) [N]")
+        lower.set_ylabel("residual (model - measured) [N]")
     (upper if lower is None else lower).set_xlabel(series.axis.label)
     relabel_in_display_units([upper] if lower is None else [upper, lower])
     if figure is None:

@@ -8,6 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from ...control.inputs import check_input_names
+from ...core.annotation import one_line
 from ...core.errors import ParameterError
 from ...core.system import System
 from ...plant.plant import Plant
@@ -28,7 +29,11 @@ def air_of_each(plant: Plant, pressure: MuscleValues, air_mass: MuscleValues) ->
         )
     for value in values:
         if not isinstance(value, float | int | np.floating) or not np.isfinite(value):
-            raise ParameterError(f"find_equilibrium: {name} is {value!r}; it must be a finite number in {unit}.")
+            names = ", ".join(prefix.removesuffix(".") for prefix in plant.prefixes)
+            raise ParameterError(
+                f"find_equilibrium: {name} is {one_line(value)}; it must be a finite number in {unit}"
+                f"{f', or a tuple with the values of {names}' if len(plant.muscles) > 1 else ''}."
+            )
         if air_mass is not None and not value > 0:
             raise ParameterError(f"find_equilibrium: air_mass is {value:g} kg; it must be greater than 0.")
     return tuple(float(value) for value in values if value is not None)

@@ -1,0 +1,50 @@
+"""Entry of a muscle, a law or a fit that is written to a muscle file."""
+
+from __future__ import annotations
+
+import dataclasses
+
+from ..core.annotation import one_line
+from ..core.errors import ParameterError
+from ..identify import Fit
+from ..muscle import Muscle
+from ..muscle.characteristic.base import Characteristic
+from .entry import OPTIONAL_PARTS, Entry
+
+Savable = Entry | Fit | Muscle | Characteristic
+"""What a muscle file may contain."""
+
+
+def entry_of(thing: Savable) -> Entry:
+    """The entry of a muscle, a law or a fit; an entry itself. Raises ParameterError for anything else."""
+    if isinstance(thing, Entry):
+        return thing
+    if isinstance(thing, Fit):
+        return _of_fit(thing)
+    if isinstance(thing, Muscle):
+        return _of_muscle(thing)
+    if isinstance(thing, Characteristic):
+        name = type(thing).__name__
+        return Entry(name, name, "chosen", thing, validity_range=getattr(thing, "validity_range", None))
+    raise ParameterError(
+        f"save: {one_line(thing)} is not a muscle, a characteristic, a fit or an entry of the library."
+    )
+
+
+def _of_fit(fit: Fit) -> Entry:
+    summary, name = dict(fit.summary()), type(fit.model).__name__
+    note = (
+        f"Fitted to {fit.recording.origin}: rms error {summary['rms error']}, maximum error {summary['maximum error']}."
+    )
+    title = f"{name} fitted to {fit.recording.origin}"
+    return Entry("muscle", title, "fitted", fit.model, note=note, validity_range=fit.validity_range)
+
+
+def _of_muscle(muscle: Muscle) -> Entry:
+    """The entry with the elements that differ from those of a muscle without any."""
+    absent = {field.name: field.default for field in dataclasses.fields(Muscle)}
+    parts = {name: getattr(muscle, name) for name in OPTIONAL_PARTS if getattr(muscle, name) != absent[name]}
+    return Entry(
+        muscle.name, f"{muscle.name}: {type(muscle.contractile).__name__}", "chosen", muscle.contractile,
+        muscle.geometry, validity_range=muscle.validity_range, ratings=muscle.ratings, **parts,
+    )  # fmt: skip
