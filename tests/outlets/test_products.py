@@ -18,7 +18,7 @@ from airmuscle.library.catalogue import load
 from airmuscle.library.files import entries_of_product, list_laws, list_products
 from airmuscle.library.law_file import load_law
 from airmuscle.library.scaling import scale_entry
-from airmuscle.muscle import Ratings
+from airmuscle.muscle import CreepElements, LinearSpring, Ratings
 
 DMSP_20 = "dmsp-20-300"
 
@@ -124,6 +124,14 @@ def test_a_scaled_muscle_has_the_same_force_at_the_same_contraction_and_a_volume
     assert volumes[0] / volumes[1] == pytest.approx(2 / 3)
     assert short.checks == ()
     assert "not measured at this size" in short.note
+    assert "Not scaled" not in short.note
+
+
+def test_a_scaled_muscle_names_its_parts_of_the_original_size():
+    entry = dataclasses.replace(load_law(DMSP_20), spring=LinearSpring(1000.0), creep=CreepElements((500.0,), (10.0,)))
+    short = scale_entry(entry, resting_length="200 mm")
+    assert short.note.endswith("Not scaled, but as at the original size: spring, creep.")
+    assert short.spring == entry.spring
 
 
 def test_the_force_of_a_braid_without_wall_grows_with_the_square_of_its_diameter():

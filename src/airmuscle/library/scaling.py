@@ -9,7 +9,7 @@ from ..core.errors import ParameterError
 from ..core.units import quantity
 from ..muscle.characteristic import ChouHannaford1996, TonduLopez2000, VirtualWork
 from ..muscle.geometry import Braid
-from .entry import Entry
+from .entry import OPTIONAL_PARTS, Entry
 from .length_scaling import scale_to_length
 
 _BRAID_LAWS = (ChouHannaford1996, TonduLopez2000, VirtualWork)
@@ -23,7 +23,8 @@ def scale_entry(
 
     A text has a unit, such as "200 mm". At equal pressure and contraction the force does not depend on the length,
     unless the law contains an effect of the length; it grows with the square of the diameter. The checks of the entry,
-    which hold for its own size, are left out, and the note states the scaling, which is not a measurement. Raises
+    which hold for its own size, are left out, and the note states the scaling, which is not a measurement, and which
+    optional parts of the muscle (spring, damper, friction, wall, creep) remain those of the original size. Raises
     ParameterError for an entry that cannot be scaled, or a length that the maker does not supply; UnitError.
     """
     if resting_length is None and diameter is None:
@@ -39,8 +40,13 @@ def scale_entry(
         size = _positive(resting_length, f"{entry.name}, resting length")
         entry = _with_resting_length(entry, size)
         sizes.append(f"a resting length of {1e3 * size:.4g} mm")
-    note = " ".join(filter(None, (entry.note, f"Scaled to {' and '.join(sizes)}; not measured at this size.")))
-    return dataclasses.replace(entry, checks=(), note=note)
+    parts = [part for part in OPTIONAL_PARTS if getattr(entry, part) is not None]
+    texts = (
+        entry.note,
+        f"Scaled to {' and '.join(sizes)}; not measured at this size.",
+        f"Not scaled, but as at the original size: {', '.join(parts)}." if parts else "",
+    )
+    return dataclasses.replace(entry, checks=(), note=" ".join(filter(None, texts)))
 
 
 def _positive(value: float | str, where: str) -> float:
