@@ -65,8 +65,8 @@ class Peer:
 
 REASON = (
     "with compiled rates most of the time is spent in CVODE and in the Python call of each evaluation, which hardly "
-    "increases with the size of the plant, unlike the time of a step of Rodas4: 0.4 us with 3 states, 0.8 us with 10, "
-    "1.4 us with the surfaces of six muscles"
+    "increases with the size of the plant, unlike the time of a step of Rodas4: 0.3 us with 3 states, 0.5 us with 10, "
+    "0.6 us with the surfaces of six muscles"
 )
 PEERS = (
     Peer("scikit-sundae CVODE, hand-written rates", "sksundae", "scikit-sundae", sundae_by_hand, 45.0),

@@ -37,7 +37,7 @@ MAX_ERROR = 1e-7
 REASON = (
     "the hand-written rates skip closed valves, choked flow and the extrapolation beyond the validity range, so that "
     "an evaluation in Python takes 2 to 5 us; LSODA needs 1100 to 5400 of them, and most of the time is spent in "
-    "`solve_ivp` itself. Rodas4 takes 450 to 900 steps of 0.4 to 0.7 us each; a stage is one chain of dependent "
+    "`solve_ivp` itself. Rodas4 takes 450 to 900 steps of 0.3 to 0.6 us each; a stage is one chain of dependent "
     "operations, whose latency is the limit: independent stages of one muscle take a third of the time. A variant "
     "with the whole step as one function, without calls and loops, is 5 % faster for 3 states, 5 % slower for 6 and 2 "
     "% slower for 10, and takes twice as long to compile. At this rtol the error of LSODA is 1.7e-7 m with 3 states "
