@@ -41,8 +41,9 @@ LIBRARY = "RungeKutta4(1e-3), residual and Jacobian"
 FORMS = ("a tuple", "an array")
 HEADER = ("method", "variant", "median", "minimum", "ratio to a simulation", "maximum difference of the Jacobian")
 REASON = (
-    "a simulation skips closed valves and the extrapolation, which makes it 20 % faster; residual and Jacobian gain 12 %, "
-    "because the derivatives with respect to the limits of the validity range need the slopes of the extrapolation"
+    "a simulation skips closed valves and the extrapolation, which makes it 20 % faster; residual and Jacobian gain "
+    "12 %, because the derivatives with respect to the limits of the validity range need the slopes of the "
+    "extrapolation"
 )
 TEXT = (
     "The plant with three states, filled and discharged within 5 s; 501 rows of pressure and position; eight "
