@@ -126,8 +126,11 @@ def test_muscles_are_compared_and_own_files_are_read(muscle, tmp_path):
     wait_for(muscle, "muscle", "chou-hannaford own muscle")
     heading = downloaded(muscle, "muscle", "CSV", tmp_path).read_text().partition("\n")[0]
     assert "force of own muscle at" in heading
+    chosen = muscle.get_by_label("Muscle or law of the library").locator("option:checked")
+    assert chosen.inner_text() == "own muscle – own file"
     muscle.get_by_label("Remove own muscle").click()
     wait_for(muscle, "muscle", "chou-hannaford")
+    assert chosen.get_attribute("value") == "chou-hannaford"
 
 
 def test_a_plant_runs_by_schedule_and_by_hand_and_is_simulated_from_its_file(browser, address, tmp_path):

@@ -102,7 +102,7 @@
       return law;
     }
 
-    addSelected() { return this.fetched(this.select.value, (sheet) => this.add(sheet)); }
+    addSelected() { return this.select.value ? this.fetched(this.select.value, (sheet) => this.add(sheet)) : undefined; }
 
     replaceActive(name) {
       return this.fetched(name, (sheet) => {
@@ -129,7 +129,9 @@
 
     nameSelected() {
       const { sheet, text } = this.active, known = !text && [...this.select.options].some((option) => option.value === sheet.name);
-      if (known) this.select.value = sheet.name; else this.select.selectedIndex = -1;
+      this.select.querySelector('option[value=""]')?.remove();
+      if (!known) this.select.prepend(element("option", { value: "" }, `${sheet.name} – own file`));
+      this.select.value = known ? sheet.name : "";
     }
 
     remove(index) {
