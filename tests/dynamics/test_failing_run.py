@@ -286,6 +286,16 @@ def test_a_run_says_where_no_muscle_can_be():
     assert not [note for note in calm.notes if "range of its geometry" in note]
 
 
+def test_where_a_run_ends_hardly_depends_on_its_rows():
+    """Between rows far apart a state that has become impossible can grow without limit before the next row."""
+    plant, thrown = isothermal(), {**STATE, "speed": 100.0}
+    ends = [solve(Problem(plant, Schedule({}), 0.1, thrown, output_times=spacing)) for spacing in (1e-5, 1e-4, 2e-3)]
+    assert {end.status for end in ends} == {Status.NON_POSITIVE_VOLUME}
+    for end in ends:
+        assert end.final_time == pytest.approx(ends[0].final_time, rel=2e-3)
+        assert end.final_state == pytest.approx(ends[0].final_state, rel=2e-3)
+
+
 @pytest.mark.parametrize("method", [Rodas4(), RungeKutta4(1e-4)], ids=str)
 def test_no_more_steps_are_taken_than_allowed(method):
     plant = Plant(chosen_muscle(), FillDischarge(Supply(5e5), VALVE, VALVE), HangingMass(10.0))

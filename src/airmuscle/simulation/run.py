@@ -21,12 +21,17 @@ from ..core.status import Status
 from ..core.system import System
 from ..plant.state import check_system, state_vector
 from ..recording import Recording
-from .bound_integrator import BoundIntegrator
+from .bound_integrator import INTERRUPT_CHECK_STEPS, BoundIntegrator, RawSolution
 from .closed_loop import solve_closed_loop
 from .integrators import Integrator, default_integrator
 from .problem import NUMBERS, Problem, check_input_range, plain_numbers
 from .rows import early_end, make_recording, recorded_rows, status_of_state, truncate_at_invalid_row
 from .solution import Solution, Statistics
+
+_AT_POSSIBLE_STATE = {Status.DONE, Status.INTERRUPTED, Status.TOO_MANY_STEPS}
+"""How a run ends at a possible state."""
+INSTANTS = 1000
+"""Instants between two rows at which the first impossible state is looked for (chosen)."""
 
 
 def solve(problem: Problem) -> Solution:
@@ -47,10 +52,26 @@ def _solve_open_loop(problem: Problem) -> Solution:
     shown = (rows, times) if reached == times.size else (rows[:reached], times[:reached])
     table = recorded_rows(compiled, *shown, segments, problem.start_time)
     raw, table = truncate_at_invalid_row(compiled, raw, table, times)
+    if raw.status not in _AT_POSSIBLE_STATE and raw.reached > 0 and raw.steps < INTERRUPT_CHECK_STEPS:
+        raw = _end_between_rows(problem, raw)
     recording, diagnostics = make_recording(compiled, raw, table, times, integrator, problem.end_time, {})
     final = dict(zip(compiled.description.state_names, raw.state.tolist(), strict=True))
     statistics = Statistics(raw.steps, raw.rejected)
     return Solution(problem, recording, raw.status, statistics, diagnostics, raw.time, final)
+
+
+def _end_between_rows(problem: Problem, raw: RawSolution) -> RawSolution:
+    """The solution, which ended early, with time, state and status of the first impossible one of many instants since
+    its last row, if there is one: beyond the model numbers can grow without limit. A run does not depend on its rows.
+    """
+    compiled, integrator = problem.compiled, problem.integrator
+    assert integrator is not None
+    instants = np.linspace(problem.times[raw.reached - 1], raw.time, INSTANTS + 1)[1:]
+    again = integrator.run(compiled, problem.segments, problem.start_time, problem.initial_vector, instants)
+    rows, reached = again.rows[: again.reached], instants[: again.reached]
+    table = recorded_rows(compiled, rows, reached, problem.segments, problem.start_time)
+    end, _ = truncate_at_invalid_row(compiled, again, table, instants)
+    return raw if end is again else raw._replace(time=end.time, state=end.state, status=end.status)
 
 
 def borrow(pool: dict[Any, list[Any]], compiled: CompiledSystem, integrator: Integrator) -> BoundIntegrator:
