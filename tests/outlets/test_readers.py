@@ -448,6 +448,16 @@ def test_the_time_column_may_contain_clock_times(tmp_path: Path, cells: list[str
     assert "contains clock times; time is counted from the first" in recording.notes[0]
 
 
+def test_a_change_to_summer_time_is_no_gap_where_the_offset_from_utc_is_stated():
+    cells = ["2024-03-31T01:59:59.5+01:00", "2024-03-31T03:00:00+02:00", "2024-03-31T03:00:01+02:00"]
+    assert seconds_from_clock(cells) == pytest.approx([0.0, 0.5, 1.5])
+
+
+def test_dates_that_decrease_do_not_pass_midnight():
+    cells = ["2024-05-17 20:00:00", "2024-05-17 20:00:01", "2024-05-17 06:00:00"]
+    assert seconds_from_clock(cells) == pytest.approx([0.0, 1.0, -14 * 3600.0])
+
+
 def test_other_texts_are_not_clock_times():
     assert seconds_from_clock(["12:00:00", "n/a"]) is None
     assert seconds_from_clock([]) is None
