@@ -431,6 +431,22 @@ def test_a_constant_column_states_the_resting_length(tmp_path: Path):
     assert "a.csv, line 22: rest_length [cm] changes from 31 to 32" in refusal(ColumnError, path)
 
 
+def test_waveforms_of_tdms_that_start_at_different_times_are_aligned(tmp_path: Path):
+    nptdms = pytest.importorskip("nptdms")
+    begin, late = np.datetime64("2024-05-17T12:00:00.000000"), np.timedelta64(250, "ms")
+    rows = 0.05 * np.arange(40)
+    with nptdms.TdmsWriter(tmp_path / "run.tdms") as file:
+        file.write_segment([
+            nptdms.ChannelObject("g", "pressure [bar]", 1.0 + rows, {"wf_increment": 0.05, "wf_start_time": begin}),
+            nptdms.ChannelObject(
+                "g", "force [N]", 10.0 * (rows + 0.25), {"wf_increment": 0.05, "wf_start_time": begin + late}
+            ),
+        ])  # fmt: skip
+    recording = only(read(tmp_path / "run.tdms"))
+    assert len(recording) == 35
+    assert recording["force"] == pytest.approx(10.0 * (recording["pressure"] / 1e5 - 1.0))
+
+
 @pytest.mark.parametrize(
     "cells",
     [
