@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy import stats
 
 from airmuscle.core.errors import ColumnError
 from airmuscle.recording import Recording
@@ -249,6 +250,13 @@ def test_the_plateaus_of_a_staircase_are_its_steps():
     points = plateau_points(recording, found)
     assert len(points) == 45
     assert "45 plateaus replace" in points.notes[-1]
+
+
+def test_the_standard_errors_of_a_plateau_are_those_of_the_mean_of_a_sample():
+    recording, _ = bench()
+    for plateau in find_plateaus(recording):
+        rows = recording["pressure"][plateau.interval.rows]
+        assert plateau.standard_errors["pressure"] == pytest.approx(stats.sem(rows))
 
 
 def test_a_slow_ramp_is_quasi_static_but_not_a_plateau_and_a_fast_one_neither():

@@ -431,6 +431,22 @@ def test_a_joint_beyond_the_length_states_the_torque():
         choose(am.load("dmsp-20-300"), JOINT, dataclasses.replace(SIX_BAR, max_length=0.06))
 
 
+def test_a_joint_limited_by_its_inertia_states_the_torque_with_that_of_the_inertia():
+    heavy, short = dataclasses.replace(JOINT, inertia=20.0), dataclasses.replace(SIX_BAR, max_length=0.06)
+    torque = heavy.torque + heavy.acceleration_torque(short.cycle_time)
+    with pytest.raises(SolveError, match=r"with that of the inertia") as error:
+        choose(am.load("dmsp-20-300"), heavy, short)
+    found = re.search(r"at most (\S+) N m; (\S+) N m is needed", str(error.value))
+    assert found is not None
+    reached, needed = (float(number) for number in found.groups())
+    assert needed == pytest.approx(short.safety_factor * torque, rel=1e-3)
+    share = reached / needed
+    reduced = heavy.reduced(load=0.999 * share)
+    assert choose(am.load("dmsp-20-300"), reduced, short).length <= 0.06
+    with pytest.raises(SolveError):
+        choose(am.load("dmsp-20-300"), heavy.reduced(load=1.001 * share), short)
+
+
 @pytest.mark.parametrize("make", [
     lambda: LiftRequirement(stroke=0.0, mass=1.0),
     lambda: LiftRequirement(stroke=-0.04, mass=1.0),

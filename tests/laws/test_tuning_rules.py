@@ -124,6 +124,12 @@ def exact_ultimate_point(model):
     return UltimatePoint(math.hypot(1, low * model.time_constant) / model.gain, 2 * math.pi / low)
 
 
+def test_noise_about_the_middle_of_an_oscillation_does_not_shorten_its_period():
+    time = 0.01 * np.arange(2000)
+    noise = np.random.default_rng(1).normal(0.0, 0.05, time.size)
+    assert ultimate_point(time, np.sin(2 * np.pi * time) + noise, amplitude=1.0).period == pytest.approx(1.0, rel=5e-3)
+
+
 def test_a_relay_finds_the_ultimate_point_and_the_model():
     exact = exact_ultimate_point(PLANT)
     model = exact.first_order(PLANT.gain)

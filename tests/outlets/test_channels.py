@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from airmuscle.core.errors import ColumnError
 from airmuscle.recording.channels import Channel, merge_channels
 
 OFFSETS = pytest.mark.parametrize("offset", [0.0, -3.0, 1.7e9], ids=["from 0", "before 0", "from 1970"])
@@ -29,3 +30,10 @@ def test_rows_that_a_channel_does_not_cover_are_left_out(offset):
     columns = dict(zip(("time", "pressure", "force"), merge_channels("made", channels, {}).columns, strict=True))
     assert len(columns["time"]) == 101
     assert columns["force"] == pytest.approx(3.0 * np.linspace(0.5, 1.5, 101), abs=1e-5)
+
+
+def test_a_channel_whose_time_decreases_is_not_interpolated():
+    fine, twice = 0.05 * np.arange(20), np.tile(0.2 * np.arange(5), 2)
+    channels = [Channel("pressure", np.ones(20), fine), Channel("force", np.repeat([0.0, 1.0], 5), twice)]
+    with pytest.raises(ColumnError, match="made: the time of channel 'force' decreases at its row 6"):
+        merge_channels("made", channels, {})

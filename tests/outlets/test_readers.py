@@ -431,6 +431,22 @@ def test_a_constant_column_states_the_resting_length(tmp_path: Path):
     assert "a.csv, line 22: rest_length [cm] changes from 31 to 32" in refusal(ColumnError, path)
 
 
+def test_waveforms_of_tdms_that_start_at_different_times_are_aligned(tmp_path: Path):
+    nptdms = pytest.importorskip("nptdms")
+    begin, late = np.datetime64("2024-05-17T12:00:00.000000"), np.timedelta64(250, "ms")
+    rows = 0.05 * np.arange(40)
+    with nptdms.TdmsWriter(tmp_path / "run.tdms") as file:
+        file.write_segment([
+            nptdms.ChannelObject("g", "pressure [bar]", 1.0 + rows, {"wf_increment": 0.05, "wf_start_time": begin}),
+            nptdms.ChannelObject(
+                "g", "force [N]", 10.0 * (rows + 0.25), {"wf_increment": 0.05, "wf_start_time": begin + late}
+            ),
+        ])  # fmt: skip
+    recording = only(read(tmp_path / "run.tdms"))
+    assert len(recording) == 35
+    assert recording["force"] == pytest.approx(10.0 * (recording["pressure"] / 1e5 - 1.0))
+
+
 @pytest.mark.parametrize(
     "cells",
     [
@@ -446,6 +462,16 @@ def test_the_time_column_may_contain_clock_times(tmp_path: Path, cells: list[str
     recording = only(read(tmp_path / "run.csv"))
     assert recording["time"] == pytest.approx([0.0, 0.5, 1.5])
     assert "contains clock times; time is counted from the first" in recording.notes[0]
+
+
+def test_a_change_to_summer_time_is_no_gap_where_the_offset_from_utc_is_stated():
+    cells = ["2024-03-31T01:59:59.5+01:00", "2024-03-31T03:00:00+02:00", "2024-03-31T03:00:01+02:00"]
+    assert seconds_from_clock(cells) == pytest.approx([0.0, 0.5, 1.5])
+
+
+def test_dates_that_decrease_do_not_pass_midnight():
+    cells = ["2024-05-17 20:00:00", "2024-05-17 20:00:01", "2024-05-17 06:00:00"]
+    assert seconds_from_clock(cells) == pytest.approx([0.0, 1.0, -14 * 3600.0])
 
 
 def test_other_texts_are_not_clock_times():

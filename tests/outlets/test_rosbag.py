@@ -43,6 +43,24 @@ def test_topics_become_columns_with_common_rows(bag):
     assert run["arm.joints.position.wrist"] == pytest.approx(-0.02 * np.arange(21), abs=1e-12)
 
 
+@pytest.mark.parametrize("kind", ["Bool", "Int32"])
+def test_a_valve_of_a_slower_topic_switches_between_two_values(tmp_path, kind):
+    rosbag2 = pytest.importorskip("rosbags.rosbag2", reason="needs the package rosbags")
+    typesys = pytest.importorskip("rosbags.typesys", reason="needs the package rosbags")
+    store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+    force, valve = store.types["std_msgs/msg/Float64"], store.types[f"std_msgs/msg/{kind}"]
+    with rosbag2.Writer(tmp_path / "bag", version=9) as writer:
+        names = ("/force", force), ("/valve", valve)
+        forces, valves = (writer.add_connection(name, of.__msgtype__, typestore=store) for name, of in names)
+        for k in range(21):
+            stamp = 5 * 10**9 + k * 10**7
+            writer.write(forces, stamp, store.serialize_cdr(force(1.0 * k), force.__msgtype__))
+            if k % 10 == 0:
+                writer.write(valves, stamp, store.serialize_cdr(valve(k == 10), valve.__msgtype__))
+    (run,) = read(tmp_path / "bag", units={"force": "N"})
+    assert run["valve"].tolist() == [0.0] * 10 + [1.0] * 10 + [0.0]
+
+
 def test_one_topic_can_be_chosen(bag):
     (run,) = read(bag, group="/arm/joints")
     assert list(run) == ["time", "arm.joints.position.elbow", "arm.joints.position.wrist"]

@@ -41,6 +41,7 @@ def merge_channels(
         _check_equal_lengths(origin, channels)
         return _make_table(origin, channels, timed[0].time if timed else None, (), constants, row_label)
     _check_timed(origin, channels)
+    _check_ordered(origin, channels)
     return _resample(origin, channels, constants, row_label)
 
 
@@ -67,6 +68,19 @@ def _check_timed(origin: str, channels: Sequence[Channel]) -> None:
             f"{origin}: the channels have different rows, and no time is stated for {', '.join(untimed)}. "
             "Select a group whose channels have equal lengths, or export the channels with their time."
         )
+
+
+def _check_ordered(origin: str, channels: Sequence[Channel]) -> None:
+    """Raise ColumnError where the time of a channel decreases, so that no interpolation is defined."""
+    for channel in channels:
+        if channel.time is None:
+            continue
+        decreasing = np.flatnonzero(np.diff(channel.time) < 0.0)
+        if decreasing.size:
+            raise ColumnError(
+                f"{origin}: the time of channel '{channel.name}' decreases at its row {decreasing[0] + 2}, and the "
+                "channels have different rows. Write each run to a file of its own."
+            )
 
 
 def _resample(

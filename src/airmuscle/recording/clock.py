@@ -19,24 +19,29 @@ def seconds_from_clock(cells: Sequence[str]) -> Array | None:
 
     For times without a date, a decrease by more than half a day is taken as the passing of midnight.
     """
-    times = [_parse_time(cell.replace(",", ".")) for cell in cells]
+    texts = [cell.strip().replace(",", ".") for cell in cells]
+    times = [_parse_time(text) for text in texts]
     if not times or any(time is None for time in times):
         return None
     seconds = np.array(times, dtype=float)
-    seconds[1:] += 86_400.0 * np.cumsum(np.diff(seconds) < -43_200.0)
+    if all(_TIME_OF_DAY.fullmatch(text) for text in texts):
+        seconds[1:] += 86_400.0 * np.cumsum(np.diff(seconds) < -43_200.0)
     return np.asarray(seconds - seconds[0])
 
 
 def _parse_time(cell: str) -> float | None:
-    """The time in a cell [s], counted from midnight or from 1970; None if it is not a clock time."""
-    clock = _TIME_OF_DAY.fullmatch(cell.strip())
+    """The time in a cell [s], counted from midnight or, with a date, from 1970; None if it is not a clock time.
+
+    A time that states its offset from UTC is converted to UTC, so that the change to summer time is no gap.
+    """
+    clock = _TIME_OF_DAY.fullmatch(cell)
     if clock:
         return 3600.0 * float(clock[1]) + 60.0 * float(clock[2]) + float(clock[3])
-    german = _GERMAN_DATE.fullmatch(cell.strip())
-    iso = f"{german[3]}-{int(german[2]):02}-{int(german[1]):02} {german[4]}" if german else cell.strip()
+    german = _GERMAN_DATE.fullmatch(cell)
+    iso = f"{german[3]}-{int(german[2]):02}-{int(german[1]):02} {german[4]}" if german else cell
     try:
         moment = datetime.datetime.fromisoformat(iso)
     except ValueError:
         return None
-    epoch = datetime.datetime(1970, 1, 1, tzinfo=moment.tzinfo)
+    epoch = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC if moment.tzinfo else None)
     return (moment - epoch).total_seconds()

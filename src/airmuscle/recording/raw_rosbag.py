@@ -67,10 +67,10 @@ def _numbers(value: Any, path: str) -> Iterator[tuple[str, float]]:
         if field in ("header", "layout", "__msgtype__") or field.endswith("covariance"):
             continue
         if isinstance(item, bool | int | float | np.number):
-            yield inner, float(item)
+            yield inner, item.item() if isinstance(item, np.number) else item
         elif isinstance(item, np.ndarray) and item.dtype.kind in "biuf" and 0 < item.size <= MAX_ELEMENTS:
             words = labels if len(labels) == item.size else [str(i) for i in range(item.size)]
-            yield from ((f"{inner}.{word}", float(x)) for word, x in zip(words, item.ravel(), strict=True))
+            yield from ((f"{inner}.{word}", x) for word, x in zip(words, item.ravel().tolist(), strict=True))
         elif hasattr(item, "__dataclass_fields__"):
             yield from _numbers(item, inner)
 
@@ -81,7 +81,8 @@ def _channels(topic: str, messages: list[tuple[float, dict[str, float]]]) -> lis
     channels = []
     for name in names:
         rows = [(time, numbers[name]) for time, numbers in messages if name in numbers]
-        time, values = np.array(rows, dtype=float).T
+        time = np.array([row[0] for row in rows])
+        values = np.array([row[1] for row in rows])  # integers remain integers, which are held between messages
         first = np.concatenate([[True], np.diff(time) > 0])
         channels.append(Channel(topic if name == "data" else f"{topic}.{name}", values[first], time[first]))
     return channels

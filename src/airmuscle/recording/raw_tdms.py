@@ -13,6 +13,9 @@ from .channels import Channel, merge_channels
 from .optional_dependency import import_lab_package, run_reader
 from .table import RawTable
 
+NO_DATE = np.datetime64("1904-01-01T00:00:00", "us")
+"""The date that LabVIEW writes where none is set, the origin of its time."""
+
 
 def read_tdms_tables(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
     """Read one table from each group with channels, or from the named group. Raises FileError or ColumnError."""
@@ -48,18 +51,37 @@ def _make_table(path: Path, group: Any, properties: dict[str, Any], several: boo
         if isinstance(value, float | int | str) and name not in ("name", "description", "title", "author")
     }
     origin = f"{path.name}, group '{group.name}'" if several else path.name
-    return merge_channels(origin, [_make_channel(c) for c in group.channels()], constants)
+    channels = group.channels()
+    starts = _start_times(channels)
+    return merge_channels(
+        origin, [_make_channel(c, start) for c, start in zip(channels, starts, strict=True)], constants
+    )
 
 
-def _make_channel(channel: Any) -> Channel:
+def _make_channel(channel: Any, start: float) -> Channel:
     unit = str(channel.properties.get("unit_string") or channel.properties.get("NI_UnitDescription") or "")
-    return Channel(channel.name, channel[:], _waveform_time(channel), unit)
+    return Channel(channel.name, channel[:], _waveform_time(channel, start), unit)
 
 
-def _waveform_time(channel: Any) -> Array | None:
+def _start_times(channels: list[Any]) -> list[float]:
+    """The start of each waveform after that of the first [s]; 0 for all unless each waveform states its date."""
+    dates = {i: c.properties.get("wf_start_time") for i, c in enumerate(channels) if _step(c) > 0.0 and len(c)}
+    if any(date is None or np.datetime64(date) <= NO_DATE for date in dates.values()):
+        return [0.0] * len(channels)
+    instants = {i: np.datetime64(date, "us") for i, date in dates.items()}
+    first = min(instants.values(), default=NO_DATE)
+    return [float((instants.get(i, first) - first) / np.timedelta64(1, "s")) for i in range(len(channels))]
+
+
+def _step(channel: Any) -> float:
+    """The sample time of a waveform [s]; 0 for other channels."""
+    return float(channel.properties.get("wf_increment", 0.0))
+
+
+def _waveform_time(channel: Any, start: float) -> Array | None:
     """The times of a waveform [s]; None for other channels, for which LabVIEW writes a step of zero."""
-    step = float(channel.properties.get("wf_increment", 0.0))
+    step = _step(channel)
     if not step > 0.0:
         return None
-    start = float(channel.properties.get("wf_start_offset", 0.0))
-    return np.asarray(start + step * np.arange(len(channel)))
+    offset = float(channel.properties.get("wf_start_offset", 0.0))
+    return np.asarray(start + offset + step * np.arange(len(channel)))

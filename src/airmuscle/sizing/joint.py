@@ -46,6 +46,10 @@ class JointSearch:
 
     def needed(self, muscle: StaticMuscle, extended: Array, contracted: Array) -> Array:
         """Needed length [m] for each pair (E, C) of contractions (E,) and (C,); infinity where there is none."""
+        return np.asarray(self._needed_of_each(muscle, extended, contracted).max(axis=0))
+
+    def _needed_of_each(self, muscle: StaticMuscle, extended: Array, contracted: Array) -> Array:
+        """Needed lengths [m] (2, E, C) for the torques of the contracted and of the extended muscle."""
         torques = self._torques
         upper, lower = muscle.capacity(contracted), muscle.floor(extended)[:, None]
         upper_extended, lower_contracted = muscle.capacity(extended)[:, None], muscle.floor(contracted)
@@ -55,7 +59,7 @@ class JointSearch:
             lengths = [self.conditions.safety_factor * torque / (self.count * gain)
                        for torque, gain in zip(torques, gains, strict=True)]  # fmt: skip
         possible = (ratio > 0.0) & (gains[0] > 0.0) & (gains[1] > 0.0)
-        return np.where(possible, np.maximum(*lengths), math.inf)
+        return np.where(possible, np.array(lengths), math.inf)
 
     def _best(self, muscle: StaticMuscle) -> tuple[float, float, float]:
         """Shortest length [m] and its contractions, extended and contracted. Raises SolveError, with the reason."""
@@ -127,12 +131,15 @@ class JointSearch:
 
     def shortfall(self, muscle: StaticMuscle, length: float) -> str:
         """Reason why a length [m] is not sufficient."""
-        shortest, _, _ = self._best(muscle)
-        needed = self.conditions.safety_factor * self._torques[0]
+        shortest, extended, contracted = self._best(muscle)
+        lengths = self._needed_of_each(muscle, np.array([extended]), np.array([contracted]))
+        limiting = int(np.argmax(lengths))  # the muscle whose torque determines the shortest length
+        needed = self.conditions.safety_factor * self._torques[limiting]
         reached = needed * length / shortest  # the needed length is proportional to the torque
+        inertia = " with that of the inertia" if limiting else ""
         return (
             f"with {1e3 * length:.4g} mm, the torque at the ends is at most {reached:.4g} N m; {needed:.4g} N m is "
-            "needed"
+            f"needed{inertia}"
         )
 
 

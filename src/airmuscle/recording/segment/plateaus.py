@@ -92,7 +92,8 @@ def _make_plateau(recording: Recording, interval: Interval) -> Plateau:
     rows = {name: recording[name][interval.rows] for name in recording}
     medians = {name: float(np.median(values)) for name, values in rows.items()}
     root_count = np.sqrt(len(interval))
-    return Plateau(interval, medians, {name: float(np.std(values) / root_count) for name, values in rows.items()})
+    errors = {name: float(np.std(values, ddof=1) / root_count) for name, values in rows.items()}
+    return Plateau(interval, medians, errors)
 
 
 def plateau_points(recording: Recording, plateaus: tuple[Plateau, ...]) -> Recording:

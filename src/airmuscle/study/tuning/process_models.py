@@ -32,6 +32,8 @@ ASTROM_HAGGLUND1984 = Reference(
 )
 UNSETTLED = 0.05
 """Relative change in the last tenth of a step response from which on it is not settled (chosen)."""
+DEAD_BAND = 0.25
+"""Part of the amplitude that an oscillation exceeds on both sides of its middle in each period (chosen)."""
 MIN_ROWS = 10
 """Smallest number of rows of an experiment (chosen)."""
 
@@ -164,7 +166,7 @@ def ultimate_point(
     t, y = t[late], y[late]
     a = float(np.ptp(y)) / 2
     around = y - (y.max() + y.min()) / 2
-    rising = np.flatnonzero((around[:-1] < 0) & (around[1:] >= 0))
+    rising = _rising_crossings(around, DEAD_BAND * a)
     if rising.size < 3 or a <= abs(hysteresis):
         raise ParameterError(
             f"relay experiment: {rising.size} rising crossings and an amplitude of {a:.4g} in the second half; at "
@@ -173,6 +175,14 @@ def ultimate_point(
     crossings = t[rising] - around[rising] * (t[rising + 1] - t[rising]) / (around[rising + 1] - around[rising])
     gain = 4 * amplitude / (math.pi * math.sqrt(a**2 - hysteresis**2))
     return UltimatePoint(gain, float(crossings[-1] - crossings[0]) / (rising.size - 1))
+
+
+def _rising_crossings(values: Array, band: float) -> npt.NDArray[np.intp]:
+    """The rows before the first rising crossing of zero between each row below -band and the next row above band."""
+    decided = np.flatnonzero(np.abs(values) > band)
+    lows = decided[:-1][(values[decided[:-1]] < 0) & (values[decided[1:]] > 0)]
+    crossings = np.flatnonzero((values[:-1] < 0) & (values[1:] >= 0))
+    return np.asarray(crossings[np.searchsorted(crossings, lows)], dtype=np.intp)
 
 
 def _rows(time: npt.ArrayLike, output: npt.ArrayLike, size: float) -> tuple[Array, Array]:
