@@ -203,6 +203,26 @@ def test_a_profile_of_what_is_not_determined_is_open():
     assert found.cost_increase.max() < 0.1
 
 
+def test_a_start_time_is_found_on_a_clock_that_counts_from_1970():
+    """The zero of the clock changes neither the search nor the bounds and standard errors."""
+    plant, epoch = rigid_plant(), 1.7e9
+    first = rigid_fill(plant)
+    shifted = first.recording.with_columns(time=first.recording["time"] + epoch)
+    fits = [
+        fit_dynamic(
+            plant, [dataclasses.replace(first, recording=recording, start_time=begun)],
+            free=("circuit.fill.conductance",), per_record=(StartTime(0.02),), observed={"pressure": 300.0},
+        )
+        for recording, begun in ((first.recording, 0.004), (shifted, epoch + 0.004))
+    ]  # fmt: skip
+    near, far = (fit["start time of record 1"] for fit in fits)
+    assert not far.on_bound
+    assert far.value - epoch == pytest.approx(near.value, abs=1e-6)
+    assert far.stderr == pytest.approx(near.stderr, rel=0.01)
+    widths = [np.ptp(fit.profile("start time of record 1", 4).interval) for fit in fits]
+    assert widths == pytest.approx([2 * 1.96 * near.stderr] * 2, rel=0.2)
+
+
 def test_the_start_pressure_is_a_nuisance():
     plant = rigid_plant()
     command = Schedule({"fill": ((0.0, 1.0),)})

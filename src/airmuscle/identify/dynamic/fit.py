@@ -71,7 +71,7 @@ def fit_dynamic(
     _check_row_count(problem)
     outcomes = sorted(_solve_all(problem, initial_guesses(problem, starts, seed)), key=lambda outcome: outcome[1])
     if not np.isfinite(outcomes[0][1]):
-        problem.residuals(np.array([u.value for u in unknowns]) / problem.scales)  # raises the cause, if there is one
+        problem.residuals(problem.scaled(np.array([u.value for u in unknowns])))  # raises the cause, if there is one
         raise IdentificationError(
             "the plant cannot be simulated from any initial guess. Check the bounds and the initial conditions."
         )
@@ -118,7 +118,7 @@ def initial_guesses(problem: DynamicFitProblem, count: int, seed: int) -> list[A
         low, high = unknown.search_range
         fraction = (rng.permutation(cells) + rng.random(cells)) / max(cells, 1)
         columns.append(low * (high / low) ** fraction if low > 0 else low + fraction * (high - low))
-    return [values / problem.scales, *(np.column_stack(columns) / problem.scales)]
+    return [problem.scaled(values), *problem.scaled(np.column_stack(columns))]
 
 
 def _build_result(problem: DynamicFitProblem, searches: Array, costs: Array) -> DynamicFit:
@@ -139,11 +139,11 @@ def _build_result(problem: DynamicFitProblem, searches: Array, costs: Array) -> 
     estimates = tuple(
         Estimate(u.name, u.symbol, float(value), float(stderr), u.unit, u.meaning, bool(bound))
         for u, value, stderr, bound in zip(
-            problem.unknowns, scaled * problem.scales, standard_errors * problem.scales, on_bound, strict=True
+            problem.unknowns, problem.values(scaled), standard_errors * problem.scales, on_bound, strict=True
         )
     )
     correlations = covariance / np.outer(standard_errors, standard_errors)
-    optima = distinct_optima(searches * problem.scales, costs, problem.scales)
+    optima = distinct_optima(problem.values(searches), costs, problem.scales)
     notes = [
         *(str(combination) for combination in analysis.undetermined),
         *describe_bounds(estimates, jacobian, inverse, on_bound, problem.scales),

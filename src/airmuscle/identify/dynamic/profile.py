@@ -14,7 +14,7 @@ from .problem import DynamicFitProblem
 NORMAL_95 = 1.96
 """Square root of the cost increase, in residual variances, at the limits of a 95 % confidence interval."""
 MAX_STANDARD_ERRORS = 4.0
-"""Range of a profile in standard errors to either side, at most twice the estimate."""
+"""Range of a profile in standard errors to either side, at most twice the estimate of a parameter."""
 
 MIN_IMPROVEMENT = 0.1
 """Reduction of the sum of squares, in residual variances, that shows that the fit was not converged; chosen."""
@@ -71,10 +71,12 @@ def compute_profile(
     estimates  of the fit, whose sum of squares is `cost` and whose residual variance is `variance`
     index      of the profiled estimate
     """
-    best = np.array([e.value for e in estimates]) / problem.scales
+    best = problem.scaled(np.array([e.value for e in estimates]))
     low, high = (bound[index] for bound in problem.bounds)
     stderr = estimates[index].stderr / problem.scales[index]
-    span = min(high - low, 2.0 * abs(best[index]) or 1.0)
+    span = high - low
+    if problem.unknowns[index].paths:  # the zero of a clock or of an initial value gives no range
+        span = min(span, 2.0 * abs(best[index]) or 1.0)
     distance = min(MAX_STANDARD_ERRORS * stderr, span) if np.isfinite(stderr) else span
     rows = [(best[index], cost, best)]
     for side in (-1.0, 1.0):
@@ -89,6 +91,6 @@ def compute_profile(
             rows.append((value, constrained_cost, scaled))
     rows.sort(key=lambda row: row[0])
     cost_increase = np.array([(constrained_cost - cost) / variance for _, constrained_cost, _ in rows])
-    values = np.array([value for value, _, _ in rows]) * problem.scales[index]
-    all_estimates = np.array([scaled for _, _, scaled in rows]) * problem.scales
+    values = problem.origins[index] + np.array([value for value, _, _ in rows]) * problem.scales[index]
+    all_estimates = problem.values(np.array([scaled for _, _, scaled in rows]))
     return DynamicProfile(estimates[index].name, estimates[index].unit, values, cost_increase, all_estimates)
