@@ -365,6 +365,22 @@ def test_model_error_is_called_so():
     assert any("model error rather than noise" in note for note in fit.notes)
 
 
+def test_the_autocorrelation_is_that_along_the_time_of_each_quantity():
+    """Neighbours in time, not the pressure and the position of one row."""
+    plant = moving()
+    experiment = recorded(plant, 3)
+    gappy = experiment.recording["pressure"].copy()
+    gappy[::7] = np.nan
+    record = dataclasses.replace(experiment, recording=experiment.recording.with_columns(pressure=gappy))
+    wrong = changed(plant, circuit__fill__critical_ratio=0.5)
+    fit = fit_dynamic(wrong, [record], free=("circuit.fill.conductance",), observed=SENSORS)
+    series = [fit.residuals()[name] / deviation for name, deviation in SENSORS.items()]
+    series = [each[np.isfinite(each)] for each in series]
+    expected = sum(each[1:] @ each[:-1] for each in series) / sum(each @ each for each in series)
+    assert expected > 0.3
+    assert f"(lag 1: {expected:.2f})" in "".join(fit.notes)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
