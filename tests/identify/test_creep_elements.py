@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from airmuscle.core.errors import IdentificationError, ParameterError
+from airmuscle.identify.campaign.creep_stage import HeldRows
 from airmuscle.identify.hysteresis import creep_elements, find_holds, fit_creep
 from airmuscle.identify.hysteresis.creep import Creep, CreepFit
 from airmuscle.muscle import CreepElements
@@ -85,3 +86,13 @@ def test_a_held_length_whose_force_relaxes_by_less_than_the_band_of_a_constant_l
     assert creep.time_constants == pytest.approx((8.0,), rel=0.05)
     load = {**columns, "contraction": 0.1 + (500.0 - force) / 1e4, "force": 340.0 + columns["force"] - force}
     assert [each.quantity for each in find_holds(Recording(load, "bench"))] == ["contraction"]
+
+
+def test_a_hold_that_ends_within_the_dead_time_is_no_fit_of_the_motion():
+    time = np.arange(0.0, 0.3, 0.001)
+    held = 0.04 * np.clip((time - 0.02) / 0.1, 0.0, 1.0)
+    columns = {"time": time, "pressure": np.full(time.size, 3e5), "contraction": held, "force": 500.0 - 4000.0 * held}
+    record = Recording(columns, "bench", constants={"resting_length": 0.3})
+    with pytest.raises(IdentificationError, match=r"the hold ends 0\.18 s after"):
+        HeldRows.after(record, 0.12)
+    assert HeldRows.after(record, 0.05).recording["force"] == pytest.approx(340.0)

@@ -223,6 +223,21 @@ def test_a_start_time_is_found_on_a_clock_that_counts_from_1970():
     assert widths == pytest.approx([2 * 1.96 * near.stderr] * 2, rel=0.2)
 
 
+def test_the_effect_of_a_bound_of_a_start_time_does_not_depend_on_the_zero_of_the_clock():
+    plant, epoch, moves = rigid_plant(), 1.7e9, []
+    first = rigid_fill(plant)
+    for zero in (1.0, epoch):
+        recording = first.recording.with_columns(time=first.recording["time"] + zero)
+        early = dataclasses.replace(first, recording=recording, start_time=zero - 0.05)
+        fit = fit_dynamic(
+            plant, [early], free=("circuit.fill.conductance",), per_record=(StartTime(0.02),),
+            observed={"pressure": 300.0},
+        )  # fmt: skip
+        moves.append(next(note for note in fit.notes if "is on its bound" in note).partition("If the bound were ")[2])
+    assert moves[0] == moves[1]
+    assert moves[0].startswith("0.002 s greater, it would move circuit.fill.conductance by")
+
+
 def test_the_start_pressure_is_a_nuisance():
     plant = rigid_plant()
     command = Schedule({"fill": ((0.0, 1.0),)})

@@ -146,7 +146,7 @@ def _build_result(problem: DynamicFitProblem, searches: Array, costs: Array) -> 
     optima = distinct_optima(problem.values(searches), costs, problem.scales)
     notes = [
         *(str(combination) for combination in analysis.undetermined),
-        *describe_bounds(estimates, jacobian, inverse, on_bound, problem.scales),
+        *describe_bounds(estimates, jacobian, inverse, on_bound, problem.scales, problem.origins),
         *describe_optima(optima, estimates, costs),
         *_describe_model_error(separate_residuals(problem.record_models, residuals), estimates, inner.size),
     ]
