@@ -24,6 +24,7 @@ from airmuscle.identify.dynamic import (
     fit_dynamic,
     locate_pressure_sensor,
 )
+from airmuscle.identify.dynamic.profile import DynamicProfile
 from airmuscle.mechanism import HangingMass, Isometric
 from airmuscle.muscle import Muscle, SwellingWall
 from airmuscle.muscle.friction import Dahl
@@ -201,6 +202,13 @@ def test_a_profile_of_what_is_not_determined_is_open():
     found = fit.profile("circuit.fill.conductance", 3)
     assert np.isnan(found.interval).all()
     assert found.cost_increase.max() < 0.1
+
+
+def test_a_profile_that_ends_where_the_plant_cannot_be_simulated_has_no_limit_there():
+    values, increase = np.arange(6.0), np.array([np.inf, 1.0, 0.0, 1.0, 9.0, np.inf])
+    low, high = DynamicProfile("x", "1", values, increase, values[:, None]).interval
+    assert np.isnan(low)
+    assert high == pytest.approx(3.0 + 0.96 / 2.0)
 
 
 def test_a_start_time_is_found_on_a_clock_that_counts_from_1970():

@@ -33,7 +33,8 @@ class DynamicProfile:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Limits of the 95 % interval, where the cost increase is 1.96 squared; NaN where it stays below."""
+        """Limits of the 95 % interval, where the cost increase is 1.96 squared; NaN where it stays below, or where
+        the plant cannot be simulated before it is reached."""
         best = int(np.argmin(self.cost_increase))
         distance = np.sqrt(np.maximum(self.cost_increase - self.cost_increase[best], 0.0))
         below = self._find_crossing(self.values[: best + 1][::-1], distance[: best + 1][::-1])
@@ -42,7 +43,7 @@ class DynamicProfile:
     @staticmethod
     def _find_crossing(values: Array, distance: Array) -> float:
         above = np.flatnonzero(distance > NORMAL_95)
-        if not above.size:
+        if not above.size or not np.isfinite(distance[above[0]]):
             return float("nan")
         i = int(above[0])
         fraction = (NORMAL_95 - distance[i - 1]) / (distance[i] - distance[i - 1])
