@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from airmuscle.core.errors import IdentificationError, ParameterError
-from airmuscle.identify.hysteresis import creep_elements, fit_creep
+from airmuscle.identify.campaign.creep_stage import HeldRows
+from airmuscle.identify.hysteresis import creep_elements, find_holds, fit_creep
 from airmuscle.identify.hysteresis.creep import Creep, CreepFit
 from airmuscle.muscle import CreepElements
 from airmuscle.recording import Recording
@@ -64,3 +65,34 @@ def test_creep_that_passive_elements_do_not_have_and_missing_values_are_refused(
         creep_elements(made((0.01,), (2.0,)), step=0.005)
     with pytest.raises(ParameterError, match="the step is 0 m"):
         creep_elements(made((0.01,), (2.0,)), step=0.0)
+
+
+def test_a_held_length_whose_force_relaxes_by_less_than_the_band_of_a_constant_load_is_a_hold_at_a_length():
+    """5 N of 500 N, a hundred times the noise, are a relaxation; the noise of the held length is no creep."""
+    random, time = np.random.default_rng(0), np.arange(0.0, 61.3, 0.1)
+    elapsed = np.maximum(time - 1.3, 0.0)
+    held = 0.04 * np.clip((time - 1.0) / 0.3, 0.0, 1.0)
+    force = 500.0 - 4000.0 * held - 4.8 * np.exp(-elapsed / 8.0) * (time >= 1.3)
+    columns = {
+        "time": time,
+        "pressure": np.full(time.size, 3e5),
+        "contraction": held + 1e-6 * random.standard_normal(time.size),
+        "force": force + 0.05 * random.standard_normal(time.size),
+    }
+    (hold,) = find_holds(Recording(columns, "bench"))
+    assert hold.quantity == "force"
+    creep = fit_creep(Recording(columns, "bench").rows(hold.interval.rows), "force").creep
+    assert creep.amplitudes == pytest.approx((4.8,), rel=0.05)
+    assert creep.time_constants == pytest.approx((8.0,), rel=0.05)
+    load = {**columns, "contraction": 0.1 + (500.0 - force) / 1e4, "force": 340.0 + columns["force"] - force}
+    assert [each.quantity for each in find_holds(Recording(load, "bench"))] == ["contraction"]
+
+
+def test_a_hold_that_ends_within_the_dead_time_is_no_fit_of_the_motion():
+    time = np.arange(0.0, 0.3, 0.001)
+    held = 0.04 * np.clip((time - 0.02) / 0.1, 0.0, 1.0)
+    columns = {"time": time, "pressure": np.full(time.size, 3e5), "contraction": held, "force": 500.0 - 4000.0 * held}
+    record = Recording(columns, "bench", constants={"resting_length": 0.3})
+    with pytest.raises(IdentificationError, match=r"the hold ends 0\.18 s after"):
+        HeldRows.after(record, 0.12)
+    assert HeldRows.after(record, 0.05).recording["force"] == pytest.approx(340.0)

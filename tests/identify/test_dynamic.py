@@ -24,6 +24,7 @@ from airmuscle.identify.dynamic import (
     fit_dynamic,
     locate_pressure_sensor,
 )
+from airmuscle.identify.dynamic.profile import DynamicProfile
 from airmuscle.mechanism import HangingMass, Isometric
 from airmuscle.muscle import Muscle, SwellingWall
 from airmuscle.muscle.friction import Dahl
@@ -203,6 +204,48 @@ def test_a_profile_of_what_is_not_determined_is_open():
     assert found.cost_increase.max() < 0.1
 
 
+def test_a_profile_that_ends_where_the_plant_cannot_be_simulated_has_no_limit_there():
+    values, increase = np.arange(6.0), np.array([np.inf, 1.0, 0.0, 1.0, 9.0, np.inf])
+    low, high = DynamicProfile("x", "1", values, increase, values[:, None]).interval
+    assert np.isnan(low)
+    assert high == pytest.approx(3.0 + 0.96 / 2.0)
+
+
+def test_a_start_time_is_found_on_a_clock_that_counts_from_1970():
+    """The zero of the clock changes neither the search nor the bounds and standard errors."""
+    plant, epoch = rigid_plant(), 1.7e9
+    first = rigid_fill(plant)
+    shifted = first.recording.with_columns(time=first.recording["time"] + epoch)
+    fits = [
+        fit_dynamic(
+            plant, [dataclasses.replace(first, recording=recording, start_time=begun)],
+            free=("circuit.fill.conductance",), per_record=(StartTime(0.02),), observed={"pressure": 300.0},
+        )
+        for recording, begun in ((first.recording, 0.004), (shifted, epoch + 0.004))
+    ]  # fmt: skip
+    near, far = (fit["start time of record 1"] for fit in fits)
+    assert not far.on_bound
+    assert far.value - epoch == pytest.approx(near.value, abs=1e-6)
+    assert far.stderr == pytest.approx(near.stderr, rel=0.01)
+    widths = [np.ptp(fit.profile("start time of record 1", 4).interval) for fit in fits]
+    assert widths == pytest.approx([2 * 1.96 * near.stderr] * 2, rel=0.2)
+
+
+def test_the_effect_of_a_bound_of_a_start_time_does_not_depend_on_the_zero_of_the_clock():
+    plant, epoch, moves = rigid_plant(), 1.7e9, []
+    first = rigid_fill(plant)
+    for zero in (1.0, epoch):
+        recording = first.recording.with_columns(time=first.recording["time"] + zero)
+        early = dataclasses.replace(first, recording=recording, start_time=zero - 0.05)
+        fit = fit_dynamic(
+            plant, [early], free=("circuit.fill.conductance",), per_record=(StartTime(0.02),),
+            observed={"pressure": 300.0},
+        )  # fmt: skip
+        moves.append(next(note for note in fit.notes if "is on its bound" in note).partition("If the bound were ")[2])
+    assert moves[0] == moves[1]
+    assert moves[0].startswith("0.002 s greater, it would move circuit.fill.conductance by")
+
+
 def test_the_start_pressure_is_a_nuisance():
     plant = rigid_plant()
     command = Schedule({"fill": ((0.0, 1.0),)})
@@ -343,6 +386,22 @@ def test_model_error_is_called_so():
     wrong = dataclasses.replace(plant, circuit=circuit)
     fit = fit_dynamic(wrong, [rigid_fill(plant)], free=("circuit.fill.conductance",), observed={"pressure": 300.0})
     assert any("model error rather than noise" in note for note in fit.notes)
+
+
+def test_the_autocorrelation_is_that_along_the_time_of_each_quantity():
+    """Neighbours in time, not the pressure and the position of one row."""
+    plant = moving()
+    experiment = recorded(plant, 3)
+    gappy = experiment.recording["pressure"].copy()
+    gappy[::7] = np.nan
+    record = dataclasses.replace(experiment, recording=experiment.recording.with_columns(pressure=gappy))
+    wrong = changed(plant, circuit__fill__critical_ratio=0.5)
+    fit = fit_dynamic(wrong, [record], free=("circuit.fill.conductance",), observed=SENSORS)
+    series = [fit.residuals()[name] / deviation for name, deviation in SENSORS.items()]
+    series = [each[np.isfinite(each)] for each in series]
+    expected = sum(each[1:] @ each[:-1] for each in series) / sum(each @ each for each in series)
+    assert expected > 0.3
+    assert f"(lag 1: {expected:.2f})" in "".join(fit.notes)
 
 
 @pytest.mark.parametrize(

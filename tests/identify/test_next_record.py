@@ -4,6 +4,7 @@ errors are those of a joint fit with it, and a record that responds to one of tw
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 
@@ -68,6 +69,21 @@ def test_the_pair_of_valve_and_wall_with_the_greatest_correlation_is_separated(f
     assert best.gain > 3.0
     assert f"To separate them, measure {best.description}" in ranking.verdict
     assert [each.gain for each in ranking.ranking] == sorted((each.gain for each in ranking.ranking), reverse=True)
+
+
+def test_the_precision_does_not_depend_on_the_zero_of_the_clock():
+    """A start time that is estimated as nearly zero is not known more closely than another one."""
+    plant, free = rig(), ("circuit.fill.conductance", VALVE, WALL)
+    record = measured(plant, FILL, np.arange(0.0, 2.0, 0.01), 0.0, 1)
+    late = fitted(plant, free).estimates[-1].value
+    shifted = record.recording.with_columns(time=record.recording["time"] - late + 1e-9)
+    near_zero = dataclasses.replace(record, recording=shifted, start_time=-late)
+    sensor, own = {"pressure": NOISE}, (StartTime(0.02),)
+    fit = fit_dynamic(plant, [near_zero], free=free, observed=sensor, per_record=own)
+    now = rank_records(fit, (VALVE, WALL)).now
+    assert abs(fit.estimates[-1].value) < 1e-8
+    for name, error in zip((VALVE, WALL), now.standard_errors, strict=True):
+        assert error == pytest.approx(fit[name].stderr / fit[name].value, rel=0.01)
 
 
 def test_the_present_precision_is_that_of_the_fit(fill):

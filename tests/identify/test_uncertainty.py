@@ -172,6 +172,22 @@ def test_the_profile_of_a_linear_parameter_is_students_interval():
     assert ends.high == pytest.approx(found[name].value + half, abs=1e-3 * half)
 
 
+def test_bands_and_profiles_count_a_parameter_on_a_bound_as_known():
+    """The fit is that without the parameter, and so are its band and the interval of the others."""
+    pressure, held = np.array([2e5, 4e5, 6e5, 3e5, 5e5]), np.array([0.02, 0.06, 0.1, 0.14, 0.18])
+    law = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.0)
+    force = law.unclamped_force(pressure, held) * (1.0 + held) + 2.0 * np.array([1.0, -1.0, 1.0, -1.0, 1.0])
+    points = Recording({"pressure": pressure, "contraction": held, "force": force}, "bench")
+    found = fit(law, points)
+    on_bound = tuple(estimate.name for estimate in found.estimates if estimate.on_bound)
+    known = fit(found.model, points, fixed=on_bound)
+    assert on_bound
+    assert found.sigma == pytest.approx(known.sigma, rel=1e-6)
+    assert confidence_band(found, PLACES).high == pytest.approx(confidence_band(known, PLACES).high, rel=1e-6)
+    low, expected = (profile(each, "geometry.radius").low for each in (found, known))  # towards the high end it leaves
+    assert low - found.values[0] == pytest.approx(expected - known.values[0], rel=1e-3)
+
+
 def short_of_contraction(least: float, seed: int) -> Recording:
     """Points of an exponential muscle, from some contraction on."""
     random = np.random.default_rng(seed)

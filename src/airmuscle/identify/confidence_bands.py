@@ -27,9 +27,10 @@ def confidence_band(fit: Fit, points: Recording, *, level: float = 0.95, predict
     """The confidence band of a fit at points: value -+ t sqrt(g^T C g), in the fitted quantity [SI].
 
     g is the gradient of the law with respect to its parameters, C their covariance, t the quantile of Student's
-    distribution with N - P degrees of freedom. `prediction` gives the prediction band of one further observation: the
-    residual variance is added. `points` has the columns that the law takes as arguments, and the constant
-    `resting_length` if the law was fitted to several lengths. A parameter on a bound is treated as known.
+    distribution with N - P degrees of freedom, P the number of parameters that are not on a bound; one on a bound is
+    treated as known. `prediction` gives the prediction band of one further observation: the residual variance is added.
+    `points` has the columns that the law takes as arguments, and the constant `resting_length` if the law was fitted to
+    several lengths.
 
     The band of a PooledLengthLaw is that of the specimen that `points` state (the constant `specimen`, or else the
     resting length), or of a new muscle, with the scatter of the specimens. The band assumes independent residuals. Rows
@@ -38,7 +39,7 @@ def confidence_band(fit: Fit, points: Recording, *, level: float = 0.95, predict
     """
     from scipy.special import stdtrit
 
-    degrees_of_freedom = int(np.count_nonzero(fit.censoring == 0)) - len(fit.estimates)
+    degrees_of_freedom = fit.degrees_of_freedom
     if degrees_of_freedom <= 0 or not np.isfinite(fit.sigma):
         raise IdentificationError(
             f"{fit.recording.origin}: the band cannot be computed, because there are no more uncensored rows than "

@@ -57,8 +57,9 @@ def profile(fit: Fit, name: str, *, level: float = 0.95) -> ProfileLikelihood:
     """The profile-likelihood interval of one parameter (Bates and Watts (1988), Nonlinear Regression, 6.1).
 
     It holds all values for which the sum of squares, minimised over the other parameters, stays below
-    S (1 + F/(N - P)), where F is the quantile of Fisher's distribution with 1 and N - P degrees of freedom. Raises
-    IdentificationError for a robust fit, a parameter on its bound, or without degrees of freedom.
+    S (1 + F/(N - P)), where F is the quantile of Fisher's distribution with 1 and N - P degrees of freedom; P counts
+    the parameters that are not on a bound. Raises IdentificationError for a robust fit, a parameter on its bound, or
+    without degrees of freedom.
     """
     from scipy.special import stdtrit
 
@@ -68,7 +69,7 @@ def profile(fit: Fit, name: str, *, level: float = 0.95) -> ProfileLikelihood:
             "Fit with LeastSquares()."
         )
     estimate = fit[name]
-    degrees_of_freedom = int(np.count_nonzero(fit.censoring == 0)) - len(fit.estimates)
+    degrees_of_freedom = fit.degrees_of_freedom
     if degrees_of_freedom <= 0 or not np.isfinite(estimate.stderr):
         raise IdentificationError(
             f"{name} has no likelihood profile, because it is on its bound or there are no more uncensored rows than "

@@ -94,6 +94,11 @@ class Fit(NotebookDisplay):
     effects: SpecimenEffects | None = None
     """The effects of the specimens on a PooledLengthLaw. Estimates and problem are those of its population law."""
 
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Number of the uncensored rows minus that of the parameters that are not on a bound; negative where fewer."""
+        return int(np.count_nonzero(self.censoring == 0)) - sum(not estimate.on_bound for estimate in self.estimates)
+
     def __getitem__(self, name: str) -> Estimate:
         """An estimate by the path of its parameter, for example `geometry.radius`. Raises ParameterError."""
         for estimate in self.estimates:

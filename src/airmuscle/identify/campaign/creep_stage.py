@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...core.arrays import Array
-from ...core.errors import AirmuscleError
+from ...core.errors import AirmuscleError, IdentificationError
 from ...core.short_repr import ShortRepr
 from ...muscle import CreepElements
 from ...recording import Recording
@@ -103,8 +103,17 @@ class HeldRows:
 
     @classmethod
     def after(cls, whole: Recording, end_of_motion: float) -> HeldRows:
-        """The rows after a dead time from the end of the motion [s] to the end of the recording."""
-        start = int(np.argmax(whole["time"] > end_of_motion + DEADTIME))
+        """The rows after a dead time from the end of the motion [s] to the end of the recording.
+
+        Raises IdentificationError where there are none.
+        """
+        later = whole["time"] > end_of_motion + DEADTIME
+        if not later.any():
+            raise IdentificationError(
+                f"{whole.origin}: the hold ends {whole['time'][-1] - end_of_motion:.2g} s after the motion, within the "
+                f"{DEADTIME:g} s in which load cell and frame settle; hold longer."
+            )
+        start = int(np.argmax(later))
         rows = np.arange(start, len(whole))
         kept = rows[np.unique(np.linspace(0, rows.size - 1, min(FIT_ROWS, rows.size)).round().astype(int))]
         path = displacement(whole)

@@ -103,6 +103,12 @@ class Unknown:
         return abs(self.value) or (span if np.isfinite(span) else 1.0)
 
     @property
+    def origin(self) -> float:
+        """Value from which the unknown is counted in the search: of a start time that of the experiment, whatever the
+        zero of the clock; otherwise 0."""
+        return self.value if isinstance(self.target, StartTime) else 0.0
+
+    @property
     def search_range(self) -> tuple[float, float]:
         """Range of the initial guesses of a multi-start: a factor of three both ways, within the bounds."""
         if isinstance(self.target, StartTime | InitialValue):

@@ -17,7 +17,7 @@ from ..result import Estimate
 from .experiment import Experiment, ParameterPaths, RecordUnknown, make_unknowns
 from .levenberg_marquardt import LevenbergMarquardt
 from .problem import MAX_RUNS, DynamicFitProblem
-from .record_model import RecordModel, count_readings
+from .record_model import RecordModel, count_readings, separate_residuals
 from .reliability import describe_bounds, describe_flatness, describe_optima, distinct_optima
 from .result import DynamicFit
 
@@ -71,7 +71,7 @@ def fit_dynamic(
     _check_row_count(problem)
     outcomes = sorted(_solve_all(problem, initial_guesses(problem, starts, seed)), key=lambda outcome: outcome[1])
     if not np.isfinite(outcomes[0][1]):
-        problem.residuals(np.array([u.value for u in unknowns]) / problem.scales)  # raises the cause, if there is one
+        problem.residuals(problem.scaled(np.array([u.value for u in unknowns])))  # raises the cause, if there is one
         raise IdentificationError(
             "the plant cannot be simulated from any initial guess. Check the bounds and the initial conditions."
         )
@@ -118,7 +118,7 @@ def initial_guesses(problem: DynamicFitProblem, count: int, seed: int) -> list[A
         low, high = unknown.search_range
         fraction = (rng.permutation(cells) + rng.random(cells)) / max(cells, 1)
         columns.append(low * (high / low) ** fraction if low > 0 else low + fraction * (high - low))
-    return [values / problem.scales, *(np.column_stack(columns) / problem.scales)]
+    return [problem.scaled(values), *problem.scaled(np.column_stack(columns))]
 
 
 def _build_result(problem: DynamicFitProblem, searches: Array, costs: Array) -> DynamicFit:
@@ -139,28 +139,32 @@ def _build_result(problem: DynamicFitProblem, searches: Array, costs: Array) -> 
     estimates = tuple(
         Estimate(u.name, u.symbol, float(value), float(stderr), u.unit, u.meaning, bool(bound))
         for u, value, stderr, bound in zip(
-            problem.unknowns, scaled * problem.scales, standard_errors * problem.scales, on_bound, strict=True
+            problem.unknowns, problem.values(scaled), standard_errors * problem.scales, on_bound, strict=True
         )
     )
     correlations = covariance / np.outer(standard_errors, standard_errors)
-    optima = distinct_optima(searches * problem.scales, costs, problem.scales)
+    optima = distinct_optima(problem.values(searches), costs, problem.scales)
     notes = [
         *(str(combination) for combination in analysis.undetermined),
-        *describe_bounds(estimates, jacobian, inverse, on_bound, problem.scales),
+        *describe_bounds(estimates, jacobian, inverse, on_bound, problem.scales, problem.origins),
         *describe_optima(optima, estimates, costs),
-        *_describe_model_error(residuals, estimates, inner.size),
+        *_describe_model_error(separate_residuals(problem.record_models, residuals), estimates, inner.size),
     ]
     return DynamicFit(problem, estimates, correlations, analysis, residual_std, costs, optima, tuple(notes))
 
 
-def _describe_model_error(residuals: Array, estimates: Sequence[Estimate], unknowns: int) -> list[str]:
-    """Sentences on autocorrelated residuals, which are a sign of model error, and on what they leave open."""
-    autocorrelation = float(np.sum(residuals[1:] * residuals[:-1]) / max(np.sum(residuals**2), 1e-300))
+def _describe_model_error(series: Sequence[Array], estimates: Sequence[Estimate], unknowns: int) -> list[str]:
+    """Sentences on autocorrelated residuals, which are a sign of model error, and on what they leave open.
+
+    series  residuals of each quantity of each record in order of time
+    """
+    products = sum(float(each[1:] @ each[:-1]) for each in series)
+    autocorrelation = products / max(sum(float(each @ each) for each in series), 1e-300)
     if autocorrelation <= MAX_AUTOCORRELATION:
         return []
     factor = np.sqrt((1 + autocorrelation) / (1 - autocorrelation))
     return [
         f"the residuals are autocorrelated (lag 1: {autocorrelation:.2f}), which indicates model error rather than "
         f"noise; the standard errors are too small by a factor of about {factor:.1f}",
-        *describe_flatness(estimates, residuals.size - unknowns),
+        *describe_flatness(estimates, sum(each.size for each in series) - unknowns),
     ]

@@ -23,7 +23,7 @@ search if that is more; chosen."""
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class DynamicFitProblem:
-    """Residuals as a function of the scaled unknowns (P,)."""
+    """Residuals as a function of the scaled unknowns (P,), counted from their origins in units of their magnitudes."""
 
     record_models: tuple[RecordModel, ...]
     unknowns: tuple[Unknown, ...]
@@ -36,10 +36,23 @@ class DynamicFitProblem:
         return np.array([u.scale for u in self.unknowns])
 
     @functools.cached_property
+    def origins(self) -> Array:
+        """Values from which the unknowns are counted [SI], shape (P,)."""
+        return np.array([u.origin for u in self.unknowns])
+
+    def scaled(self, values: Array) -> Array:
+        """The scaled unknowns for values [SI], shape (..., P)."""
+        return np.asarray((values - self.origins) / self.scales)
+
+    def values(self, scaled: Array) -> Array:
+        """The values [SI] of scaled unknowns, shape (..., P)."""
+        return np.asarray(self.origins + scaled * self.scales)
+
+    @functools.cached_property
     def bounds(self) -> tuple[Array, Array]:
         """Lower and upper bounds of the scaled unknowns, shape (P,) each."""
         low, high = np.array([u.low for u in self.unknowns]), np.array([u.high for u in self.unknowns])
-        return low / self.scales, high / self.scales
+        return self.scaled(low), self.scaled(high)
 
     def residuals(self, scaled: Array) -> tuple[Array, Array]:
         """Residuals (R,) in standard deviations of the sensors, and their Jacobian (R, P) by the scaled unknowns."""
@@ -51,7 +64,7 @@ class DynamicFitProblem:
 
         Raises SimulationError or IdentificationError where a simulation fails or exceeds `max_steps`.
         """
-        return stack_residuals(self.record_models, scaled * self.scales, self.sensor_deviations, self.scales, max_steps)
+        return stack_residuals(self.record_models, self.values(scaled), self.sensor_deviations, self.scales, max_steps)
 
     def solve(self, scaled: Array, fixed: Sequence[int] = (), max_runs: int = MAX_RUNS) -> tuple[Array, float]:
         """Least squares from an initial guess (P,) with some unknowns fixed, given by index.

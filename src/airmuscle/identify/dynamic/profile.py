@@ -14,7 +14,7 @@ from .problem import DynamicFitProblem
 NORMAL_95 = 1.96
 """Square root of the cost increase, in residual variances, at the limits of a 95 % confidence interval."""
 MAX_STANDARD_ERRORS = 4.0
-"""Range of a profile in standard errors to either side, at most twice the estimate."""
+"""Range of a profile in standard errors to either side, at most twice the estimate of a parameter."""
 
 MIN_IMPROVEMENT = 0.1
 """Reduction of the sum of squares, in residual variances, that shows that the fit was not converged; chosen."""
@@ -33,7 +33,8 @@ class DynamicProfile:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Limits of the 95 % interval, where the cost increase is 1.96 squared; NaN where it stays below."""
+        """Limits of the 95 % interval, where the cost increase is 1.96 squared; NaN where it stays below, or where
+        the plant cannot be simulated before it is reached."""
         best = int(np.argmin(self.cost_increase))
         distance = np.sqrt(np.maximum(self.cost_increase - self.cost_increase[best], 0.0))
         below = self._find_crossing(self.values[: best + 1][::-1], distance[: best + 1][::-1])
@@ -42,7 +43,7 @@ class DynamicProfile:
     @staticmethod
     def _find_crossing(values: Array, distance: Array) -> float:
         above = np.flatnonzero(distance > NORMAL_95)
-        if not above.size:
+        if not above.size or not np.isfinite(distance[above[0]]):
             return float("nan")
         i = int(above[0])
         fraction = (NORMAL_95 - distance[i - 1]) / (distance[i] - distance[i - 1])
@@ -71,10 +72,12 @@ def compute_profile(
     estimates  of the fit, whose sum of squares is `cost` and whose residual variance is `variance`
     index      of the profiled estimate
     """
-    best = np.array([e.value for e in estimates]) / problem.scales
+    best = problem.scaled(np.array([e.value for e in estimates]))
     low, high = (bound[index] for bound in problem.bounds)
     stderr = estimates[index].stderr / problem.scales[index]
-    span = min(high - low, 2.0 * abs(best[index]) or 1.0)
+    span = high - low
+    if problem.unknowns[index].paths:  # the zero of a clock or of an initial value gives no range
+        span = min(span, 2.0 * abs(best[index]) or 1.0)
     distance = min(MAX_STANDARD_ERRORS * stderr, span) if np.isfinite(stderr) else span
     rows = [(best[index], cost, best)]
     for side in (-1.0, 1.0):
@@ -89,6 +92,6 @@ def compute_profile(
             rows.append((value, constrained_cost, scaled))
     rows.sort(key=lambda row: row[0])
     cost_increase = np.array([(constrained_cost - cost) / variance for _, constrained_cost, _ in rows])
-    values = np.array([value for value, _, _ in rows]) * problem.scales[index]
-    all_estimates = np.array([scaled for _, _, scaled in rows]) * problem.scales
+    values = problem.origins[index] + np.array([value for value, _, _ in rows]) * problem.scales[index]
+    all_estimates = problem.values(np.array([scaled for _, _, scaled in rows]))
     return DynamicProfile(estimates[index].name, estimates[index].unit, values, cost_increase, all_estimates)

@@ -239,6 +239,17 @@ def stack_residuals(
     return np.concatenate(residuals), np.concatenate(jacobians), longest
 
 
+def separate_residuals(models: Sequence[RecordModel], residuals: Array) -> list[Array]:
+    """The stacked residuals (R,) of each quantity of each record in order of time, missing values omitted."""
+    series, begin = [], 0
+    for model in models:
+        rows = residuals[begin : begin + int(model.valid.sum())]
+        quantity = np.nonzero(model.valid)[1]
+        series += [rows[quantity == q] for q in range(len(model.names))]
+        begin += rows.size
+    return series
+
+
 def count_readings(models: Sequence[RecordModel]) -> int:
     """The number of finite measured values."""
     return sum(int(model.valid.sum()) for model in models)

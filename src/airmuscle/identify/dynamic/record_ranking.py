@@ -118,13 +118,15 @@ def _percent(value: float) -> str:
 
 
 def _relative(fit: DynamicFit, index: int) -> float:
-    """The magnitude by which an unknown is made relative: its estimate, or its scale if that is zero."""
-    return abs(fit.estimates[index].value) or fit.unknowns[index].scale
+    """The magnitude by which an unknown is made relative: the estimate of a parameter, or its scale if that is zero;
+    the margin of a start time or an initial value, whose zero is arbitrary."""
+    unknown = fit.unknowns[index]
+    return (abs(fit.estimates[index].value) if unknown.paths else 0.0) or unknown.scale
 
 
 def _fit_information(fit: DynamicFit, common: Sequence[int]) -> Array:
     """The Fisher information of the relative common unknowns from the records of the fit, with the prior."""
-    _, jacobian = fit.problem.residuals(fit.values / fit.problem.scales)
+    _, jacobian = fit.problem.residuals(fit.problem.scaled(fit.values))
     factors = np.array([_relative(fit, i) for i in range(len(fit.unknowns))]) / fit.problem.scales
     matrix = jacobian * factors / max(fit.residual_std, 1e-12)
     others = [i for i, e in enumerate(fit.estimates) if i not in common and not e.on_bound]

@@ -143,21 +143,26 @@ def describe_flatness(estimates: Sequence[Estimate], degrees_of_freedom: int) ->
 
 
 def describe_bounds(
-    estimates: Sequence[Estimate], jacobian: Array, inverse: Array, on_bound: npt.NDArray[np.bool_], scales: Array
-) -> list[str]:
+    estimates: Sequence[Estimate], jacobian: Array, inverse: Array, on_bound: npt.NDArray[np.bool_], scales: Array,
+    origins: Array | None = None,
+) -> list[str]:  # fmt: skip
     """Sentences on every unknown on its bound: no standard error, the consequence, and the effect on the others.
 
     jacobian  of the residuals by the scaled unknowns, shape (R, P)
     inverse   (J^T J)^-1 of the unknowns that are not on a bound, in their order; NaN where undetermined
     scales    magnitudes of the unknowns [SI], shape (P,)
+    origins   values from which the unknowns are counted [SI], shape (P,); 0 by default
     """
+    origins = np.zeros(on_bound.size) if origins is None else origins
     inner = np.flatnonzero(~on_bound)
     notes = []
     for k in map(int, np.flatnonzero(on_bound)):
         bound = estimates[k]
         shifts = -inverse @ (jacobian[:, inner].T @ jacobian[:, k]) * scales[inner] / scales[k]
-        moved = _moved([estimates[int(i)] for i in inner], shifts * BOUND_SHIFT * (abs(bound.value) or scales[k]))
-        greater = f"{100 * BOUND_SHIFT:.0f} % greater"
+        change = BOUND_SHIFT * (abs(bound.value - origins[k]) or scales[k])
+        moved = _moved([estimates[int(i)] for i in inner], shifts * change)
+        relative, absolute = f"{100 * BOUND_SHIFT:.0f} % greater", f"{change:.2g} {bound.display_unit} greater"
+        greater = absolute if origins[k] else relative
         effect = f" If the bound were {greater}, it would move {', '.join(moved)}." if moved else ""
         value = f"{bound.value:.4g} {bound.display_unit}".rstrip()
         notes.append(

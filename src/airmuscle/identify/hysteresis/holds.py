@@ -18,6 +18,8 @@ MIN_ROWS = 12
 """Minimum number of rows for a fit of creep."""
 LENGTH_TOLERANCE = 5e-4
 """Range of contraction within which the length counts as constant (chosen)."""
+DRIFT = 2.0
+"""Change of the level of a quantity that creeps, in standard deviations of its noise (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,16 +34,22 @@ def find_holds(recording: Recording) -> Iterator[Hold]:
     """The holds among the pressure plateaus of a recording; none without a time column."""
     force, contraction = recording["force"], recording["contraction"]
     for plateau in find_plateaus(recording, columns=("pressure",)):
-        if (
-            len(plateau.interval) >= MIN_ROWS
-            and np.ptp(force[plateau.interval.rows]) <= RELATIVE_BAND * np.abs(force).max()
-        ):
+        rows = plateau.interval.rows
+        has_constant_force = np.ptp(force[rows]) <= RELATIVE_BAND * np.abs(force).max()
+        relaxes = _drifts(force[rows]) and not _drifts(contraction[rows])
+        if len(plateau.interval) >= MIN_ROWS and has_constant_force and not relaxes:
             yield Hold(plateau.interval, "contraction")
             continue
         for level in level_intervals(contraction, LENGTH_TOLERANCE, within=plateau.interval):
             interval = _trim_to_level(contraction, level)
             if len(interval) >= MIN_ROWS:
                 yield Hold(interval, "force")
+
+
+def _drifts(values: Array) -> bool:
+    """Whether the level of the values changes beyond their noise from the first to the last quarter of the rows."""
+    quarter = max(values.size // 4, 1)
+    return bool(abs(np.median(values[-quarter:]) - np.median(values[:quarter])) > DRIFT * estimate_noise(values))
 
 
 def _trim_to_level(values: Array, level: Interval) -> Interval:
