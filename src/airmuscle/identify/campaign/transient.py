@@ -43,7 +43,7 @@ class PressureStep:
 
 @dataclasses.dataclass(frozen=True)
 class Motion:
-    """The motion of a record: start and end [s] between 2 % and 98 % of its net travel [m]."""
+    """The motion of a record: start and end [s] between 2 % and 95 % of its net travel [m]."""
 
     start: float
     end: float

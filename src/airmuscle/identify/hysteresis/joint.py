@@ -87,7 +87,8 @@ def _fit_law(own: Sequence[HysteresisFit], usable: Sequence[LoopFit]) -> JointFi
     reference = int(np.argmax(pressures))
     constant = search_parameters(own[len(own) // 2].friction, runs)
     candidates = [(constant, float("nan"))]
-    if pressures[reference] > 1e3 and pressures[reference] > MIN_PRESSURE_RATIO * pressures.min():
+    lowest = float(pressures.min())  # -inf where a run has no pressure
+    if np.isfinite(lowest) and pressures[reference] > max(1e3, MIN_PRESSURE_RATIO * lowest):
         scaled = search_parameters(_initial_scale(own, pressures, reference), runs)
         p_value = _f_test(constant[0], scaled[0], runs)
         size = _sample_size(scaled[0], runs)
