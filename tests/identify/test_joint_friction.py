@@ -5,6 +5,7 @@ The truth of these tests is a Coulomb friction with a sinusoidal presliding, whi
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 
 import numpy as np
@@ -105,6 +106,16 @@ def test_a_constant_friction_gets_no_scale():
     assert best.justified
     assert not isinstance(best.friction, PressureScaledFriction)
     assert "The data justify no dependence of the friction on the pressure" in best.verdict
+
+
+def test_a_run_without_a_pressure_leaves_the_dependence_on_pressure_untested():
+    """Its mean pressure is unknown, so that no scale over the pressure can be fitted to the runs."""
+    fits = [fit_loop(loop, elements=3) for loop in find_loops([sweep(p, GROWING[p]) for p in (1e5, 3e5, 6e5)])]
+    without = [dataclasses.replace(f, series=dataclasses.replace(f.series, pressure=None)) for f in fits[0].fits]
+    unknown = dataclasses.replace(fits[0], fits=tuple(without))
+    for found in fit_jointly([unknown, *fits[1:]]):
+        assert not isinstance(found.friction, PressureScaledFriction)
+        assert np.isnan(found.scale_p_value)
 
 
 @pytest.mark.slow

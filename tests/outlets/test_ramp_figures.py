@@ -19,12 +19,12 @@ from airmuscle.cli.app import app
 from airmuscle.core.plotting import save
 from airmuscle.identify import Fit, fit
 from airmuscle.library.entry import Entry
+from airmuscle.library.fitted_entry import list_files
 from airmuscle.muscle.characteristic import ContractileSurface
 from airmuscle.muscle.isobars import compute_isobars
 from airmuscle.recording import Recording
 from airmuscle.report.band_plot import band_plot
 from airmuscle.report.fit_chapter import fit_chapter
-from airmuscle.report.fit_files import list_files
 from airmuscle.report.isobar_plot import isobar_plot
 from airmuscle.report.levels import is_pressure_ramp, levels_of
 from airmuscle.report.ramp_plot import ramp_plot

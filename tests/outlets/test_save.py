@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 import airmuscle as am
-from airmuscle.muscle.characteristic import ContractileSurface
+from airmuscle.muscle.characteristic import ContractileSurface, TonduLopez2000
 from airmuscle.muscle.friction import Dahl
+from airmuscle.muscle.geometry import Braid
 
 ENTRY = am.load("dmsp-20-300")
 MUSCLES = {
@@ -36,5 +37,14 @@ def test_a_saved_fit_is_read_back_with_its_errors_and_its_range(tmp_path: Path):
     assert (saved.characteristic, saved.validity_range) == (fit.model, fit.validity_range)
     assert saved.provenance == "fitted"
     assert saved.note.startswith("Fitted to dmsp-20-300.csv: rms error")
+    assert saved.error_band.quantity == "force"
     muscle = am.Muscle(fit.model, ENTRY.geometry)
     assert am.load(am.save(muscle, tmp_path / "muscle.toml")).muscle == muscle
+
+
+def test_the_fit_of_a_law_with_a_geometry_is_saved_as_a_muscle(tmp_path: Path):
+    law = TonduLopez2000(Braid(0.01, 0.43, 0.3), 1.1)
+    fit = am.fit(law, am.load_data("dmsp-20-300"))
+    saved = am.load(am.save(fit, tmp_path / "fit.toml"))
+    assert saved.muscle.contractile == fit.model
+    assert saved.geometry == fit.model.geometry

@@ -10,9 +10,9 @@ import typer
 from ..core.output_folder import check_writable
 from ..identify import UNCENSORED
 from ..identify import fit as fit_model
+from ..library.fitted_entry import fitted_entry, missing_geometry
 from ..library.initial_law import find_initial_law
 from ..recording import Recording
-from ..report.fit_files import fitted_entry, missing_geometry
 from .bench_files import Files, read_recordings
 from .fit_compare import compare_models
 from .fit_geometry import parse_braid, with_braid

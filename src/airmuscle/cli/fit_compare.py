@@ -13,11 +13,11 @@ from ..core.processes import available_cores
 from ..identify import Candidate, Comparison, standard_candidates
 from ..identify.law_selection import LawSelection, select_law
 from ..library.entry import Entry
+from ..library.fitted_entry import fitted_entry, left_out_ratio, missing_geometry
 from ..library.initial_law import InitialLaw, find_initial_law, resting_lengths
 from ..muscle.geometry import Geometry
 from ..recording import Recording
 from ..report.compare_chapter import compare_chapter
-from ..report.fit_files import fitted_entry, left_out_ratio, missing_geometry
 from .fit_geometry import check_one_length, with_braid
 from .fit_options import FitRequest
 from .fit_output import fit_to_dict, print_results, write_results

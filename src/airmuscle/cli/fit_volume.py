@@ -15,6 +15,7 @@ from ..core.output_folder import atomic_folder, check_writable
 from ..core.units import quantity
 from ..identify.volume_fit import VolumeFit, fit_volume, volume_points
 from ..library.entry import Entry
+from ..library.fitted_entry import list_files
 from ..library.initial_law import resting_lengths
 from ..library.law_file import load_law
 from ..library.write import part_toml, save
@@ -22,7 +23,6 @@ from ..muscle.characteristic import ValidityRange
 from ..muscle.characteristic.energy_defect import EnergyDefect, maxwell_defect
 from ..muscle.characteristic.validity_range import validity_range_of
 from ..recording import Recording
-from ..report.fit_files import list_files
 from ..report.volume_chapter import volume_chapter
 from ..report.write import write_into
 from .bench_files import Files, read_recordings

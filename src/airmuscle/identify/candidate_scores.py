@@ -121,11 +121,14 @@ def _cross_validate(
 
 
 def _excess_error(name: str, rmse: float, lowest: float) -> ExcludedModel:
-    error = f"error on the rows of the fit, {rmse:.4g} N, is more than {MAX_EXCESS:g} times the lowest error on rows"
-    cause = f"its cross-validation takes long, and its {error} left out, {lowest:.4g} N"
+    error = (
+        f"error on the rows of the fit, {rmse:.4g} N, is more than {MAX_EXCESS:g} times the lowest cross-validated "
+        f"error, {lowest:.4g} N"
+    )
+    cause = f"its cross-validation takes long, and its {error}"
     reason = (
-        f"Its {error} left out of another law, {lowest:.4g} N, and its cross-validation takes long, so it was omitted. "
-        "To cross-validate it, give it as a candidate."
+        f"Its {error}, and its cross-validation takes long, so it was omitted. To cross-validate it, give it as a "
+        "candidate."
     )
     return ExcludedModel(name, reason, cause)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 from ..core.annotation import one_line
 from ..core.errors import ParameterError
@@ -10,6 +11,7 @@ from ..identify import Fit
 from ..muscle import Muscle
 from ..muscle.characteristic.base import Characteristic
 from .entry import OPTIONAL_PARTS, Entry
+from .fitted_entry import fitted_entry
 
 Savable = Entry | Fit | Muscle | Characteristic
 """What a muscle file may contain."""
@@ -20,24 +22,19 @@ def entry_of(thing: Savable) -> Entry:
     if isinstance(thing, Entry):
         return thing
     if isinstance(thing, Fit):
-        return _of_fit(thing)
+        return fitted_entry(thing, _of_law(thing.model), [Path(thing.recording.origin)])
     if isinstance(thing, Muscle):
         return _of_muscle(thing)
     if isinstance(thing, Characteristic):
-        name = type(thing).__name__
-        return Entry(name, name, "chosen", thing, validity_range=getattr(thing, "validity_range", None))
+        return _of_law(thing)
     raise ParameterError(
         f"save: {one_line(thing)} is not a muscle, a characteristic, a fit or an entry of the library."
     )
 
 
-def _of_fit(fit: Fit) -> Entry:
-    summary, name = dict(fit.summary()), type(fit.model).__name__
-    note = (
-        f"Fitted to {fit.recording.origin}: rms error {summary['rms error']}, maximum error {summary['maximum error']}."
-    )
-    title = f"{name} fitted to {fit.recording.origin}"
-    return Entry("muscle", title, "fitted", fit.model, note=note, validity_range=fit.validity_range)
+def _of_law(law: Characteristic) -> Entry:
+    name = type(law).__name__
+    return Entry(name, name, "chosen", law, validity_range=getattr(law, "validity_range", None))
 
 
 def _of_muscle(muscle: Muscle) -> Entry:

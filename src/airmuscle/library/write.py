@@ -68,7 +68,7 @@ def scenario_toml(
 def save(entry: Savable, path: str | Path) -> Path:
     """Write a muscle, a characteristic, a fit or a library entry to a muscle file that `load` reads.
 
-    The file is complete or unchanged. A fit without a geometry gives a characteristic; for a muscle, write
+    The file is complete or unchanged. The fit of a law without a geometry gives a characteristic; for a muscle, write
     `Muscle(fit.model, geometry)`. Raises FileError, and ParameterError for anything else.
     """
     entry = entry_of(entry)

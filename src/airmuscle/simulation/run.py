@@ -52,7 +52,7 @@ def _solve_open_loop(problem: Problem) -> Solution:
     shown = (rows, times) if reached == times.size else (rows[:reached], times[:reached])
     table = recorded_rows(compiled, *shown, segments, problem.start_time)
     raw, table = truncate_at_invalid_row(compiled, raw, table, times)
-    if raw.status not in _AT_POSSIBLE_STATE and raw.reached > 0 and raw.steps < INTERRUPT_CHECK_STEPS:
+    if raw.status not in _AT_POSSIBLE_STATE and raw.reached > 0 and raw.steps < INTERRUPT_CHECK_STEPS:  # a short run
         raw = _end_between_rows(problem, raw)
     recording, diagnostics = make_recording(compiled, raw, table, times, integrator, problem.end_time, {})
     final = dict(zip(compiled.description.state_names, raw.state.tolist(), strict=True))

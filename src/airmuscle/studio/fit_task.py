@@ -24,11 +24,12 @@ from ..identify.hysteresis import LoopFit, find_loops, fit_jointly, fit_loop, lo
 from ..identify.hysteresis.selection import select_friction
 from ..identify.law_selection import LawSelection, select_law
 from ..library.entry import Entry
+from ..library.fitted_entry import fitted_entry, left_out_ratio, missing_geometry
 from ..library.initial_law import find_initial_law
 from ..library.write import part_toml
 from ..recording.segment import check_contents, motion_direction
 from ..report.compare_chapter import compare_chapter
-from ..report.fit_files import fitted_entry, left_out_ratio, missing_geometry, write_fit
+from ..report.fit_files import write_fit
 from ..report.hysteresis_chapter import hysteresis_chapters
 from ..report.write import as_json, write_into
 from .fit_hints import as_field_error, in_page_words
