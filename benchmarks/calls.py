@@ -60,10 +60,9 @@ class Called(am.control.Controller):
 
 
 LSODA_REASON = (
-    "LSODA takes the time of about 60 kernels here, so that 40 needs a call of 1.5 kernels; beside the kernel, the "
-    "inputs and outputs of 2501 rows take a quarter of it, and the checks, the diagnostics and the Recording in Python "
-    "another quarter. Outputs in vector lanes would save an estimated 15 us of a call and lengthen the compilation of "
-    "a new plant by 5 to 27 % (measured with 3 to 45 states)"
+    "LSODA takes the time of about 59 kernels here, so that 40 needs a call of 1.47 kernels; beside the kernel, the "
+    "inputs and outputs of 2501 rows take a sixth of it, and the checks, the diagnostics and the Recording in Python "
+    "a quarter, more where the machine is busy"
 )
 LOOP_REASON = (
     "a loop ends an integration step at each sample, with pulses also at each switching instant: 1676 steps to 1246 "

@@ -148,13 +148,17 @@ def test_for_small_steps_a_loop_is_that_of_the_linearised_plant():
 
 @pytest.mark.parametrize("method", [Rodas4(), RungeKutta4(1e-3), DormandPrince8(1e-3)])
 def test_every_sampling_instant_is_met_exactly(method):
-    """No row is missing, what was measured is what the column held then, and the command changes nowhere else."""
+    """No row is missing, what was measured is what the column held then, and the command changes nowhere else.
+
+    Rows are computed several at once, so that they may differ from what was measured by the rounding of the ambient
+    pressure.
+    """
     h = 0.03
     run = simulate(lifting(), ControlLoop(VALVES, h, PRESSURE), duration=1.0, integrator=method, output_times=0.007)
     instants = h * np.arange(34)
     assert np.isin(instants, run["time"]).all()
     at = np.searchsorted(run["time"], instants)
-    assert np.array_equal(run["measured.pressure"][at], run["pressure"][at])
+    assert run["measured.pressure"][at] == pytest.approx(run["pressure"][at], rel=1e-14, abs=1e-9)
     for name in ("fill", "discharge"):
         changed = np.flatnonzero(np.diff(run[f"command.{name}"]) != 0) + 1
         assert np.isin(run["time"][changed], instants).all()

@@ -136,12 +136,12 @@ Extension = Callable[[Printer], None]
 """What adds further functions to a module; they share its `prepare`."""
 
 
-def _no_extension(printer: Printer) -> None:
+def no_extension(printer: Printer) -> None:
     """The functions of the module alone."""
 
 
 def implicit_module(
-    t: TracedSystem, language: TargetLanguage = LLVM, extend: Extension = _no_extension
+    t: TracedSystem, language: TargetLanguage = LLVM, extend: Extension = no_extension
 ) -> tuple[str, ArraySizes]:
     """What an implicit method needs: rhs, jac, factor, solve, stage, df_dt and outputs.
 
@@ -177,7 +177,7 @@ def implicit_module(
 
 
 def rates_module(
-    t: TracedSystem, language: TargetLanguage = LLVM, extend: Extension = _no_extension
+    t: TracedSystem, language: TargetLanguage = LLVM, extend: Extension = no_extension
 ) -> tuple[str, ArraySizes]:
     """What a caller with an integrator of its own needs: rhs and outputs, as in `implicit_module`."""
     printer, point = Printer(language), {"x": t.x, "u": t.u, PARAMETERS: t.p}

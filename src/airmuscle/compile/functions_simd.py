@@ -1,12 +1,12 @@
-"""The functions of a system for many plants side by side: the same instructions over rows of numbers."""
+"""The functions of a system over vectors: for many plants side by side, and for many rows of one plant."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-from .functions import PARAMETERS, Printer, TracedSystem
+from .functions import PARAMETERS, Extension, Printer, TracedSystem
 from .ir import emission
-from .ir.instructions import Code, Operand
+from .ir.instructions import Code, Operand, instructions
 from .llvm import emit, vector_math
 from .llvm.emit import FLAGS, FunctionBody, LlvmLanguage
 from .llvm.types import LlvmType
@@ -15,6 +15,81 @@ POINT = ("x", "u", PARAMETERS)
 """The arguments that rates and outputs depend on."""
 AT_ONCE = 64
 """Bytes of one value in the step: the widest register (measured; values of two do not fit the registers)."""
+
+ROWS = LlvmType(lanes=4)
+"""A value of several rows of one plant. Vectors of eight slow down what the processor does next (measured)."""
+MAX_OPERATIONS = 500
+"""Outputs of more operations are computed row by row: compiling them twice takes longer than runs save (measured)."""
+
+
+def rows_at_once(t: TracedSystem) -> int:
+    """The number of rows whose outputs one call computes; 1 where that is `outputs`, otherwise it is `row_outputs`."""
+    import casadi
+
+    count = casadi.Function("outputs", [t.x, t.u, t.p], [t.o]).n_instructions()
+    return ROWS.lanes if count <= MAX_OPERATIONS else 1
+
+
+def row_outputs(t: TracedSystem) -> Extension:
+    """The function `row_outputs(x, u, c, o)`: `outputs` at `ROWS` at once, of one plant.
+
+    x, u, o   (W, n), (W, m), (W, k), one row after the other
+    """
+    point = dict(zip(POINT, (t.x, t.u, t.p), strict=True))
+
+    def add(printer: Printer) -> None:
+        block = _RowsBody({"x": t.x.numel(), "u": t.u.numel(), "o": t.o.numel()})
+        code = instructions(list(point.values()), [t.o])
+        for (_, index), value in printer.compute(block, code, list(point)).items():
+            block.store("o", index, value)
+        text = emit.function("row_outputs", ["x", "u", "c", "o"], block)
+        printer.text.append(vector_math.declarations({ROWS}) + text)
+
+    return add
+
+
+class _RowsBody(FunctionBody):
+    """A function at several rows of one plant: its arguments are tables of these rows, `c` is the same for all."""
+
+    def __init__(self, widths: Mapping[str, int]) -> None:
+        super().__init__((), ROWS)
+        self._widths = widths
+
+    def load(self, array: str, index: int) -> str:
+        """The value of an array element in each row."""
+        if array not in self._widths:
+            return self._spread(self._element(array, index))
+        result = "poison"
+        for row in range(ROWS.lanes):
+            element = self._element(array, index + row * self._widths[array])
+            result = self.put(f"insertelement {ROWS.text} {result}, {ROWS.element} {element}, i32 {row}")
+        return result
+
+    def store(self, array: str, index: int, value: str) -> None:
+        """Write an array element in each row."""
+        for row in range(ROWS.lanes):
+            element = self.put(f"extractelement {ROWS.text} {value}, i32 {row}")
+            place = self._place(array, index + row * self._widths[array])
+            self.lines.append(f"  store {ROWS.element} {element}, ptr {place}, align 8")
+
+    def call(self, function: str, x: Sequence[str]) -> str:
+        """A call of the C library for each row; vectorised functions would take longer to compile than they save."""
+        result = "poison"
+        for row in range(ROWS.lanes):
+            given = [self.put(f"extractelement {ROWS.text} {a}, i32 {row}") for a in x]
+            arguments = ", ".join(f"{ROWS.element} {a}" for a in given)
+            value = self.put(f"call {FLAGS} {ROWS.element} @{function}({arguments})")
+            result = self.put(f"insertelement {ROWS.text} {result}, {ROWS.element} {value}, i32 {row}")
+        return result
+
+    def power_by_call(self, base: str, exponent: str) -> str:
+        return self.call("pow", (base, exponent))
+
+    def _element(self, array: str, index: int) -> str:
+        return self.put(f"load {ROWS.element}, ptr {self._place(array, index)}, align 8")
+
+    def _place(self, array: str, index: int) -> str:
+        return self.put(f"getelementptr inbounds {ROWS.element}, ptr %{array}, i64 {index}")
 
 
 def lanes_module(

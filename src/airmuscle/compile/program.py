@@ -20,7 +20,7 @@ from . import functions, sensitivities, sensitivities_explicit
 from .cache.kernel import address_of
 from .cache.module import load_module
 from .functions import ArraySizes, TracedSystem
-from .functions_simd import lanes_module
+from .functions_simd import lanes_module, row_outputs, rows_at_once
 from .llvm.types import LlvmType
 
 Tableau = tuple[tuple[tuple[float, ...], ...], tuple[float, ...]]
@@ -47,15 +47,21 @@ class Program:
     def __init__(self, system: System) -> None:
         self._system = system
         self._form: TracedSystem | sensitivities.TangentSystem
+        rows = 1
         if isinstance(system, SensitivitySystem):
             self._form = sensitivities.tangent_system(system)
             text, self.sizes = sensitivities.implicit_module(self._form)
         else:
             self._form = functions.trace_system(system)
-            text, self.sizes = functions.implicit_module(self._form)
+            rows = rows_at_once(self._form)
+            extend = row_outputs(self._form) if rows > 1 else functions.no_extension
+            text, self.sizes = functions.implicit_module(self._form, extend=extend)
         self.output_names = self._form.output_names
         self._engine = load_module(text)
         self.address = {name: int(self._engine.get_function_address(name)) for name in _FUNCTIONS}
+        at_rows = int(self._engine.get_function_address("row_outputs" if rows > 1 else "outputs"))
+        self.outputs_at_rows = at_rows, rows
+        """The address of the function that computes the outputs at rows, and at how many at once."""
         self._prepare = prepare_function(self._engine)
         self._steps: dict[Any, _ExplicitStep] = {}
         self._lane_modules: dict[Any, tuple[Any, int]] = {}

@@ -47,9 +47,11 @@ class RowRecorder:
         sizes, self._ranges = self.sizes, np.empty((2, columns.size))
         states, inputs, outputs = (np.empty((0, width)) for width in (sizes.states, sizes.inputs, sizes.outputs))
         none, nothing = np.empty(0), np.empty((0, sizes.inputs))
+        function, width = compiled.program.outputs_at_rows
+        work = (np.zeros((width, count)) for count in (sizes.states, sizes.inputs, sizes.outputs))
         self._kernel = record.bind(
-            compiled.address["outputs"], compiled.precomputed, states, none, 0.0, none, nothing, nothing, inputs,
-            outputs, columns, *self._ranges,
+            function, compiled.precomputed, states, none, 0.0, none, nothing, nothing, inputs,
+            outputs, columns, *self._ranges, *work,
         )  # fmt: skip
 
     def adopt(self, compiled: CompiledSystem) -> None:

@@ -43,24 +43,53 @@ def _is_finite(table: Any) -> Any:
 
 @PART
 def _rows_before(times: Any, row: Any, end: Any) -> Any:
-    """The first row from `row` on that is not before `end`."""
-    while row < times.shape[0] and times[row] < end:
-        row += 1
-    return row
+    """The first row from `row` on that is not before `end`, found in growing and then in shrinking strides."""
+    count, stride = times.shape[0], 1
+    if row >= count or times[row] >= end:
+        return row
+    while row + stride < count and times[row + stride] < end:
+        row += stride
+        stride *= 2
+    while stride > 1:
+        stride //= 2
+        if row + stride < count and times[row + stride] < end:
+            row += stride
+    return row + 1
+
+
+@PART
+def _evaluate(function: Any, c: Any, states: Any, inputs: Any, outputs: Any, x: Any, u: Any, o: Any) -> None:
+    """Outputs (N, k) at states (N, n) and inputs (N, m), W rows at once; x, u, o (W, ...) hold the last block."""
+    width, count, rest = x.shape[0], states.shape[0], 0
+    while rest + width <= count:
+        invoke(function, (pointer(states[rest]), pointer(inputs[rest]), pointer(c), pointer(outputs[rest])))
+        rest += width
+    if rest < count:
+        for each in range(width):
+            row = min(rest + each, count - 1)
+            for i in range(states.shape[1]):
+                x[each, i] = states[row, i]
+            for i in range(inputs.shape[1]):
+                u[each, i] = inputs[row, i]
+        invoke(function, (pointer(x), pointer(u), pointer(c), pointer(o)))
+        for row in range(rest, count):
+            for i in range(outputs.shape[1]):
+                outputs[row, i] = o[row - rest, i]
 
 
 @numba.njit(error_model="numpy", nogil=True)
 def record(
     function: Any, c: Any, states: Any, times: Any, begin: Any, ends: Any, values: Any, slopes: Any,
-    inputs: Any, outputs: Any, columns: Any, lower: Any, upper: Any,
+    inputs: Any, outputs: Any, columns: Any, lower: Any, upper: Any, x: Any, u: Any, o: Any,
 ) -> Any:  # fmt: skip
     """Fill inputs (N, m) and outputs (N, k) at states (N, n) and rising times (N,); the first row that is not finite.
 
-    function(x, u, c, o)  address of the outputs
+    function(x, u, c, o)  address of the outputs at W rows: `outputs` of a program, or its `row_outputs`
     begin, ends, values, slopes  beginning of the first segment, and as in `rodas4`; of a row where two segments meet
                  the inputs are those that begin there
     columns      (r,) numbers of the columns whose range is wanted: of a state i, of an output n + i
     lower, upper (r,): smallest and largest value of each of these columns
+    x, u, o      (W, n), (W, m), (W, k): workspace
     Returns N where all outputs are finite.
     """
     count, n, m, k = times.shape[0], states.shape[1], values.shape[1], outputs.shape[1]
@@ -75,8 +104,7 @@ def record(
             for each in range(first, row):
                 inputs[each, i] = value + (times[each] - start) * slope
     if k > 0:
-        for row in range(count):
-            invoke(function, (pointer(states[row]), pointer(inputs[row]), pointer(c), pointer(outputs[row])))
+        _evaluate(function, c, states, inputs, outputs, x, u, o)
     for place in range(columns.shape[0]):
         column = columns[place]
         if column < n:

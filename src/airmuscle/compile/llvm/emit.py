@@ -57,11 +57,16 @@ class FunctionBody(FunctionBlock):
         number = self.number
         result = number.literal(value)
         if number.lanes > 1:
-            first = self.put(f"insertelement {number.text} poison, {number.element} {result}, i32 0")
-            places = f"<{number.lanes} x i32> zeroinitializer"
-            result = self.put(f"shufflevector {number.text} {first}, {number.text} poison, {places}")
+            result = self._spread(result)
         self._constants[result] = value
         return result
+
+    def _spread(self, element: str) -> str:
+        """A vector with one value in all lanes."""
+        number = self.number
+        first = self.put(f"insertelement {number.text} poison, {number.element} {element}, i32 0")
+        places = f"<{number.lanes} x i32> zeroinitializer"
+        return self.put(f"shufflevector {number.text} {first}, {number.text} poison, {places}")
 
     def load(self, array: str, index: int) -> str:
         """The value of an array element, or of a scalar argument."""
@@ -103,10 +108,7 @@ class FunctionBody(FunctionBlock):
         other exponents that are constant or depend on parameters alone the shorter form of `steady_power`."""
         value = self._constants.get(exponent)
         if self.number == DOUBLE or value is None or abs(value) > 16 or not (2 * value).is_integer():
-            if self.number == DOUBLE or (value is None and exponent not in self._steady):
-                return self.call("pow", (base, exponent))
-            self.needed["pow"] = 2  # for arguments beyond the range of the shorter form
-            return self.call(STEADY_POWER, (base, exponent))
+            return self.power_by_call(base, exponent)
         result, square, left = self.constant(1.0), base, int(abs(value))
         while left:
             if left % 2:
@@ -115,6 +117,13 @@ class FunctionBody(FunctionBlock):
         if abs(value) % 1:
             result = self.put(f"fmul {FLAGS} {self.number.text} {result}, {self.intrinsic('sqrt', (base,))}")
         return result if value >= 0 else self.put(f"fdiv {FLAGS} {self.number.text} {self.constant(1.0)}, {result}")
+
+    def power_by_call(self, base: str, exponent: str) -> str:
+        """base**exponent by a function."""
+        if self.number == DOUBLE or (exponent not in self._constants and exponent not in self._steady):
+            return self.call("pow", (base, exponent))
+        self.needed["pow"] = 2  # for arguments beyond the range of the shorter form
+        return self.call(STEADY_POWER, (base, exponent))
 
     def unless_zero(
         self, gates: Sequence[str], compute: Callable[[], dict[Operand, str]], instead: Mapping[Operand, str]
