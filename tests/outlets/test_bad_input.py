@@ -303,6 +303,7 @@ def test_a_run_that_cannot_be(plant: Plant):
         {"start_time": np.nan},
         {"start_time": 1e300},
         {"output_times": np.inf},
+        {"output_times": [0.1, np.nan]},
     )
     for given in wrong:
         (name,) = given

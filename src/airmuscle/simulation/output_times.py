@@ -59,6 +59,8 @@ def _times(given: Any) -> Array:
         times = np.empty((0, 0))
     if times.ndim != 1:
         raise ParameterError(f"simulate: output_times is {one_line(given)}; give a spacing [s] or a list of times [s].")
+    if np.isnan(times).any():
+        raise ParameterError(f"simulate: output_times is {one_line(given)}; a time is not a number (NaN).")
     times = np.sort(times)
     return times[np.diff(times, prepend=-np.inf) > 0]
 
