@@ -35,6 +35,7 @@ from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, ProportionalRegulator, ProportionalValve, SecondOrderLag, Supply, Valve
 from airmuscle.pneumatics.gas import Isothermal
 from airmuscle.simulation import Problem, closed_loop, simulate, solve
+from airmuscle.simulation.batch import simulate_batch
 from airmuscle.simulation.bound_integrator import BoundIntegrator
 from airmuscle.simulation.integrators import DormandPrince8, Rodas4, RungeKutta4
 
@@ -517,11 +518,17 @@ def test_the_recording_says_who_commanded_what():
         (RungeKutta4(1e-3), "kutta-1901"),
     ],
 )
-def test_a_problem_and_its_solution_cite_plant_integrator_and_controller(integrator, key):
+def test_a_problem_its_solution_and_its_recording_cite_plant_integrator_and_controller(integrator, key):
     problem = Problem(lifting(), ControlLoop(VALVES, TICK, PRESSURE), duration=0.05, integrator=integrator)
     sources = {r.key for r in cite(problem)}
     assert sources >= {key, "astrom-hagglund-1995", *(r.key for r in cite(problem.system))}
-    assert sources == {r.key for r in cite(solve(problem))}
+    solution = solve(problem)
+    assert sources == {r.key for r in cite(solution)} == {r.key for r in cite(solution.recording)}
+    held = simulate(problem.system, Schedule({}), duration=0.05, integrator=integrator)
+    assert [r.key for r in cite(held)] == sorted({key, *(r.key for r in cite(problem.system))})
+    assert cite(held.rows(slice(3))) == cite(held)
+    batch = simulate_batch(problem.system, {}, [Schedule({})], duration=0.05, integrator=integrator)
+    assert cite(batch.recording(0)) == cite(held)
 
 
 @pytest.mark.parametrize("period", [0.0, -0.1, np.nan, np.inf, True, "1 s"])

@@ -21,6 +21,7 @@ from airmuscle.core.errors import (
     UnknownNameError,
 )
 from airmuscle.core.reference import cite
+from airmuscle.identify import fit
 from airmuscle.library import catalogue, files, write
 from airmuscle.library.entry import Entry
 from airmuscle.library.location import Location
@@ -30,6 +31,7 @@ from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import CreepElements, EndStop, LinearDamper, LinearSpring, PressureDamper, SwellingWall
 from airmuscle.muscle.characteristic.chou_hannaford1996 import ChouHannaford1996
 from airmuscle.muscle.characteristic.clamped import Clamped
+from airmuscle.muscle.characteristic.contractile_surface import ContractileSurface
 from airmuscle.muscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip, NoFriction, PrandtlIshlinskii
 from airmuscle.muscle.geometry.braid import Braid
 
@@ -111,6 +113,23 @@ def test_the_page_on_muscle_files_holds_the_muscle_that_it_names(tmp_path: Path)
         catalogue.load("dmsp-20-300").characteristic.force(375e3, 0.11), rel=1e-4
     )
     assert entry.checks[0].tolerance == 38.9
+
+
+@pytest.mark.parametrize("name", files.list_data())
+def test_a_published_data_set_is_cited_also_by_a_fit_to_it(name: str, tmp_path: Path):
+    """The licence of most of them requires it."""
+    data = catalogue.load_data(name)
+    (source,) = cite(data)
+    words = re.findall(r"[A-Z][a-z]+", source.authors)
+    assert words
+    assert all(word in data.notes[-1] for word in words), "the header of the file names the same authors"
+    assert cite(data.rows(slice(20))) == [source]
+    result = fit(
+        ContractileSurface.blank(2, max_force=1e5), [data.rows(slice(0, None, 2)), data.rows(slice(1, None, 2))]
+    )
+    assert {r.key for r in cite(result)} == {source.key, *(r.key for r in cite(result.model))}
+    entry = catalogue.load(write.save(result, tmp_path / "muscle.toml"))
+    assert source in cite(entry)
 
 
 FRICTION = [

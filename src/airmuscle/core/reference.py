@@ -37,6 +37,9 @@ CHOSEN = "chosen"
 
 def _walk(obj: Any) -> Iterator[Reference]:
     """Yield the references of an object and of its fields, with repetitions."""
+    if isinstance(obj, Reference):
+        yield obj
+        return
     yield from getattr(obj, "references", ())
     if dataclasses.is_dataclass(obj) and not isinstance(obj, type):
         for field in dataclasses.fields(obj):
@@ -49,7 +52,8 @@ def _walk(obj: Any) -> Iterator[Reference]:
 def cite(obj: Any) -> list[Reference]:
     """Return the references of an object and of all its components, without repetitions, sorted by key.
 
-    `obj` is any object of airmuscle: a characteristic, a muscle, a plant, a fit, a library entry, or a tuple of them.
+    `obj` is any object of airmuscle: a characteristic, a muscle, a plant, a fit, a recording, a library entry, or a
+    tuple of them. Recordings have the references of a published data set, or of the models of a simulation.
     Raises ParameterError for anything else, such as a name.
     """
     if not (dataclasses.is_dataclass(obj) or isinstance(obj, tuple | list) or hasattr(obj, "references")):

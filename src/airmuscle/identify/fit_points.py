@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from ..core.arrays import Array
 from ..core.errors import IdentificationError
+from ..core.reference import cite
 from ..muscle.characteristic.base import Characteristic, ForceLaw
 from ..recording import Recording
 from ..recording.segment import ISOBARIC, ISOMETRIC, find_runs
@@ -126,7 +127,8 @@ def _join_recordings(runs: Sequence[Recording]) -> tuple[Recording, npt.NDArray[
         by_row = [np.full(len(run), float(run.constants[RESTING_LENGTH])) for run in runs]
         columns[RESTING_LENGTH] = np.concatenate(by_row)
     length = lengths.pop() if len(lengths) == 1 else None
-    return Recording(columns, origin, {} if length is None else {"resting_length": length}), missing
+    constants = {} if length is None else {"resting_length": length}
+    return Recording(columns, origin, constants, references=tuple(cite(runs))), missing
 
 
 def _columns_at_levels(recording: Recording) -> dict[str, Array]:

@@ -106,7 +106,8 @@ def corrected_length(run: Recording, offset: float) -> Recording:
     columns["contraction"] = run["contraction"] * float(length) / corrected
     if "time" in run.columns:
         columns["time"] = run["time"]
-    return Recording(columns, run.origin, {**run.constants, "resting_length": corrected})
+    constants = {**run.constants, "resting_length": corrected}
+    return Recording(columns, run.origin, constants, references=run.references)
 
 
 def estimate_length_error(

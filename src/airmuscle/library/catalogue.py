@@ -9,6 +9,8 @@ from __future__ import annotations
 import dataclasses
 from pathlib import Path
 
+from ..core.errors import FileError
+from ..core.reference import Reference
 from ..recording import Recording, read_csv
 from .build import build_valve_entry
 from .entry import Entry, issue_warning
@@ -29,8 +31,10 @@ from .files import (
     read_toml,
 )
 from .law_file import describes_plant, describes_product, describes_valve
+from .location import Location
 from .plant_file import PlantEntry, build_plant_entry
 from .product_entry import ProductEntry, build_product_entry
+from .references import read_references
 from .valve_entry import ValveEntry
 
 
@@ -72,10 +76,19 @@ def _folder_of(name: str) -> Path:
 def load_data(name: str) -> Recording:
     """A data set of the library by its name or a unique beginning of it.
 
-    The last note of the Recording is the header of the file, with source and licence.
+    The last note of the Recording is the header of the file, with source and licence; `cite` gives its references.
     """
     path = DATA / f"{complete_name(str(name), list_data(), 'data set')}.csv"
     recording: Recording = read_csv(path)
     lines = path.read_text(encoding="utf-8").splitlines()
     header = " ".join(line.lstrip("# ") for line in lines if line.startswith("#") and " = " not in line)
-    return dataclasses.replace(recording, notes=(*recording.notes, header))
+    return dataclasses.replace(recording, notes=(*recording.notes, header), references=_data_references(path))
+
+
+def _data_references(path: Path) -> tuple[Reference, ...]:
+    """References of a data set, from the file on the sources of its folder."""
+    file = path.parent / "references.toml"
+    for i, source in enumerate(read_toml(file)["source"], 1):
+        if path.stem in source["data_sets"]:
+            return read_references(source, Location(file.name, f"source.{i}", file.parent))
+    raise FileError(f"{file}: there is no source of the data set '{path.stem}'.")

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..core.reference import cite
 from ..identify import Fit
 from ..identify.candidate_scores import RankedModel
 from ..identify.prediction.result import LEVEL
@@ -33,6 +34,7 @@ def fitted_entry(result: Fit, initial: Entry, files: Sequence[Path], error_ratio
         initial, name="muscle", title=title, provenance="fitted", note=note, warning="", characteristic=result.model,
         geometry=geometry, validity_range=result.validity_range, checks=(),
         uncertainty=None, error_band=_error_band(result, error_ratio),
+        references=tuple(cite((initial.references, result.recording.references))),
     )  # fmt: skip
     return dataclasses.replace(entry, note=" ".join([note, *missing_geometry(entry)]))
 

@@ -14,6 +14,7 @@ from ..core.arrays import Array
 from ..core.errors import ColumnError, ParameterError, suggestion
 from ..core.field_types import check_field_types
 from ..core.notebook import Card, NotebookDisplay
+from ..core.reference import Reference
 from ..core.units import conversion
 from .columns import quantity_of
 from .heading import split_unit
@@ -36,6 +37,7 @@ class Recording(NotebookDisplay):
     constants  constants of the run: resting_length [m], ambient [Pa], specimen
     notes      notes for the user, such as assumptions made by the reader
     units      units stated in the file, before conversion to SI
+    references sources: of published measurements, or of the models of a simulation
     """
 
     columns: Mapping[str, Array]
@@ -43,6 +45,7 @@ class Recording(NotebookDisplay):
     constants: Mapping[str, float | str] = dataclasses.field(default_factory=dict)
     notes: tuple[str, ...] = ()
     units: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    references: tuple[Reference, ...] = ()
 
     def __post_init__(self) -> None:
         check_field_types(self)
@@ -65,11 +68,14 @@ class Recording(NotebookDisplay):
 
     @classmethod
     def from_arrays(
-        cls, columns: Mapping[str, Array], origin: str, constants: Mapping[str, float | str], notes: tuple[str, ...]
-    ) -> Recording:
+        cls, columns: Mapping[str, Array], origin: str, constants: Mapping[str, float | str], notes: tuple[str, ...],
+        references: tuple[Reference, ...],
+    ) -> Recording:  # fmt: skip
         """A recording of read-only vectors of one length, which are not checked again."""
         recording = object.__new__(cls)
-        recording.__dict__.update(columns=columns, origin=origin, constants=constants, notes=notes, units={})
+        recording.__dict__.update(
+            columns=columns, origin=origin, constants=constants, notes=notes, units={}, references=references
+        )
         return recording
 
     def __getitem__(self, name: str) -> Array:

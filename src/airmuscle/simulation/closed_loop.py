@@ -75,7 +75,9 @@ def _solution(problem: Problem, run: CompiledRun | CalledRun) -> Solution:
     notes = loop.controller.notes(control_state.controller)
     remarks = (remark, *(Diagnostic(DiagnosticCode.CONTROLLER, remark.subject, text) for text in notes))
     more = _controller_columns(run, times[: raw.reached])
-    recording, diagnostics = make_recording(compiled, raw, table, times, integrator, problem.end_time, more, remarks)
+    recording, diagnostics = make_recording(
+        compiled, raw, table, times, integrator, problem.end_time, problem.references, more, remarks
+    )
     final = dict(zip(compiled.description.state_names, run.state.tolist(), strict=True))
     statistics = Statistics(raw.steps, raw.rejected)
     return Solution(problem, recording, raw.status, statistics, diagnostics, run.time, final, control_state)

@@ -13,13 +13,14 @@ import numpy.typing as npt
 
 from ..compile.program import CompiledSystem, compile_system
 from ..control.control_loop import ControlLoop, ControlLoopState
-from ..control.inputs import InputSignal, check_input_signal
+from ..control.inputs import InputSignal, Schedule, check_input_signal
 from ..control.law_design import designed_loop
 from ..control.piecewise_linear import PiecewiseLinear
 from ..control.with_drivers import WithDrivers
 from ..core.arrays import FEW, Array
 from ..core.declaration import as_float
 from ..core.errors import ParameterError
+from ..core.reference import Reference, cite
 from ..core.short_repr import ShortRepr
 from ..core.system import System
 from ..plant.state import check_system, state_vector
@@ -98,6 +99,16 @@ class Problem(ShortRepr):
     def end_time(self) -> float:
         """End of the run [s]."""
         return self.start_time + self.duration
+
+    @property
+    def references(self) -> tuple[Reference, ...]:
+        """Sources of the models, of the integrator and of the controller, sorted by key."""
+        known = self.compiled.description.references
+        if self.integrator not in known:
+            known[self.integrator] = tuple(cite((self.system, self.integrator)))
+        if type(self.input) is Schedule or not cite((self.input,)):
+            return known[self.integrator]
+        return tuple(cite((self.system, self.input, self.integrator)))
 
     @functools.cached_property
     def compiled(self) -> CompiledSystem:

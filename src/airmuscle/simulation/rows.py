@@ -13,6 +13,7 @@ from ..compile.program import CompiledSystem
 from ..control.piecewise_linear import PiecewiseLinear
 from ..core.arrays import Array
 from ..core.diagnostics import Columns, Diagnostic, DiagnosticCode
+from ..core.reference import Reference
 from ..core.status import Status
 from ..recording import Recording
 from .bound_integrator import RawSolution
@@ -132,12 +133,13 @@ def status_of_state(
 
 def make_recording(
     compiled: CompiledSystem, raw: RawSolution, table: RowTable, times: Array, integrator: Integrator | None,
-    end: float, more: dict[str, Array], before: tuple[Diagnostic, ...] = (),
+    end: float, references: tuple[Reference, ...], more: dict[str, Array], before: tuple[Diagnostic, ...] = (),
 ) -> tuple[Recording, tuple[Diagnostic, ...]]:  # fmt: skip
     """The recording of the rows that were reached, with its diagnostics as notes.
 
-    more    further columns
-    before  diagnostics that come first
+    references  sources of the models, of the integrator and of the controller
+    more        further columns
+    before      diagnostics that come first
     """
     known, reached = compiled.description, raw.reached
     states = raw.rows
@@ -158,7 +160,8 @@ def make_recording(
     if raw.status != Status.DONE:
         later.append(early_end(compiled, raw, end))
     notes += [diagnostic.message for diagnostic in later]
-    return Recording.from_arrays(columns, "simulation", known.constants, tuple(notes)), (*diagnostics, *later)
+    recording = Recording.from_arrays(columns, "simulation", known.constants, tuple(notes), references)
+    return recording, (*diagnostics, *later)
 
 
 @functools.lru_cache(maxsize=32)

@@ -54,7 +54,9 @@ def _solve_open_loop(problem: Problem) -> Solution:
     raw, table = truncate_at_invalid_row(compiled, raw, table, times)
     if raw.status not in _AT_POSSIBLE_STATE and raw.reached > 0 and raw.steps < INTERRUPT_CHECK_STEPS:  # a short run
         raw = _end_between_rows(problem, raw)
-    recording, diagnostics = make_recording(compiled, raw, table, times, integrator, problem.end_time, {})
+    recording, diagnostics = make_recording(
+        compiled, raw, table, times, integrator, problem.end_time, problem.references, {}
+    )
     final = dict(zip(compiled.description.state_names, raw.state.tolist(), strict=True))
     statistics = Statistics(raw.steps, raw.rejected)
     return Solution(problem, recording, raw.status, statistics, diagnostics, raw.time, final)

@@ -10,7 +10,7 @@ from ..control.control_loop import ControlLoopState
 from ..core.diagnostics import Diagnostic
 from ..core.errors import SimulationError
 from ..core.notebook import Card, NotebookDisplay
-from ..core.reference import Reference, cite
+from ..core.reference import Reference
 from ..core.status import Status
 from ..plant.units import column_units
 from ..recording import Recording
@@ -60,7 +60,7 @@ class Solution(NotebookDisplay):
     @property
     def references(self) -> list[Reference]:
         """Sources of the models, of the integrator and of the controller."""
-        return cite((self.problem.system, self.problem.input, self.problem.integrator))
+        return list(self.problem.references)
 
     def continuation(self, duration: float) -> Problem:
         """The Problem that continues this run for `duration` [s] from its final state, at the same output spacing.

@@ -93,7 +93,7 @@ class BatchSolution:
         notes = [f"plant {index} of a batch", *self.notes, *map(str, remarks)]
         if self.status[index]:
             notes.append(self.reason(index))
-        return Recording(columns, "simulation", system.constants, tuple(notes))
+        return Recording(columns, "simulation", system.constants, tuple(notes), references=tuple(self.references))
 
     def __repr__(self) -> str:
         failed = f", {self.failed.size} failed" if self.failed.size else ""
