@@ -327,6 +327,7 @@ def test_plants_that_differ_in_their_circuit_alone_share_the_search_for_rest(mon
 @pytest.mark.parametrize(
     ("varied", "message"),
     [
+        ({"mass": [1.0]}, r"Plant has no parameter 'mass'. Did you mean 'mechanism.mass'\?"),
         ({"mechanism.mas": [1.0]}, r"Plant has no parameter 'mechanism.mas'. Did you mean 'mechanism.mass'\?"),
         (
             {"mechanism.mass": [5.0, np.nan]},
@@ -625,3 +626,8 @@ def test_rows_that_go_together_are_checked_at_once(monkeypatch):
 def test_a_limit_of_the_validity_range_beyond_its_bounds_names_the_row():
     with pytest.raises(ParameterError, match=r"row 2.*min_pressure.*allowed range: -101325 to 1e\+08 Pa"):
         variations.variations_of(paper(), {"muscle.contractile.min_pressure": [0.0, 0.0, -2e5]}, None)
+
+
+def test_variations_and_input_in_exchanged_places_are_named():
+    with pytest.raises(ParameterError, match="The order of the arguments is: plant, variations, input"):
+        simulate_batch(plain(), PULSE, {"mechanism.mass": [5.0, 6.0]}, duration=0.1)

@@ -158,7 +158,10 @@ def test_segments_of_another_shape_never_reach_a_kernel(segments, message):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"input": {"fill": 1.0}}, "the input is {'fill': 1.0}; give a"),
+        (
+            {"input": {"fill": 1.0}},
+            r"the input is {'fill': 1.0}; give a .* Schedule\({'fill': \(\(0, 1.0\),\)}\) is an",
+        ),
         ({"duration": "1 s"}, "duration is '1 s'; it must be one number, in SI"),
         ({"output_times": "10 ms"}, "output_times is '10 ms'; it must be one number"),
         ({"output_times": [[0.01, 0.02]]}, "give a spacing"),

@@ -141,6 +141,15 @@ def test_names_and_units_come_along():
     assert repr(found).startswith("LinearModel(6 states, inputs command, 17 outputs; poles ")
 
 
+def test_rounding_errors_of_poles_are_not_shown():
+    """A load on enclosed air without losses: an integrator and an undamped pair."""
+    model = linearise(CASES["joint"][0], moving(CASES["joint"][0]), CASES["joint"][1])
+    at = replace(
+        model, A=np.array([[1e-14, 0.0, 0.0], [0.0, -1e-13, -43.78], [0.0, 43.78, 0.0]]), states=("m", "x", "v")
+    )
+    assert "poles 0, 0-43.78j, 0+43.78j 1/s" in repr(at)
+
+
 def test_scipy_and_python_control_see_the_same_system():
     plant, inputs = CASES["joint"]
     found = linearise(plant, moving(plant), inputs).select(outputs=("angle", "left.pressure"))

@@ -20,6 +20,9 @@ from ..plant.units import column_units
 from ..simulation.equilibrium import complete_inputs
 from .static_stiffness import Stiffness, stiffness
 
+ROUNDING = 1e-12
+"""Part of the fastest pole below which real and imaginary parts are rounding errors."""
+
 
 class Pole(NamedTuple):
     """One pole [1/s], its natural frequency |s|/(2 pi) [Hz] and damping ratio -Re s/|s| (nan for an integrator)."""
@@ -129,12 +132,19 @@ class LinearModel:
         return control.NonlinearIOSystem(response.rates, response.outputs, name=type(self.system).__name__, **names)
 
     def __repr__(self) -> str:
-        slow = ", ".join(f"{p.value:.4g}" for p in self.poles[:6])
+        poles = [p.value for p in self.poles]
+        slow = ", ".join(_as_text(value, ROUNDING * abs(poles[-1])) for value in poles[:6])
         more = ", ..." if len(self.states) > 6 else ""
         return (
             f"LinearModel({len(self.states)} states, inputs {', '.join(self.inputs) or 'none'}, {len(self.outputs)} "
             f"outputs; poles {slow}{more} 1/s)"
         )
+
+
+def _as_text(pole: complex, smallest: float) -> str:
+    """A pole with four digits, without parts that are not above the smallest that can be told from zero."""
+    parts = [0.0 if abs(part) <= smallest else part for part in (pole.real, pole.imag)]
+    return f"{complex(*parts):.4g}" if parts[1] else f"{parts[0]:.4g}"
 
 
 class _Response:

@@ -52,8 +52,11 @@ class InputSignal(abc.ABC):
 def check_input_signal(given: object) -> None:
     """Raise ParameterError for anything that is not an InputSignal, such as a dictionary."""
     if not isinstance(given, InputSignal):
+        remedy = ""
+        if isinstance(given, Mapping) and given:
+            remedy = f" Schedule({{{next(iter(given))!r}: ((0, 1.0),)}}) is an input of 1 from 0 s on."
         raise ParameterError(
-            f"the input is {abridged(given)}; give a Schedule, a SampledSignal or another InputSignal."
+            f"the input is {abridged(given)}; give a Schedule, a SampledSignal or another InputSignal.{remedy}"
         )
 
 

@@ -155,6 +155,7 @@ class SimulationError(AirmuscleError):
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:
-    """Return a sentence that suggests the closest known name, or an empty string if none is close."""
-    matches = difflib.get_close_matches(str(name), list(known), n=1)
+    """Return a sentence that suggests the closest known name, or a path that ends with the name, or an empty string."""
+    names = list(known)
+    matches = difflib.get_close_matches(str(name), names, n=1) or [each for each in names if each.endswith(f".{name}")]
     return f" Did you mean '{matches[0]}'?" if matches else ""

@@ -10,6 +10,7 @@ from ..core.errors import ParameterError
 from ..identify import Fit
 from ..muscle import Muscle
 from ..muscle.characteristic.base import Characteristic
+from ..plant.plant import Plant
 from .entry import OPTIONAL_PARTS, Entry
 from .fitted_entry import fitted_entry
 
@@ -27,8 +28,11 @@ def entry_of(thing: Savable) -> Entry:
         return _of_muscle(thing)
     if isinstance(thing, Characteristic):
         return _of_law(thing)
+    remedy = ""
+    if isinstance(thing, Plant):
+        remedy = " A plant is written with its run: airmuscle.scenario.write.save_scenario(scenario, path)."
     raise ParameterError(
-        f"save: {one_line(thing)} is not a muscle, a characteristic, a fit or an entry of the library."
+        f"save: {one_line(thing)} is not a muscle, a characteristic, a fit or an entry of the library.{remedy}"
     )
 
 

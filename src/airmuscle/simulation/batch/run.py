@@ -146,8 +146,9 @@ def _count(initial_states: Mapping[str, npt.ArrayLike] | None, input: object) ->
     if isinstance(input, InputSignal | ControlLoop):
         return of_states
     if not isinstance(input, Sequence):
+        order = " The order of the arguments is: plant, variations, input." if isinstance(input, Mapping) else ""
         raise ParameterError(
-            f"simulate_batch: the input is {one_line(input)}; give an InputSignal, a ControlLoop, or a list."
+            f"simulate_batch: the input is {one_line(input)}; give an InputSignal, a ControlLoop, or a list.{order}"
         )
     if of_states is not None and of_states != len(input):
         raise ParameterError(
