@@ -153,7 +153,7 @@ class Description:
         """The same for steps with held inputs."""
         self.loop_runs: dict[Any, list[Any]] = {}
         """Runs of control loops at this system that nothing uses at present, by the form of the loop."""
-        self.references: dict[Any, tuple[Any, ...]] = {}
+        self.cited: dict[Any, tuple[Any, ...]] = {}
         """Sources of the models and of an integrator, by the integrator."""
         self.recorders: list[Any] = []
         """Kernels of the rows bound to this system that no run uses at present."""

@@ -12,6 +12,7 @@ from ..core.declaration import model
 from ..core.errors import ParameterError
 from ..core.notebook import Card, NotebookDisplay
 from ..core.ops import Value
+from ..core.quantity_arguments import accept_quantities_in
 from ..core.reference import Reference
 from ..core.variables import StateVariable
 from .characteristic.base import Characteristic, ForceLaw
@@ -246,3 +247,8 @@ class Muscle(NotebookDisplay):
         closed valves the pressure changes and the stiffness is larger: see `airmuscle.analysis.static_stiffness`.
         """
         return -autodiff.derivative(self, "static_force", pressure, contraction, wrt=1)
+
+
+accept_quantities_in(
+    Muscle, {"tension": ("Pa", "1", "m/s"), **dict.fromkeys(("static_force", "stiffness"), ("Pa", "1"))}
+)

@@ -103,7 +103,7 @@ class Problem(ShortRepr):
     @property
     def references(self) -> tuple[Reference, ...]:
         """Sources of the models, of the integrator and of the controller, sorted by key."""
-        known = self.compiled.description.references
+        known = self.compiled.description.cited
         if self.integrator not in known:
             known[self.integrator] = tuple(cite((self.system, self.integrator)))
         if type(self.input) is Schedule or not cite((self.input,)):

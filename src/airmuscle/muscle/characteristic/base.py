@@ -8,13 +8,19 @@ several solutions, the one reached from rest is returned: the smallest contracti
 from __future__ import annotations
 
 import abc
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from ...core import autodiff
 from ...core.ops import Value
+from ...core.quantity_arguments import accept_quantities_in
 from ...core.reference import Reference
 from .solve import describe_range, find_first_root
 
+_UNITS = {
+    "force": ("Pa", "1"), "contraction": ("Pa", "N"), "pressure": ("1", "N"), "slopes": ("Pa", "1"),
+    "stiffness": ("Pa", "1"),
+}  # fmt: skip
+"""Units of the arguments of the methods."""
 MIN_PRESSURE = 1e-300
 """Replaces a pressure of zero [Pa] as a divisor; no load then has a solution."""
 
@@ -29,11 +35,18 @@ class Slopes(NamedTuple):
 
 
 class Characteristic(abc.ABC):
-    """Static relation between gauge pressure [Pa], contraction [1] and tension [N]; pulling is positive."""
+    """Static relation between gauge pressure [Pa], contraction [1] and tension [N]; pulling is positive.
+
+    Arguments are numbers, arrays or lists in SI units, or texts with a unit: `force("3 bar", "10 %")`.
+    """
 
     references: ClassVar[tuple[Reference, ...]] = ()
     traceable: ClassVar[bool] = True
     """Whether the model is in closed form over `ops`; otherwise a plant uses it through `as_force_law`."""
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        accept_quantities_in(cls, _UNITS)
 
     @property
     def pressure_range(self) -> tuple[float, float]:
@@ -92,6 +105,9 @@ class Characteristic(abc.ABC):
             f"{type(self).__name__}: no force in the range {limits} gives a contraction of {100 * contraction:.4g} % "
             f"at {pressure / 1e3:.4g} kPa. "
         )
+
+
+accept_quantities_in(Characteristic, _UNITS)
 
 
 class ForceLaw(Characteristic):

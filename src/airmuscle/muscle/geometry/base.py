@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import abc
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +11,7 @@ import numpy.typing as npt
 from ...core import autodiff
 from ...core.errors import GeometryLimitError
 from ...core.ops import Value
+from ...core.quantity_arguments import accept_quantities_in
 from ...core.reference import Reference
 
 
@@ -30,6 +31,10 @@ def check_contraction_range(contraction: Value, limits: tuple[float, float], own
         )
 
 
+_UNITS = {"volume": ("1",), "volume_derivative": ("1",)}
+"""Units of the arguments of the methods."""
+
+
 class Geometry(abc.ABC):
     """Volume [m3] and outline of a muscle; contraction is (L_0 - L)/L_0.
 
@@ -39,6 +44,10 @@ class Geometry(abc.ABC):
     references: ClassVar[tuple[Reference, ...]] = ()
     traceable: ClassVar[bool] = True
     resting_length: float
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        accept_quantities_in(cls, _UNITS)
 
     @property
     @abc.abstractmethod
@@ -64,3 +73,6 @@ class Geometry(abc.ABC):
         """Raise GeometryLimitError if a contraction [1] is outside `contraction_range`."""
         values = np.asarray(contraction, dtype=float)
         check_contraction_range(values, self.contraction_range, type(self).__name__)
+
+
+accept_quantities_in(Geometry, _UNITS)

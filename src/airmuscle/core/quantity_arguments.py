@@ -1,0 +1,78 @@
+"""Quantity arguments of public methods: texts with a unit and lists become numbers, anything else is an error."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from .annotation import one_line
+from .errors import ParameterError
+from .units import quantity
+
+_PLAIN = frozenset({float, int, np.float64})
+"""Types of numbers that need no conversion."""
+_ARRAY, _DOUBLE = np.ndarray, np.dtype(np.float64)
+_EXAMPLES = {"Pa": "'3 bar'", "N": "'200 N'", "1": "'10 %'"}
+"""A text for each unit of an argument."""
+
+
+def accept_quantities(method: Callable[..., Any], units: Sequence[str]) -> Callable[..., Any]:
+    """The method, whose leading arguments after `self` may also be texts with a unit, lists and arrays of integers.
+
+    Symbols and arrays of other libraries are passed on. A call with two numbers takes 0.1 us longer.
+    """
+    names = tuple(inspect.signature(method).parameters)[1 : 1 + len(units)]
+    unit_of = dict(zip(names, units, strict=True))
+
+    @functools.wraps(method)
+    def converted(self: Any, *given: Any, **named: Any) -> Any:
+        if len(given) == 2 and not named:  # the usual call: as short as it can be
+            a, b = given
+            if (type(a) in _PLAIN or (type(a) is _ARRAY and a.dtype is _DOUBLE)) and (
+                type(b) in _PLAIN or (type(b) is _ARRAY and b.dtype is _DOUBLE)
+            ):
+                return method(self, a, b)
+        owner = f"{type(self).__name__}.{method.__name__}"
+        values = [_as_number(value, name, unit_of, owner) for value, name in zip(given, names, strict=False)]
+        named = {name: _as_number(value, name, unit_of, owner) for name, value in named.items()}
+        return method(self, *values, *given[len(values) :], **named)
+
+    return converted
+
+
+def accept_quantities_in(cls: type[Any], units: Mapping[str, Sequence[str]]) -> None:
+    """Let the methods that a class defines itself accept quantities; `units` are those of their arguments."""
+    for name, of_arguments in units.items():
+        method = cls.__dict__.get(name)
+        if inspect.isfunction(method) and not getattr(method, "__isabstractmethod__", False):
+            setattr(cls, name, accept_quantities(method, of_arguments))
+
+
+def _as_number(value: Any, name: str, units: Mapping[str, str], owner: str) -> Any:
+    """The argument as a number or an array of numbers in SI. Raises ParameterError or UnitError."""
+    kind = type(value)
+    if name not in units or kind in _PLAIN or (kind is np.ndarray and value.dtype.kind == "f"):
+        return value
+    if kind is str:
+        return quantity(value, units[name], where=f"{owner}: {name}")
+    if value is None or kind in (bool, list, tuple, dict, set, bytes, complex) or kind is np.ndarray:
+        return _as_array(value, name, units[name], owner)
+    return value
+
+
+def _as_array(value: Any, name: str, unit: str, owner: str) -> Any:
+    if not (value is None or isinstance(value, bool | dict | set | bytes | complex)):
+        try:
+            array = np.asarray(value)
+        except ValueError:  # rows of unequal length
+            array = np.array(None)
+        if array.dtype.kind in "iuf":
+            return array.astype(float)
+    raise ParameterError(
+        f"{owner}: {name} is {one_line(value)}; give a number or an array of numbers in {unit if unit != '1' else 'SI'}"
+        f", or a text with a unit, such as {_EXAMPLES.get(unit, f'1 {unit}')}."
+    )
