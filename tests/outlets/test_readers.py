@@ -546,6 +546,14 @@ def test_decimation_keeps_rows_as_measured(long_file: Path, most: int):
     assert step == 1 or recording.notes[0].startswith(f"The file has 20000 rows; one in {step} is kept as measured")
 
 
+def test_block_means_of_clock_times_are_those_of_numbers(tmp_path: Path):
+    rows = "".join(f"12:00:{i:02};{i};{i * i}\n" for i in range(20))
+    (tmp_path / "run.csv").write_text(f"time;pressure [kPa];force [N]\n{rows}")
+    recording = only(read(tmp_path / "run.csv", downsampling=BlockMeans(4)))
+    assert recording["time"] == pytest.approx(1e-3 * (recording["pressure"] - recording["pressure"][0]))
+    assert only(read(tmp_path / "run.csv", downsampling=BlockMeans(3)))["time"] == pytest.approx([0.0, 7.0, 13.0])
+
+
 @pytest.mark.parametrize("most", [7_000, 13, 1])
 def test_block_means_are_means(long_file: Path, most: int):
     recording = only(read(long_file, downsampling=BlockMeans(most)))
