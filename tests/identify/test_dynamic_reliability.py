@@ -137,6 +137,18 @@ def test_a_fit_with_model_error_states_the_range_at_one_per_cent_of_rms() -> Non
     assert describe_flatness(estimates, 300) == []
 
 
+@pytest.mark.parametrize("zero", [0.0, 1.7e9])
+def test_changes_of_a_start_time_are_relative_to_its_margin_whatever_the_zero_of_the_clock(zero: float) -> None:
+    margins, scales, costs = np.array([np.nan, 0.02]), np.array([0.5, 0.02]), np.array([1000.0, 1000.1, 1000.2])
+    values = np.array([[0.5, zero], [0.5, zero + 0.0002], [0.5, zero + 0.01]])
+    optima = distinct_optima(values, costs, scales, margins)
+    assert [each.searches for each in optima] == [2, 1]
+    small, large = ([an_estimate("ratio", 0.5, 1e-5), an_estimate("start time", zero, e)] for e in (1e-5, 1e-3))
+    assert "start time" in describe_optima(optima, small, costs, margins)[0]
+    assert describe_flatness(small, 10_000, margins) == []
+    assert "start time" in describe_flatness(large, 10_000, margins)[0]
+
+
 def test_the_range_at_one_per_cent_of_rms_is_that_of_a_linear_fit() -> None:
     random = np.random.default_rng(1)
     design, data = random.standard_normal((400, 2)), random.standard_normal(400)

@@ -66,3 +66,12 @@ def test_a_recording_without_a_loop_is_left_out_with_a_warning_that_names_it():
     with pytest.warns(AirmuscleWarning, match=r"left out: one_way\.csv: the falling branch has no rows to fit"):
         loops = find_loops([one_way, recording(LEVELS[:1])])
     assert [loop.recording.origin for loop in loops] == ["three.csv"]
+
+
+def test_a_loop_at_another_held_length_is_no_repeat_without_a_resting_length_either():
+    def held(length: float) -> Recording:
+        pressure = np.concatenate([np.linspace(5e4, 5e5, 200), np.linspace(5e5, 5e4, 200)])
+        columns = {"time": 0.2 * np.arange(400.0), "pressure": pressure, "length": np.full(400, length)}
+        return Recording({**columns, "force": 200.0 + 1e-3 * pressure}, f"{length}")
+
+    assert [loop.repeat is not None for loop in find_loops([held(0.3), held(0.296), held(0.2961)])] == [False, True]

@@ -129,6 +129,26 @@ def test_a_sawtooth_has_a_deflating_branch_of_one_or_two_rows_at_each_fall():
     assert all(len(b.interval) < 10 for b in found[1::2])
 
 
+@pytest.mark.parametrize("constant", ["contraction", "force"])
+def test_no_branch_leaves_its_run_where_ramps_at_other_lengths_or_loads_follow_each_other(constant: str):
+    swept = {"contraction": "force", "force": "contraction"}[constant]
+    pressure = np.tile(np.linspace(0.0, 6e5, 150), 5) + RANDOM(4).normal(0, 300.0, 750)
+    levels = np.repeat(np.linspace(0.05, 0.25, 5), 150)
+    recording = timed(pressure, **{constant: levels, swept: 1e-6 * pressure})
+    found = inspect(recording).branches
+    assert [(b.interval.start, b.interval.stop) for b in found] == [(i, i + 150) for i in range(0, 750, 150)]
+    assert {b.name for b in found} == {"inflating"}
+    assert found == find_branches(recording)
+
+
+def test_a_short_run_of_a_slack_muscle_does_not_split_the_branches():
+    swing = 1.0 - np.abs(np.linspace(-1.0, 1.0, 400))
+    contraction = np.maximum(swing - 0.1, 0.0)
+    recording = timed(6e5 * swing, contraction=0.2 * contraction, force=500.0 * contraction)
+    assert len(find_runs(recording)) > 1
+    assert [b.direction for b in inspect(recording).branches] == [1, -1]
+
+
 def test_constant_pressure_and_no_pressure_have_no_branch():
     assert (
         find_branches(

@@ -109,10 +109,45 @@ def test_a_first_order_step_response_is_recovered():
     assert found.dead_time == pytest.approx(1.0, abs=0.02)
 
 
+@pytest.mark.parametrize("zero", [0.0, 5.0, 1.7e6])
+def test_noise_changes_a_recovered_step_response_by_little(zero):
+    time = np.linspace(-20.0, 80.0, 5001)
+    noise = np.random.default_rng(2).normal(0.0, 0.03, time.size)
+    noise[(time >= 0.0) & (time < 0.01)] = 0.3  # the row of the step alone is far from the mean of the rows before it
+    output = 5.0 - 3.0 * PLANT.step_response(np.maximum(time, 0.0)) + noise
+    found = first_order_of_step(time + zero, output, step=-3.0, step_time=zero)
+    assert found.gain == pytest.approx(2.0, rel=3e-3)
+    assert found.time_constant == pytest.approx(10.0, rel=0.02)
+    assert found.dead_time == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_swing_below_a_level_after_an_overshoot_does_not_delay_the_level():
+    time = np.linspace(0.0, 40.0, 2001)
+    swinging = 1.0 - np.exp(-0.1 * time) * np.cos(2.0 * time)
+    found = first_order_of_step(time, swinging, step=1.0)
+    assert found.time_constant + found.dead_time == pytest.approx(time[np.argmax(swinging >= 1 - np.exp(-1))], abs=0.02)
+
+
 def test_an_integrating_step_response_is_recovered():
     time = np.linspace(0.0, 20.0, 201)
     found = integrator_of_step(time, 1.0 + 4.0 * LEVEL.step_response(time), step=4.0)
     assert (found.rate, found.dead_time) == (pytest.approx(0.5), pytest.approx(2.0))
+
+
+def test_the_initial_value_of_an_integrating_step_response_is_the_mean_of_the_rows_until_the_step():
+    time = np.linspace(-5.0, 20.0, 251)
+    output = 1.0 + 4.0 * LEVEL.step_response(np.maximum(time, 0.0))
+    output[time <= 0.0] += np.where(np.arange(51) % 2, 0.5, -0.5)
+    output[50] += 0.5  # so that the mean of the 51 rows is 1
+    found = integrator_of_step(time, output, step=4.0, step_time=0.0)
+    assert (found.rate, found.dead_time) == (pytest.approx(0.5), pytest.approx(2.0))
+
+
+@pytest.mark.parametrize("step_time", [-1.0, 19.5])
+def test_a_step_before_the_first_row_or_near_the_last_is_refused(step_time):
+    time = np.linspace(0.0, 20.0, 201)
+    with pytest.raises(ParameterError, match=rf"the step is at {step_time:g} s; one row or more must be until then"):
+        first_order_of_step(time, 1.0 - np.exp(-time), 1.0, step_time=step_time)
 
 
 def exact_ultimate_point(model):
@@ -128,6 +163,24 @@ def test_noise_about_the_middle_of_an_oscillation_does_not_shorten_its_period():
     time = 0.01 * np.arange(2000)
     noise = np.random.default_rng(1).normal(0.0, 0.05, time.size)
     assert ultimate_point(time, np.sin(2 * np.pi * time) + noise, amplitude=1.0).period == pytest.approx(1.0, rel=5e-3)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05, 0.1])
+@pytest.mark.parametrize("hysteresis", [0.0, 0.6])
+def test_noise_does_not_enlarge_the_amplitude_of_an_oscillation(noise, hysteresis):
+    time = 0.01 * np.arange(2000)
+    output = np.sin(2 * np.pi * time) + np.random.default_rng(1).normal(0.0, noise, time.size)
+    found = ultimate_point(time, output, amplitude=1.0, hysteresis=hysteresis)
+    assert found.gain == pytest.approx(4 / math.pi / math.sqrt(1 - hysteresis**2), rel=max(0.3 * noise, 1e-6))
+
+
+@pytest.mark.parametrize("rows", [7, 20, 300])
+def test_the_amplitude_of_a_triangular_oscillation_is_half_its_range(rows):
+    time = np.arange(40 * rows + 1) / rows
+    triangle = 2 / np.pi * np.arcsin(np.sin(2 * np.pi * time + 0.3))
+    assert ultimate_point(time, triangle, amplitude=1.0).gain == pytest.approx(
+        4 / math.pi, rel=0.03 if rows > 50 else 0.2
+    )
 
 
 def test_a_relay_finds_the_ultimate_point_and_the_model():

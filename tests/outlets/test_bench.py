@@ -50,6 +50,25 @@ def test_rows_as_they_come_are_those_of_the_complete_file(tmp_path: Path):
     assert reader.skipped == 0
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "time [s]  pressure [kPa]  force [N]\n0.0    1.5   5\n  0.1  1.6 6\n",
+        "time [s],pressure [kPa],force [N],\n0.0,1.5,5,\n0.1,1.6,6,\n",
+        "time [s];pressure [kPa];force [N]\n0,0;1,5;5;\n0,1;1,6;6;\n",
+        'time [s],pressure [kPa],force [N]\n"0.0","1.5","5"\n0.1,1.6,6\n',
+    ],
+    ids=["several blanks", "delimiter at the end of each line", "delimiter at the end of numbers", "quotation marks"],
+)
+def test_a_stream_is_split_into_cells_as_a_file_is(tmp_path: Path, text: str):
+    (tmp_path / "log.csv").write_text(text)
+    whole = read_csv(tmp_path / "log.csv")
+    reader = RowReader("log")
+    rows = [row for line in text.splitlines() if (row := reader.read(line))]
+    assert reader.skipped == 0
+    assert [list(row.values()) for row in rows] == np.transpose(list(whole.columns.values())).tolist()
+
+
 def test_a_growing_file_is_read_as_it_comes_and_a_partial_line_waits_for_its_rest(tmp_path: Path):
     file = tmp_path / "log.csv"
     pieces = ["pressure [kPa],contraction [%],fo", "rce [N]\n100,1", "0,200\n110,11,210\n", "120,12,2", "20\n"]
@@ -76,11 +95,19 @@ def test_damaged_rows_of_a_serial_log_are_left_out_and_counted():
                        constants={"resting_length": "200 mm"})  # fmt: skip
     rows = [
         reader.read(line)
-        for line in ("3.0,180,500", "3.0,1", "\x00\x02,180,5x", "nan,180,500", "# a remark", "3.1,178,510")
+        for line in (
+            "3.0,180,500",
+            "3.0,1",
+            "\x00\x02,180,5x",
+            "nan,180,500",
+            "3.0,\r180,500",
+            "# a remark",
+            "3.1,178,510",
+        )
     ]
-    assert [row is not None for row in rows] == [True, False, False, False, False, True]
+    assert [row is not None for row in rows] == [True, False, False, False, False, False, True]
     assert rows[0]["contraction"] == pytest.approx(0.1)
-    assert reader.skipped == 3
+    assert reader.skipped == 4
 
 
 def test_a_stream_of_noise_is_refused():

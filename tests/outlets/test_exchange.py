@@ -80,6 +80,14 @@ def test_a_written_file_is_read_back_bit_by_bit(extension, tmp_path):
     assert found.constants["resting_length"] == 0.3
 
 
+@pytest.mark.parametrize("extension", [".csv", ".parquet", ".h5"])
+@pytest.mark.parametrize("specimen", ["007", "12", "nan", "A 3", 'he said "A"', '"A"', "1e5"])
+def test_a_specimen_remains_a_text_also_where_it_looks_like_a_number(extension: str, specimen: str, tmp_path):
+    pytest.importorskip({".parquet": "pyarrow", ".csv": "csv"}.get(extension, "h5py"), reason="needs the extra lab")
+    (found,) = read(write(RUN.with_constants(specimen=specimen), tmp_path / f"run{extension}"))
+    assert found.constants["specimen"] == specimen
+
+
 def test_an_unknown_extension_and_an_unwritable_folder_are_named(tmp_path):
     with pytest.raises(FileError, match=r"cannot be written as '\.xyz'; allowed: \.csv, \.parquet, \.h5, \.hdf5"):
         write(RUN, tmp_path / "run.xyz")

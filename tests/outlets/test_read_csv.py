@@ -189,6 +189,11 @@ def test_the_file_may_state_the_resting_length(bench, remark: str):
     assert read_csv(bench(f"{remark}\n{PLAIN}"), resting_length=0.4).constants["resting_length"] == 0.4
 
 
+@pytest.mark.parametrize("number", ["1013.", "+1013", "01013", "1013"])
+def test_the_unit_of_a_constant_counts_however_its_number_is_written(bench, number: str):
+    assert read_csv(bench(f"# ambient [mbar] = {number}\n{PLAIN}")).constants["ambient"] == pytest.approx(101_300.0)
+
+
 def test_missing_units_may_be_given(bench):
     path = bench("p,eps,F\n1,0,3\n2,0.1,4\n")
     recording = read_csv(path, units={"pressure": "bar", "F": "kN"}, specimen="old one")

@@ -381,6 +381,27 @@ def test_a_given_decimal_sign_resolves_thousands_separators(tmp_path: Path):
     assert only(read(tmp_path / "run.csv", decimal=","))["force"] == pytest.approx([1234.5, 2000.0])
 
 
+def test_points_separate_thousands_next_to_a_given_decimal_comma_also_where_no_comma_occurs(tmp_path: Path):
+    (tmp_path / "run.csv").write_text("force [N];length [mm]\n1.234;290\n2.000;280\n")
+    assert only(read(tmp_path / "run.csv", decimal=","))["force"] == pytest.approx([1234.0, 2000.0])
+
+
+@pytest.mark.parametrize(
+    ("decimal", "cells"), [(",", "0.5;1,5"), (".", "0,5;1.5"), (",", "12.5;280"), (".", "0,500;2")]
+)
+def test_a_sign_that_cannot_separate_thousands_contradicts_the_given_decimal_sign(tmp_path: Path, decimal, cells):
+    (tmp_path / "run.csv").write_text(f"force [N];length [mm]\n{cells}\n")
+    said = refusal(ColumnError, tmp_path / "run.csv", decimal=decimal)
+    assert f"line 2: '{cells.partition(';')[0]}' contradicts the decimal sign '{decimal}', which is stated" in said
+
+
+def test_commas_in_quoted_cells_are_ambiguous_next_to_a_decimal_point(tmp_path: Path):
+    (tmp_path / "run.csv").write_text('time [s],force [N]\n0.5,"1,234"\n1.5,"2,345"\n')
+    assert "the comma in '1,234' is ambiguous" in refusal(ColumnError, tmp_path / "run.csv")
+    forces = only(read(tmp_path / "run.csv", decimal="."))["force"]
+    assert forces == pytest.approx([1234.0, 2345.0])
+
+
 @pytest.mark.parametrize(
     ("columns", "kind", "expected"),
     [
@@ -474,6 +495,11 @@ def test_dates_that_decrease_do_not_pass_midnight():
     assert seconds_from_clock(cells) == pytest.approx([0.0, 1.0, -14 * 3600.0])
 
 
+def test_clock_times_with_dates_are_exact_to_the_last_bit():
+    cells = [f"2024-05-17T12:00:03.{i:06}" for i in range(0, 5000, 100)]
+    assert np.asarray(seconds_from_clock(cells)).tolist() == [i / 1e4 for i in range(50)]
+
+
 def test_other_texts_are_not_clock_times():
     assert seconds_from_clock(["12:00:00", "n/a"]) is None
     assert seconds_from_clock([]) is None
@@ -518,6 +544,14 @@ def test_decimation_keeps_rows_as_measured(long_file: Path, most: int):
     table = large_csv.read_large_csv(long_file, downsampling=Decimation(most))
     assert np.array_equal(table.rows, np.arange(4, 20_004, step)), "rows have the line numbers of the file"
     assert step == 1 or recording.notes[0].startswith(f"The file has 20000 rows; one in {step} is kept as measured")
+
+
+def test_block_means_of_clock_times_are_those_of_numbers(tmp_path: Path):
+    rows = "".join(f"12:00:{i:02};{i};{i * i}\n" for i in range(20))
+    (tmp_path / "run.csv").write_text(f"time;pressure [kPa];force [N]\n{rows}")
+    recording = only(read(tmp_path / "run.csv", downsampling=BlockMeans(4)))
+    assert recording["time"] == pytest.approx(1e-3 * (recording["pressure"] - recording["pressure"][0]))
+    assert only(read(tmp_path / "run.csv", downsampling=BlockMeans(3)))["time"] == pytest.approx([0.0, 7.0, 13.0])
 
 
 @pytest.mark.parametrize("most", [7_000, 13, 1])

@@ -23,20 +23,21 @@ def seconds_from_clock(cells: Sequence[str]) -> Array | None:
     times = [_parse_time(text) for text in texts]
     if not times or any(time is None for time in times):
         return None
-    seconds = np.array(times, dtype=float)
+    instants = np.array(times, dtype=float)
     if all(_TIME_OF_DAY.fullmatch(text) for text in texts):
-        seconds[1:] += 86_400.0 * np.cumsum(np.diff(seconds) < -43_200.0)
-    return np.asarray(seconds - seconds[0])
+        instants[1:] += 86_400e6 * np.cumsum(np.diff(instants) < -43_200e6)
+    return np.asarray((instants - instants[0]) / 1e6)
 
 
 def _parse_time(cell: str) -> float | None:
-    """The time in a cell [s], counted from midnight or, with a date, from 1970; None if it is not a clock time.
+    """The time in a cell [us], counted from midnight or, with a date, from 1970; None if it is not a clock time.
 
+    Microseconds since 1970 are exact as floating-point numbers, seconds with a fraction are not.
     A time that states its offset from UTC is converted to UTC, so that the change to summer time is no gap.
     """
     clock = _TIME_OF_DAY.fullmatch(cell)
     if clock:
-        return 3600.0 * float(clock[1]) + 60.0 * float(clock[2]) + float(clock[3])
+        return 3600e6 * float(clock[1]) + 60e6 * float(clock[2]) + 1e6 * float(clock[3])
     german = _GERMAN_DATE.fullmatch(cell)
     iso = f"{german[3]}-{int(german[2]):02}-{int(german[1]):02} {german[4]}" if german else cell
     try:
@@ -44,4 +45,4 @@ def _parse_time(cell: str) -> float | None:
     except ValueError:
         return None
     epoch = datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC if moment.tzinfo else None)
-    return (moment - epoch).total_seconds()
+    return (moment - epoch) / datetime.timedelta(microseconds=1)

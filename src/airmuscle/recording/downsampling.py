@@ -50,13 +50,16 @@ class Decimation(Downsampling):
 
 
 class BlockMeans(Downsampling):
-    """Means over blocks of n rows: noise is averaged, outliers are smeared, saturation and resolution are lost."""
+    """Means over blocks of n rows: noise is averaged, outliers are smeared, saturation and resolution are lost.
+
+    A text, such as a clock time, is that of the middle row of its block.
+    """
 
     def reduce(self, cells: Cells, step: int) -> Cells:
-        if isinstance(cells, list):
-            return cells[::step]
         starts = np.arange(0, len(cells), step)
         sizes: npt.NDArray[np.int64] = np.diff(np.append(starts, len(cells)))
+        if isinstance(cells, list):
+            return [cells[row] for row in (starts + (sizes - 1) // 2).tolist()]
         return np.asarray(np.add.reduceat(cells, starts) / sizes, dtype=float)
 
     def note(self, rows: int, step: int) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import csv
 import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -72,7 +73,9 @@ class RowReader:
         text_format = TextFormat(headerless=bool(self._names))
         delimiter = text_format.detect_delimiter(line)
         cells = split_cells(line, delimiter)
-        if is_comment(line) or not all(is_number(cell) for cell in cells):
+        while cells and not cells[-1]:
+            cells.pop()  # a delimiter at the end of the line
+        if is_comment(line) or not cells or not all(is_number(cell) for cell in cells):
             return None
         header = parse_header(self.origin, self._head, text_format)
         self._delimiter, self._comma = header.delimiter, header.delimiter != ","
@@ -83,6 +86,7 @@ class RowReader:
         """Conversions of the columns, from the header and the first row, which is checked as a recording."""
         headings = tuple(self._names.get(text, self._names.get(str(i), text))
                          for i, text in enumerate(header.headings, 1))  # fmt: skip
+        headings = headings[: len(first)] if not any(headings[len(first) :]) else headings
         missing = [name for name in self._names if name not in {*header.headings, *map(str, range(1, len(first) + 1))}]
         if missing:
             raise ColumnError(
@@ -104,12 +108,12 @@ class RowReader:
         ]
 
     def _read_row(self, line: str) -> dict[str, float] | None:
-        cells = line.strip().split(self._delimiter)
         try:
-            if len(cells) != self._width:
+            cells = split_cells(line, self._delimiter)
+            if len(cells) < self._width or any(cells[self._width :]):
                 raise ValueError
-            values = [float(self._point(cell)) for cell in cells]
-        except ValueError:
+            values = [float(self._point(cell)) for cell in cells[: self._width]]
+        except (ValueError, csv.Error):  # such as a carriage return within the line
             self._skip()
             return None
         assert self._conversions is not None

@@ -92,7 +92,8 @@ def parse_constant_comment(line: str) -> tuple[str, float | str] | None:
     try:
         value = json.loads(text)
     except json.JSONDecodeError:
-        return (name, text) if known else None
+        stated = f"{text} {match['unit']}" if match["unit"] and is_number(text) else text  # `1013.` is no JSON
+        return (name, stated) if known else None
     if not isinstance(value, float | int | str) or isinstance(value, bool):
         return None
     return name, f"{text} {match['unit']}" if match["unit"] else value

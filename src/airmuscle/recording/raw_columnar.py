@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -196,7 +197,13 @@ def _texts(values: Any) -> list[str]:
 
 
 def _number(text: str) -> float | str:
+    """A constant in the metadata: a number, a text in quotation marks, or any other text as it is."""
     try:
         return float(text)
     except ValueError:
+        pass
+    try:
+        quoted = json.loads(text) if text.startswith('"') else text
+    except json.JSONDecodeError:
         return text
+    return str(quoted)

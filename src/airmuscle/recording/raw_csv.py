@@ -23,6 +23,8 @@ from .text_format import (
     split_cells,
 )
 
+_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}[.,]\d{3}")
+
 
 def read_csv_table(path: str | Path, text_format: TextFormat = TextFormat()) -> RawTable:
     """Read the table in a text file. Raises FileError or ColumnError."""
@@ -57,15 +59,13 @@ def parse_columns(origin: str, header: TextHeader, body: NumberedLines, text_for
         numbers = np.loadtxt(lines, delimiter=separator, comments=None, ndmin=2, quotechar='"')
     except ValueError:
         numbers = np.empty((0, 0))  # a text, an empty cell or a ragged row: `_parse_by_cell` reports the line
-    ambiguous = comma and any("." in line for _, line in body)
+    ambiguous = (comma or text_format.decimal == ",") and any("." in line for _, line in body)
     if ambiguous or numbers.shape != (len(body), len(header.headings)):
-        return _parse_by_cell(origin, header, body, comma, text_format.decimal)
+        return _parse_by_cell(origin, header, body, text_format.decimal)
     return tuple(np.ascontiguousarray(column) for column in numbers.T)
 
 
-def _parse_by_cell(
-    origin: str, header: TextHeader, body: NumberedLines, comma: bool, decimal: str | None
-) -> tuple[Cells, ...]:
+def _parse_by_cell(origin: str, header: TextHeader, body: NumberedLines, decimal: str | None) -> tuple[Cells, ...]:
     rows = [split_cells(line, header.delimiter) for _, line in body]
     width = len(header.headings)
     for (line, _), row in zip(body, rows, strict=True):
@@ -76,8 +76,10 @@ def _parse_by_cell(
                 f"{len(row)}."
                 f"{hint if header.delimiter == ',' else ''} Start lines that are not part of the table with '#'."
             )
-    if comma and decimal is None:
+    if decimal is None:
         _check_decimal_sign(origin, body, rows)
+    else:
+        _check_thousands(origin, body, rows, decimal)
     return tuple(_to_cells([_with_decimal_point(row[i], decimal) for row in rows]) for i in range(width))
 
 
@@ -95,6 +97,17 @@ def _to_cells(cells: list[str]) -> Cells:
         return np.array([float(cell) for cell in cells])
     except ValueError:
         return cells
+
+
+def _check_thousands(origin: str, body: NumberedLines, rows: list[list[str]], decimal: str) -> None:
+    """Raise ColumnError where the sign that is not the stated decimal sign cannot separate thousands, as in `0.5`."""
+    for (line, _), row in zip(body, rows, strict=True):
+        for cell in row:
+            if (COMMA_NUMBER if decimal == "." else POINT_NUMBER).fullmatch(cell) and not _THOUSANDS.fullmatch(cell):
+                raise ColumnError(
+                    f"{origin}, line {line}: '{cell}' contradicts the decimal sign '{decimal}', which is stated: the "
+                    "other sign separates groups of three digits. Correct the decimal sign or the number."
+                )
 
 
 def _check_decimal_sign(origin: str, body: NumberedLines, rows: list[list[str]]) -> None:

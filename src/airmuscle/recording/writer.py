@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 from ..core.atomic_output import atomic_file
 from ..core.errors import AirmuscleError, FileError
 from .csv_writer import write_csv
+from .header import is_number
 from .heading import split_unit
 from .optional_dependency import import_lab_package
 from .recording import Recording, column_heading
@@ -54,10 +56,16 @@ def _write_parquet(recording: Recording, temporary: Path, path: Path) -> None:
     arrow, parquet = import_lab_package("pyarrow", path), import_lab_package("pyarrow.parquet", path)
     columns = _columns(recording)
     fields = [arrow.field(name, arrow.float64(), metadata={"unit": unit}) for name, unit, _ in columns]
-    metadata = {name: str(value) for name, value in recording.constants.items()}
+    metadata = {name: _constant_text(value) for name, value in recording.constants.items()}
     schema = arrow.schema(fields, metadata=metadata)
     table = arrow.Table.from_arrays([arrow.array(values) for _, _, values in columns], schema=schema)
     parquet.write_table(table, str(temporary))
+
+
+def _constant_text(value: float | str) -> str:
+    """A constant as text; a text that looks like a number, such as the specimen `007`, in quotation marks."""
+    is_text = isinstance(value, str) and (is_number(value) or value.startswith('"'))
+    return json.dumps(value, ensure_ascii=False) if is_text else str(value)
 
 
 def _write_hdf5(recording: Recording, temporary: Path, path: Path) -> None:

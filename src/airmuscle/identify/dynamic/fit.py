@@ -143,21 +143,21 @@ def _build_result(problem: DynamicFitProblem, searches: Array, costs: Array) -> 
         )
     )
     correlations = covariance / np.outer(standard_errors, standard_errors)
-    optima = distinct_optima(problem.values(searches), costs, problem.scales)
+    optima = distinct_optima(problem.values(searches), costs, problem.scales, problem.margins)
     notes = [
         *(str(combination) for combination in analysis.undetermined),
         *describe_bounds(estimates, jacobian, inverse, on_bound, problem.scales, problem.origins),
-        *describe_optima(optima, estimates, costs),
-        *_describe_model_error(separate_residuals(problem.record_models, residuals), estimates, inner.size),
+        *describe_optima(optima, estimates, costs, problem.margins),
+        *_describe_model_error(problem, residuals, estimates, inner.size),
     ]
     return DynamicFit(problem, estimates, correlations, analysis, residual_std, costs, optima, tuple(notes))
 
 
-def _describe_model_error(series: Sequence[Array], estimates: Sequence[Estimate], unknowns: int) -> list[str]:
-    """Sentences on autocorrelated residuals, which are a sign of model error, and on what they leave open.
-
-    series  residuals of each quantity of each record in order of time
-    """
+def _describe_model_error(
+    problem: DynamicFitProblem, residuals: Array, estimates: Sequence[Estimate], unknowns: int
+) -> list[str]:
+    """Sentences on autocorrelated residuals (R,), which are a sign of model error, and on what they leave open."""
+    series = separate_residuals(problem.record_models, residuals)
     products = sum(float(each[1:] @ each[:-1]) for each in series)
     autocorrelation = products / max(sum(float(each @ each) for each in series), 1e-300)
     if autocorrelation <= MAX_AUTOCORRELATION:
@@ -166,5 +166,5 @@ def _describe_model_error(series: Sequence[Array], estimates: Sequence[Estimate]
     return [
         f"the residuals are autocorrelated (lag 1: {autocorrelation:.2f}), which indicates model error rather than "
         f"noise; the standard errors are too small by a factor of about {factor:.1f}",
-        *describe_flatness(estimates, sum(each.size for each in series) - unknowns),
+        *describe_flatness(estimates, residuals.size - unknowns, problem.margins),
     ]

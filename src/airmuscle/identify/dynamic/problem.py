@@ -40,6 +40,11 @@ class DynamicFitProblem:
         """Values from which the unknowns are counted [SI], shape (P,)."""
         return np.array([u.origin for u in self.unknowns])
 
+    @functools.cached_property
+    def margins(self) -> Array:
+        """Margins of start times and initial values [SI], whose zero is arbitrary; NaN of parameters, shape (P,)."""
+        return np.array([np.nan if u.paths else u.scale for u in self.unknowns])
+
     def scaled(self, values: Array) -> Array:
         """The scaled unknowns for values [SI], shape (..., P)."""
         return np.asarray((values - self.origins) / self.scales)

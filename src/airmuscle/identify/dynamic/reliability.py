@@ -57,18 +57,21 @@ class Optimum:
     searches: int
 
 
-def distinct_optima(values: Array, costs: Array, scales: Array) -> tuple[Optimum, ...]:
+def distinct_optima(values: Array, costs: Array, scales: Array, margins: Array | None = None) -> tuple[Optimum, ...]:
     """The optima of searches that ended at `values` (S, P) with `costs` (S,), lowest first.
 
-    Two searches ended at one optimum if their sums of squares and all unknowns, relative to `scales` (P,), agree.
-    Searches without a result are left out.
+    Two searches ended at one optimum if their sums of squares and all unknowns, relative to their values or at least a
+    thousandth of `scales` (P,), agree; start times and initial values relative to their `margins` (P,), which are NaN
+    for parameters. Searches without a result are left out.
     """
+    margins = np.full(scales.size, np.nan) if margins is None else margins
     optima: list[Optimum] = []
     for point, cost in zip(values, costs, strict=True):
         if not np.isfinite(cost):
             continue
         for i, optimum in enumerate(optima):
-            near = np.abs(point - optimum.values) <= SAME_VALUE * np.maximum(np.abs(optimum.values), 1e-3 * scales)
+            reference = np.maximum(np.abs(optimum.values), 1e-3 * scales)
+            near = np.abs(point - optimum.values) <= SAME_VALUE * np.where(np.isnan(margins), reference, margins)
             if cost <= (1 + SAME_COST) * optimum.cost + 1e-9 and near.all():
                 optima[i] = dataclasses.replace(optimum, searches=optimum.searches + 1)
                 break
@@ -82,12 +85,17 @@ def searches_at_lowest(costs: Array) -> int:
     return int(np.count_nonzero(costs <= (1 + SAME_COST) * costs[0] + 1e-9))
 
 
-def describe_optima(optima: Sequence[Optimum], estimates: Sequence[Estimate], costs: Array) -> list[str]:
-    """Sentences on other optima that fit almost as well, or on an optimum that a single search reached."""
+def describe_optima(
+    optima: Sequence[Optimum], estimates: Sequence[Estimate], costs: Array, margins: Array | None = None
+) -> list[str]:
+    """Sentences on other optima that fit almost as well, or on an optimum that a single search reached.
+
+    margins  of the estimates that have one, as in `distinct_optima`
+    """
     best, notes = optima[0], list[str]()
     for other in optima[1:]:
         increase = float(np.sqrt(other.cost / max(best.cost, 1e-300))) - 1.0
-        differences = _differences(other, estimates)
+        differences = _differences(other, estimates, _magnitudes(estimates, margins))
         if increase > SIMILAR_RMS or not differences:
             continue
         notes.append(
@@ -108,27 +116,36 @@ def _count(number: int) -> str:
     return "one search" if number == 1 else f"{number} searches"
 
 
-def _differences(other: Optimum, estimates: Sequence[Estimate]) -> list[str]:
+def _magnitudes(estimates: Sequence[Estimate], margins: Array | None) -> Array:
+    """The magnitudes to which changes of the estimates are relative [SI], shape (P,): their values or margins."""
+    values = np.array([max(abs(estimate.value), 1e-300) for estimate in estimates])
+    return values if margins is None else np.where(np.isnan(margins), values, margins)
+
+
+def _differences(other: Optimum, estimates: Sequence[Estimate], magnitudes: Array) -> list[str]:
     """The unknowns that differ by more than their standard errors contain, the largest relative difference first."""
     differences = []
-    for estimate, value in zip(estimates, other.values, strict=True):
+    for estimate, value, magnitude in zip(estimates, other.values, magnitudes, strict=True):
         change = abs(value - estimate.value)
         contained = MIN_STANDARD_ERRORS * estimate.stderr if np.isfinite(estimate.stderr) else 0.0
-        relative = change / max(abs(estimate.value), 1e-300)
+        relative = change / magnitude
         if change > contained and relative > SAME_VALUE:
             unit = f" {estimate.display_unit}" if estimate.display_unit else ""
             differences.append((relative, f"{estimate.name} {value:.3g} instead of {estimate.value:.3g}{unit}"))
     return [text for _, text in sorted(differences, reverse=True)[:MAX_NAMES]]
 
 
-def describe_flatness(estimates: Sequence[Estimate], degrees_of_freedom: int) -> list[str]:
+def describe_flatness(
+    estimates: Sequence[Estimate], degrees_of_freedom: int, margins: Array | None = None
+) -> list[str]:
     """A sentence on the unknowns that change widely at an rms residual that is hardly greater, by the linearised fit.
 
     The sum of squares grows by one residual variance at a standard error, so the rms residual grows by the fraction r
-    at sqrt((2 r + r^2) (N - P)) standard errors.
+    at sqrt((2 r + r^2) (N - P)) standard errors. `margins` are those of `distinct_optima`.
     """
     ratio = float(np.sqrt((2 * SMALL_RMS + SMALL_RMS**2) * degrees_of_freedom))
-    wide = [(ratio * e.stderr / max(abs(e.value), 1e-300), e) for e in estimates if np.isfinite(e.stderr)]
+    sizes = zip(estimates, _magnitudes(estimates, margins), strict=True)
+    wide = [(ratio * e.stderr / size, e) for e, size in sizes if np.isfinite(e.stderr)]
     wide = [each for each in wide if each[0] > WIDE_RANGE and ratio > MIN_STANDARD_ERRORS]
     if not wide:
         return []

@@ -224,11 +224,9 @@ def _is_same_level(one: Run, other: Run) -> bool:
         or other.constant_value is None
     ):
         return False
-    band = (
-        CONTRACTION_BAND
-        if one.constant_column == "contraction"
-        else RELATIVE_BAND * max(abs(one.constant_value), abs(other.constant_value))
-    )
+    size = max(abs(one.constant_value), abs(other.constant_value))
+    bands = {"contraction": CONTRACTION_BAND, "length": CONTRACTION_BAND * size}
+    band = bands.get(one.constant_column or "", RELATIVE_BAND * size)
     return abs(one.constant_value - other.constant_value) <= band
 
 

@@ -2,9 +2,10 @@
 
 The driven quantity of an isobaric run is the contraction, length or position; that of all other runs is the pressure. A
 branch ends where this quantity has moved back from an extreme by more than a fraction `reversal` of its range; smaller
-ripples do not end it. A dwell at an extreme belongs to the branch before it, because friction depends on the previous
-motion: the reversal is placed at the last row before the quantity leaves the level of the dwell. A branch column in the
-file is not used; `branch_column_agreement` compares it with the result.
+ripples do not end it. A branch ends with its run, too, because the muscle was moved or loaded anew before the next run.
+A dwell at an extreme belongs to the branch before it, because friction depends on the previous motion: the reversal is
+placed at the last row before the quantity leaves the level of the dwell. A branch column in the file is not used;
+`branch_column_agreement` compares it with the result.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 from ...core.arrays import Array
 from ..recording import Recording
 from .interval import Interval, running_median
-from .runs import AT_REST, ISOBARIC, Run, find_runs, moved_column
+from .runs import AT_REST, ISOBARIC, ISOMETRIC, ISOTONIC, Run, find_runs, moved_column
 from .sampling import count_rows
 from .sensor import Sensor, estimate_noise
 
@@ -77,17 +78,31 @@ def find_branches(
         return tuple(b for each in isobaric for b in _motion_branches(recording, column, each, reversal))
     if sensor is None and any(run.kind == AT_REST for run in runs):
         sensor = Sensor("pressure", 0.0, estimate_noise(recording["pressure"]))
-    return _pressure_branches(recording, sensor, reversal)
+    return tuple(_pressure_branches(recording, _split_at_runs(recording, runs), sensor, reversal))
 
 
-def _pressure_branches(recording: Recording, sensor: Sensor | None, reversal: float) -> tuple[Branch, ...]:
-    pressure = recording["pressure"]
-    smooth = _remove_spikes(pressure, recording.columns.get("time"))
-    threshold = max(reversal * float(np.ptp(smooth)), 10.0 * (sensor.std if sensor else 0.0))
-    return tuple(
-        Branch(interval, direction, float(smooth[interval.start]), float(smooth[interval.stop - 1]))
-        for interval, direction in _monotonic_intervals(smooth, threshold)
-    )
+def _split_at_runs(recording: Recording, runs: tuple[Run, ...]) -> list[Interval]:
+    """The intervals that no branch of the pressure leaves: runs at other lengths or loads, and the rows between them.
+
+    The whole recording if it is one run, or if most of its rows belong to no such run.
+    """
+    separate = [run.interval for run in runs if run.kind in (ISOMETRIC, ISOTONIC)]
+    if 2 * sum(len(interval) for interval in separate) <= len(recording):
+        separate = []
+    inner = {row for a, b in itertools.pairwise(separate) for row in (a.stop, b.start)}
+    return [Interval(a, b) for a, b in itertools.pairwise(sorted({0, *inner, len(recording)}))]
+
+
+def _pressure_branches(
+    recording: Recording, parts: list[Interval], sensor: Sensor | None, reversal: float
+) -> Iterator[Branch]:
+    time, pressure = recording.columns.get("time"), recording["pressure"]
+    smooth = [_remove_spikes(pressure[part.rows], None if time is None else time[part.rows]) for part in parts]
+    threshold = max(reversal * float(np.ptp(np.concatenate(smooth))), 10.0 * (sensor.std if sensor else 0.0))
+    for part, values in zip(parts, smooth, strict=True):
+        for each, direction in _monotonic_intervals(values, threshold):
+            ends = float(values[each.start]), float(values[each.stop - 1])
+            yield Branch(Interval(part.start + each.start, part.start + each.stop), direction, *ends)
 
 
 def _motion_branches(recording: Recording, column: str | None, run: Interval, reversal: float) -> Iterator[Branch]:

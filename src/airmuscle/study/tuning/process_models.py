@@ -34,6 +34,9 @@ UNSETTLED = 0.05
 """Relative change in the last tenth of a step response from which on it is not settled (chosen)."""
 DEAD_BAND = 0.25
 """Part of the amplitude that an oscillation exceeds on both sides of its middle in each period (chosen)."""
+MAX_HARMONICS, ROWS_PER_HARMONIC, SURE_HARMONICS = 15, 4, 5
+"""Maximum number of harmonics of the waveform of an oscillation, rows of a period for each of them, and number of
+harmonics for which two rows of a period are enough (chosen)."""
 MIN_ROWS = 10
 """Smallest number of rows of an experiment (chosen)."""
 
@@ -115,39 +118,45 @@ def _check(model: object, name: str, value: float, possible: bool) -> None:
         raise ParameterError(f"{type(model).__name__}: {name} is {value}; no step response has that.")
 
 
-def first_order_of_step(time: npt.ArrayLike, output: npt.ArrayLike, step: float) -> FirstOrderDeadTime:
+def first_order_of_step(
+    time: npt.ArrayLike, output: npt.ArrayLike, step: float, step_time: float | None = None
+) -> FirstOrderDeadTime:
     """The first-order model with dead time of a step response, by the times at 28.3 % and 63.2 % (Smith 1972).
 
-    time, output  rows (N,) from the step on; the last tenth of the output is its final value
+    time, output  rows (N,); the last tenth of the output is its final value
     step          size of the step [u]
+    step_time     time of the step [s]; the mean of the rows until then is the initial value. By default the first row
+                  is that of the step, and the initial value is this row alone
 
     T = 1.5 (t_63 - t_28), L = t_63 - T. Raises ParameterError for an output that does not settle or does not change.
     """
-    t, y = _rows(time, output, step)
-    change = float(y[-max(1, y.size // 10) :].mean() - y[0])
+    t, y, initial = _step_rows(time, output, step, step_time)
+    change = float(y[-max(1, y.size // 10) :].mean() - initial)
     spread = float(np.ptp(y[-max(1, y.size // 10) :]))
     if change == 0.0 or spread > UNSETTLED * abs(change):
         raise ParameterError(
             f"step response: the output changes by {change:.4g} and still by {spread:.4g} in its last tenth; record "
             "until it settles, or identify an integrator."
         )
-    part = (y - y[0]) / change
-    early, late = (_first_time(t, part, level) for level in (1 - math.exp(-1 / 3), 1 - math.exp(-1)))
+    part = (y - initial) / change
+    early, late = (_time_of_level(t, part, level) for level in (1 - math.exp(-1 / 3), 1 - math.exp(-1)))
     constant = 1.5 * (late - early)
     return FirstOrderDeadTime(change / step, max(constant, 1e-12), max(late - constant, 0.0))
 
 
-def integrator_of_step(time: npt.ArrayLike, output: npt.ArrayLike, step: float) -> IntegratorDeadTime:
+def integrator_of_step(
+    time: npt.ArrayLike, output: npt.ArrayLike, step: float, step_time: float | None = None
+) -> IntegratorDeadTime:
     """The integrator with dead time of a step response: the straight line through the second half of the rows.
 
     The dead time is where the line passes through the initial output. Arguments as in `first_order_of_step`.
     """
-    t, y = _rows(time, output, step)
-    half = t >= (t[0] + t[-1]) / 2
+    t, y, initial = _step_rows(time, output, step, step_time)
+    half = t >= t[-1] / 2
     slope, offset = np.polyfit(t[half], y[half], 1)
     if slope == 0.0:
         raise ParameterError("step response: the output does not move in its second half; it is no integrator.")
-    return IntegratorDeadTime(float(slope) / step, max(float((y[0] - offset) / slope), 0.0))
+    return IntegratorDeadTime(float(slope) / step, max(float((initial - offset) / slope), 0.0))
 
 
 def ultimate_point(
@@ -159,22 +168,42 @@ def ultimate_point(
     amplitude     d, half the difference between both commands of the relay [u]
     hysteresis    e, half the width of the relay's hysteresis [y]
 
-    Reference: Åström and Hägglund (1984). Raises ParameterError for an output that does not oscillate.
+    a is half the range of the periodic waveform, so that the noise of the rows does not enlarge it. Reference: Åström
+    and Hägglund (1984). Raises ParameterError for an output that does not oscillate.
     """
     t, y = _rows(time, output, amplitude)
-    late = t >= (t[0] + t[-1]) / 2
+    late = t >= t[-1] / 2
     t, y = t[late], y[late]
-    a = float(np.ptp(y)) / 2
+    extent = float(np.ptp(y)) / 2
     around = y - (y.max() + y.min()) / 2
-    rising = _rising_crossings(around, DEAD_BAND * a)
-    if rising.size < 3 or a <= abs(hysteresis):
-        raise ParameterError(
-            f"relay experiment: {rising.size} rising crossings and an amplitude of {a:.4g} in the second half; at "
-            "least three crossings and an amplitude above the hysteresis are needed. Record for longer."
-        )
+    rising = _rising_crossings(around, DEAD_BAND * extent)
+    if rising.size < 3:
+        raise _no_oscillation(rising.size, extent)
     crossings = t[rising] - around[rising] * (t[rising + 1] - t[rising]) / (around[rising + 1] - around[rising])
-    gain = 4 * amplitude / (math.pi * math.sqrt(a**2 - hysteresis**2))
-    return UltimatePoint(gain, float(crossings[-1] - crossings[0]) / (rising.size - 1))
+    period = float(crossings[-1] - crossings[0]) / (rising.size - 1)
+    whole = (t >= crossings[0]) & (t < crossings[-1])
+    a = _waveform_amplitude(t[whole], y[whole], period, rising.size - 1)
+    if a <= abs(hysteresis):
+        raise _no_oscillation(rising.size, a)
+    return UltimatePoint(4 * amplitude / (math.pi * math.sqrt(a**2 - hysteresis**2)), period)
+
+
+def _no_oscillation(crossings: int, amplitude: float) -> ParameterError:
+    return ParameterError(
+        f"relay experiment: {crossings} rising crossings and an amplitude of {amplitude:.4g} in the second half; at "
+        "least three crossings and an amplitude above the hysteresis are needed. Record for longer."
+    )
+
+
+def _waveform_amplitude(time: Array, values: Array, period: float, periods: int) -> float:
+    """Half the range of the periodic waveform through the rows (N,), by least squares of its harmonics."""
+    rows = values.size // periods
+    count = max(1, min(MAX_HARMONICS, max(rows // ROWS_PER_HARMONIC, min(SURE_HARMONICS, (rows - 1) // 2))))
+    phases = 2 * math.pi / period * np.outer(time, np.arange(1, count + 1))
+    matrix = np.column_stack([np.ones(time.size), np.cos(phases), np.sin(phases)])
+    coefficients = np.linalg.lstsq(matrix, values, rcond=None)[0]
+    fine = np.outer(np.linspace(0.0, 2 * math.pi, 32 * count, endpoint=False), np.arange(1, count + 1))
+    return 0.5 * float(np.ptp(np.column_stack([np.cos(fine), np.sin(fine)]) @ coefficients[1:]))
 
 
 def _rising_crossings(values: Array, band: float) -> npt.NDArray[np.intp]:
@@ -197,11 +226,33 @@ def _rows(time: npt.ArrayLike, output: npt.ArrayLike, size: float) -> tuple[Arra
     return t - t[0], y
 
 
-def _first_time(time: Array, part: Array, level: float) -> float:
-    """The time at which the lines between the rows first reach a level."""
-    i = int(np.argmax(part >= level))
-    if part[i] < level:
-        raise ParameterError(f"step response: it does not reach {100 * level:.3g} % of its change.")
-    if i == 0:
+def _step_rows(
+    time: npt.ArrayLike, output: npt.ArrayLike, step: float, step_time: float | None
+) -> tuple[Array, Array, float]:
+    """The rows from the step on, with times counted from it, and the initial value."""
+    t, y = _rows(time, output, step)
+    if step_time is None:
+        return t, y, float(y[0])
+    t = t + float(np.asarray(time, dtype=float)[0] - step_time)
+    after = t >= 0.0
+    if not (t <= 0.0).any() or np.count_nonzero(after) < MIN_ROWS:
+        raise ParameterError(
+            f"step response: the step is at {step_time:g} s; one row or more must be until then and {MIN_ROWS} or "
+            "more from then on."
+        )
+    return t[after], y[after], float(y[t <= 0.0].mean())
+
+
+def _time_of_level(time: Array, part: Array, level: float) -> float:
+    """The time at which the lines between the rows reach a level: the time below it until they are halfway from the
+    level to the final value, so that neither noise about the level nor a later swing below it counts."""
+    if part[0] >= level:
         return float(time[0])
-    return float(time[i - 1] + (level - part[i - 1]) / (part[i] - part[i - 1]) * (time[i] - time[i - 1]))
+    beyond = np.flatnonzero(part >= (1.0 + level) / 2)
+    if not beyond.size:
+        raise ParameterError(f"step response: it does not reach {50 * (1 + level):.3g} % of its change.")
+    below = level - part[: int(beyond[0]) + 1]
+    low, high = np.minimum(below[:-1], below[1:]), np.maximum(below[:-1], below[1:])
+    shares = np.clip(high / np.where(high > low, high - low, 1.0), 0.0, 1.0)
+    shares = np.where(high > low, shares, high > 0.0)
+    return float(time[0] + shares @ np.diff(time[: below.size]))
