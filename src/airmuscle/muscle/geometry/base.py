@@ -15,11 +15,11 @@ from ...core.reference import Reference
 
 
 def check_contraction_range(contraction: Value, limits: tuple[float, float], owner: str, remark: str = "") -> None:
-    """Raise GeometryLimitError if a contraction [1] is outside `limits`; symbols are not checked.
+    """Raise GeometryLimitError if a contraction [1] is outside `limits`; symbols and JAX arrays are not checked.
 
     `owner` names the model and `remark` extends the message.
     """
-    if not isinstance(contraction, float | int | np.ndarray | np.generic):
+    if type(contraction).__module__.partition(".")[0] in ("casadi", "jax", "jaxlib"):
         return
     values = np.asarray(contraction, dtype=float)
     outside = ~((values >= limits[0]) & (values <= limits[1]))

@@ -1,0 +1,96 @@
+"""Laws at the ends of their ranges and beyond: an error, infinity or a continued force, never an arbitrary number.
+
+Straight fibres have an infinite dV/deps at zero contraction; a geometry states its limits to every call with numbers,
+of whatever type; beyond the contractions for which it was identified no law pulls harder than at their end.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from airmuscle.core import autodiff
+from airmuscle.core.errors import GeometryLimitError
+from airmuscle.library import catalogue
+from airmuscle.muscle.characteristic import CircleVirtualWork, ExactMeridian, RubberLine, ValidityRange
+from airmuscle.muscle.characteristic.energy_defect import maxwell_defect, virtual_work_defect
+from airmuscle.muscle.geometry import Braid, StraightFibre
+from airmuscle.muscle.geometry.catenary import Catenary
+from airmuscle.muscle.geometry.circular_arc import CircularArc
+from airmuscle.muscle.geometry.parabola import Parabola, TrueArcParabola
+from airmuscle.muscle.geometry.pleated import PleatedTube
+from airmuscle.muscle.geometry.vessel import Vessel
+
+BRAID = Braid(0.01, 0.4363, 0.2)
+RUBBER = RubberLine(3e5, 1e5)
+TUBES = {
+    **{type(m).__name__: StraightFibre(0.2, 0.02, 1, m) for m in (CircularArc(), Catenary(), Parabola(), TrueArcParabola())},
+    "PleatedTube": PleatedTube(0.2, 0.02, 1),
+}  # fmt: skip
+EXACT = ExactMeridian(PleatedTube(0.2, 0.02), RUBBER, 2e-3)
+
+
+@pytest.mark.parametrize("name", TUBES)
+def test_the_volume_of_straight_fibres_increases_infinitely_fast_at_zero_contraction(name: str):
+    assert TUBES[name].volume_derivative(0.0) == np.inf
+    nearly_straight = TUBES[name].segments * np.pi * 0.01 * TUBES[name].fibre_length ** 2 / np.sqrt(6 * 1e-8)
+    assert TUBES[name].volume_derivative(np.array([0.0, 1e-8])) == pytest.approx([np.inf, nearly_straight], rel=1e-3)
+
+
+@pytest.mark.parametrize("method", ["volume", "volume_derivative"])
+@pytest.mark.parametrize("name", TUBES)
+@pytest.mark.parametrize("kind", [float, np.array, pd.Series])
+def test_a_contraction_beyond_the_geometry_is_refused_whatever_its_type(method: str, name: str, kind):
+    values = 0.7 if kind is float else kind([0.1, 0.7])
+    with pytest.raises(GeometryLimitError, match="a contraction of 70 % is outside its range, 0 to 50 %"):
+        getattr(TUBES[name], method)(values)
+
+
+def test_a_list_or_a_column_beyond_the_exact_meridian_is_refused():
+    for contraction in ([0.1, 0.7], pd.Series([0.1, 0.7])):
+        with pytest.raises(GeometryLimitError, match="a contraction of 70 % is outside"):
+            EXACT.force([2e5, 2e5], contraction)
+
+
+@pytest.mark.parametrize("name", ["dmsp-10-250", "dmsp-20-300"])
+def test_beyond_the_contractions_of_its_modulus_a_festo_muscle_does_not_pull_again(name: str):
+    law = catalogue.load(name).characteristic
+    contraction = np.linspace(0.4, 0.9, 51)
+    for pressure in (0.0, 3e5, 6e5):
+        assert (law.force(pressure, contraction) == 0.0).all()
+        assert law.unclamped_force(pressure, contraction) == pytest.approx(law.unclamped_force(pressure, 0.4))
+
+
+def test_derivatives_at_no_points_are_no_derivatives():
+    none = np.zeros((0, 3))
+    law = catalogue.load("dmsp-20-300").characteristic
+    assert law.slopes(none, none).by_pressure.shape == BRAID.volume_derivative(none).shape == (0, 3)
+    values, by_parameters = autodiff.jacobian(BRAID, "volume", none)
+    assert (values.shape, by_parameters.shape) == ((0,), (0, 3))
+
+
+def test_a_derivative_at_a_missing_value_is_missing():
+    law = catalogue.load("sarosi-dmsp-20-400n").characteristic
+    for point in ((np.nan, 0.05), (2e5, np.nan), (np.array([np.nan]), 0.05)):
+        assert np.isnan([*law.slopes(*point)]).all()
+    stiffness = law.stiffness(2e5, np.array([0.05, np.nan]))
+    assert np.isnan(stiffness).tolist() == [False, True]
+
+
+def test_energy_defects_leave_out_straight_fibres():
+    law = CircleVirtualWork(StraightFibre(0.2, 0.02), RUBBER, 2e-3)
+    known = ValidityRange(0.0, 6e5, 0.0, 0.25)
+    assert maxwell_defect(law, law.geometry, known).relative < 1e-12
+    assert virtual_work_defect(law, law.geometry, known).contraction > 0.0
+
+
+def test_an_energy_defect_with_a_constant_volume_has_no_relative_size():
+    law = catalogue.load("sarosi-dmsp-20-400n").characteristic
+    known = ValidityRange(1e5, 4e5, 0.0, 0.2)
+    for defect, worst in (
+        (maxwell_defect(law, Vessel(2e-4), known), float(law.slopes(4e5, 0.0).by_pressure)),
+        (virtual_work_defect(law, Vessel(2e-4), known), law.force(4e5, 0.0)),
+    ):
+        assert defect.worst == pytest.approx(worst, rel=1e-9)
+        assert " (– %) at " in str(defect)
