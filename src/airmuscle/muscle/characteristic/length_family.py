@@ -36,9 +36,10 @@ class LengthFamily(ForceLaw):
     @property
     def linear_in(self) -> tuple[str, ...]:
         """The coefficients of both models if both are linear in them, else none."""
-        models: tuple[tuple[str, Any], ...] = (("inner", self.inner), ("change", self.change))
-        fields = [f"{name}.{law.linear_in}" for name, law in models if hasattr(law, "linear_in")]
-        return tuple(fields) if len(fields) == len(models) else ()
+        inner, change = _linear_fields(self.inner), _linear_fields(self.change)
+        if not (inner and change):
+            return ()
+        return (*(f"inner.{field}" for field in inner), *(f"change.{field}" for field in change))
 
     def with_resting_length(self, resting_length: float) -> Self:
         """Return the model of a muscle of the same type with this resting length [m]."""
@@ -96,3 +97,9 @@ class LogarithmicLength(LengthFamily):
 
     def length_factor(self) -> Value:
         return ops.log(self.resting_length / self.reference_length)
+
+
+def _linear_fields(law: ForceLaw) -> tuple[str, ...]:
+    """The fields in which a law is linear."""
+    fields: str | tuple[str, ...] = getattr(law, "linear_in", ())
+    return (fields,) if isinstance(fields, str) else fields
