@@ -1,19 +1,38 @@
 """Laws at the ends of their ranges and beyond: an error, infinity or a continued force, never an arbitrary number.
 
 Straight fibres have an infinite dV/deps at zero contraction; a geometry states its limits to every call with numbers,
-of whatever type; beyond the contractions for which it was identified no law pulls harder than at their end.
+of whatever type; beyond the contractions for which it was identified no law pulls harder than at their end. A contraction
+above 1, probably in per cent, is named.
 """
 
 from __future__ import annotations
+
+import warnings
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from airmuscle.core import autodiff
-from airmuscle.core.errors import GeometryLimitError
+from airmuscle.core.errors import AirmuscleWarning, GeometryLimitError, PhysicsError
 from airmuscle.library import catalogue
-from airmuscle.muscle.characteristic import CircleVirtualWork, ExactMeridian, RubberLine, ValidityRange
+from airmuscle.library.files import list_laws
+from airmuscle.muscle.characteristic import (
+    Characteristic,
+    ChouHannaford1996,
+    CircleVirtualWork,
+    Clamped,
+    ContractileSurface,
+    EffectiveLength,
+    ExactMeridian,
+    Hunt2017,
+    InverseLength,
+    PooledLengthLaw,
+    RubberLine,
+    TonduLopez2000,
+    ValidityRange,
+    VirtualWork,
+)
 from airmuscle.muscle.characteristic.energy_defect import maxwell_defect, virtual_work_defect
 from airmuscle.muscle.geometry import Braid, StraightFibre
 from airmuscle.muscle.geometry.catenary import Catenary
@@ -28,7 +47,14 @@ TUBES = {
     **{type(m).__name__: StraightFibre(0.2, 0.02, 1, m) for m in (CircularArc(), Catenary(), Parabola(), TrueArcParabola())},
     "PleatedTube": PleatedTube(0.2, 0.02, 1),
 }  # fmt: skip
+SURFACE = ContractileSurface((300.0, -200.0, 40.0), 0.0, 6e5, 0.0, 0.25, 0.0, 1200.0, 1)
 EXACT = ExactMeridian(PleatedTube(0.2, 0.02), RUBBER, 2e-3)
+
+
+def law_of(name: str) -> Characteristic:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AirmuscleWarning)
+        return catalogue.load(name).characteristic
 
 
 @pytest.mark.parametrize("name", TUBES)
@@ -55,7 +81,7 @@ def test_a_list_or_a_column_beyond_the_exact_meridian_is_refused():
 
 @pytest.mark.parametrize("name", ["dmsp-10-250", "dmsp-20-300"])
 def test_beyond_the_contractions_of_its_modulus_a_festo_muscle_does_not_pull_again(name: str):
-    law = catalogue.load(name).characteristic
+    law = law_of(name)
     contraction = np.linspace(0.4, 0.9, 51)
     for pressure in (0.0, 3e5, 6e5):
         assert (law.force(pressure, contraction) == 0.0).all()
@@ -64,14 +90,14 @@ def test_beyond_the_contractions_of_its_modulus_a_festo_muscle_does_not_pull_aga
 
 def test_derivatives_at_no_points_are_no_derivatives():
     none = np.zeros((0, 3))
-    law = catalogue.load("dmsp-20-300").characteristic
+    law = law_of("dmsp-20-300")
     assert law.slopes(none, none).by_pressure.shape == BRAID.volume_derivative(none).shape == (0, 3)
     values, by_parameters = autodiff.jacobian(BRAID, "volume", none)
     assert (values.shape, by_parameters.shape) == ((0,), (0, 3))
 
 
 def test_a_derivative_at_a_missing_value_is_missing():
-    law = catalogue.load("sarosi-dmsp-20-400n").characteristic
+    law = law_of("sarosi-dmsp-20-400n")
     for point in ((np.nan, 0.05), (2e5, np.nan), (np.array([np.nan]), 0.05)):
         assert np.isnan([*law.slopes(*point)]).all()
     stiffness = law.stiffness(2e5, np.array([0.05, np.nan]))
@@ -86,7 +112,7 @@ def test_energy_defects_leave_out_straight_fibres():
 
 
 def test_an_energy_defect_with_a_constant_volume_has_no_relative_size():
-    law = catalogue.load("sarosi-dmsp-20-400n").characteristic
+    law = law_of("sarosi-dmsp-20-400n")
     known = ValidityRange(1e5, 4e5, 0.0, 0.2)
     for defect, worst in (
         (maxwell_defect(law, Vessel(2e-4), known), float(law.slopes(4e5, 0.0).by_pressure)),
@@ -94,3 +120,38 @@ def test_an_energy_defect_with_a_constant_volume_has_no_relative_size():
     ):
         assert defect.worst == pytest.approx(worst, rel=1e-9)
         assert " (– %) at " in str(defect)
+
+
+@pytest.mark.parametrize("name", list_laws())
+@pytest.mark.parametrize(
+    "contraction", [10.0, 10, np.array([0.1, np.nan, 10.0]), pd.Series([10.0])], ids=lambda c: type(c).__name__
+)
+def test_no_law_gives_a_force_without_a_word_for_a_contraction_in_per_cent(name: str, contraction):
+    law = law_of(name)
+    with warnings.catch_warnings(record=True) as issued:
+        warnings.simplefilter("always")
+        try:
+            force = law.force(3e5, contraction)
+        except PhysicsError:
+            return
+    straight_line = name in ("reynolds2003", "serres2009")
+    assert np.nanmin(force) < -1e4 if straight_line else "per cent? As a ratio it is 0.1" in str(issued[0].message)
+
+
+@pytest.mark.parametrize("law", [SURFACE, InverseLength(SURFACE, SURFACE, 0.2, 0.3), EffectiveLength(SURFACE, 0.2, 0.0),
+                                 PooledLengthLaw(SURFACE, (SURFACE,)), Clamped(VirtualWork(BRAID))])  # fmt: skip
+def test_a_law_with_a_limited_force_names_the_unit_of_a_contraction_in_per_cent(law):
+    with pytest.warns(AirmuscleWarning, match=r"contraction of 10 exceeds .* As a ratio it is 0\.1\."):
+        law.force(3e5, 10.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        law.force(np.array([3e5, 4e5]), np.array([[1.0], [-0.05]]))
+        law.slopes(3e5, 1.5)  # traced
+    with pytest.warns(AirmuscleWarning, match="contraction of 500 exceeds .* a ratio of lengths.$"):
+        law.force(3e5, 500)
+
+
+def test_a_pressure_for_a_contraction_in_per_cent_is_not_given_without_a_word():
+    for law in (ChouHannaford1996(BRAID), TonduLopez2000(BRAID), Hunt2017(0.2)):
+        with pytest.warns(AirmuscleWarning, match="Is it in per cent"):
+            law.pressure(10.0, 50.0)
