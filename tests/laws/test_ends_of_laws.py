@@ -8,15 +8,17 @@ above 1, probably in per cent, is named.
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from airmuscle.core import autodiff
-from airmuscle.core.errors import AirmuscleWarning, GeometryLimitError, PhysicsError
+from airmuscle.core.errors import AirmuscleWarning, GeometryLimitError, ParameterError, PhysicsError
 from airmuscle.library import catalogue
 from airmuscle.library.files import list_laws
+from airmuscle.muscle import Muscle
 from airmuscle.muscle.characteristic import (
     Characteristic,
     ChouHannaford1996,
@@ -155,3 +157,22 @@ def test_a_pressure_for_a_contraction_in_per_cent_is_not_given_without_a_word():
     for law in (ChouHannaford1996(BRAID), TonduLopez2000(BRAID), Hunt2017(0.2)):
         with pytest.warns(AirmuscleWarning, match="Is it in per cent"):
             law.pressure(10.0, 50.0)
+
+
+def test_a_slack_muscle_has_the_stiffness_zero_without_a_sign():
+    law = law_of("sarosi-dmsp-10")
+    for thing in (law, Muscle(law, BRAID)):
+        assert not np.signbit(thing.stiffness(1e5, 0.2))
+        assert not np.signbit(thing.stiffness(1e5, np.array([0.2])))
+
+
+def test_four_fibres_are_the_fewest_and_the_contraction_ends_below_the_pole():
+    law = law_of("saga2007")
+    law = replace(law, fibres=4, projection_factor=1.0, geometry=replace(law.geometry, rings=2))
+    end = law.contraction_range[1]
+    assert end == pytest.approx(law.pole, rel=2e-9)
+    assert end < law.pole < 0.5
+    assert law.equilibrium_pressure(end, 100.0) > 1e9 > 0.0 > law.equilibrium_pressure(law.pole * 1.001, 100.0)
+    for fibres in (3, 2, 5):
+        with pytest.raises(ParameterError, match="it must be an even integer, 4 or more"):
+            replace(law, fibres=fibres)

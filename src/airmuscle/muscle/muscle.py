@@ -245,4 +245,4 @@ class Muscle(NotebookDisplay):
         reduces that of the muscle, and friction, which increases it until the bristles slide, is not included. With
         closed valves the pressure changes and the stiffness is larger: see `airmuscle.analysis.static_stiffness`.
         """
-        return -autodiff.derivative(self, "static_force", pressure, contraction, wrt=1)
+        return 0.0 - autodiff.derivative(self, "static_force", pressure, contraction, wrt=1)  # not -0 where slack
