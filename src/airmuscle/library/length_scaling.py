@@ -9,10 +9,9 @@ from ..core import tree
 from ..core.errors import ParameterError
 from ..muscle.characteristic import MartensBoblan2017, Reynolds2003, Serres2009
 from ..muscle.geometry import Braid, Geometry
+from ..muscle.muscle import LENGTH_TOLERANCE
 
 T = TypeVar("T")
-LENGTH_TOLERANCE = 1e-6
-"""Difference of two resting lengths [m] up to which they are the same (chosen)."""
 _STIFFNESSES: dict[type[Any], tuple[str, ...]] = {
     Reynolds2003: ("stiffness_offset", "stiffness_by_pressure"),
     Serres2009: ("softening_offset", "softening", "stiffening_offset", "stiffening"),
