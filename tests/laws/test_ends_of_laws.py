@@ -34,10 +34,13 @@ from airmuscle.muscle.characteristic import (
     TonduLopez2000,
     ValidityRange,
     VirtualWork,
+    as_force_law,
 )
+from airmuscle.muscle.characteristic.borzikova import SAM_30X290
 from airmuscle.muscle.characteristic.energy_defect import maxwell_defect, virtual_work_defect
 from airmuscle.muscle.geometry import Braid, StraightFibre
 from airmuscle.muscle.geometry.catenary import Catenary
+from airmuscle.muscle.geometry.chebyshev import ChebyshevGeometry, as_polynomial
 from airmuscle.muscle.geometry.circular_arc import CircularArc
 from airmuscle.muscle.geometry.parabola import Parabola, TrueArcParabola
 from airmuscle.muscle.geometry.pleated import PleatedTube
@@ -176,3 +179,40 @@ def test_four_fibres_are_the_fewest_and_the_contraction_ends_below_the_pole():
     for fibres in (3, 2, 5):
         with pytest.raises(ParameterError, match="it must be an even integer, 4 or more"):
             replace(law, fibres=fibres)
+
+
+@pytest.mark.parametrize("degree", [-1, 2.5, "3", True])
+def test_the_degree_of_a_polynomial_is_a_whole_number(degree):
+    known = ValidityRange(0.0, 6e5, 0.0, 0.2)
+    for call in (
+        lambda: as_force_law(SURFACE, known, degree=degree),
+        lambda: as_polynomial(BRAID, degree, (0.0, 0.2)),
+        lambda: ContractileSurface.blank(degree),
+        lambda: ContractileSurface((), 0.0, 1.0, 0.0, 1.0, degree=degree),
+    ):
+        with pytest.raises(ParameterError, match=r"degree .*must be an integer"):
+            call()
+
+
+def test_a_polynomial_volume_has_a_range_without_infinite_slopes_and_without_zero_length():
+    for tube in (StraightFibre(0.2, 0.02), PleatedTube(0.2, 0.02)):
+        with pytest.raises(GeometryLimitError, match=r"is infinite at a contraction of 0 %. .* such as \(0.01, 0.5\)"):
+            as_polynomial(tube)
+    with pytest.raises(ParameterError, match=r"the contraction range is -0.1\d* to 1; .* less than 1"):
+        as_polynomial(Braid(0.01, 0.43632, 0.2))
+    with pytest.raises(ParameterError, match="1 coefficients; at least two are required"):
+        ChebyshevGeometry((1e-4,), 0.0, 0.2, 0.2)
+
+
+@pytest.mark.parametrize("force_degree", [1, 3])
+def test_plane_curves_determine_a_surface_of_one_degree_in_the_force(force_degree: int):
+    with pytest.raises(ParameterError, match=f"3 curves determine a surface of force_degree 2, not {force_degree}"):
+        SAM_30X290.interpolate(force_degree)
+
+
+def test_equilibria_and_fibre_tensions_at_the_ends():
+    law = law_of("saga2007")
+    for point in ((np.nan, 100.0), (1e5, np.inf)):
+        with pytest.raises(ParameterError, match=r"Saga2007.equilibria: .* must be finite"):
+            law.equilibria(*point)
+    assert law.shell_tension(1e5, 0.0) > 1e100

@@ -11,6 +11,7 @@ from ...core.arrays import Array
 from ...core.declaration import model, parameter
 from ...core.errors import AirmuscleWarning, PhysicsError, SolveError
 from ...core.ops import Value
+from ..geometry.base import check_degree
 from .base import Characteristic, ForceLaw
 from .contractile_surface import ContractileSurface, exponents
 from .validity_range import ValidityRange
@@ -51,8 +52,9 @@ def as_force_law(law: Characteristic, validity_range: ValidityRange, *, degree: 
     A polynomial of total degree `degree` is fitted by least squares on a dense grid; the errors are evaluated on a
     second grid between its points. Points without a solution are omitted, with an AirmuscleWarning that states their
     fraction. Raises SolveError if too few points have a solution, or if the force is unbounded at one of them, as that
-    of straight fibres at zero contraction.
+    of straight fibres at zero contraction, and ParameterError for a degree that is not an integer, 0 or more.
     """
+    check_degree("as_force_law", degree)
     count = 4 * (degree + 1)
     pressure, contraction = _grid(validity_range, np.cos(np.pi * (np.arange(count) + 0.5) / count))
     force = _force_or_nan(law, pressure, contraction)

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import autodiff
-from ...core.errors import GeometryLimitError
+from ...core.annotation import abridged
+from ...core.errors import GeometryLimitError, ParameterError
 from ...core.ops import Value
 from ...core.reference import Reference
 
@@ -28,6 +29,12 @@ def check_contraction_range(contraction: Value, limits: tuple[float, float], own
             f"{owner}: a contraction of {100 * values[outside].flat[0]:.4g} % is outside its range, "
             f"{100 * limits[0]:.4g} to {100 * limits[1]:.4g} %{remark}."
         )
+
+
+def check_degree(owner: str, degree: object, least: int = 0) -> None:
+    """Raise ParameterError unless the degree of a polynomial is an integer of at least `least`."""
+    if isinstance(degree, bool) or not isinstance(degree, int) or degree < least:
+        raise ParameterError(f"{owner}: degree is {abridged(degree)}; it must be an integer, {least} or more.")
 
 
 class Geometry(abc.ABC):
