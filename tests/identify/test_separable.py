@@ -15,6 +15,7 @@ import pytest
 import airmuscle
 from airmuscle import read_csv
 from airmuscle.core.errors import IdentificationError
+from airmuscle.core.tree import leaves
 from airmuscle.identify import UNCENSORED, Candidate, LevelSplit, compare, fit
 from airmuscle.identify.candidates import blank_surface, standard_candidates
 from airmuscle.identify.censored_least_squares import solve_censored_least_squares
@@ -22,7 +23,15 @@ from airmuscle.identify.censoring import Censoring
 from airmuscle.identify.cross_validation import label_folds
 from airmuscle.identify.problem import make_problem
 from airmuscle.identify.variable_projection import find_initial_values, is_linear_parameter
-from airmuscle.muscle.characteristic import ContractileSurface, EffectiveLength, Hunt2017, Sarosi2012
+from airmuscle.muscle.characteristic import (
+    ContractileSurface,
+    EffectiveLength,
+    Hunt2017,
+    InverseLength,
+    Sarosi2012,
+    TonduLopez2000,
+)
+from airmuscle.muscle.geometry import Braid
 from airmuscle.recording import Recording
 
 DATA = Path(airmuscle.__file__).parent / "library" / "data"
@@ -142,3 +151,13 @@ def test_a_fold_that_leaves_the_exponential_open_is_excluded_by_name():
     )
     (excluded,) = found.excluded
     assert "cannot separate a_1, a_2, a_3" in excluded.reason
+
+
+def test_a_family_of_lengths_names_the_linear_parameters_of_both_its_models():
+    for law, linear in (
+        (InverseLength(SAROSI, blank_surface(2), 0.2, 0.3), 5 + 6),
+        (InverseLength(EffectiveLength(blank_surface(2), 0.2, 0.02), SAROSI, 0.2, 0.3), 6 + 5),
+        (InverseLength(SAROSI, TonduLopez2000(Braid(0.01, 0.4363, 0.2)), 0.2, 0.3), 0),
+    ):
+        paths = [leaf.path.partition("[")[0] for leaf in leaves(law)]
+        assert sum(path in law.linear_in for path in paths) == linear

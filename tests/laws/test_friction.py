@@ -297,3 +297,9 @@ def test_unequal_lengths_and_active_dead_zones_are_errors():
 def test_the_force_of_maxwell_slip_is_the_sum_of_its_springs():
     law = MaxwellSlip((2e4, 1e4), (3e-4, 1.2e-3))
     assert law.force({"bristle1": 3e-4, "bristle2": -1e-3}, 0.0) == pytest.approx(6.0 - 10.0, rel=1e-14)
+
+
+@pytest.mark.parametrize("law", ALL, ids=name)
+def test_a_path_without_rows_has_no_forces(law):
+    none = np.array([])
+    assert law.force_along(none).shape == law.force_along(none, none).shape == (0,)

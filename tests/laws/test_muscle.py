@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from airmuscle.core.errors import AirmuscleWarning
 from airmuscle.muscle import CubicSpring, LinearDamper, LinearSpring, Muscle, PressureDamper
-from airmuscle.muscle.characteristic import ChouHannaford1996
+from airmuscle.muscle.characteristic import (
+    ChouHannaford1996,
+    Clamped,
+    ContractileSurface,
+    EffectiveLength,
+    Reynolds2003,
+)
 from airmuscle.muscle.geometry import Braid
 from airmuscle.pneumatics.gas import GAS_CONSTANT, Ambient, Isothermal, Polytropic, absolute_pressure, gauge_pressure
 
@@ -73,3 +82,15 @@ def test_isothermal_air_obeys_boyle_and_polytropic_air_its_exponent():
     assert one == pytest.approx(2**1.3 * two)
     resting = AMBIENT.pressure * 1e-4 / (GAS_CONSTANT * 293.15)
     assert Polytropic(1.3).pressure(resting, 1e-4, AMBIENT) == pytest.approx(AMBIENT.pressure)
+
+
+def test_a_law_of_another_resting_length_than_that_of_the_geometry_is_named():
+    surface = ContractileSurface((300.0, -200.0, 40.0), 0.0, 6e5, 0.0, 0.25, 0.0, 1200.0, 1)
+    laws = (Reynolds2003(0.2), Clamped(Reynolds2003(0.2)), EffectiveLength(surface, 0.2, 0.01))
+    for law in laws:
+        with pytest.warns(AirmuscleWarning, match="law of a muscle of 200 mm, but .* of Braid is 300 mm"):
+            Muscle(law, BRAID)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for law in (ChouHannaford1996(Braid(0.01, 0.44, 0.2)), surface, Reynolds2003(0.3 + 1e-7)):
+            Muscle(law, BRAID)

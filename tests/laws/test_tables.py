@@ -49,10 +49,22 @@ def test_a_table_ends_where_one_of_two_isobars_ends():
         SMALL.force(3e5, 0.05)
 
 
+def test_the_slope_on_an_isobar_is_one_sided_where_the_next_isobar_does_not_cover_the_contraction():
+    rows = np.array([(1e5, 0.0, 100.0), (1e5, 0.1, 0.0), (2e5, 0.0, 200.0), (2e5, 0.1, 80.0), (3e5, 0.05, 250.0),
+                     (3e5, 0.1, 220.0)])  # fmt: skip
+    law = Tabulated(*(tuple(column) for column in rows.T))
+    assert law.slopes(2e5, 0.0).by_pressure == pytest.approx(100.0 / 1e5)
+    assert law.slopes(2e5, np.array([0.0, 0.1])).by_pressure == pytest.approx([1e-3, 140.0 / 1e5])
+    assert law.slopes(3e5, 0.1).by_pressure == pytest.approx(140.0 / 1e5)
+    assert law.slopes(1e5, 0.1).by_pressure == pytest.approx(80.0 / 1e5)
+
+
 def test_a_point_without_a_solution_states_the_tabulated_range():
     with pytest.raises(SolveError, match=r"with 150 N at 100 kPa.*Tabulated forces at this point: 0 to 100 N"):
         SMALL.contraction(1e5, 150.0)
     with pytest.raises(SolveError, match=r"gives 250 N .* of 0 %.*Tabulated forces at this point: 100 to 200 N"):
+        SMALL.pressure(0.0, 250.0)
+    with pytest.raises(SolveError, match="no gauge pressure in the range 100 to 200 kPa gives 250 N"):
         SMALL.pressure(0.0, 250.0)
     with pytest.raises(SolveError, match="The table does not cover this point"):
         SMALL.pressure(0.5, 10.0)
@@ -111,3 +123,10 @@ def test_a_surrogate_warns_where_the_model_has_no_solution():
     assert 0.4 < surrogate.coverage < 0.6
     with pytest.raises(SolveError, match="0 of 400 points of the validity range"):
         as_force_law(SMALL, ValidityRange(3e5, 4e5, 0.0, 0.2), degree=4)
+
+
+def test_a_surrogate_of_an_unbounded_force_is_refused():
+    law = catalogue.load("saga2007").characteristic
+    with pytest.raises(SolveError, match=r"force of Saga2007 is unbounded at a contraction of 0 % and 50 kPa"):
+        as_force_law(law, ValidityRange(5e4, 2e5, 0.0, 0.3))
+    assert as_force_law(law, ValidityRange(5e4, 2e5, 0.02, 0.3)).max_error < 5.0

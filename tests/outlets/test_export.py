@@ -281,19 +281,23 @@ def test_every_closed_form_law_has_its_value_and_slopes_in_c(tmp_path):
         for row, x, y in zip(rows, a.tolist(), b.tolist(), strict=True):
             printed.call(getattr(library, f"law{i}_evaluate"), x, y, c, row)
         assert printed.deviation(rows, law_values(law)) < 1e-12, name
+        for row, point in zip(rows, ((np.nan, b[0]), (a[0], np.nan)), strict=False):
+            printed.call(getattr(library, f"law{i}_evaluate"), *point, c, row)
+            assert np.isnan(row).all(), f"{name} gives a value at a missing argument"
 
 
 def test_a_law_in_octave_takes_arrays(tmp_path):
     law = load_law("dmsp-20-300").characteristic
     write_law(law, tmp_path, Octave(), name="festo")
-    script = "[f, s, k] = festo(3e5, [0.05; 0.1; 0.15]); printf('%.17g ', [f, s, k]');"
+    script = "[f, s, k] = festo(3e5, [0.05; 0.1; 0.15; NaN]); printf('%.17g ', [f, s, k]');"
     done = subprocess.run(
         [printed.require("octave-cli"), "--no-init-file", "--quiet", "--eval", script],
         cwd=tmp_path,
         capture_output=True,
         text=True,
     )
-    found = np.array(done.stdout.split(), dtype=float).reshape(3, 3)
+    found, missing = np.split(np.array(done.stdout.split(), dtype=float).reshape(4, 3), [3])
+    assert np.isnan(missing).all()
     contraction = np.array([0.05, 0.1, 0.15])
     slopes = law.slopes(3e5, contraction)
     expected = np.column_stack([law.force(3e5, contraction), slopes.by_pressure, -slopes.by_contraction])

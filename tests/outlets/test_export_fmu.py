@@ -243,7 +243,7 @@ def test_the_log_states_once_what_left_its_validity_range(tmp_path):
 def test_an_input_outside_its_range_is_reported(instance):
     instance.set(fill=1.5)
     instance.step(0.0, 0.001)
-    assert any("the input fill is outside its range, 0 to 1" in text for _, text in instance.log)
+    assert any("the input fill is outside its range, 0 to 1 (" in text for _, text in instance.log)
 
 
 @pytest.mark.parametrize(

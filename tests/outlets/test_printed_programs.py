@@ -17,6 +17,7 @@ import pytest
 
 from airmuscle.compile import functions
 from airmuscle.compile.ir.instructions import Operation
+from airmuscle.compile.ir.interpreter import InterpretedBody
 from airmuscle.compile.jacobians import derivatives
 from airmuscle.compile.llvm.jit import jit_compile
 from airmuscle.compile.program import compile_system
@@ -239,3 +240,24 @@ def test_the_text_is_the_same_every_time():
         for _ in range(2)
     }
     assert len(texts) == 1
+
+
+@pytest.mark.parametrize(
+    ("operation", "arguments", "result"),
+    [
+        (Operation.SINH, (-1000.0,), -math.inf),
+        (Operation.COSH, (-1000.0,), math.inf),
+        (Operation.FLOOR, (-math.inf,), -math.inf),
+        (Operation.LOG, (0.0,), -math.inf),
+        (Operation.LOG1P, (-1.0,), -math.inf),
+        (Operation.POWER, (-1e200, 3.0), -math.inf),
+        (Operation.CONSTANT_POWER, (0.0, -2.0), math.inf),
+        (Operation.SQRT, (-1.0,), math.nan),
+        (Operation.ASIN, (2.0,), math.nan),
+    ],
+    ids=str,
+)
+def test_the_interpreter_gives_infinity_or_nan_where_the_c_library_does(operation, arguments, result):
+    body = InterpretedBody({"x": arguments})
+    body.store("y", 0, body.operate(operation, [body.load("x", i) for i in range(len(arguments))]))
+    assert body.stored["y", 0] == pytest.approx(result, nan_ok=True)

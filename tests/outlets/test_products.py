@@ -18,6 +18,8 @@ from airmuscle.library.catalogue import load
 from airmuscle.library.files import entries_of_product, list_laws, list_products
 from airmuscle.library.law_file import load_law
 from airmuscle.library.scaling import scale_entry
+from airmuscle.library.stated_band import StatedBand
+from airmuscle.library.uncertainty import ParameterUncertainty
 from airmuscle.muscle import CreepElements, LinearSpring, Ratings
 
 DMSP_20 = "dmsp-20-300"
@@ -125,6 +127,36 @@ def test_a_scaled_muscle_has_the_same_force_at_the_same_contraction_and_a_volume
     assert short.checks == ()
     assert "not measured at this size" in short.note
     assert "Not scaled" not in short.note
+
+
+@pytest.mark.parametrize("name", ["reynolds2003", "serres2009"])
+def test_a_spring_of_twice_the_length_has_half_the_stiffness(name: str):
+    entry = load_law(name)
+    long = scale_entry(entry, resting_length="400 mm")
+    pressure, contraction = np.array([[2e5], [5e5]]), np.array([0.0, 0.05, 0.15])
+    force = entry.characteristic.force(pressure, contraction)
+    assert long.characteristic.force(pressure, contraction) == pytest.approx(force, rel=1e-12)
+
+
+def test_a_scaled_muscle_keeps_only_the_uncertainty_of_parameters_that_do_not_change():
+    law = load_law(DMSP_20)
+    for names, kept in (
+        (("characteristic.c0", "characteristic.geometry.radius"), True),
+        (("characteristic.c1",), False),
+    ):
+        count = len(names)
+        stated = ParameterUncertainty(names, (1.0,) * count, tuple(map(tuple, np.eye(count))))
+        entry = scale_entry(dataclasses.replace(law, uncertainty=stated), resting_length="200 mm")
+        assert entry.uncertainty == (stated if kept else None)
+
+
+def test_another_diameter_is_another_product_without_the_ratings_and_the_band_of_the_first():
+    band = StatedBand("force", 12.0, "40 rows")
+    entry = dataclasses.replace(load_law("tondu-lopez"), ratings=Ratings(max_force=100.0), error_band=band)
+    wide = scale_entry(entry, diameter="30 mm")
+    assert (wide.ratings, wide.error_band) == (None, None)
+    long = scale_entry(entry, resting_length="400 mm")
+    assert (long.ratings, long.error_band) == (entry.ratings, band)
 
 
 def test_a_scaled_muscle_names_its_parts_of_the_original_size():

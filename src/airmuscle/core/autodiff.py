@@ -81,13 +81,15 @@ def _call_traced(
     count = len(arguments)
     numbers = [value.item() if isinstance(value, np.ndarray) else value for value in parameters if not many]
     vector = np.vstack(rows[count:]) if many else np.array(numbers, dtype=float)
+    if not broadcast[0].size:  # CasADi evaluates a function of no points at one point
+        return [np.zeros((function.numel_out(i), 0)) for i in range(function.n_out())], broadcast[0].shape
     return [r.full() for r in function(*rows[:count], vector)], broadcast[0].shape
 
 
 def derivative(obj: Any, method: str, *arguments: Any, wrt: int = 0) -> Any:
     """Exact derivative of `obj.method(*arguments)` with respect to argument number `wrt`, shaped like the arguments.
 
-    Raises TraceError if the method cannot be traced.
+    It is NaN where an argument is NaN. Raises TraceError if the method cannot be traced.
     """
     if ops.is_symbol(*arguments):
         return _symbolic_derivative(obj, method, arguments, wrt)
@@ -95,6 +97,9 @@ def derivative(obj: Any, method: str, *arguments: Any, wrt: int = 0) -> Any:
         return _jax_derivative(obj, method, arguments, wrt)
     results, shape, _ = _evaluate_traced(obj, method, arguments)
     value = results[1 + wrt].reshape(shape)
+    missing = functools.reduce(np.logical_or, (np.isnan(np.asarray(x, dtype=float)) for x in arguments))
+    if missing.any():  # a traced comparison with NaN takes one of its branches
+        value = np.where(missing, np.nan, value)
     return float(value) if value.ndim == 0 else value
 
 
@@ -209,8 +214,7 @@ def _substitute(derivative: Any, x: Any, point: Sequence[Any], symbolic: bool) -
 def jacobian(obj: Any, method: str, *arguments: Any) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """Values of `obj.method` at N points, shape (N,), and derivatives with respect to its P leaves, shape (N, P)."""
     results, _, count = _evaluate_traced(obj, method, arguments)
-    size = results[-1].size // max(count, 1)
-    return results[0].reshape(-1), results[-1].reshape(count, size)
+    return results[0].reshape(-1), results[-1].reshape(count, sum(1 for _ in tree.leaves(obj)))
 
 
 def parameter_derivatives(obj: Any, method: str, arguments: Sequence[Any], leaves: Sequence[int]) -> Any:

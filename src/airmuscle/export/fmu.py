@@ -23,6 +23,7 @@ from ..simulation.integrators import Rodas4
 from .c_source import CSource
 from .c_text import c_array, c_number, c_string, c_strings
 from .fmi_description import FmuDescription
+from .fmi_units import has_unit
 from .fmi_variables import first_inputs, make_variables
 from .platforms import Platform, this_platform
 from .provenance import block_comment
@@ -198,7 +199,8 @@ def _limits(system: object, columns: Sequence[str]) -> list[tuple[int, float, fl
                 limits.append((columns.index(limit.column), low - slack, high + slack, describe_limit(limit)))
     for given in getattr(system, "input_variables", ()):
         slack = 1e-9 * (given.maximum - given.minimum)
-        text = f"the input {given.name} is outside its range, {given.minimum:.4g} to {given.maximum:.4g} {given.unit}"
+        unit = f" {given.unit}" if has_unit(given.unit) else ""
+        text = f"the input {given.name} is outside its range, {given.minimum:.4g} to {given.maximum:.4g}{unit}"
         limits.append((columns.index(given.name), given.minimum - slack, given.maximum + slack, text))
     return limits
 

@@ -112,9 +112,11 @@ def print_law(law: Characteristic, name: str, title: str) -> PrintedLaw:
     slopes = [casadi.jacobian(value, each) for each in x]
     if method == "force":
         slopes[1] = -slopes[1]
-    values = casadi.cse(casadi.densify(casadi.vertcat(value, *slopes)))
+    # NaN for a missing argument: a printed comparison takes one of its branches, such as the lower limit of the force.
+    known = casadi.logic_and(*(casadi.logic_or(each >= 0, each < 0) for each in x))
+    values = casadi.if_else(known, casadi.densify(casadi.vertcat(value, *slopes)), x[0] + x[1])
     lines = provenance(title, law)
-    return PrintedLaw(name, method, arguments, results, x, parameters, values, tuple(leaves(law)), lines)
+    return PrintedLaw(name, method, arguments, results, x, parameters, casadi.cse(values), tuple(leaves(law)), lines)
 
 
 def check_closed_form(model: Any) -> None:

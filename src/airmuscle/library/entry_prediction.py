@@ -14,10 +14,11 @@ from ..identify.cross_validation import specimen_name
 from ..identify.prediction import RecordPrediction, predict_static
 from ..identify.problem import fitted_quantity_of
 from ..muscle.characteristic.base import ForceLaw
+from ..muscle.muscle import LENGTH_TOLERANCE
 from ..recording import Recording
 from ..recording.plausibility import CONTRACTION_RANGE
 from .entry import Entry
-from .length_scaling import LENGTH_TOLERANCE, scale_to_length
+from .length_scaling import scale_to_length
 
 UNUSED_PARTS = ("damper", "wall", "series", "stop")
 """Elements of a muscle that a static prediction leaves out."""

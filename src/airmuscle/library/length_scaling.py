@@ -7,20 +7,25 @@ from typing import Any, TypeVar
 
 from ..core import tree
 from ..core.errors import ParameterError
-from ..muscle.characteristic import MartensBoblan2017
+from ..muscle.characteristic import MartensBoblan2017, Reynolds2003, Serres2009
 from ..muscle.geometry import Braid, Geometry
+from ..muscle.muscle import LENGTH_TOLERANCE
 
 T = TypeVar("T")
-LENGTH_TOLERANCE = 1e-6
-"""Difference of two resting lengths [m] up to which they are the same (chosen)."""
+_STIFFNESSES: dict[type[Any], tuple[str, ...]] = {
+    Reynolds2003: ("stiffness_offset", "stiffness_by_pressure"),
+    Serres2009: ("softening_offset", "softening", "stiffening_offset", "stiffening"),
+}
+"""Parameters in N/m of one specimen, by law: a spring of twice the length has half the stiffness."""
 
 
 def scale_to_length(thing: T, resting_length: float, where: str) -> T:
     """The law or geometry of a muscle of the same type with this resting length [m].
 
-    Radius and braid angle of a Braid do not change, and a modulus that is a polynomial in the length keeps its values
-    at the same contraction. What does not depend on the resting length is returned unchanged. Raises ParameterError,
-    which begins with `where`, for a law or geometry that is not of this length and cannot be scaled.
+    Radius and braid angle of a Braid do not change; a modulus that is a polynomial in the length keeps its values at
+    the same contraction, and so does the force of a spring with a stiffness in N/m. What does not depend on the resting
+    length is returned unchanged. Raises ParameterError, which begins with `where`, for a law or geometry that is not of
+    this length and cannot be scaled.
     """
     different = _different_lengths(thing, resting_length)
     if not different:
@@ -53,7 +58,9 @@ def _scale(thing: Any, resting_length: float) -> Any:
         return thing.with_resting_length(resting_length)
     has_length = "resting_length" in {field.name for field in dataclasses.fields(thing)}
     if isinstance(thing, Braid) or (has_length and not isinstance(thing, Geometry)):
-        return dataclasses.replace(thing, resting_length=resting_length)
+        ratio = thing.resting_length / resting_length
+        stiffnesses = {name: getattr(thing, name) * ratio for name in _STIFFNESSES.get(type(thing), ())}
+        return dataclasses.replace(thing, resting_length=resting_length, **stiffnesses)
     geometry = getattr(thing, "geometry", None)
     if not isinstance(geometry, Braid):
         return thing

@@ -23,12 +23,14 @@ def scale_entry(
 
     A text has a unit, such as "200 mm". At equal pressure and contraction the force does not depend on the length,
     unless the law contains an effect of the length; it grows with the square of the diameter. The checks of the entry,
-    which hold for its own size, are left out, and the note states the scaling, which is not a measurement, and which
-    optional parts of the muscle (spring, damper, friction, wall, creep) remain those of the original size. Raises
-    ParameterError for an entry that cannot be scaled, or a length that the maker does not supply; UnitError.
+    which hold for its own size, are left out, as are the uncertainty of parameters that change, and with the diameter
+    the ratings and the error band. The note states the scaling, which is not a measurement, and which optional parts
+    of the muscle (spring, damper, friction, wall, creep) remain those of the original size. Raises ParameterError for
+    an entry that cannot be scaled, or a length that the maker does not supply; UnitError.
     """
     if resting_length is None and diameter is None:
         return entry
+    original = entry
     if not isinstance(entry, Entry):  # a valve or a product
         raise ParameterError(f"{getattr(entry, 'name', entry)!s:.80} has no law to scale; give a muscle or a law.")
     sizes = []
@@ -46,7 +48,17 @@ def scale_entry(
         f"Scaled to {' and '.join(sizes)}; not measured at this size.",
         f"Not scaled, but as at the original size: {', '.join(parts)}." if parts else "",
     )
-    return dataclasses.replace(entry, checks=(), note=" ".join(filter(None, texts)))
+    changed = _fitted_values(entry) != _fitted_values(original)
+    return dataclasses.replace(
+        entry, checks=(), note=" ".join(filter(None, texts)), uncertainty=None if changed else entry.uncertainty
+    )
+
+
+def _fitted_values(entry: Entry) -> list[float]:
+    """The values of the parameters of which the uncertainty is stated."""
+    names = () if entry.uncertainty is None else entry.uncertainty.parameters
+    values = {f"characteristic.{leaf.path}": leaf.value for leaf in leaves(entry.characteristic)}
+    return [values[name] for name in names if name in values]
 
 
 def _positive(value: float | str, where: str) -> float:
@@ -85,4 +97,10 @@ def _with_diameter(entry: Entry, diameter: float) -> Entry:
         )
     radius = diameter / 2
     scaled = dataclasses.replace(law, geometry=dataclasses.replace(law.geometry, radius=radius))
-    return dataclasses.replace(entry, characteristic=scaled, geometry=dataclasses.replace(geometry, radius=radius))
+    return dataclasses.replace(
+        entry,
+        characteristic=scaled,
+        geometry=dataclasses.replace(geometry, radius=radius),
+        ratings=None,
+        error_band=None,
+    )

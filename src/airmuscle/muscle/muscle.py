@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple
@@ -9,13 +10,14 @@ from typing import Any, ClassVar, NamedTuple
 from ..core import autodiff, ops
 from ..core.annotation import abridged
 from ..core.declaration import model
-from ..core.errors import ParameterError
+from ..core.errors import AirmuscleWarning, ParameterError
 from ..core.notebook import Card, NotebookDisplay
 from ..core.ops import Value
 from ..core.quantity_arguments import accept_quantities_in
 from ..core.reference import Reference
 from ..core.variables import StateVariable
 from .characteristic.base import Characteristic, ForceLaw
+from .characteristic.clamped import Clamped
 from .characteristic.contractile_surface import HOSOVSKY_HILL
 from .characteristic.validity_range import ValidityRange
 from .characteristic.virtual_work import VirtualWork
@@ -35,6 +37,8 @@ RELAXED: Mapping[str, Value] = MappingProxyType({})
 """Relaxed state of a muscle: every state that is not given is 0."""
 INNER_CONTRACTION = "inner_contraction"
 """Name of the state of a muscle with a series spring: the contraction of its contractile element."""
+LENGTH_TOLERANCE = 1e-6
+"""Difference of two resting lengths [m] up to which they are the same (chosen)."""
 
 
 class MuscleForce(NamedTuple):
@@ -115,6 +119,22 @@ class Muscle(NotebookDisplay):
             raise ParameterError(f"Muscle: ratings is {abridged(self.ratings)}; it must be a Ratings or None.")
         if isinstance(self.series, ElasticSeriesElement):
             self._check_series_elements()
+        self._check_lengths()
+
+    def _check_lengths(self) -> None:
+        """Warn of a law whose force depends on a resting length that is not that of the geometry."""
+        law: Any = self.contractile
+        while isinstance(law, Clamped):
+            law = law.inner
+        own, length = getattr(law, "resting_length", None), self.geometry.resting_length
+        if own is not None and abs(own - length) > LENGTH_TOLERANCE:
+            warnings.warn(
+                f"{self.name}: {type(law).__name__} is the law of a muscle of {1e3 * own:.6g} mm, but the resting "
+                f"length of {type(self.geometry).__name__} is {1e3 * length:.6g} mm. The force would be that of "
+                "another length; give both the same resting length.",
+                AirmuscleWarning,
+                stacklevel=5,
+            )
 
     def _check_series_elements(self) -> None:
         for pressure in (-1e5, 0.0, 1e6):  # every damper is linear or piecewise linear in pressure
@@ -246,7 +266,7 @@ class Muscle(NotebookDisplay):
         reduces that of the muscle, and friction, which increases it until the bristles slide, is not included. With
         closed valves the pressure changes and the stiffness is larger: see `airmuscle.analysis.static_stiffness`.
         """
-        return -autodiff.derivative(self, "static_force", pressure, contraction, wrt=1)
+        return 0.0 - autodiff.derivative(self, "static_force", pressure, contraction, wrt=1)  # not -0 where slack
 
 
 accept_quantities_in(

@@ -9,6 +9,9 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
 
 from .emission import FunctionBlock, unknown_operation
 from .instructions import Operand, Operation
@@ -56,6 +59,13 @@ _OPERATIONS: dict[Operation, Function] = {
     Operation.MASK: lambda x, y: y if x != 0.0 else 0.0,
     Operation.SELECT: lambda x, y, z: y if x != 0.0 else z,
 }
+_NOT_FINITE: dict[Operation, Callable[..., Any]] = {
+    Operation.SQRT: np.sqrt, Operation.EXP: np.exp, Operation.LOG: np.log, Operation.SIN: np.sin,
+    Operation.COS: np.cos, Operation.TAN: np.tan, Operation.SINH: np.sinh, Operation.COSH: np.cosh,
+    Operation.ASIN: np.arcsin, Operation.ACOS: np.arccos, Operation.LOG1P: np.log1p, Operation.EXPM1: np.expm1,
+    Operation.POWER: np.power, Operation.CONSTANT_POWER: np.power, Operation.FLOOR: np.floor,
+}  # fmt: skip
+"""Functions for which Python raises an exception where the C library gives infinity or NaN."""
 
 
 def _to_single(value: float) -> float:
@@ -103,10 +113,9 @@ class InterpretedBody(FunctionBlock):
             raise unknown_operation(operation, "interpreted")
         try:
             return self._result(_FUNCTIONS[operation](*values))
-        except ValueError:
-            return self._result(-math.inf if operation is Operation.LOG and values[0] == 0.0 else math.nan)
-        except OverflowError:
-            return self._result(math.inf)
+        except (ValueError, OverflowError):  # of Python; the C library gives infinity or NaN
+            with np.errstate(all="ignore"):
+                return self._result(float(_NOT_FINITE[operation](*map(np.float64, values))))
 
     def unless_zero(
         self, gates: Sequence[str], compute: Callable[[], dict[Operand, str]], instead: Mapping[Operand, str]

@@ -81,7 +81,7 @@ class Characteristic(abc.ABC):
 
     def stiffness(self, pressure: Value, contraction: Value) -> Value:
         """Stiffness -dF/deps [N] at constant pressure; divide by the resting length for [N/m]."""
-        return -self.slopes(pressure, contraction).by_contraction
+        return 0.0 - self.slopes(pressure, contraction).by_contraction  # not -0 for a slack muscle
 
     def _no_contraction_message(self, pressure: float, force: float) -> str:
         low, high = self.contraction_range

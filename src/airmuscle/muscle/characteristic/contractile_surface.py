@@ -10,7 +10,9 @@ from ...core.declaration import model, parameter
 from ...core.errors import ParameterError
 from ...core.ops import Value
 from ...core.reference import Reference
+from ..geometry.base import check_degree
 from .base import ForceLaw
+from .solve import warn_above_whole_length
 from .validity_range import ValidityRange
 
 HOSOVSKY_HILL = Reference(
@@ -59,7 +61,8 @@ class ContractileSurface(ForceLaw):
     degree: int = 5
 
     def check(self) -> None:
-        expected = (self.degree + 1) * (self.degree + 2) // 2 if self.degree >= 0 else 0
+        check_degree("ContractileSurface", self.degree)
+        expected = (self.degree + 1) * (self.degree + 2) // 2
         if len(self.coefficients) != expected:
             raise ParameterError(
                 f"ContractileSurface: degree {self.degree} requires {expected} coefficients, not "
@@ -79,6 +82,7 @@ class ContractileSurface(ForceLaw):
 
         The fitted surface is limited to `min_force` and `max_force`; the default limit is above the force of a muscle.
         """
+        check_degree("ContractileSurface", degree)
         size = len(exponents(degree))
         return cls((0.0,) * size, 0.0, 1.0, 0.0, 1.0, min_force, max_force, degree)
 
@@ -106,6 +110,8 @@ class ContractileSurface(ForceLaw):
         return ValidityRange(self.min_pressure, self.max_pressure, self.min_contraction, self.max_contraction)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
+        if type(contraction) is not float or contraction > 1.0:
+            warn_above_whole_length(contraction, self)
         return ops.clip(self.polynomial(pressure, contraction), self.min_force, self.max_force)
 
     def unclamped_force(self, pressure: Value, contraction: Value) -> Value:

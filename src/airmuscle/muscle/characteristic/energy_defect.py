@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -26,13 +27,17 @@ class EnergyDefect:
     pressure: float
     contraction: float
     relative: float
-    """`worst` divided by the maximum magnitude of the quantity that follows from the volume of the muscle."""
+    """`worst` divided by the maximum magnitude of the quantity that follows from the volume of the muscle.
+
+    NaN if the volume is constant.
+    """
     slack: float
     """Fraction of the validity range that was excluded because the muscle is slack there."""
 
     def __str__(self) -> str:
+        relative = "–" if math.isnan(self.relative) else f"{100 * self.relative:.2f}"
         return (
-            f"{self.worst:.4g} {self.unit} ({100 * self.relative:.2f} %) at {self.pressure / 1e3:.4g} kPa and "
+            f"{self.worst:.4g} {self.unit} ({relative} %) at {self.pressure / 1e3:.4g} kPa and "
             f"{100 * self.contraction:.2f} % of contraction; slack on {100 * self.slack:.0f} % of the validity range"
         )
 
@@ -42,7 +47,8 @@ def maxwell_defect(characteristic: Characteristic, geometry: Geometry, validity_
 
     F(p, L) tension, V(L) volume, dV/dL = -(dV/deps)/L0. A muscle with a defect generates or loses energy on a closed
     path of pressure and length: the defect times the enclosed area. Slack states are excluded, because the volume of a
-    slack muscle does not follow from its length. Raises SolveError if the muscle is slack everywhere.
+    slack muscle does not follow from its length, and straight fibres, whose dV/dL is infinite. Raises SolveError if the
+    muscle is slack everywhere.
     """
 
     def sides(pressure: Array, contraction: Array) -> tuple[Array, Array]:
@@ -82,9 +88,11 @@ def _largest(
     if not taut.any():
         raise SolveError(f"{type(law).__name__} is slack in its whole validity range; the defect is not defined.")
     p, c = p[taut], c[taut]
-    actual, expected = (np.broadcast_to(side, p.shape) for side in sides(p, c))
+    with np.errstate(invalid="ignore"):  # zero pressure times the infinite dV/dL of straight fibres
+        actual, expected = (np.broadcast_to(side, p.shape) for side in sides(p, c))
+    p, c, actual, expected = (side[np.isfinite(expected)] for side in (p, c, actual, expected))
     difference = np.abs(actual - expected)
     at = int(np.argmax(difference))
-    worst = float(difference[at])
-    relative = worst / float(np.abs(expected).max())
+    worst, scale = float(difference[at]), float(np.abs(expected).max())
+    relative = worst / scale if scale > 0 else math.nan
     return EnergyDefect(worst, unit, float(p[at]), float(c[at]), relative, slack=float(1 - taut.mean()))

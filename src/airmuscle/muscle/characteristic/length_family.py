@@ -10,6 +10,7 @@ from ...core import ops
 from ...core.declaration import model, parameter
 from ...core.ops import Value
 from .base import ForceLaw
+from .solve import warn_above_whole_length
 
 
 @model
@@ -36,9 +37,10 @@ class LengthFamily(ForceLaw):
     @property
     def linear_in(self) -> tuple[str, ...]:
         """The coefficients of both models if both are linear in them, else none."""
-        models: tuple[tuple[str, Any], ...] = (("inner", self.inner), ("change", self.change))
-        fields = [f"{name}.{law.linear_in}" for name, law in models if hasattr(law, "linear_in")]
-        return tuple(fields) if len(fields) == len(models) else ()
+        inner, change = _linear_fields(self.inner), _linear_fields(self.change)
+        if not (inner and change):
+            return ()
+        return (*(f"inner.{field}" for field in inner), *(f"change.{field}" for field in change))
 
     def with_resting_length(self, resting_length: float) -> Self:
         """Return the model of a muscle of the same type with this resting length [m]."""
@@ -60,6 +62,8 @@ class LengthFamily(ForceLaw):
         return dataclasses.replace(self, **surfaces)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
+        if type(contraction) is not float or contraction > 1.0:
+            warn_above_whole_length(contraction, self)
         return ops.maximum(self.unclamped_force(pressure, contraction), 0.0)
 
     @abc.abstractmethod
@@ -96,3 +100,9 @@ class LogarithmicLength(LengthFamily):
 
     def length_factor(self) -> Value:
         return ops.log(self.resting_length / self.reference_length)
+
+
+def _linear_fields(law: ForceLaw) -> tuple[str, ...]:
+    """The fields in which a law is linear."""
+    fields: str | tuple[str, ...] = getattr(law, "linear_in", ())
+    return (fields,) if isinstance(fields, str) else fields

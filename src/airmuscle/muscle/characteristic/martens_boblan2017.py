@@ -10,6 +10,7 @@ from ...core.ops import Value
 from ...core.reference import Reference
 from ..geometry.braid import Braid
 from .base import ForceLaw
+from .solve import warn_above_whole_length
 
 MARTENS_BOBLAN_2017 = Reference(
     "martens-boblan-2017",
@@ -21,6 +22,9 @@ MARTENS_BOBLAN_2017 = Reference(
     "10.3390/act6040033",
     "formula, parameters and measured force maps of the appendix, CC BY 4.0; numbers read from a public copy",
 )
+
+_MAX_CONTRACTION = 0.4
+"""Upper limit of the contractions for which the modulus E(L) was identified."""
 
 
 @model
@@ -34,7 +38,8 @@ class MartensBoblan2017(ForceLaw):
 
     p: gauge pressure; L: length; D: diameter; L_f, n: length and number of turns of a thread; H_0: wall thickness;
     F_l, F_pe: axial and circumferential force of the wall. The braid angle is theta = 28.6 deg + d_theta with the
-    printed d_theta in radians. Reference: Martens and Boblan (2017).
+    printed d_theta in radians. Above a contraction of 40 %, the limit of E(L), the force is that at 40 %: the formula
+    would give a force that increases with contraction. Reference: Martens and Boblan (2017).
     """
 
     references: ClassVar[tuple[Reference, ...]] = (MARTENS_BOBLAN_2017,)
@@ -52,9 +57,11 @@ class MartensBoblan2017(ForceLaw):
     def contraction_range(self) -> tuple[float, float]:
         """From -5 %, or half the contraction of straight threads if greater, to 40 %, the validity range of E(L)."""
         straight, _ = self.geometry.contraction_range
-        return (ops.maximum(-0.05, straight / 2), 0.4)
+        return (ops.maximum(-0.05, straight / 2), _MAX_CONTRACTION)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
+        if type(contraction) is not float or contraction > 1.0:
+            warn_above_whole_length(contraction, self)
         return ops.maximum(self.unclamped_force(pressure, contraction), 0.0)
 
     def modulus(self, length: Value) -> Value:
@@ -63,7 +70,7 @@ class MartensBoblan2017(ForceLaw):
 
     def unclamped_force(self, pressure: Value, contraction: Value) -> Value:
         rest, angle = self.geometry.resting_length, self.geometry.braid_angle
-        length = rest * (1.0 - contraction)
+        length = rest * (1.0 - ops.minimum(contraction, _MAX_CONTRACTION))
         turns = rest * ops.tan(angle) / (ops.pi * 2 * self.geometry.radius)
         thread = rest / ops.cos(angle)
         across = ops.sqrt(thread**2 - length**2)

@@ -11,6 +11,7 @@ from ...core.arrays import Array
 from ...core.declaration import model, parameter
 from ...core.errors import AirmuscleWarning, PhysicsError, SolveError
 from ...core.ops import Value
+from ..geometry.base import check_degree
 from .base import Characteristic, ForceLaw
 from .contractile_surface import ContractileSurface, exponents
 from .validity_range import ValidityRange
@@ -50,8 +51,10 @@ def as_force_law(law: Characteristic, validity_range: ValidityRange, *, degree: 
 
     A polynomial of total degree `degree` is fitted by least squares on a dense grid; the errors are evaluated on a
     second grid between its points. Points without a solution are omitted, with an AirmuscleWarning that states their
-    fraction. Raises SolveError if too few points have a solution.
+    fraction. Raises SolveError if too few points have a solution, or if the force is unbounded at one of them, as that
+    of straight fibres at zero contraction, and ParameterError for a degree that is not an integer, 0 or more.
     """
+    check_degree("as_force_law", degree)
     count = 4 * (degree + 1)
     pressure, contraction = _grid(validity_range, np.cos(np.pi * (np.arange(count) + 0.5) / count))
     force = _force_or_nan(law, pressure, contraction)
@@ -80,7 +83,15 @@ def _with_errors(
 ) -> PolynomialSurrogate:
     """Return the surrogate of a fitted surface with its errors."""
     pressure, contraction = _grid(validity_range, np.linspace(-1.0, 1.0, 4 * surface.degree + 3))
-    error = surface.force(pressure, contraction) - _force_or_nan(law, pressure, contraction)
+    force = _force_or_nan(law, pressure, contraction)
+    if (unbounded := np.abs(force) > _NO_CLAMP).any():
+        at = int(np.argmax(unbounded))
+        raise SolveError(
+            f"as_force_law: the force of {type(law).__name__} is unbounded at a contraction of "
+            f"{100 * contraction[at]:.4g} % and {pressure[at] / 1e3:.4g} kPa. Choose a validity range without this "
+            "point."
+        )
+    error = surface.force(pressure, contraction) - force
     known = np.isfinite(error)
     if not known.all():
         warnings.warn(

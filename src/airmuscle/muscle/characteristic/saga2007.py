@@ -8,7 +8,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np  # noqa: TID251  (polynomial roots are never traced)
 
 from ...core import autodiff, ops
-from ...core.declaration import model, parameter
+from ...core.declaration import as_finite_float, model, parameter
 from ...core.errors import ParameterError
 from ...core.ops import Value
 from ...core.reference import Reference
@@ -150,11 +150,14 @@ class Saga2007(PressureLaw):
         return (ops.pi * self.geometry.end_radius**2 * pressure + force) * steepness / self.fibres
 
     def shell_tension(self, pressure: Value, contraction: Value) -> Value:
-        """Tension of one fibre [N] from the radial balance of the half shell, (18); equal to (8) in equilibrium."""
+        """Tension of one fibre [N] from the radial balance of the half shell, (18); equal to (8) in equilibrium.
+
+        It is unbounded at zero contraction, where the fibres are straight.
+        """
         shell, rubber, lever = self._terms(contraction)
         resultant = pressure * (shell + lever * ops.pi * self.geometry.end_radius**2) - rubber
         steepness = ops.sqrt(1.0 + self.end_slope(contraction) ** 2)
-        return resultant * steepness / (self.fibres * lever)
+        return resultant * steepness / (self.fibres * ops.maximum(lever, _MIN_SLOPE))
 
     def middle_strain(self, contraction: Value) -> Value:
         """Hoop strain of the rubber in the middle, (10): (l_0/(4 d_0)) sqrt(24 eps (1 - eps)) [1]."""
@@ -189,13 +192,15 @@ class Saga2007(PressureLaw):
 
         With the rubber integrated along the axis they are roots of one quintic, so that none is missed. Beyond
         `contraction_range` they are mathematical solutions without physical meaning. Raises ParameterError for
-        another rubber integral.
+        another rubber integral, and for a pressure or a load that is not finite.
         """
         if not isinstance(self.rubber_integral, AxialIntegral):
             raise ParameterError(
                 "Saga2007: the equilibria are roots of a polynomial only if the rubber is integrated along the axis; "
                 "use rubber_integral=AxialIntegral(), or the method `contraction`."
             )
+        for name, value in (("pressure", pressure), ("force", force)):
+            as_finite_float(f"Saga2007.equilibria: {name}", value)
         roots = sorted({c for c in _quintic_roots(self, pressure, force) if 0.0 <= c < 1.0})
         return tuple(EquilibriumPoint(c, self._is_stable(c, force)) for c in roots)
 

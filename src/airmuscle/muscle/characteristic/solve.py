@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from ...core.errors import SolveError, TraceError
+from ...core.errors import AirmuscleWarning, SolveError, TraceError
 
 INTERVALS = 256
 """Intervals of the search grid; a pair of roots within 1/256 of the search range is not resolved."""
@@ -32,6 +33,25 @@ def as_arrays(*values: Any) -> tuple[Any, ...]:
     """The values as arrays of numbers of one shape. Raises TraceError for traced values."""
     check_numbers(*values)
     return tuple(np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in values)))
+
+
+def warn_above_whole_length(contraction: Any, owner: object) -> None:
+    """Issue an AirmuscleWarning for contractions [1] above 1: probably percentages. Traced values are not checked.
+
+    `owner` is the law of the caller, which skips the call for an ordinary float.
+    """
+    if type(contraction).__module__.partition(".")[0] in ("casadi", "jax", "jaxlib"):
+        return
+    values = np.asarray(contraction, dtype=float)
+    largest = float(np.max(values, initial=0.0, where=~np.isnan(values)))
+    if largest > 1.0:
+        hint = f" Is it in per cent? As a ratio it is {largest / 100:g}." if largest <= 100.0 else ""
+        warnings.warn(
+            f"{type(owner).__name__}: a contraction of {largest:g} exceeds the whole length of the muscle; it is a "
+            f"ratio of lengths.{hint}",
+            AirmuscleWarning,
+            stacklevel=3,
+        )
 
 
 def describe_range(low: float, high: float, unit: str) -> str:

@@ -26,8 +26,9 @@ class Tabulated(Characteristic):
     The rows (p_i, eps_i, F_i) may be in any order. On an isobar the force must not increase with contraction, and it
     must not decrease from one isobar to the next, so that each quantity is uniquely determined by the other two.
     Isobars may cover different contraction ranges; between two of them the table covers their common range. Points
-    outside the table raise SolveError. The slope with respect to pressure is discontinuous at the isobars. A plant
-    uses the table through `as_force_law`.
+    outside the table raise SolveError. The slope with respect to pressure is discontinuous at the isobars: it is that
+    of the interval above, or of the one below where the next isobar does not cover the contraction. A plant uses the
+    table through `as_force_law`.
     Reference for the cubic: Fritsch and Carlson, SIAM J. Numer. Anal. 17:238 (1980).
     """
 
@@ -51,6 +52,10 @@ class Tabulated(Characteristic):
                 f"Tabulated: at a contraction of {100 * contraction:.4g} % the force decreases with pressure. Correct "
                 "the rows, or fit a surface to them."
             )
+
+    @property
+    def pressure_range(self) -> tuple[float, float]:
+        return (min(self.pressures), max(self.pressures))
 
     @property
     def contraction_range(self) -> tuple[float, float]:
@@ -129,11 +134,14 @@ class _IsobarTable:
             first = int(np.argmax(outside.reshape(-1)))
             raise SolveError(self._outside_message(p.flat[first], c.flat[first], start.flat[first], end.flat[first]))
         j, fraction = self._bracketing_isobars(p)
-        low, high = (np.take_along_axis(self.forces(c), k[None], axis=0)[0] for k in (j, j + 1))
+        forces = self.forces(c)
+        by_pressure = np.diff(forces, axis=0) / np.diff(self.levels).reshape(-1, *(1,) * c.ndim)
+        above, below = (np.take_along_axis(by_pressure, k[None], axis=0)[0] for k in (j, np.maximum(j - 1, 0)))
+        low, high = (np.take_along_axis(forces, k[None], axis=0)[0] for k in (j, j + 1))
         by_c = np.array([slope(c) for slope in self.slopes])
         low_by_c, high_by_c = (np.take_along_axis(by_c, k[None], axis=0)[0] for k in (j, j + 1))
-        by_pressure = (high - low) / (self.levels[j + 1] - self.levels[j])
-        return _interpolate(fraction, low, high), by_pressure, _interpolate(fraction, low_by_c, high_by_c)
+        slope = np.where(np.isnan(above) & (fraction == 0), below, above)
+        return _interpolate(fraction, low, high), slope, _interpolate(fraction, low_by_c, high_by_c)
 
     def contraction_limits(self, pressure: Array) -> tuple[Array, Array]:
         """Contraction limits of the table at each pressure [Pa]; NaN for pressures outside it."""

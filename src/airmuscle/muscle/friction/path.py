@@ -78,6 +78,8 @@ def relative_deflection(rate: Callable[[Any, Any], Any], displacement: Any, slid
     for the sharpest transitions and 1e-8 for usual ones.
     """
     increments = _increments(displacement) / sliding_length
+    if not increments.size:
+        return increments
     curve = _LoadingCurve(rate)
     positions, directions = np.zeros(increments.size), np.ones(increments.size)
     distances, xi, direction = np.abs(increments), curve.position(0.0), 1.0

@@ -9,18 +9,19 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import autodiff
-from ...core.errors import GeometryLimitError
+from ...core.annotation import abridged
+from ...core.errors import GeometryLimitError, ParameterError
 from ...core.ops import Value
 from ...core.quantity_arguments import accept_quantities_in
 from ...core.reference import Reference
 
 
 def check_contraction_range(contraction: Value, limits: tuple[float, float], owner: str, remark: str = "") -> None:
-    """Raise GeometryLimitError if a contraction [1] is outside `limits`; symbols are not checked.
+    """Raise GeometryLimitError if a contraction [1] is outside `limits`; symbols and JAX arrays are not checked.
 
     `owner` names the model and `remark` extends the message.
     """
-    if not isinstance(contraction, float | int | np.ndarray | np.generic):
+    if type(contraction).__module__.partition(".")[0] in ("casadi", "jax", "jaxlib"):
         return
     values = np.asarray(contraction, dtype=float)
     outside = ~((values >= limits[0]) & (values <= limits[1]))
@@ -33,6 +34,12 @@ def check_contraction_range(contraction: Value, limits: tuple[float, float], own
 
 _UNITS = {"volume": ("1",), "volume_derivative": ("1",)}
 """Units of the arguments of the methods."""
+
+
+def check_degree(owner: str, degree: object, least: int = 0) -> None:
+    """Raise ParameterError unless the degree of a polynomial is an integer of at least `least`."""
+    if isinstance(degree, bool) or not isinstance(degree, int) or degree < least:
+        raise ParameterError(f"{owner}: degree is {abridged(degree)}; it must be an integer, {least} or more.")
 
 
 class Geometry(abc.ABC):

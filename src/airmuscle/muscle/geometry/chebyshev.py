@@ -7,9 +7,9 @@ import numpy.typing as npt
 
 from ...core import ops
 from ...core.declaration import model, parameter
-from ...core.errors import ParameterError
+from ...core.errors import GeometryLimitError, ParameterError
 from ...core.ops import Value
-from .base import Geometry
+from .base import Geometry, check_degree
 
 _ERROR_POINTS = 1001
 """Points at which the approximation error is evaluated; dense enough for the kinks in the slope of a table."""
@@ -40,11 +40,15 @@ class ChebyshevGeometry(Geometry):
     )
 
     def check(self) -> None:
-        if len(self.coefficients) < 2 or not self.min_contraction < self.max_contraction < 1.0:
+        if len(self.coefficients) < 2:
             raise ParameterError(
-                f"ChebyshevGeometry: {len(self.coefficients)} coefficients on contractions {self.min_contraction:g} "
-                f"to {self.max_contraction:g}; at least two coefficients and min_contraction < max_contraction < 1 "
-                "are required."
+                f"ChebyshevGeometry: {len(self.coefficients)} coefficients; at least two are required (degree 1)."
+            )
+        if not self.min_contraction < self.max_contraction < 1.0:
+            raise ParameterError(
+                f"ChebyshevGeometry: min_contraction is {self.min_contraction:g} and max_contraction "
+                f"{self.max_contraction:g}; the first must be less than the second, and this less than 1, where the "
+                "length is zero."
             )
 
     @property
@@ -82,11 +86,17 @@ def as_polynomial(
     """Return a traceable geometry that interpolates `geometry` at the Chebyshev points of a contraction range [1].
 
     The default range is that of the geometry. The errors are evaluated at 1001 points. If dV/deps is infinite at zero
-    contraction, as for straight fibres, the range must begin above zero. Raises GeometryLimitError if the range
-    exceeds that of the geometry.
+    contraction, as for straight fibres, the range must begin above zero, otherwise GeometryLimitError is raised, as it
+    is if the range exceeds that of the geometry. Raises ParameterError for a degree that is not a positive integer.
     """
+    check_degree("as_polynomial", degree, 1)
     low, high = contraction_range or geometry.contraction_range
     geometry.check_contraction([low, high])
+    if low < high and not np.isfinite(geometry.volume_derivative(low)):
+        raise GeometryLimitError(
+            f"as_polynomial: dV/deps of {type(geometry).__name__} is infinite at a contraction of {100 * low:.4g} %. "
+            f"Give a contraction_range that begins above it, such as ({low + 0.01:g}, {high:g})."
+        )
     middle, half = (low + high) / 2, (high - low) / 2
     coefficients = np.polynomial.chebyshev.chebinterpolate(
         lambda x: geometry.volume(_clip_to_range(middle + half * x, low, high)), degree

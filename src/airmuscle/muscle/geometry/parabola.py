@@ -44,6 +44,7 @@ def _arc_moment(slope_squared: Value, power: int) -> Value:
 def _parabolic_segment(slope: Value, slope_squared: Value, length: Value, end_radius: Value) -> Segment:
     """Segment with a parabolic meridian of this end slope, chord length [m] and end radius [m]."""
     rise = length * slope / 4
+    rise_squared = length**2 * slope_squared / 16  # not rise**2, whose derivative is 0 times infinity at rest
     excess = 2 * length * rise / 3
     steepness = ops.sqrt(1.0 + slope_squared)
     return Segment(
@@ -55,8 +56,8 @@ def _parabolic_segment(slope: Value, slope_squared: Value, length: Value, end_ra
         end_cosine=1.0 / steepness,
         excess=excess,
         arc_excess=length * rise * _arc_moment(slope_squared, 1),
-        arc_excess_squared=length * rise**2 * _arc_moment(slope_squared, 2),
-        volume=segment_volume(end_radius, length, excess, 8 * length * rise**2 / 15),
+        arc_excess_squared=length * rise_squared * _arc_moment(slope_squared, 2),
+        volume=segment_volume(end_radius, length, excess, 8 * length * rise_squared / 15),
     )
 
 

@@ -92,7 +92,8 @@ class PleatedTube(FibreTube):
         """Effective area F/p [m2] of the ideal muscle; infinite at zero contraction."""
         shape = self.elliptic_outline(contraction)
         radius = self.end_radius / np.cos(shape.angle)
-        return unwrap_scalar(np.pi * radius**2 * (1 - 2 * shape.parameter) / (2 * shape.parameter))
+        area = np.pi * radius**2 * (1 - 2 * shape.parameter) / (2 * shape.parameter)
+        return unwrap_scalar(np.where(np.asarray(contraction) > 0, area, np.inf))
 
     def volume_derivative(self, contraction: Value) -> Value:
         """dV/deps = L_0 F/p [m3] by virtual work; the tests compare it with the derivative of the volume."""

@@ -86,5 +86,9 @@ class StraightFibre(FibreTube):
         check_contraction_range(contraction, self.contraction_range, "StraightFibre")
         return self.meridian.segment(contraction, self.fibre_length, self.end_radius)
 
+    def volume_derivative(self, contraction: Value) -> Value:
+        check_contraction_range(contraction, self.contraction_range, "StraightFibre")
+        return super().volume_derivative(contraction)
+
     def profile(self, contraction: float, position: Array) -> Profile:
         return self.meridian.profile(contraction, self.fibre_length, self.end_radius, position)
