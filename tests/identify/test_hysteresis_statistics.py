@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from airmuscle.core.errors import AirmuscleWarning, ColumnError, IdentificationError
 from airmuscle.identify.hysteresis import (
     HysteresisFit,
     LoopFit,
@@ -245,3 +246,18 @@ def test_the_standard_deviation_and_the_criterion_of_a_polynomial_are_those_of_l
     k = degree + 2
     criterion = 12 * np.log(square[0] / 12) + 2 * k + 2 * k * (k + 1) / (12 - k - 1)
     assert fit.aicc[f"polynomial of degree {degree}"] == pytest.approx(criterion, rel=1e-9)
+
+
+# No rows
+
+
+def test_a_recording_without_rows_is_refused_or_left_out_by_name():
+    empty = dataclasses.replace(loop().rows(slice(0, 0)), origin="empty.csv")
+    with pytest.raises(IdentificationError, match=r"empty\.csv: a fit of creep needs 12 or more rows"):
+        fit_creep(empty, "force")
+    with pytest.raises(ColumnError, match=r"empty\.csv: the recording has no rows"):
+        volume_points([empty])
+    with pytest.raises(IdentificationError, match=r"empty\.csv: the recording has no rows"):
+        find_loops([empty])
+    with pytest.warns(AirmuscleWarning, match=r"left out: empty\.csv: the recording has no rows"):
+        assert len(find_loops([empty, loop()])) == 1
