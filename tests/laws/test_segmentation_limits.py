@@ -19,6 +19,7 @@ from airmuscle.recording.segment import (
     find_branches,
     find_outliers,
     find_runs,
+    inspect,
     quasi_static_rows,
 )
 from airmuscle.recording.segment.sensor import estimate_noise
@@ -165,3 +166,14 @@ def test_the_noise_of_a_length_makes_no_reversal_of_a_motion(std: float):
     contraction = contraction + RANDOM(4).normal(0.0, std, 240)
     recording = timed(contraction=contraction, pressure=np.full(240, 3e5), force=2e3 * contraction)
     assert [b.direction for b in find_branches(recording)] == [1, -1]
+
+
+# No rows
+
+
+def test_a_recording_without_rows_has_no_sensor_and_no_segment_and_does_not_count_beside_others():
+    empty = timed(pressure=np.empty(0), contraction=np.empty(0), force=np.empty(0))
+    found = inspect(empty)
+    assert (found.sensors, found.runs, found.branches, found.plateaus, found.quasi_static) == ({}, (), (), (), 0.0)
+    other = timed(pressure=RANDOM(5).normal(0.0, 100.0, 50))
+    assert estimate_sensors([empty, other]) == estimate_sensors([other])

@@ -74,6 +74,8 @@ def volume_points(recordings: Sequence[Recording], temperature: float = 293.15) 
     """
     contractions, volumes, fills = [], [], 0
     for recording in recordings:
+        if not len(recording):
+            raise ColumnError(f"{recording.origin}: the recording has no rows. Give one with measured values.")
         if "volume" in recording.columns:
             contractions.append(recording["contraction"])
             volumes.append(recording["volume"])

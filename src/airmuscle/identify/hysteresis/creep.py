@@ -90,12 +90,13 @@ def fit_creep(recording: Recording, quantity: str) -> CreepFit:
     Time counts from the first row. An element is added as long as the F test is significant. Raises IdentificationError
     for fewer than 12 rows, or time that does not increase.
     """
-    time, values = recording["time"] - recording["time"][0], recording[quantity]
+    time, values = recording["time"], recording[quantity]
     if time.size < 12 or not (np.diff(time) > 0).all():
         raise IdentificationError(
             f"{recording.origin}: a fit of creep needs 12 or more rows of a hold in increasing time; there are "
             f"{time.size} rows."
         )
+    time = time - time[0]
     fits = [_fit_constant(values), _fit_elements(time, values, 1), _fit_elements(time, values, 2)]
     squares = [float(np.mean((creep.value_at(time) - values) ** 2)) for creep in fits]
     sample_size = effective_sample_size(fits[-1].value_at(time) - values)

@@ -103,7 +103,9 @@ def find_loops(
     isometric while no characteristic is given.
     """
     sensors, loops, failed = estimate_sensors(recordings), list[HysteresisLoop](), list[IdentificationError]()
-    each_run = [part for recording in recordings for part in _separate_runs(recording, sensors)]
+    empty = [recording.origin for recording in recordings if not len(recording)]
+    failed += [IdentificationError(f"{origin}: the recording has no rows. Give one with a loop.") for origin in empty]
+    each_run = [part for recording in recordings if len(recording) for part in _separate_runs(recording, sensors)]
     for recording, run in each_run:
         try:
             loop = _make_loop(recording, run, sensors, characteristic, degree, all_rows)

@@ -65,9 +65,10 @@ def estimate_sensors(recordings: Recording | Sequence[Recording]) -> Mapping[str
     """The sensors of the columns of a recording, or of several recordings from one test rig, by column name.
 
     Several recordings show the limits more reliably, because a single run may hardly reach them. Resolution and noise
-    are medians over the recordings.
+    are medians over the recordings. Recordings without rows do not count.
     """
-    several = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
+    given = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
+    several = [recording for recording in given if len(recording)]
     names = dict.fromkeys(n for r in several for n in r.columns if n.rpartition(".")[2] not in _IGNORED)
     return {
         name: _estimate_sensor(name, [r.columns[name] for r in several if name in r.columns])
