@@ -216,3 +216,16 @@ def test_equilibria_and_fibre_tensions_at_the_ends():
         with pytest.raises(ParameterError, match=r"Saga2007.equilibria: .* must be finite"):
             law.equilibria(*point)
     assert law.shell_tension(1e5, 0.0) > 1e100
+
+
+def test_the_range_of_a_short_pleated_tube_ends_where_the_search_for_its_outline_ends():
+    tube = PleatedTube(0.02, 0.1)
+    end = tube.contraction_range[1]
+    assert tube.free_contraction < end < 0.5
+    assert tube.elliptic_outline(end).parameter == pytest.approx(0.81, rel=1e-9)
+
+
+def test_the_contraction_of_a_circle_by_virtual_work_ends_below_its_maximum_volume():
+    law = CircleVirtualWork(StraightFibre(0.2, 0.02), RUBBER, 2e-3)
+    end = law.contraction_range[1]
+    assert law.geometry.volume_derivative(end) > 0.0 > law.geometry.volume_derivative(end * (1 + 3e-9))
