@@ -229,3 +229,24 @@ def test_the_contraction_of_a_circle_by_virtual_work_ends_below_its_maximum_volu
     law = CircleVirtualWork(StraightFibre(0.2, 0.02), RUBBER, 2e-3)
     end = law.contraction_range[1]
     assert law.geometry.volume_derivative(end) > 0.0 > law.geometry.volume_derivative(end * (1 + 3e-9))
+
+
+def test_an_energy_defect_states_the_share_of_slack_states():
+    law = VirtualWork(BRAID)  # it pushes above its maximum volume
+    end = 1.0 - 1.0 / (np.sqrt(3.0) * np.cos(BRAID.braid_angle))
+    known = ValidityRange(1e5, 2e5, 0.0, 2 * end)
+    assert virtual_work_defect(law, BRAID, known).slack == pytest.approx(20 / 41, abs=1 / 40)
+    assert virtual_work_defect(law, BRAID, ValidityRange(1e5, 2e5, 0.0, end)).slack < 1 / 40
+    assert f"slack on {100 * maxwell_defect(law, BRAID, known).slack:.0f} %" in str(maxwell_defect(law, BRAID, known))
+
+
+def test_rigid_ends_end_where_the_active_length_ends():
+    law = EffectiveLength(SURFACE, 0.2, 0.04, 0.002)
+    low, high = law.contraction_range
+    assert [(c * 0.2 + 0.002) / 0.16 for c in (low, high)] == pytest.approx(SURFACE.contraction_range)
+    wider = law.with_validity_range((1e5, 5e5), (0.0, 0.2)).inner
+    assert wider.validity_range.pressure == (1e5, 5e5)
+    assert wider.validity_range.contraction == pytest.approx((-0.1, 0.3))
+    same = law.rescaled((1e5, 5e5), (0.0, 0.2))
+    assert same.inner.validity_range == wider.validity_range
+    assert same.unclamped_force(2e5, 0.1) == pytest.approx(law.unclamped_force(2e5, 0.1), rel=1e-12)
