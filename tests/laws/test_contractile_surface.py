@@ -86,3 +86,7 @@ def test_it_stays_within_its_force_limits():
 def test_invalid_surfaces_are_errors(change, message):
     with pytest.raises(ParameterError, match=message):
         dataclasses.replace(surface(0), **change)
+
+
+def test_the_labels_of_the_terms_follow_the_order_of_the_coefficients():
+    assert ContractileSurface.blank(2).term_labels == ("1", "x", "x^2", "q", "x q", "q^2")

@@ -18,6 +18,7 @@ from airmuscle.core.errors import AirmuscleWarning, ParameterError, SolveError
 from airmuscle.library import catalogue, files
 from airmuscle.library.entry import Entry
 from airmuscle.muscle.characteristic.base import Characteristic, ContractionLaw, ForceLaw, PressureLaw
+from airmuscle.muscle.characteristic.solve import find_first_root
 from airmuscle.muscle.characteristic.validity_range import ValidityRange
 
 ARGUMENTS = {
@@ -188,3 +189,39 @@ def test_jax_gives_the_values_of_numpy(name: str):
 def test_a_validity_range_needs_increasing_limits():
     with pytest.raises(ParameterError, match="min_pressure 2 must be less than max_pressure 1"):
         ValidityRange(2.0, 1.0, 0.0, 0.1)
+
+
+def first_root(function: Any, a: Any = 0.0, b: Any = 0.0) -> Any:
+    """The first root from -1 to 2."""
+    return find_first_root(function, (-1.0, 2.0), (a, b), lambda *values: "no root: " + ", ".join(map(str, values)))
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+def test_the_first_of_several_roots_is_found_at_any_scale(scale: float):
+    at = np.array([[-0.9], [0.31], [1.2]])
+    found = first_root(lambda x, a, b: scale * (x - a) * (x - b) * (x - 1.9), at, np.array([1.5, 1.6]))
+    np.testing.assert_allclose(found, np.broadcast_to(at, (3, 2)), rtol=1e-14)
+
+
+def test_a_plateau_at_zero_begins_at_its_edge_and_a_root_at_the_start_is_the_start():
+    edges = np.array([-0.3, 0.1234, 1.7])
+    np.testing.assert_allclose(first_root(lambda x, a, b: np.minimum(x - a, 0.0), edges), edges, rtol=1e-14)
+    assert first_root(lambda x, a, b: np.maximum(x + 1.0, 0.0)) == -1.0
+    assert first_root(lambda x, a, b: 0.0 * x) == -1.0
+
+
+def test_without_a_root_the_message_has_the_arguments_and_the_extreme_values():
+    with pytest.raises(SolveError, match=r"no root: 3.0, 0.5, -3.5, -0.5$"):
+        first_root(lambda x, a, b: x - a + b, np.array([0.0, 3.0]), 0.5)
+    with pytest.raises(SolveError, match=r"no root: 1.0, 0.0, nan, nan$"):
+        first_root(lambda x, a, b: x * np.nan, 1.0)
+    with pytest.raises(SolveError, match=r"no root: 0.0, 0.0, -2.0, 1.0$"):  # it falls through zero
+        first_root(lambda x, a, b: -x)
+
+
+def test_no_load_on_a_limited_law_is_solved_where_the_force_ends():
+    law = entry("sarosi-dmsp-10").characteristic
+    free = law.contraction(4e5, 0.0)
+    assert law.force(4e5, free) == pytest.approx(0.0, abs=1e-9)
+    assert law.force(4e5, free - 1e-6) > 0.0
+    assert law.contraction(4e5, 1e-6) == pytest.approx(free, abs=1e-8)

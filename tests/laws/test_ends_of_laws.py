@@ -216,3 +216,37 @@ def test_equilibria_and_fibre_tensions_at_the_ends():
         with pytest.raises(ParameterError, match=r"Saga2007.equilibria: .* must be finite"):
             law.equilibria(*point)
     assert law.shell_tension(1e5, 0.0) > 1e100
+
+
+def test_the_range_of_a_short_pleated_tube_ends_where_the_search_for_its_outline_ends():
+    tube = PleatedTube(0.02, 0.1)
+    end = tube.contraction_range[1]
+    assert tube.free_contraction < end < 0.5
+    assert tube.elliptic_outline(end).parameter == pytest.approx(0.81, rel=1e-9)
+
+
+def test_the_contraction_of_a_circle_by_virtual_work_ends_below_its_maximum_volume():
+    law = CircleVirtualWork(StraightFibre(0.2, 0.02), RUBBER, 2e-3)
+    end = law.contraction_range[1]
+    assert law.geometry.volume_derivative(end) > 0.0 > law.geometry.volume_derivative(end * (1 + 3e-9))
+
+
+def test_an_energy_defect_states_the_share_of_slack_states():
+    law = VirtualWork(BRAID)  # it pushes above its maximum volume
+    end = 1.0 - 1.0 / (np.sqrt(3.0) * np.cos(BRAID.braid_angle))
+    known = ValidityRange(1e5, 2e5, 0.0, 2 * end)
+    assert virtual_work_defect(law, BRAID, known).slack == pytest.approx(20 / 41, abs=1 / 40)
+    assert virtual_work_defect(law, BRAID, ValidityRange(1e5, 2e5, 0.0, end)).slack < 1 / 40
+    assert f"slack on {100 * maxwell_defect(law, BRAID, known).slack:.0f} %" in str(maxwell_defect(law, BRAID, known))
+
+
+def test_rigid_ends_end_where_the_active_length_ends():
+    law = EffectiveLength(SURFACE, 0.2, 0.04, 0.002)
+    low, high = law.contraction_range
+    assert [(c * 0.2 + 0.002) / 0.16 for c in (low, high)] == pytest.approx(SURFACE.contraction_range)
+    wider = law.with_validity_range((1e5, 5e5), (0.0, 0.2)).inner
+    assert wider.validity_range.pressure == (1e5, 5e5)
+    assert wider.validity_range.contraction == pytest.approx((-0.1, 0.3))
+    same = law.rescaled((1e5, 5e5), (0.0, 0.2))
+    assert same.inner.validity_range == wider.validity_range
+    assert same.unclamped_force(2e5, 0.1) == pytest.approx(law.unclamped_force(2e5, 0.1), rel=1e-12)

@@ -57,6 +57,16 @@ def test_the_slope_on_an_isobar_is_one_sided_where_the_next_isobar_does_not_cove
     assert law.slopes(2e5, np.array([0.0, 0.1])).by_pressure == pytest.approx([1e-3, 140.0 / 1e5])
     assert law.slopes(3e5, 0.1).by_pressure == pytest.approx(140.0 / 1e5)
     assert law.slopes(1e5, 0.1).by_pressure == pytest.approx(80.0 / 1e5)
+    with pytest.raises(SolveError, match=r"250 kPa and a contraction of 3 % .* covers 5 to 10 % at this pressure"):
+        law.force(2.5e5, 0.03)
+    assert law.pressure(0.1, 150.0) == pytest.approx(2e5 + 0.5 * 1e5)
+
+
+def test_isobars_may_touch_and_the_lowest_pressure_is_the_solution():
+    law = Tabulated((1e5, 1e5, 2e5, 2e5, 3e5, 3e5), (0.0, 0.2) * 3, (100.0, 0.0, 150.0, 0.0, 260.0, 60.0))
+    assert law.force(1.5e5, 0.2) == 0.0
+    assert law.pressure(0.2, 0.0) == 1e5
+    assert law.pressure(np.array([0.0, 0.2]), np.array([205.0, 15.0])) == pytest.approx([2.5e5, 2.25e5])
 
 
 def test_a_point_without_a_solution_states_the_tabulated_range():

@@ -372,8 +372,10 @@ def test_parameters_that_are_not_tunable_are_constants(tmp_path):
 
 def test_units_are_powers_of_base_units():
     assert base_powers("m3/(s Pa)") == {"m": 4, "kg": -1, "s": 1}
+    assert base_powers("N/") is None
     assert base_powers("N m/rad") == {"kg": 1, "m": 2, "s": -2, "rad": -1}
     assert base_powers("Pa/m^2") == {"kg": 1, "m": -3, "s": -2}
+    assert base_powers("N/m/Pa") == {"m": 1}
     assert base_powers("u/y") is None
 
 

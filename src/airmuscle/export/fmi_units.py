@@ -17,9 +17,9 @@ _ATOM = re.compile(r"([A-Za-z]+)(?:\^?(-?\d+))?$")
 
 def base_powers(unit: str) -> dict[str, int] | None:
     """The powers of the base units in a unit such as `m3/(s Pa)`; None where they are not known."""
-    numerator, slash, denominator = unit.replace("Pa(a)", "Pa").partition("/")
+    numerator, *denominators = unit.replace("Pa(a)", "Pa").split("/")
     powers: dict[str, int] = {}
-    for part, sign in ((numerator, 1), (denominator.strip("()"), -1)):
+    for part, sign in ((numerator, 1), *((text.strip("()"), -1) for text in denominators)):
         for word in part.replace("*", " ").split():
             atom = _ATOM.match(word)
             if word == "1":
@@ -28,7 +28,7 @@ def base_powers(unit: str) -> dict[str, int] | None:
                 return None
             for base, power in BASE[atom[1]].items():
                 powers[base] = powers.get(base, 0) + sign * power * int(atom[2] or 1)
-    if slash and not denominator:
+    if "" in denominators:
         return None
     return {base: power for base, power in powers.items() if power}
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -25,6 +26,9 @@ _WORDS = """
 """
 KEYWORDS = frozenset(_WORDS.split())
 """Words of Modelica, and names in the package, that are no names of variables."""
+_FACTORS = r"[A-Za-z]+-?\d*(\.[A-Za-z]+-?\d*)*"
+_UNIT = re.compile(rf"(1|{_FACTORS})(/([A-Za-z]+-?\d*|\({_FACTORS}\)))?")
+"""Units of the Modelica specification: whole exponents, and one fraction bar."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -98,7 +102,8 @@ def _variables(program: ExportedRun) -> tuple[list[ModelicaVariable], ...]:
     for group in groups:
         variables = []
         for name, kind, unit, value in group:
-            word, text = next(words), [f'unit = "{_modelica_unit(unit)}"']
+            word, in_units = next(words), _modelica_unit(unit)
+            text = [f'unit = "{in_units}"'] if in_units else []
             binding = f" = {value}" if kind.startswith("parameter") else ""
             text += [value] if value and not binding else []
             label = name.replace("\\", " ").replace('"', "'")
@@ -112,5 +117,9 @@ def _identifiers(names: Sequence[str]) -> list[str]:
 
 
 def _modelica_unit(unit: str) -> str:
-    """A unit in the syntax of Modelica: `N.m/rad` for `N m/rad`."""
-    return unit.replace("Pa(a)", "Pa").replace("^", "").replace("*", ".").replace(" ", ".") or "1"
+    """A unit in the syntax of Modelica: `N.m/rad` for `N m/rad`, `N/(m.Pa)` for `N/m/Pa`; empty if it has none."""
+    numerator, *denominators = unit.replace("Pa(a)", "Pa").replace("^", "").replace("*", " ").split("/")
+    below = ".".join(word for part in denominators for word in part.strip("()").split())
+    fraction = f"/({below})" if "." in below else f"/{below}" if below else ""
+    text = (".".join(numerator.split()) or "1") + fraction
+    return text if _UNIT.fullmatch(text) else ""
