@@ -136,11 +136,10 @@ def test_no_law_gives_a_force_without_a_word_for_a_contraction_in_per_cent(name:
     with warnings.catch_warnings(record=True) as issued:
         warnings.simplefilter("always")
         try:
-            force = law.force(3e5, contraction)
+            law.force(3e5, contraction)
         except PhysicsError:
             return
-    straight_line = name in ("reynolds2003", "serres2009")
-    assert np.nanmin(force) < -1e4 if straight_line else "per cent? As a ratio it is 0.1" in str(issued[0].message)
+    assert "per cent? As a ratio it is 0.1" in str(issued[0].message)
 
 
 @pytest.mark.parametrize("law", [SURFACE, InverseLength(SURFACE, SURFACE, 0.2, 0.3), EffectiveLength(SURFACE, 0.2, 0.0),
@@ -151,7 +150,8 @@ def test_a_law_with_a_limited_force_names_the_unit_of_a_contraction_in_per_cent(
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         law.force(np.array([3e5, 4e5]), np.array([[1.0], [-0.05]]))
-        law.slopes(3e5, 1.5)  # traced
+    with pytest.warns(AirmuscleWarning, match=r"contraction of 1\.5 exceeds"):
+        law.slopes(3e5, 1.5)
     with pytest.warns(AirmuscleWarning, match="contraction of 500 exceeds .* a ratio of lengths.$"):
         law.force(3e5, 500)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import inspect
 from collections.abc import Callable, Mapping, Sequence
@@ -20,13 +21,24 @@ _EXAMPLES = {"Pa": "'3 bar'", "N": "'200 N'", "1": "'10 %'"}
 """A text for each unit of an argument."""
 
 
-def accept_quantities(method: Callable[..., Any], units: Sequence[str]) -> Callable[..., Any]:
+@dataclasses.dataclass(frozen=True)
+class RatioCheck:
+    """Check of an argument that is a ratio: `check(value, owner)` of every value that is not a float of at most 1."""
+
+    argument: str
+    check: Callable[[Any, object], None]
+
+
+def accept_quantities(
+    method: Callable[..., Any], units: Sequence[str], ratio: RatioCheck | None = None
+) -> Callable[..., Any]:
     """The method, whose leading arguments after `self` may also be texts with a unit, lists and arrays of integers.
 
     Symbols and arrays of other libraries are passed on. A call with two numbers takes 0.1 us longer.
     """
     names = tuple(inspect.signature(method).parameters)[1 : 1 + len(units)]
     unit_of = dict(zip(names, units, strict=True))
+    place = names.index(ratio.argument) if ratio is not None and ratio.argument in names else None
 
     @functools.wraps(method)
     def converted(self: Any, *given: Any, **named: Any) -> Any:
@@ -35,21 +47,25 @@ def accept_quantities(method: Callable[..., Any], units: Sequence[str]) -> Calla
             if (type(a) in _PLAIN or (type(a) is _ARRAY and a.dtype is _DOUBLE)) and (
                 type(b) in _PLAIN or (type(b) is _ARRAY and b.dtype is _DOUBLE)
             ):
+                if place is not None and not (type(given[place]) is float and given[place] <= 1.0):
+                    ratio.check(given[place], self)  # type: ignore[union-attr]
                 return method(self, a, b)
         owner = f"{type(self).__name__}.{method.__name__}"
         values = [_as_number(value, name, unit_of, owner) for value, name in zip(given, names, strict=False)]
         named = {name: _as_number(value, name, unit_of, owner) for name, value in named.items()}
+        if place is not None:
+            ratio.check(values[place] if place < len(values) else named.get(names[place], 0.0), self)  # type: ignore[union-attr]
         return method(self, *values, *given[len(values) :], **named)
 
     return converted
 
 
-def accept_quantities_in(cls: type[Any], units: Mapping[str, Sequence[str]]) -> None:
+def accept_quantities_in(cls: type[Any], units: Mapping[str, Sequence[str]], ratio: RatioCheck | None = None) -> None:
     """Let the methods that a class defines itself accept quantities; `units` are those of their arguments."""
     for name, of_arguments in units.items():
         method = cls.__dict__.get(name)
         if inspect.isfunction(method) and not getattr(method, "__isabstractmethod__", False):
-            setattr(cls, name, accept_quantities(method, of_arguments))
+            setattr(cls, name, accept_quantities(method, of_arguments, ratio))
 
 
 def _as_number(value: Any, name: str, units: Mapping[str, str], owner: str) -> Any:

@@ -12,15 +12,16 @@ from typing import Any, ClassVar, NamedTuple
 
 from ...core import autodiff
 from ...core.ops import Value
-from ...core.quantity_arguments import accept_quantities_in
+from ...core.quantity_arguments import RatioCheck, accept_quantities_in
 from ...core.reference import Reference
-from .solve import describe_range, find_first_root
+from .solve import describe_range, find_first_root, warn_above_whole_length
 
 _UNITS = {
     "force": ("Pa", "1"), "contraction": ("Pa", "N"), "pressure": ("1", "N"), "slopes": ("Pa", "1"),
     "stiffness": ("Pa", "1"),
 }  # fmt: skip
 """Units of the arguments of the methods."""
+_CONTRACTION = RatioCheck("contraction", warn_above_whole_length)
 MIN_PRESSURE = 1e-300
 """Replaces a pressure of zero [Pa] as a divisor; no load then has a solution."""
 
@@ -46,7 +47,7 @@ class Characteristic(abc.ABC):
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
-        accept_quantities_in(cls, _UNITS)
+        accept_quantities_in(cls, _UNITS, _CONTRACTION)
 
     @property
     def pressure_range(self) -> tuple[float, float]:
@@ -107,7 +108,7 @@ class Characteristic(abc.ABC):
         )
 
 
-accept_quantities_in(Characteristic, _UNITS)
+accept_quantities_in(Characteristic, _UNITS, _CONTRACTION)
 
 
 class ForceLaw(Characteristic):

@@ -10,7 +10,7 @@ from ...core.ops import Value
 from ...core.reference import Reference
 from ..geometry.braid import CHOU_HANNAFORD_1996, Braid
 from .base import MIN_PRESSURE, ForceLaw
-from .solve import check_solution, warn_above_whole_length
+from .solve import check_solution
 
 
 @model
@@ -45,13 +45,9 @@ class ChouHannaford1996(ForceLaw):
         return (start, 1.0 - self.thread / (ops.sqrt(3.0) * self.geometry.resting_length))
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        if type(contraction) is not float or contraction > 1.0:
-            warn_above_whole_length(contraction, self)
         return pressure * self._effective_area(contraction)
 
     def pressure(self, contraction: Value, force: Value) -> Value:
-        if type(contraction) is not float or contraction > 1.0:
-            warn_above_whole_length(contraction, self)
         solution = force / self._effective_area(contraction)
         return check_solution(solution, self.pressure_range, (contraction, force), self._pressure_limits_message)
 

@@ -7,7 +7,6 @@ from ...core.declaration import model, parameter
 from ...core.errors import ParameterError
 from ...core.ops import Value
 from .base import ForceLaw
-from .solve import warn_above_whole_length
 
 
 @model
@@ -32,8 +31,6 @@ class Clamped(ForceLaw):
         return self.inner.contraction_range
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        if type(contraction) is not float or contraction > 1.0:
-            warn_above_whole_length(contraction, self)
         return ops.clip(self.inner.force(pressure, contraction), self.min_force, self.max_force)
 
     def unclamped_force(self, pressure: Value, contraction: Value) -> Value:

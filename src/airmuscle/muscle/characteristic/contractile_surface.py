@@ -12,7 +12,6 @@ from ...core.ops import Value
 from ...core.reference import Reference
 from ..geometry.base import check_degree
 from .base import ForceLaw
-from .solve import warn_above_whole_length
 from .validity_range import ValidityRange
 
 HOSOVSKY_HILL = Reference(
@@ -110,8 +109,6 @@ class ContractileSurface(ForceLaw):
         return ValidityRange(self.min_pressure, self.max_pressure, self.min_contraction, self.max_contraction)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        if type(contraction) is not float or contraction > 1.0:
-            warn_above_whole_length(contraction, self)
         return ops.clip(self.polynomial(pressure, contraction), self.min_force, self.max_force)
 
     def unclamped_force(self, pressure: Value, contraction: Value) -> Value:

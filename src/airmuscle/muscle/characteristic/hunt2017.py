@@ -10,7 +10,6 @@ from ...core.errors import ParameterError
 from ...core.ops import Value
 from ...core.reference import Reference
 from .base import PressureLaw
-from .solve import warn_above_whole_length
 
 HUNT_2017 = Reference(
     "hunt-2017",
@@ -71,8 +70,6 @@ class Hunt2017(PressureLaw):
             )
 
     def pressure(self, contraction: Value, force: Value) -> Value:
-        if type(contraction) is not float or contraction > 1.0:
-            warn_above_whole_length(contraction, self)
         span = ops.maximum(self.max_contraction - self.span_by_force * force, _MIN_SPAN)
         argument = ops.clip(
             self.steepness * (contraction / span - self.centre), -_MAX_TANGENT_ARGUMENT, _MAX_TANGENT_ARGUMENT

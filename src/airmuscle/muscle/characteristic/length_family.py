@@ -10,7 +10,6 @@ from ...core import ops
 from ...core.declaration import model, parameter
 from ...core.ops import Value
 from .base import ForceLaw
-from .solve import warn_above_whole_length
 
 
 @model
@@ -62,8 +61,6 @@ class LengthFamily(ForceLaw):
         return dataclasses.replace(self, **surfaces)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        if type(contraction) is not float or contraction > 1.0:
-            warn_above_whole_length(contraction, self)
         return ops.maximum(self.unclamped_force(pressure, contraction), 0.0)
 
     @abc.abstractmethod

@@ -10,7 +10,6 @@ from ...core.ops import Value
 from ...core.reference import Reference
 from ..geometry.braid import Braid
 from .base import ForceLaw
-from .solve import warn_above_whole_length
 
 MARTENS_BOBLAN_2017 = Reference(
     "martens-boblan-2017",
@@ -60,8 +59,6 @@ class MartensBoblan2017(ForceLaw):
         return (ops.maximum(-0.05, straight / 2), _MAX_CONTRACTION)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        if type(contraction) is not float or contraction > 1.0:
-            warn_above_whole_length(contraction, self)
         return ops.maximum(self.unclamped_force(pressure, contraction), 0.0)
 
     def modulus(self, length: Value) -> Value:

@@ -9,7 +9,6 @@ from ...core.declaration import model, parameter
 from ...core.errors import ParameterError, suggestion
 from ...core.ops import Value
 from .base import ForceLaw
-from .solve import warn_above_whole_length
 
 
 @model
@@ -69,8 +68,6 @@ class PooledLengthLaw(ForceLaw):
         return dataclasses.replace(self, population=_of_length(self.population, length), specimen=specimen)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        if type(contraction) is not float or contraction > 1.0:
-            warn_above_whole_length(contraction, self)
         return ops.maximum(self.unclamped_force(pressure, contraction), 0.0)
 
     def unclamped_force(self, pressure: Value, contraction: Value) -> Value:

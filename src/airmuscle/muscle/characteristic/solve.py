@@ -36,10 +36,7 @@ def as_arrays(*values: Any) -> tuple[Any, ...]:
 
 
 def warn_above_whole_length(contraction: Any, owner: object) -> None:
-    """Issue an AirmuscleWarning for contractions [1] above 1: probably percentages. Traced values are not checked.
-
-    `owner` is the law of the caller, which skips the call for an ordinary float.
-    """
+    """Issue an AirmuscleWarning for contractions [1] above 1: probably percentages. Traced values are not checked."""
     if type(contraction).__module__.partition(".")[0] in ("casadi", "jax", "jaxlib"):
         return
     values = np.asarray(contraction, dtype=float)

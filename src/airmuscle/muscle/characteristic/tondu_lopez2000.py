@@ -10,7 +10,7 @@ from ...core.ops import Value
 from ...core.reference import Reference
 from ..geometry.braid import Braid
 from .base import MIN_PRESSURE, ForceLaw
-from .solve import check_solution, warn_above_whole_length
+from .solve import check_solution
 
 TONDU_LOPEZ_2000 = Reference(
     "tondu-lopez-2000",
@@ -48,13 +48,9 @@ class TonduLopez2000(ForceLaw):
         return (start / self.end_correction, zero_force / self.end_correction)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        if type(contraction) is not float or contraction > 1.0:
-            warn_above_whole_length(contraction, self)
         return pressure * self._effective_area(contraction)
 
     def pressure(self, contraction: Value, force: Value) -> Value:
-        if type(contraction) is not float or contraction > 1.0:
-            warn_above_whole_length(contraction, self)
         solution = force / self._effective_area(contraction)
         return check_solution(solution, self.pressure_range, (contraction, force), self._pressure_limits_message)
 
