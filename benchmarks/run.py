@@ -70,8 +70,9 @@ Written by `benchmarks/run.py` on {date}. {machine}. {versions}.
 
 All variants are timed in one process, in each round once and in random order, fast ones several times per round and
 after a call that is not timed: the first call after another variant takes up to half longer, because it fills the
-caches of the processor again. The tables state the median and the minimum of the rounds; ratios are medians of the ratios within a round. Targets in seconds apply to the minimum, because
-other load can only increase a time. Each table also states the errors. Linear algebra uses one thread in all variants.
+caches of the processor again. The tables state the median and the minimum of the rounds; ratios are medians of the
+ratios within a round. Targets in seconds apply to the minimum, because other load can only increase a time. Each
+table also states the errors. Linear algebra uses one thread in all variants.
 Total time {seconds:.0f} s.
 """
 
