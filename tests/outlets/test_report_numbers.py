@@ -31,7 +31,7 @@ from airmuscle.report.dynamic_chapter import _estimate_table, _estimates, _optim
 from airmuscle.report.fit_chapter import _rows
 from airmuscle.report.hysteresis_chapter import _law_table, describe_row_counts
 from airmuscle.report.joint_friction_chapter import _run_table
-from airmuscle.report.prediction_chapter import _overview
+from airmuscle.report.prediction_chapter import _overview, with_unit
 from airmuscle.report.prediction_chapter import _record as predicted_record
 from airmuscle.report.sizing_chapter import _valve_settings, choice_row
 from airmuscle.report.uncertainty_chapter import Uncertainty, _table
@@ -148,6 +148,10 @@ def test_a_prediction_has_rows_counted_from_1_shares_in_per_cent_and_display_uni
     assert (columns["rows"], columns["rows within the band [%]"]) == ([3], [pytest.approx(200 / 3)])
     assert columns["95 % band"] == ["±2 kPa"]
     assert "maximum error -5 kPa in row 3" in predicted_record(1, record).summary
+
+
+def test_a_ratio_has_no_unit_and_a_contraction_is_in_per_cent():
+    assert [with_unit(0.25, name) for name in ("fill", "contraction", "pressure")] == ["0.25", "25 %", "0.00025 kPa"]
 
 
 def test_a_ranking_has_each_error_under_its_heading_and_the_criterion_from_the_lowest():
