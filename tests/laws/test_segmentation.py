@@ -141,6 +141,19 @@ def test_no_branch_leaves_its_run_where_ramps_at_other_lengths_or_loads_follow_e
     assert found == find_branches(recording)
 
 
+@pytest.mark.parametrize(("after", "falls"), [(5e5, {(150, 4)}), (2e4, set())])
+def test_rows_between_runs_belong_to_the_branch_of_neither(after: float, falls: set[tuple[int, int]]):
+    gap = np.array([0.0107, 0.0111, 0.0193, 0.0197])
+    contraction = np.concatenate([0.03 * i + np.concatenate([np.zeros(150), gap]) for i in range(5)])
+    contraction += RANDOM(6).normal(0.0, 1e-5, contraction.size)
+    pressure = np.tile(np.concatenate([np.linspace(0.0, 6e5, 150), np.linspace(after, 0.2 * after, 4)]), 5)
+    recording = timed(pressure, contraction=contraction, force=1e-3 * pressure).rows(slice(0, 766))
+    found = inspect(recording).branches
+    rising = [(b.interval.start, b.interval.stop) for b in found if b.direction > 0]
+    assert rising == [(i, i + 150) for i in range(0, 770, 154)]
+    assert {(b.interval.start % 154, len(b.interval)) for b in found if b.direction < 0} == falls
+
+
 def test_a_short_run_of_a_slack_muscle_does_not_split_the_branches():
     swing = 1.0 - np.abs(np.linspace(-1.0, 1.0, 400))
     contraction = np.maximum(swing - 0.1, 0.0)

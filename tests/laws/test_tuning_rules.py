@@ -134,6 +134,13 @@ def test_an_integrating_step_response_is_recovered():
     assert (found.rate, found.dead_time) == (pytest.approx(0.5), pytest.approx(2.0))
 
 
+def test_the_line_of_an_integrating_step_response_is_that_of_the_second_half_of_the_rows():
+    time = np.linspace(0.0, 20.0, 201)
+    output = 1.0 + 4.0 * LEVEL.step_response(time) + np.where((time > 0.0) & (time < 9.9), 3.0, 0.0)
+    found = integrator_of_step(time, output, step=4.0)
+    assert (found.rate, found.dead_time) == (pytest.approx(0.5), pytest.approx(2.0))
+
+
 def test_the_initial_value_of_an_integrating_step_response_is_the_mean_of_the_rows_until_the_step():
     time = np.linspace(-5.0, 20.0, 251)
     output = 1.0 + 4.0 * LEVEL.step_response(np.maximum(time, 0.0))

@@ -110,6 +110,17 @@ def test_damaged_rows_of_a_serial_log_are_left_out_and_counted():
     assert reader.skipped == 4
 
 
+@pytest.mark.parametrize(
+    ("row", "is_read"),
+    [("-0.94,0.1", True), ("-0.96,0.1", False), ("1,1.01", False), ("1,-0.51", False), ("1e30,0.1", False)],
+)
+def test_a_row_of_numbers_that_no_sensor_measures_is_left_out(row: str, is_read: bool):
+    reader = RowReader("port", columns={"1": "pressure [barg]", "2": "contraction"}, constants={"ambient": "950 mbar"})
+    rows = [reader.read("1,0.1"), reader.read(row)]
+    assert [each is not None for each in rows] == [True, is_read]
+    assert reader.skipped == (0 if is_read else 1)
+
+
 def test_a_stream_of_noise_is_refused():
     reader = RowReader("port")
     for line in ("pressure [bar],contraction [%],force [N]", "1,2,3"):

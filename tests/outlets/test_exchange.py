@@ -88,6 +88,33 @@ def test_a_specimen_remains_a_text_also_where_it_looks_like_a_number(extension: 
     assert found.constants["specimen"] == specimen
 
 
+STAMPS = pd.to_datetime(["2024-05-17 12:00:00.000000", "2024-05-17 12:00:00.000250", "2024-05-17 12:00:01.000000"])
+
+
+@pytest.mark.parametrize("heading", ["time", "time [ms]"])
+@pytest.mark.parametrize("stamps", [STAMPS, STAMPS.tz_localize("Europe/Berlin"), STAMPS - STAMPS[0]])
+def test_dates_and_durations_are_seconds_from_the_first_whatever_the_heading_states(heading, stamps, tmp_path):
+    frame = pd.DataFrame({heading: stamps, "pressure [bar]": [1.0, 2.0, 3.0]})
+    assert from_pandas(frame)["time"].tolist() == [0.0, 0.00025, 1.0]
+    assert from_pandas(frame.set_index(heading))["time"].tolist() == [0.0, 0.00025, 1.0]
+    pytest.importorskip("pyarrow", reason="needs the extra lab")
+    frame.to_parquet(tmp_path / "run.parquet")
+    assert read(tmp_path / "run.parquet")[0]["time"].tolist() == [0.0, 0.00025, 1.0]
+
+
+def test_each_named_level_of_an_index_is_a_column():
+    index = pd.MultiIndex.from_product([[0.0, 0.1], ["a"]], names=["time [s]", "name"])
+    assert from_pandas(pd.DataFrame({"pressure [bar]": [1.0, 2.0]}, index=index))["time"].tolist() == [0.0, 0.1]
+
+
+def test_a_worksheet_of_clock_times_and_numbers_as_texts_is_a_table(tmp_path):
+    pytest.importorskip("openpyxl", reason="needs the extra lab")
+    cells = {"time": ["12:00:00", "12:00:00.5", "12:00:01"], "pressure [bar]": ["1,5", "2,5", "3"]}
+    pd.DataFrame(cells).to_excel(tmp_path / "run.xlsx", index=False)
+    (found,) = read(tmp_path / "run.xlsx")
+    assert (found["time"].tolist(), found["pressure"].tolist()) == ([0.0, 0.5, 1.0], [1.5e5, 2.5e5, 3e5])
+
+
 def test_an_unknown_extension_and_an_unwritable_folder_are_named(tmp_path):
     with pytest.raises(FileError, match=r"cannot be written as '\.xyz'; allowed: \.csv, \.parquet, \.h5, \.hdf5"):
         write(RUN, tmp_path / "run.xyz")

@@ -162,3 +162,18 @@ def test_a_damaged_file_and_a_missing_package_are_one_error_each(
     assert "No such file or directory" in refusal(FileError, tmp_path / f"none{ending}")
     monkeypatch.setitem(sys.modules, package, None)
     assert f"needs the package {package}. Install it: pip install airmuscle[lab]" in refusal(FileError, path)
+
+
+def test_attributes_of_an_hdf5_file_count_in_its_groups_unless_these_state_others(tmp_path: Path):
+    h5py = pytest.importorskip("h5py", reason="needs the extra lab")
+    with h5py.File(tmp_path / "rig.h5", "w") as file:
+        file.attrs["ambient"] = "950 hPa"
+        file.attrs["specimen"] = "A"
+        for name in ("first", "second"):
+            group = file.create_group(f"day/{name}")
+            group["time [s]"], group["pressure [bara]"] = [0.0, 1.0], [1.0, 2.0]
+        group.attrs["ambient"] = "900 hPa"
+    first, second = read(tmp_path / "rig.h5")
+    assert first["pressure"] == pytest.approx([5e3, 1.05e5])
+    assert second["pressure"] == pytest.approx([1e4, 1.1e5])
+    assert first.constants == {"ambient": 95e3, "specimen": "A"}

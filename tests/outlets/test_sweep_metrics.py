@@ -27,6 +27,7 @@ from airmuscle.study.metrics import (
     TimeSeries,
     TimeToReach,
 )
+from airmuscle.study.result import _statistics
 
 TIME = np.linspace(0.0, 2.0, 21)
 RAMP = 3.0 * TIME - 1.0
@@ -144,3 +145,11 @@ def test_units_follow_from_the_column():
 def test_an_invalid_metric_is_rejected(make, message):
     with pytest.raises(ParameterError, match=message):
         make()
+
+
+def test_the_statistics_of_the_runs_are_those_of_a_sample_without_missing_values():
+    found = _statistics(np.array([1.0, np.nan, 2.0, 6.0]))
+    assert (found["runs"], found["mean"], found["median"]) == (3, 3.0, 2.0)
+    assert found["standard deviation"] == pytest.approx(np.sqrt(7.0))
+    assert (found["5 %"], found["95 %"]) == pytest.approx((1.1, 5.6))
+    assert np.isnan(_statistics(np.array([4.0]))["standard deviation"])

@@ -131,17 +131,20 @@ def _make_table(
     if time is not None and not has_time:
         channels = [Channel("time", time - time[0], unit="s"), *channels]
     headings = tuple(c.name for c in channels)
-    units = tuple(c.unit for c in channels)
+    units = tuple("s" if np.asarray(c.values).dtype.kind in "Mm" else c.unit for c in channels)  # see `to_cells`
     columns = tuple(to_cells(c.values) for c in channels)
     rows = np.arange(1, len(channels[0].values) + 1)
     return RawTable(origin, headings, units if any(units) else None, columns, rows, row_label, constants, notes)
 
 
 def to_cells(values: Any) -> Cells:
-    """Values as cells of a RawTable: numbers as floats, dates as seconds from the first, anything else as text."""
+    """Values as cells of a RawTable: numbers as floats, dates as seconds from the first, durations in seconds, anything
+    else as text."""
     array = np.asarray(values)
-    if array.dtype.kind == "M":
-        return np.asarray((array - array[0]) / np.timedelta64(1, "s"), dtype=float)
+    if array.dtype.kind in "Mm":
+        return np.asarray(
+            (array - array[0] if array.dtype.kind == "M" else array) / np.timedelta64(1, "s"), dtype=float
+        )
     if array.dtype.kind in "biuf":
         return np.ascontiguousarray(array, dtype=float)
     return [v.decode("utf-8", errors="replace") if isinstance(v, bytes) else str(v) for v in array.tolist()]

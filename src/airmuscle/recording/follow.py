@@ -17,6 +17,7 @@ from ..core.units import AMBIENT_PRESSURE, UnitConversion
 from .header import is_number
 from .heading import find_quantity_name
 from .interpret import interpret, resolve_headings, unit_conversion
+from .plausibility import CONTRACTION_RANGE, MAX_MAGNITUDE
 from .table import RawTable
 from .text_format import TextFormat, TextHeader, has_content, is_comment, parse_header, split_cells
 
@@ -97,7 +98,7 @@ class RowReader:
         table = RawTable(self.origin, headings, header.units, cells, rows, constants=header.constants)
         recording = interpret(table, units=self._units, constants=self._constants)
         self._first, self.notes = recording, recording.notes
-        ambient = float(recording.constants.get("ambient", AMBIENT_PRESSURE))
+        self._ambient = ambient = float(recording.constants.get("ambient", AMBIENT_PRESSURE))
         held = {find_quantity_name(name) for name in self._constants}
         self._held = {name: float(recording[name][0]) for name in recording if name in held}
         self._width = len(headings)
@@ -118,7 +119,7 @@ class RowReader:
             return None
         assert self._conversions is not None
         row = {**self._held, **{name: float(convert(values[i])) for i, name, convert in self._conversions}}
-        if not all(np.isfinite(value) for value in row.values()):
+        if not all(self._is_possible(name, value) for name, value in row.items()):
             self._skip()
             return None
         self._unreadable = 0
@@ -126,6 +127,14 @@ class RowReader:
         if "contraction" not in row and "length" in row and isinstance(length, float):
             row["contraction"] = (length - row["length"]) / length
         return row
+
+    def _is_possible(self, name: str, value: float) -> bool:
+        """Whether a value may be a measurement: a damaged number may still be a number."""
+        quantity = name.rpartition(".")[2]
+        low, high = {"pressure": (-self._ambient, MAX_MAGNITUDE), "contraction": CONTRACTION_RANGE}.get(
+            quantity, (-MAX_MAGNITUDE, MAX_MAGNITUDE)
+        )
+        return low < value < high
 
     def _skip(self) -> None:
         self.skipped += 1

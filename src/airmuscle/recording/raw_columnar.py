@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -119,8 +120,17 @@ def check_no_external_links(h5py: Any, group: Any, path: Path) -> None:
             check_no_external_links(h5py, group[name], path)
 
 
-def _groups(h5py: Any, group: Any, origin: str, downsampling: Downsampling) -> Iterator[StoredTable]:
-    """The table of each group with vectors and of each dataset that is a table; no links are followed."""
+def _groups(
+    h5py: Any,
+    group: Any,
+    origin: str,
+    downsampling: Downsampling,
+    outer: Mapping[str, float | str] = MappingProxyType({}),
+) -> Iterator[StoredTable]:
+    """The table of each group with vectors and of each dataset that is a table; no links are followed.
+
+    The constants of the `outer` groups and of the file count in each group, which may state others.
+    """
     vectors: list[Any] = []
     tables: list[Any] = []
     groups: list[Any] = []
@@ -132,7 +142,7 @@ def _groups(h5py: Any, group: Any, origin: str, downsampling: Downsampling) -> I
             groups.append(item)
         elif item.size and item.ndim:
             (vectors if item.ndim == 1 and item.dtype.names is None else tables).append(item)
-    constants, numeric = _constants(group.attrs), [d for d in vectors if d.dtype.kind in "biuf"]
+    constants, numeric = {**outer, **_constants(group.attrs)}, [d for d in vectors if d.dtype.kind in "biuf"]
     reduction = Reduction.of((d.size for d in numeric), downsampling)
     channels = [Channel(_name(d), _values(d, reduction.step, downsampling), unit=_unit(d.attrs)) for d in numeric]
     place = f"{origin}, group '{group.name}'"
@@ -143,7 +153,7 @@ def _groups(h5py: Any, group: Any, origin: str, downsampling: Downsampling) -> I
         channels = _columns(dataset, reduction.step, downsampling)
         yield StoredTable(dataset.name, channels, {**constants, **_constants(dataset.attrs)}, reduction)
     for inner in groups:
-        yield from _groups(h5py, inner, origin, downsampling)
+        yield from _groups(h5py, inner, origin, downsampling, constants)
 
 
 def _values(dataset: Any, step: int, downsampling: Downsampling, field: str | None = None) -> Any:

@@ -23,6 +23,7 @@ from .header import (
 from .optional_dependency import import_lab_package, run_reader
 from .table import Cells, RawTable
 
+_NUMBERS = float | int | datetime.date | datetime.time | datetime.timedelta
 Rows = list[tuple[int, list[Any]]]
 """Non-empty rows of a worksheet with their numbers, counted from 1."""
 
@@ -114,13 +115,15 @@ def _find_heading_row(rows: Rows) -> int:
 
 
 def _is_numeric(row: list[Any]) -> bool:
-    """Whether more than half of the cells of a row are numbers, also as texts; the others may be names."""
+    """Whether more than half of the cells of a row are numbers or times, also as texts; the others may be names."""
     cells = [c for c in row if c not in (None, "")]
-    numbers = sum(
-        isinstance(c, float | int | datetime.date | datetime.time) or (isinstance(c, str) and is_number(c))
-        for c in cells
-    )
+    numbers = sum(_is_numeric_text(c) if isinstance(c, str) else isinstance(c, _NUMBERS) for c in cells)
     return 2 * numbers > len(cells)
+
+
+def _is_numeric_text(cell: str) -> bool:
+    """Whether a text is a number, a clock time or a date."""
+    return is_number(cell) or (any(map(str.isdigit, cell)) and not any(map(str.isalpha, cell)))
 
 
 def _cell(row: list[Any], j: int) -> Any:

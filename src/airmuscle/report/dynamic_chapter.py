@@ -11,7 +11,7 @@ from ..core.plotting import BLACK, BLUE, RED, legend_below, new_figure
 from ..core.reference import cite
 from ..identify.dynamic import CrossPrediction, DynamicFit, describe_cross_predictions
 from ..identify.dynamic.profile import DynamicProfile
-from ..recording.display_units import display_scale
+from ..recording.display_units import display_scale, displayed
 from ..recording.recording import column_heading
 from .chapter import Chapter, Plot, Table
 from .uncertainty_chapter import NORMAL_QUANTILE, UNBOUNDED
@@ -50,9 +50,7 @@ def _estimates(fit: DynamicFit, title: str, remarks: Sequence[str], cross: Seque
     rms = {
         "record": [c.experiment.recording.origin for c in fit.problem.record_models for _ in c.names],
         "quantity": [name for c in fit.problem.record_models for name in c.names],
-        "rms residual": [
-            _with_unit(fit.rms(n, i), n) for i, c in enumerate(fit.problem.record_models) for n in c.names
-        ],
+        "rms residual": [displayed(n, fit.rms(n, i)) for i, c in enumerate(fit.problem.record_models) for n in c.names],
     }
     tables = [
         *_cross_table(cross),
@@ -78,15 +76,10 @@ def _cross_table(cross: Sequence[CrossPrediction]) -> list[Table]:
     columns: dict[str, Any] = {
         "record": [each.record for each, _ in pairs],
         "quantity": [name for _, name in pairs],
-        "rms error, predicted by the others": [_with_unit(each.rms[name], name) for each, name in pairs],
-        "rms residual of the joint fit": [_with_unit(each.fitted[name], name) for each, name in pairs],
+        "rms error, predicted by the others": [displayed(name, each.rms[name]) for each, name in pairs],
+        "rms residual of the joint fit": [displayed(name, each.fitted[name]) for each, name in pairs],
     }
     return [Table("cross", "Each record predicted by the parameters of the others", columns)]
-
-
-def _with_unit(value: float, name: str) -> str:
-    factor, unit = display_scale(name)
-    return f"{value * factor:.4g} {unit}"
 
 
 def _estimate_table(fit: DynamicFit) -> Table:
@@ -192,7 +185,7 @@ def _record(fit: DynamicFit, number: int) -> Chapter:
         columns[f"measured {column_heading(name)}"] = measured[name]
         columns[f"modelled {column_heading(name)}"] = modelled[name]
         columns[f"residual of {column_heading(name)}"] = errors[name]
-    rms = ", ".join(f"{name} {_with_unit(fit.rms(name, number), name)}" for name in course.names)
+    rms = ", ".join(f"{name} {displayed(name, fit.rms(name, number))}" for name in course.names)
     stem = f"record-{number + 1}"
     return Chapter(
         paper=stem,

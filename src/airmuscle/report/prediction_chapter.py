@@ -11,7 +11,7 @@ from ..core.arrays import Array
 from ..core.plotting import BLACK, BLUE, RED, legend_below, new_figure
 from ..core.reference import cite
 from ..identify.prediction import QuantityPrediction, RecordPrediction
-from ..recording.display_units import display_scale
+from ..recording.display_units import display_scale, displayed
 from ..recording.recording import column_heading
 from ..recording.segment.runs import CONTRACTION_BAND
 from .chapter import Chapter, Plot, Table
@@ -40,9 +40,8 @@ def describe_band(quantity: QuantityPrediction) -> str:
 
 
 def with_unit(value: float, name: str) -> str:
-    """A value of a quantity in its display unit."""
-    factor, unit = display_scale(name)
-    return f"{value * factor:.4g} {unit}"
+    """A value of a quantity in its display unit; a ratio has none."""
+    return displayed(name, value)
 
 
 def _overview(model: str, thing: Any, predictions: Sequence[RecordPrediction], band: str) -> Chapter:

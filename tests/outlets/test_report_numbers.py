@@ -1,0 +1,199 @@
+"""Numbers of report tables are those of the results, in the unit of their heading."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import types
+
+import numpy as np
+import pytest
+
+import airmuscle as am
+from airmuscle.control import Schedule
+from airmuscle.identify import Bootstrap
+from airmuscle.identify.dynamic import Experiment, InitialConditions, fit_dynamic
+from airmuscle.identify.hysteresis import LoopFit, find_loops, fit_hysteresis, fit_jointly
+from airmuscle.identify.prediction import QuantityPrediction, RecordPrediction
+from airmuscle.identify.static_fit import fit
+from airmuscle.identify.volume_fit import VolumePoints, fit_volume
+from airmuscle.mechanism import Isometric
+from airmuscle.muscle import Muscle
+from airmuscle.muscle.characteristic import VirtualWork
+from airmuscle.muscle.friction import MaxwellSlip
+from airmuscle.muscle.geometry import Braid
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import FillDischarge, Polytropic, Supply, Valve
+from airmuscle.recording import Recording
+from airmuscle.report.campaign_chapters import ValidationRow, _band_table, _plan_table, _validation_table
+from airmuscle.report.compare_chapter import _ranking
+from airmuscle.report.dynamic_chapter import _estimate_table, _estimates, _optima_table, _record
+from airmuscle.report.fit_chapter import _rows
+from airmuscle.report.hysteresis_chapter import _law_table, describe_row_counts
+from airmuscle.report.joint_friction_chapter import _run_table
+from airmuscle.report.prediction_chapter import _overview, with_unit
+from airmuscle.report.prediction_chapter import _record as predicted_record
+from airmuscle.report.sizing_chapter import _valve_settings, choice_row
+from airmuscle.report.uncertainty_chapter import Uncertainty, _table
+from airmuscle.report.volume_chapter import _compared, _volumes
+from airmuscle.sizing import LiftRequirement, SizingConditions, choose
+from airmuscle.sizing.scenario import scenario_valves
+
+LENGTH = 0.3
+BRAID = Braid(0.01, 0.43, LENGTH)
+SLIP = MaxwellSlip((2e4, 1e4), (4e-4, 2e-3))
+
+
+def test_a_choice_of_a_sizing_is_in_millimetres_bar_per_cent_and_litres():
+    lift = LiftRequirement(force=300.0, stroke=0.03)
+    choice = choose(am.load("dmsp-20-300"), lift, SizingConditions(supply=6e5))
+    row, first, last = choice_row(choice), choice.design.extended, choice.design.contracted
+    assert row["length [mm]"] == pytest.approx(1e3 * choice.length)
+    assert (row["pressure, long [bar]"], row["pressure, short [bar]"]) == (first.pressure / 1e5, last.pressure / 1e5)
+    assert row["contraction, long [%]"] == 100 * first.contraction
+    assert row["contraction, short [%]"] == 100 * last.contraction
+    assert row["force, short [N]"] == last.force
+    assert row["air a cycle [l (ANR)]"] == pytest.approx(1e3 * choice.reference_volume)
+    assert row["efficiency [%]"] == pytest.approx(100 * choice.efficiency)
+    assert row["diameter [mm]"] == pytest.approx(1e3 * choice.diameter)
+    assert 1.0 < row["diameter [mm]"] < 100.0
+    fill, _ = scenario_valves(choice)
+    litres_per_second_and_bar = fill.conductance * 1e3 * 1e5
+    assert float(_valve_settings(choice)[0][1].split()[0]) == pytest.approx(litres_per_second_and_bar, rel=1e-3)
+
+
+def test_a_dynamic_fit_has_two_standard_errors_and_residuals_as_model_minus_measured():
+    valve = Valve(3e-9, 0.35)
+    plant = Plant(Muscle.ideal(BRAID), FillDischarge(Supply(6e5), valve, valve), Isometric(0.05), Polytropic(1.2))
+    command = Schedule({"fill": ((0.0, 1.0),)})
+    run = am.simulate(plant, command, duration=1.0, initial_state=plant.state_at(pressure=0.0), output_times=0.01)
+    noisy = run["pressure"] + 500.0 * np.random.default_rng(2).standard_normal(len(run))
+    record = Recording({"time": run["time"], "pressure": noisy}, "fill.csv")
+    found = fit_dynamic(
+        plant, [Experiment(record, command, InitialConditions.at_coordinates(plant, 0.0))],
+        free=("circuit.fill.conductance",), observed={"pressure": 500.0},
+    )  # fmt: skip
+    (estimate,) = found.estimates
+    table = _estimate_table(found).columns
+    assert (table["value (SI)"], table["2 standard errors (SI)"]) == ([estimate.value], [2 * estimate.stderr])
+    chapter = _estimates(found, "Fill", (), ())
+    rms = next(each for each in chapter.tables if each.name == "rms").columns["rms residual"]
+    assert rms == [f"{found.rms('pressure') / 1e3:.4g} kPa"]
+    (values,) = _record(found, 0).tables
+    assert values.columns["measured pressure [Pa]"].tolist() == noisy.tolist()
+    assert values.columns["residual of pressure [Pa]"] == pytest.approx(found.modelled()["pressure"] - noisy)
+    worse = dataclasses.replace(found.optima[0], cost=4.0 * found.optima[0].cost)
+    (optima,) = _optima_table(dataclasses.replace(found, optima=(found.optima[0], worse)))
+    assert optima.columns["rms residual relative to the lowest"] == pytest.approx([1.0, 2.0])
+
+
+def test_a_volume_is_in_cubic_centimetres_and_its_criterion_counts_from_the_best():
+    contraction = np.linspace(0.0, 0.25, 20)
+    volume = BRAID.volume(contraction) + 3e-7 * np.random.default_rng(1).standard_normal(20)
+    found = fit_volume(VolumePoints(contraction, np.asarray(volume), 0), LENGTH)
+    columns = _volumes(found).columns
+    at = columns["contraction [%]"] / 100
+    assert columns["volume [cm3]"] == pytest.approx(1e6 * np.asarray(found.geometry.volume(at)))
+    assert columns["standard deviation [cm3]"] == pytest.approx(1e6 * found.standard_deviation(at))
+    compared = _compared(found).columns
+    lowest = min(found.aicc.values())
+    expected = [found.aicc[name] - lowest for name in compared["law"]]
+    assert compared["AICc above the best"] == pytest.approx(expected)
+    assert expected[0] == 0.0
+
+
+def isobaric(level: float, coulomb: float) -> Recording:
+    turns = (0.02, 0.16, 0.02, 0.16)
+    contraction = np.concatenate([np.linspace(a, b, 100) for a, b in itertools.pairwise(turns)])
+    noise = np.random.default_rng(int(level)).standard_normal(300)
+    force = 900.0 - 4000.0 * contraction - coulomb * SLIP.force_along(contraction * LENGTH) + 0.5 * noise
+    columns = {"time": 0.2 * np.arange(300), "pressure": np.full(300, level), "contraction": contraction}
+    return Recording({**columns, "force": force}, f"{level:g}", {"resting_length": LENGTH})
+
+
+def test_the_friction_of_loops_is_in_newtons_and_deviations_in_per_cent():
+    loops = find_loops([isobaric(1e5, 1.0), isobaric(3e5, 1.5)], degree=2)
+    fits = [
+        LoopFit(each, (fit_hysteresis(SLIP, each.recording, static_curve=each.static_curve),), {}) for each in loops
+    ]
+    columns, one = _law_table(fits[0], "").columns, fits[0].fits[0]
+    names = ("rmse_without_friction", "rmse", "gap", "residual_gap", "aicc_reduction")
+    headings = (
+        "rms error without friction [N]", "rms error [N]", "branch gap without friction [N]",
+        "remaining branch gap [N]", "reduction of AICc",
+    )  # fmt: skip
+    assert [columns[heading] for heading in headings] == [[getattr(one, name)] for name in names]
+    rows = loops[0].fitted_rows
+    path = loops[0].recording["contraction"]
+    rising = int(np.count_nonzero(rows & (np.gradient(path) > 0)))
+    sentence = describe_row_counts(loops[0])
+    assert int(sentence.split()[0]) == pytest.approx(rising, abs=4)
+    assert rising > 1.5 * (rows.sum() - rising)
+    (joint,) = fit_jointly(fits)
+    table, runs = _run_table(joint).columns, joint.agreement
+    assert table["from this run [N]"] == [run.amplitude for run in runs]
+    assert table["from all runs [N]"] == [run.joint_amplitude for run in runs]
+    assert table["rms deviation [%]"] == [100 * run.deviation for run in runs]
+
+
+def test_a_prediction_has_rows_counted_from_1_shares_in_per_cent_and_display_units():
+    measured, predicted = np.array([1e5, 2e5, 3e5, 4e5]), np.array([1.01e5, 2.0e5, 2.95e5, 4e5])
+    compared = np.array([True, True, True, False])
+    quantity = QuantityPrediction("pressure", measured, predicted, np.full(4, 2e3), compared)
+    record = RecordPrediction(Recording({"pressure": measured}, "a.csv"), (quantity,))
+    columns = _overview("plant.toml", VirtualWork(BRAID), [record], "").tables[0].columns
+    rms = np.sqrt((1e3**2 + 5e3**2) / 3)
+    assert columns["rms error"] == [f"{rms / 1e3:.4g} kPa"]
+    assert columns["maximum error"] == ["-5 kPa"]
+    assert (columns["rows"], columns["rows within the band [%]"]) == ([3], [pytest.approx(200 / 3)])
+    assert columns["95 % band"] == ["±2 kPa"]
+    assert "maximum error -5 kPa in row 3" in predicted_record(1, record).summary
+
+
+def test_a_ratio_has_no_unit_and_a_contraction_is_in_per_cent():
+    assert [with_unit(0.25, name) for name in ("fill", "contraction", "pressure")] == ["0.25", "25 %", "0.00025 kPa"]
+
+
+def test_a_ranking_has_each_error_under_its_heading_and_the_criterion_from_the_lowest():
+    def model(name: str, inside: float, outside: float, aicc: float) -> types.SimpleNamespace:
+        candidate = types.SimpleNamespace(name=name)
+        return types.SimpleNamespace(
+            candidate=candidate, parameter_count=3, in_sample_rmse=inside, cross_validated_rmse=outside, aicc=aicc
+        )
+
+    ranking = (model("a", 1.0, 2.0, -90.0), model("b", 0.5, 3.0, -100.0))
+    columns = _ranking(types.SimpleNamespace(ranking=ranking)).columns
+    assert columns["in-sample rms error [N]"] == [1.0, 0.5]
+    assert columns["cross-validation rms error [N]"] == [2.0, 3.0]
+    assert columns["AICc above the lowest"] == [10.0, 0.0]
+
+
+def test_the_intervals_of_a_fit_are_those_of_its_standard_errors_and_of_its_bootstrap():
+    law, contraction = VirtualWork(BRAID), np.linspace(0.0, 0.2, 20)
+    noise = np.random.default_rng(3).standard_normal(20)
+    data = Recording({"pressure": np.full(20, 3e5), "contraction": contraction,
+                      "force": np.asarray(law.force(3e5, contraction)) + noise}, "a", {"resting_length": LENGTH})  # fmt: skip
+    found = fit(law, data)
+    draws = Bootstrap(found, found.values * np.linspace(0.9, 1.2, 101)[:, None], 5, 0)
+    columns = _table(Uncertainty(found, draws)).columns
+    assert columns["2.5 %, standard error"] == pytest.approx(found.values - 1.96 * found.standard_errors)
+    assert columns["97.5 %, standard error"] == pytest.approx(found.values + 1.96 * found.standard_errors)
+    assert columns["2.5 %, bootstrap"] == pytest.approx(found.values * 0.9075)
+    assert columns["97.5 %, bootstrap"] == pytest.approx(found.values * 1.1925)
+    rows = _rows(found).columns
+    assert rows["residual [N]"] == pytest.approx(rows["modelled force [N]"] - data["force"])
+
+
+def test_tables_of_a_campaign_have_shares_in_per_cent_and_runs_in_kilopascals():
+    columns = _validation_table([ValidationRow("a", 2.0, 8.0, 0.94, 50)]).columns
+    assert (columns["rms error [N]"], columns["half width of the 95 % band [N]"]) == ([2.0], [8.0])
+    assert columns["rows within the band [%]"] == [94.0]
+    force = np.array([10.0, 250.0])
+    run = types.SimpleNamespace(
+        constant="pressure", level=3e5, swept="contraction", sweep_limits=(0.0, 0.21), force=force
+    )
+    plan = types.SimpleNamespace(plan=types.SimpleNamespace(runs=[run]))
+    columns = _plan_table(types.SimpleNamespace(next_experiments=[plan])).columns
+    assert (columns["constant"], columns["swept"]) == (["pressure 300 kPa"], ["contraction 0 % to 21 %"])
+    assert columns["expected force [N]"] == ["10 to 250"]
+    assert _band_table(types.SimpleNamespace(static=None)) is None
