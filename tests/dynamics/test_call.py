@@ -3,6 +3,8 @@ for many gives; what is kept with a plant is checked again where it changes."""
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from called_controller import Called
@@ -18,7 +20,7 @@ from airmuscle.control.inputs import InputSignal, SampledSignal, Schedule
 from airmuscle.control.pid import PID
 from airmuscle.control.piecewise_linear import PiecewiseLinear, merge_columns
 from airmuscle.core import arrays
-from airmuscle.core.errors import GeometryLimitError, ParameterError
+from airmuscle.core.errors import AirmuscleWarning, GeometryLimitError, ParameterError
 from airmuscle.core.system import System
 from airmuscle.core.variables import Input, StateVariable
 from airmuscle.mechanism import HangingMass
@@ -292,3 +294,19 @@ def test_a_loop_whose_drivers_change_nothing_is_the_loop_without_drivers(other):
     assert held.recording["fill"].max() > 0.0
     assert all(np.array_equal(held.recording[name], driven.recording[name]) for name in held.recording)
     assert (held.final_state, held.control_state[1:7]) == (driven.final_state, driven.control_state[1:7])
+
+
+def test_an_input_that_varies_after_the_run_only_is_named():
+    """Times since 1970 in a file, a run from 0 s on: the first value would be held in silence."""
+    stamps = 1.7e9 + np.linspace(0.0, 0.1, 5)
+    signal = SampledSignal({"fill": tuple((t, 8.0 * (t - stamps[0])) for t in stamps.tolist())})
+    plant = lifting()
+    given = {"duration": 0.2, "initial_state": plant.state_at(pressure=2e5)}
+    with pytest.warns(AirmuscleWarning, match=r"input 'fill' begin at 1.7e\+09 s, after the end of the run at 0.2 s"):
+        simulate(plant, signal, **given)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        run = simulate(plant, signal, **given, start_time=1.7e9)
+        simulate(plant, SampledSignal({"fill": ((0.3, 0.5), (0.4, 0.5))}), **given)
+        simulate(plant, SampledSignal({"fill": ((0.1, 0.0), (0.4, 0.5))}), **given)
+    assert run["fill"].max() == pytest.approx(0.8, rel=1e-6)

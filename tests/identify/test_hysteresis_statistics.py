@@ -261,3 +261,11 @@ def test_a_recording_without_rows_is_refused_or_left_out_by_name():
         find_loops([empty])
     with pytest.warns(AirmuscleWarning, match=r"left out: empty\.csv: the recording has no rows"):
         assert len(find_loops([empty, loop()])) == 1
+
+
+def test_creep_is_fitted_to_a_contraction_or_a_force_only():
+    time = np.arange(20.0)
+    rows = Recording({"time": time, "length": 0.2 + 1e-3 * np.exp(-time)}, "hold.csv")
+    with pytest.raises(IdentificationError, match=r"hold.csv: creep of the column 'length' .*'contraction' or 'force'"):
+        fit_creep(rows, "length")
+    assert fit_creep(rows.with_constants(resting_length=0.21), "contraction").verdict

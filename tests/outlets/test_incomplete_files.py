@@ -112,6 +112,14 @@ def test_a_pattern_gives_the_values_of_a_name(pattern: str, name: str, expected:
     assert FileNamePattern(pattern).values(Path(f"{name}.csv")) == expected
 
 
+def test_a_hyphen_that_may_be_a_minus_sign_is_refused_until_the_pattern_holds_it() -> None:
+    path = Path("iso-10.csv")
+    with pytest.raises(ColumnError, match=r"hyphen of 'o-10' may be a minus sign .* pattern: '-\{contraction \[%\]\}'"):
+        FileNamePattern("iso{contraction [%]}").values(path)
+    assert FileNamePattern("iso-{contraction [%]}").values(path) == {"contraction [%]": 10.0}
+    assert FileNamePattern("iso_{contraction [%]}").values(Path("iso_-10.csv")) == {"contraction [%]": -10.0}
+
+
 @pytest.mark.parametrize("pattern", ["held{length}", "held{size [mm]}", "held", "{length [mm]}_{length [mm]}", "{}"])
 def test_a_pattern_without_a_quantity_and_its_unit_is_refused(pattern: str) -> None:
     with pytest.raises(ColumnError, match=r"\{length \[cm\]\}"):

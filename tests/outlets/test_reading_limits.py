@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from airmuscle.core.errors import AirmuscleWarning, ColumnError, UnitError
-from airmuscle.recording import Recording, UniformTime, read
+from airmuscle.recording import Recording, UniformTime, read, read_csv
 from airmuscle.recording.header import parse_unit_row
 from airmuscle.recording.reader import check_bench
 
@@ -164,3 +164,11 @@ def test_rounded_stamps_deviate_by_at_most_their_rounding_and_five_sample_times(
     else:
         (recording,) = read(tmp_path / "run.csv", time_base=UniformTime())
         assert recording["time"] == pytest.approx(time)
+
+
+def test_a_vertical_bar_separates_cells_where_no_comma_does(tmp_path):
+    path = tmp_path / "bars.txt"
+    path.write_text("time [s]|pressure [kPa]\n0|1.5\n1|2\n", encoding="utf-8")
+    assert read_csv(path)["pressure"].tolist() == [1500.0, 2000.0]
+    path.write_text("time [s],|F| [N]\n0,1.5\n1,2\n", encoding="utf-8")
+    assert [*read_csv(path)] == ["time", "|F| [N]"]

@@ -6,24 +6,21 @@ import abc
 import bisect
 import dataclasses
 import itertools
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
 
 from ..core.annotation import abridged, one_line
-from ..core.arrays import Array
 from ..core.declaration import as_float
-from ..core.errors import ParameterError, suggestion
+from ..core.errors import AirmuscleWarning, ParameterError, suggestion
 from ..recording.recording import Recording
+from .approximation import approximate
 from .piecewise_linear import PiecewiseLinear
 
 MAX_INSTANTS = 10_000_000
 """Instants of one run that fit a usual memory."""
-MAX_POINTS = 100_000
-"""Points of a sampled function."""
-INITIAL_LINES = 64
-"""Straight lines that a sampled function is first approximated by (chosen)."""
 
 
 class InputSignal(abc.ABC):
@@ -195,7 +192,7 @@ class SampledSignal(InputSignal):
         duration = as_float("SampledSignal.sampled: duration", duration)
         start = as_float("SampledSignal.sampled: start", start)
         error = as_float("SampledSignal.sampled: error", error)
-        return cls({name: _approximate(name, f, start, start + duration, error) for name, f in functions.items()})
+        return cls({name: approximate(name, f, start, start + duration, error) for name, f in functions.items()})
 
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
         check_input_names(list(self.points), inputs)
@@ -210,45 +207,18 @@ class SampledSignal(InputSignal):
                 values[:, i] = np.interp(edges, times, levels)
         return PiecewiseLinear(ends, values[:-1], np.diff(values, axis=0) / np.diff(edges)[:, None])
 
-
-def _approximate(
-    name: str, function: Callable[[float], float], start: float, end: float, error: float
-) -> tuple[tuple[float, float], ...]:
-    """Points of a function whose connecting lines stay within `error` of it."""
-    if not (0 < error < np.inf and -np.inf < start < end < np.inf):
-        raise ParameterError(
-            f"the sampled signal of '{name}': from {start!r} to {end!r} s within {error!r}; the error and the duration "
-            "must be greater than 0."
-        )
-    times = np.linspace(start, end, INITIAL_LINES + 1)
-    values = _evaluate(name, function, times)
-    while True:
-        lengths = np.diff(times)
-        between = times[:-1] + np.array([[0.25], [0.5], [0.75]]) * lengths
-        exact = _evaluate(name, function, between.ravel()).reshape(between.shape)
-        errors = np.abs(exact - np.interp(between, times, values)).max(axis=0)
-        at = np.flatnonzero(errors > error)
-        if at.size == 0:
-            return tuple(zip(times.tolist(), values.tolist(), strict=True))
-        if times.size + at.size > MAX_POINTS or lengths[at].min() < 1e-9 * (end - start):
-            raise ParameterError(
-                f"the sampled signal of '{name}' is not approximated to {error:g} by {times.size} points: the error is "
-                f"{errors.max():g} at {times[np.argmax(errors)]:g} s. Allow a larger error; give a function that jumps "
-                "as a Schedule."
-            )
-        times, values = np.insert(times, at + 1, between[1, at]), np.insert(values, at + 1, exact[1, at])
-
-
-def _evaluate(name: str, function: Callable[[float], float], times: Array) -> Array:
-    """A function of time at times (N,). Raises ParameterError where it gives no finite number."""
-    if not callable(function):
-        raise ParameterError(f"the sampled signal of '{name}' is {function!r}; give a function of time [s].")
-    values = np.empty(times.size)
-    for i, time in enumerate(times.tolist()):
-        values[i] = as_float(f"the sampled signal of '{name}' at {time:g} s", function(time))
-        if not np.isfinite(values[i]):
-            raise ParameterError(f"the sampled signal of '{name}' is {values[i]} at {time:g} s; it must be finite.")
-    return values
+    def checked_segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
+        """As of any signal; an AirmuscleWarning for an input that varies after the end of the run only."""
+        for name, points in self.points.items():
+            first, end = points[0][0], start + duration
+            if first > end and any(value != points[0][1] for _, value in points):
+                warnings.warn(
+                    f"the points of the input '{name}' begin at {first:.6g} s, after the end of the run at {end:.6g} "
+                    "s: its first value is held. If its times have another zero, subtract it, or set start_time.",
+                    AirmuscleWarning,
+                    stacklevel=7,
+                )
+        return super().checked_segments(inputs, start, duration)
 
 
 @dataclasses.dataclass(frozen=True)

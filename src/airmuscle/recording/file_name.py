@@ -59,5 +59,12 @@ class FileNamePattern:
                 f"{path.name}: the name does not match the pattern '{self.text}'. Correct the pattern, or give the "
                 "values of this file as constants."
             )
+        for group, (name, text) in enumerate(zip(self._names, match.groups(), strict=True), 1):
+            start = match.start(group)
+            if name and name not in TEXT_NAMES and text[0] == "-" and path.stem[start - 1 : start].isalnum():
+                raise ColumnError(
+                    f"{path.name}: the hyphen of '{path.stem[start - 1]}{text}' may be a minus sign or a separator. "
+                    f"A separator belongs into the pattern: '-{{{name}}}'. Give a negative value as a constant."
+                )
         pairs = zip(self._names, match.groups(), strict=True)
         return {name: text if name in TEXT_NAMES else float(text.replace(",", ".")) for name, text in pairs if name}

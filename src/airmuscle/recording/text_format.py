@@ -52,7 +52,8 @@ class TextFormat:
 
     def detect_delimiter(self, line: str) -> str:
         """The given delimiter, otherwise the one detected in a line of the table; blanks only between numbers."""
-        return self.delimiter or next((d for d in "\t;" if d in line), " " if _are_numbers_and_blanks(line) else ",")
+        sign = next((d for d in "\t;" if d in line), "|" if "|" in line and "," not in line else "")
+        return self.delimiter or sign or (" " if _are_numbers_and_blanks(line) else ",")
 
     def with_blanks(self, body: NumberedLines) -> TextFormat:
         """The format with blanks as the delimiter, if none is given and they separate the first numbers of a table."""

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ...core.annotation import one_line
 from ...core.arrays import Array
 from ...core.declaration import model, parameter
 from ...core.errors import IdentificationError, ParameterError
@@ -88,8 +89,13 @@ def fit_creep(recording: Recording, quantity: str) -> CreepFit:
     """Fit creep of a column, `contraction` or `force`, to the rows of a hold at constant pressure.
 
     Time counts from the first row. An element is added as long as the F test is significant. Raises IdentificationError
-    for fewer than 12 rows, or time that does not increase.
+    for another column, fewer than 12 rows, or time that does not increase.
     """
+    if quantity not in ("contraction", "force"):
+        raise IdentificationError(
+            f"{recording.origin}: creep of the column '{one_line(quantity)}' is not fitted; give 'contraction' or "
+            "'force'. A length becomes a contraction where the recording states the resting length."
+        )
     time, values = recording["time"], recording[quantity]
     if time.size < 12 or not (np.diff(time) > 0).all():
         raise IdentificationError(
