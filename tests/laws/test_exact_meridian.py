@@ -287,3 +287,13 @@ def test_rest_below_the_threshold_pressure():
         near, further = exact(line).pressure(np.array([1e-4, 4e-4]), 80.0)
         assert 2 * near - further == pytest.approx(start, rel=0.01)  # it leaves the start like sqrt(eps)
     assert circle(LINE_B).contraction(circle(LINE_B).threshold_pressure, 80.0) == 0.0
+
+
+def test_a_slender_tube_contracts_to_its_maximum_volume_beyond_half_its_length():
+    tube = PleatedTube(0.206, 0.017)
+    law = ExactMeridian(tube, RubberLine(1.1e4, 0.0), 3.3e-3)
+    assert tube.contraction_range[1] == tube.free_contraction > 0.505
+    assert tube.effective_area(tube.free_contraction) == pytest.approx(0.0, abs=1e-12)
+    for contraction in (0.1, 0.3, 0.5):
+        pressure = law.pressure(contraction, 20.0)
+        assert law.contraction(pressure, 20.0) == pytest.approx(contraction, abs=1e-10)

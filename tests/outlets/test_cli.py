@@ -433,10 +433,9 @@ def test_simulate_writes_a_recording_that_reads_back(scenario: Path, tmp_path: P
 
 
 def test_a_run_that_fails_keeps_what_it_has_and_says_why(scenario: Path, tmp_path: Path):
-    """A valve of half a metre fills the muscle with 50 bar in a millisecond, which throws the load beyond any geometry."""
+    """A valve of half a metre fills the muscle in a millisecond and throws a light load by the length of the muscle."""
     example = (Path(__file__).resolve().parents[2] / "examples" / "fill_discharge.toml").read_text(encoding="utf-8")
-    torn = example.replace("2.6167e-9", "9e-6").replace('gas = "Isothermal"', "").replace("200 N s", "1 N s")
-    torn = torn.replace("650 kPa(a)", "50 bar")
+    torn = example.replace("2.6167e-9", "9e-6").replace('gas = "Isothermal"', "").replace('"10 kg"', '"5 kg"')
     scenario.write_text(torn, encoding="utf-8")
     result = airmuscle("simulate", scenario, "--out", tmp_path / "run")
     assert result.exit_code == 1

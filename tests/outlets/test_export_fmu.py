@@ -29,7 +29,7 @@ from airmuscle.cli.app import app
 from airmuscle.control import PID, ControlLoop, Schedule
 from airmuscle.core.errors import FileError, ParameterError
 from airmuscle.export import compiler, write_fmu
-from airmuscle.export.fmi_units import base_powers
+from airmuscle.export.fmi_units import BASE, base_powers
 from airmuscle.muscle.characteristic.validity_range import ValidityRange
 from airmuscle.simulation import Problem, Rodas4, RungeKutta4, solve
 
@@ -420,3 +420,15 @@ def test_options_that_do_not_fit_are_refused(options, message, tmp_path):
     done = airmuscle("export", "dmsp-20-300", *options, "--out", tmp_path)
     assert done.exit_code == 2
     assert message in done.output
+
+
+def test_the_base_units_of_an_fmu_are_those_of_the_international_system():
+    import pint
+
+    registry = pint.UnitRegistry()
+    names = {"[length]": "m", "[mass]": "kg", "[time]": "s", "[temperature]": "K"}
+    for unit, powers in BASE.items():
+        dimensions = registry.parse_units(unit).dimensionality
+        expected = {"rad": 1} if unit == "rad" else {names[key]: int(power) for key, power in dimensions.items()}
+        assert powers == expected, unit
+        assert registry.Quantity(1.0, unit).to_base_units().magnitude == 1.0

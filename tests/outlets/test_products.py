@@ -19,7 +19,7 @@ from airmuscle.library.files import entries_of_product, list_laws, list_products
 from airmuscle.library.law_file import load_law
 from airmuscle.library.scaling import scale_entry
 from airmuscle.library.stated_band import StatedBand
-from airmuscle.library.uncertainty import ParameterUncertainty
+from airmuscle.library.uncertainty import ParameterUncertainty, without_parts
 from airmuscle.muscle import CreepElements, LinearSpring, Ratings
 
 DMSP_20 = "dmsp-20-300"
@@ -150,6 +150,29 @@ def test_a_scaled_muscle_keeps_only_the_uncertainty_of_parameters_that_do_not_ch
         assert entry.uncertainty == (stated if kept else None)
 
 
+def uncertainty_of(errors: tuple[float, float], correlation: float) -> ParameterUncertainty:
+    """The uncertainty of a damping and a stiffness."""
+    return ParameterUncertainty(
+        ("damper.damping", "spring.stiffness"), errors, ((1.0, correlation), (correlation, 1.0))
+    )  # fmt: skip
+
+
+def test_an_uncertainty_has_finite_errors_and_possible_correlations():
+    for errors in ((np.inf, 1.0), (np.nan, 1.0), (1.0, -1e-9)):
+        with pytest.raises(ParameterError, match="standard errors must be finite and not negative"):
+            uncertainty_of(errors, 0.0)
+    assert uncertainty_of((0.0, 2.0), -1.0 - 5e-7).covariance[1].tolist() == [0.0, 4.0]
+    with pytest.raises(ParameterError, match="allowed range of a correlation: -1 to 1"):
+        uncertainty_of((1.0, 2.0), 1.0 + 1e-5)
+
+
+def test_an_uncertainty_without_a_part_has_the_rows_of_the_others():
+    stated = uncertainty_of((1.0, 2.0), 0.5)
+    assert without_parts(stated, ["damper"]) == ParameterUncertainty(("spring.stiffness",), (2.0,), ((1.0,),))
+    assert without_parts(stated, ["damper", "spring"]) is None
+    assert without_parts(stated, ["friction"]) == stated
+
+
 def test_another_diameter_is_another_product_without_the_ratings_and_the_band_of_the_first():
     band = StatedBand("force", 12.0, "40 rows")
     entry = dataclasses.replace(load_law("tondu-lopez"), ratings=Ratings(max_force=100.0), error_band=band)
@@ -182,6 +205,7 @@ def test_the_force_of_a_braid_without_wall_grows_with_the_square_of_its_diameter
         (DMSP_20, {"diameter": "40 mm"}, "MartensBoblan2017 cannot be scaled to another diameter"),
         ("festo-tool-dmsp-20", {"resting_length": "200 mm"}, "has no resting length: its force depends on pressure"),
         ("tondu-lopez", {"diameter": "-1 mm"}, "diameter is -1 mm; it must be greater than zero"),
+        ("tondu-lopez", {"resting_length": "0 mm"}, "resting length is 0 mm; it must be greater than zero"),
     ],
 )
 def test_a_size_that_cannot_be_is_refused(name: str, size: dict[str, str], message: str):

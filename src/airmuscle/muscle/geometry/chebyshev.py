@@ -46,9 +46,8 @@ class ChebyshevGeometry(Geometry):
             )
         if not self.min_contraction < self.max_contraction < 1.0:
             raise ParameterError(
-                f"ChebyshevGeometry: min_contraction is {self.min_contraction:g} and max_contraction "
-                f"{self.max_contraction:g}; the first must be less than the second, and this less than 1, where the "
-                "length is zero."
+                f"ChebyshevGeometry: min_contraction {self.min_contraction:g} must be less than max_contraction "
+                f"{self.max_contraction:g}, and this less than 1, where the length is zero."
             )
 
     @property

@@ -57,7 +57,10 @@ class PleatedTube(FibreTube):
 
     @property
     def contraction_range(self) -> tuple[float, float]:
-        """From zero to 50 %, less for a short tube; above `free_contraction` the tension is negative."""
+        """From zero to 50 %, less for a short tube, more for a slender one, to its `free_contraction`.
+
+        Above `free_contraction` the tension is negative.
+        """
         return (0.0, _max_contraction(self._slenderness))
 
     @property
@@ -177,7 +180,10 @@ def _contraction(mu: Any, slenderness: float) -> Any:
 @functools.cache
 def _max_contraction(slenderness: float) -> float:
     """Return the maximum contraction [1] of a tube of this slenderness."""
-    return min(0.5, float(_contraction(np.asarray(_ROOT_MU_BRACKET[1] ** 2), slenderness)))
+    at_maximum_volume, at_end = (
+        float(_contraction(np.asarray(mu), slenderness)) for mu in (0.5, _ROOT_MU_BRACKET[1] ** 2)
+    )
+    return max(at_maximum_volume, min(0.5, at_end))
 
 
 def unwrap_scalar(value: Any) -> Any:
