@@ -25,6 +25,8 @@ from airmuscle.pneumatics import FillDischarge, RegulatedSupply, Supply, Tank, V
 from airmuscle.pneumatics.gas import Ambient, EnergyBalance, Isothermal
 from airmuscle.simulation import Problem, Rodas4, solve
 
+# Laws and geometries of different lengths are combined.
+pytestmark = pytest.mark.filterwarnings("ignore:.*is the law of a muscle of")
 DURATION = 0.5
 VALVE = Valve(1e-8, 0.3)
 

@@ -70,7 +70,7 @@ def bench(head: str = HEAD, table: list[list[float]] | None = None, **replaced: 
 
 
 CSV = {
-    "without units": (bench("pressure,length,force"), r"'pressure': no unit is stated. Rename the column header to 'pressure \[kPa\]'"),
+    "without units": (bench("pressure,length,force"), r"'pressure': no unit is stated. State that of the values in the column header, for example 'pressure \[kPa\]'"),
     "decimal comma": (bench(row_1="1,5,300,5,201,5"), r"line 2: the line must have 3 cells .* it has 6. .* decimal comma, separate the columns by ';'"),
     "text": (bench(row_7="n/a,290,100"), r"line 8: pressure 'n/a' is not a number. Correct the cell or delete"),
     "NaN": (bench(row_7="nan,290,100"), r"line 8: pressure is nan; it must be finite .* Delete the line, or fill the gap"),

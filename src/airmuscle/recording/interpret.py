@@ -165,7 +165,8 @@ def unit_conversion(table: RawTable, heading: Heading, ambient: float) -> UnitCo
             return UnitConversion(1.0)
         example = f"{heading.name} [{UNIT_SPELLINGS[target][1 % len(UNIT_SPELLINGS[target])]}]"
         raise UnitError(
-            f"{where}: no unit is stated. Rename the column header to '{example}'; usual units are {usual}.",
+            f"{where}: no unit is stated. State that of the values in the column header, for example "
+            f"'{example}'; usual units are {usual}.",
             hint=Hint("To state the unit", "units", {heading.name: ...}),
         )
     try:
