@@ -77,8 +77,8 @@ def test_a_row_does_not_depend_on_how_many_there_are(count):
 def test_many_outputs_are_computed_one_by_one():
     """Machine code of a large plant's outputs is not generated twice."""
     plant = EXAMPLES["surface"]
-    muscles = tuple(dataclasses.replace(plant.muscles[0], name=f"muscle{i}") for i in range(6))
-    large = dataclasses.replace(plant, muscle=muscles, circuit=plant.circuits * 6, mechanism=HangingMass(60.0))
+    muscles = tuple(dataclasses.replace(plant.muscles[0], name=f"muscle{i}") for i in range(12))
+    large = dataclasses.replace(plant, muscle=muscles, circuit=plant.circuits * 12, mechanism=HangingMass(60.0))
     compiled = compile_system(large)
     assert compiled.program.outputs_at_rows == (compiled.address["outputs"], 1)
     states, inputs = points(compiled, 7)

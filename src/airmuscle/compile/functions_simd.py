@@ -18,7 +18,7 @@ AT_ONCE = 64
 
 ROWS = LlvmType(lanes=4)
 """A value of several rows of one plant. Vectors of eight slow down what the processor does next (measured)."""
-MAX_OPERATIONS = 500
+MAX_OPERATIONS = 2000
 """Outputs of more operations are computed row by row: compiling them twice takes longer than runs save (measured)."""
 
 
