@@ -10,7 +10,7 @@ import pytest
 
 import airmuscle as am
 from airmuscle.core.declaration import model
-from airmuscle.core.errors import ParameterError, UnitError
+from airmuscle.core.errors import AirmuscleWarning, ParameterError, UnitError
 from airmuscle.muscle.characteristic.base import ForceLaw, PressureLaw
 
 BRAID = am.geometry.Braid(0.01, 0.4363, 0.3)
@@ -23,6 +23,17 @@ class Product(ForceLaw):
 
     def force(self, pressure, contraction):
         return 2 * pressure - 1e6 * contraction
+
+
+@model
+class Other(ForceLaw):
+    """A user's law whose methods name their arguments in another way."""
+
+    def force(self, p, eps):
+        return 2 * p - 1e6 * eps
+
+    def slopes(self, *point):
+        return super().slopes(*point)
 
 
 LAWS = {
@@ -78,6 +89,16 @@ def test_a_muscle_and_its_geometry_take_texts_too():
     assert BRAID.volume("5 %") == BRAID.volume(0.05)
     assert np.array_equal(BRAID.volume([0, 0.1]), BRAID.volume(np.array([0.0, 0.1])))
     assert BRAID.volume_derivative("5 %") == BRAID.volume_derivative(0.05)
+
+
+def test_a_law_may_name_its_arguments_in_another_way():
+    law = Other()
+    assert law.force("3 bar", "5 %") == law.force(3e5, 0.05) == law.force(p=3e5, eps="5 %")
+    assert law.slopes("3 bar", "5 %") == law.slopes(3e5, 0.05) == (2.0, -1e6)
+    with pytest.raises(ParameterError, match=r"Other.force: p is None; give a number"):
+        law.force(None, 0.1)
+    with pytest.warns(AirmuscleWarning, match="Is it in per cent"):
+        law.force(3e5, 5.0)
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, NamedTuple
 
 from ...core import autodiff
 from ...core.ops import Value
-from ...core.quantity_arguments import RatioCheck, accept_quantities_in
+from ...core.quantity_arguments import accept_quantities_in
 from ...core.reference import Reference
 from .solve import describe_range, find_first_root, warn_above_whole_length
 
@@ -21,7 +21,6 @@ _UNITS = {
     "stiffness": ("Pa", "1"),
 }  # fmt: skip
 """Units of the arguments of the methods."""
-_CONTRACTION = RatioCheck("contraction", warn_above_whole_length)
 MIN_PRESSURE = 1e-300
 """Replaces a pressure of zero [Pa] as a divisor; no load then has a solution."""
 
@@ -47,7 +46,7 @@ class Characteristic(abc.ABC):
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
-        accept_quantities_in(cls, _UNITS, _CONTRACTION)
+        accept_quantities_in(cls, _UNITS, warn_above_whole_length)
 
     @property
     def pressure_range(self) -> tuple[float, float]:
@@ -108,7 +107,7 @@ class Characteristic(abc.ABC):
         )
 
 
-accept_quantities_in(Characteristic, _UNITS, _CONTRACTION)
+accept_quantities_in(Characteristic, _UNITS, warn_above_whole_length)
 
 
 class ForceLaw(Characteristic):
