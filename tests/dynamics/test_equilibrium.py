@@ -15,7 +15,7 @@ from widths import widened
 from airmuscle.compile.program import compile_system
 from airmuscle.control.inputs import ZERO_INPUT, Schedule
 from airmuscle.core import ops
-from airmuscle.core.errors import EquilibriumError, GeometryLimitError, ParameterError
+from airmuscle.core.errors import EquilibriumError, GeometryLimitError, ParameterError, UnitError
 from airmuscle.mechanism import (
     AntagonisticJoint,
     HangingMass,
@@ -284,7 +284,8 @@ def test_air_that_no_pressure_holds_names_the_muscle():
         ({"pressure": (1e5, 1e5, 1e5)}, "pressure has 3 values; the plant has 2 muscles"),
         ({"air_mass": -1e-4}, "must be greater than 0"),
         ({"air_mass": float("nan")}, "must be a finite number in kg"),
-        ({"pressure": "3 bar"}, "must be a finite number in Pa"),
+        ({"pressure": b"3 bar"}, "must be a finite number in Pa"),
+        ({"pressure": None, "air_mass": {}}, "must be a finite number in kg"),
         ({"pressure": {"left": 2e5, "right": 3e5}}, "in Pa, or a tuple with the values of left, right"),
         ({"pressure": -2e5}, "not above absolute vacuum"),
         ({"pressure": 1e5, "inputs": {"hold": 1.0}}, "no input 'hold'"),
@@ -304,3 +305,19 @@ def test_an_input_beyond_its_range_is_refused():
     valve = ProportionalValve(Supply(6e5), VALVE, VALVE, SecondOrderLag(80.0), muscle_count=2)
     with pytest.raises(ParameterError, match=r"the input 'command' is 2; allowed range: -1 to 1"):
         find_equilibrium(Plant((LEFT, RIGHT), valve, JOINT), pressure=1e5, inputs={"command": 2.0})
+
+
+def test_states_and_equilibria_take_texts_with_a_unit_and_lists():
+    plant = PLANTS["joint"]
+    assert find_equilibrium(plant, pressure="2 bar") == find_equilibrium(plant, pressure=2e5)
+    two = find_equilibrium(plant, pressure=(1e5, 2e5))
+    assert find_equilibrium(plant, pressure=["1 bar", 2e5]) == two
+    assert plant.state_at(pressure=["1 bar", "200 kPa"], angle="5 deg") == plant.state_at(
+        pressure=(1e5, 2e5), angle=np.deg2rad(5.0)
+    )
+    one = PLANTS["isometric"]
+    assert find_equilibrium(one, air_mass="0.1 g") == find_equilibrium(one, air_mass=1e-4)
+    with pytest.raises(UnitError, match="find_equilibrium: pressure: unit 'N' cannot be converted to 'Pa'"):
+        find_equilibrium(one, pressure="3 N")
+    with pytest.raises(UnitError, match="the angle of a state: unit 'mm' cannot be converted to 'rad'"):
+        plant.state_at(pressure=1e5, angle="5 mm")

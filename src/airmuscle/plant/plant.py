@@ -8,7 +8,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, ClassVar
 
-from ..core.declaration import as_finite_float, model
+from ..core.declaration import model
 from ..core.diagnostics import ColumnLimit, Columns, Diagnostic, DiagnosticCode
 from ..core.errors import GeometryLimitError
 from ..core.ops import Value
@@ -24,7 +24,7 @@ from .display import PlantDisplay
 from .evaluation import PlantEvaluation
 from .muscle_state import MuscleState, air_states, muscle_outputs, muscle_state, states_of_muscle
 from .steady_state import fill_muscles, settle_muscles
-from .validation import check_free, check_parts, check_pressures, check_unique
+from .validation import as_quantity, check_free, check_parts, check_pressures, check_unique
 
 _AIR_STATES = ("air_mass", "internal_energy")
 _ROUNDING = 1e-3
@@ -213,8 +213,8 @@ class Plant(PlantDisplay, System):
         at = self.evaluate(state, inputs)
         return self.rates_of(at, state), self.outputs_of(at)
 
-    def state_at(self, *, pressure: float | tuple[float, ...], **values: float) -> dict[str, float]:
-        """A state by the gauge pressure [Pa] of the muscle (or of each), and by states by name.
+    def state_at(self, *, pressure: float | str | Sequence[float | str], **values: float | str) -> dict[str, float]:
+        """A state by the gauge pressure [Pa] of the muscle (or of each), and by states by name; also texts with a unit.
 
         Coordinates and speeds that are not given are 0; walls, tubes, tanks and series springs are in steady state at
         this pressure, bristles relaxed. Names with a dot are passed as `**{"left.bristle": 1e-4}`. Raises
@@ -222,11 +222,12 @@ class Plant(PlantDisplay, System):
         a volume that is not positive; GeometryLimitError for an impossible contraction.
         """
         pressures = check_pressures(pressure, len(self.muscles), self.ambient)
-        values = {name: as_finite_float(f"Plant: the {name} of a state", value) for name, value in values.items()}
         muscles = zip(self.prefixes, self.muscles, strict=True)
         air = {f"{p}{s.name}" for p, m in muscles for s in air_states(m, self.gas, self.ambient)}
-        check_free(values, [s.name for s in self.states if s.name not in air])
-        state: dict[str, Value] = {n: 0.0 for c in self.mechanism.coordinates for n in (c.name, c.speed)} | values
+        units = {s.name: s.unit for s in self.states if s.name not in air}
+        check_free(values, list(units))
+        given = {n: as_quantity(f"Plant: the {n} of a state", value, units[n]) for n, value in values.items()}
+        state: dict[str, Value] = {n: 0.0 for c in self.mechanism.coordinates for n in (c.name, c.speed)} | given
         contractions = self.mechanism.contractions(state, self.resting_lengths)
         for muscle, contraction in zip(self.muscles, contractions, strict=True):
             muscle.geometry.check_contraction(contraction)

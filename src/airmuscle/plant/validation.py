@@ -10,7 +10,7 @@ import numpy as np
 from ..core.annotation import one_line
 from ..core.declaration import as_finite_float, check_structure, parameters
 from ..core.errors import ParameterError, TraceError
-from ..core.units import check_above_vacuum
+from ..core.units import check_above_vacuum, quantity
 from ..mechanism import Mechanism
 from ..muscle import Muscle
 from ..muscle.characteristic.validity_range import ValidityRange
@@ -101,13 +101,19 @@ def check_free(values: Iterable[str], free: Sequence[str]) -> None:
             raise ParameterError(f"Plant: no coordinate '{name}'; there are {', '.join(free) or 'none'}.")
 
 
-def check_pressures(pressure: float | tuple[float, ...], muscles: int, ambient: Ambient) -> list[float]:
-    """The gauge pressure [Pa] of each muscle, from one for all or one for each.
+def as_quantity(where: str, value: Any, unit: str) -> float:
+    """A finite number in SI, also from a text with a unit. Raises ParameterError or UnitError."""
+    return quantity(value, unit, where=where) if isinstance(value, str) else as_finite_float(where, value)
 
-    Raises ParameterError for a pressure that is not above absolute vacuum and for another number than of muscles.
+
+def check_pressures(pressure: float | str | Sequence[float | str], muscles: int, ambient: Ambient) -> list[float]:
+    """The gauge pressure [Pa] of each muscle, from one for all or one for each; also texts with a unit.
+
+    Raises UnitError, and ParameterError for a pressure that is not above absolute vacuum and for another number than of
+    muscles.
     """
-    given = pressure if isinstance(pressure, tuple) else (pressure,) * muscles
-    pressures = [as_finite_float("Plant: the pressure of a state", p) for p in given]
+    given = pressure if isinstance(pressure, tuple | list) else (pressure,) * muscles
+    pressures = [as_quantity("Plant: the pressure of a state", p, "Pa") for p in given]
     if len(pressures) != muscles:
         raise ParameterError(f"Plant: {len(pressures)} pressures are given for {muscles} muscles.")
     for each in pressures:

@@ -40,7 +40,7 @@ def find_equilibria(
 ) -> tuple[Equilibrium, ...]:
     """Static equilibria for given pressures or air masses of the muscles, sorted by ascending coordinates.
 
-    pressure   gauge pressure [Pa] of the muscle, a number for all or a tuple with one for each
+    pressure   gauge pressure [Pa] of the muscle, a number for all or a tuple with one for each; also texts with a unit
     air_mass   alternatively: mass of the air [kg] with closed valves; the gas law determines the pressure at the
                temperature of the air at rest
     inputs     0 by default, so that a latch is open
@@ -50,9 +50,9 @@ def find_equilibria(
 
     With one coordinate, the whole range of the muscles is searched; a pair of equilibria closer than 1/100 of the range
     is found by the extremum of the force between them. With several, Newton's method starts from many points and may
-    miss an equilibrium to which none of them converges. Raises ParameterError for invalid values, GeometryLimitError if
-    the mechanism fixes a muscle at a contraction beyond its limits, EquilibriumError if every position is an
-    equilibrium.
+    miss an equilibrium to which none of them converges. Raises ParameterError or UnitError for invalid values,
+    GeometryLimitError if the mechanism fixes a muscle at a contraction beyond its limits, EquilibriumError if every
+    position is an equilibrium.
     """
     one = _statics(plant, pressure, air_mass, inputs)
     rows, x = _balances(one)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TypeAlias
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -11,18 +11,21 @@ from ...control.inputs import check_input_names
 from ...core.annotation import one_line
 from ...core.errors import ParameterError
 from ...core.system import System
+from ...core.units import quantity
 from ...plant.plant import Plant
 
-MuscleValues: TypeAlias = float | tuple[float, ...] | None
+MuscleValues: TypeAlias = float | str | Sequence[float | str] | None
 """One number for all muscles, or one for each; None where the other quantity is given."""
 
 
 def air_of_each(plant: Plant, pressure: MuscleValues, air_mass: MuscleValues) -> tuple[float, ...]:
-    """The given pressures [Pa] or air masses [kg], one for each muscle. Raises ParameterError where they are wrong."""
+    """The given pressures [Pa] or air masses [kg], one for each muscle. Raises ParameterError or UnitError."""
     if (pressure is None) == (air_mass is None):
         raise ParameterError("find_equilibrium: give either the pressure [Pa] or the air_mass [kg] of the muscles.")
     name, given, unit = ("pressure", pressure, "Pa") if air_mass is None else ("air_mass", air_mass, "kg")
-    values = given if isinstance(given, tuple) else (given,) * len(plant.muscles)
+    where = f"find_equilibrium: {name}"
+    several: Sequence[Any] = given if isinstance(given, tuple | list) else (given,) * len(plant.muscles)
+    values = [quantity(value, unit, where=where) if isinstance(value, str) else value for value in several]
     if len(values) != len(plant.muscles):
         raise ParameterError(
             f"find_equilibrium: {name} has {len(values)} values; the plant has {len(plant.muscles)} muscles."
