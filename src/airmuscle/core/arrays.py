@@ -10,6 +10,8 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 """A NumPy array of float64."""
+NUMBERS = frozenset({float, int, np.float64})
+"""Types of numbers that need no conversion."""
 FEW = 64
 """Numbers up to which a Python loop is faster than NumPy (measured)."""
 

@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 
 from .annotation import one_line
+from .arrays import NUMBERS
 from .errors import ParameterError
 from .units import quantity
 
-_PLAIN = frozenset({float, int, np.float64})
-"""Types of numbers that need no conversion."""
 _ARRAY, _DOUBLE = np.ndarray, np.dtype(np.float64)
 _EXAMPLES = {"Pa": "'3 bar'", "N": "'200 N'", "1": "'10 %'"}
 """A text for each unit of an argument."""
@@ -41,8 +40,8 @@ def accept_quantities(
     def converted(self: Any, *given: Any, **named: Any) -> Any:
         if len(given) == 2 and not named:  # the usual call: as short as it can be
             a, b = given
-            if (type(a) in _PLAIN or (type(a) is _ARRAY and a.dtype is _DOUBLE)) and (
-                type(b) in _PLAIN or (type(b) is _ARRAY and b.dtype is _DOUBLE)
+            if (type(a) in NUMBERS or (type(a) is _ARRAY and a.dtype is _DOUBLE)) and (
+                type(b) in NUMBERS or (type(b) is _ARRAY and b.dtype is _DOUBLE)
             ):
                 if place >= 0 and not (type(given[place]) is float and given[place] <= 1.0):
                     check_ratio(given[place], self)  # type: ignore[misc]
@@ -70,7 +69,7 @@ def accept_quantities_in(
 def _as_number(value: Any, name: str, units: Mapping[str, str], owner: str) -> Any:
     """The argument as a number or an array of numbers in SI. Raises ParameterError or UnitError."""
     kind = type(value)
-    if name not in units or kind in _PLAIN or (kind is np.ndarray and value.dtype.kind == "f"):
+    if name not in units or kind in NUMBERS or (kind is np.ndarray and value.dtype.kind == "f"):
         return value
     if kind is str:
         return quantity(value, units[name], where=f"{owner}: {name}")

@@ -211,9 +211,13 @@ def _number(text: str) -> float | str:
     try:
         return float(text)
     except ValueError:
-        pass
+        return _without_quotation_marks(text)
+
+
+def _without_quotation_marks(text: str) -> str:
+    """The text that `write` put in quotation marks because it looks like a number; any other text as it is."""
     try:
-        quoted = json.loads(text) if text.startswith('"') else text
+        value = json.loads(text)
     except json.JSONDecodeError:
         return text
-    return str(quoted)
+    return value if isinstance(value, str) else text

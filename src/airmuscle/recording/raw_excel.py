@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import ColumnError, FileError, suggestion
+from .clock import seconds_from_clock
 from .header import (
     COMMA_NUMBER,
     POINT_NUMBER,
@@ -123,7 +124,7 @@ def _is_numeric(row: list[Any]) -> bool:
 
 def _is_numeric_text(cell: str) -> bool:
     """Whether a text is a number, a clock time or a date."""
-    return is_number(cell) or (any(map(str.isdigit, cell)) and not any(map(str.isalpha, cell)))
+    return is_number(cell) or seconds_from_clock((cell,)) is not None
 
 
 def _cell(row: list[Any], j: int) -> Any:

@@ -17,7 +17,7 @@ from ..control.inputs import InputSignal, Schedule, check_input_signal
 from ..control.law_design import designed_loop
 from ..control.piecewise_linear import PiecewiseLinear
 from ..control.with_drivers import WithDrivers
-from ..core.arrays import FEW, Array
+from ..core.arrays import FEW, NUMBERS, Array
 from ..core.declaration import as_float
 from ..core.errors import ParameterError
 from ..core.reference import Reference, cite
@@ -28,8 +28,6 @@ from .equilibrium import find_equilibrium
 from .integrators import Integrator, default_integrator
 from .output_times import output_times
 
-NUMBERS = frozenset({float, int, np.float64})
-"""Types of numbers that need no conversion."""
 MAX_KEPT_ROWS = 100_000
 """Output times that are kept with a plant for its next run, 0.8 MB (chosen)."""
 LARGEST = sys.float_info.max

@@ -15,6 +15,7 @@ from ..control.control_loop import ControlLoop
 from ..control.inputs import InputSignal, Schedule
 from ..control.piecewise_linear import PiecewiseLinear
 from ..core.annotation import one_line
+from ..core.arrays import NUMBERS
 from ..core.declaration import as_float
 from ..core.errors import ParameterError, SimulationError
 from ..core.status import Status
@@ -24,7 +25,7 @@ from ..recording import Recording
 from .bound_integrator import INTERRUPT_CHECK_STEPS, BoundIntegrator, RawSolution
 from .closed_loop import solve_closed_loop
 from .integrators import Integrator, default_integrator
-from .problem import NUMBERS, Problem, check_input_range, plain_numbers
+from .problem import Problem, check_input_range, plain_numbers
 from .rows import early_end, make_recording, recorded_rows, status_of_state, truncate_at_invalid_row
 from .solution import Solution, Statistics
 
