@@ -79,7 +79,6 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
         self.action_space = batch_space(self.single_action_space, num_envs)
         plants = self._plants
         self._given = np.zeros((plants.blocks, plants.width, len(task.actions) + 1), plants.dtype)
-        self._inputs = self._given.reshape(-1, len(task.actions) + 1)[:num_envs]
         self._elapsed = np.zeros(num_envs, np.int64)
         self._over: Booleans = np.zeros(num_envs, bool)
         self._generators: list[np.random.Generator] = []
@@ -128,6 +127,11 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
         elif over.any():
             return self._begun_at_once(observations, over), rewards, terminated, truncated, _final(observations, over)
         return observations, rewards, terminated, truncated, {}
+
+    @property
+    def _inputs(self) -> npt.NDArray[Any]:
+        """The inputs of the plants (N, m + 1), a view."""
+        return self._given.reshape(-1, self._given.shape[-1])[: self.num_envs]
 
     def close_extras(self, **options: Any) -> None:
         """End the threads."""

@@ -93,6 +93,10 @@ class Problem(ShortRepr):
         driven = WithDrivers(loop.other_inputs, loop.drivers)
         return driven.checked_segments(inputs, self.start_time, self.duration)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields alone: compiled code belongs to a process, and all else follows from the fields."""
+        return {field.name: self.__dict__[field.name] for field in dataclasses.fields(self)}
+
     @property
     def end_time(self) -> float:
         """End of the run [s]."""

@@ -49,7 +49,8 @@ class Stepper:
     state (n,), inputs (m,), outputs (k,)    present values [SI]; `state` may be written to, for instance by an observer
 
     Equal steps from equal states give equal results to the last bit. A step allocates no arrays. A Stepper is for one
-    thread at a time. Raises ParameterError for an unknown or impossible initial state.
+    thread at a time; a copy, also a pickled one, goes on from the present state by itself. Raises ParameterError for
+    an unknown or impossible initial state.
     """
 
     def __init__(
@@ -166,6 +167,18 @@ class Stepper:
         state_vector(self.plant, dict(zip(self.state_names, snapshot.state, strict=True)))
         self.state[:], self._given[:], self.time = snapshot.state, snapshot.inputs, float(snapshot.time)
         return self._settle()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Arguments, parameters and present state; kernels and addresses belong to a process."""
+        options = {"integrator": self.integrator, "check_validity": self.check_validity}
+        initial = None if self._initial is None else dict(zip(self.state_names, self._initial.tolist(), strict=True))
+        parameters = self._compiled.parameters, self._compiled.nominal
+        return {"arguments": (self.plant, initial), "options": options, "at": parameters, "present": self.snapshot()}
+
+    def __setstate__(self, stored: dict[str, Any]) -> None:
+        self.__init__(*stored["arguments"], **stored["options"])  # type: ignore[misc]
+        self._bind(self._compiled.at(*stored["at"]))
+        self.restore(stored["present"])
 
     @property
     def plant(self) -> System:

@@ -55,6 +55,7 @@ class BatchStepper:
             raise ParameterError(f"BatchStepper: cores is {cores!r}; it must be a whole number from 1 on.")
         compiled, number = compile_system(plant), precision.number
         self.plant, self.count, self.width = plant, count, number.lanes
+        self._options = {"integrator": integrator, "precision": precision, "cores": cores}
         self.dtype: Any = np.float64 if number.bits == 64 else np.float32
         self.blocks = -(-count // self.width)
         (prepare, *functions), held = compiled.program.lanes(integrator.tableau(), number)
@@ -70,6 +71,17 @@ class BatchStepper:
         self._steps = np.zeros(1, dtype=np.int64)
         self._parts = [self._bind(functions, ends[i : i + 2].copy(), integrator.step) for i in range(cores)]
         self._threads = concurrent.futures.ThreadPoolExecutor(cores - 1) if cores > 1 else None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Arguments and arrays; threads, kernels and addresses belong to a process."""
+        arrays = self.states, self.inputs, self.parameters, self.outputs
+        return {"plant": self.plant, "count": self.count, "options": self._options, "arrays": arrays}
+
+    def __setstate__(self, stored: dict[str, Any]) -> None:
+        self.__init__(stored["plant"], stored["count"], **stored["options"])  # type: ignore[misc]
+        for own, array in zip((self.states, self.inputs, self.parameters, self.outputs), stored["arrays"], strict=True):
+            own[...] = array
+        self.prepare()
 
     def _columns(self, length: int, blocks: int | None = None) -> Columns:
         """An array (B, length, W) whose blocks begin at multiples of ALIGNMENT bytes."""
