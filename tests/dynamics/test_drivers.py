@@ -285,7 +285,7 @@ def test_rows_too_near_an_instant_give_way_to_it():
             r"SolenoidDriver.opening_delay .* is -0.001 s; allowed range: 0 to 10 s",
         ),
         (lambda: SolenoidDriver(closing_ramp=float("nan")), r"SolenoidDriver.closing_ramp .* must be finite"),
-        (lambda: PWM(0.0), r"PWM.frequency .* is 0 1/s; allowed range: 0.001 to"),
+        (lambda: PWM(0.0), r"PWM.frequency .* is 0 Hz; allowed range: 0.001 to"),
         (lambda: PWM(100.0, 6e-3), r"PWM.smallest_pulse is 0.006 s, more than half of the carrier's period of 0.01 s"),
         (
             lambda: WithDrivers(Schedule({}), {"fill": 3}),

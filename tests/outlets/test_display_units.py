@@ -236,3 +236,10 @@ def test_a_configuration_in_a_folder_of_another_user_is_not_read(config, monkeyp
         module.chosen_scale("Pa", 1e-3, "kPa")
     monkeypatch.setattr(module.os, "access", lambda folder, mode: False)
     assert module.chosen_scale("Pa", 1e-3, "kPa") == (1e-3, "kPa")
+
+
+def test_an_angular_speed_in_hertz_is_in_turns_per_second():
+    with display("Hz"):
+        assert in_display_unit(2 * np.pi, "rad/s") == (pytest.approx(1.0), "Hz")
+    with display("rpm"):
+        assert in_display_unit(2 * np.pi, "rad/s") == (pytest.approx(60.0), "rpm")

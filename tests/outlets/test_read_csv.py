@@ -382,3 +382,9 @@ def test_a_given_unit_overrides_that_of_the_file_with_a_note(tmp_path):
     assert recording["pressure"][0] == pytest.approx(30 * 6894.757293168361)
     assert "The pressure is read in psig, as specified by the user; the file states bar." in recording.notes
     assert not any("specified by the user" in note for note in read_csv(path, units={"pressure": "bar"}).notes)
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("Hz", 2 * np.pi), ("rpm", np.pi / 30), ("deg/s", np.pi / 180)])
+def test_an_angular_speed_in_turns_is_in_rad_per_second(bench, unit: str, factor: float):
+    recording = read_csv(bench(f"time [s],angular_speed [{unit}]\n0,1\n1,2\n2,3\n"))
+    assert recording["angular_speed"] == pytest.approx(factor * np.array([1.0, 2.0, 3.0]))

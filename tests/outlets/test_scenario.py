@@ -478,7 +478,7 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
             FILL,
             'drivers = { fill = "PWM" }',
             ParameterError,
-            r"\[input.drivers.fill\]: PWM needs 'frequency' \[1/s\]",
+            r"\[input.drivers.fill\]: PWM needs 'frequency' \[Hz\]",
         ),
         (
             FILL,

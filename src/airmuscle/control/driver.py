@@ -119,7 +119,7 @@ class PWM(Driver):
     period differs from the command by at most the smallest pulse times the frequency.
     """
 
-    frequency: float = parameter("1/s", "f_c", "frequency of the carrier", bounds=(1e-3, 1e6))
+    frequency: float = parameter("Hz", "f_c", "frequency of the carrier", bounds=(1e-3, 1e6))
     smallest_pulse: float = parameter("s", "t_min", "shortest pulse and gap", bounds=(0.0, 1e3), default=0.0)
 
     def check(self) -> None:

@@ -95,9 +95,15 @@ def _registry() -> Any:
     return pint.UnitRegistry()
 
 
+_NAMES_OF_PINT = {"kp": "kgf", "rev": "turn", "Nm": "N m"}
+"""Kilopond, revolution and newton metre in names of pint, to which Nm is the metre number, a unit of yarns."""
+
+
 def _to_pint_syntax(unit: str) -> str:
-    """Return a unit in the syntax of pint: `m3/(s Pa)` becomes `m**3/(s*Pa)`; the kilopond kp is kgf."""
-    unit = re.sub(r"\bkp\b", "kgf", unit.replace("³", "3").replace("²", "2"))
+    """Return a unit in the syntax of pint, with its names: `m3/(s Pa)` becomes `m**3/(s*Pa)`."""
+    unit = unit.replace("³", "3").replace("²", "2")
+    for name, of_pint in _NAMES_OF_PINT.items():
+        unit = re.sub(rf"\b{name}\b", of_pint, unit)
     powers = re.sub(r"([A-Za-z])\^?(\d)", r"\1**\2", unit)
     return re.sub(r"(?<=[\w)])\s+(?=[\w(])", "*", powers).replace("%", "percent").replace("°C", "degC")
 
@@ -106,17 +112,27 @@ _LARGE_EXPONENT = re.compile(r"(\*\*|\^)[\s\d()+-]*(\*\*|\^)|(\*\*|\^)\s*\(?\s*[
 """Nested exponents and exponents of ten or more: no unit has them, and their evaluation may not terminate."""
 
 
+_UNCERTAIN_NAME = re.compile(r"(?<![A-Za-z_])(tons?|ton_force|force_ton|mt|cwt|hundredweight)(?![A-Za-z_])")
+_REPLACEMENTS = {
+    "mt": "t (1000 kg)", "hundredweight": "kg or lb", "cwt": "kg or lb", "force": "kN",
+    "ton": "t (1000 kg), short_ton (907.2 kg) or long_ton (1016 kg)",
+}  # fmt: skip
+"""What to write in place of a name of several units; `mt` is a thousandth of a tonne to pint."""
+
+
 def _convert_with_pint(unit: str, target: str, where: str) -> UnitConversion:
-    """Return the conversion found by pint. Raises UnitError."""
+    """Return the conversion found by pint, with 2 pi between frequencies and angular speeds. Raises UnitError."""
     import pint
 
+    if name := _UNCERTAIN_NAME.search(unit):
+        instead = next(replacement for part, replacement in _REPLACEMENTS.items() if part in name[1])
+        raise UnitError(f"{where}'{name[1]}' is the name of several units; write {instead}.")
     try:
         if _LARGE_EXPONENT.search(unit):
             raise ValueError(unit)
         registry = _registry()
-        zero, one = (
-            registry.Quantity(v, _to_pint_syntax(unit)).to(_to_pint_syntax(target)).magnitude for v in (0.0, 1.0)
-        )
+        given, wanted = (registry.Quantity(1.0, _to_pint_syntax(text)) for text in (unit, target))
+        zero, one, two = (registry.Quantity(v, given.units).to(wanted.units).magnitude for v in (0.0, 1.0, 2.0))
     except pint.DimensionalityError:
         raise UnitError(
             f"{where}unit '{unit}' cannot be converted to {_describe_target(target)}: it measures another quantity."
@@ -125,7 +141,34 @@ def _convert_with_pint(unit: str, target: str, where: str) -> UnitConversion:
         raise UnitError(
             f"{where}'{unit}' is not a known unit. Write it like 'mm', 'kPa', 'bara', 'N', '%' or 'm3/(s Pa)'."
         ) from None
-    return UnitConversion(float(one - zero), float(zero))
+    if not math.isclose(two - one, one - zero):
+        raise UnitError(f"{where}unit '{unit}' is logarithmic; write {_describe_target(target)}.")
+    return UnitConversion(
+        float(one - zero) * _angle_factor(given.units, wanted.units, unit, target, where), float(zero)
+    )
+
+
+def _angle_factor(given: Any, wanted: Any, unit: str, target: str, where: str) -> float:
+    """1 for units that count angles and bits alike, which are ratios to pint; 2 pi between frequency and angular speed.
+
+    A torque per angle may be written without the angle, N m s. Raises UnitError for an angle in place of a ratio.
+    """
+    counted, expected = _counted(given), _counted(wanted)
+    if counted == expected or (not counted and expected == {"radian": -1}):
+        return 1.0
+    if counted == {"radian": 1} and target == "Hz":
+        return 1.0 / (2.0 * math.pi)
+    if expected == {"radian": 1} and any(name.endswith("hertz") for name in given._units):
+        return 2.0 * math.pi
+    reason = "it measures another quantity." if counted else "it states no angle."
+    frequency = " Write rad/s, deg/s, or a frequency in Hz or rpm." if target == "rad/s" else ""
+    raise UnitError(f"{where}unit '{unit}' cannot be converted to {_describe_target(target)}: {reason}{frequency}")
+
+
+def _counted(unit: Any) -> dict[str, float]:
+    """Exponents of radian and bit in a unit."""
+    exponents = _registry().get_base_units(unit)[1]._units
+    return {name: exponents[name] for name in ("radian", "bit") if exponents.get(name)}
 
 
 def _describe_target(target: str) -> str:
@@ -158,10 +201,6 @@ def conversion(unit: str, target: str, *, ambient: float = AMBIENT_PRESSURE, whe
         bare = _SPELLING.get(match["unit"].lower(), match["unit"].lower())
         absolute = match["kind"].lower().startswith("a")
         return UnitConversion(conversion(bare, "Pa").factor, -ambient if absolute else 0.0)
-    if unit in _FACTORS and {_FACTORS[unit][1], target} == {"1", "rad"}:  # pint treats an angle as a ratio
-        raise UnitError(
-            f"{where}unit '{unit}' cannot be converted to {_describe_target(target)}: it measures another quantity."
-        )
     if unit in _FACTORS and _FACTORS[unit][1] == target:
         factor = _FACTORS[unit][0]
         return UnitConversion(factor, assumed_gauge=target == "Pa")
