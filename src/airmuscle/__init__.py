@@ -2,7 +2,7 @@
 
 Nouns are frozen models, verbs are functions. Everything inside is SI, pressure is gauge, contraction is
 (L0 - L)/L0, pulling is positive. The laws are in `airmuscle.characteristic`, short for
-`airmuscle.muscle.characteristic`, the units in `airmuscle.units`.
+`airmuscle.muscle.characteristic`, the units in `airmuscle.units`, the exceptions in `airmuscle.errors`.
 
 Each name is imported from its package when it is first used (PEP 562), so that `import airmuscle` takes no time.
 Type checkers read the same names in `__init__.pyi`.
@@ -38,8 +38,8 @@ _MODULES = {
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names.split()}
 _PARTS_OF_A_MUSCLE = ("characteristic", "friction", "geometry")
 _SUBPACKAGES = (
-    *_PARTS_OF_A_MUSCLE, "analysis", "control", "environments", "export", "identify", "library", "mechanism", "muscle",
-    "plant", "pneumatics", "recording", "simulation", "sizing", "study", "units",
+    *_PARTS_OF_A_MUSCLE, "analysis", "control", "environments", "errors", "export", "identify", "library", "mechanism",
+    "muscle", "plant", "pneumatics", "recording", "simulation", "sizing", "study", "units",
 )  # fmt: skip
 
 __all__ = sorted([*_MODULE_OF, "units"])  # noqa: PLE0605

@@ -1,6 +1,7 @@
 from . import analysis as analysis
 from . import control as control
 from . import environments as environments
+from . import errors as errors
 from . import export as export
 from . import identify as identify
 from . import library as library

@@ -110,7 +110,9 @@ def test_the_packages_have_136_arrows_and_13_floors_at_most():
     below: dict[str, set[str]] = defaultdict(set)
     for path in FILES:
         room, *rest = path.relative_to(SOURCE).parts
-        below[room if rest else path.stem] |= {name.split(".")[1] for name in imported(path) if "." in name}
+        if not rest:  # the face
+            continue
+        below[room] |= {name.split(".")[1] for name in imported(path) if "." in name}
     for path in (ROOT / "benchmarks").glob("*.py"):
         names = {
             name for node in ast.walk(tree_of(path)) if isinstance(node, ast.ImportFrom) for name in [node.module or ""]
@@ -262,9 +264,9 @@ def code_for_users() -> Iterator[tuple[str, str]]:
 
 
 def face_of(module: str) -> frozenset[str] | None:
-    """The names in `__all__` of a package, and its subpackages; None if the module is not a package."""
+    """The names in `__all__` of a package, or of the exceptions, and its subpackages; None for any other module."""
     folder = SOURCE.parent.joinpath(*module.split("."))
-    if not folder.is_dir():
+    if not folder.is_dir() and module != "airmuscle.errors":
         return None
     names = getattr(importlib.import_module(module), "__all__", ())
     return frozenset(names) | {path.parent.name for path in folder.glob("*/__init__.py")}
@@ -291,3 +293,17 @@ def test_code_for_users_imports_from_faces_only():
 def test_an_import_that_is_not_from_a_face_is_detected():
     code = "from airmuscle.units import bar, no_unit\nfrom airmuscle.core.errors import FileError\nimport airmuscle.core.ops"
     assert list(names_outside_faces(code)) == ["airmuscle.units.no_unit", "airmuscle.core.errors", "airmuscle.core.ops"]
+
+
+def test_all_exceptions_are_in_airmuscle_errors():
+    from airmuscle import errors
+    from airmuscle.core import errors as core_errors
+
+    defined = {
+        name
+        for name, thing in vars(core_errors).items()
+        if inspect.isclass(thing) and issubclass(thing, Exception | Warning)
+    }
+    assert defined == set(errors.__all__)
+    assert all(getattr(errors, name) is getattr(core_errors, name) for name in errors.__all__)
+    assert all(name in (errors.__doc__ or "") for name in errors.__all__)

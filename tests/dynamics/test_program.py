@@ -27,7 +27,7 @@ FORMULAS = {
     "roots": lambda x, y: ops.sqrt(x * x + y * y + 1),
     "exponentials": lambda x, y: ops.exp(x / 4) * ops.log(5 + y),
     "angles": lambda x, y: ops.sin(x) * ops.cos(y) + ops.tan(x / 4) - ops.arctan(y * x),
-    "hyperbolics": lambda x, y: ops.sinh(x / 3) - ops.cosh(y / 3) + ops.arcsinh(x),
+    "hyperbolics": lambda x, y: ops.sinh(x / 3) - ops.cosh(y / 3) + ops.arcsinh(x) + ops.tanh(x - y),
     "choices": lambda x, y: ops.where(x >= y, x * 3, y - 1) + ops.where(ops.both(x > 0, y > 0), 1.0, -1.0),
     "tangents": lambda x, y: ops.where(x * y >= 0, 0.0, x * y) * (y - x) + ops.where(y <= 0, 0.0, y * (3 + x)) + x,
     "extremes": lambda x, y: ops.maximum(x, y) * 2 - ops.minimum(x * y, 1.0) + ops.clip(x, -1.0, 1.5),

@@ -44,7 +44,7 @@ FORMULAS = {
     "roots": lambda x, y: ops.sqrt(x * x + y * y + 1),
     "exponentials": lambda x, y: ops.exp(x / 4) * ops.log(5 + y) + ops.exp(x * y) * ops.exp(y),
     "angles": lambda x, y: ops.sin(x) * ops.cos(y) + ops.tan(x / 4) - ops.arctan(y * x),
-    "hyperbolics": lambda x, y: ops.sinh(x / 3) - ops.cosh(y / 3) * x + ops.arcsinh(x * y),
+    "hyperbolics": lambda x, y: ops.sinh(x / 3) - ops.cosh(y / 3) * x + ops.arcsinh(x * y) * ops.tanh(y),
     "choices": lambda x, y: ops.where(x >= y, x * y, y * y - 1) + ops.where(ops.both(x > 0, y > 0), x * x, -1.0),
     "extremes": lambda x, y: ops.maximum(x, y) * 2 - ops.minimum(x * y, 1.0) * y + ops.clip(x, -1.0, 1.0) * x,
     "untaken": lambda x, y: ops.where(x > 0.25, ops.sqrt(ops.maximum(x - 0.25, 0.0)), 0.0 * y) + x * y,

@@ -19,6 +19,7 @@ OUTSIDE = {
     "tan": (INFINITE, math.nan),
     "arctan": (INFINITE, math.nan),
     "arcsinh": (-INFINITE, math.nan),
+    "tanh": (INFINITE, -INFINITE, math.nan),
     "floor": (-INFINITE, math.nan),
 }
 

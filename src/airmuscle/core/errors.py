@@ -10,6 +10,7 @@ AirmuscleError
 ├── PhysicsError             the model has no solution
 │   ├── SolveError           no pressure, contraction or force satisfies the request
 │   ├── GeometryLimitError   a contraction outside the range of the geometry
+│   ├── RatingError          an operating point that the maker of the muscle does not permit
 │   └── EquilibriumError     a plant has no equilibrium; the message names the muscle and the forces
 ├── TraceError               a model cannot be traced into a compiled program
 ├── IdentificationError      the data cannot determine the requested quantities

@@ -23,7 +23,7 @@ _PLAIN = frozenset({float, int, bool})
 
 _SMALLEST, _LARGEST = sys.float_info.min, sys.float_info.max
 _DOMAINS = {
-    **dict.fromkeys(("sin", "cos", "tan", "arctan", "arcsinh", "floor"), (-_LARGEST, _LARGEST)),
+    **dict.fromkeys(("sin", "cos", "tan", "arctan", "arcsinh", "tanh", "floor"), (-_LARGEST, _LARGEST)),
     **dict.fromkeys(("exp", "sinh", "cosh"), (-700.0, 700.0)),
     "sqrt": (0.0, _LARGEST),
     "log": (_SMALLEST, _LARGEST),
@@ -151,6 +151,11 @@ def sinh(x: Value) -> Value:
 def cosh(x: Value) -> Value:
     """Hyperbolic cosine."""
     return _unary("cosh", x)
+
+
+def tanh(x: Value) -> Value:
+    """Hyperbolic tangent."""
+    return _unary("tanh", x)
 
 
 def arctan(x: Value) -> Value:
