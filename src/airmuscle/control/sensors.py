@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
+import numpy as np
+
 from ..core import ops
+from ..core.arrays import Array
 from ..core.declaration import Parameter, model, parameter
 from ..core.errors import ParameterError
 from ..core.ops import Value
@@ -78,6 +81,7 @@ class WithSensors(EnclosingLaw):
     """
 
     references: ClassVar[tuple[Reference, ...]] = (LECUYER1999,)
+    simulated: ClassVar[bool] = True
 
     law: ControlLaw
     sensors: tuple[ColumnSensor, ...]
@@ -108,14 +112,30 @@ class WithSensors(EnclosingLaw):
     def step(
         self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
     ) -> tuple[Mapping[str, Value], dict[str, Value]]:
+        columns, later = self._read(memory, measurement.columns, dt)
+        commands, law = self.law.step(select_prefix("law.", memory), measurement._replace(columns=columns), dt)
+        return commands, {**later, **with_prefix("law.", law)}
+
+    def readings(self, measured: Array, sample_time: float) -> Array:
+        """The outputs (K, m) of the sensors for the values (K, m) in front of them, at successive samples."""
+        memory, rows = self.initial_memory, []
+        for row in measured.tolist():
+            columns, later = self._read(memory, dict(zip(self.measured_columns, row, strict=True)), sample_time)
+            memory = {**memory, **later}
+            rows.append(list(columns.values()))
+        return np.array(rows, dtype=float).reshape(measured.shape)
+
+    def _read(
+        self, memory: Mapping[str, Value], measured: Mapping[str, Value], dt: Value
+    ) -> tuple[dict[str, Value], dict[str, Value]]:
+        """The measured columns behind their sensors, and the memory of sensors and generator."""
         started = memory["started"]
         fresh, kept = seeded(self.seed), select_prefix("random.", memory)
         random: dict[str, Value] = {name: ops.where(started > 0, kept[name], fresh[name]) for name in STATE}
-        columns, later = dict(measurement.columns), {"started": 1.0}
+        columns, later = dict(measured), {"started": 1.0}
         for sensor in self.sensors:
             deviate, random = drawn_normal(random)
             own = select_prefix(f"sensor.{sensor.column}.", memory)
             columns[sensor.column], after = sensor.measure(own, columns[sensor.column], deviate, started, dt)
             later |= with_prefix(f"sensor.{sensor.column}.", after)
-        commands, law = self.law.step(select_prefix("law.", memory), measurement._replace(columns=columns), dt)
-        return commands, {**later, **with_prefix("random.", random), **with_prefix("law.", law)}
+        return columns, {**later, **with_prefix("random.", random)}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import ClassVar
 
 from ..core import ops
 from ..core.declaration import model, parameter
@@ -21,6 +22,8 @@ class WithStuckValve(EnclosingLaw):
     t time since the first sample, u_i the command of one input. With u_f = 0 a valve remains closed, with a small u_f
     it leaks. All other inputs receive what the law commands.
     """
+
+    simulated: ClassVar[bool] = True
 
     law: ControlLaw
     stuck_input: str

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from ..control.control_loop import MEASURED
+from ..control.controller import Controller
+from ..control.enclosing_law import EnclosingLaw, without_simulated
+from ..control.sensors import WithSensors
+from ..core.arrays import Array
 from ..simulation import Problem, solve
 from ..simulation.batch.precision import Double, Precision, Single
 from ..simulation.sampled_loop import prepare_loop
@@ -17,6 +22,11 @@ from .write import checked_name, write_files
 
 PRECISIONS: dict[str, Precision] = {"double": Double(), "float": Single()}
 """Precisions of the arithmetic of exported controllers, by the names of the type in C."""
+LEFT_OUT = (
+    "Not part of this program: simulated sensors and faults of the scenario (resolution, noise, lag, delay); the "
+    "measurements are those of the real sensors."
+)
+"""Note on simulated sensors and faults."""
 
 
 def write_controller(
@@ -25,7 +35,9 @@ def write_controller(
 ) -> tuple[Path, ...]:  # fmt: skip
     """Write the control law of a problem as C99 for a microcontroller; returns the paths of its files.
 
-    problem  a plant with a ControlLoop; the run is simulated, and its measurements are the data of the replay
+    problem  a plant with a ControlLoop; the run is simulated, and its measurements are the data of the replay.
+             Simulated sensors and faults (`WithSensors`, `WithStuckValve`) belong to the plant and are left out, at any
+             depth of the law; the readings of sensors around the whole law are the data of the replay
     tunable  paths of the parameters that remain variables; none by default: all are constants of the program
     precision  Double(), or Single() for a processor that computes with floats alone
 
@@ -37,12 +49,24 @@ def write_controller(
     """
     loop = check_control_law(problem)
     prepared = prepare_loop(problem, loop.init(problem.start_time))
-    printed = print_controller(prepared, checked_name(name) or program_name(title or type(loop.controller).__name__),
-                               title, tunable, "float" if precision == Single() else "double")  # fmt: skip
+    law = without_simulated(loop.controller)
+    of_real_plant = dataclasses.replace(prepared, loop=dataclasses.replace(loop, controller=law))
+    notes = () if law == loop.controller else (LEFT_OUT,)
+    printed = print_controller(of_real_plant, checked_name(name) or program_name(title or type(law).__name__), title,
+                               tunable, "float" if precision == Single() else "double", notes)  # fmt: skip
     recording = solve(problem).raise_if_incomplete().recording
     rows = np.searchsorted(recording["time"], prepared.instants[:-1] - 1e-9 * loop.sample_time)
     measured = np.column_stack([recording[f"{MEASURED}{column}"][rows] for column in loop.controller.measured_columns])
+    measured = _readings(loop.controller, measured, loop.sample_time)
     samples = printed.replay(measured, prepared.setpoint_values)
     if precision == Single():
         check_single_precision(printed, samples, loop.sample_time)
     return write_files(printed.files(samples), folder)
+
+
+def _readings(law: Controller, measured: Array, sample_time: float) -> Array:
+    """The measurements (K, m) of a run behind the simulated sensors around its law."""
+    while isinstance(law, EnclosingLaw) and law.simulated:
+        measured = law.readings(measured, sample_time) if isinstance(law, WithSensors) else measured
+        law = law.law
+    return measured

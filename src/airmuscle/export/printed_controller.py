@@ -188,11 +188,17 @@ def check_control_law(problem: Problem) -> ControlLoop:
 
 
 def print_controller(
-    prepared: SampledLoop, name: str, title: str = "", tunable: Sequence[str] | None = (), number: str = "double"
+    prepared: SampledLoop,
+    name: str,
+    title: str = "",
+    tunable: Sequence[str] | None = (),
+    number: str = "double",
+    notes: Sequence[str] = (),
 ) -> PrintedController:
     """The control law of a prepared loop, with its sample time, ranges and fixed parameters as constants.
 
     tunable  paths of the parameters that remain variables; None: all
+    notes    further lines of the comment at the beginning
     """
     import casadi
 
@@ -212,13 +218,13 @@ def print_controller(
     limited = [_limited(commands[i], *prepared.ranges[n]) for i, n in enumerate(law.inputs)]
     inputs = {"measurement": sample.measured, "setpoint": sample.setpoints, "memory": sample.memory, "parameters": p}
     outputs = {"command": casadi.densify(casadi.vertcat(*limited)), "later": casadi.densify(later)}
-    notes = [f"Sample time {c_number(loop.sample_time)} s; set points {', '.join(law.setpoints) or 'none'}; measured "
+    about = [f"Sample time {c_number(loop.sample_time)} s; set points {', '.join(law.setpoints) or 'none'}; measured "
              f"{', '.join(law.measured_columns)}; commanded {', '.join(law.inputs)}, limited to "
              f"{', '.join(f'{a!r} to {b!r}' for a, b in zip(low, high, strict=True))}."]  # fmt: skip
     if loop.drivers:
         kinds = ", ".join(f"{key}: {value}" for key, value in loop.drivers.items())
-        notes.append(f"Not part of this program: the drivers between commands and openings ({kinds}).")
-    lines = provenance(title or type(law).__name__, law, notes=notes)
+        about.append(f"Not part of this program: the drivers between commands and openings ({kinds}).")
+    lines = provenance(title or type(law).__name__, law, notes=[*about, *notes])
     ranges = [prepared.ranges[n] for n in law.inputs]
     return PrintedController(name, law, inputs, outputs, ranges, tuple(known[i] for i in chosen), lines, number)
 
