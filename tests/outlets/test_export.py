@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ctypes
 import dataclasses
+import json
 import re
 import subprocess
 import warnings
@@ -69,6 +70,8 @@ def check_run(text, csv, problem):
 
 
 RUN = {C99(): run_c, JavaScript(): run_javascript, Octave(): printed.run_octave}
+BUILD_FILES = {"CMakeLists.txt", "package.json"}
+"""Files that depend on the name of a program alone."""
 TARGETS = pytest.mark.parametrize("target", RUN, ids=lambda target: type(target).__name__)
 CASES = {
     "one muscle": ("dmsp-20-300", Rodas4(1e-6)),
@@ -170,13 +173,69 @@ def test_the_program_has_no_undefined_behaviour(tmp_path):
     run_c(tmp_path, "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 
 
-def test_the_header_can_be_read_by_a_c_plus_plus_compiler(tmp_path):
-    write_program(problem_of("dmsp-20-300"), tmp_path, C99(), name="plant")
+def test_the_sources_are_c_plus_plus_too(tmp_path):
+    """The program that g++ builds writes the same numbers as that of gcc, without fused operations."""
+    write_program(problem_of("dmsp-20-300", duration=0.2), tmp_path, C99(), name="plant")
     (tmp_path / "use.cpp").write_text(
-        '#include "plant.h"\nint main() { return PLANT_STATE_AIR_MASS + PLANT_INPUT_FILL; }\n'
+        '#include "plant.h"\nint used() { return PLANT_STATE_AIR_MASS + PLANT_INPUT_FILL; }\n'
     )
-    command = [printed.require("g++"), "-Wall", "-Werror", "-pedantic", "-c", "use.cpp"]
-    assert subprocess.run(command, cwd=tmp_path, capture_output=True).returncode == 0
+    options = ["-std=c++17", "-Wall", "-Wextra", "-Werror", "-pedantic", "-ffp-contract=off"]
+    command = [printed.require("g++"), *options, "-x", "c++", "plant.c", "main.c", "use.cpp", "-o", "program", "-lm"]
+    printed.finished(command, tmp_path)
+    assert printed.finished(["./program"], tmp_path) == run_c(tmp_path, "-ffp-contract=off")
+
+
+@pytest.mark.parametrize("language", ["C", "CXX"])
+def test_cmake_builds_the_program(language, tmp_path):
+    problem = problem_of("dmsp-20-300", duration=0.2)
+    write_program(problem, tmp_path, C99(), name="plant")
+    cmake = printed.require("cmake")
+    printed.finished([cmake, "-S", ".", "-B", "build", f"-DLANGUAGE={language}"], tmp_path)
+    printed.finished([cmake, "--build", "build"], tmp_path)
+    check_run(*printed.finished(["build/plant_run"], tmp_path), problem)
+
+
+WRONG_ARGUMENTS = {
+    "{parameter: {}}": "simulate: there is no 'parameter'; there are parameters, ",
+    "{parameters: {'mechanism.inner.mass': 20}}": "parameters: there is no 'mechanism.inner.mass'; there are ",
+    "{parameters: [1, 2]}": "parameters: 2 values are given; give ",
+    "{parameters: 3}": "parameters: give an array, or values by name.",
+    "{parameters: {'mechanism.mass': NaN}}": "parameters: mechanism.mass is NaN; it must be a finite number.",
+    "{initial: [1]}": "initial: 1 values are given; give 3: air_mass, position, speed.",
+    "{segments: {ends: [1], values: [[0]], slopes: [[0, 0]]}}": "segments, values: 1 values are given; give 2: fill, disc",
+    "{segments: {ends: [1, 2], values: [[0, 0]], slopes: [[0, 0]]}}": "segments: ends, values and slopes must have one el",
+}
+
+
+def test_javascript_refuses_wrong_arguments_by_name(tmp_path):
+    write_program(problem_of("dmsp-20-300", duration=0.1), tmp_path, JavaScript(), name="plant")
+    calls = ", ".join(f"() => M.simulate({argument})" for argument in WRONG_ARGUMENTS)
+    script = f"""import * as M from "./plant.mjs";
+const said = [{calls}].map((call) => {{ try {{ call(); return "nothing"; }} catch (error) {{ return error.name + " " + error.message; }} }});
+process.stdout.write(JSON.stringify(said));"""
+    messages = printed.run_node(script, None, tmp_path)
+    for message, expected in zip(messages, WRONG_ARGUMENTS.values(), strict=True):
+        assert message.startswith(f"RangeError {expected}"), message
+
+
+def test_typescript_knows_the_names_of_the_module(tmp_path):
+    """Checked by the compiler where it is installed; the package is one that npm and bundlers resolve."""
+    write_program(problem_of("dmsp-20-300", duration=0.1), tmp_path, JavaScript(), name="plant")
+    package = json.loads((tmp_path / "package.json").read_text())
+    assert all((tmp_path / path).exists() for path in package["exports"]["."].values())
+    types = (tmp_path / "plant.d.mts").read_text()
+    assert 'export type State = "air_mass" | "position" | "speed";' in types
+    (tmp_path / "use.mts").write_text(
+        'import {simulate} from "./plant.mjs";\n'
+        'const run = simulate({parameters: {"mechanism.mass": 12}, initial: {position: 0.01}});\n'
+        "export const last: number | undefined = run.columns.position.at(-1);\n"
+    )
+    options = ["--noEmit", "--strict", "--target", "es2022", "--module", "nodenext"]
+    printed.finished([printed.require("tsc"), *options, "use.mts"], tmp_path)
+    (tmp_path / "use.mts").write_text('import {simulate} from "./plant.mjs";\nsimulate({parameters: {mass: 12}});\n')
+    done = subprocess.run(["tsc", *options, "use.mts"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode != 0
+    assert "'mass' does not exist" in done.stdout
 
 
 @TARGETS
@@ -374,6 +433,8 @@ def test_names_of_users_cannot_leave_their_text(tmp_path):
 def test_every_file_states_where_it_comes_from(target, tmp_path):
     problem = problem_of("dmsp-20-300")
     for path in write_program(problem, tmp_path, target, name="plant", title="A title"):
+        if path.name in BUILD_FILES:
+            continue
         text = path.read_text()
         assert re.search(r"Exported by airmuscle \d+\.\d+\.\d+\.", text), path
         assert re.search(r"SHA-256 of the model: [0-9a-f]{64}", text)
@@ -386,7 +447,8 @@ def test_every_file_states_where_it_comes_from(target, tmp_path):
 @TARGETS
 def test_files_are_the_same_every_time_and_change_with_the_model(target, tmp_path):
     def contents(folder, problem):
-        return [path.read_bytes() for path in write_program(problem, tmp_path / folder, target, name="plant")]
+        paths = write_program(problem, tmp_path / folder, target, name="plant")
+        return [path.read_bytes() for path in paths if path.name not in BUILD_FILES]
 
     first, second = contents("a", problem_of("dmsp-20-300")), contents("b", problem_of("dmsp-20-300"))
     assert first == second
@@ -463,7 +525,12 @@ def airmuscle(*arguments):
 def test_the_command_writes_a_program_that_runs(tmp_path):
     done = airmuscle("export", EXAMPLES / "fill_discharge.toml", "--to", "c", "--out", tmp_path)
     assert done.exit_code == 0, done.output
-    assert {path.name for path in tmp_path.iterdir()} == {"fill_discharge.h", "fill_discharge.c", "main.c"}
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "fill_discharge.h",
+        "fill_discharge.c",
+        "main.c",
+        "CMakeLists.txt",
+    }
     assert "cc -O2 fill_discharge.c main.c -lm -o run && ./run run.csv" in done.output
     text, csv = run_c(tmp_path)
     assert "404 steps" in text
@@ -495,7 +562,7 @@ def test_the_command_builds_and_runs_the_program(tmp_path):
     done = airmuscle("export", EXAMPLES / "fill_discharge.toml", "--to", "c", "--out", tmp_path, "--build")
     assert done.exit_code == 0, done.output
     assert re.search(r"program: 2501 rows; 404 steps, \d+ rejected, time 25 s; code \d+ bytes", done.output)
-    assert {path.suffix for path in tmp_path.iterdir()} == {".c", ".h"}
+    assert {path.suffix for path in tmp_path.iterdir()} == {".c", ".h", ".txt"}
 
 
 def test_without_a_compiler_it_says_what_can_be_done(tmp_path, monkeypatch):

@@ -233,7 +233,12 @@ def test_the_command_exports_the_controller_of_a_scenario(tmp_path):
     scenario = Path(__file__).parents[2] / "examples" / "pressure_loop.toml"
     done = CliRunner().invoke(app, ["export", str(scenario), "--controller", "--to", "c", "--out", str(tmp_path)])
     assert done.exit_code == 0, done.output
-    assert {path.name for path in tmp_path.iterdir()} == {"pressure_loop.h", "pressure_loop.c", "main.c"}
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "pressure_loop.h",
+        "pressure_loop.c",
+        "main.c",
+        "CMakeLists.txt",
+    }
     assert "250 samples, 0 commands differ" in replay(tmp_path).stdout
     wrong = CliRunner().invoke(app, ["export", str(scenario), "--controller", "--to", "js", "--out", str(tmp_path)])
     assert wrong.exit_code == 2

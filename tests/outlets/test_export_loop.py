@@ -224,6 +224,13 @@ def test_the_command_exports_the_loop_of_a_scenario(tmp_path):
     scenario = Path(__file__).parents[2] / "examples" / "pressure_loop.toml"
     done = CliRunner().invoke(app, ["export", str(scenario), "--to", "c", "--out", str(tmp_path)])
     assert done.exit_code == 0, done.output
-    names = {"pressure_loop.h", "pressure_loop.c", "pressure_loop_controller.h", "pressure_loop_controller.c", "main.c"}
+    names = {
+        "pressure_loop.h",
+        "pressure_loop.c",
+        "pressure_loop_controller.h",
+        "pressure_loop_controller.c",
+        "main.c",
+        "CMakeLists.txt",
+    }
     assert {path.name for path in tmp_path.iterdir()} == names
     assert "cc -O2 pressure_loop.c pressure_loop_controller.c main.c -lm -o run" in done.output

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from ..compile.text.c import CBody
+from .templates import filled
 
 WIDTH = 116
+_PROGRAM = "add_executable({0}_run main.c)\ntarget_link_libraries({0}_run PRIVATE {0})"
 _PLAIN = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 _.,:;[](){}<>+-*/=^%!'|~#$@&")
 _BODIES = {number: CBody(number=number) for number in ("double", "float")}
 
@@ -47,6 +49,16 @@ def c_integers(declaration: str, values: Sequence[Any]) -> str:
     """An array of whole numbers, or a table of rows of them; of none, one zero, because C has no empty array."""
     rows = [f"{{{', '.join(map(str, row))}}}" if isinstance(row, tuple) else str(row) for row in values]
     return f"{declaration} = {{{_wrapped(rows or ['0'])}}};\n"
+
+
+def with_cmake(name: str, files: Mapping[str, str]) -> dict[str, str]:
+    """The files of a C program or law with a CMakeLists.txt, which compiles them as C99 or as C++."""
+    main = "main.c" if "main.c" in files else ""
+    places = {
+        "file": name, "sources": " ".join(file for file in files if file.endswith(".c") and file != main),
+        "main": f" {main}" if main else "", "program": _PROGRAM.format(name) if main else "",
+    }  # fmt: skip
+    return {**files, "CMakeLists.txt": filled("CMakeLists.txt", places, name).rstrip() + "\n"}
 
 
 def _wrapped(items: Sequence[str]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -47,7 +47,7 @@ class JavaScriptModule:
             functions += f"\n{self.loop.controller.sample_in(JavaScriptLanguage('control_'))}"
         places = {
             "provenance": comment, "constants": text, "functions": functions, "solver": solver,
-            "simulate": self._simulation(),
+            "arguments": filled("arguments.mjs", {}, self.name), "simulate": self._simulation(),
         }  # fmt: skip
         run = {
             "provenance": comment, "file": self.name, "columns": to_json(["time", *columns]),
@@ -55,8 +55,42 @@ class JavaScriptModule:
         }  # fmt: skip
         return {
             f"{self.name}.mjs": filled("program.mjs", places, self.name),
+            f"{self.name}.d.mts": filled("program.d.mts", self._types(comment), self.name),
             f"{self.name}.run.mjs": filled("run.mjs", run, self.name),
+            "package.json": self._package(),
         }
+
+    def _types(self, comment: str) -> dict[str, str]:
+        """The places of the TypeScript declarations."""
+        system, loop = self.system, self.loop
+        names = {
+            "states": system.state_names, "inputs": system.input_names, "outputs": system.output_names,
+            "parameters": [leaf.path for leaf in system.tunable],
+        }  # fmt: skip
+        types = {kind: _union(of) for kind, of in names.items()}
+        if loop is None:
+            return {"provenance": comment, **types, "columns": "", "changes": "", "results": ""}
+        changes = f"  controllerParameters?: Values<{_union(leaf.path for leaf in loop.controller.tunable)}>;\n"
+        changes += (
+            f"  /** Set points {', '.join(loop.controller.law.setpoints) or 'none'}. */\n  setpoint?: Segments;\n"
+        )
+        columns = f" | {_union(loop.added_columns)}"
+        return {
+            "provenance": comment,
+            **types,
+            "columns": columns,
+            "changes": changes,
+            "results": "  samples: number;\n",
+        }
+
+    def _package(self) -> str:
+        """The package.json of a folder that npm installs."""
+        module = {"types": f"./{self.name}.d.mts", "default": f"./{self.name}.mjs"}
+        content = {
+            "name": self.name.replace("_", "-"), "version": "1.0.0", "private": True, "description": self.provenance[0],
+            "type": "module", "types": module["types"], "exports": {".": module},
+        }  # fmt: skip
+        return json.dumps(content, indent=2) + "\n"
 
     def _names(self) -> dict[str, Any]:
         """The constants that importers can read."""
@@ -124,6 +158,11 @@ class JavaScriptModule:
             return {"FIRST_STEP": integrator.step, "CLOSE": close, "ROWS": rows, "WEIGHTS": weights, "NODES": nodes}
         assert isinstance(integrator, Rodas4)
         return {"FIRST_STEP": 0.0, "CLOSE": 0.0, "RTOL": integrator.rtol, **COEFFICIENTS}
+
+
+def _union(names: Iterable[str]) -> str:
+    """The TypeScript type of a text that is one of these names."""
+    return " | ".join(map(json.dumps, names)) or "never"
 
 
 def to_json(value: Any) -> str:

@@ -22,7 +22,7 @@ from ..core.tree import Leaf, leaves
 from ..simulation import Problem
 from ..simulation.compiled_law import trace_sample
 from ..simulation.sampled_loop import SampledLoop
-from .c_text import c_array, c_number, c_strings
+from .c_text import c_array, c_number, c_strings, with_cmake
 from .identifiers import make_identifiers
 from .printed_system import find_leaf
 from .provenance import block_comment, provenance
@@ -101,7 +101,7 @@ class PrintedController:
                 "ranges": c_array(f"static const double ranges[{upper}_COMMANDS + 1]", self.ranges_of(samples), 1),
             }, self.name),
         }  # fmt: skip
-        return {**self.source_files(), "main.c": filled("replay.c", places, self.name)}
+        return with_cmake(self.name, {**self.source_files(), "main.c": filled("replay.c", places, self.name)})
 
     def ranges_of(self, samples: ReplayedSamples) -> Array:
         """The width of the range of each command (c,); of one without limits its largest size in the run."""

@@ -9,6 +9,7 @@ from typing import ClassVar
 
 from .c_loop import loop_main
 from .c_source import CSource
+from .c_text import with_cmake
 from .exported_loop import ExportedLoop
 from .identifiers import make_identifier
 from .javascript_module import JavaScriptModule
@@ -47,7 +48,8 @@ class Target(abc.ABC):
 
 @dataclasses.dataclass(frozen=True)
 class C99(Target):
-    """C99 without memory allocation: header, source, and a main program that runs the scenario.
+    """C99 without memory allocation, which also compiles as C++: header, source, a main program that runs the scenario,
+    and a CMakeLists.txt.
 
     A controller has a header and a source of its own.
     """
@@ -57,12 +59,14 @@ class C99(Target):
     def run_files(self, program: ExportedRun) -> dict[str, str]:
         source = CSource(program.name, program.system, program.run.integrator, program.provenance)
         if program.loop is None:
-            return {**source.files(), "main.c": source.main(program.run, program.columns)}
+            files = {**source.files(), "main.c": source.main(program.run, program.columns)}
+            return with_cmake(program.name, files)
         main = loop_main(program.name, program.system, program.run, program.loop, program.columns, program.provenance)
-        return {**source.files(), **program.loop.controller.source_files(), "main.c": main}
+        files = {**source.files(), **program.loop.controller.source_files(), "main.c": main}
+        return with_cmake(program.name, files)
 
     def law_files(self, law: PrintedLaw) -> dict[str, str]:
-        return law.c_files()
+        return with_cmake(law.name, law.c_files())
 
 
 @dataclasses.dataclass(frozen=True)

@@ -3,6 +3,10 @@
 
 #include <math.h>
 
+#ifdef __cplusplus
+#define restrict
+#endif
+
 @constants@
 @functions@
 int model_step(@number@ *memory, const @number@ *measurement, const @number@ *setpoint, @number@ *command)

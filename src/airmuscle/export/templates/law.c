@@ -3,5 +3,9 @@
 
 #include <math.h>
 
+#ifdef __cplusplus
+#define restrict
+#endif
+
 @constants@
 @functions@

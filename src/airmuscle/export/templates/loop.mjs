@@ -28,11 +28,18 @@ function segmentsOf({ends, values, slopes}, begin, end, start, command) {
 /**
  * Run of the control loop. Every argument is optional: by default the exported run. `controllerParameters` are those of
  * the control law, `setpoint` {ends, values, slopes} its set points, `segments` the inputs that it does not command.
- * Returns {columns: {time, ...}, status, time, steps, rejected, samples}.
+ * Parameters and `initial` are arrays, or objects of some values by name. Throws RangeError for unknown names, wrong
+ * lengths and numbers that are not finite. Returns {columns: {time, ...}, status, time, steps, rejected, samples}.
  */
 export function simulate(changes = {}) {
-  const given = {parameters: defaults, controllerParameters: loop.parameterDefaults, setpoint: loop.setpoint, ...run, ...changes};
-  const {parameters, controllerParameters, setpoint, initial, start, segments, times} = given;
+  const usual = {parameters: defaults, controllerParameters: loop.parameterDefaults, setpoint: loop.setpoint, ...run};
+  checkKeys("simulate", changes, Object.keys(usual));
+  const given = {...usual, ...changes}, {setpoint, start, segments, times} = given;
+  const numbers = valuesOf("parameters", given.parameters, parameters, defaults);
+  const ofController = valuesOf("controllerParameters", given.controllerParameters, loop.parameters, loop.parameterDefaults);
+  const initial = valuesOf("initial", given.initial, states, run.initial);
+  checkSegments("segments", segments, inputs);
+  checkSegments("setpoint", setpoint, loop.setpoints);
   const names = ["time", ...states, ...inputs, ...outputs, ...loop.columns];
   const columns = Object.fromEntries(names.map((name) => [name, []]));
   const c = new Float64Array(SIZES.held), x = new Float64Array(states.length);
@@ -41,7 +48,7 @@ export function simulate(changes = {}) {
   const shown = new Float64Array(loop.setpoints.length), command = new Float64Array(loop.commanded.length);
   const memory = Float64Array.from(loop.initialMemory), later = new Float64Array(memory.length);
   const drivers = loop.drivers.map((driver) => ({...driver, state: [...driver.state]}));
-  prepare(parameters, c);
+  prepare(numbers, c);
   const s = new Solver(c, start, initial);
   let row = 0, result = status.done, samples = 0;
   const applied = Float64Array.from(segments.values[0]);
@@ -95,7 +102,7 @@ export function simulate(changes = {}) {
     outputsOf(s.x, applied, c, o);
     loop.measuredAt.forEach(([kind, i], j) => (measured[j] = kind === 0 ? s.x[i] : o[i]));
     setpointsAt(setpoint, begin, start, wanted);
-    control_sample(measured, wanted, memory, controllerParameters, command, later);
+    control_sample(measured, wanted, memory, ofController, command, later);
     if (![...measured, ...command].every(Number.isFinite)) result = status.notFinite;
     else {
       memory.set(later);

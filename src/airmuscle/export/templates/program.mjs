@@ -34,4 +34,5 @@ class Segment {
 }
 
 @solver@
+@arguments@
 @simulate@

@@ -1,14 +1,20 @@
 /**
  * Run from `initial` at `start` through `segments` {ends, values, slopes}; rows at `times`. Every argument is optional:
- * by default the exported run. Returns {columns: {time, ...}, status, time, steps, rejected}.
+ * by default the exported run. `parameters` and `initial` are arrays, or objects of some values by name. Throws
+ * RangeError for unknown names, wrong lengths and numbers that are not finite. Returns {columns: {time, ...}, status, time, steps, rejected}.
  */
 export function simulate(changes = {}) {
-  const {parameters, initial, start, segments, times} = {parameters: defaults, ...run, ...changes};
+  const usual = {parameters: defaults, ...run};
+  checkKeys("simulate", changes, Object.keys(usual));
+  const given = {...usual, ...changes}, {start, segments, times} = given;
+  const numbers = valuesOf("parameters", given.parameters, parameters, defaults);
+  const initial = valuesOf("initial", given.initial, states, run.initial);
+  checkSegments("segments", segments, inputs);
   const names = ["time", ...states, ...inputs, ...outputs];
   const columns = Object.fromEntries(names.map((name) => [name, []]));
   const c = new Float64Array(SIZES.held), x = new Float64Array(states.length);
   const u = new Float64Array(inputs.length), o = new Float64Array(outputs.length);
-  prepare(parameters, c);
+  prepare(numbers, c);
   const s = new Solver(c, start, initial);
   let row = 0, result = status.done;
   const write = (limit) => {
