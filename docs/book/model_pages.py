@@ -185,7 +185,7 @@ def property_section(cls: type[Any]) -> str:
     if searched:
         lines.append(f"* By a bracketed root search with exact slopes: {', '.join(searched)}.")
     if not cls.traceable:
-        lines.append("* Not in closed form: a plant uses it through `as_force_law`, which states its error.")
+        lines.append("* Not in closed form: a plant uses it through `as_force_law`, which estimates its maximum error.")
     return "## Directions\n\n" + "\n".join(lines) + "\n"
 
 

@@ -1,20 +1,13 @@
-"""A table is interpolated through its rows without overshoot, and points outside it are refused.
-
-Its surrogate for plants is a polynomial with a stated error bound.
-"""
+"""A table is interpolated through its rows without overshoot, and points outside it are refused."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from airmuscle.core.errors import AirmuscleWarning, GeometryLimitError, ParameterError, SolveError
+from airmuscle.core.errors import GeometryLimitError, ParameterError, SolveError
 from airmuscle.library import catalogue
-from airmuscle.muscle.characteristic.chou_hannaford1996 import ChouHannaford1996
-from airmuscle.muscle.characteristic.polynomial_surrogate import as_force_law
 from airmuscle.muscle.characteristic.tabulated import Tabulated
-from airmuscle.muscle.characteristic.validity_range import ValidityRange
-from airmuscle.muscle.geometry.braid import Braid
 from airmuscle.muscle.geometry.tabulated import TabulatedGeometry
 
 TOOL = ("festo-tool-dmsp-10", "festo-tool-dmsp-20", "festo-tool-dmsp-40")
@@ -104,39 +97,3 @@ def test_a_volume_outside_its_table_is_an_error():
         table.volume(0.2)
     with pytest.raises(ParameterError, match="2 contractions and 1 volumes"):
         TabulatedGeometry((0.0, 0.1), (1e-4,), 0.3)
-
-
-def test_a_surrogate_of_a_polynomial_is_exact():
-    law = ChouHannaford1996(Braid(0.01, 0.4363, 0.3))
-    surrogate = as_force_law(law, ValidityRange(5e4, 6e5, 0.0, 0.3), degree=3)  # linear in p, quadratic in eps
-    assert surrogate.max_error < 1e-9
-    assert surrogate.force(3.3e5, 0.123) == pytest.approx(law.force(3.3e5, 0.123), rel=1e-12)
-
-
-@pytest.mark.parametrize("name", TOOL)
-def test_the_stated_error_of_a_surrogate_is_a_bound(name: str):
-    entry = catalogue.load(name)
-    surrogate = as_force_law(entry.characteristic, entry.validity_range)
-    p, c = np.meshgrid(
-        np.linspace(*entry.validity_range.pressure, 173), np.linspace(*entry.validity_range.contraction, 173)
-    )
-    error = np.abs(surrogate.force(p, c) - entry.characteristic.force(p, c))
-    assert error.max() <= 1.15 * surrogate.max_error  # measured on a coarser grid
-    assert np.sqrt(np.mean(error**2)) == pytest.approx(surrogate.rms_error, rel=0.15)
-    assert surrogate.coverage == 1.0
-
-
-def test_a_surrogate_warns_where_the_model_has_no_solution():
-    validity_range = ValidityRange(1e5, 2e5, 0.0, 0.2)
-    with pytest.warns(AirmuscleWarning, match=r"Tabulated has no solution on \d\d % of the validity range"):
-        surrogate = as_force_law(SMALL, validity_range, degree=3)
-    assert 0.4 < surrogate.coverage < 0.6
-    with pytest.raises(SolveError, match="0 of 400 points of the validity range"):
-        as_force_law(SMALL, ValidityRange(3e5, 4e5, 0.0, 0.2), degree=4)
-
-
-def test_a_surrogate_of_an_unbounded_force_is_refused():
-    law = catalogue.load("saga2007").characteristic
-    with pytest.raises(SolveError, match=r"force of Saga2007 is unbounded at a contraction of 0 % and 50 kPa"):
-        as_force_law(law, ValidityRange(5e4, 2e5, 0.0, 0.3))
-    assert as_force_law(law, ValidityRange(5e4, 2e5, 0.02, 0.3)).max_error < 5.0

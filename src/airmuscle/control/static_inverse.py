@@ -37,8 +37,9 @@ class StaticInverse:
     affine in p. For n = 10 the force at the returned pressure differs from F by less than 1e-9 of the force range for
     the laws of this package (tested). A force that no pressure in the range produces gives the nearer limit.
 
-    A characteristic that is not a traceable force law is approximated first: `as_force_law(law, validity_range)`, whose
-    `max_error` [N] divided by dF/dp is the error of the inverse [Pa]. A muscle with a series spring is refused.
+    A characteristic that is not a traceable force law is approximated first: `as_force_law(law, validity_range)`. Its
+    estimated `max_error` [N] divided by dF/dp estimates the maximum error of the inverse [Pa]. A muscle with a series
+    spring is refused.
     References: Saga et al. (2007) for the purpose; Anderson and Björck (1973) for the root.
     """
 
@@ -107,7 +108,7 @@ def check_invertible(owner: str, law: ForceLaw | Muscle) -> None:
     if not contractile.traceable:
         raise ParameterError(
             f"{owner}: {type(contractile).__name__} has no closed form. Approximate it first: "
-            "as_force_law(law, ValidityRange(...)) states its error."
+            "as_force_law(law, ValidityRange(...)) estimates its error."
         )
     if isinstance(law, Muscle) and isinstance(law.series, ElasticSeriesElement):
         raise ParameterError(

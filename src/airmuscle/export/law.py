@@ -127,8 +127,8 @@ def check_closed_form(model: Any) -> None:
     elif dataclasses.is_dataclass(model) and not isinstance(model, type):
         if not autodiff.is_traceable(type(model)):
             raise ParameterError(
-                f"{type(model).__name__} has no closed form and cannot be exported. Approximate it first, with a "
-                "stated error: as_force_law(law, validity_range) for a characteristic, as_polynomial for a geometry."
+                f"{type(model).__name__} has no closed form and cannot be exported. Approximate it first, with its "
+                "error: as_force_law(law, validity_range) for a characteristic, as_polynomial for a geometry."
             )
         for field in dataclasses.fields(model):
             check_closed_form(getattr(model, field.name))

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import contextvars
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,17 @@ INTERVALS = 256
 """Intervals of the search grid; a pair of roots within 1/256 of the search range is not resolved."""
 
 _TOLERANCES = {"xatol": 0.0, "xrtol": 4 * float(np.finfo(float).eps), "fatol": 0.0, "frtol": 0.0}
+_UNSOLVED_AS_NAN = contextvars.ContextVar("unsolved_as_nan", default=False)
+
+
+@contextlib.contextmanager
+def unsolved_as_nan() -> Iterator[None]:
+    """Within this context, points without a solution are NaN in the results of the functions below, not an error."""
+    token = _UNSOLVED_AS_NAN.set(True)
+    try:
+        yield
+    finally:
+        _UNSOLVED_AS_NAN.reset(token)
 
 
 def check_numbers(*values: Any) -> None:
@@ -70,8 +83,8 @@ def find_first_root(
 
     This is the branch reached from rest as x increases. `args` are the two other quantities a and b, scalars or arrays
     that broadcast; the result has their shape. Raises SolveError for the first pair without a root, with the text of
-    `message(a, b, minimum, maximum)`, where minimum and maximum are the extreme values of `function` within `bounds`.
-    Raises TraceError for traced values, which have no numbers.
+    `message(a, b, minimum, maximum)`, where minimum and maximum are the extreme values of `function` within `bounds`;
+    within `unsolved_as_nan()` such a pair gives NaN. Raises TraceError for traced values, which have no numbers.
     """
     from scipy.optimize import elementwise
 
@@ -83,16 +96,16 @@ def find_first_root(
     rises = (values[:-1] < 0) & (values[1:] >= 0)
     at_start = values[0] == 0
     unsolved = ~(rises.any(axis=0) | at_start)
-    if unsolved.any():
+    if unsolved.any() and not _UNSOLVED_AS_NAN.get():
         first_unsolved = int(np.argmax(unsolved))
         finite = values[~np.isnan(values[:, first_unsolved]), first_unsolved]
         extremes = (float(finite.min()), float(finite.max())) if finite.size else (np.nan, np.nan)
         raise SolveError(message(float(a[first_unsolved]), float(b[first_unsolved]), *extremes))
-    roots = np.full(a.size, bounds[0])
+    roots = np.where(unsolved, np.nan, bounds[0])
     index = rises.argmax(axis=0)
     plateau = np.take_along_axis(values, index[None, :] + 1, axis=0)[0] == 0
     for subset, target in ((~plateau, function), (plateau, _sign_function(function))):
-        selected = subset & ~at_start
+        selected = subset & ~at_start & ~unsolved
         if selected.any():
             bracket = (grid[index[selected]], grid[index[selected] + 1])
             with np.errstate(over="ignore", invalid="ignore"):
@@ -113,12 +126,15 @@ def check_solution(
 ) -> Any:
     """Return `solution`, the result of a closed form; raises SolveError(message(a, b)) if it is not within `bounds`.
 
-    `args` are the two other quantities a and b. Symbols and JAX arrays have no values and are not checked.
+    `args` are the two other quantities a and b. Symbols and JAX arrays have no values and are not checked. Within
+    `unsolved_as_nan()` a solution outside is NaN.
     """
     if type(solution).__module__.partition(".")[0] in ("casadi", "jax", "jaxlib"):
         return solution
     values = np.asarray(solution, dtype=float)
     outside = ~((values >= bounds[0]) & (values <= bounds[1]))
+    if outside.any() and _UNSOLVED_AS_NAN.get():
+        return np.where(outside, np.nan, values)
     if outside.any():
         first, second = (np.broadcast_to(np.asarray(v, dtype=float), values.shape)[outside].flat[0] for v in args)
         raise SolveError(message(float(first), float(second)))
