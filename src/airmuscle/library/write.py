@@ -54,15 +54,17 @@ def tables_toml(tables: Mapping[str, Any]) -> str:
 
 def scenario_toml(
     title: str, plant: Any, input_table: Mapping[str, Any], run: Mapping[str, Any], note: str = "",
-    uncertainty: Mapping[str, Any] | None = None,
+    fitted: Mapping[str, Any] | None = None,
 ) -> str:  # fmt: skip
     """Text of a scenario that `load_scenario` reads: a plant with all parameters, the command and run tables.
 
-    Each line of `note` becomes a comment at the beginning; `uncertainty` is that of the fit of the plant.
+    Each line of `note` becomes a comment at the beginning; `fitted` are the tables [observed] and [uncertainty] of the
+    fit of the plant.
     """
     comments = "".join(f"# {line}\n" for line in note.splitlines())
-    last = {} if uncertainty is None else {"uncertainty": uncertainty}
-    return comments + _to_text({"title": title, "plant": model_table(plant), "input": input_table, "run": run, **last})
+    return comments + _to_text(
+        {"title": title, "plant": model_table(plant), "input": input_table, "run": run, **(fitted or {})}
+    )
 
 
 def save(entry: Savable, path: str | Path) -> Path:

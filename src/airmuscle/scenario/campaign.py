@@ -87,7 +87,8 @@ def _fill(campaign: Campaign, record: CampaignRecord, muscle: Muscle) -> tuple[s
     points = {name: [list(point) for point in rows] for name, rows in valve_commands(record).items()}
     run = {"duration": float(record.recording["time"][-1]) - start, "initial_state": {"pressure": known["pressure"]}}
     table = fit_uncertainty(stage.fit) | {DEVIATIONS: {"pressure": _fill_deviation(stage)}}
-    return scenario_toml(record.origin, plant, points, run, _note(record, start), _known_in(table, plant)), ""
+    fitted = {"uncertainty": _known_in(table, plant)}
+    return scenario_toml(record.origin, plant, points, run, _note(record, start), fitted), ""
 
 
 def _release(campaign: Campaign, record: CampaignRecord, muscle: Muscle) -> tuple[str, str]:
@@ -97,8 +98,8 @@ def _release(campaign: Campaign, record: CampaignRecord, muscle: Muscle) -> tupl
     plant, known, start = _fitted_record(stage, record, muscle)
     state = {name: known[name] for name in ("pressure", "position", "speed")}
     run = {"duration": float(record.recording["time"][-1]) - start, "initial_state": state}
-    table = _known_in(fit_uncertainty(stage.fit), plant)
-    return scenario_toml(record.origin, plant, {"latched": [[0.0, 0.0]]}, run, _note(record, start), table), ""
+    fitted = {"uncertainty": _known_in(fit_uncertainty(stage.fit), plant)}
+    return scenario_toml(record.origin, plant, {"latched": [[0.0, 0.0]]}, run, _note(record, start), fitted), ""
 
 
 def _fill_deviation(stage: FillStage) -> float:

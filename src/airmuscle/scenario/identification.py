@@ -19,8 +19,9 @@ integrator = { model = "Rodas4", rtol = 1e-8 }  optional
 "gas.exponent" = [1.01, 1.4]
 [[record]]
 file = "fill1.csv"                          relative to this file
-initial_state = { pressure = "0 bar" }      optional: equilibrium at this pressure, or a state with position = "10 mm";
-                                            by default equilibrium at the pressure of the first rows
+initial_state = { pressure = "0 bar" }      optional: equilibrium at this pressure, of each muscle "left.pressure", or
+                                            a state with position = "10 mm"; by default equilibrium at the pressures of
+                                            the first rows, or where there is none, at their coordinates
 start_time = "0.2 s"                        optional: time of the record at which the input begins
 first = "0 s"                               optional, and last: the time interval of the record that is used
 mapping = "rig.toml"                        optional, and resting_length: information that the file lacks
@@ -52,6 +53,7 @@ from ..library.plant_file import build_plant
 from ..library.write import scenario_toml
 from ..plant.plant import Plant
 from ..simulation import Integrator
+from .initial_state import pressure_names
 from .plant_uncertainty import fit_uncertainty
 from .record import Record, optional_table
 from .study_tables import (
@@ -84,6 +86,8 @@ class DynamicFitSetup:
     starts: int = 1
     seed: int = 0
     method: Integrator | None = None
+    columns: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    """Measured column of each observed output that has another name."""
 
     def fit(self) -> DynamicFit:
         """The result of the fit; see `airmuscle.identify.dynamic.fit_dynamic`."""
@@ -117,11 +121,12 @@ class DynamicFitSetup:
                 known[what.name] = float(fit.values[k])
         coordinates = plant.mechanism.coordinates
         given = {name for c in coordinates for name in (c.name, c.speed) if c.name in known}
-        start = {name: value for name, value in known.items() if name == "pressure" or name in given}
+        start = {name: value for name, value in known.items() if name in given or name in pressure_names(plant)}
         duration = float(record_model.times[-1]) - record_model.start_time(fit.values)
         run = {"duration": duration, "initial_state": start}
-        title, uncertainty = f"{self.title}, {origin}", fit_uncertainty(fit, cross)
-        return scenario_toml(title, plant, self.input_tables[record], run, note, uncertainty)
+        named = {name: {"deviation": self.observed[name], "column": column} for name, column in self.columns.items()}
+        fitted = {"observed": {**self.observed, **named}, "uncertainty": fit_uncertainty(fit, cross)}
+        return scenario_toml(f"{self.title}, {origin}", plant, self.input_tables[record], run, note, fitted)
 
 
 def load_dynamic_fit(path: str | Path) -> DynamicFitSetup:
@@ -150,6 +155,7 @@ def load_dynamic_fit(path: str | Path) -> DynamicFitSetup:
         experiments=tuple(experiment for experiment, _ in records),
         input_tables=tuple(table for _, table in records),
         observed={name: deviation for name, (deviation, _) in observed.items()},
+        columns={name: column for name, (_, column) in observed.items() if column != name},
         free=tuple(read_shared(item, f"{in_fit}, free") for item in read_list(fit, "free", in_fit)),
         own=read_own(fit, plant, in_fit),
         bounds=_read_bounds(optional_table(fit, "bounds", in_fit), plant, in_fit.inside("bounds")),

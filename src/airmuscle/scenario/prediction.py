@@ -19,8 +19,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ..core.errors import ColumnError, ParameterError
 from ..identify.dynamic import Experiment
 from ..identify.dynamic.experiment import RecordUnknown
@@ -29,8 +27,10 @@ from ..library.files import is_path, list_plants, read_toml
 from ..library.location import Location, check_keys, located_errors
 from ..library.plant_file import plant_tables
 from ..recording import Recording
+from ..recording.heading import split_unit
 from ..simulation import Integrator
-from .record import FIRST_ROWS, Record, optional_table
+from .initial_state import first_value, pressure_names, recorded_pressures
+from .record import Record, optional_table, with_observed
 from .scenario import TABLES, Scenario, build_scenario
 from .study_tables import build_method, read_observed, read_own
 
@@ -57,11 +57,12 @@ class PlantModel:
         scenario states. Raises ColumnError for a recording without a predictable quantity, ParameterError otherwise.
         """
         with located_errors(recording.origin):
+            recording = self._with_observed(recording)
             names = self.predicted_names(recording)
             row = {"start_time": start_time, "initial_state": self._initial_state(recording)}
         place = Location(recording.origin, "", self.location.folder)
         experiment, _ = Record(row, place, self.tables, self.scenario.plant, recording).build_experiment({})
-        return self._predict(experiment, dict.fromkeys(names, 0.0), own)
+        return self._predict(experiment, {name: self._observed.get(name, (0.0, name))[0] for name in names}, own)
 
     def predict_file(self, path: Path) -> list[RecordPrediction]:
         """Predict each record of a file of records. Raises FileError, ParameterError, UnitError or ColumnError."""
@@ -70,7 +71,7 @@ class PlantModel:
         plant, fit = self.scenario.plant, optional_table(tables, "fit", location)
         check_keys(fit, _FIT, location.inside("fit"))
         own, method = read_own(fit, plant, location.inside("fit")), build_method(fit, location.inside("fit"))
-        observed = {name: (0.0, name) for name in self._deviations}
+        observed = dict(self._observed)
         if "observed" in tables:
             in_observed = location.inside("observed")
             observed = read_observed(optional_table(tables, "observed", location), plant, in_observed)
@@ -91,13 +92,23 @@ class PlantModel:
         return predictions
 
     @property
-    def _deviations(self) -> Mapping[str, float]:
+    def _observed(self) -> Mapping[str, tuple[float, str]]:
+        """Deviation, 0 where it is not stated, and column of each quantity that the fit observed."""
         uncertainty = self.scenario.uncertainty
-        return {} if uncertainty is None else uncertainty.deviations
+        stated = () if uncertainty is None else uncertainty.deviations
+        return {name: (0.0, name) for name in stated} | dict(self.scenario.observed)
+
+    def _with_observed(self, recording: Recording) -> Recording:
+        """The recording with those columns of the fit that it has under the names of the outputs."""
+        kept = {}
+        for name, (deviation, column) in self._observed.items():
+            if column in [split_unit(heading)[0] for heading in recording]:
+                kept[name] = deviation, column
+        return with_observed(recording, kept, self.scenario.plant)
 
     def predicted_names(self, recording: Recording) -> tuple[str, ...]:
         """The quantities to predict: the recorded ones of the fit, else all of the plant. Raises ColumnError."""
-        known = self._deviations or [name for name in PREDICTABLE if name in self._outputs()]
+        known = self._observed or [n for kind in PREDICTABLE for n in self._outputs() if n.rpartition(".")[2] == kind]
         names = tuple(name for name in known if name in recording)
         if not names:
             raise ColumnError(f"no column can be predicted; the plant gives {', '.join(known)}.")
@@ -108,13 +119,16 @@ class PlantModel:
         state = dict(self.scenario.initial_state)
         return {**plant.outputs(state, dict.fromkeys(plant.inputs, 0.0)), **state}
 
-    def _initial_state(self, recording: Recording) -> dict[str, Any]:
-        """The states that the scenario states, at their recorded initial values if there are any."""
-        stated = self.tables["run"].get("initial_state", {})
-        initial = dict(stated) if isinstance(stated, Mapping) else {}
-        for name in tuple(initial):
-            if name in recording:
-                initial[name] = float(np.nanmedian(recording[name][:FIRST_ROWS]))
+    def _initial_state(self, recording: Recording) -> dict[str, float]:
+        """The recorded initial pressures, else those of the scenario, and the other states that it states, at their
+        recorded initial values if there are any."""
+        plant, outputs, stated = self.scenario.plant, self._outputs(), self.tables["run"].get("initial_state", {})
+        pressures = {name: float(outputs[name]) for name in pressure_names(plant)}
+        initial = {**pressures, **recorded_pressures(plant, recording)}
+        own = [c for coordinate in plant.mechanism.coordinates for c in (coordinate.name, coordinate.speed)]
+        for name in own:
+            if name in stated:
+                initial[name] = first_value(recording, name) if name in recording else float(outputs[name])
         return initial
 
     def _predict(

@@ -9,17 +9,16 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import ParameterError
-from ..identify.dynamic import Experiment, InitialConditions
+from ..identify.dynamic import Experiment
 from ..library.location import Location, check_keys, located_errors, read_finite_number, read_text
 from ..library.plant_file import build_plant
 from ..plant.plant import Plant
 from ..recording import Recording, read
 from ..recording.columns import quantity_of
 from ..simulation.problem import check_signal
+from .initial_state import build_initial_conditions
 from .inputs import build_input_signal
 
-FIRST_ROWS = 3
-"""Number of first rows whose median is the default initial pressure (chosen)."""
 _KEYS = ("file", "initial_state", "start_time", "first", "last", "mapping", "resting_length", "input", "plant")
 
 
@@ -53,7 +52,9 @@ class Record:
         with located_errors(in_input):
             duration = max(float(recording["time"][-1]) - start_time, 1e-9)
             check_signal(plant, signal, 0.0, duration)
-        return Experiment(recording, signal, self._initial_conditions(plant, recording), start_time, plant), table
+        initial = optional_table(self.row, "initial_state", self.location)
+        conditions = build_initial_conditions(initial, plant, recording, self.location.inside("initial_state"))
+        return Experiment(recording, signal, conditions, start_time, plant), table
 
     def _build_plant(self) -> Plant:
         """The shared plant, with the parts that this record replaces."""
@@ -72,9 +73,7 @@ class Record:
             runs = read(self.location.folder / name, **options)
             if len(runs) != 1:
                 raise ParameterError(f"{name} contains {len(runs)} runs; give one file for each record.")
-            columns = {name: (column, signal_unit(name, self.shared)) for name, (_, column) in observed.items()}
-            run = runs[0].with_columns(**{name: runs[0].in_unit(*column) for name, column in columns.items()})
-            return self._cut(run)
+            return self._cut(with_observed(runs[0], observed, self.shared))
 
     def _cut(self, recording: Recording) -> Recording:
         """The rows from the time `first` to the time `last`."""
@@ -89,21 +88,11 @@ class Record:
             )
         return recording.rows(rows)
 
-    def _initial_conditions(self, plant: Plant, recording: Recording) -> InitialConditions:
-        """Equilibrium at a pressure, or the given state."""
-        inner = self.location.inside("initial_state")
-        table = dict(optional_table(self.row, "initial_state", self.location))
-        values = {
-            name: read_finite_number(value, signal_unit(name, plant) or "1", f"{inner}, {name}")
-            for name, value in table.items()
-        }
-        pressures = [name for name in recording if name.rpartition(".")[2] == "pressure"]
-        default = float(np.median(recording[pressures[0]][:FIRST_ROWS])) if pressures else 0.0
-        pressure = values.pop("pressure", default)
-        with located_errors(inner):
-            if values:
-                return InitialConditions.at_coordinates(plant, pressure, **values)
-            return InitialConditions.at_rest(plant, pressure)
+
+def with_observed(recording: Recording, observed: Mapping[str, tuple[float, str]], plant: Plant) -> Recording:
+    """The recording with the observed columns under the names of the outputs [SI]. Raises ColumnError, UnitError."""
+    columns = {name: (column, signal_unit(name, plant)) for name, (_, column) in observed.items()}
+    return recording.with_columns(**{name: recording.in_unit(*column) for name, column in columns.items()})
 
 
 def optional_table(tables: Mapping[str, Any], key: str, location: Location) -> Mapping[str, Any]:

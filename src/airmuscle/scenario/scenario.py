@@ -11,11 +11,13 @@
     [run]
     duration = "25 s"
     output_times = "10 ms"                      optional
-    initial_state = { pressure = "0 bar" }      optional: equilibrium at this pressure; or a state, position = "10 mm";
-                                                or all states of the plant by name
+    initial_state = { pressure = "0 bar" }      optional: equilibrium at this pressure, of each muscle "left.pressure";
+                                                or a state, position = "10 mm"; or all states of the plant by name
     integrator = { model = "Rodas4", rtol = 1e-8 }  optional
     [output]
     columns = ["pressure", "force"]             optional: columns of the recording besides time; all by default
+    [observed]                                  written by fit-dynamic, read by predict: as in a study of fit-dynamic
+    [uncertainty]                               the same: see plant_uncertainty.py
 
 Components are tables with `model` and their parameters; new components need no new grammar.
 """
@@ -30,8 +32,7 @@ from typing import Any
 
 from ..control.control_loop import ControlLoop
 from ..control.inputs import InputSignal
-from ..core.errors import EquilibriumError, FileError, ParameterError, suggestion
-from ..core.hints import HintedText
+from ..core.errors import FileError, ParameterError, suggestion
 from ..identify.prediction import PlantUncertainty
 from ..library.build import build
 from ..library.files import is_path, list_plants, read_toml
@@ -40,22 +41,17 @@ from ..library.plant_file import SCENARIO_TABLES, build_plant, plant_tables
 from ..plant.plant import Plant
 from ..recording import Recording
 from ..simulation import Integrator, Problem, solve
-from ..simulation.equilibrium import find_equilibrium
 from .controller import build_control_loop, signal_units
+from .initial_state import build_initial_state
 from .inputs import build_input_signal
 from .plant_uncertainty import read_plant_uncertainty
+from .study_tables import read_observed
 
-TABLES = ("title", *SCENARIO_TABLES, "uncertainty")
+TABLES = ("title", *SCENARIO_TABLES, "observed", "uncertainty")
 RUN = ("duration", "start_time", "output_times", "initial_state", "integrator")
 OUTPUT = ("columns",)
 DEFAULT_INITIAL_STATE: Mapping[str, Any] = MappingProxyType({"pressure": 0.0})
 """Default initial state of a run: equilibrium at ambient pressure."""
-START_REMEDY = (
-    ' In [run], initial_state = { pressure = "2 bar" } is the equilibrium at another pressure, and '
-    '{ position = "0 mm" } a state at rest that need not be one; a load that rests on a stop is a '
-    "mechanism within WithEndStops."
-)
-"""What to do where a scenario begins in an equilibrium that does not exist."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -68,6 +64,8 @@ class Scenario:
     """Columns of the recording besides time; all if empty."""
     uncertainty: PlantUncertainty | None = None
     """That of the fit of the plant, for predictions; a simulation does not use it."""
+    observed: Mapping[str, tuple[float, str]] = dataclasses.field(default_factory=dict)
+    """Standard deviation of the sensor [SI] and column of each output that the fit of the plant observed."""
     defaults: tuple[str, ...] = ()
     """Keys of [run] that the file does not state."""
 
@@ -130,7 +128,7 @@ def build_scenario(
     duration = _read_duration(run, "duration", in_run)
     in_input, input_table = location.inside("input"), _check_table(tables.get("input", {}), "input", location)
     open_loop = _build_input_signal(input_table, plant, in_input)  # before the search for an equilibrium
-    initial_state = _build_initial_state(
+    initial_state = build_initial_state(
         run.get("initial_state", DEFAULT_INITIAL_STATE), plant, in_run.inside("initial_state"), equilibrium
     )
     integrator = (
@@ -148,9 +146,8 @@ def build_scenario(
         title=read_text(tables, "title", location, needed=False) or Path(location.file).stem,
         problem=problem,
         columns=_read_columns(output_table, list(run_column_units(problem)), location.inside("output")),
-        uncertainty=read_plant_uncertainty(tables["uncertainty"], plant, location.inside("uncertainty"))
-        if "uncertainty" in tables
-        else None,
+        uncertainty=_read_uncertainty(tables, plant, location),
+        observed=_read_observed(tables, plant, location),
         defaults=tuple(key for key in RUN if key not in run),
     )
 
@@ -160,6 +157,18 @@ def _check_table(value: Any, key: str, location: Location) -> Mapping[str, Any]:
         what = "is missing" if value is None else f"is {value!r}; it must be a table"
         raise ParameterError(f"{location}: the table [{key}] {what}.")
     return value
+
+
+def _read_observed(tables: Mapping[str, Any], plant: Plant, location: Location) -> dict[str, tuple[float, str]]:
+    if "observed" not in tables:
+        return {}
+    return read_observed(_check_table(tables["observed"], "observed", location), plant, location.inside("observed"))
+
+
+def _read_uncertainty(tables: Mapping[str, Any], plant: Plant, location: Location) -> PlantUncertainty | None:
+    if "uncertainty" not in tables:
+        return None
+    return read_plant_uncertainty(tables["uncertainty"], plant, location.inside("uncertainty"))
 
 
 def _build_input_signal(table: Mapping[str, Any], plant: Plant, location: Location) -> InputSignal | None:
@@ -190,32 +199,6 @@ def initial_pressure(tables: Mapping[str, Any], location: Location) -> float | N
     return read_finite_number(
         start.get("pressure", 0.0), "Pa", f"{location.inside('run').inside('initial_state')}, pressure"
     )
-
-
-def _build_initial_state(
-    table: Any, plant: Plant, location: Location, equilibrium: dict[str, float] | None
-) -> dict[str, float]:
-    if not isinstance(table, Mapping):
-        raise ParameterError(
-            f'{location} is {table!r}; it must be a table. Write initial_state = {{ pressure = "0 bar" }}.'
-        )
-    all_states = {state.name: state.unit for state in plant.states}
-    if set(table) == set(all_states):
-        return {name: read_finite_number(table[name], unit, f"{location}, {name}") for name, unit in all_states.items()}
-    coordinates = {
-        name: unit for c in plant.mechanism.coordinates for name, unit in ((c.name, c.unit), (c.speed, f"{c.unit}/s"))
-    }
-    units = {"pressure": "Pa", **coordinates}
-    check_keys(table, tuple(units), location)
-    values = {key: read_finite_number(value, units[key], f"{location}, {key}") for key, value in table.items()}
-    pressure = values.pop("pressure", 0.0)
-    with located_errors(location):
-        if values:
-            return plant.state_at(pressure=pressure, **values)
-        try:
-            return find_equilibrium(plant, pressure=pressure) if equilibrium is None else equilibrium
-        except EquilibriumError as error:
-            raise EquilibriumError(HintedText(error.message, START_REMEDY)) from None
 
 
 def _read_columns(table: Mapping[str, Any], known: Sequence[str], location: Location) -> tuple[str, ...]:

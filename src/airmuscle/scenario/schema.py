@@ -48,6 +48,7 @@ def scenario_schema() -> Schema:
         "input": _input(models),
         "run": _run(models),
         "output": _table({"columns": {"type": "array", "items": _TEXT}}),
+        "observed": {"type": "object", "additionalProperties": _observed()},
         "uncertainty": _table(_plant_uncertainty(), (plant_uncertainty.DEVIATIONS,)),
     }
     return _document("A simulation with airmuscle", _select_keys(tables, scenario.TABLES), ("plant", "run"), models)
@@ -87,6 +88,11 @@ def _uncertainty() -> Schema:
     numbers = {"type": "array", "items": {"type": "number"}}
     names = {"type": "array", "items": _TEXT}
     return {"parameters": names, "standard_errors": numbers, "correlations": {"type": "array", "items": numbers}}
+
+
+def _observed() -> Schema:
+    deviation = _quantity("", 0.0)
+    return {"anyOf": [deviation, _table({"deviation": deviation, "column": _TEXT}, ("deviation",))]}
 
 
 def _plant_uncertainty() -> Schema:

@@ -12,6 +12,7 @@ from ..library.build import build
 from ..library.location import Location, check_keys, check_type, read_finite_number, read_text
 from ..plant.plant import Plant
 from ..simulation import Integrator
+from .initial_state import PRESSURE, pressure_names
 from .record import optional_table, signal_unit
 
 
@@ -87,8 +88,8 @@ def read_own(table: Mapping[str, Any], plant: Plant, location: Location) -> tupl
     if "start_time" in table:
         own.append(StartTime(read_positive(table["start_time"], "s", f"{location}, start_time")))
     for name, margin in optional_table(table, "initial_state", location).items():
-        unit = signal_unit(name, plant) or "1"
-        own.append(InitialValue(name, read_positive(margin, unit, f"{location}, start, {name}")))
+        within = read_positive(margin, signal_unit(name, plant) or "1", f"{location}, initial_state, {name}")
+        own += [InitialValue(each, within) for each in (pressure_names(plant) if name == PRESSURE else (name,))]
     return tuple(own)
 
 

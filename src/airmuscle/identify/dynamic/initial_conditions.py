@@ -16,10 +16,13 @@ from ...core.errors import IdentificationError, ParameterError, suggestion
 from ...core.status import Status
 from ...core.system import System
 from ...plant.plant import Plant
+from ...plant.validation import check_pressures
 from ...simulation.equilibrium import find_equilibrium
 
 PRESSURE_STEP = 100.0
 """Increase of gauge pressure [Pa] by which states that depend on the pressure are detected."""
+MusclePressures = float | str | Sequence[float | str]
+"""Gauge pressure [Pa] of all muscles, or one for each; also as texts with a unit."""
 _compiled_conditions: dict[Any, Function] = {}
 
 
@@ -39,24 +42,30 @@ class InitialConditions:
     equal: tuple[tuple[str, str], ...] = ()
 
     @classmethod
-    def at_rest(cls, plant: Plant, pressure: float) -> InitialConditions:
-        """Equilibrium of a plant with one muscle at a gauge pressure [Pa], walls and tubes in steady state."""
+    def at_rest(cls, plant: Plant, pressure: MusclePressures) -> InitialConditions:
+        """Equilibrium at gauge pressures [Pa], one for all muscles or one for each; walls and tubes in steady state.
+
+        Raises ParameterError for another number of pressures than muscles, EquilibriumError where there is none.
+        """
         speeds = [c.speed for c in plant.mechanism.coordinates]
         coordinates = [c.name for c in plant.mechanism.coordinates]
-        state = find_equilibrium(plant, pressure=pressure)
-        known, stationary, equal = _steady_conditions(plant, state, pressure, (*speeds, *coordinates))
+        pressures = check_pressures(pressure, len(plant.muscles), plant.ambient)
+        state = find_equilibrium(plant, pressure=tuple(pressures))
+        known, stationary, equal = _steady_conditions(plant, state, pressures, (*speeds, *coordinates))
         known |= dict.fromkeys(speeds, 0.0)
-        return cls({"pressure": pressure, **known}, state, (*stationary, *speeds), equal)
+        return cls({**_by_output(plant, pressures), **known}, state, (*stationary, *speeds), equal)
 
     @classmethod
-    def at_coordinates(cls, plant: Plant, pressure: float, **coordinates: float) -> InitialConditions:
-        """A plant with one muscle at a gauge pressure [Pa] and given coordinates [SI]; speeds are zero unless given.
+    def at_coordinates(cls, plant: Plant, pressure: MusclePressures, **coordinates: float) -> InitialConditions:
+        """A plant at gauge pressures [Pa], one for all muscles or one for each, and given coordinates [SI].
 
-        Walls and tubes are in steady state at this pressure, also where it is an unknown.
+        Speeds are zero unless given. Walls and tubes are in steady state at these pressures, also where they are
+        unknowns. Raises ParameterError for another number of pressures than muscles, or an unknown name.
         """
-        state = plant.state_at(pressure=pressure, **coordinates)
-        known, stationary, equal = _steady_conditions(plant, state, pressure)
-        return cls({"pressure": pressure, **known}, state, stationary, equal)
+        pressures = check_pressures(pressure, len(plant.muscles), plant.ambient)
+        state = plant.state_at(pressure=pressures, **coordinates)
+        known, stationary, equal = _steady_conditions(plant, state, pressures)
+        return cls({**_by_output(plant, pressures), **known}, state, stationary, equal)
 
     def check_plant(self, system: System, values: Mapping[str, Any]) -> None:
         """Raise ParameterError for a name that the system lacks, or where the number of conditions is wrong."""
@@ -75,26 +84,33 @@ class InitialConditions:
             )
 
 
-def _steady_conditions(
-    plant: Plant, state: Mapping[str, float], pressure: float, excluded: Sequence[str] = ()
-) -> tuple[dict[str, float], tuple[str, ...], tuple[tuple[str, str], ...]]:
-    """The conditions for the states other than the air mass: known values, stationary states and equal outputs.
+def _by_output(plant: Plant, pressures: Sequence[float]) -> dict[str, float]:
+    """The gauge pressures [Pa] of the muscles by the names of their outputs."""
+    return {f"{prefix}pressure": value for prefix, value in zip(plant.prefixes, pressures, strict=True)}
 
-    A state that does not depend on the pressure is known. Of the others, a tube has the pressure of the muscle, and the
+
+def _steady_conditions(
+    plant: Plant, state: Mapping[str, float], pressures: Sequence[float], excluded: Sequence[str] = ()
+) -> tuple[dict[str, float], tuple[str, ...], tuple[tuple[str, str], ...]]:
+    """The conditions for the states other than the air masses: known values, stationary states and equal outputs.
+
+    A state that depends on no pressure is known. Of the others, a tube has the pressure of its muscle, and the
     remaining ones are stationary.
     """
     motion = {c.name: state[c.name] for c in plant.mechanism.coordinates}
     motion |= {c.speed: state[c.speed] for c in plant.mechanism.coordinates}
-    other = plant.state_at(pressure=pressure + PRESSURE_STEP, **motion)
+    increased = [[p + PRESSURE_STEP * (i == k) for i, p in enumerate(pressures)] for k in range(len(pressures))]
+    others = [plant.state_at(pressure=each, **motion) for each in increased]
     outputs = plant.outputs(state, dict.fromkeys(plant.inputs, 0.0))
     known, stationary, equal = {}, [], []
     for name, value in state.items():
-        if name == "air_mass" or name in excluded:
+        if name in excluded or name in [f"{prefix}air_mass" for prefix in plant.prefixes]:
             continue
-        if other[name] == value:
+        if all(other[name] == value for other in others):
             known[name] = value
         elif (tube_pressure := f"{name.removesuffix('air_mass')}pressure") in outputs:
-            equal.append((tube_pressure, "pressure"))
+            prefix = next(prefix for prefix in plant.prefixes if name.startswith(prefix))
+            equal.append((tube_pressure, f"{prefix}pressure"))
         else:
             stationary.append(name)
     return known, tuple(stationary), tuple(equal)

@@ -45,6 +45,8 @@ CONSEQUENCES: tuple[tuple[tuple[str, ...], str], ...] = (
      "it."),
 )  # fmt: skip
 """Consequence of an unknown on its bound, by the last part of its path."""
+RECORD_CONSEQUENCE = "The true value may lie beyond it: give a wider margin, or state the value in the record."
+"""Consequence of a start time or an initial value on its bound."""
 _OTHER_CONSEQUENCE = "Extend the bound if it is not physical, or fix the parameter at a measured value."
 
 
@@ -201,5 +203,7 @@ def _moved(estimates: Sequence[Estimate], shifts: Array) -> list[str]:
 
 
 def _consequence(name: str) -> str:
+    if name.startswith(("start time", "initial ")):
+        return RECORD_CONSEQUENCE
     last = name.partition(" of record")[0].rpartition(".")[2].partition("[")[0]
     return next((text for names, text in CONSEQUENCES if last in names), _OTHER_CONSEQUENCE)

@@ -16,6 +16,7 @@ from ...simulation.integrators import Integrator, Rodas4
 from ..dynamic.experiment import Experiment, ParameterPaths, RecordUnknown, StartTime, Unknown, make_unknowns
 from ..dynamic.fit import fit_dynamic
 from ..dynamic.record_model import ModelOutputs, RecordModel
+from ..dynamic.reliability import RECORD_CONSEQUENCE
 from ..dynamic.result import DynamicFit
 from .result import QuantityPrediction, RecordPrediction
 
@@ -71,10 +72,7 @@ def predict_dynamic(
     if own:
         fit = fit_dynamic(plant, [experiment], free=(), per_record=own, observed=deviations, method=method)
         plant, experiment = fit.plant(), _with_estimates(fit, experiment)
-        values = ", ".join(
-            f"{e.name.removesuffix(' of record 1')} {e.value:.4g} {e.display_unit}".rstrip() for e in fit.estimates
-        )
-        notes.append(f"estimated from the record itself: {values} (SI)")
+        notes += _describe_estimates(fit)
     modelled, unknowns = _simulate(plant, experiment, deviations, uncertainty, method or Rodas4())
     spread = _parameter_variance(modelled, unknowns, uncertainty)
     recording, quantities = experiment.recording, []
@@ -86,6 +84,16 @@ def predict_dynamic(
         compared = np.isfinite(measured) & np.isfinite(predicted)
         quantities.append(QuantityPrediction(name, measured, predicted, half, compared))
     return RecordPrediction(recording, tuple(quantities), tuple(notes))
+
+
+def _describe_estimates(fit: DynamicFit) -> list[str]:
+    """The unknowns estimated from the record itself, and those of them that are on a bound."""
+    texts = [f"{e.name.removesuffix(' of record 1')} {e.value:.4g} {e.display_unit}".rstrip() for e in fit.estimates]
+    bounded = [text for text, e in zip(texts, fit.estimates, strict=True) if e.on_bound]
+    return [
+        f"estimated from the record itself: {', '.join(texts)} (SI)",
+        *(f"on its bound: {text}. {RECORD_CONSEQUENCE}" for text in bounded),
+    ]
 
 
 def _deviation(name: str, experiment: Experiment, uncertainty: PlantUncertainty | None) -> float:
