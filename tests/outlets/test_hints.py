@@ -32,7 +32,7 @@ from airmuscle.identify.candidates import blank_surface, standard_candidates
 from airmuscle.identify.hysteresis import find_loops, fit_loop
 from airmuscle.library.location import located_errors
 from airmuscle.muscle.characteristic import Sarosi2012
-from airmuscle.recording import Recording, read, read_csv
+from airmuscle.recording import DropMissing, Recording, read, read_csv
 from airmuscle.recording.csv_writer import write_csv
 from airmuscle.recording.time_base import NoTime
 
@@ -43,6 +43,7 @@ VALUES = {
     "fixed": ("wall_thickness",), "sigma": 1.0, "by": LevelSplit("contraction"), "leave_out": LevelSplit("pressure"),
     "units": {"pressure": ...}, "columns": {1: "pressure [kPa]"}, "decimal": ",", "resting_length": ...,
     "constants": {"length": "73.2 mm"}, "file_name": "held{length [mm]}", "time_base": NoTime(), "ordered": False,
+    "skip_rows": 1, "missing": DropMissing((-999.0,)), "displacement_zero": "12 mm",
     "all_rows": True, "characteristic": ..., "censoring": ..., "free": ("circuit.fill.conductance",), "": ...,
 }  # fmt: skip
 """A value of every argument that a hint of the source names."""
@@ -248,7 +249,7 @@ CASES: dict[str, tuple[Callable[[Path], Path], Callable[[Path], Any], tuple[Any,
         'use --column "1=pressure [kPa]" --column "2=force [N]".'),
     "ambiguous decimal sign": (
         lambda path: text_file(path, THOUSANDS), read, ("fit", *SURFACE, 1),
-        "use decimal=',' of read.", 'To specify the decimal sign, write decimal = "," in a --mapping file.'),
+        "use decimal=',' of read.", "To specify the decimal sign, use --decimal ','."),
     "no resting length": (
         lambda path: sweep(path, RISE_AND_FALL, (3e5, 3e5, 3e5)), loops, ("hysteresis",),
         "use resting_length=... of read.", 'To state it, use --resting-length "...".'),

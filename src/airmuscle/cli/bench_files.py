@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
@@ -11,10 +12,12 @@ import typer
 from ..core.errors import ParameterError
 from ..library.catalogue import load_data
 from ..recording import ColumnMapping, Recording, read
+from ..recording.row_notes import RowNote
 from ..recording.segment import check_contents
 from .completion import complete_data
 from .progress import reading_progress
 from .reading_options import ReadingOptions
+from .terminal import echo
 
 Files = Annotated[
     list[Path],
@@ -24,8 +27,14 @@ Files = Annotated[
         autocompletion=complete_data,
     ),
 ]
-_SINGULAR = {"units": "unit", "columns": "column", "constants": "constant"}
+_SINGULAR = {"units": "unit", "columns": "column", "constants": "constant", "missing_codes": "missing-code"}
 """Options that may be repeated, by the names of their fields."""
+
+
+def print_row_notes(recordings: Iterable[Recording]) -> None:
+    """Print the notes on rows that were left out or filled, on the error stream."""
+    for note in dict.fromkeys(note for each in recordings for note in each.notes if isinstance(note, RowNote)):
+        echo(f"note: {note}", err=True)
 
 
 def read_recordings(files: list[Path], reading: ReadingOptions) -> list[Recording]:
@@ -49,4 +58,5 @@ def read_recordings(files: list[Path], reading: ReadingOptions) -> list[Recordin
     with reading_progress() as progress:
         recordings = read(paths, mapping=mapping, units=units, progress=progress) if paths else ()
     check_contents(recordings)
+    print_row_notes(recordings)
     return [*recordings, *(load_data(str(name)) for name in names)]

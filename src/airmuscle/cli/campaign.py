@@ -19,10 +19,11 @@ from ..library.initial_law import resting_lengths
 from ..library.write import save
 from ..muscle.geometry import Geometry
 from ..recording import ColumnMapping, Recording
-from ..recording.reader import check_bench, find_files, read_file
+from ..recording.reader import complete_bench, find_files, read_file
 from ..report.campaign_chapters import UnreadFile, ValidationRow, campaign_chapters
 from ..report.write import as_json, write_into
 from ..scenario.campaign import RecordScenario, campaign_scenarios
+from .bench_files import print_row_notes
 from .campaign_output import campaign_to_dict, print_campaign, stage_to_dict
 from .campaign_stages import KeptStages
 from .fit_geometry import braid_of_length, check_one_length, parse_braid
@@ -87,7 +88,9 @@ def campaign(
     files = [path for path in find_files(folder) if path.resolve() not in kept_aside]
     recordings, unread = _read_each(files, columns, units)
     aside = [recording for path in find_files(validate or ()) for recording in read_file(path, columns, units)]
-    check_bench([*recordings, *aside])
+    complete = complete_bench([*recordings, *aside], columns)
+    print_row_notes(complete)
+    recordings, aside = complete[: len(recordings)], complete[len(recordings) :]
     geometry = None if size is None else braid_of_length(size, _one_length(recordings))
     check_writable(out)
     result = _identify(recordings, geometry, out)

@@ -12,6 +12,7 @@ from ..recording import Recording, read, write
 from ..recording.csv_writer import write_csv
 from ..recording.reader import find_files
 from ..recording.writer import EXTENSIONS
+from .bench_files import print_row_notes
 from .options import Json
 from .reading_options import NO_OPTIONS, ReadingOptions, with_reading_options
 from .terminal import echo, print_json
@@ -42,6 +43,7 @@ def convert_data(
     if target.suffix.lower() not in EXTENSIONS:
         raise FileError(f"{target}: the extension must be one of {', '.join(EXTENSIONS)}.")
     recordings = read(source, mapping=reading.column_mapping(), units=reading.units)
+    print_row_notes(recordings)
     paths = [_path(target, i, len(recordings)) for i in range(len(recordings))]
     _check_no_source(paths, source)
     for recording, path in zip(recordings, paths, strict=True):

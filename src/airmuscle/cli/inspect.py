@@ -24,26 +24,12 @@ Files = Annotated[
     list[str],
     typer.Argument(metavar="FILES", help="Files, folders or glob patterns: CSV, Excel, MAT, TDMS, MDF."),
 ]
-Delimiter = Annotated[
-    str | None, typer.Option(metavar="CHARACTER", help="Column delimiter of text files; default: detected.")
-]
-Decimal = Annotated[
-    str | None, typer.Option(metavar="CHARACTER", help="Decimal mark of text files; default: detected.")
-]
-Sheet = Annotated[str | None, typer.Option(metavar="NAME", help="Worksheet of an Excel file; default: all.")]
-Group = Annotated[
-    str | None, typer.Option(metavar="NAME", help="Group of a TDMS or MDF file, or struct of a MAT file.")
-]
 
 
 @with_reading_options
 def inspect(
     files: Files,
     reading: ReadingOptions = NO_OPTIONS,
-    delimiter: Delimiter = None,
-    decimal: Decimal = None,
-    sheet: Sheet = None,
-    group: Group = None,
     json: Json = False,
     out: OptionalFolder = None,
 ) -> None:
@@ -61,8 +47,7 @@ def inspect(
       airmuscle inspect log.mat --column "data(:,1)=time [s]" --column "data(:,2)=pressure [bara]"
       airmuscle inspect runs/*.tdms --mapping rig.toml --json
     """
-    columns = reading.column_mapping(delimiter=delimiter, decimal=decimal, sheet=sheet, group=group)
-    inspections = inspect_all(_read(files, columns, reading.units))
+    inspections = inspect_all(_read(files, reading.column_mapping(), reading.units))
     if out:
         _save_figures(inspections, out)
     if json:

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from ..recording.constants import CONSTANT_UNITS
 from ..recording.display_units import display_scale
-from ..recording.segment import Inspection, Outlier, Run, Sampling
+from ..recording.segment import Inspection, Run, Sampling
 from ..report.formatting import MISSING
 from .option_hints import in_options
 
@@ -39,7 +40,7 @@ def column_rows(inspection: Inspection) -> Iterator[tuple[str, ...]]:
 def summary(inspection: Inspection) -> Iterator[str]:
     """Constants, sampling, runs, branches, plateaus, outliers, notes and findings, one line each."""
     for name, value in inspection.recording.constants.items():
-        factor, unit = display_scale("length" if name == "resting_length" else "pressure" if name == "ambient" else "")
+        factor, unit = display_scale({"ambient": "pressure"}.get(name, "length" if name in CONSTANT_UNITS else ""))
         yield f"{name}: {value * factor:.4g} {unit}" if isinstance(value, float) and unit else f"{name}: {value}"
     if inspection.sampling:
         yield f"sampling: {_describe_sampling(inspection.sampling)}"
@@ -54,7 +55,7 @@ def summary(inspection: Inspection) -> Iterator[str]:
         share = f"{100 * inspection.quasi_static:.0f} % of all rows are quasi-static"
         yield f"plateaus: {len(inspection.plateaus)} with {count} rows; {share}"
     if inspection.outliers:
-        outliers = _shorten([_describe_outlier(outlier) for outlier in inspection.outliers])
+        outliers = _shorten(list(map(str, inspection.outliers)))
         yield f"suspected outliers: {len(inspection.outliers)}, not removed: {outliers}"
     yield from (f"note: {note}" for note in inspection.recording.notes)
     for finding in inspection.findings:
@@ -84,9 +85,3 @@ def _describe_run(run: Run) -> str:
         return _with_rows(run.kind.name, run)
     factor, unit = display_scale(run.constant_column)
     return _with_rows(f"{run.kind.name} at {run.constant_column} {run.constant_value * factor:.4g} {unit}", run)
-
-
-def _describe_outlier(outlier: Outlier) -> str:
-    factor, unit = display_scale(outlier.column)
-    values = f"{outlier.value * factor:.4g} {unit}, neighbours {outlier.expected * factor:.4g} {unit}"
-    return f"{outlier.column} in row {outlier.row + 1} ({values})"

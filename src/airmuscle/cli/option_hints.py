@@ -6,10 +6,13 @@ import json
 from collections.abc import Callable, Mapping
 
 from ..core.hints import Hint, HintedText
+from ..recording.missing_values import MISSING_VALUES
 from ..recording.time_base import TIME_BASES
 
 TIME_BASE_NAMES = {base: name for name, base in TIME_BASES.items()}
 """Names of the time bases of the option --time."""
+MISSING_NAMES = {treatment: name for name, treatment in MISSING_VALUES.items()}
+"""Names of the treatments of missing values of the option --missing."""
 Instruction = Callable[[Hint], str]
 """The end of a sentence that states what to do on the command line."""
 
@@ -50,6 +53,12 @@ def _time(hint: Hint) -> str:
     return f"use --time {name}"
 
 
+def _missing(hint: Hint) -> str:
+    """The name of a treatment of missing values, with its codes."""
+    codes = "".join(f" --missing-code '{code}'" for code in hint.value.codes)
+    return f"use --missing {MISSING_NAMES[type(hint.value)]}{codes}"
+
+
 _FILES: Mapping[str, Instruction] = {
     "units": _unit,
     "columns": _column,
@@ -57,14 +66,20 @@ _FILES: Mapping[str, Instruction] = {
     "file_name": lambda hint: f"use --file-name '{hint.value}'",
     "time_base": _time,
     "ordered": _time,
-    "decimal": lambda hint: f"write decimal = {json.dumps(hint.value)} in a --mapping file",
+    "decimal": lambda hint: f"use --decimal '{hint.value}'",
     "resting_length": lambda hint: 'use --resting-length "..."',
+    "displacement_zero": lambda hint: f'use --displacement-zero "{hint.value}"',
+    "skip_rows": lambda hint: "use --skip-rows N",
+    "missing": _missing,
 }
 _RECORDS: Mapping[str, Instruction] = {
     "units": lambda hint: "write it in the heading under [columns] of the record's mapping file",
     "columns": lambda hint: f"write {_toml_table(hint)} in the record's mapping file",
     "decimal": lambda hint: f"write decimal = {json.dumps(hint.value)} in the record's mapping file",
     "resting_length": lambda hint: 'write resting_length = "..." under [[record]]',
+    "displacement_zero": lambda hint: f'write displacement_zero = "{hint.value}" in the mapping of the record',
+    "skip_rows": lambda hint: "write skip_rows = N in the mapping of the record",
+    "missing": lambda hint: f'write missing = "{MISSING_NAMES[type(hint.value)]}" in the mapping of the record',
 }
 INSTRUCTIONS: Mapping[str, Mapping[str, Instruction]] = {
     "inspect": _FILES,

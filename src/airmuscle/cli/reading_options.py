@@ -1,4 +1,4 @@
-"""Options of every command that reads measurement files: resting length, units, columns, constants and time base."""
+"""Options of every command that reads measurement files: how a file is read, and what it does not state itself."""
 
 from __future__ import annotations
 
@@ -46,6 +46,51 @@ Constants = Annotated[
         help="Quantity that was held and not recorded, 'length=73.2 mm', or specimen, run. Repeatable.",
     ),
 ]
+DisplacementZero = Annotated[
+    str | None,
+    typer.Option(
+        metavar="QUANTITY",
+        help="Reading of a displacement, shortening or elongation at the resting length, such as '12 mm'; default: 0.",
+    ),
+]
+SkipRows = Annotated[
+    int | None,
+    typer.Option(
+        min=0,
+        metavar="N",
+        help="Lines above the headings of text files and worksheets; default: detected, or found by --column.",
+    ),
+]
+Missing = Annotated[
+    str | None,
+    typer.Option(
+        metavar="TREATMENT",
+        help="Missing values (empty, '---', NaN, '#N/A', --missing-code): error (default), drop (leave out the rows), "
+        "interpolate (short gaps in time; other rows are left out).",
+    ),
+]
+MissingCodes = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--missing-code", metavar="CODE", help="Number or text that stands for a missing value: -999. Repeatable."
+    ),
+]
+Outliers = Annotated[
+    str | None,
+    typer.Option(
+        metavar="TREATMENT", help="Suspected outliers, as inspect lists them: keep (default) or drop (leave out)."
+    ),
+]
+Delimiter = Annotated[
+    str | None, typer.Option(metavar="CHARACTER", help="Column delimiter of text files; default: detected.")
+]
+Decimal = Annotated[
+    str | None, typer.Option(metavar="CHARACTER", help="Decimal mark of text files; default: detected.")
+]
+Sheet = Annotated[str | None, typer.Option(metavar="NAME", help="Worksheet of an Excel file; default: all.")]
+Group = Annotated[
+    str | None, typer.Option(metavar="NAME", help="Group of a TDMS or MDF file, or struct of a MAT file.")
+]
 NamePattern = Annotated[
     str | None,
     typer.Option(
@@ -76,14 +121,23 @@ class ReadingOptions:
     constant: Constants = None
     file_name: NamePattern = None
     time: TimeOption = None
+    displacement_zero: DisplacementZero = None
+    skip_rows: SkipRows = None
+    missing: Missing = None
+    missing_code: MissingCodes = None
+    outliers: Outliers = None
+    delimiter: Delimiter = None
+    decimal: Decimal = None
+    sheet: Sheet = None
+    group: Group = None
 
     @property
     def units(self) -> dict[str, str]:
         """The unit of each column that `--unit` names. Raises BadParameter."""
         return parse_pairs("--unit", self.unit)
 
-    def column_mapping(self, **more: Any) -> ColumnMapping:
-        """The mapping of the file, if any; the options, and `more` fields of the mapping, take precedence.
+    def column_mapping(self) -> ColumnMapping:
+        """The mapping of the file, if any; the options take precedence.
 
         Raises BadParameter for an option that is not NAME=TEXT, FileError and ParameterError for a mapping file that is
         invalid, and ColumnError for contradictory columns.
@@ -92,16 +146,25 @@ class ReadingOptions:
         return base.with_overrides(
             columns=parse_pairs("--column", self.column),
             constants=parse_pairs("--constant", self.constant),
-            file_name=self.file_name,
-            time=self.time,
-            resting_length=self.resting_length,
-            ambient=self.ambient,
-            **more,
+            missing_codes=tuple(map(_code, self.missing_code)) if self.missing_code else None,
+            **{name: getattr(self, name) for name in _SAME_IN_MAPPING},
         )
 
 
 NO_OPTIONS = ReadingOptions()
+_SAME_IN_MAPPING = (
+    "resting_length", "ambient", "displacement_zero", "file_name", "time", "skip_rows", "missing", "outliers",
+    "delimiter", "decimal", "sheet", "group",
+)  # fmt: skip
 _FIELDS = tuple(field.name for field in dataclasses.fields(ReadingOptions))
+
+
+def _code(text: str) -> float | str:
+    """The code of a missing value: a number, or else a text."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
 
 
 def with_reading_options(command: Command) -> Command:

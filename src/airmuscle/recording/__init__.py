@@ -7,6 +7,7 @@ from .data_frames import from_pandas, to_xarray
 from .downsampling import BlockMeans, Decimation
 from .follow import RowReader, follow_lines
 from .mapping import ColumnMapping
+from .missing_values import DropMissing, InterpolateMissing, MissingValues, RefuseMissing
 from .reader import read
 from .recording import Recording
 from .time_base import NoTime, RecordedTime, TimeBase, UniformTime
@@ -17,10 +18,14 @@ __all__ = [
     "BlockMeans",
     "ColumnMapping",
     "Decimation",
+    "DropMissing",
+    "InterpolateMissing",
+    "MissingValues",
     "NoTime",
     "Quantity",
     "RecordedTime",
     "Recording",
+    "RefuseMissing",
     "RowReader",
     "TimeBase",
     "UniformTime",

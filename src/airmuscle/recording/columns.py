@@ -20,6 +20,8 @@ QUANTITIES: dict[str, Quantity] = {
     "contraction": Quantity("1", "eps", "contraction (L0 - L)/L0; negative if the muscle is stretched"),
     "force": Quantity("N", "F", "tensile force of the muscle, positive in tension"),
     "length": Quantity("m", "L", "muscle length between the end fittings"),
+    "shortening": Quantity("m", "x", "shortening from the resting length, L0 - L; positive as the muscle contracts"),
+    "elongation": Quantity("m", "u", "elongation from the resting length, L - L0; read as a negative shortening"),
     "position": Quantity("m", "y", "displacement of the load, positive as the muscle contracts"),
     "speed": Quantity("m/s", "v", "speed of the load, positive as the muscle contracts"),
     "acceleration": Quantity("m/s^2", "a", "acceleration of the load"),

@@ -13,13 +13,14 @@ from ..core.errors import ColumnError
 from ..core.units import conversion, quantity
 from .table import RawTable
 
-CONSTANT_UNITS = {"resting_length": "m", "ambient": "Pa"}
+CONSTANT_UNITS = {"resting_length": "m", "ambient": "Pa", "displacement_zero": "m"}
 """The SI units of the constants that have a unit."""
-CONSTANT_RANGES = {"resting_length": (1e-3, 20.0), "ambient": (1e3, 2e5)}
+CONSTANT_RANGES = {"resting_length": (1e-3, 20.0), "ambient": (1e3, 2e5), "displacement_zero": (-20.0, 20.0)}
 """The allowed ranges in SI units, those of the parameters of a geometry and of the ambient air."""
 _NAMES = {
     "resting_length": ("resting_length", "rest_length", "initial_length", "original_length", "l0", "l_0", "ruhelänge"),
     "ambient": ("ambient", "ambient_pressure", "atmospheric_pressure", "barometer"),
+    "displacement_zero": ("displacement_zero",),
 }
 _WITH_UNIT = re.compile(
     r"(?P<name>.*?)[\s_]*"
@@ -58,7 +59,7 @@ def check_constants(table: RawTable, constants: Mapping[str, Any]) -> None:
     """Raise ColumnError for a constant that is not positive, or outside its allowed range."""
     for name, (low, high) in CONSTANT_RANGES.items():
         value, unit = constants.get(name, low), CONSTANT_UNITS[name]
-        if not value > 0:
+        if low > 0 and not value > 0:
             raise ColumnError(f"{table.origin}: {name} is {value:g} {unit}; it must be positive.")
         if not low <= value <= high:
             raise ColumnError(

@@ -7,6 +7,7 @@ from .columns import quantity_of
 
 _DISPLAY_UNITS = {
     "pressure": (1e-3, "kPa"), "contraction": (100.0, "%"), "length": (1e3, "mm"), "position": (1e3, "mm"),
+    "shortening": (1e3, "mm"),
     "volume": (1e6, "cm³"), "air_mass": (1e3, "g"), "mass_flow": (1e3, "g/s"),
 }  # fmt: skip
 """Factor and unit of the quantities that are not displayed in SI units."""

@@ -14,6 +14,7 @@ import numpy as np
 from ..core.annotation import abridged
 from ..core.errors import ColumnError, FileError, ParameterError
 from ..core.units import AMBIENT_PRESSURE, UnitConversion
+from .displacement import displacement_columns
 from .header import is_number
 from .heading import find_quantity_name
 from .interpret import interpret, resolve_headings, unit_conversion
@@ -123,6 +124,7 @@ class RowReader:
             self._skip()
             return None
         self._unreadable = 0
+        row, _ = displacement_columns(row, self._first.constants)
         length = self._first.constants.get("resting_length")
         if "contraction" not in row and "length" in row and isinstance(length, float):
             row["contraction"] = (length - row["length"]) / length

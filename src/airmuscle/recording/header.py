@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from ..core.errors import ColumnError, UnitError
 from ..core.hints import Hint
@@ -17,6 +18,8 @@ COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
 POINT_NUMBER = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
 """A number with a decimal point, without thousands separators."""
 _CONSTANT_COMMENT = re.compile(r"[#%]\s*(?P<name>[^\W\d][\w -]*?)(?:\s*\[(?P<unit>[^\]]*)\])?\s*[=:]\s*(?P<value>.+)")
+MAX_PREAMBLE = 1000
+"""Maximum number of lines above the headings (chosen)."""
 _TEXT_CONSTANTS = ("resting_length", "ambient", "specimen", "run")
 
 
@@ -32,6 +35,34 @@ def is_number(cell: str) -> bool:
 def are_headings(cells: Sequence[str]) -> bool:
     """Whether a row of cells contains headings: at least one cell is not a number."""
     return not all(is_number(cell) for cell in cells if cell)
+
+
+def bare_heading(text: str) -> str:
+    """A heading without the unit in brackets, `force` of `force [N]`."""
+    return text.partition("[")[0].partition("(")[0].strip()
+
+
+def stated_heading_row(
+    rows: Iterable[tuple[int, Sequence[str]]], named: Sequence[str], skip_rows: int | None
+) -> int | None:
+    """The index of the row of headings that the user states; None if nothing is stated or found.
+
+    rows       numbers in the file, counted from 1, and cells
+    named      headings that the row contains, complete or without unit: the row with most of them
+    skip_rows  number of rows of the file above the headings
+    """
+    best, most = None, 0
+    for index, (number, cells) in enumerate(itertools.islice(rows, None if skip_rows else MAX_PREAMBLE)):
+        if skip_rows is not None:
+            if number > skip_rows:
+                return index
+            continue
+        found = len({*cells, *map(bare_heading, cells)} & set(named))
+        if found > most:
+            best, most = index, found
+        if most == len(named):
+            break
+    return best
 
 
 def missing_header_error(location: str) -> ColumnError:

@@ -17,6 +17,7 @@ _SYNONYMS = {
     "kontraktion": "contraction", "l": "length", "länge": "length", "y": "position",
     "displacement": "position", "velocity": "speed", "a": "acceleration", "zeit": "time",
     "temperatur": "temperature", "volumen": "volume",
+    "verkürzung": "shortening", "verlängerung": "elongation",
     **{quantity.symbol.lower(): name for name, quantity in QUANTITIES.items() if len(quantity.symbol) > 1},
     **{name: name for name in QUANTITIES},
 }  # fmt: skip

@@ -5,6 +5,7 @@ Units are converted, absolute pressures become gauge pressures, and implausible 
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 from collections.abc import Mapping
 
@@ -18,7 +19,9 @@ from ..core.units import AMBIENT_PRESSURE, UnitConversion, conversion, quantity
 from .clock import seconds_from_clock
 from .columns import QUANTITIES
 from .constants import check_constants, collect_constants, constant_from_column, parse_constant_name
+from .displacement import displacement_columns, proposal
 from .heading import UNIT_SPELLINGS, Heading, find_quantity_name, parse_heading
+from .missing_values import MissingValues, RefuseMissing
 from .plausibility import check_plausible
 from .recording import Recording
 from .repeated_columns import check_unique, without_repeated_columns
@@ -28,7 +31,7 @@ from .time_base import RecordedTime, TimeBase
 
 def interpret(
     table: RawTable, *, units: Mapping[str, str], constants: Mapping[str, float | str],
-    time_base: TimeBase = RecordedTime(),
+    time_base: TimeBase = RecordedTime(), missing: MissingValues = RefuseMissing(),
 ) -> Recording:  # fmt: skip
     """Convert a table to a Recording; `units` and `constants` given by the user override those of the file.
 
@@ -39,6 +42,7 @@ def interpret(
     held = {name: value for name, value in constants.items() if _is_quantity(name)}
     run_constants = collect_constants(table, {n: value for n, value in constants.items() if n not in held})
     headings = resolve_headings(table, units)
+    table = missing.treat(table, headings)
     for heading, cells in zip(headings, table.columns, strict=True):
         if not heading.known and not isinstance(cells, list):
             constant = constant_from_column(table, heading.text, heading.unit, cells)
@@ -54,6 +58,8 @@ def interpret(
             note = _keep_unknown_column(table, heading, cells, columns)
         notes += [note] if note and note not in notes else []
     notes += _add_held(table, columns, held, ambient)
+    columns, displaced = displacement_columns(columns, run_constants)
+    notes += displaced
     notes += _apply_time_base(table, columns, time_base)
     check_plausible(table, columns, run_constants.get("resting_length"), ambient, ordered=time_base.ordered)
     written = {h.name: h.unit for h in headings if h.known and h.unit and h.name in columns}
@@ -74,11 +80,19 @@ def _add_held(table: RawTable, columns: dict[str, Array], held: Mapping[str, flo
         if heading.name in columns:
             raise ColumnError(f"{where} is stated as a constant, but a column contains it. Omit one of them.")
         number = f"{value!r} {heading.unit}" if heading.unit and not isinstance(value, str) else value
-        si = quantity(number, heading.target or "1", ambient=ambient, where=where)
+        si = _held_value(number, heading.target or "1", ambient, where)
         columns[heading.name] = np.full(rows, si)
         unit = "" if heading.target == "1" else f" {heading.target}"
         notes.append(f"The {heading.name} is {si:.6g}{unit} in every row, as specified by the user.")
     return notes
+
+
+def _held_value(stated: float | str, target: str, ambient: float, where: str) -> float:
+    """The value of a held quantity in SI; a force may be stated as a load in g or kg, as in a column."""
+    if target == "N" and isinstance(stated, str):
+        with contextlib.suppress(UnitError):
+            return quantity(stated, "kg") * STANDARD_GRAVITY
+    return quantity(stated, target, ambient=ambient, where=where)
 
 
 def _apply_time_base(table: RawTable, columns: dict[str, Array], time_base: TimeBase) -> list[str]:
@@ -133,7 +147,8 @@ def _no_known_column(table: RawTable, headings: list[Heading]) -> ColumnError:
     hint = f" Did you mean '{near[0]}'?" if near else ""
     return ColumnError(
         f"{table.origin}: no column is a known quantity ({', '.join(names)}); known quantities are "
-        f"{', '.join(QUANTITIES)}.{hint}"
+        f"{', '.join(QUANTITIES)}.{hint}",
+        hint=Hint("To state the number of lines above the headings", "skip_rows", 1, "read"),
     )
 
 
@@ -144,7 +159,7 @@ def _convert_column(table: RawTable, heading: Heading, cells: Cells, ambient: fl
         if seconds is not None:
             return seconds, f"The time column contains clock times; time is counted from the first, {cells[0]}."
     change = unit_conversion(table, heading, ambient)
-    values = _parse_numbers(table, heading, cells)
+    values = np.array(cells, dtype=float)
     if change.assumed_gauge:
         reason = f"the unit '{heading.unit}' does not state it. Write bara or kPa(a) for an absolute pressure."
         return change(values), f"The {heading.name} is read as gauge: {reason}"
@@ -189,29 +204,6 @@ def _is_mass(unit: str) -> bool:
         return False
 
 
-def _parse_numbers(table: RawTable, heading: Heading, cells: Cells) -> Array:
-    """The cells as numbers. Raises ColumnError at the first cell that is not a finite number."""
-    if isinstance(cells, list):
-        for row, cell in enumerate(cells):
-            try:
-                float(cell)
-            except ValueError:
-                problem = f"'{cell}' is not a number" if cell else "has an empty cell"
-                raise ColumnError(
-                    f"{table.location(row)}: {heading.name} {problem}. Correct the cell or delete the "
-                    f"{table.row_label}."
-                ) from None
-    values = np.array(cells, dtype=float)
-    bad = ~np.isfinite(values)
-    if bad.any():
-        row = int(np.argmax(bad))
-        raise ColumnError(
-            f"{table.location(row)}: {heading.name} is {values[row]}; it must be finite (non-finite cells in the "
-            f"column: {np.count_nonzero(bad)}). Delete the {table.row_label}, or fill the gap before reading."
-        )
-    return values
-
-
 def _keep_unknown_column(table: RawTable, heading: Heading, cells: Cells, columns: dict[str, Array]) -> str:
     """Keep an unknown numeric column without conversion, and return the note on the column, if any."""
     if isinstance(cells, list):
@@ -223,5 +215,5 @@ def _keep_unknown_column(table: RawTable, heading: Heading, cells: Cells, column
         return f"Column '{heading.text}' is constant and states the {constant[0]}: {constant[1]:.4g} (SI)."
     columns[heading.text or "unnamed"] = cells
     near = difflib.get_close_matches(heading.text.partition(" ")[0].lower(), QUANTITIES, n=1)
-    hint = f" Did you mean '{near[0]}'?" if near else ""
+    hint = proposal(heading.text) or (f" Did you mean '{near[0]}'?" if near else "")
     return f"Column '{heading.text}' is not a known quantity and is kept without conversion.{hint}"

@@ -4,6 +4,10 @@ A mapping file (TOML; all keys are optional):
 
 resting_length = "300 mm"
 decimal = ","
+skip_rows = 7
+missing = "drop"
+missing_codes = [-999]
+outliers = "drop"
 
 file_name = "cut{specimen}_held{length [cm]}cm"
 time = "uniform"
@@ -32,13 +36,18 @@ from .columns import QUANTITIES
 from .constants import parse_constant_name
 from .file_kind import check_regular_file
 from .file_name import FileNamePattern
+from .header import bare_heading
 from .heading import parse_heading
+from .missing_values import MISSING_VALUES, MissingValues
 from .table import RawTable
 from .text_format import TextFormat
 from .time_base import TIME_BASES, TimeBase
 
-CONSTANT_NAMES = ("resting_length", "ambient", "specimen", "run")
+CONSTANT_NAMES = ("resting_length", "ambient", "displacement_zero", "specimen", "run")
 """Constants of a run that a mapping may state."""
+OUTLIERS = ("keep", "drop")
+"""Treatments of suspected outliers."""
+_TEXTS = ("delimiter", "decimal", "sheet", "group", "file_name", "time", "missing", "outliers")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,6 +62,10 @@ class ColumnMapping:
     group      group of a TDMS or MDF file, struct of a MAT file
     file_name  pattern of values in the names of the files, `held{length [cm]}cm`, as in FileNamePattern
     time       time base: recorded, uniform (for rounded stamps), unordered or none
+    skip_rows  number of lines above the headings of a text file or worksheet; by default they are detected
+    missing    missing values: error, drop (leave out the rows) or interpolate (short gaps in time)
+    missing_codes  numbers and texts that stand for missing values, such as -999
+    outliers   suspected outliers: keep or drop (leave out the rows)
     """
 
     columns: Mapping[str, str] = dataclasses.field(default_factory=dict)
@@ -63,11 +76,19 @@ class ColumnMapping:
     group: str | None = None
     file_name: str | None = None
     time: str | None = None
+    skip_rows: int | None = None
+    missing: str | None = None
+    missing_codes: tuple[float | str, ...] = ()
+    outliers: str | None = None
 
     def __post_init__(self) -> None:
         check_field_types(self)
-        if self.time is not None and self.time not in TIME_BASES:
-            raise ColumnError(f"mapping: time is '{self.time}'; allowed range: {', '.join(TIME_BASES)}.")
+        for key, allowed in (("time", TIME_BASES), ("missing", MISSING_VALUES), ("outliers", OUTLIERS)):
+            value = getattr(self, key)
+            if value is not None and value not in allowed:
+                raise ColumnError(f"mapping: {key} is '{value}'; allowed range: {', '.join(allowed)}.")
+        if self.skip_rows is not None and self.skip_rows < 0:
+            raise ColumnError(f"mapping: skip_rows is {self.skip_rows}; it must be 0 or more.")
         for name in self.constants:
             if name not in CONSTANT_NAMES and not (parse_constant_name(name) or parse_heading(name).known):
                 raise ColumnError(
@@ -87,12 +108,18 @@ class ColumnMapping:
     @property
     def text_format(self) -> TextFormat:
         """The part of the mapping that applies to text files."""
-        return TextFormat(self.delimiter, self.decimal, headerless=any(c.isdecimal() for c in self.columns))
+        names = tuple(name for name in self.columns if not name.isdecimal())
+        return TextFormat(self.delimiter, self.decimal, len(names) < len(self.columns), names, self.skip_rows)
 
     @property
     def time_base(self) -> TimeBase:
         """The time base of the files."""
         return TIME_BASES[self.time or "recorded"]
+
+    @property
+    def missing_values(self) -> MissingValues:
+        """The treatment of missing values."""
+        return MISSING_VALUES[self.missing or "error"](self.missing_codes)
 
     def constants_of(self, path: Path) -> dict[str, float | str]:
         """The constants of one file: those in its name take precedence over those of all files."""
@@ -121,31 +148,49 @@ def read_mapping(path: str | Path) -> ColumnMapping:
         raise FileError(f"{path}: cannot be read ({reason.strerror}). Check the name and the folder.") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as reason:
         raise FileError(f"{path.name}: is not a valid TOML file ({reason}).") from None
-    known = ("columns", "constants", *CONSTANT_NAMES, "delimiter", "decimal", "sheet", "group", "file_name", "time")
+    return mapping_of_tables(content, path.name)
+
+
+def mapping_of_tables(content: Mapping[str, Any], where: str) -> ColumnMapping:
+    """The mapping that the keys of a TOML table describe; `where` begins the messages. Raises as `read_mapping`."""
+    content = dict(content)
+    known = ("columns", "constants", *CONSTANT_NAMES, *_TEXTS, "skip_rows", "missing_codes")
     for key, value in content.items():
         if key not in known:
             raise ParameterError(
-                f"{path.name}: unknown key '{key}'; allowed range: {', '.join(known)}.{suggestion(key, known)}"
+                f"{where}: unknown key '{key}'; allowed range: {', '.join(known)}.{suggestion(key, known)}"
             )
-        if key not in ("columns", "constants", *CONSTANT_NAMES) and not isinstance(value, str):
-            raise ParameterError(f"{path.name}: {key} = {value!r}; it must be a quoted text.")
+        if key in _TEXTS and not isinstance(value, str):
+            raise ParameterError(f"{where}: {key} = {value!r}; it must be a quoted text.")
+    _check_numbers(content, where)
     columns = content.pop("columns", {})
     if not isinstance(columns, dict):
-        raise ParameterError(f"{path.name}: columns must be a table: [columns], followed by one line per column.")
+        raise ParameterError(f"{where}: columns must be a table: [columns], followed by one line per column.")
     if not isinstance(content.get("constants", {}), dict):
-        raise ParameterError(f"{path.name}: constants must be a table: [constants], followed by one line per constant.")
-    headings = {name: _parse_entry(path, name, value) for name, value in columns.items()}
+        raise ParameterError(f"{where}: constants must be a table: [constants], followed by one line per constant.")
+    headings = {name: _parse_entry(where, name, value) for name, value in columns.items()}
     return ColumnMapping().with_overrides(columns=headings, **content)
 
 
-def _parse_entry(path: Path, column: str, value: Any) -> str:
+def _check_numbers(content: dict[str, Any], where: str) -> None:
+    """Check `skip_rows` and `missing_codes`, which becomes a tuple. Raises ParameterError."""
+    skip, codes = content.get("skip_rows", 0), content.get("missing_codes", [])
+    if not isinstance(skip, int) or isinstance(skip, bool):
+        raise ParameterError(f"{where}: skip_rows = {skip!r}; it must be a number of lines, such as 7.")
+    if not isinstance(codes, list) or not all(isinstance(c, float | int | str) and c is not True for c in codes):
+        raise ParameterError(f'{where}: missing_codes = {codes!r}; it must be a list, such as [-999, "OL"].')
+    if codes:
+        content["missing_codes"] = tuple(code if isinstance(code, str) else float(code) for code in codes)
+
+
+def _parse_entry(where: str, column: str, value: Any) -> str:
     """`pressure [bara]`, from this text or from `{quantity = "pressure", unit = "bara"}`."""
     if isinstance(value, str):
         return value
     if isinstance(value, dict) and isinstance(value.get("quantity"), str) and set(value) <= {"quantity", "unit"}:
         return f"{value['quantity']} [{value['unit']}]" if value.get("unit") else value["quantity"]
     raise ParameterError(
-        f"{path.name}: column '{column}' is mapped to {value!r}; write 'pressure [bara]' or "
+        f"{where}: column '{column}' is mapped to {value!r}; write 'pressure [bara]' or "
         '{ quantity = "pressure", unit = "bara" }.'
     )
 
@@ -180,7 +225,7 @@ def _has_unit(heading: str) -> bool:
 
 def _column_index(table: RawTable, column: str) -> int:
     """The index of a column, by its heading, by its heading without unit, or by its number from 1."""
-    bare = [text.partition("[")[0].partition("(")[0].strip() for text in table.headings]
+    bare = list(map(bare_heading, table.headings))
     for names in (list(table.headings), bare):
         if names.count(column) == 1:
             return names.index(column)

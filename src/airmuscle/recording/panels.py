@@ -11,8 +11,9 @@ from .columns import QUANTITIES, quantity_of
 ROLES = {"setpoint.": "set point", "measured.": "measured", "command.": "command"}
 """Prefixes of the columns of a control loop, and their names in a legend."""
 ORDER = (
-    "position", "angle", "pressure", "contraction", "length", "force", "torque", "stiffness", "opening", "mass_flow",
-    "friction", "speed", "angular_speed", "acceleration", "angular_acceleration", "temperature", "volume", "air_mass",
+    "position", "angle", "pressure", "contraction", "length", "shortening", "force", "torque", "stiffness", "opening",
+    "mass_flow", "friction", "speed", "angular_speed", "acceleration", "angular_acceleration", "temperature", "volume",
+    "air_mass",
 )  # fmt: skip
 """Quantities in the order of their panels; others follow."""
 MAX_TITLE_LINE = 16

@@ -20,19 +20,25 @@ from .header import (
     missing_header_error,
     parse_constant_cells,
     parse_unit_row,
+    stated_heading_row,
 )
 from .optional_dependency import import_lab_package, run_reader
 from .table import Cells, RawTable
+from .text_format import TextFormat
 
 _NUMBERS = float | int | datetime.date | datetime.time | datetime.timedelta
 Rows = list[tuple[int, list[Any]]]
 """Non-empty rows of a worksheet with their numbers, counted from 1."""
 
 
-def read_excel_tables(path: Path, sheet: str | None = None, *, headerless: bool = False) -> tuple[RawTable, ...]:
+def read_excel_tables(
+    path: Path, sheet: str | None = None, text_format: TextFormat = TextFormat()
+) -> tuple[RawTable, ...]:
     """Read one table from each worksheet that contains one, or from the named worksheet.
 
-    With `headerless`, columns without headings are named by their numbers. Raises FileError or ColumnError.
+    text_format  the place of the headings; delimiter and decimal sign do not apply
+
+    Raises FileError or ColumnError.
     """
     openpyxl = import_lab_package("openpyxl", path)
 
@@ -40,15 +46,16 @@ def read_excel_tables(path: Path, sheet: str | None = None, *, headerless: bool 
         book = openpyxl.load_workbook(path, read_only=True, data_only=True)
         try:
             check_sheet_exists(path, sheet, book.sheetnames)
-            names = [w.title for w in book.worksheets] if sheet is None else [sheet]
+            tables = [w.title for w in book.worksheets if hasattr(w, "iter_rows")]  # a chart sheet has no rows
+            names = tables if sheet is None else [sheet]
             return {name: nonempty_rows(book[name].iter_rows(values_only=True)) for name in names}
         finally:
             book.close()
 
-    return tables_of_sheets(path, run_reader(path, "an Excel workbook", read), headerless)
+    return tables_of_sheets(path, run_reader(path, "an Excel workbook", read), text_format)
 
 
-def tables_of_sheets(path: Path, contents: dict[str, Rows], headerless: bool) -> tuple[RawTable, ...]:
+def tables_of_sheets(path: Path, contents: dict[str, Rows], text_format: TextFormat) -> tuple[RawTable, ...]:
     """The tables of the sheets of a workbook. Raises FileError if there is none."""
     sheets = {name: rows for name, rows in contents.items() if _contains_table(rows)}
     if not sheets:
@@ -57,7 +64,7 @@ def tables_of_sheets(path: Path, contents: dict[str, Rows], headerless: bool) ->
         )
     several = len(sheets) > 1
     return tuple(
-        _parse_table(f"{path.name}, sheet '{name}'" if several else path.name, rows, headerless)
+        _parse_table(f"{path.name}, sheet '{name}'" if several else path.name, rows, text_format)
         for name, rows in sheets.items()
     )
 
@@ -79,9 +86,13 @@ def _contains_table(rows: Rows) -> bool:
     return any(_is_numeric(row) for _, row in rows)
 
 
-def _parse_table(origin: str, rows: Rows, headerless: bool) -> RawTable:
+def _parse_table(origin: str, rows: Rows, text_format: TextFormat) -> RawTable:
     """The table of a worksheet; rows above the headings may state constants."""
-    start = _find_heading_row(rows)
+    texts = ((i, [_text(cell) for cell in row]) for i, row in rows)
+    stated = stated_heading_row(texts, text_format.named, text_format.skip_rows)
+    if text_format.skip_rows is not None and stated is None:
+        raise FileError(f"{origin}: there is no table below the {text_format.skip_rows} rows of skip_rows.")
+    start = _find_heading_row(rows) if stated is None else stated
     constants = dict(
         constant for _, row in rows[:start] if (constant := parse_constant_cells([_text(cell) for cell in row]))
     )
@@ -89,7 +100,7 @@ def _parse_table(origin: str, rows: Rows, headerless: bool) -> RawTable:
     used = [j for j, cell in enumerate(cells) if cell not in (None, "")]
     if are_headings([_text(c) for c in cells]):
         headings, body = [_text(cells[j]) for j in used], rows[start + 1 :]
-    elif headerless:
+    elif text_format.headerless:
         headings, body = [str(n) for n in range(1, len(used) + 1)], rows[start:]
     else:
         raise missing_header_error(f"{origin}, row {first}")

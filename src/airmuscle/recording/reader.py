@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import glob
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from ..core.errors import FileError
@@ -12,6 +12,7 @@ from .file_kind import check_text_file
 from .interpret import interpret
 from .large_csv import Progress, is_large_file, read_large_csv
 from .mapping import ColumnMapping, apply_mapping, read_mapping
+from .missing_values import MissingValues
 from .raw_columnar import read_hdf5_tables, read_parquet_tables
 from .raw_csv import read_csv_table
 from .raw_excel import read_excel_tables
@@ -21,6 +22,7 @@ from .raw_rosbag import read_rosbag_tables
 from .raw_tdms import read_tdms_tables
 from .raw_workbook import read_workbook_tables
 from .recording import Recording
+from .segment.outliers import without_outliers
 from .suspicious_values import warn_of_suspicious_values
 from .table import RawTable
 from .time_base import RecordedTime, TimeBase
@@ -31,10 +33,10 @@ Tables = tuple[RawTable, ...]
 
 TEXT_EXTENSIONS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".prn")
 _BINARY_READERS: Mapping[str, Callable[[Path, ColumnMapping, Downsampling], Tables]] = {
-    ".xlsx": lambda path, m, d: read_excel_tables(path, m.sheet, headerless=m.text_format.headerless),
-    ".xlsm": lambda path, m, d: read_excel_tables(path, m.sheet, headerless=m.text_format.headerless),
-    ".xls": lambda path, m, d: read_workbook_tables(path, m.sheet, headerless=m.text_format.headerless),
-    ".ods": lambda path, m, d: read_workbook_tables(path, m.sheet, headerless=m.text_format.headerless),
+    ".xlsx": lambda path, m, d: read_excel_tables(path, m.sheet, m.text_format),
+    ".xlsm": lambda path, m, d: read_excel_tables(path, m.sheet, m.text_format),
+    ".xls": lambda path, m, d: read_workbook_tables(path, m.sheet, m.text_format),
+    ".ods": lambda path, m, d: read_workbook_tables(path, m.sheet, m.text_format),
     ".parquet": lambda path, m, d: read_parquet_tables(path, m.group),
     ".h5": lambda path, m, d: read_hdf5_tables(path, m.group, d),
     ".hdf5": lambda path, m, d: read_hdf5_tables(path, m.group, d),
@@ -68,6 +70,10 @@ def read(
     downsampling: Downsampling = Decimation(),
     ordered: bool = True,
     time_base: TimeBase | None = None,
+    displacement_zero: float | str | None = None,
+    skip_rows: int | None = None,
+    missing: MissingValues | None = None,
+    drop_outliers: bool | None = None,
     progress: Progress | None = None,
 ) -> tuple[Recording, ...]:
     """Read the recordings in a file, several files, a glob pattern (`runs/*.csv`) or a folder, in SI units.
@@ -83,6 +89,12 @@ def read(
     ordered       whether the recorded time must increase
     time_base     RecordedTime(), UniformTime() for stamps that the logger rounded, or NoTime(); by default that of the
                   mapping, or the recorded time
+    displacement_zero  reading of a displacement at the resting length [m], or a text with a unit
+    skip_rows     number of lines above the headings of text files and worksheets; by default they are detected, or
+                  found by the headings that `columns` names
+    missing       RefuseMissing(), DropMissing(codes) or InterpolateMissing(codes); by default that of the mapping, or
+                  an error that lists the missing values
+    drop_outliers whether the rows of suspected outliers are left out; by default as in the mapping, or kept
     progress      called with the name of a file and the fraction that has been read
 
     The extension gives the format: text (CSV), Excel, OpenDocument, MAT, TDMS, MDF, Parquet or HDF5. A load in kg
@@ -94,15 +106,16 @@ def read(
     column_mapping = base.with_overrides(
         columns=columns, resting_length=resting_length, ambient=ambient, specimen=specimen, delimiter=delimiter,
         decimal=decimal, sheet=sheet, group=group, constants=constants or {}, file_name=file_name,
+        displacement_zero=displacement_zero, skip_rows=skip_rows,
+        outliers=None if drop_outliers is None else "drop" if drop_outliers else "keep",
     )  # fmt: skip
     chosen = time_base or (column_mapping.time_base if column_mapping.time else RecordedTime(ordered))
     recordings = [
         recording
         for path in find_files(source)
-        for recording in read_file(path, column_mapping, units or {}, downsampling, chosen, progress)
+        for recording in read_file(path, column_mapping, units or {}, downsampling, chosen, progress, missing)
     ]
-    check_bench(recordings)
-    return tuple(recordings)
+    return tuple(complete_bench(recordings, column_mapping))
 
 
 def read_file(
@@ -112,13 +125,27 @@ def read_file(
     downsampling: Downsampling = Decimation(),
     time_base: TimeBase | None = None,
     progress: Progress | None = None,
+    missing: MissingValues | None = None,
 ) -> list[Recording]:
-    """The recordings in one file, as `read`; the checks across the files of a bench are those of `check_bench`."""
+    """The recordings in one file, as `read`; what concerns all files of a test rig is done by `complete_bench`."""
     chosen = time_base or (mapping.time_base if mapping.time else RecordedTime())
     return [
-        interpret(apply_mapping(table, mapping), units=units, constants=mapping.constants_of(path), time_base=chosen)
+        interpret(
+            apply_mapping(table, mapping),
+            units=units,
+            constants=mapping.constants_of(path),
+            time_base=chosen,
+            missing=missing or mapping.missing_values,
+        )
         for table in read_tables(path, mapping, downsampling, progress)
     ]
+
+
+def complete_bench(recordings: Sequence[Recording], mapping: ColumnMapping) -> list[Recording]:
+    """The recordings of one bench, without outliers if the mapping says so, checked as by `check_bench`."""
+    complete = list(without_outliers(recordings) if mapping.outliers == "drop" else recordings)
+    check_bench(complete)
+    return complete
 
 
 def check_bench(recordings: list[Recording]) -> None:

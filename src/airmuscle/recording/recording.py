@@ -13,10 +13,12 @@ from ..core.annotation import one_line
 from ..core.arrays import Array
 from ..core.errors import ColumnError, ParameterError, suggestion
 from ..core.field_types import check_field_types
+from ..core.hints import HintedText
 from ..core.notebook import Card, NotebookDisplay
 from ..core.reference import Reference
 from ..core.units import conversion
 from .columns import quantity_of
+from .displacement import ZERO_NOT_STATED
 from .heading import split_unit
 from .plot import plot_columns
 from .recording_card import recording_card
@@ -89,18 +91,18 @@ class Recording(NotebookDisplay):
                 return (resting_length - self.columns["length"]) / resting_length
             if name == "length" and "contraction" in self.columns:
                 return resting_length * (1.0 - self.columns["contraction"])
+            if "shortening" in self.columns and name in ("contraction", "length"):
+                contraction = self.columns["shortening"] / resting_length
+                return contraction if name == "contraction" else resting_length * (1.0 - contraction)
         known = list(self.columns)
-        remedy = ""
-        if name == "contraction" and "length" in known:
-            remedy = " Specify the resting length to convert the length to a contraction."
+        remedy: str = ""
+        moved = next((each for each in ("length", "shortening") if each in known), "")
+        if name == "contraction" and moved:
+            remedy = f" Specify the resting length to convert the {moved} to a contraction."
         elif name == "contraction" and "position" in known:
-            remedy = (
-                " A displacement has no stated zero and direction: if it is the shortening from the resting length L0, "
-                "write the length L0 minus the displacement, or the contraction, displacement/L0."
-            )
-        raise ColumnError(
-            f"{self.origin}: no column '{name}'; the columns are {', '.join(known)}.{suggestion(name, known)}{remedy}"
-        )
+            remedy = HintedText(" ", ZERO_NOT_STATED)
+        text = f"{self.origin}: no column '{name}'; the columns are {', '.join(known)}.{suggestion(name, known)}"
+        raise ColumnError(HintedText(text, remedy))
 
     def __contains__(self, name: str) -> bool:
         try:

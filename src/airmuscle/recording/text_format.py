@@ -17,6 +17,7 @@ from .header import (
     parse_constant_cells,
     parse_constant_comment,
     parse_unit_row,
+    stated_heading_row,
 )
 
 NumberedLines = list[tuple[int, str]]
@@ -30,12 +31,15 @@ _DECIMALS = (".", ",")
 class TextFormat:
     """Format of a text table: `delimiter` and `decimal`; None means automatic detection.
 
-    With `headerless`, the columns of a table without headings are named by their numbers, "1", "2" and so on.
+    With `headerless`, the columns of a table without headings are named by their numbers, "1", "2" and so on. The
+    headings are in the line that contains most of `named`, or in the first one below `skip_rows` lines if it is given.
     """
 
     delimiter: str | None = None
     decimal: str | None = None
     headerless: bool = False
+    named: tuple[str, ...] = ()
+    skip_rows: int | None = None
 
     def __post_init__(self) -> None:
         if self.delimiter is not None and self.delimiter not in _DELIMITERS:
@@ -117,6 +121,8 @@ def parse_header(origin: str, lines: NumberedLines, text_format: TextFormat) -> 
         )
     text_format = text_format.with_blanks(body)
     above = _lines_above_headings(body, text_format)
+    if text_format.skip_rows is not None and body[-1][0] <= text_format.skip_rows:
+        raise FileError(f"{origin}: there is no table below the {text_format.skip_rows} lines of skip_rows.")
     preamble, body = body[:above], body[above:]
     delimiter = text_format.detect_delimiter(body[0][1])
     headings, count = _find_headings(origin, comments, body, delimiter, text_format.headerless)
@@ -135,23 +141,35 @@ def parse_header(origin: str, lines: NumberedLines, text_format: TextFormat) -> 
 def _lines_above_headings(body: NumberedLines, text_format: TextFormat) -> int:
     """The number of lines above the headings, such as the title and the settings of a logger.
 
-    The headings are the line above the first row of numbers that has as many cells, or the line above the unit row.
+    The headings are where the user states them; otherwise the line above the first row of numbers that has as many
+    cells, or the line above the unit row.
     """
+    cells_of = ((i, split_cells(line, text_format.detect_delimiter(line))) for i, line in body)
+    stated = stated_heading_row(cells_of, text_format.named, text_format.skip_rows)
+    if stated is not None:
+        return stated
     rows: list[tuple[str, list[str]]] = []
     for _, line in body:
         delimiter = text_format.detect_delimiter(line)
         cells = split_cells(line, delimiter)
         if _is_numeric(cells):
-            if not rows or _is_numeric(rows[-1][1]):
+            if not rows or (_is_numeric(rows[-1][1]) and is_number(cells[0]) and is_number(rows[-1][1][0])):
                 return 0  # no heading is found above the first rows of numbers
-            if rows[-1][0] == delimiter and count_cells(rows[-1][1]) >= count_cells(cells):
-                break
+            above = _heading_above(rows, delimiter, count_cells(cells))
+            if above is not None:
+                return above
         rows.append((delimiter, cells))
-    else:
-        return 0
-    last = len(rows) - 1
-    units = last > 0 and rows[-2][0] == delimiter and parse_unit_row(rows[-2][1], rows[-1][1])
-    return last - 1 if units else last
+    return 0
+
+
+def _heading_above(rows: list[tuple[str, list[str]]], delimiter: str, width: int) -> int | None:
+    """The index of the headings of a first row of numbers with `width` filled cells; None if they are not above it."""
+    last = [row for row in rows[-2:] if row[0] == delimiter]
+    if not last or rows[-1][0] != delimiter or _is_numeric(last[-1][1]):
+        return None
+    if len(last) == 2 and parse_unit_row(last[0][1], last[1][1]):
+        return len(rows) - 2 if max(count_cells(cells) for _, cells in last) >= width else None
+    return len(rows) - 1 if count_cells(last[-1][1]) >= width else None
 
 
 def _are_numbers_and_blanks(line: str) -> bool:

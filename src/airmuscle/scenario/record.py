@@ -15,6 +15,7 @@ from ..library.plant_file import build_plant
 from ..plant.plant import Plant
 from ..recording import Recording, read
 from ..recording.columns import quantity_of
+from ..recording.mapping import mapping_of_tables
 from ..simulation.problem import check_signal
 from .initial_state import build_initial_conditions
 from .inputs import build_input_signal
@@ -67,9 +68,11 @@ class Record:
         """The used part of the file, with the observed columns under the names of the outputs."""
         name = read_text(self.row, "file", self.location, needed=True)
         options = {key: self.row[key] for key in ("mapping", "resting_length") if key in self.row}
-        if "mapping" in options:
-            options["mapping"] = self.location.folder / options["mapping"]
         with located_errors(self.location):
+            if isinstance(options.get("mapping"), Mapping):
+                options["mapping"] = mapping_of_tables(options["mapping"], "mapping")
+            elif "mapping" in options:
+                options["mapping"] = self.location.folder / options["mapping"]
             runs = read(self.location.folder / name, **options)
             if len(runs) != 1:
                 raise ParameterError(f"{name} contains {len(runs)} runs; give one file for each record.")

@@ -85,7 +85,8 @@ class FitSettings:
             name: texts.pop(name) for name in ("resting_length", "ambient") if name in texts
         }
         try:
-            mapping = am.recording.ColumnMapping(self.columns if columns is None else columns, constants, **texts)
+            chosen = self.columns if columns is None else columns
+            mapping = am.recording.ColumnMapping().with_overrides(columns=chosen, constants=constants, **texts)
             _ = mapping.text_format  # checks delimiter and decimal mark
             return mapping
         except AirmuscleError as error:

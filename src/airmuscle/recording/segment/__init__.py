@@ -4,7 +4,7 @@ from .branches import Branch, branch_directions, find_branches, motion_direction
 from .findings import Finding, check_swept
 from .inspection import Inspection, check_contents, inspect, inspect_all
 from .interval import Interval
-from .outliers import Outlier, find_outliers
+from .outliers import Outlier, find_outliers, without_outliers
 from .plateaus import Plateau, find_plateaus, plateau_points
 from .quasi_static import quasi_static_rows
 from .runs import AT_REST, FREE, ISOBARIC, ISOMETRIC, ISOTONIC, Run, find_runs
@@ -40,4 +40,5 @@ __all__ = [
     "motion_direction",
     "plateau_points",
     "quasi_static_rows",
+    "without_outliers",
 ]

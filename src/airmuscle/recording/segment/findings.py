@@ -10,6 +10,7 @@ import numpy as np
 from ...core.errors import ColumnError
 from ...core.hints import Hint, HintedText
 from ..columns import quantity_of
+from ..displacement import ZERO_NOT_STATED
 from ..recording import Recording
 from ..time_base import UNIFORM, WITHOUT_TIME
 from .quasi_static import quasi_static_rows
@@ -121,6 +122,16 @@ def _motion_findings(recording: Recording) -> Iterator[Finding]:
                 Hint("To state its place in the names of the files", "file_name", "held{length [mm]}", "read"),
             )
         )
+    elif "pressure" in recording and "force" in recording and "contraction" not in recording:
+        yield Finding(_contraction_missing(str(moved_column(recording))))
+
+
+def _contraction_missing(moved: str) -> HintedText:
+    """The reason why a static fit will refuse a recording with this column of the motion, and the remedy."""
+    refused = "a static fit needs the contraction and will refuse this recording."
+    if moved == "position":
+        return HintedText(f"{refused} ", ZERO_NOT_STATED)
+    return HintedText(f"{refused}", Hint(f"To convert the {moved}", "resting_length", "300 mm", "read"))
 
 
 def _pressure_range(recording: Recording) -> str:

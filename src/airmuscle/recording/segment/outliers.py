@@ -1,4 +1,4 @@
-"""Outliers: readings that contradict their neighbours, detected robustly, listed and never removed.
+"""Outliers: readings that contradict their neighbours, detected robustly, listed, and left out on request.
 
 An outlier consists of one or two rows that differ from the rows before and after by more than eight standard deviations
 of the sensor, while those rows agree with each other. The overshoot of a step is not an outlier, because the rows after
@@ -8,12 +8,14 @@ it are at another level. Nor is the turning point of a ramp, because it lies on 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from ...core.arrays import Array
+from ..display_units import display_scale
 from ..recording import Recording
+from ..row_notes import RowNote
 from .sensor import Sensor, estimate_sensors
 
 MIN_DEVIATIONS = 8.0
@@ -26,6 +28,8 @@ SLOPE_STEPS = 5
 """Number of steps between rows whose median is the slope before and after a row."""
 WINDOW = 3
 """Number of rows before and after that are compared."""
+MAX_LISTED = 8
+"""Maximum number of outliers that a note lists (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,6 +45,11 @@ class Outlier:
     expected: float
     deviations: float
 
+    def __str__(self) -> str:
+        factor, unit = display_scale(self.column)
+        reading, expected = (f"{each * factor:.4g} {unit}" for each in (self.value, self.expected))
+        return f"{self.column} in row {self.row + 1} ({reading}, neighbours {expected})"
+
 
 def find_outliers(recording: Recording, sensors: Mapping[str, Sensor] | None = None) -> tuple[Outlier, ...]:
     """The suspected outliers of a recording; empty without time, because rows are then not neighbours in time."""
@@ -52,6 +61,29 @@ def find_outliers(recording: Recording, sensors: Mapping[str, Sensor] | None = N
         if name in recording.columns
         for outlier in _column_outliers(name, recording[name], sensor)
     )
+
+
+def without_outliers(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
+    """The recordings of one test rig without the rows of suspected outliers; a note on each recording lists them."""
+    sensors = estimate_sensors(recordings) if recordings else {}
+    return tuple(_without(recording, find_outliers(recording, sensors)) for recording in recordings)
+
+
+def _without(recording: Recording, outliers: Sequence[Outlier]) -> Recording:
+    if "time" not in recording:
+        note = f"{recording.origin}: without time, rows are no neighbours, and no outlier is left out."
+        return dataclasses.replace(recording, notes=(*recording.notes, RowNote(note)))
+    if not outliers:
+        return recording
+    kept = np.ones(len(recording), dtype=bool)
+    kept[[outlier.row for outlier in outliers]] = False
+    count = int(np.count_nonzero(~kept))
+    more = f"; and {len(outliers) - MAX_LISTED} more" if len(outliers) > MAX_LISTED else ""
+    note = (
+        f"{recording.origin}: rows left out as suspected outliers: {count} of {len(kept)}: "
+        f"{'; '.join(map(str, outliers[:MAX_LISTED]))}{more}."
+    )
+    return dataclasses.replace(recording.rows(kept), notes=(*recording.notes, RowNote(note)))
 
 
 def _column_outliers(name: str, values: Array, sensor: Sensor) -> Iterator[Outlier]:

@@ -8,13 +8,14 @@ from collections.abc import Collection, Iterator, Mapping
 import numpy as np
 
 from ...core.arrays import Array
+from ..displacement import MOVED
 from ..recording import Recording
 from .interval import Interval, level_intervals, running_median, true_intervals
 from .quasi_static import MAX_CHANGE, quasi_static_rows
 from .sampling import count_rows
 from .sensor import Sensor, estimate_sensors
 
-CONSTANT_COLUMNS = ("pressure", "contraction", "length", "position", "force")
+CONSTANT_COLUMNS = ("pressure", *MOVED, "force")
 """Columns that are constant in a plateau, where they were measured."""
 MIN_DURATION = 0.2
 """Minimum duration of a plateau [s] (chosen)."""

@@ -16,7 +16,7 @@ from .outliers import Outlier
 from .plateaus import Plateau
 from .sensor import Sensor
 
-_PLOTTED = ("pressure", "force", "contraction", "length", "position", "temperature")
+_PLOTTED = ("pressure", "force", "contraction", "length", "shortening", "position", "temperature")
 _COLOURS = {1: BLUE, -1: RED}
 
 

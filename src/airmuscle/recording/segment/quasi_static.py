@@ -12,6 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...core.arrays import Array
+from ..displacement import MOVED
 from ..recording import Recording
 from .interval import Mask
 from .sampling import count_rows
@@ -22,7 +23,7 @@ MAX_CHANGE = 0.01
 NOISE_FACTOR = 5.7
 """A difference of two readings below this multiple of the standard deviation of the sensor is noise: four standard
 deviations of the difference (chosen)."""
-_MONITORED = ("pressure", "contraction", "length", "position")
+_MONITORED = ("pressure", *MOVED)
 
 
 def quasi_static_rows(

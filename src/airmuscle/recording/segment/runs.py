@@ -16,6 +16,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from ...core.arrays import Array
+from ..displacement import MOVED
 from ..recording import Recording
 from .interval import Interval, level_intervals
 from .sensor import Sensor, estimate_sensors
@@ -45,7 +46,7 @@ class RunKind:
 
 
 ISOBARIC = RunKind("isobaric", ("pressure",))
-ISOMETRIC = RunKind("isometric", ("contraction", "length", "position"))
+ISOMETRIC = RunKind("isometric", MOVED)
 ISOTONIC = RunKind("isotonic", ("force",))
 AT_REST = RunKind("at rest", ())
 FREE = RunKind("free", ())
@@ -156,7 +157,7 @@ def _min_sweep(recording: Recording, name: str) -> float:
 
 
 def moved_column(recording: Recording) -> str | None:
-    """The measured column of the motion: contraction, length or position; None without any."""
+    """The measured column of the motion: contraction, length, shortening or position; None without any."""
     return _column(recording, ISOMETRIC)
 
 

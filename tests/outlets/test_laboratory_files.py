@@ -1,0 +1,377 @@
+"""Files as a laboratory has them: lines above the headings, displacements, missing values and outliers.
+
+Every command that reads measurement files takes the same options for them, and says which rows it leaves out.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import airmuscle as am
+from airmuscle.cli.app import app
+from airmuscle.core.constants import STANDARD_GRAVITY
+from airmuscle.core.errors import ColumnError, FileError, ParameterError
+from airmuscle.recording import ColumnMapping, DropMissing, InterpolateMissing, Recording, RefuseMissing, read
+from airmuscle.recording.mapping import mapping_of_tables
+
+PREAMBLE = ("Prüfstand 3 (Zwick Z010)", "Prüfer;Müller", "Datum;12.03.2026;14:05", "Kanal;1;2;3", "Verstärkung;1;10;1")
+HEADINGS = "Zeit;Druck (rel.);Kraft;Weg;Bemerkung"
+UNITS = "s;bar;N;mm;"
+ROWS = ("0,00;2,0;120,5;0,0;Start", "0,05;2,0;118,2;0,5;", "0,10;2,1;116,0;1,0;Öl", "0,15;2,0;113,9;1,5;")
+SHORTENING = {"Weg": "shortening [mm]"}
+READING = ("inspect", "fit", "hysteresis", "campaign", "fit-volume", "predict", "convert-data")
+OPTIONS = (
+    "--resting-length", "--ambient", "--unit", "--mapping", "--column", "--constant", "--file-name", "--time",
+    "--displacement-zero", "--skip-rows", "--missing", "--missing-code", "--outliers", "--delimiter", "--decimal",
+    "--sheet", "--group",
+)  # fmt: skip
+
+
+def airmuscle(*arguments: object) -> Any:
+    return CliRunner().invoke(app, [str(a) for a in arguments], env={"COLUMNS": "250"})
+
+
+def text(folder: Path, lines: Sequence[str], name: str = "bench.csv", separator: str = ";") -> Path:
+    path = folder / name
+    path.write_bytes("\r\n".join([*lines, ""]).replace(";", separator).encode("cp1252"))
+    return path
+
+
+def workbook(folder: Path, lines: Sequence[str], name: str = "bench.xlsx") -> Path:
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for line in lines:
+        book.active.append([_cell(cell) for cell in line.split(";")])
+    book.save(folder / name)
+    return folder / name
+
+
+def _cell(cell: str) -> float | str | None:
+    number = cell.replace(",", ".")
+    return float(number) if re.fullmatch(r"-?[\d.]+", number) and number.count(".") < 2 else cell or None
+
+
+def only(source: Path, **options: Any) -> Recording:
+    (recording,) = read(source, **options)
+    return recording
+
+
+# Headings below other lines
+
+
+@pytest.mark.parametrize("separator", [";", "\t"])
+@pytest.mark.parametrize("above", [1, len(PREAMBLE)])
+def test_headings_are_found_below_lines_of_other_width_with_a_column_of_remarks(tmp_path, above: int, separator: str):
+    recording = only(text(tmp_path, [*PREAMBLE[:above], HEADINGS, UNITS, *ROWS], separator=separator))
+    assert {"time", "pressure", "force"} <= set(recording)
+    assert recording["force"] == pytest.approx([120.5, 118.2, 116.0, 113.9])
+
+
+def test_lines_above_the_headings_may_be_filled_up_with_separators(tmp_path):
+    padded = [f"{line};;;;" for line in PREAMBLE[:2]]
+    assert only(text(tmp_path, [*padded, HEADINGS, UNITS, *ROWS]))["pressure"][2] == pytest.approx(2.1e5)
+
+
+NUMBERED = ("1;2;3;4;5", "10;10;1;1;1", "Zeit;p1;F1;Weg;Bemerkung", *ROWS)
+MAPPED = {"p1": "pressure [bar]", "F1": "force [N]", "Zeit": "time [s]"}
+
+
+@pytest.mark.parametrize("write", [text, workbook])
+def test_headings_that_the_mapping_names_are_found_below_rows_of_numbers(tmp_path, write):
+    with pytest.raises(ColumnError):
+        read(write(tmp_path, NUMBERED))
+    recording = only(write(tmp_path, NUMBERED), columns=MAPPED)
+    assert recording["force"] == pytest.approx([120.5, 118.2, 116.0, 113.9])
+    assert only(write(tmp_path, NUMBERED), columns={**MAPPED, "Weg": ""})["time"][-1] == pytest.approx(0.15)
+
+
+@pytest.mark.parametrize("write", [text, workbook])
+def test_the_number_of_lines_above_the_headings_may_be_stated(tmp_path, write):
+    path = write(tmp_path, ("1;2;3;4;5", "a;b;c;d;e", *ROWS[1:3], HEADINGS, UNITS, *ROWS))
+    recording = only(path, skip_rows=4)
+    assert len(recording) == 4
+    assert recording["pressure"][0] == pytest.approx(2e5)
+    assert only(path, mapping=ColumnMapping(skip_rows=4))["pressure"].tolist() == recording["pressure"].tolist()
+    with pytest.raises(FileError, match=r"no table below the 99 (lines|rows)"):
+        read(path, skip_rows=99)
+
+
+def test_the_heading_row_of_a_large_file_is_found_in_the_same_way(tmp_path, monkeypatch):
+    monkeypatch.setattr("airmuscle.recording.large_csv.LARGE_FILE_BYTES", 10)
+    assert len(only(text(tmp_path, [*PREAMBLE, HEADINGS, UNITS, *ROWS]))) == 4
+    assert len(only(text(tmp_path, NUMBERED), columns=MAPPED)) == 4
+
+
+# Displacements
+
+
+@pytest.mark.parametrize("write", [text, workbook])
+def test_a_shortening_becomes_a_contraction(tmp_path, write):
+    recording = only(write(tmp_path, [HEADINGS, UNITS, *ROWS]), columns=SHORTENING, resting_length="200 mm")
+    assert recording["contraction"] == pytest.approx([0.0, 0.0025, 0.005, 0.0075], abs=1e-12)
+    assert recording["length"] == pytest.approx([0.2, 0.1995, 0.199, 0.1985])
+
+
+def test_the_zero_and_the_direction_of_a_displacement_are_stated(tmp_path):
+    path = text(tmp_path, [HEADINGS, UNITS, *ROWS])
+    contraction = pytest.approx((np.array([0.0, 0.5, 1.0, 1.5]) - 2.0) / 200.0)
+    stated = {"displacement_zero": "2 mm", "resting_length": "200 mm"}
+    assert only(path, columns=SHORTENING, **stated)["contraction"] == contraction
+    assert -only(path, columns={"Weg": "elongation [mm]"}, **stated)["contraction"] == contraction
+    measured = only(path, columns={"Weg": "displacement [mm]"}, **stated)
+    assert measured["contraction"] == contraction
+    assert measured["position"][1] == pytest.approx(5e-4)
+
+
+def test_a_shortening_without_resting_length_is_converted_when_it_is_known(tmp_path):
+    recording = only(text(tmp_path, [HEADINGS, UNITS, *ROWS]), columns=SHORTENING)
+    assert recording["shortening"][3] == pytest.approx(1.5e-3)
+    with pytest.raises(ColumnError, match="Specify the resting length to convert the shortening"):
+        recording["contraction"]
+    assert recording.with_constants(resting_length=0.3)["contraction"][3] == pytest.approx(0.005)
+    assert recording.with_constants(resting_length=0.3)["length"][3] == pytest.approx(0.2985)
+
+
+def test_the_zero_of_a_displacement_may_stand_in_the_file_or_its_name(tmp_path):
+    table = ("time [s];shortening [mm];force [N]", "0;5;3", "1;7;2")
+    inside = text(tmp_path, ("# displacement_zero [mm] = 5", "# resting_length: 100 mm", *table))
+    assert only(inside)["contraction"] == pytest.approx([0.0, 0.02])
+    named = text(tmp_path, table, "zero_5mm.csv")
+    pattern = {"file_name": "zero_{displacement_zero [mm]}mm", "resting_length": 0.1}
+    assert only(named, **pattern)["contraction"] == pytest.approx([0.0, 0.02])
+
+
+@pytest.mark.parametrize("zero", ["5", "2 kg", "30 m"])
+def test_an_impossible_zero_of_a_displacement_is_refused(tmp_path, zero: str):
+    with pytest.raises(am.AirmuscleError, match="displacement_zero"):
+        read(text(tmp_path, [HEADINGS, UNITS, *ROWS]), columns=SHORTENING, displacement_zero=zero)
+
+
+@pytest.mark.parametrize("heading", ["Weg", "Hub", "Stroke", "Traversenweg"])
+def test_quantities_are_proposed_for_headings_of_displacements(tmp_path, heading: str):
+    notes = " ".join(only(text(tmp_path, [HEADINGS.replace("Weg", heading), UNITS, *ROWS])).notes)
+    assert ("map it to 'shortening [mm]'" in notes) == (heading != "Traversenweg" or "traverse" in heading.lower())
+
+
+def test_inspect_says_that_a_fit_will_refuse_a_displacement(tmp_path):
+    path = text(tmp_path, [HEADINGS, UNITS, *ROWS])
+    said = airmuscle("inspect", path, "--column", "Weg=displacement [mm]").output
+    assert "will refuse this recording. A displacement has no stated zero and direction." in said
+    assert '--column "displacement=shortening [mm]"' in said
+    said = airmuscle("inspect", path, "--column", "Weg=shortening [mm]").output
+    assert 'To convert the shortening, use --resting-length "..."' in said
+    said = airmuscle("inspect", path, "--column", "Weg=shortening [mm]", "--resting-length", "200 mm").output
+    assert "will refuse" not in said
+
+
+# Missing values
+
+GAPS = (
+    "time [s];pressure [kPa];force [N]", "0;100;10", "1;---;11", "2;102;", "3;#N/A;-999", "4;104;14", "5;105;15",
+    "6;;16", "7;;17", "8;;18", "9;;19", "10;;20", "11;111;21",
+)  # fmt: skip
+
+
+def test_all_missing_values_are_reported_at_once(tmp_path):
+    with pytest.raises(ColumnError) as caught:
+        read(text(tmp_path, GAPS))
+    said = str(caught.value)
+    assert "bench.csv: 8 cells in 8 of 12 lines are no finite numbers" in said
+    assert "line 3 (pressure '---'), line 4 (force empty), line 5 (pressure '#N/A')" in said
+    assert "use missing=DropMissing() of read" in said
+    assert "use missing=InterpolateMissing() of read" in said
+
+
+def test_many_missing_values_are_counted(tmp_path):
+    rows = [f"{i};100;" for i in range(50)]
+    with pytest.raises(ColumnError, match=r"50 cells in 50 of 50 lines .* line 9 \(force empty\) and 42 more\."):
+        read(text(tmp_path, [GAPS[0], *rows]))
+
+
+def test_rows_with_missing_values_are_left_out_and_named(tmp_path):
+    recording = only(text(tmp_path, GAPS), missing=DropMissing())
+    assert recording["time"].tolist() == [0, 4, 5, 11]
+    (note,) = [note for note in recording.notes if "left out" in note]
+    assert note == (
+        "bench.csv: rows left out, because a value is missing: 8 of 12 (lines 3, 4, 5, 8, 9, 10, 11 and 12)."
+    )
+
+
+def test_short_gaps_are_interpolated_in_time_and_long_ones_are_left_out(tmp_path):
+    recording = only(text(tmp_path, GAPS), missing=InterpolateMissing((-999.0,)))
+    assert recording["time"].tolist() == [0, 1, 2, 3, 4, 5, 11]
+    assert recording["pressure"][:5] == pytest.approx([100e3, 101e3, 102e3, 103e3, 104e3])
+    assert recording["force"][:5] == pytest.approx([10, 11, 12, 13, 14])
+    assert any("rows with values interpolated in time: 3 of 12 (lines 3, 4 and 5)" in note for note in recording.notes)
+    longer = only(text(tmp_path, GAPS), missing=InterpolateMissing((-999.0,), max_gap=6.0))
+    assert longer["pressure"][6:11] == pytest.approx(np.arange(106e3, 111e3, 1e3))
+
+
+def test_a_valve_command_keeps_its_value_in_a_gap(tmp_path):
+    path = text(tmp_path, ("time [s];pressure [kPa];fill", "0;1;1", "1;2;", "2;3;0"))
+    assert only(path, missing=InterpolateMissing())["fill"].tolist() == [1, 1, 0]
+
+
+def test_the_ends_of_a_recording_are_not_extrapolated(tmp_path):
+    path = text(tmp_path, ("time [s];force [N]", "0;", "1;2", "2;3", "3;"))
+    assert only(path, missing=InterpolateMissing())["time"].tolist() == [1, 2]
+
+
+def test_missing_times_are_never_interpolated(tmp_path):
+    path = text(tmp_path, ("time [s];force [N]", "0;1", ";2", "2;", "3;4"))
+    recording = only(path, missing=InterpolateMissing())
+    assert recording["time"].tolist() == [0, 2, 3]
+    assert recording["force"] == pytest.approx([1, 3, 4])
+    untimed = text(tmp_path, ("pressure [kPa];force [N]", "0;1", "1;", "2;3"))
+    with pytest.raises(ColumnError, match=r"interpolated in time, but there is no time column\. .*DropMissing"):
+        read(untimed, missing=InterpolateMissing())
+
+
+def test_clock_times_may_be_missing(tmp_path):
+    path = text(tmp_path, ("time;force [N]", "12:00:00;1", ";2", "12:00:02;3"))
+    assert only(path, missing=DropMissing())["time"].tolist() == [0, 2]
+    path = text(tmp_path, ("time;force [N]", "12:00:00;1", "12:00:01;", "12:00:02;3"))
+    assert only(path, missing=InterpolateMissing())["force"].tolist() == [1, 2, 3]
+
+
+@pytest.mark.parametrize("code", [-999.0, "-999", "OL"])
+def test_codes_stand_for_missing_values(tmp_path, code: float | str):
+    cell = "OL" if code == "OL" else "-999"
+    path = text(tmp_path, ("time [s];force [N];remark", "0;1;a", f"1;{cell};b", "2;3;c"))
+    assert only(path, missing=DropMissing((code,)))["force"].tolist() == [1, 3]
+    with pytest.raises(ColumnError, match=r"line 3: force "):
+        read(path, missing=RefuseMissing((code,)))
+
+
+def test_a_text_that_is_no_marker_is_refused_with_the_code_as_its_remedy(tmp_path):
+    path = text(tmp_path, ("time [s];force [N]", "0;1", "1;OL", "2;OL"))
+    with pytest.raises(ColumnError, match=r"2 cells .* use missing=DropMissing\(codes=\('OL',\)\) of read"):
+        read(path, missing=DropMissing())
+    said = airmuscle("inspect", path).stderr
+    assert "use --missing drop --missing-code 'OL'" in " ".join(said.split())
+
+
+def test_numbers_with_separated_thousands_are_reported_at_once(tmp_path):
+    path = text(tmp_path, ("time [s];force [N]", "0;1.300,00", "1;1.301,50", "2;3"))
+    with pytest.raises(ColumnError, match=r"2 cells in 2 of 3 lines .* use decimal=',' of read"):
+        read(path)
+    assert only(path, decimal=",")["force"].tolist() == [1300, 1301.5, 3]
+
+
+def test_a_recording_without_a_complete_row_is_refused(tmp_path):
+    path = text(tmp_path, ("time [s];force [N]", "0;", "1;---"))
+    with pytest.raises(ColumnError, match="every row contains a missing value"):
+        read(path, missing=DropMissing())
+
+
+@pytest.mark.parametrize("write", [text, workbook])
+def test_cells_of_remarks_are_not_missing_values(tmp_path, write):
+    recording = only(write(tmp_path, [HEADINGS, UNITS, *ROWS]), missing=DropMissing())
+    assert len(recording) == 4
+
+
+def test_values_that_are_not_numbers_are_missing_in_a_workbook_and_in_matlab(tmp_path):
+    path = workbook(tmp_path, GAPS)
+    assert only(path, missing=DropMissing())["time"].tolist() == [0, 4, 5, 11]
+    scipy_io = pytest.importorskip("scipy.io")
+    pytest.importorskip("pymatreader")
+    force = np.array([1.0, np.nan, -999.0, 4.0])
+    scipy_io.savemat(tmp_path / "bench.mat", {"time_s": np.arange(4.0), "force_N": force})
+    assert only(tmp_path / "bench.mat", missing=DropMissing((-999,)))["force"].tolist() == [1, 4]
+    assert only(tmp_path / "bench.mat", missing=InterpolateMissing((-999,)))["force"].tolist() == [1, 2, 3, 4]
+
+
+# Outliers
+
+
+def ramp(folder: Path, name: str = "ramp.csv", spike: float = 9999.0) -> Path:
+    time = np.arange(400) * 0.05
+    noise = np.random.default_rng(1).normal(0.0, 0.5, 400)
+    force = 200.0 - 6.0 * time + noise
+    force[120] = spike
+    rows = [f"{t:.2f};{100 + t:.3f};{f:.2f}" for t, f in zip(time, force, strict=True)]
+    return text(folder, ["time [s];pressure [kPa];force [N]", *rows], name)
+
+
+def test_suspected_outliers_are_left_out_on_request_and_named(tmp_path):
+    assert only(ramp(tmp_path))["force"].max() == 9999.0
+    recording = only(ramp(tmp_path), drop_outliers=True)
+    assert len(recording) == 399
+    assert recording["force"].max() < 202.0
+    (note,) = [note for note in recording.notes if "outlier" in note]
+    assert re.fullmatch(
+        r"ramp\.csv: rows left out as suspected outliers: 1 of 400: force in row 121 \(9999 N, neighbours 16\d\.?\d* N\)\.",
+        note,
+    )
+
+
+def test_rows_without_time_have_no_outliers_which_is_said(tmp_path):
+    path = text(tmp_path, ("pressure [kPa];force [N]", "0;1", "1;2"))
+    assert any("without time, rows are no neighbours" in note for note in only(path, drop_outliers=True).notes)
+
+
+# Loads in names
+
+
+@pytest.mark.parametrize(("unit", "newton"), [("g", STANDARD_GRAVITY / 2), ("kg", 500 * STANDARD_GRAVITY), ("N", 500)])
+def test_a_load_in_the_name_of_a_file_is_a_force(tmp_path, unit: str, newton: float):
+    path = text(tmp_path, ("time [s];pressure [kPa]", "0;300", "1;400"), "load500.csv")
+    assert only(path, file_name=f"load{{force [{unit}]}}")["force"] == pytest.approx([newton] * 2)
+    assert only(path, constants={"force": f"500 {unit}"})["force"] == pytest.approx([newton] * 2)
+
+
+# Mapping files
+
+
+def test_a_mapping_file_states_all_of_it(tmp_path):
+    rig = tmp_path / "rig.toml"
+    rig.write_text('skip_rows = 2\nmissing = "drop"\nmissing_codes = [-999, "OL"]\noutliers = "drop"\n'
+                   'displacement_zero = "5 mm"\nresting_length = "100 mm"\n')  # fmt: skip
+    path = text(
+        tmp_path, ("a;1;2", "b;2;3", "time [s];shortening [mm];force [N]", "0;5;1", "1;-999;2", "2;7;OL", "3;8;1")
+    )
+    assert only(path, mapping=rig)["contraction"] == pytest.approx([0.0, 0.03])
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("skip_rows", "7"), ("skip_rows", -1), ("skip_rows", True), ("missing", "fill"), ("missing", 3),
+     ("missing_codes", -999), ("missing_codes", [True]), ("outliers", "delete"), ("displacement_zero", [1])],
+)  # fmt: skip
+def test_an_impossible_value_in_a_mapping_is_refused(key: str, value: Any):
+    with pytest.raises((ParameterError, ColumnError), match=key):
+        mapping_of_tables({key: value}, "rig.toml")
+
+
+# Commands
+
+
+@pytest.mark.parametrize("command", READING)
+def test_every_command_that_reads_has_every_option(command: str):
+    options = set(re.findall(r"--[a-z-]+", airmuscle(command, "--help").output))
+    assert set(OPTIONS) <= options
+
+
+@pytest.mark.parametrize("arguments", [("inspect",), ("convert-data", "out.csv"), ("fit", "--compare")])
+@pytest.mark.parametrize("bad", [("--missing", "fill"), ("--outliers", "maybe"), ("--skip-rows", "-1")])
+def test_an_unknown_treatment_is_refused_by_every_command(tmp_path, arguments: tuple[str, ...], bad: tuple[str, str]):
+    command, *more = arguments
+    result = airmuscle(command, ramp(tmp_path), *(tmp_path / m if m.endswith("csv") else m for m in more), *bad)
+    assert result.exit_code in (1, 2)
+    assert not isinstance(result.exception, ValueError)
+
+
+def test_inspect_and_convert_data_say_what_they_left_out(tmp_path):
+    path = ramp(tmp_path)
+    (shown,) = json.loads(airmuscle("inspect", path, "--outliers", "drop", "--json").stdout)
+    assert shown["rows"] == 399
+    converted = airmuscle("convert-data", path, tmp_path / "plain.csv", "--plain", "--outliers", "drop")
+    assert "note: ramp.csv: rows left out as suspected outliers: 1 of 400" in " ".join(converted.stderr.split())
