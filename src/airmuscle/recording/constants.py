@@ -13,13 +13,17 @@ from ..core.errors import ColumnError
 from ..core.units import conversion, quantity
 from .table import RawTable
 
-CONSTANT_UNITS = {"resting_length": "m", "ambient": "Pa", "displacement_zero": "m"}
+CONSTANT_UNITS = {"resting_length": "m", "ambient": "Pa", "ambient_temperature": "K", "displacement_zero": "m"}
 """The SI units of the constants that have a unit."""
-CONSTANT_RANGES = {"resting_length": (1e-3, 20.0), "ambient": (1e3, 2e5), "displacement_zero": (-20.0, 20.0)}
+CONSTANT_RANGES = {
+    "resting_length": (1e-3, 20.0), "ambient": (1e3, 2e5), "ambient_temperature": (200.0, 400.0),
+    "displacement_zero": (-20.0, 20.0),
+}  # fmt: skip
 """The allowed ranges in SI units, those of the parameters of a geometry and of the ambient air."""
 _NAMES = {
     "resting_length": ("resting_length", "rest_length", "initial_length", "original_length", "l0", "l_0", "ruhelänge"),
-    "ambient": ("ambient", "ambient_pressure", "atmospheric_pressure", "barometer"),
+    "ambient": ("ambient", "ambient_pressure", "atmospheric_pressure", "barometer", "umgebungsdruck", "luftdruck"),
+    "ambient_temperature": ("ambient_temperature", "room_temperature", "umgebungstemperatur", "raumtemperatur"),
     "displacement_zero": ("displacement_zero",),
 }
 _WITH_UNIT = re.compile(

@@ -20,7 +20,7 @@ POINT_NUMBER = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
 _CONSTANT_COMMENT = re.compile(r"[#%]\s*(?P<name>[^\W\d][\w -]*?)(?:\s*\[(?P<unit>[^\]]*)\])?\s*[=:]\s*(?P<value>.+)")
 MAX_PREAMBLE = 1000
 """Maximum number of lines above the headings (chosen)."""
-_TEXT_CONSTANTS = ("resting_length", "ambient", "specimen", "run")
+_TEXT_CONSTANTS = ("resting_length", "ambient", "ambient_temperature", "specimen", "run")
 
 
 def is_number(cell: str) -> bool:

@@ -57,6 +57,7 @@ def interpret(
         else:
             note = _keep_unknown_column(table, heading, cells, columns)
         notes += [note] if note and note not in notes else []
+    notes += _standard_atmosphere(table, headings) if "ambient" not in run_constants else []
     notes += _add_held(table, columns, held, ambient)
     columns, displaced = displacement_columns(columns, run_constants)
     notes += displaced
@@ -68,6 +69,17 @@ def interpret(
 
 def _is_quantity(name: str) -> bool:
     return parse_constant_name(name) is None and parse_heading(name).known
+
+
+def _standard_atmosphere(table: RawTable, headings: list[Heading]) -> list[str]:
+    """A note where absolute pressures become gauge pressures although the ambient pressure is not stated."""
+    absolute = [h.name for h in headings if h.target == "Pa" and unit_conversion(table, h, AMBIENT_PRESSURE).offset]
+    if not absolute:
+        return []
+    return [
+        f"The {' and '.join(absolute)} is absolute, and the ambient pressure is not stated: it is converted to gauge "
+        f"with the standard atmosphere, {AMBIENT_PRESSURE / 1e3:.4g} kPa."
+    ]
 
 
 def _add_held(table: RawTable, columns: dict[str, Array], held: Mapping[str, float | str], ambient: float) -> list[str]:

@@ -43,7 +43,7 @@ from .table import RawTable
 from .text_format import TextFormat
 from .time_base import TIME_BASES, TimeBase
 
-CONSTANT_NAMES = ("resting_length", "ambient", "displacement_zero", "specimen", "run")
+CONSTANT_NAMES = ("resting_length", "ambient", "ambient_temperature", "displacement_zero", "specimen", "run")
 """Constants of a run that a mapping may state."""
 OUTLIERS = ("keep", "drop")
 """Treatments of suspected outliers."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -12,7 +13,8 @@ from ..control.trajectory import ACCELERATION, spline_trajectory
 from ..core import tree
 from ..core.arrays import Array
 from ..core.errors import AirmuscleError
-from ..identify.campaign import Campaign, CampaignRecord, FillStage, RecordKind, ReleaseStage, valve_commands
+from ..identify.campaign import Campaign, CampaignRecord, FillStage, RecordKind, ReleaseStage
+from ..identify.dynamic import stated_ambient
 from ..library.write import scenario_toml
 from ..mechanism import Isometric, PrescribedMotion
 from ..muscle import Muscle
@@ -84,7 +86,7 @@ def _fill(campaign: Campaign, record: CampaignRecord, muscle: Muscle) -> tuple[s
     if not isinstance(stage, FillStage) or record not in stage.records:
         return "", "the fills of this muscle were not fitted"
     plant, known, start = _fitted_record(stage, record, muscle)
-    points = {name: [list(point) for point in rows] for name, rows in valve_commands(record).items()}
+    points = {name: [list(point) for point in rows] for name, rows in stage.commands(record).items()}
     run = {"duration": float(record.recording["time"][-1]) - start, "initial_state": {"pressure": known["pressure"]}}
     table = fit_uncertainty(stage.fit) | {DEVIATIONS: {"pressure": _fill_deviation(stage)}}
     fitted = {"uncertainty": _known_in(table, plant)}
@@ -123,7 +125,7 @@ def _fitted_record(
     number = stage.records.index(record)
     fitted = stage.fit.plant(number)
     assert isinstance(fitted, Plant)
-    plant = Plant(muscle, fitted.circuit, fitted.mechanism, gas=fitted.gas)
+    plant = dataclasses.replace(fitted, muscle=muscle)
     model = stage.fit.problem.record_models[number]
     return plant, model.experiment.initial_conditions.known, model.start_time(stage.fit.values)
 
@@ -141,9 +143,9 @@ def _slow(record: CampaignRecord, muscle: Muscle) -> str:
         table[ACCELERATION] = [list(point) for point in motion.input.points[ACCELERATION]]
         initial |= motion.initial_state
         mechanism = PrescribedMotion()
-    circuit = _regulator(float(pressure.max()))
+    plant = Plant(muscle, _regulator(float(pressure.max())), mechanism, ambient=stated_ambient(recording))
     run: Mapping[str, Any] = {"duration": float(time[-1]), "initial_state": initial}
-    return scenario_toml(record.origin, Plant(muscle, circuit, mechanism), table, run, _note(record, start))
+    return scenario_toml(record.origin, plant, table, run, _note(record, start))
 
 
 def _regulator(pressure: float) -> ProportionalRegulator:

@@ -24,9 +24,10 @@ initial_state = { pressure = "0 bar" }      optional: equilibrium at this pressu
                                             the first rows, or where there is none, at their coordinates
 start_time = "0.2 s"                        optional: time of the record at which the input begins
 first = "0 s"                               optional, and last: the time interval of the record that is used
-mapping = "rig.toml"                        optional, and resting_length: information that the file lacks
+mapping = "rig.toml"                        optional, and resting_length, ambient: information that the file lacks
 [record.input]                              optional: input of this record
-[record.plant.mechanism]                    optional: parts of the plant that differ in this record
+[record.plant.mechanism]                    optional: parts of the plant that differ in this record; its ambient air is
+                                            that which the file of the record states, unless [plant.ambient] does
 """
 
 from __future__ import annotations

@@ -61,7 +61,7 @@ class PlantModel:
             names = self.predicted_names(recording)
             row = {"start_time": start_time, "initial_state": self._initial_state(recording)}
         place = Location(recording.origin, "", self.location.folder)
-        experiment, _ = Record(row, place, self.tables, self.scenario.plant, recording).build_experiment({})
+        experiment, _ = Record(row, place, self.tables, self.scenario.plant, recording, True).build_experiment({})
         return self._predict(experiment, {name: self._observed.get(name, (0.0, name))[0] for name in names}, own)
 
     def predict_file(self, path: Path) -> list[RecordPrediction]:
@@ -85,7 +85,7 @@ class PlantModel:
         merged = {"plant": self.tables["plant"], "input": self.tables.get("input", {}), **tables}
         predictions = []
         for i, row in enumerate(rows, 1):
-            record = Record(row, location.inside(f"record {i}"), merged, plant)
+            record = Record(row, location.inside(f"record {i}"), merged, plant, predicted=True)
             experiment, _ = record.build_experiment(observed)
             deviations = {name: deviation for name, (deviation, _) in observed.items()}
             predictions.append(self._predict(experiment, deviations, own, method))

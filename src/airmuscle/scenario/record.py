@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import ParameterError
-from ..identify.dynamic import Experiment
+from ..identify.dynamic import Experiment, stated_ambient
 from ..library.location import Location, check_keys, located_errors, read_finite_number, read_text
 from ..library.plant_file import build_plant
 from ..plant.plant import Plant
@@ -20,7 +20,8 @@ from ..simulation.problem import check_signal
 from .initial_state import build_initial_conditions
 from .inputs import build_input_signal
 
-_KEYS = ("file", "initial_state", "start_time", "first", "last", "mapping", "resting_length", "input", "plant")
+_OPTIONS = ("mapping", "resting_length", "ambient")
+_KEYS = ("file", "initial_state", "start_time", "first", "last", *_OPTIONS, "input", "plant")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -33,6 +34,8 @@ class Record:
     shared: Plant
     given: Recording | None = None
     """The recording, if it was read before; then the table needs no file."""
+    predicted: bool = False
+    """Whether the record is predicted: then its ambient air replaces that of the plant, which was found elsewhere."""
 
     def build_experiment(self, observed: Mapping[str, tuple[float, str]]) -> tuple[Experiment, Mapping[str, Any]]:
         """The record as an experiment, and its table [input]; `observed` has the column of each output.
@@ -42,12 +45,12 @@ class Record:
         if not isinstance(self.row, Mapping):
             raise ParameterError(f"{self.location} is {self.row!r}; write [[record]] and its keys under it.")
         check_keys(self.row, _KEYS, self.location)
-        plant = self._build_plant()
         table = dict(optional_table({**self.tables, **self.row}, "input", self.location))
         if "file" in table:  # absolute, because the table is also written to other folders
             table["file"] = str((self.location.folder / str(table["file"])).resolve())
         in_input = self.location.inside("input")
         recording = self._read_recording(observed) if self.given is None else self._cut(self.given)
+        plant = self._build_plant(recording)
         start_time = read_finite_number(self.row.get("start_time", 0.0), "s", f"{self.location}, start_time")
         signal = build_input_signal(table, plant.input_variables, in_input)
         with located_errors(in_input):
@@ -57,17 +60,22 @@ class Record:
         conditions = build_initial_conditions(initial, plant, recording, self.location.inside("initial_state"))
         return Experiment(recording, signal, conditions, start_time, plant), table
 
-    def _build_plant(self) -> Plant:
-        """The shared plant, with the parts that this record replaces."""
+    def _build_plant(self, recording: Recording) -> Plant:
+        """The shared plant with the parts that this record replaces, in the ambient air of the recording unless the
+        file states another one."""
         replaced = optional_table(self.row, "plant", self.location)
-        if not replaced:
-            return self.shared
-        return build_plant({**self.tables["plant"], **replaced}, self.location.inside("plant"))
+        tables = {**self.tables["plant"], **replaced}
+        plant = build_plant(tables, self.location.inside("plant")) if replaced else self.shared
+        stated = {} if self.predicted else optional_table(tables, "ambient", self.location.inside("plant"))
+        measured = stated_ambient(recording, plant.ambient)
+        free = {name: value for name, value in vars(measured).items() if name not in stated}
+        ambient = dataclasses.replace(plant.ambient, **free)
+        return plant if ambient == plant.ambient else dataclasses.replace(plant, ambient=ambient)
 
     def _read_recording(self, observed: Mapping[str, tuple[float, str]]) -> Recording:
         """The used part of the file, with the observed columns under the names of the outputs."""
         name = read_text(self.row, "file", self.location, needed=True)
-        options = {key: self.row[key] for key in ("mapping", "resting_length") if key in self.row}
+        options = {key: self.row[key] for key in _OPTIONS if key in self.row}
         with located_errors(self.location):
             if isinstance(options.get("mapping"), Mapping):
                 options["mapping"] = mapping_of_tables(options["mapping"], "mapping")

@@ -3,7 +3,8 @@
 from .campaign import STAGES, Campaign, Prediction, identify_campaign
 from .creep_stage import CreepStage
 from .error_band import ErrorBand
-from .fill_stage import FillStage, valve_commands
+from .fill_records import valve_commands
+from .fill_stage import FillStage
 from .friction_stage import FrictionStage
 from .held_creep import HeldCreep, fit_held_creep, free_of_creep
 from .next_experiment import NextExperiment

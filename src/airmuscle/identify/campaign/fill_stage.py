@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -11,29 +11,30 @@ from ...control.inputs import Schedule
 from ...core.arrays import Array
 from ...core.errors import AirmuscleError
 from ...core.short_repr import ShortRepr
-from ...mechanism import Isometric
-from ...muscle import Muscle
-from ...muscle.geometry import Geometry, Vessel
+from ...muscle.geometry import Geometry
 from ...plant.plant import Plant
-from ...pneumatics import FillDischarge, Supply, Valve
-from ...pneumatics.gas import EnergyBalance
-from ..dynamic import DynamicFit, Experiment, InitialConditions, StartTime, fit_dynamic
+from ...pneumatics import FillDischarge
+from ..dynamic import CommandInstants, DynamicFit, Experiment, StartTime, fit_dynamic
+from ..dynamic.ambient import describe_ambient
+from .fill_records import (
+    HEAT_TRANSFER_BOUNDS,
+    at_record,
+    detected_experiment,
+    held_contraction,
+    instant_margin,
+    pressure_deviation,
+    rescaled,
+    vessel_plant,
+    with_instants,
+)
 from .record import CampaignRecord
-from .rows import thin
 from .stage import LeftOutStage
+from .valve_unknowns import CONDUCTANCE, DISCHARGE, ValveUnknowns, poor_ratios
 from .volume import VolumeChange, VolumeEstimate, relate_volumes
 
 NAME = "fills and volume"
-FIT_ROWS = 250
-"""Maximum number of rows of a fill (chosen)."""
-ASSUMED_CONDUCTANCE = 1e-8
-"""Conductance of the fill valve [m3/(s Pa)] for which the relative volumes are fitted (chosen)."""
-MIN_DEVIATION = 100.0
-"""Least standard deviation of the pressure sensor [Pa] (chosen)."""
-FILL, DISCHARGE = "circuit.fill", "circuit.discharge"
-RATIOS = (f"{FILL}.critical_ratio", f"{DISCHARGE}.critical_ratio")
+HEAT_TRANSFER = "gas.heat_transfer"
 VOLUME = "muscle.geometry.enclosed_volume"
-SUPPLY = "circuit.supply.pressure"
 REMEDY = (
     "record a fill from ambient pressure and a discharge through the valve at a held length, at three lengths with the "
     "same valve and supply, at 100 rows per second or more, until the pressure has settled"
@@ -53,10 +54,10 @@ class FillStage(ShortRepr):
     geometry: Geometry
     estimate: VolumeEstimate | None
     contractions: Array
-    volumes: Array
-    """Relative volumes times the scale [m3], shape (K,): what each fill alone says with the common valve."""
     cross_rms: tuple[float, ...]
     """Rms error of the pressure of each fill, predicted by the parameters of the others [Pa]; empty for one fill."""
+    supposed: tuple[str, ...] = ()
+    """What the records do not determine or state, and what is taken for it, as sentences."""
 
     @property
     def circuit(self) -> FillDischarge:
@@ -65,6 +66,12 @@ class FillStage(ShortRepr):
         assert isinstance(plant, Plant)
         assert isinstance(plant.circuit, FillDischarge)
         return plant.circuit
+
+    def commands(self, record: CampaignRecord) -> Mapping[str, Sequence[tuple[float, float]]]:
+        """The instants [s] and values of the commands of both valves in a record, with the estimated instants."""
+        command = self.fit.problem.record_models[self.records.index(record)].command(self.fit.values)
+        assert isinstance(command, Schedule)
+        return command.changes
 
     @property
     def verdict(self) -> str:
@@ -85,7 +92,7 @@ class FillStage(ShortRepr):
             )
         else:
             text += " The volume is that of the given geometry."
-        return text
+        return " ".join([text, *self.supposed])
 
 
 def fit_fill_stage(
@@ -94,7 +101,10 @@ def fit_fill_stage(
     change: VolumeChange | None,
     progress: Callable[[float], None],
 ) -> FillStage | LeftOutStage:
-    """Fit conductances, critical ratio, heat transfer and supply pressure to all fills together.
+    """Fit conductances, critical ratios, heat transfer and supply pressure to all fills together.
+
+    Each record has the ambient air that it states, and its own instants of the valve commands. A valve that no record
+    shows is supposed to be equal to the other one, and so is a critical ratio that the records do not determine.
 
     geometry  the given geometry of the muscle; then the conductance follows from it
     change    the change of the volume with contraction; then fills at several lengths determine the volume at rest
@@ -102,21 +112,18 @@ def fit_fill_stage(
     if not records:
         return LeftOutStage(NAME, "no record is a fill or a discharge at a held length", REMEDY)
     try:
-        relative = _fit_relative(records)
+        rising = [record for record in records if any(step.change > 0 for step in record.steps)]
+        relative = _RelativeFit.of(rising or records)
         progress(0.5)
-        values = np.array([e.value for e in relative.estimates if e.name.startswith(VOLUME)])
-        errors = np.array([e.stderr for e in relative.estimates if e.name.startswith(VOLUME)])
-        contractions = np.array([_contraction(record) for record in records])
         estimate = None
         if geometry is None:
-            estimate = None if change is None else relate_volumes(values, errors, contractions, change)
+            estimate = None if change is None else relative.relate(change)
             if estimate is None or change is None:
-                return LeftOutStage(NAME, _no_volume(contractions, change), REMEDY)
+                return LeftOutStage(NAME, _no_volume(relative.contractions, change), REMEDY)
             geometry, scale = change.geometry(estimate.volume_at_rest), estimate.scale
         else:
-            known = np.array([float(geometry.volume(c)) for c in contractions])
-            scale = float(known @ values / (values @ values))
-        return _fit_jointly(records, relative, geometry, estimate, contractions, scale * values, scale, progress)
+            scale = relative.scale_to(geometry)
+        return _fit_jointly(records, relative.experiments(records, geometry, scale), geometry, estimate, progress)
     except AirmuscleError as error:
         return LeftOutStage(NAME, str(error.message), REMEDY)
 
@@ -130,65 +137,95 @@ def _no_volume(contractions: Array, change: VolumeChange | None) -> str:
     )
 
 
-def _fit_relative(records: Sequence[CampaignRecord]) -> DynamicFit:
-    """The volumes of the fills for the assumed conductance of the fill valve, and what the records share."""
-    experiments = [_experiment(record, _vessel_plant(record, 1.0)) for record in records]
-    first = experiments[0].plant
-    assert isinstance(first, Plant)
-    shared: list[str | tuple[str, ...]] = ["gas.heat_transfer", RATIOS]
-    if any(step.change < 0 for record in records for step in record.steps):
-        shared.append(f"{DISCHARGE}.conductance")
-    if any(step.change > 0 for record in records for step in record.steps):
-        shared.append(SUPPLY)
+@dataclasses.dataclass(frozen=True)
+class _RelativeFit:
+    """A fit of own volumes of the records for an assumed conductance of the valve of their first direction.
+
+    The records with a fill have it, because without one the ratio of the other conductance and the volumes remains.
+    """
+
+    fit: DynamicFit
+    records: tuple[CampaignRecord, ...]
+
+    @classmethod
+    def of(cls, records: Sequence[CampaignRecord]) -> _RelativeFit:
+        experiments = [detected_experiment(record, vessel_plant(record)) for record in records]
+        valves = ValveUnknowns.of(records)
+        free = [*valves.shared, *([f"{DISCHARGE}.{CONDUCTANCE}"] if valves.both else [])]
+        return cls(_fit(records, experiments, free, (VOLUME,)), tuple(records))
+
+    @property
+    def contractions(self) -> Array:
+        return np.array([held_contraction(record) for record in self.records])
+
+    def _volumes(self) -> tuple[Array, Array]:
+        """The relative volumes and their standard errors, shape (K,) each."""
+        own = [estimate for estimate in self.fit.estimates if estimate.name.startswith(VOLUME)]
+        return np.array([e.value for e in own]), np.array([e.stderr for e in own])
+
+    def relate(self, change: VolumeChange) -> VolumeEstimate | None:
+        return relate_volumes(*self._volumes(), self.contractions, change)
+
+    def scale_to(self, geometry: Geometry) -> float:
+        """The factor of the relative volumes that makes them those of a geometry."""
+        known = np.array([float(geometry.volume(c)) for c in self.contractions])
+        values, _ = self._volumes()
+        return float(known @ values / (values @ values))
+
+    def experiments(self, records: Sequence[CampaignRecord], geometry: Geometry, scale: float) -> list[Experiment]:
+        """All records with the volumes of a geometry, from the valves and instants of this fit."""
+        found = rescaled(self.fit.plant(), scale)
+        experiments = []
+        for record in records:
+            plant = at_record(found, record, float(geometry.volume(held_contraction(record))))
+            experiment = detected_experiment(record, plant)
+            known = record in self.records
+            experiments.append(with_instants(experiment, self.fit, self.records.index(record)) if known else experiment)
+        return experiments
+
+
+def _fit(
+    records: Sequence[CampaignRecord], experiments: Sequence[Experiment], free: Sequence[str | tuple[str, ...]],
+    own: tuple[str, ...] = (),
+) -> DynamicFit:  # fmt: skip
+    """A fit with the heat transfer, and own instants of the valve commands, because the detected ones are inexact."""
+    first, margin = experiments[0].plant, instant_margin(records)
+    assert first is not None
     return fit_dynamic(
-        first, experiments, free=shared, observed={"pressure": _deviation(records)},
-        per_record=(VOLUME, StartTime(_margin(records))), bounds={"gas.heat_transfer": (1e-3, 1e3)},
+        first, experiments, free=(HEAT_TRANSFER, *free), observed={"pressure": pressure_deviation(records)},
+        per_record=(*own, StartTime(margin), CommandInstants(margin)), bounds={HEAT_TRANSFER: HEAT_TRANSFER_BOUNDS},
     )  # fmt: skip
 
 
 def _fit_jointly(
     records: Sequence[CampaignRecord],
-    relative: DynamicFit,
+    experiments: Sequence[Experiment],
     geometry: Geometry,
     estimate: VolumeEstimate | None,
-    contractions: Array,
-    volumes: Array,
-    scale: float,
     progress: Callable[[float], None],
 ) -> FillStage:
     """The fit with the volumes of one curve, and the prediction of each record from the others."""
-    own = [float(geometry.volume(c)) for c in contractions]
-    experiments = [
-        _experiment(record, _rescaled(relative.plant(i), scale, volume), _start(relative, i))
-        for i, (record, volume) in enumerate(zip(records, own, strict=True))
-    ]
-    fit = _fit_common(records, experiments, range(len(records)))
+    everything = range(len(records))
+    valves = ValveUnknowns.of(records)
+    fit = _fit_common(records, experiments, everything)
+    if valves.both and (reason := poor_ratios(fit)):
+        valves = dataclasses.replace(valves, common_ratio=reason)
+        fit = _fit_common(records, experiments, everything, reason)
     cross = []
-    if len(records) > 1:
-        for i in range(len(records)):
-            others = [k for k in range(len(records)) if k != i]
-            part = _fit_common(records, experiments, others)
-            cross.append(_prediction_rms(fit, part, i))
-            progress(0.5 + 0.5 * (i + 1) / len(records))
-    return FillStage(fit, tuple(records), tuple(experiments), geometry, estimate, contractions, volumes, tuple(cross))
+    for i in everything if len(records) > 1 else ():
+        part = _fit_common(records, experiments, [k for k in everything if k != i], valves.common_ratio)
+        cross.append(_prediction_rms(fit, part, i))
+        progress(0.5 + 0.5 * (i + 1) / len(records))
+    contractions = np.array([held_contraction(record) for record in records])
+    supposed = (*valves.supposed, *describe_ambient([record.recording for record in records]))
+    return FillStage(fit, tuple(records), tuple(experiments), geometry, estimate, contractions, tuple(cross), supposed)
 
 
 def _fit_common(
-    records: Sequence[CampaignRecord], experiments: Sequence[Experiment], chosen: Sequence[int]
+    records: Sequence[CampaignRecord], experiments: Sequence[Experiment], chosen: Sequence[int], common_ratio: str = ""
 ) -> DynamicFit:
-    used = [experiments[i] for i in chosen]
-    steps = [step for i in chosen for step in records[i].steps]
-    free: list[str | tuple[str, ...]] = ["gas.heat_transfer", RATIOS]
-    if any(step.change > 0 for step in steps):
-        free += [f"{FILL}.conductance", SUPPLY]
-    if any(step.change < 0 for step in steps):
-        free.append(f"{DISCHARGE}.conductance")
-    first = used[0].plant
-    assert first is not None
-    return fit_dynamic(
-        first, used, free=free, observed={"pressure": _deviation(records)}, per_record=(StartTime(_margin(records)),),
-        bounds={"gas.heat_transfer": (1e-3, 1e3)},
-    )  # fmt: skip
+    valves = ValveUnknowns.of([records[i] for i in chosen], common_ratio)
+    return _fit(records, [experiments[i] for i in chosen], [*valves.shared, *valves.paths(CONDUCTANCE)])
 
 
 def _prediction_rms(fit: DynamicFit, part: DynamicFit, record: int) -> float:
@@ -201,77 +238,3 @@ def _prediction_rms(fit: DynamicFit, part: DynamicFit, record: int) -> float:
     model = fit.problem.record_models[record]
     differences = model.evaluate(values).values[:, 0] - model.experiment.recording["pressure"]
     return float(np.sqrt(np.mean(differences**2)))
-
-
-def _contraction(record: CampaignRecord) -> float:
-    return float(np.median(record.recording["contraction"]))
-
-
-def _deviation(records: Sequence[CampaignRecord]) -> float:
-    """Standard deviation of the pressure sensor [Pa]."""
-    return max(float(np.median([r.inspection.sensors["pressure"].std for r in records])), MIN_DEVIATION)
-
-
-def _margin(records: Sequence[CampaignRecord]) -> float:
-    """Maximum error of the detected start of a step [s]: a quarter of the shortest step, at least two rows."""
-    sample = max(float(np.median(np.diff(r.recording["time"]))) for r in records)
-    return max(0.25 * min(step.duration for r in records for step in r.steps), 2.0 * sample)
-
-
-def _start(fit: DynamicFit, record: int) -> float:
-    return fit.problem.record_models[record].start_time(fit.values)
-
-
-def _vessel_plant(record: CampaignRecord, scale: float) -> Plant:
-    """The plant of a held muscle, with initial values from the steps of the record."""
-    rising = [step for step in record.steps if step.change > 0]
-    top = max(step.final_pressure for step in record.steps) if rising else float(record.recording["pressure"][0])
-    duration = float(np.mean([step.duration for step in record.steps]))
-    volume = ASSUMED_CONDUCTANCE * 1e5 * duration / 1.2
-    muscle = Muscle.ideal(Vessel(min(max(volume, 2e-7), 5e-2), record.resting_length or 0.2))
-    valve = Valve(ASSUMED_CONDUCTANCE, 0.35)
-    circuit = FillDischarge(Supply(top + 5e3), valve, valve)
-    return Plant(muscle, circuit, Isometric(_contraction(record)), gas=EnergyBalance(1.0 * scale))
-
-
-def _rescaled(plant: object, scale: float, volume: float) -> Plant:
-    """The plant with this volume [m3], its conductances and heat transfer multiplied by the scale."""
-    assert isinstance(plant, Plant)
-    circuit, gas = plant.circuit, plant.gas
-    assert isinstance(circuit, FillDischarge)
-    assert isinstance(gas, EnergyBalance)
-    fill, discharge = (
-        dataclasses.replace(valve, conductance=valve.conductance * scale)
-        for valve in (circuit.fill, circuit.discharge)
-        if isinstance(valve, Valve)
-    )
-    vessel = Vessel(volume, plant.muscles[0].geometry.resting_length)
-    return dataclasses.replace(
-        plant,
-        muscle=Muscle.ideal(vessel),
-        circuit=dataclasses.replace(circuit, fill=fill, discharge=discharge),
-        gas=dataclasses.replace(gas, heat_transfer=float(np.clip(gas.heat_transfer * scale, 1e-3, 1e3))),
-    )
-
-
-def valve_commands(record: CampaignRecord) -> dict[str, tuple[tuple[float, float], ...]]:
-    """The instants [s] and values of the commands of both valves, counted from the start of the first step."""
-    start = record.steps[0].start
-    points: dict[str, list[tuple[float, float]]] = {"fill": [], "discharge": []}
-    for step in record.steps:
-        opened, closed = ("fill", "discharge") if step.change > 0 else ("discharge", "fill")
-        instant = max(step.start - start, 0.0)
-        if points[closed]:
-            points[closed].append((instant, 0.0))
-        points[opened].append((instant, 1.0))
-    return {name: tuple(values) for name, values in points.items() if values}
-
-
-def _experiment(record: CampaignRecord, plant: Plant, start: float | None = None) -> Experiment:
-    recording = thin(record.recording, FIT_ROWS)
-    began = record.steps[0].start if start is None else start
-    before = record.recording["time"] < record.steps[0].start
-    pressure = record.recording["pressure"]
-    initial = float(np.median(pressure[before])) if before.sum() >= 3 else float(pressure[0])
-    conditions = InitialConditions.at_rest(plant, initial)
-    return Experiment(recording, Schedule(valve_commands(record)), conditions, began, plant)

@@ -16,7 +16,7 @@ from ...muscle import LinearDamper, Muscle
 from ...plant.plant import Plant
 from ...pneumatics import ClosedChamber
 from ...pneumatics.gas import Polytropic
-from ..dynamic import DynamicFit, Experiment, InitialConditions, StartTime, fit_dynamic
+from ..dynamic import DynamicFit, Experiment, InitialConditions, StartTime, fit_dynamic, stated_ambient
 from .record import CampaignRecord
 from .rows import displacement, thin
 from .stage import LeftOutStage
@@ -125,6 +125,7 @@ def _experiment(record: CampaignRecord, muscle: Muscle, mass: float) -> Experime
         ClosedChamber(),
         WithLatch(HangingMass(mass)),
         gas=Polytropic(1.2),
+        ambient=stated_ambient(whole),
     )
     rest = {"position": float(np.median(path[:count])), "speed": 0.0}
     conditions = InitialConditions.at_coordinates(plant, float(np.median(whole["pressure"][:count])), **rest)

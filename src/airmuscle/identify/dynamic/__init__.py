@@ -1,8 +1,9 @@
 """Dynamic identification: plant parameters from transient records (fill, discharge, release)."""
 
 from ..identifiability import analyse_identifiability
+from .ambient import stated_ambient
 from .cross_prediction import CrossPrediction, cross_predict, describe_cross_predictions
-from .experiment import Experiment, InitialValue, StartTime
+from .experiment import CommandInstants, Experiment, InitialValue, StartTime
 from .fit import fit_dynamic
 from .initial_conditions import InitialConditions
 from .record_ranking import RecordRanking, rank_records
@@ -10,6 +11,7 @@ from .result import DynamicFit
 from .sensing import locate_pressure_sensor
 
 __all__ = [
+    "CommandInstants",
     "CrossPrediction",
     "DynamicFit",
     "Experiment",
@@ -23,4 +25,5 @@ __all__ = [
     "fit_dynamic",
     "locate_pressure_sensor",
     "rank_records",
+    "stated_ambient",
 ]

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...compile import System
-from ...control.inputs import InputSignal, check_input_signal
+from ...control.inputs import InputSignal, Schedule, check_input_signal
 from ...core import tree
 from ...core.errors import ParameterError, suggestion
 from ...core.field_types import check_field_types
@@ -66,9 +66,36 @@ class InitialValue:
         return f"initial {self.name}"
 
 
+@dataclasses.dataclass(frozen=True)
+class CommandInstants:
+    """The instants at which the command of a run changes after its first one, each of them as an unknown.
+
+    They count from the start of the run, whose error is that of `StartTime`. The command must be a Schedule.
+    """
+
+    margin: float
+    """Maximum deviation from an instant of the command of the experiment [s]."""
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
+
+
+@dataclasses.dataclass(frozen=True)
+class CommandInstant:
+    """One instant of a command as an unknown: the instant in the command of the experiment [s], and its margin [s]."""
+
+    instant: float
+    margin: float
+
+    def __str__(self) -> str:
+        return "command instant"
+
+
 ParameterPaths = str | tuple[str, ...]
 """Path of a parameter, or paths of several parameters with one common value."""
-RecordUnknown = ParameterPaths | StartTime | InitialValue
+Nuisance = StartTime | InitialValue | CommandInstant
+"""An unknown of one record that is no parameter of the plant."""
+RecordUnknown = ParameterPaths | StartTime | InitialValue | CommandInstants
 """An unknown with its own value in every record."""
 
 
@@ -80,7 +107,7 @@ class Unknown:
     """
 
     name: str
-    target: tuple[str, ...] | StartTime | InitialValue
+    target: tuple[str, ...] | Nuisance
     record: int | None
     value: float
     low: float
@@ -91,27 +118,27 @@ class Unknown:
 
     @property
     def paths(self) -> tuple[str, ...]:
-        """Paths of the parameters with this value; none for a start time or an initial value."""
+        """Paths of the parameters with this value; none for an instant or an initial value."""
         return self.target if isinstance(self.target, tuple) else ()
 
     @property
     def scale(self) -> float:
         """Magnitude by which the unknown is scaled in the search."""
-        if isinstance(self.target, StartTime | InitialValue):
+        if isinstance(self.target, Nuisance):
             return self.target.margin
         span = self.high - self.low
         return abs(self.value) or (span if np.isfinite(span) else 1.0)
 
     @property
     def origin(self) -> float:
-        """Value from which the unknown is counted in the search: of a start time that of the experiment, whatever the
+        """Value from which the unknown is counted in the search: of an instant that of the experiment, whatever the
         zero of the clock; otherwise 0."""
-        return self.value if isinstance(self.target, StartTime) else 0.0
+        return self.value if isinstance(self.target, StartTime | CommandInstant) else 0.0
 
     @property
     def search_range(self) -> tuple[float, float]:
         """Range of the initial guesses of a multi-start: a factor of three both ways, within the bounds."""
-        if isinstance(self.target, StartTime | InitialValue):
+        if isinstance(self.target, Nuisance):
             return self.low, self.high
         ends = (self.value / 3, self.value * 3) if self.value else (-self.scale, self.scale)
         return max(self.low, min(ends)), min(self.high, max(ends))
@@ -128,7 +155,9 @@ def make_unknowns(
     unknowns = [_plant_unknown(plant, paths, None, bounds) for paths in free]
     for i, experiment in enumerate(experiments):
         for target in per_record:
-            if isinstance(target, StartTime | InitialValue):
+            if isinstance(target, CommandInstants):
+                unknowns += _instant_unknowns(experiment, target.margin, i)
+            elif isinstance(target, StartTime | InitialValue):
                 unknowns.append(_record_unknown(experiment, target, i))
             else:
                 unknowns.append(_plant_unknown(experiment.plant or plant, target, i, bounds))
@@ -180,3 +209,32 @@ def _record_unknown(experiment: Experiment, target: StartTime | InitialValue, re
         unit = column_heading(target.name).partition("[")[2].rstrip("]") or "SI"
     name, margin = f"{target} of record {record + 1}", target.margin
     return Unknown(name, target, record, value, value - margin, value + margin, unit, symbol, str(target))
+
+
+def _instant_unknowns(experiment: Experiment, margin: float, record: int) -> list[Unknown]:
+    """The instants of a command after its first one. Raises ParameterError for a command that is no Schedule."""
+    if not isinstance(experiment.command, Schedule):
+        raise ParameterError(
+            f"the command of record {record + 1} is a {type(experiment.command).__name__}, which has no "
+            "instants; give a Schedule, or leave CommandInstants out."
+        )
+    instants = sorted({instant for points in experiment.command.changes.values() for instant, _ in points})
+    return [
+        Unknown(
+            f"command instant {number} of record {record + 1}", CommandInstant(instant, margin), record, instant,
+            instant - margin, instant + margin, "s", f"t_{number}", "command instant",
+        )
+        for number, instant in enumerate(instants[1:], 2)
+    ]  # fmt: skip
+
+
+def with_command_instants(command: InputSignal, instants: Mapping[float, float]) -> InputSignal:
+    """The command with its instants [s] replaced by others, all inputs that change at an instant together."""
+    if not instants:
+        return command
+    assert isinstance(command, Schedule)
+    changes = {
+        name: tuple((instants.get(instant, instant), value) for instant, value in points)
+        for name, points in command.changes.items()
+    }
+    return Schedule(changes)

@@ -14,6 +14,7 @@ from ...core.errors import IdentificationError, ParameterError
 from ...simulation.integrators import Integrator, Rodas4
 from ..identifiability import analyse_identifiability
 from ..result import Estimate
+from .ambient import check_ambient
 from .experiment import Experiment, ParameterPaths, RecordUnknown, make_unknowns
 from .levenberg_marquardt import LevenbergMarquardt
 from .problem import MAX_RUNS, DynamicFitProblem
@@ -49,8 +50,8 @@ def fit_dynamic(
     free        paths of the parameters common to all records, ("circuit.fill.conductance",); a tuple of paths has one
                 common value
     observed    the measured outputs, each with the standard deviation of its sensor [SI]
-    per_record  unknowns with a separate value in every record: paths (supply pressure), StartTime(margin) or
-                InitialValue(name, margin)
+    per_record  unknowns with a separate value in every record: paths (supply pressure), StartTime(margin),
+                CommandInstants(margin) or InitialValue(name, margin)
     bounds      by the first path; by default those declared
     starts      number of initial guesses of a multi-start: the values of the plant, and a Latin hypercube within a
                 factor of three. A search whose sum of squares is a thousand times the lowest one after 20 simulations
@@ -60,10 +61,13 @@ def fit_dynamic(
 
     The standard errors are scaled by the standard deviation of the residuals. Combinations of parameters that the
     records do not determine are named in the notes. Raises IdentificationError where no initial guess can be simulated,
-    or there are no more observations than unknowns.
+    or there are no more observations than unknowns, ParameterError where a record states another ambient air than its
+    plant has.
     """
     if not experiments or not observed or starts < 1:
         raise ParameterError("fit_dynamic needs at least one record, one observed quantity and one start.")
+    for experiment in experiments:
+        check_ambient(plant, experiment)
     unknowns = make_unknowns(plant, experiments, free, per_record, bounds or {})
     method = method or Rodas4()
     models = tuple(RecordModel(plant, e, i, unknowns, observed, method) for i, e in enumerate(experiments))

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from ...compile.cache.kernel import evaluate
 from ...compile.program import CompiledSystem, compile_system
-from ...control.piecewise_linear import PiecewiseLinear
+from ...control.inputs import InputSignal
 from ...core import tree
 from ...core.arrays import Array
 from ...core.errors import IdentificationError, ParameterError
@@ -19,8 +19,9 @@ from ...core.system import System
 from ...simulation.bound_integrator import BoundIntegrator
 from ...simulation.integrators import Integrator
 from ...simulation.with_sensitivities import WithSensitivities
-from .experiment import Experiment, InitialValue, StartTime, Unknown
+from .experiment import CommandInstant, Experiment, InitialValue, StartTime, Unknown, with_command_instants
 from .initial_conditions import compile_conditions, solve_initial_state
+from .time_grid import TimeGrid, make_time_grid
 
 MAX_STEPS = 1_000_000
 """Maximum number of steps of one simulation."""
@@ -64,12 +65,14 @@ class RecordModel:
         self._initial_values = [
             (j, i) for j, k in enumerate(self.sensitivity_indices) for i in _known_index(unknowns[k], experiment)
         ]
+        targets = [(j, unknowns[k].target) for j, k in enumerate(self.sensitivity_indices)]
+        self._instant_columns = [(j, target) for j, target in targets if isinstance(target, CommandInstant)]
         self._leaf_by_column = np.zeros((self._leaves.size, len(self.sensitivity_indices)))
         for j, k in enumerate(self.sensitivity_indices):
             self._leaf_by_column[[leaf_index[path] for path in unknowns[k].paths], j] = 1.0
         self._state_nominal = np.array([s.nominal for s in self.plant.states])
         self._guess = np.array([experiment.initial_conditions.guess[s.name] for s in self.plant.states])
-        self._last_grid: _TimeGrid | None = None
+        self._last_grid: TimeGrid | None = None
         self._idle: list[BoundIntegrator] = []
         """Bound integrators that no simulation uses at present."""
 
@@ -107,6 +110,14 @@ class RecordModel:
         times = [values[k] for k in self.unknown_indices if isinstance(self.unknowns[k].target, StartTime)]
         return float(times[0]) if times else self.experiment.start_time
 
+    def command(self, values: Array) -> InputSignal:
+        """The command of the run with its estimated instants."""
+        return with_command_instants(self.experiment.command, self._instants(values))
+
+    def _instants(self, values: Array) -> dict[float, float]:
+        """The estimated instants [s] by those of the command of the experiment."""
+        return {target.instant: float(values[self.sensitivity_indices[j]]) for j, target in self._instant_columns}
+
     def evaluate(self, values: Array, max_steps: int = MAX_STEPS) -> ModelOutputs:
         """The modelled outputs at the rows of the record for unknowns at `values` (P,) [SI].
 
@@ -127,7 +138,7 @@ class RecordModel:
     def _outputs(self, values: Array, max_steps: int) -> tuple[Array, npt.NDArray[np.bool_], int]:
         """Outputs of the compiled system at the rows, the mask of the rows before the start, and the steps."""
         state, derivatives = self.initial_state(values)
-        grid = self._time_grid(self.start_time(values))
+        grid = self._time_grid(values)
         leaves = self._system.parameters.copy()
         leaves[: self._leaves.size] = self.leaves(values)
         system = self._system.at(leaves, self._nominal)
@@ -136,17 +147,35 @@ class RecordModel:
         if self.sensitivity_indices:
             full_state[state.size :] = derivatives.ravel()
         bound = self._bound_integrator(system)
-        solution = bound.run(grid.segments, 0.0, full_state, grid.times, max_steps)
-        if solution.status == Status.INTERRUPTED:
-            raise KeyboardInterrupt
-        if solution.status != Status.DONE:
-            raise IdentificationError(
-                f"{self.experiment.recording.origin}: the simulation ended early, at {solution.time:.4g} s."
-            )
+        rows, steps = self._integrate(bound, system, full_state, grid, max_steps)
         results = np.empty((grid.times.size, system.sizes.outputs))
-        evaluate(system.address["outputs"], system.precomputed, solution.rows, grid.inputs, results)
+        evaluate(system.address["outputs"], system.precomputed, rows, grid.inputs, results)
         self._idle.append(bound)  # only now: another thread that takes it overwrites the precomputed values
-        return results, grid.before_start, solution.steps
+        return results, grid.before_start, steps
+
+    def _integrate(
+        self, bound: BoundIntegrator, system: CompiledSystem, state: Array, grid: TimeGrid, max_steps: int
+    ) -> tuple[Array, int]:
+        """The states with their sensitivities at the rows, and the steps, interval by interval.
+
+        The sensitivity to an instant of the command begins there with the difference of the rates before and after it.
+        """
+        rows, steps, held = list[Array](), 0, grid.intervals[0].segments.values[0]
+        for interval in grid.intervals:
+            if interval.column is not None:
+                own = self._guess.size
+                before, after = (system.rates(state.tolist(), u)[:own] for u in (held, interval.segments.values[0]))
+                state[own:].reshape(own, -1)[:, interval.column] += before - after
+            solution = bound.run(interval.segments, interval.begin, state, interval.times, max_steps - steps)
+            if solution.status == Status.INTERRUPTED:
+                raise KeyboardInterrupt
+            if solution.status != Status.DONE:
+                raise IdentificationError(
+                    f"{self.experiment.recording.origin}: the simulation ended early, at {solution.time:.4g} s."
+                )
+            rows.append(solution.rows)
+            state, held, steps = solution.state, interval.segments.values[-1], steps + solution.steps
+        return rows[0] if len(rows) == 1 else np.concatenate(rows), steps
 
     def _bound_integrator(self, system: CompiledSystem) -> BoundIntegrator:
         """The integrator at a system, an idle one if there is any: binding takes a twentieth of a simulation."""
@@ -157,15 +186,14 @@ class RecordModel:
         bound.rebind(self.method.binding(system))
         return bound
 
-    def _time_grid(self, start_time: float) -> _TimeGrid:
-        """The rows relative to the start of the run; the last result is kept, as the start time rarely changes."""
-        grid = self._last_grid
-        if grid is None or grid.start_time != start_time:
-            elapsed = self.times - start_time
-            times, inputs = np.maximum(elapsed, 0.0), self.plant.inputs
-            segments = self.experiment.command.segments(inputs, 0.0, max(float(elapsed[-1]), 1e-9))
-            input_values = np.ascontiguousarray(segments.inputs_at(times, 0.0))
-            self._last_grid = grid = _TimeGrid(start_time, times, elapsed < 0, segments, input_values)
+    def _time_grid(self, values: Array) -> TimeGrid:
+        """The rows relative to the start of the run; the last result is kept, as the instants rarely change."""
+        grid, start_time, instants = self._last_grid, self.start_time(values), self._instants(values)
+        if grid is None or (grid.start_time, grid.instants) != (start_time, instants):
+            command = with_command_instants(self.experiment.command, instants)
+            columns = {target.instant: j for j, target in self._instant_columns}
+            grid = make_time_grid(self.times, start_time, command, self.plant.inputs, instants, columns)
+            self._last_grid = grid
         return grid
 
 
@@ -175,16 +203,6 @@ class ModelOutputs(NamedTuple):
     values: Array
     jacobian: Array
     steps: int
-
-
-class _TimeGrid(NamedTuple):
-    """The rows of a record relative to the start of the run, with the inputs there."""
-
-    start_time: float
-    times: Array
-    before_start: npt.NDArray[np.bool_]
-    segments: PiecewiseLinear
-    inputs: Array
 
 
 def _known_index(unknown: Unknown, experiment: Experiment) -> list[int]:

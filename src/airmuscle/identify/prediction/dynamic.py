@@ -13,7 +13,8 @@ from ...core.errors import IdentificationError, ParameterError
 from ...core.field_types import check_field_types
 from ...core.short_repr import ShortRepr
 from ...simulation.integrators import Integrator, Rodas4
-from ..dynamic.experiment import Experiment, ParameterPaths, RecordUnknown, StartTime, Unknown, make_unknowns
+from ..dynamic.ambient import describe_other_ambient
+from ..dynamic.experiment import Experiment, InitialValue, ParameterPaths, RecordUnknown, Unknown, make_unknowns
 from ..dynamic.fit import fit_dynamic
 from ..dynamic.record_model import ModelOutputs, RecordModel
 from ..dynamic.reliability import RECORD_CONSEQUENCE
@@ -55,20 +56,21 @@ def predict_dynamic(
 ) -> RecordPrediction:
     """Predict quantities of a transient record by simulating an identified plant from its initial conditions.
 
-    plant        the identified plant; that of the experiment replaces it
+    plant        the identified plant; that of the experiment replaces it, for example one in other ambient air, which a
+                 note states
     observed     the quantities to predict, outputs of the plant that the recording has, each with the standard
                  deviation of its sensor [SI], which weights the estimation of `own`; 0 where it is not known
     uncertainty  of the plant; the half width of the 95 % band is 1.96 sqrt(g^T C g + s^2) with the sensitivities g to
                  the fitted parameters, their covariance C and the standard deviation s of the residuals of the fit
     own          unknowns that are estimated from the record itself before the prediction: StartTime(margin),
-                 InitialValue(name, margin) or paths, such as a supply pressure
+                 CommandInstants(margin), InitialValue(name, margin) or paths, such as a supply pressure
     method       by default Rodas4(rtol=1e-6)
 
     Raises IdentificationError where the simulation fails, ParameterError for unknown names.
     """
+    notes = describe_other_ambient(plant, experiment)
     plant = experiment.plant or plant
     deviations = {name: sensor or _deviation(name, experiment, uncertainty) for name, sensor in observed.items()}
-    notes: list[str] = []
     if own:
         fit = fit_dynamic(plant, [experiment], free=(), per_record=own, observed=deviations, method=method)
         plant, experiment = fit.plant(), _with_estimates(fit, experiment)
@@ -109,11 +111,15 @@ def _with_estimates(fit: DynamicFit, experiment: Experiment) -> Experiment:
     known = dict(experiment.initial_conditions.known)
     for estimate, unknown in zip(fit.estimates, fit.unknowns, strict=True):
         target = unknown.target
-        if not isinstance(target, tuple | StartTime):
+        if isinstance(target, InitialValue):
             known[target.name] = estimate.value
     conditions = dataclasses.replace(experiment.initial_conditions, known=known)
     return dataclasses.replace(
-        experiment, plant=fit.plant(), start_time=model.start_time(fit.values), initial_conditions=conditions
+        experiment,
+        plant=fit.plant(),
+        start_time=model.start_time(fit.values),
+        initial_conditions=conditions,
+        command=model.command(fit.values),
     )
 
 

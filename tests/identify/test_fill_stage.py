@@ -1,0 +1,185 @@
+"""The stage of fills of a campaign finds what its own model has simulated, within three standard errors: with a fill and
+its discharge in one file, with different critical ratios, and in any ambient air that the records state. What the
+records do not show or state is supposed, and said.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from widths import widened
+
+from airmuscle import load
+from airmuscle.control.inputs import Schedule
+from airmuscle.core.errors import ParameterError
+from airmuscle.identify.campaign import FillStage, classify_records
+from airmuscle.identify.campaign.fill_stage import fit_fill_stage
+from airmuscle.identify.campaign.release_stage import fit_release_stage
+from airmuscle.identify.campaign.volume import volume_change
+from airmuscle.identify.dynamic import Experiment, InitialConditions, fit_dynamic, stated_ambient
+from airmuscle.mechanism import HangingMass, Isometric, WithLatch
+from airmuscle.muscle import LinearDamper, Muscle
+from airmuscle.muscle.characteristic import VirtualWork
+from airmuscle.muscle.geometry import Braid
+from airmuscle.plant.plant import Plant
+from airmuscle.pneumatics import Ambient, ClosedChamber, FillDischarge, Supply, Valve
+from airmuscle.pneumatics.gas import EnergyBalance, Polytropic
+from airmuscle.recording import Recording
+from airmuscle.simulation import Rodas4, simulate
+
+BRAID = Braid(0.01, math.radians(25), 0.3)
+CONTRACTIONS = (0.0, 0.1, 0.2)
+NOISE = 150.0
+STANDARD = Ambient()
+BOTH = {"fill": ((0.5, 1.0), (3.2, 0.0)), "discharge": ((3.2, 1.0),)}
+FILL, DISCHARGE = {"fill": ((0.5, 1.0),)}, {"discharge": ((0.5, 1.0),)}
+
+
+def true_plant(contraction, ratio, ambient):
+    valves = FillDischarge(Supply(6e5), Valve(3e-9, 0.35), Valve(3.6e-9, ratio))
+    return Plant(Muscle.ideal(BRAID), valves, Isometric(contraction), EnergyBalance(0.4), ambient)
+
+
+def record(contraction, command, seed, *, ratio=0.35, ambient=STANDARD, begin=0.0, stated=True, duration=6.0):
+    plant, times = true_plant(contraction, ratio, ambient), np.arange(0.0, duration, 0.008)
+    run = simulate(
+        plant, Schedule(command), duration=duration, initial_state=plant.state_at(pressure=begin), output_times=times,
+        integrator=Rodas4(1e-8),
+    )  # fmt: skip
+    noise = np.random.default_rng(seed).normal(0.0, NOISE, times.size)
+    pressure = np.interp(times, run["time"], run["pressure"])
+    columns = {"time": times, "pressure": pressure + noise, "contraction": np.full(times.size, contraction)}
+    constants = {"ambient": ambient.pressure, "ambient_temperature": ambient.temperature} if stated else {}
+    return Recording(columns, f"fill {contraction:g} {min(command)}", {"resting_length": 0.3, **constants})
+
+
+def stage_of(recordings, geometry=BRAID, change=None):
+    stage = fit_fill_stage(classify_records(recordings), geometry, change, lambda _: None)
+    assert isinstance(stage, FillStage), stage.reason
+    return stage
+
+
+def true_values(ratio=0.35):
+    return {
+        "gas.heat_transfer": 0.4, "circuit.fill.critical_ratio": 0.35, "circuit.discharge.critical_ratio": ratio,
+        "circuit.fill.conductance": 3e-9, "circuit.discharge.conductance": 3.6e-9, "circuit.supply.pressure": 6e5,
+    }  # fmt: skip
+
+
+def assert_true(stage, ratio=0.35):
+    for name, true in true_values(ratio).items():
+        estimate = stage.fit[name]
+        assert abs(estimate.value - true) < 3.0 * estimate.stderr, estimate
+    for i in range(len(stage.records)):
+        assert stage.fit.rms("pressure", i) == pytest.approx(NOISE, rel=0.15)
+
+
+@pytest.mark.parametrize("seed", widened(range(5), lambda seed: seed == 0))
+def test_a_fill_and_its_discharge_in_one_file(seed):
+    stage = stage_of([record(c, BOTH, 10 * seed + i) for i, c in enumerate(CONTRACTIONS)])
+    assert_true(stage)
+    switch = stage.commands(stage.records[2])["discharge"][0][0] + stage.fit["start time of record 3"].value
+    assert switch == pytest.approx(3.2, abs=1e-3)
+    assert stage.records[2].steps[1].start < 3.196  # what is detected is early
+
+
+@pytest.mark.parametrize(
+    "ambient", widened([Ambient(8e4, 303.0), Ambient(9.5e4)], lambda ambient: ambient.pressure < 9e4)
+)
+def test_the_plants_have_the_ambient_air_of_their_records(ambient):
+    stage = stage_of([record(c, BOTH, i, ambient=ambient) for i, c in enumerate(CONTRACTIONS)])
+    assert_true(stage)
+    assert stage.fit.plant().ambient == ambient
+
+
+def test_records_in_different_ambient_air():
+    airs = (Ambient(8e4), Ambient(9e4, 303.0), STANDARD)
+    stage = stage_of([record(c, BOTH, i, ambient=a) for i, (c, a) in enumerate(zip(CONTRACTIONS, airs, strict=True))])
+    assert_true(stage)
+    assert [stage.fit.plant(i).ambient for i in range(3)] == list(airs)
+    assert "ambient" not in stage.verdict
+
+
+def test_an_ambient_pressure_that_no_record_states_is_said():
+    silent = stage_of([record(c, BOTH, i, stated=False) for i, c in enumerate(CONTRACTIONS)])
+    assert "No record states the ambient pressure: 101.3 kPa are supposed" in silent.verdict
+    some = stage_of([record(c, BOTH, i, stated=i > 0) for i, c in enumerate(CONTRACTIONS)])
+    assert "fill 0 discharge does not state the ambient pressure" in some.verdict
+
+
+def test_fills_and_discharges_in_separate_files_with_different_critical_ratios():
+    recordings = [record(c, FILL, i, ratio=0.15) for i, c in enumerate(CONTRACTIONS)]
+    recordings += [record(c, DISCHARGE, 3 + i, ratio=0.15, begin=6e5) for i, c in enumerate(CONTRACTIONS)]
+    assert_true(stage_of(recordings), ratio=0.15)
+
+
+def test_the_volume_follows_from_fills_also_with_separate_discharges():
+    recordings = [record(c, FILL, i) for i, c in enumerate(CONTRACTIONS)]
+    recordings += [record(c, DISCHARGE, 3 + i, begin=6e5) for i, c in enumerate(CONTRACTIONS)]
+    change = volume_change(VirtualWork(BRAID), 0.3, (1e5, 6e5), (0.0, 0.25))
+    estimate = stage_of(recordings, None, change).estimate
+    error = abs(estimate.volume_at_rest - float(BRAID.volume(0.0)))
+    assert error < 3.0 * estimate.volume_stderr < 0.02 * float(BRAID.volume(0.0))
+
+
+@pytest.mark.parametrize(
+    ("command", "begin", "missing", "shown"), [(FILL, 0.0, "discharge", "fill"), (DISCHARGE, 6e5, "fill", "discharge")]
+)
+def test_a_valve_that_no_record_shows_is_supposed_to_be_the_other(command, begin, missing, shown):
+    stage = stage_of([record(c, command, i, begin=begin) for i, c in enumerate(CONTRACTIONS)])
+    assert (
+        f"No record is a {missing}: the {missing} valve is supposed to be equal to the {shown} valve" in stage.verdict
+    )
+    valves = stage.circuit
+    assert valves.fill == valves.discharge
+    assert valves.fill.conductance == pytest.approx(3e-9 if shown == "fill" else 3.6e-9, rel=0.01)
+
+
+def test_a_critical_ratio_that_is_not_determined_is_supposed_to_be_the_other():
+    """A discharge that ends while its flow is choked does not show the critical ratio."""
+    recordings = [record(c, FILL, i) for i, c in enumerate(CONTRACTIONS)]
+    recordings.append(record(0.1, BOTH, 9, duration=3.45))
+    stage = stage_of(recordings)
+    assert "do not determine the critical ratio of the discharge valve (it has no effect on them)" in stage.verdict
+    assert stage.circuit.fill.critical_ratio == stage.circuit.discharge.critical_ratio
+
+
+def test_the_release_has_the_ambient_air_of_its_record():
+    muscle, ambient, times = load("dmsp-20-300").muscle, Ambient(8e4), np.arange(0.0, 2.0, 0.002)
+    damped = dataclasses.replace(muscle, damper=LinearDamper(150.0))
+    plant = Plant(damped, ClosedChamber(), WithLatch(HangingMass(15.0)), Polytropic(1.2), ambient)
+    run = simulate(
+        plant, Schedule({"latched": ((0.0, 1.0), (0.4, 0.0))}), duration=2.0, output_times=times,
+        initial_state=plant.state_at(pressure=2.5e5, position=0.012), integrator=Rodas4(1e-8),
+    )  # fmt: skip
+    random = np.random.default_rng(1)
+    pressure, path, force = (np.interp(times, run["time"], run[name]) for name in ("pressure", "position", "force"))
+    path = path + random.normal(0.0, 1e-5, times.size)
+    columns = {
+        "time": times, "pressure": pressure + random.normal(0.0, 100.0, times.size),
+        "contraction": path / 0.3, "length": 0.3 - path, "force": force,
+    }  # fmt: skip
+    released = Recording(columns, "release", {"resting_length": 0.3, "mass": 15.0, "ambient": 8e4})
+    fit = fit_release_stage(classify_records([released]), damped).fit
+    for name, true in (("gas.exponent", 1.2), ("muscle.damper.damping", 150.0)):
+        assert abs(fit[name].value - true) < 3.0 * fit[name].stderr
+
+
+def test_a_record_in_other_ambient_air_than_its_plant_is_refused():
+    measured, plant = record(0.1, FILL, 0, ambient=Ambient(8e4)), true_plant(0.1, 0.35, STANDARD)
+    experiment = Experiment(measured, Schedule(FILL), InitialConditions.at_rest(plant, 0.0))
+    with pytest.raises(ParameterError, match=r"states an ambient pressure of 80 kPa, but its plant has 101\.3 kPa"):
+        fit_dynamic(plant, [experiment], free=("circuit.fill.conductance",), observed={"pressure": NOISE})
+    warm = true_plant(0.1, 0.35, Ambient(8e4, 310.0))
+    experiment = Experiment(measured, Schedule(FILL), InitialConditions.at_rest(warm, 0.0), plant=warm)
+    with pytest.raises(ParameterError, match=r"an ambient temperature of 293\.1 K, but its plant has 310 K"):
+        fit_dynamic(warm, [experiment], free=("circuit.fill.conductance",), observed={"pressure": NOISE})
+
+
+def test_what_a_record_does_not_state_is_that_of_the_default():
+    assert stated_ambient(Recording({"time": np.zeros(1)}, "x")) == STANDARD
+    warm = Recording({"time": np.zeros(1)}, "x", {"ambient_temperature": 300.0})
+    assert stated_ambient(warm, Ambient(9e4)) == Ambient(9e4, 300.0)
