@@ -183,6 +183,7 @@ def airmuscle(
     """Models, identification and simulation of pneumatic artificial muscles.
 
     Pressures are gauge pressures unless the unit is an absolute one (bara, kPa(a), psia).
+    An absolute pressure is converted with the ambient pressure of the plant or file; without one, 101.325 kPa.
 
     \b
     Examples:

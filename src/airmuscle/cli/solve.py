@@ -30,7 +30,10 @@ from .terminal import echo, percent, print_json, print_table
 UNITS = {"pressure": "Pa", "contraction": "1", "force": "N"}
 
 Pressure = Annotated[
-    str | None, typer.Option(metavar="QUANTITY", help="Pressure with unit: '3 bar' (gauge), '400 kPa', '4 bara'.")
+    str | None,
+    typer.Option(
+        metavar="QUANTITY", help="Pressure with unit: '3 bar' (gauge), '400 kPa', '4 bara' (at 101.325 kPa ambient)."
+    ),
 ]
 Contraction = Annotated[str | None, typer.Option(metavar="QUANTITY", help="Contraction: 0.12 or '12 %'.")]
 Force = Annotated[str | None, typer.Option(metavar="QUANTITY", help="Tension with unit: '100 N', '0.1 kN'.")]

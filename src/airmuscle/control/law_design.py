@@ -8,7 +8,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..core.ops import Value
-from ..core.tree import Structure, structure
+from ..core.system import System
+from ..core.tree import Structure, structure, with_ambient
 from .control_law import ControlLaw
 from .control_loop import ControlLoop
 from .controller import Controller, Measurement
@@ -63,7 +64,12 @@ def _designed(part: Any) -> Any:
     return dataclasses.replace(part, **changed) if changed else part
 
 
-def designed_loop(loop: ControlLoop) -> ControlLoop:
-    """A loop with the designed laws in its controller; the same object where there is no design."""
-    controller = with_designed_laws(loop.controller)
+def designed_loop(loop: ControlLoop, system: System) -> ControlLoop:
+    """A loop with the designed laws in its controller; the same object where there is no design.
+
+    Pressures that the controller states as absolute are converted with the ambient pressure of the system.
+    """
+    controller, ambient = with_designed_laws(loop.controller), system.constants.get("ambient")
+    if isinstance(controller, ControlLaw) and isinstance(ambient, float):
+        controller = with_ambient(controller, ambient)
     return loop if controller is loop.controller else dataclasses.replace(loop, controller=controller)

@@ -14,6 +14,7 @@ from typing import Any, TypeVar, dataclass_transform
 
 import numpy as np
 
+from .absolute_pressure import AbsolutePressure
 from .annotation import abridged, conforms, describe, type_hints
 from .errors import AirmuscleWarning, ParameterError, suggestion
 from .short_repr import ShortRepr
@@ -141,7 +142,8 @@ def _is_list(value: Any) -> bool:
 def _check_value(owner: str, declared: Parameter, value: Any) -> Any:
     """Return the value as float or tuple of floats; a text with a unit is converted to SI units.
 
-    Raises ParameterError if it is not finite or out of bounds, UnitError if the unit has another dimension.
+    An AbsolutePressure remains one. Raises ParameterError if it is not finite or out of bounds, UnitError if the unit
+    has another dimension.
     """
     low, high = declared.bounds
     if type(value) is float and low <= value <= high and (value == 0.0 or declared.plausible <= abs(value) < math.inf):
@@ -155,7 +157,7 @@ def _check_value(owner: str, declared: Parameter, value: Any) -> Any:
     if isinstance(value, bool) or not isinstance(value, float | int | np.floating | np.integer):
         raise ParameterError(f"{label} is {abridged(value)}; it must be a number{unit and ' in' + unit}.")
     try:
-        value = float(value)
+        value = value if isinstance(value, AbsolutePressure) else float(value)
     except OverflowError:
         raise ParameterError(f"{label} is too large a number; allowed range: {low:g} to {high:g}{unit}.") from None
     if not math.isfinite(value):

@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from .absolute_pressure import AbsolutePressure, at_ambient
 from .arrays import Array
 from .declaration import Parameter, parameters
+from .units import ABSOLUTE
 
 T = TypeVar("T")
 _STORED = "_tree_node"
@@ -179,10 +181,32 @@ def _unflatten(obj: Any, values: Iterator[Any]) -> Any:
     return new
 
 
+def absolute_pressures(obj: Any, varied: Mapping[str, Any]) -> dict[str, Any]:
+    """Gauge pressures [Pa] of the leaves that were stated as absolute, by path, where the ambient pressure is varied.
+
+    `varied` are the values of the varied leaves by path, numbers or columns; a leaf in it is not among the result.
+    """
+    known = list(leaves(obj))
+    ambient = next((varied[x.path] for x in known if x.declared.unit == ABSOLUTE and x.path in varied), None)
+    stated = [x for x in known if isinstance(x.value, AbsolutePressure) and x.path not in varied]
+    return {} if ambient is None else {x.path: x.value.absolute - ambient for x in stated}
+
+
 def with_parameters(obj: T, values: Sequence[float]) -> T:
     """Return the model with other leaf values, validated like a new object. Raises ParameterError."""
-    checked: T = _revalidate(unflatten(obj, [float(v) for v in values]))
+    checked: T = _revalidate(unflatten(obj, [v if isinstance(v, AbsolutePressure) else float(v) for v in values]))
     return checked
+
+
+def with_ambient(obj: T, ambient: float) -> T:
+    """Return the model with its absolute pressures converted with an ambient pressure [Pa]; `obj` if that is so.
+
+    Raises ParameterError for a gauge pressure that is out of bounds.
+    """
+    values = _node(obj).values
+    if all(value.ambient == ambient for value in values if isinstance(value, AbsolutePressure)):
+        return obj
+    return with_parameters(obj, [at_ambient(value, ambient) for value in values])
 
 
 def _revalidate(obj: Any) -> Any:

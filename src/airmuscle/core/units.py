@@ -15,10 +15,11 @@ import math
 import re
 from typing import Any
 
+from .absolute_pressure import STANDARD_ATMOSPHERE, AbsolutePressure, ambient_of_texts
 from .annotation import abridged
 from .errors import ParameterError, UnitError
 
-AMBIENT_PRESSURE = 101_325.0
+AMBIENT_PRESSURE = STANDARD_ATMOSPHERE
 """Standard atmosphere [Pa], subtracted from an absolute pressure unless another ambient pressure is given."""
 
 ABSOLUTE = "Pa(a)"
@@ -199,8 +200,7 @@ def conversion(unit: str, target: str, *, ambient: float = AMBIENT_PRESSURE, whe
         if target != "Pa":
             raise UnitError(f"{where}unit '{unit}' is a pressure; a quantity in '{target}' was expected.")
         bare = _SPELLING.get(match["unit"].lower(), match["unit"].lower())
-        absolute = match["kind"].lower().startswith("a")
-        return UnitConversion(conversion(bare, "Pa").factor, -ambient if absolute else 0.0)
+        return UnitConversion(conversion(bare, "Pa").factor, -ambient if _is_absolute(unit) else 0.0)
     if unit in _FACTORS and _FACTORS[unit][1] == target:
         factor = _FACTORS[unit][0]
         return UnitConversion(factor, assumed_gauge=target == "Pa")
@@ -231,11 +231,12 @@ def _example(target: str) -> str:
 _NUMBER = re.compile(r"^\s*(?P<number>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<unit>.*?)\s*$")
 
 
-def quantity(value: float | str, target: str, *, ambient: float = AMBIENT_PRESSURE, where: str = "") -> float:
+def quantity(value: float | str, target: str, *, ambient: float | None = None, where: str = "") -> float:
     """Return a number in SI from `0.3` (already in `target`) or from a text with a unit, `"300 mm"`.
 
-    `ambient` and `where` as for `conversion`. Raises UnitError if the text contains no number, or if its unit is
-    unknown or of the wrong dimension.
+    `ambient` and `where` as for `conversion`; without `ambient` an absolute pressure is an AbsolutePressure by the
+    ambient pressure of the plant whose file is read, else by the standard atmosphere. Raises UnitError if the text
+    contains no number, or if its unit is unknown or of the wrong dimension.
     """
     prefix = f"{where}: " if where else ""
     if isinstance(value, float | int) and not isinstance(value, bool):
@@ -259,10 +260,18 @@ def quantity(value: float | str, target: str, *, ambient: float = AMBIENT_PRESSU
     number = float(match["number"])
     if not math.isfinite(number):
         raise UnitError(f"{prefix}'{value}' is too large.")
+    of_text = ambient_of_texts() if ambient is None else ambient
     try:
-        return float(conversion(match["unit"], target, ambient=ambient, where=where)(number))
+        value = float(conversion(match["unit"], target, ambient=of_text, where=where)(number))
     except UnitError as error:
         raise UnitError(f"{error}{_suggest_unit(match['unit'], target)}") from None
+    is_absolute = ambient is None and target == "Pa" and _is_absolute(match["unit"])
+    return AbsolutePressure(value + of_text, of_text) if is_absolute else value
+
+
+def _is_absolute(unit: str) -> bool:
+    match = _GAUGE_OR_ABSOLUTE.match(unit.strip())
+    return match is not None and match["kind"].lower().startswith("a")
 
 
 def _suggest_unit(unit: str, target: str) -> str:

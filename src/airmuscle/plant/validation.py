@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.absolute_pressure import at_ambient
 from ..core.annotation import one_line
 from ..core.declaration import as_finite_float, check_structure, parameters
 from ..core.errors import ParameterError, TraceError
@@ -33,10 +34,14 @@ def check_parts(
     for muscle in muscles:
         _check_validity_limits(muscle.contractile)
     check_structure((tuple(muscles), tuple(circuits), mechanism))
+    _check_counts(muscles, circuit, circuits, mechanism)
+
+
+def check_supplies(circuits: Sequence[Circuit], ambient: Ambient) -> None:
+    """Raise ParameterError for a placeholder of a supply, and for a supply that cannot exist in the ambient air."""
     for each in circuits:
         check_not_shared(f"Plant: its {type(each).__name__}", each.supply)
         each.supply.check_ambient(ambient)
-    _check_counts(muscles, circuit, circuits, mechanism)
 
 
 def _check_validity_limits(characteristic: Any) -> None:
@@ -101,9 +106,14 @@ def check_free(values: Iterable[str], free: Sequence[str]) -> None:
             raise ParameterError(f"Plant: no coordinate '{name}'; there are {', '.join(free) or 'none'}.")
 
 
-def as_quantity(where: str, value: Any, unit: str) -> float:
-    """A finite number in SI, also from a text with a unit. Raises ParameterError or UnitError."""
-    return quantity(value, unit, where=where) if isinstance(value, str) else as_finite_float(where, value)
+def as_quantity(where: str, value: Any, unit: str, ambient: float) -> float:
+    """A finite number in SI, also from a text with a unit; `ambient` [Pa] converts absolute pressures.
+
+    Raises ParameterError or UnitError.
+    """
+    if isinstance(value, str):
+        return quantity(value, unit, ambient=ambient, where=where)
+    return as_finite_float(where, at_ambient(value, ambient))
 
 
 def check_pressures(pressure: float | str | Sequence[float | str], muscles: int, ambient: Ambient) -> list[float]:
@@ -113,7 +123,7 @@ def check_pressures(pressure: float | str | Sequence[float | str], muscles: int,
     muscles.
     """
     given = pressure if isinstance(pressure, tuple | list) else (pressure,) * muscles
-    pressures = [as_quantity("Plant: the pressure of a state", p, "Pa") for p in given]
+    pressures = [as_quantity("Plant: the pressure of a state", p, "Pa", ambient.pressure) for p in given]
     if len(pressures) != muscles:
         raise ParameterError(f"Plant: {len(pressures)} pressures are given for {muscles} muscles.")
     for each in pressures:

@@ -38,6 +38,7 @@ from pathlib import Path
 from typing import Any
 
 from ..core import tree
+from ..core.absolute_pressure import ambient_pressure
 from ..core.errors import ParameterError
 from ..identify.dynamic import (
     CrossPrediction,
@@ -140,6 +141,12 @@ def load_dynamic_fit(path: str | Path) -> DynamicFitSetup:
     location = Location(str(file), "", file.parent)
     check_keys(tables, _TABLES, location)
     plant = build_plant(required_table(tables, "plant", location), location.inside("plant"))
+    with ambient_pressure(plant.ambient.pressure):
+        return _build_setup(file, tables, location, plant)
+
+
+def _build_setup(file: Path, tables: Mapping[str, Any], location: Location, plant: Plant) -> DynamicFitSetup:
+    """The dynamic fit of a plant, whose ambient pressure is that of the texts."""
     observed = read_observed(required_table(tables, "observed", location), plant, location.inside("observed"))
     rows = tables.get("record")
     if not isinstance(rows, list) or not rows:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.absolute_pressure import ambient_pressure
 from ..core.errors import ParameterError
 from ..identify.dynamic import Experiment, stated_ambient
 from ..library.location import Location, check_keys, located_errors, read_finite_number, read_text
@@ -51,13 +52,14 @@ class Record:
         in_input = self.location.inside("input")
         recording = self._read_recording(observed) if self.given is None else self._cut(self.given)
         plant = self._build_plant(recording)
-        start_time = read_finite_number(self.row.get("start_time", 0.0), "s", f"{self.location}, start_time")
-        signal = build_input_signal(table, plant.input_variables, in_input)
-        with located_errors(in_input):
-            duration = max(float(recording["time"][-1]) - start_time, 1e-9)
-            check_signal(plant, signal, 0.0, duration)
-        initial = optional_table(self.row, "initial_state", self.location)
-        conditions = build_initial_conditions(initial, plant, recording, self.location.inside("initial_state"))
+        with ambient_pressure(plant.ambient.pressure):
+            start_time = read_finite_number(self.row.get("start_time", 0.0), "s", f"{self.location}, start_time")
+            signal = build_input_signal(table, plant.input_variables, in_input)
+            with located_errors(in_input):
+                duration = max(float(recording["time"][-1]) - start_time, 1e-9)
+                check_signal(plant, signal, 0.0, duration)
+            initial = optional_table(self.row, "initial_state", self.location)
+            conditions = build_initial_conditions(initial, plant, recording, self.location.inside("initial_state"))
         return Experiment(recording, signal, conditions, start_time, plant), table
 
     def _build_plant(self, recording: Recording) -> Plant:

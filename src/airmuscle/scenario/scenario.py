@@ -32,6 +32,7 @@ from typing import Any
 
 from ..control.control_loop import ControlLoop
 from ..control.inputs import InputSignal
+from ..core.absolute_pressure import ambient_pressure
 from ..core.errors import FileError, ParameterError, suggestion
 from ..identify.prediction import PlantUncertainty
 from ..library.build import build
@@ -121,6 +122,14 @@ def build_scenario(
     for key in ("plant", "run"):
         _check_table(tables.get(key), key, location)
     plant = plant or build_plant(tables["plant"], location.inside("plant"))
+    with ambient_pressure(plant.ambient.pressure):
+        return _build_run(tables, location, plant, equilibrium)
+
+
+def _build_run(
+    tables: Mapping[str, Any], location: Location, plant: Plant, equilibrium: dict[str, float] | None
+) -> Scenario:
+    """The scenario of a plant, whose ambient pressure is that of the texts."""
     run, in_run = tables["run"], location.inside("run")
     check_keys(run, RUN, in_run)
     if "duration" not in run:
@@ -191,14 +200,15 @@ def _read_duration(table: Mapping[str, Any], key: str, location: Location) -> fl
     return duration
 
 
-def initial_pressure(tables: Mapping[str, Any], location: Location) -> float | None:
-    """Gauge pressure [Pa] of the initial equilibrium of a run; None if the run starts from another state."""
+def initial_pressure(tables: Mapping[str, Any], location: Location, plant: Plant) -> float | None:
+    """Gauge pressure [Pa] of the initial equilibrium of a plant; None if the run starts from another state."""
     start = tables["run"].get("initial_state", DEFAULT_INITIAL_STATE)
     if not isinstance(start, Mapping) or set(start) - {"pressure"}:
         return None
-    return read_finite_number(
-        start.get("pressure", 0.0), "Pa", f"{location.inside('run').inside('initial_state')}, pressure"
-    )
+    with ambient_pressure(plant.ambient.pressure):
+        return read_finite_number(
+            start.get("pressure", 0.0), "Pa", f"{location.inside('run').inside('initial_state')}, pressure"
+        )
 
 
 def _read_columns(table: Mapping[str, Any], known: Sequence[str], location: Location) -> tuple[str, ...]:

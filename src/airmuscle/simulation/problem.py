@@ -67,7 +67,7 @@ class Problem(ShortRepr):
         object.__setattr__(self, "integrator", default_integrator(self.integrator))
         self._check_time()
         if isinstance(self.input, ControlLoop):
-            object.__setattr__(self, "input", designed_loop(self.input))
+            object.__setattr__(self, "input", designed_loop(self.input, self.system))
             known = self.compiled.description
             self.input.check_columns((*known.state_names, *known.output_names), known.input_names)
             if self.control_state is None:

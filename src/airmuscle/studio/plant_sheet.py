@@ -57,7 +57,7 @@ def sheet_of_tables(
         "provenance": str(tables.get("provenance", _SOURCES[0])),
         "note": str(tables.get("note", "")),
         "warning": str(tables.get("warning", "")),
-        "start_equilibrium": initial_pressure(tables, location) is not None,
+        "start_equilibrium": initial_pressure(tables, location, scenario.plant) is not None,
         "duration": scenario.problem.duration,
         "values": program.system.defaults.tolist(),
         "parameters": _parameter_rows(plant, sources),

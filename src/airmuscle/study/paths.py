@@ -17,10 +17,12 @@ from typing import Any
 import numpy as np
 
 from ..control.control_loop import ControlLoop
+from ..core.absolute_pressure import AbsolutePressure
 from ..core.arrays import Array
 from ..core.declaration import parameters
 from ..core.errors import ParameterError, suggestion
-from ..core.tree import flatten, leaves, with_parameters
+from ..core.tree import absolute_pressures, flatten, leaves, with_parameters
+from ..core.units import ABSOLUTE
 from ..library.location import Location
 from ..library.models import model_class
 from ..scenario.controller import controller_number_paths
@@ -77,15 +79,20 @@ class ScenarioTemplate:
         None for a run whose initial state must be computed individually. The values are not validated.
         """
         plant, individually = self.scenario.plant, [None] * len(values)
-        pressure = initial_pressure(self.tables, self.location)
+        pressure = initial_pressure(self.tables, self.location, plant)
         if pressure is None or any(
-            not isinstance(p.location, int) and p.location[:2] == ("run", "initial_state") for p in varied
+            p.location[:2] == ("run", "initial_state")
+            if not isinstance(p.location, int)
+            else p.unit == ABSOLUTE and isinstance(pressure, AbsolutePressure)
+            for p in varied
         ):
             return list(individually)
         leaf_values = np.repeat(flatten(plant)[None, :], len(values), axis=0)
-        for parameter, column in zip(varied, values.T, strict=True):
-            if isinstance(parameter.location, int):
-                leaf_values[:, parameter.location] = column
+        of_plant = {p.path: column for p, column in zip(varied, values.T, strict=True) if isinstance(p.location, int)}
+        of_plant |= absolute_pressures(plant, of_plant)
+        for place, leaf in enumerate(leaves(plant)):
+            if leaf.path in of_plant:
+                leaf_values[:, place] = of_plant[leaf.path]
         pressures, inputs = (pressure,) * len(plant.muscles), np.zeros(len(plant.inputs))
         states = find_equilibrium_of_each(self.scenario.problem.compiled, leaf_values, pressures, inputs)
         names = [s.name for s in plant.states]
@@ -102,7 +109,7 @@ class ScenarioTemplate:
         The initial state is computed, unless `initial_state` is given. Raises ParameterError or PhysicsError.
         """
         scenario, tables = self.scenario, self.tables
-        leaf_values = flatten(scenario.plant).tolist()
+        leaf_values = [leaf.value for leaf in leaves(scenario.plant)]
         for parameter, value in zip(varied, values, strict=True):
             if isinstance(parameter.location, int):
                 leaf_values[parameter.location] = float(value)

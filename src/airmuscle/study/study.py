@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..core.absolute_pressure import ambient_pressure
 from ..core.errors import ParameterError, suggestion
 from ..core.fingerprint import fingerprint
 from ..core.short_repr import ShortRepr
@@ -133,6 +134,12 @@ def load_study(path: str | Path) -> Study:
     location = Location(str(file), "", file.parent)
     check_keys(tables, TABLES, location)
     template = _read_scenario(tables.get("scenario"), location)
+    with ambient_pressure(template.scenario.plant.ambient.pressure):
+        return _build_study(file, tables, location, template)
+
+
+def _build_study(file: Path, tables: Mapping[str, Any], location: Location, template: ScenarioTemplate) -> Study:
+    """The study of a scenario, whose ambient pressure is that of the texts."""
     vary = _require_table(tables, "vary", location)
     parameters = {path: template.parameter(path, str(location.inside("vary"))) for path in vary}
     variations = [_read_variation(vary[path], parameter, location) for path, parameter in parameters.items()]

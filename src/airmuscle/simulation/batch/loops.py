@@ -177,7 +177,7 @@ class LoopBatch:
         return columns
 
 
-def loops_of(given: Any) -> tuple[ControlLoop, ...] | None:
+def loops_of(given: Any, system: System) -> tuple[ControlLoop, ...] | None:
     """The control loops among the inputs of a batch; None where its inputs are signals.
 
     Raises ParameterError where signals and loops are mixed, or loops of different controllers.
@@ -188,7 +188,7 @@ def loops_of(given: Any) -> tuple[ControlLoop, ...] | None:
         return None
     if len(loops) < len(inputs):
         raise ParameterError("simulate_batch: the inputs are control loops and signals; give one kind for all plants.")
-    distinct = {id(loop): designed_loop(loop) for loop in loops}
+    distinct = {id(loop): designed_loop(loop, system) for loop in loops}
     loops = tuple(distinct[id(loop)] for loop in loops)
     first = _names(loops[0])
     for row, loop in enumerate(loops):

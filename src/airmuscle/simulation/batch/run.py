@@ -71,8 +71,8 @@ def simulate_batch(
     Raises ParameterError for an impossible path, value, initial state, input or column; the row is named. An
     interrupted batch (Ctrl-C) is returned as far as it was computed; the other plants have Status.INTERRUPTED.
     """
-    loops = loops_of(input)
     check_system("simulate_batch", plant)
+    loops = loops_of(input, plant)
     duration = as_float("simulate_batch: duration", duration)
     start_time = as_float("simulate_batch: start_time", start_time)
     integrator = default_integrator(integrator)

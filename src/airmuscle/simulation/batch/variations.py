@@ -156,6 +156,9 @@ def variations_of(system: Any, given: Mapping[str, npt.ArrayLike], count: int | 
                 "Its paths are those of airmuscle.core.tree.leaves(plant)."
             )
         columns.append(_column(leaves[path][1], values))
+    follow = tree.absolute_pressures(system, dict(zip(given, columns, strict=True)))
+    given = {**given, **follow}
+    columns += [_column(leaves[path][1], values) for path, values in follow.items()]
     sizes = {path: len(column) for path, column in zip(given, columns, strict=True)}
     if len({*sizes.values(), *(() if count is None else (count,))}) > 1:
         others = "" if count is None else f", and initial states or inputs for {count}"

@@ -25,7 +25,8 @@ def air_of_each(plant: Plant, pressure: MuscleValues, air_mass: MuscleValues) ->
     name, given, unit = ("pressure", pressure, "Pa") if air_mass is None else ("air_mass", air_mass, "kg")
     where = f"find_equilibrium: {name}"
     several: Sequence[Any] = given if isinstance(given, tuple | list) else (given,) * len(plant.muscles)
-    values = [quantity(value, unit, where=where) if isinstance(value, str) else value for value in several]
+    ambient = plant.ambient.pressure
+    values = [quantity(v, unit, ambient=ambient, where=where) if isinstance(v, str) else v for v in several]
     if len(values) != len(plant.muscles):
         raise ParameterError(
             f"find_equilibrium: {name} has {len(values)} values; the plant has {len(plant.muscles)} muscles."

@@ -16,7 +16,7 @@ from ...control.parameter_units import parameter_units
 from ...core.errors import AirmuscleWarning, FileError, ParameterError, suggestion
 from ...core.short_repr import ShortRepr
 from ...core.tree import Leaf, leaves
-from ...core.units import quantity
+from ...core.units import conversion, quantity
 from ...library.files import is_path, list_plants, read_toml
 from ...library.law_file import load_law
 from ...library.location import Location, located_errors
@@ -122,8 +122,13 @@ class ScenarioLoop(ShortRepr):
                 f"{', '.join(known)}.{suggestion(path, known)}"
             )
         unit = self.unit(known[path])
-        first, second = (_read_bound(value, unit, f"bounds '{text}'") for value in (low, high))
+        first, second = (_read_bound(value, unit, self.ambient, f"bounds '{text}'") for value in (low, high))
         return path, (first, second)
+
+    @property
+    def ambient(self) -> float:
+        """Ambient pressure [Pa] of the plant."""
+        return self.scenario.plant.ambient.pressure
 
     def unit(self, leaf: Leaf) -> str:
         """The unit of a parameter of the controller or of a law inside it."""
@@ -146,7 +151,7 @@ class ScenarioLoop(ShortRepr):
             for key in keys:
                 table = table[key]
             present = table[last] if isinstance(last, int) or last in table else None
-            table[last] = _written(value, present, self.unit(known[path]))
+            table[last] = _written(value, present, self.unit(known[path]), self.ambient)
         return tomlkit.dumps(document)
 
     def save(self, gains: Mapping[str, float], path: Path) -> Path:
@@ -220,22 +225,22 @@ def _default_range(leaf: Leaf) -> tuple[float, float]:
     return max(low, smallest), min(high, greatest)
 
 
-def _read_bound(text: str, unit: str, where: str) -> float:
+def _read_bound(text: str, unit: str, ambient: float, where: str) -> float:
     """A bound [SI], from a text with a unit, or a number in SI units."""
     try:
         return float(text)
     except ValueError:
-        return quantity(text, unit, where=where)
+        return quantity(text, unit, ambient=ambient, where=where)
 
 
-def _written(value: float, present: Any, unit: str) -> Any:
+def _written(value: float, present: Any, unit: str, ambient: float) -> Any:
     """A number [SI] in the form of the present entry: in the unit of its text, or as a number."""
     if not isinstance(present, str):
         return value
     written = re.sub(r"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*", "", present)
-    factor = quantity(f"1 {written}", unit, where="gain")
+    change = conversion(written, unit, ambient=ambient, where="gain")
     for digits in range(4, 18):
-        number = f"{value / factor:.{digits}g}"
-        if math.isclose(quantity(f"{number} {written}", unit, where="gain"), value, rel_tol=ROUNDING):
+        number = f"{(value - change.offset) / change.factor:.{digits}g}"
+        if math.isclose(change(float(number)), value, rel_tol=ROUNDING):
             break
     return f"{number} {written}".strip()
