@@ -13,7 +13,6 @@ from ..core.diagnostics import ColumnLimit, Columns, Diagnostic, DiagnosticCode
 from ..core.errors import GeometryLimitError
 from ..core.ops import Value
 from ..core.system import System
-from ..core.tree import with_ambient
 from ..core.variables import Input, StateVariable, add_prefix, select_prefix, with_prefix
 from ..mechanism import Mechanism
 from ..muscle import Muscle
@@ -25,7 +24,7 @@ from .display import PlantDisplay
 from .evaluation import PlantEvaluation
 from .muscle_state import MuscleState, air_states, muscle_outputs, muscle_state, states_of_muscle
 from .steady_state import fill_muscles, settle_muscles
-from .validation import as_quantity, check_free, check_parts, check_pressures, check_supplies, check_unique
+from .validation import as_quantity, check_free, check_parts, check_pressures, check_unique, convert_pressures
 
 _AIR_STATES = ("air_mass", "internal_energy")
 _ROUNDING = 1e-3
@@ -51,17 +50,7 @@ class Plant(PlantDisplay, System):
 
     def check(self) -> None:
         check_parts(self.muscles, self.circuit, self.circuits, self.mechanism, self.gas, self.ambient)
-        for name in (
-            "muscle",
-            "circuit",
-            "mechanism",
-            "gas",
-        ):  # absolute pressures were stated without this ambient air
-            part = with_ambient(getattr(self, name), self.ambient.pressure)
-            if part is not getattr(self, name):
-                object.__setattr__(self, name, part)
-                self.__dict__.pop(f"{name}s", None)
-        check_supplies(self.circuits, self.ambient)
+        convert_pressures(self)
         check_unique([*(s.name for s in self.states), *self.inputs])
 
     @functools.cached_property
@@ -238,8 +227,7 @@ class Plant(PlantDisplay, System):
         air = {f"{p}{s.name}" for p, m in muscles for s in air_states(m, self.gas, self.ambient)}
         units = {s.name: s.unit for s in self.states if s.name not in air}
         check_free(values, list(units))
-        ambient = self.ambient.pressure
-        given = {n: as_quantity(f"Plant: the {n} of a state", value, units[n], ambient) for n, value in values.items()}
+        given = {n: as_quantity(f"Plant: the {n} of a state", v, units[n], self.ambient) for n, v in values.items()}
         state: dict[str, Value] = {n: 0.0 for c in self.mechanism.coordinates for n in (c.name, c.speed)} | given
         contractions = self.mechanism.contractions(state, self.resting_lengths)
         for muscle, contraction in zip(self.muscles, contractions, strict=True):

@@ -11,6 +11,7 @@ from ..core.absolute_pressure import at_ambient
 from ..core.annotation import one_line
 from ..core.declaration import as_finite_float, check_structure, parameters
 from ..core.errors import ParameterError, TraceError
+from ..core.tree import with_ambient
 from ..core.units import check_above_vacuum, quantity
 from ..mechanism import Mechanism
 from ..muscle import Muscle
@@ -37,11 +38,19 @@ def check_parts(
     _check_counts(muscles, circuit, circuits, mechanism)
 
 
-def check_supplies(circuits: Sequence[Circuit], ambient: Ambient) -> None:
-    """Raise ParameterError for a placeholder of a supply, and for a supply that cannot exist in the ambient air."""
-    for each in circuits:
+def convert_pressures(plant: Any) -> None:
+    """Convert the pressures that parts of a plant state as absolute with its ambient air, then check supplies.
+
+    Raises ParameterError for a placeholder of a supply, and for a supply that cannot exist in the ambient air.
+    """
+    for name in ("muscle", "circuit", "mechanism"):
+        part = with_ambient(getattr(plant, name), plant.ambient.pressure)
+        if part is not getattr(plant, name):
+            object.__setattr__(plant, name, part)
+            plant.__dict__.pop(f"{name}s", None)  # derived from the part before
+    for each in plant.circuits:
         check_not_shared(f"Plant: its {type(each).__name__}", each.supply)
-        each.supply.check_ambient(ambient)
+        each.supply.check_ambient(plant.ambient)
 
 
 def _check_validity_limits(characteristic: Any) -> None:
@@ -106,14 +115,14 @@ def check_free(values: Iterable[str], free: Sequence[str]) -> None:
             raise ParameterError(f"Plant: no coordinate '{name}'; there are {', '.join(free) or 'none'}.")
 
 
-def as_quantity(where: str, value: Any, unit: str, ambient: float) -> float:
-    """A finite number in SI, also from a text with a unit; `ambient` [Pa] converts absolute pressures.
+def as_quantity(where: str, value: Any, unit: str, ambient: Ambient) -> float:
+    """A finite number in SI, also from a text with a unit; absolute pressures are converted with `ambient`.
 
     Raises ParameterError or UnitError.
     """
     if isinstance(value, str):
-        return quantity(value, unit, ambient=ambient, where=where)
-    return as_finite_float(where, at_ambient(value, ambient))
+        return quantity(value, unit, ambient=ambient.pressure, where=where)
+    return as_finite_float(where, at_ambient(value, ambient.pressure))
 
 
 def check_pressures(pressure: float | str | Sequence[float | str], muscles: int, ambient: Ambient) -> list[float]:
@@ -123,7 +132,7 @@ def check_pressures(pressure: float | str | Sequence[float | str], muscles: int,
     muscles.
     """
     given = pressure if isinstance(pressure, tuple | list) else (pressure,) * muscles
-    pressures = [as_quantity("Plant: the pressure of a state", p, "Pa", ambient.pressure) for p in given]
+    pressures = [as_quantity("Plant: the pressure of a state", p, "Pa", ambient) for p in given]
     if len(pressures) != muscles:
         raise ParameterError(f"Plant: {len(pressures)} pressures are given for {muscles} muscles.")
     for each in pressures:
