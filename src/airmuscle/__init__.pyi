@@ -10,6 +10,8 @@ from . import muscle as muscle
 from . import plant as plant
 from . import pneumatics as pneumatics
 from . import recording as recording
+from . import report as report
+from . import scenario as scenario
 from . import simulation as simulation
 from . import sizing as sizing
 from . import study as study

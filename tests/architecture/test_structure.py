@@ -15,6 +15,8 @@ from pathlib import Path
 
 import pytest
 
+import airmuscle
+
 ROOT = Path(__file__).resolve().parents[2]
 SOURCE = ROOT / "src" / "airmuscle"
 FILES = sorted(SOURCE.rglob("*.py"))
@@ -69,17 +71,15 @@ def test_no_module_has_a_meaningless_name():
 
 
 def test_the_top_level_has_50_names_at_most():
-    airmuscle = pytest.importorskip("airmuscle")
-    names = getattr(airmuscle, "__all__", ())
+    """Besides its subpackages, the errors and the parts of a muscle."""
+    names = [name for name in airmuscle.__all__ if not inspect.ismodule(getattr(airmuscle, name))]
     assert len(names) <= 50
-    assert [name for name in names if not hasattr(airmuscle, name)] == []
 
 
-def test_type_checkers_read_the_names_that_the_face_imports_on_use():
-    airmuscle = pytest.importorskip("airmuscle")
-    statements = tree_of(SOURCE / "__init__.pyi").body
-    names = {alias.name for node in statements if isinstance(node, ast.ImportFrom) for alias in node.names}
-    assert names | {"__version__"} == set(dir(airmuscle))
+def test_names_that_are_imported_on_use_exist():
+    """Of every face with a stub, which type checkers and the program read alike."""
+    faces = [airmuscle, *(importlib.import_module(f"airmuscle.{path.parent.name}") for path in SOURCE.glob("*/*.pyi"))]
+    assert {f"{face.__name__}.{name}" for face in faces for name in face.__all__ if not hasattr(face, name)} == set()
 
 
 # Independence of packages and laws
@@ -215,18 +215,9 @@ def is_own(node: ast.AST) -> bool:
 
 
 def own_imports_below_the_top(path: Path) -> list[ast.AST]:
-    """Imports from airmuscle inside functions, classes and conditions.
-
-    A face whose names are imported on use (`__getattr__`) lists them for type checkers under `if TYPE_CHECKING`.
-    """
+    """Imports from airmuscle inside functions, classes and conditions."""
     tree = tree_of(path)
-    top = list(tree.body)
-    if any(isinstance(node, ast.FunctionDef) and node.name == "__getattr__" for node in tree.body):
-        blocks = [
-            node for node in tree.body if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING")
-        ]
-        top += [statement for block in blocks for statement in block.body]
-    return [node for node in ast.walk(tree) if is_own(node) and node not in top]
+    return [node for node in ast.walk(tree) if is_own(node) and node not in tree.body]
 
 
 def test_own_imports_are_at_the_top_of_a_file():
@@ -237,12 +228,10 @@ def test_own_imports_are_at_the_top_of_a_file():
 def test_modules_are_imported_by_name_in_few_files_only():
     files = {name_of(path) for path in FILES if "import_module(" in path.read_text(encoding="utf-8")}
     assert files <= {
-        "__init__.py",  # names of the face that are imported on use
         "__main__.py",  # the command line, within the handling of an interruption
         "cli/app.py",  # the module of a command
         "cli/entry_point.py",  # the command line, after SIGINT is handled
         "compile/cache/kernel.py",  # kernels that are not in the cache
-        "environments/__init__.py",  # names of the face that are imported on use
         "library/models.py",  # models named in TOML files
         "recording/optional_dependency.py",  # readers of laboratory formats
         "recording/separate_process.py",  # readers in native code

@@ -1,0 +1,10 @@
+from .arm import ArmReaching as ArmReaching
+from .joint import JointTracking as JointTracking
+from .lift import LoadLifting as LoadLifting
+from .randomisation import FactorRange as FactorRange
+from .randomisation import FitUncertainty as FitUncertainty
+from .randomisation import Randomisation as Randomisation
+from .randomisation import ValueRange as ValueRange
+from .registration import register_environments as register_environments
+from .task import EnvironmentTask as EnvironmentTask
+from .task import Observation as Observation

@@ -1,0 +1,10 @@
+from .identification import DynamicFitSetup as DynamicFitSetup
+from .identification import load_dynamic_fit as load_dynamic_fit
+from .prediction import PlantModel as PlantModel
+from .prediction import load_plant_model as load_plant_model
+from .scenario import Scenario as Scenario
+from .scenario import load_scenario as load_scenario
+from .schema import muscle_schema as muscle_schema
+from .schema import scenario_schema as scenario_schema
+from .write import save_scenario as save_scenario
+from .write import scenario_text as scenario_text
