@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -66,7 +67,7 @@ def _select(recordings: list[Recording], given: list[Candidate] | None, request:
             recordings, given, leave_out=options.split, both=both, workers=available_cores(),
             progress=lambda name, fraction: show(fraction),
         )  # fmt: skip
-    return dataclasses.replace(selection, comparisons=tuple(map(_with_option_names, selection.comparisons)))
+    return dataclasses.replace(selection, comparisons=tuple(_with_option_names(selection.comparisons)))
 
 
 def _selection_to_dict(selection: LawSelection) -> dict[str, Any]:
@@ -79,10 +80,14 @@ def _selection_to_dict(selection: LawSelection) -> dict[str, Any]:
     return data | {"recommended": name, "reason": selection.reason, "fit": fit, "purposes": purposes}
 
 
-def _with_option_names(comparison: Comparison) -> Comparison:
-    """The comparison whose reasons of exclusion name command-line options instead of Python arguments."""
-    excluded = tuple(dataclasses.replace(each, reason=in_options(each.reason, "fit")) for each in comparison.excluded)
-    return dataclasses.replace(comparison, excluded=excluded)
+def _with_option_names(comparisons: Sequence[Comparison]) -> Iterator[Comparison]:
+    """The comparisons with command-line options instead of Python arguments in their texts, and each note once."""
+    stated: dict[str, None] = {}
+    for each in comparisons:
+        excluded = tuple(dataclasses.replace(model, reason=in_options(model.reason, "fit")) for model in each.excluded)
+        notes = [note for text in each.notes if (note := in_options(text, "fit")) not in stated]
+        stated |= dict.fromkeys(notes)
+        yield dataclasses.replace(each, excluded=excluded, notes=tuple(notes))
 
 
 def _candidates(

@@ -87,6 +87,7 @@ INSTRUCTIONS: Mapping[str, Mapping[str, Instruction]] = {
         **_FILES,
         "fixed": _fix,
         "censoring": _censoring,
+        "loss": lambda hint: f"use --robust '{hint.value.scale:g} N'",
         "sigma": lambda hint: "use --equal-weights",
         "by": _leave_out,
         "leave_out": _leave_out,

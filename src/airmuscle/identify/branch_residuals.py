@@ -14,11 +14,12 @@ from ..core.hints import Hint, HintedText
 from ..recording import Recording
 from ..recording.columns import QUANTITIES
 from ..recording.segment import branch_directions, estimate_sensors, find_branches
+from ..recording.segment.branches import branch_name
 
 MIN_BRANCH_ROWS = 5
 """Minimum number of rows of a branch (chosen); the jump between two levels of a map is no branch."""
-PRESSURE_BINS = 12
-"""Intervals of pressure in each recording within which the two branches are compared (chosen)."""
+BINS = 12
+"""Intervals of the driven quantity in each recording within which the two branches are compared (chosen)."""
 MIN_BINS = 3
 """Minimum number of intervals with rows of both branches (chosen)."""
 MIN_STANDARD_ERRORS = 3.0
@@ -26,58 +27,72 @@ MIN_STANDARD_ERRORS = 3.0
 
 
 class _BranchBins(NamedTuple):
-    """Mask of the rows with a pressure; of these the direction (1 inflating, -1 deflating) and the interval."""
+    """Mask of the rows with a pressure; of these the direction (1 inflating or contracting, -1 deflating or extending)
+    and the interval of the driven quantity, whose column is named."""
 
     known: npt.NDArray[np.bool_]
     direction: Array
     bins: npt.NDArray[np.intp]
+    column: str
 
 
 _known: weakref.WeakKeyDictionary[Recording, _BranchBins] = weakref.WeakKeyDictionary()
 """Branches by recording: a comparison asks for the same recordings for every law."""
 
 
-def branch_notes(runs: Sequence[Recording], residuals: Sequence[Array], quantity: str) -> list[str]:
-    """The remark that the residuals of a fit follow two branches; empty if they do not.
+def branch_distance(runs: Sequence[Recording], residuals: Sequence[Array], quantity: str) -> float:
+    """The distance [SI] of the two branches that the residuals of a fit follow; 0 if they follow none.
 
     runs        the recordings of the fit
     residuals   residual (model - measured) of each row of each recording [SI], NaN for rows that are not measured
     quantity    name of the fitted quantity
 
-    The means of both branches are compared at equal pressure, so that an error of the law that both share does not
-    count. Their average difference must exceed three standard errors and the standard deviation of the sensor.
+    The medians of both branches are compared at equal driven quantity, so that neither an error of the law that both
+    share nor an outlier counts. Their average difference must exceed three standard errors and the standard deviation
+    of the sensor.
     """
     differences = np.concatenate([_branch_differences(*pair) for pair in zip(runs, residuals, strict=True)])
     if differences.size < MIN_BINS:
-        return []
+        return 0.0
     mean = abs(float(np.mean(differences)))
     standard_error = float(np.std(differences, ddof=1) / np.sqrt(differences.size))
     if mean <= MIN_STANDARD_ERRORS * standard_error or mean <= _sensor_deviation(runs, quantity):
+        return 0.0
+    return mean
+
+
+def branch_notes(runs: Sequence[Recording], distance: float, quantity: str, *, delayed: bool = False) -> list[str]:
+    """The remark that the residuals of a fit follow two branches at a distance [SI]; empty without a distance.
+
+    `delayed` is whether a delay of a sensor explains them, so that they are not friction.
+    """
+    if not distance:
         return []
     unit = QUANTITIES[quantity].unit
-    distance = f"{100 * mean:.3g} %" if unit == "1" else f"{mean:.3g} {unit}"
+    text = f"{100 * distance:.3g} %" if unit == "1" else f"{distance:.3g} {unit}"
+    columns = {column for run in runs if (column := _known[run].column)}
+    names = [" and ".join(branch_name(column, d) for d in (1, -1)) for column in sorted(columns, reverse=True)]
     return [
         HintedText(
-            f"The residuals follow two branches, {distance} apart on average (inflating and deflating).",
-            Hint("To identify the friction", function="identify.hysteresis.fit_hysteresis"),
+            f"The residuals follow two branches, {text} apart on average ({'; '.join(dict.fromkeys(names))}).",
+            *([] if delayed else [Hint("To identify the friction", function="identify.hysteresis.fit_hysteresis")]),
         )
     ]
 
 
 def _branch_differences(run: Recording, residuals: Array) -> Array:
-    """Mean residual of the inflating minus that of the deflating rows, by interval of pressure; shape (intervals,)."""
+    """Median residual of inflating or contracting rows minus that of the others, by interval; shape (intervals,)."""
     if run not in _known:
         _known[run] = _branch_bins(run)
-    known, direction, bins = _known[run]
+    known, direction, bins, _ = _known[run]
     if not direction.any():
         return np.zeros(0)
     values = residuals[known]
     used = np.isfinite(values) & (direction != 0)
     cell = 2 * bins[used] + (direction[used] > 0)
-    counts = np.bincount(cell, minlength=2 * PRESSURE_BINS).reshape(PRESSURE_BINS, 2)
-    sums = np.bincount(cell, values[used], minlength=2 * PRESSURE_BINS).reshape(PRESSURE_BINS, 2)
-    down, up = (sums / np.maximum(counts, 1)).T
-    return np.asarray((up - down)[(counts > 0).all(axis=1)])
+    parts = np.split(values[used][np.argsort(cell, kind="stable")], np.cumsum(np.bincount(cell, minlength=2 * BINS)))
+    down, up = parts[0 : 2 * BINS : 2], parts[1 : 2 * BINS : 2]
+    return np.array([float(np.median(a) - np.median(b)) for a, b in zip(up, down, strict=True) if a.size and b.size])
 
 
 def _branch_bins(run: Recording) -> _BranchBins:
@@ -85,10 +100,11 @@ def _branch_bins(run: Recording) -> _BranchBins:
     complete = run.rows(known)
     branches = tuple(each for each in find_branches(complete) if len(each.interval) >= MIN_BRANCH_ROWS)
     if len({branch.direction for branch in branches}) < 2:
-        return _BranchBins(known, np.zeros(0), np.zeros(0, dtype=np.intp))
-    pressure = complete["pressure"]
-    edges = np.linspace(pressure.min(), pressure.max(), PRESSURE_BINS + 1)[1:-1]
-    return _BranchBins(known, branch_directions(complete, branches), np.digitize(pressure, edges))
+        return _BranchBins(known, np.zeros(0), np.zeros(0, dtype=np.intp), "")
+    column = branches[0].column
+    driven = complete[column]
+    edges = np.linspace(driven.min(), driven.max(), BINS + 1)[1:-1]
+    return _BranchBins(known, branch_directions(complete, branches), np.digitize(driven, edges), column)
 
 
 def _sensor_deviation(runs: Sequence[Recording], quantity: str) -> float:

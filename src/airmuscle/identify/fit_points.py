@@ -17,6 +17,7 @@ from ..muscle.characteristic.base import Characteristic, ForceLaw
 from ..recording import Recording
 from ..recording.segment import ISOBARIC, ISOMETRIC, find_runs
 from .censoring import Censoring, default_censoring, force_limits
+from .data_checks import DataChecks
 from .problem import RESTING_LENGTH, FitProblem, fitted_quantity_of, make_problem
 from .weights import sensor_deviations
 
@@ -58,6 +59,11 @@ class FitPoints:
     def dropped(self) -> int:
         """Number of rows with a missing value."""
         return int(np.count_nonzero(self.missing))
+
+    @functools.cached_property
+    def checks(self) -> DataChecks:
+        """Contradictions, suspicious values and scatter of the recordings."""
+        return DataChecks.of(self.recordings)
 
     def deviations(self, quantity: str) -> Array | None:
         """The standard deviations of the sensors by recording; None unless they differ."""

@@ -35,7 +35,7 @@ class Comparison(ShortRepr):
     """Standard candidates whose initial values do not follow from the data; empty if candidates were given."""
 
     notes: tuple[str, ...] = ()
-    """Remarks on the data, such as a resting length that is probably recorded wrongly."""
+    """Remarks on the data and on the fit of the recommended law, such as contradicting rows or two branches."""
 
     @property
     def purpose(self) -> str:
@@ -130,7 +130,7 @@ def _comparison(
         raise IdentificationError(HintedText(f"the data determine none of the {len(excluded)} candidates.", *reasons))
     ranking.sort(key=lambda m: (m.cross_validated_rmse, m.parameter_count))
     recommended, reason = recommend(ranking, split)
-    remarks = length_notes(find_length_errors(recommended.fit.model, runs))
+    remarks = (*recommended.fit.notes, *length_notes(find_length_errors(recommended.fit.model, runs)))
     return Comparison(tuple(ranking), excluded, split, recommended, reason, unavailable, remarks)
 
 

@@ -18,6 +18,7 @@ from ..muscle.characteristic.base import Characteristic
 from ..muscle.characteristic.validity_range import ValidityRange
 from ..recording import Recording
 from .correlation_index import CorrelationIndex
+from .data_checks.scatter import Scatter
 from .loss import Loss
 from .plot import plot_fit
 from .problem import CONTRACTION, FORCE, FitProblem, FittedQuantity, evaluate
@@ -91,6 +92,8 @@ class Fit(NotebookDisplay):
     """The fitted problem, for refits: data, targets, weights and free parameters."""
     loss: Loss
     notes: tuple[str, ...] = ()
+    scatter: Scatter | None = None
+    """Noise and repeatability of the measured force; None for laws that give contraction or pressure."""
     effects: SpecimenEffects | None = None
     """The effects of the specimens on a PooledLengthLaw. Estimates and problem are those of its population law."""
 
@@ -197,6 +200,7 @@ class Fit(NotebookDisplay):
         return [
             ("rows", f"{self.rows_used} used, {self.rows_censored} of them censored; {self.rows_dropped} dropped"),
             ("rms error", self.format_residual(self.rmse)),
+            *([("scatter of data", str(self.scatter))] if self.scatter and str(self.scatter) else []),
             ("maximum error", f"{self.format_residual(worst.error)} {point}"),
             ("residual std", self.format_residual(self.sigma)),
             ("R2", r2),

@@ -15,7 +15,7 @@ from ..core.hints import Hint, HintedText
 from ..muscle.characteristic import PooledLengthLaw
 from ..muscle.characteristic.base import Characteristic
 from ..recording import Recording
-from .branch_residuals import branch_notes
+from .branch_residuals import branch_distance, branch_notes
 from .censoring import UNCENSORED, Censoring, default_censoring
 from .correlation_index import correlation_index
 from .fit_arguments import check_arguments
@@ -23,7 +23,7 @@ from .fit_points import POINT_COLUMNS, FitPoints
 from .gauss_newton import gauss_newton
 from .loss import LeastSquares, Loss
 from .pooling import check_poolable, pool, refit_pooled
-from .problem import FitProblem, evaluate
+from .problem import FORCE, FitProblem, evaluate
 from .result import Estimate, Fit, WorstPoint
 from .solver import LeastSquaresSolution, is_linear, solve
 from .statistics import FitStatistics, check_determined, check_determined_by_levels, compute_statistics
@@ -74,11 +74,21 @@ def fit_to_points(
     fixed: Collection[str] = (),
 ) -> Fit:
     """As `fit`, for points whose sensors and runs are estimated once for several laws."""
-    if isinstance(characteristic, PooledLengthLaw):
+    if not isinstance(characteristic, PooledLengthLaw):
+        result = _fit_law(characteristic, points, loss, censoring, sigma, fixed)
+    else:
         check_poolable(characteristic, points)
-        population = characteristic.population
-        base = fit_to_points(population, points, loss=loss, censoring=censoring, sigma=sigma, fixed=fixed)
-        return pool(characteristic, base, points)
+        result = pool(
+            characteristic, _fit_law(characteristic.population, points, loss, censoring, sigma, fixed), points
+        )
+    misfit = [] if result.scatter is None else result.scatter.misfit_notes(result.rmse, result.data_ranges["force"][1])
+    return dataclasses.replace(result, notes=(*points.checks.notes, *result.notes, *misfit))
+
+
+def _fit_law(
+    characteristic: Characteristic, points: FitPoints, loss: Loss, censoring: Censoring | None,
+    sigma: npt.ArrayLike | None, fixed: Collection[str],
+) -> Fit:  # fmt: skip
     problem = points.problem(characteristic, censoring=censoring, sigma=sigma, fixed=fixed)
     solution = solve(problem, loss)
     statistics = compute_statistics(problem, solution, loss)
@@ -86,8 +96,14 @@ def fit_to_points(
     by_recording = None if sigma is not None else points.deviations(problem.fitted_quantity.name)
     notes = (*_collect_notes(problem, statistics, loss, points.dropped), *_weighting_notes(by_recording, problem))
     notes += _loss_scale_notes(problem, solution, loss)
-    notes += _branch_notes(points, problem, solution)
-    return _build_result(problem, solution, statistics, loss, points.dropped, notes)
+    distance = _branch_distance(points, problem, solution)
+    notes += tuple(
+        branch_notes(points.recordings, distance, problem.fitted_quantity.name, delayed=points.checks.delay is not None)
+    )
+    result = _build_result(problem, solution, statistics, loss, points.dropped, notes)
+    if problem.fitted_quantity != FORCE:
+        return result
+    return dataclasses.replace(result, scatter=dataclasses.replace(points.checks.scatter, branches=distance))
 
 
 def refit(
@@ -256,14 +272,14 @@ def _loss_scale_notes(problem: FitProblem, solution: LeastSquaresSolution, loss:
     )
 
 
-def _branch_notes(points: FitPoints, problem: FitProblem, solution: LeastSquaresSolution) -> tuple[str, ...]:
-    """A remark where the residuals of inflating and deflating rows differ."""
+def _branch_distance(points: FitPoints, problem: FitProblem, solution: LeastSquaresSolution) -> float:
+    """The distance of the residuals of opposite directions of motion [SI]; 0 where they do not differ."""
     residuals = np.full(len(points.joined), np.nan)
     quantity = problem.fitted_quantity.name
     differences = solution.modelled - problem.data[quantity]
     residuals[~points.missing] = np.where(problem.censoring == 0, differences, np.nan)
     ends = np.cumsum([len(run) for run in points.recordings])
-    return tuple(branch_notes(points.recordings, np.split(residuals, ends[:-1]), quantity))
+    return branch_distance(points.recordings, np.split(residuals, ends[:-1]), quantity)
 
 
 def _length_notes(problem: FitProblem) -> list[str]:

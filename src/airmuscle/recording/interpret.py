@@ -25,8 +25,14 @@ from .missing_values import MissingValues, RefuseMissing
 from .plausibility import check_plausible
 from .recording import Recording
 from .repeated_columns import check_unique, without_repeated_columns
+from .specimens import label_texts
 from .table import Cells, RawTable
 from .time_base import RecordedTime, TimeBase
+
+MAX_LABELS = 8
+"""Maximum number of different texts of a column that is kept (chosen), such as the names of specimens."""
+MIN_LABEL_ROWS = 3
+"""Minimum number of rows of each of these texts (chosen)."""
 
 
 def interpret(
@@ -221,7 +227,7 @@ def _keep_unknown_column(table: RawTable, heading: Heading, cells: Cells, column
     if isinstance(cells, list):
         if not any(cells):
             return ""
-        return f"Column '{heading.text}' contains text and is ignored."
+        return _keep_labels(heading, cells, columns)
     constant = constant_from_column(table, heading.text, heading.unit, cells)
     if constant:
         return f"Column '{heading.text}' is constant and states the {constant[0]}: {constant[1]:.4g} (SI)."
@@ -229,3 +235,14 @@ def _keep_unknown_column(table: RawTable, heading: Heading, cells: Cells, column
     near = difflib.get_close_matches(heading.text.partition(" ")[0].lower(), QUANTITIES, n=1)
     hint = proposal(heading.text) or (f" Did you mean '{near[0]}'?" if near else "")
     return f"Column '{heading.text}' is not a known quantity and is kept without conversion.{hint}"
+
+
+def _keep_labels(heading: Heading, cells: list[str], columns: dict[str, Array]) -> str:
+    """Keep a column with a few different texts as their numbers, and return the note on a column of text."""
+    labels = label_texts(cells)
+    values, numbers, counts = np.unique(labels, return_inverse=True, return_counts=True)
+    if not 2 <= values.size <= MAX_LABELS or counts.min() < MIN_LABEL_ROWS:
+        return f"Column '{heading.text}' contains text and is ignored."
+    columns[heading.text] = (numbers.ravel() + 1).astype(np.float64)
+    texts = ", ".join(f"{i} {value or 'empty'}" for i, value in enumerate(values.tolist(), 1))
+    return f"Column '{heading.text}' contains text and is kept as numbers: {texts}."

@@ -39,6 +39,7 @@ from .file_name import FileNamePattern
 from .header import bare_heading
 from .heading import parse_heading
 from .missing_values import MISSING_VALUES, MissingValues
+from .specimens import SPECIMEN
 from .table import RawTable
 from .text_format import TextFormat
 from .time_base import TIME_BASES, TimeBase
@@ -54,8 +55,8 @@ _TEXTS = ("delimiter", "decimal", "sheet", "group", "file_name", "time", "missin
 class ColumnMapping:
     """Interpretation of files of one kind. Information that the mapping does not state is read from the file.
 
-    columns    by heading, or by number from 1, a heading with quantity and unit, `pressure [bara]`; an empty text
-               excludes the column
+    columns    by heading, or by number from 1, a heading with quantity and unit, `pressure [bara]`; `specimen` for
+               the names of the specimens, each of which is a recording; an empty text excludes the column
     constants  constants of the run, such as resting_length
     delimiter, decimal  of text files
     sheet      worksheet of an Excel file
@@ -98,11 +99,11 @@ class ColumnMapping:
         if self.file_name is not None:
             FileNamePattern(self.file_name)  # raises for placeholders that are no quantity
         for column, heading in self.columns.items():
-            if heading and not (parse_heading(heading).known or parse_constant_name(heading)):
+            if heading and not (parse_heading(heading).known or parse_constant_name(heading) or heading == SPECIMEN):
                 name = heading.partition("[")[0].strip()
                 raise ColumnError(
                     f"mapping: column '{column}' is mapped to '{heading}', which is not a known quantity; known "
-                    f"quantities are {', '.join(QUANTITIES)}, resting_length.{suggestion(name, QUANTITIES)}"
+                    f"quantities are {', '.join(QUANTITIES)}, resting_length, specimen.{suggestion(name, QUANTITIES)}"
                 )
 
     @property

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
 from ..core.errors import FileError
+from .bench_checks import warn_of_suspicious_values
 from .downsampling import Decimation, Downsampling, downsample
 from .file_kind import check_text_file
 from .interpret import interpret
@@ -23,7 +24,7 @@ from .raw_tdms import read_tdms_tables
 from .raw_workbook import read_workbook_tables
 from .recording import Recording
 from .segment.outliers import without_outliers
-from .suspicious_values import warn_of_suspicious_values
+from .specimens import split_specimens
 from .table import RawTable
 from .time_base import RecordedTime, TimeBase
 from .unit_consistency import check_unit_consistency
@@ -131,13 +132,14 @@ def read_file(
     chosen = time_base or (mapping.time_base if mapping.time else RecordedTime())
     return [
         interpret(
-            apply_mapping(table, mapping),
+            part,
             units=units,
             constants=mapping.constants_of(path),
             time_base=chosen,
             missing=missing or mapping.missing_values,
         )
         for table in read_tables(path, mapping, downsampling, progress)
+        for part in split_specimens(apply_mapping(table, mapping))
     ]
 
 

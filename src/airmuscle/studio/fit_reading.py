@@ -18,6 +18,7 @@ from ..recording.interpret import interpret, resolve_headings, unit_conversion
 from ..recording.mapping import apply_mapping
 from ..recording.reader import read_tables
 from ..recording.segment import check_contents
+from ..recording.specimens import split_specimens
 from ..recording.table import RawTable
 from ..recording.unit_consistency import check_unit_consistency
 from .fit_hints import as_field_error, in_page_words
@@ -115,12 +116,15 @@ def _read_file(path: Path, settings: FitSettings, read: ReadSet) -> None:
         if problems:
             continue
         try:
-            recording = interpret(mapped, units={}, constants=constants, time_base=_time_base(settings))
+            parts = [
+                interpret(part, units={}, constants=constants, time_base=_time_base(settings))
+                for part in split_specimens(mapped)
+            ]
         except AirmuscleError as error:
             read.complain(error, field)
             continue
-        read.recordings.append(recording)
-        read.files.append(path.name)
+        read.recordings += parts
+        read.files += [path.name] * len(parts)
 
 
 def without_folder(text: str, folder: Path) -> str:

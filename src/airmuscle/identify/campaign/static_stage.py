@@ -10,6 +10,7 @@ from ...core.short_repr import ShortRepr
 from ...muscle import CreepElements
 from ...muscle.friction import Friction
 from ...recording import Recording
+from ..data_checks import DataChecks
 from ..model_selection import Comparison, compare
 from ..result import Fit
 from .creep_stage import creep_force
@@ -33,6 +34,8 @@ class StaticStage(ShortRepr):
     """The rows of the fit, freed of friction and creep, one recording for each record."""
     bands: tuple[ErrorBand, ...]
     """One for each purpose that the records can judge."""
+    data_notes: tuple[str, ...] = ()
+    """Contradictions and suspicious values of the records."""
     held_band: ErrorBand | None = None
     """For further isometric runs, if the records contain some."""
 
@@ -48,8 +51,8 @@ class StaticStage(ShortRepr):
 
     @property
     def verdict(self) -> str:
-        """The recommended law and the bands, as sentences."""
-        return " ".join([self.comparison.reason, *(str(band) for band in self.all_bands)])
+        """The recommended law, the bands and the remarks on the data, as sentences."""
+        return " ".join([self.comparison.reason, *(str(band) for band in self.all_bands), *self.data_notes])
 
     @property
     def all_bands(self) -> tuple[ErrorBand, ...]:
@@ -90,7 +93,7 @@ def fit_static_stage(
     except AirmuscleError as error:
         return LeftOutStage(NAME, str(error.message), "measure at more levels of pressure and contraction")
     progress(1.0)
-    return StaticStage(comparison, points, bands, held)
+    return StaticStage(comparison, points, bands, DataChecks.of([record.recording for record in used]).notes, held)
 
 
 def freed_rows(record: CampaignRecord, friction: Friction, creep: CreepElements) -> Recording:

@@ -1,0 +1,186 @@
+"""Every static fit names the mistakes of a bench in its data; clean benches with friction, noise and rounding get none.
+
+The laboratories are those of tests/laboratories.py; each check has a variant that it must name.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from laboratories import (
+    ATMOSPHERE,
+    FORCE,
+    LENGTH,
+    MUSCLE,
+    PRESSURE,
+    RESTING_LENGTH,
+    Table,
+    by_hand,
+    changed,
+    every_other,
+    one_file,
+    ramps,
+    sweeps,
+    with_code,
+    with_glitches,
+    write,
+)
+
+from airmuscle.core.errors import AirmuscleWarning, ColumnError
+from airmuscle.identify import Fit, compare, fit
+from airmuscle.identify.candidates import Candidate, blank_surface
+from airmuscle.identify.data_checks import DataChecks
+from airmuscle.recording import Recording, read
+
+OTHER = dataclasses.replace(MUSCLE, radius=0.0128)
+FRICTIONLESS = dataclasses.replace(MUSCLE, friction=0.0)
+
+
+def read_all(folder: Path, tables: dict[str, Table]) -> tuple[Recording, ...]:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AirmuscleWarning)
+        return read(write(tables, folder), resting_length=RESTING_LENGTH)
+
+
+def notes_of(folder: Path, tables: dict[str, Table]) -> str:
+    return "\n".join(DataChecks.of(read_all(folder, tables)).notes)
+
+
+def fitted(folder: Path, tables: dict[str, Table]) -> Fit:
+    return fit(blank_surface(4, 1e4), read_all(folder, tables))
+
+
+@pytest.mark.parametrize(
+    "tables",
+    [sweeps(), ramps(), by_hand(), sweeps(OTHER), ramps(duration=1.0, sample_time=0.01), sweeps() | ramps()],
+    ids=["sweeps", "ramps", "by hand", "another muscle", "fast ramps", "both"],
+)
+def test_a_clean_bench_has_no_remark(tmp_path, tables):
+    assert notes_of(tmp_path, tables) == ""
+
+
+@pytest.mark.parametrize("values", [("A", "B"), (1, 2)], ids=["text", "numbers"])
+def test_two_muscles_in_one_file_are_named_with_the_column_that_tells_them_apart(tmp_path, values):
+    notes = notes_of(tmp_path, one_file(sweeps(), sweeps(OTHER, seed=90), column="muscle", values=values))
+    assert "Rows contradict each other" in notes
+    assert "both.csv, row" in notes
+    assert "To state it as the specimen, use columns={'muscle': 'specimen'} of read." in notes
+
+
+def test_a_column_that_names_the_specimen_divides_the_file(tmp_path):
+    tables = one_file(sweeps(), sweeps(OTHER, seed=90), column="muscle", values=("A", "B"))
+    found = read(write(tables, tmp_path), columns={"muscle": "specimen"}, resting_length=RESTING_LENGTH)
+    assert [run.constants["specimen"] for run in found] == ["A", "B"]
+    assert [run.origin for run in found] == ["both.csv, specimen A", "both.csv, specimen B"]
+    assert found[1]["force"].max() > 1.3 * found[0]["force"].max()
+    assert DataChecks.of(found).notes == (), "two specimens do not contradict each other"
+
+
+def test_two_muscles_in_two_files_of_one_specimen_contradict_each_other(tmp_path):
+    tables = sweeps() | {f"again_{name}": table for name, table in sweeps(OTHER, seed=90).items()}
+    notes = notes_of(tmp_path, tables)
+    assert "Rows contradict each other" in notes
+    assert "Check whether these runs are of one muscle" in notes
+
+
+def test_isobars_of_absolute_pressure_among_others_are_named(tmp_path):
+    notes = notes_of(tmp_path, every_other(sweeps(), PRESSURE, ATMOSPHERE))
+    assert "Rows contradict each other" in notes
+    assert "the pressures of isobar_200.csv, isobar_400.csv are probably absolute" in notes
+
+
+def test_ramps_of_absolute_pressure_among_others_are_named(tmp_path):
+    notes = notes_of(tmp_path, every_other(ramps(), PRESSURE, ATMOSPHERE))
+    assert "held_4.csv, held_12.csv, held_20.csv: the pressure begins at 101.1 kPa" in notes
+    assert "absolute and gauge pressures are mixed" in notes
+
+
+def test_isobars_of_absolute_pressure_throughout_are_named(tmp_path):
+    notes = notes_of(tmp_path, changed(sweeps(), PRESSURE, lambda p: p + ATMOSPHERE))
+    assert "The pressures are probably absolute, but read as gauge" in notes
+
+
+@pytest.mark.parametrize(("tables", "text"), [(ramps(), "40.2 N at zero pressure"), (sweeps(), "N at zero pressure")])
+def test_a_force_zero_is_named(tmp_path, tables, text):
+    notes = notes_of(tmp_path, changed(tables, FORCE, lambda f: f + 40.0))
+    assert text in notes
+    assert "zero of the force sensor" in notes
+
+
+def test_a_length_in_cm_under_mm_is_refused(tmp_path):
+    with pytest.raises(
+        ColumnError, match=r"pulls at a contraction of 90 to 92\.4 %, but no pneumatic muscle pulls bey"
+    ):
+        read_all(tmp_path, changed(sweeps(), LENGTH, lambda length: length / 10.0))
+
+
+@pytest.mark.parametrize(("column", "code"), [(FORCE, -999.0), (FORCE, 9999.0), (PRESSURE, 9999.0)])
+def test_a_code_for_missing_values_is_named_and_nothing_else_is_blamed(tmp_path, column, code):
+    (note,) = DataChecks.of(read_all(tmp_path, with_code(sweeps(), column, code))).notes
+    assert f"is {code:g} in 72 rows" in note
+    assert "a code for a missing value" in note
+
+
+def test_an_elongation_under_contraction_is_named(tmp_path):
+    tables = changed(sweeps(), LENGTH, lambda length: 2.0 * 300.0 - 72.0 - length)
+    assert "The column probably counts the elongation" in notes_of(tmp_path, tables)
+
+
+def test_the_delay_of_a_sensor_is_not_called_friction(tmp_path):
+    result = fitted(tmp_path, ramps(FRICTIONLESS, duration=1.0, sample_time=0.005, delay=0.04))
+    (note,) = [note for note in result.notes if "delay between the sensors" in note]
+    assert "follows the pressure by 39.9 ms" in note or "follows the pressure by 40" in note
+    assert not any("To identify the friction" in note for note in result.notes)
+
+
+def test_friction_is_not_called_a_delay(tmp_path):
+    rough = dataclasses.replace(MUSCLE, friction=40.0)
+    result = fitted(tmp_path, ramps(rough, duration=1.0, sample_time=0.005))
+    assert not any("delay" in note for note in result.notes)
+    assert any("two branches" in note and "inflating and deflating" in note for note in result.notes)
+
+
+def test_outliers_are_carried_into_the_notes_with_the_remedy(tmp_path):
+    notes = notes_of(tmp_path, with_glitches(sweeps(), 0.01, (100.0, 400.0)))
+    assert "suspected outliers of the force" in notes
+    assert "To reduce their weight, use loss=Huber(" in notes
+
+
+def test_the_branches_of_isobaric_loops_contract_and_extend(tmp_path):
+    (note,) = [note for note in fitted(tmp_path, sweeps()).notes if "two branches" in note]
+    assert "(contracting and extending)" in note
+
+
+def test_a_fit_states_the_scatter_of_its_data_and_a_law_that_does_not_follow_them(tmp_path):
+    tables = sweeps() | {f"again_{name}": table for name, table in sweeps(seed=30).items()}
+    runs = read_all(tmp_path, tables)
+    good, poor = (fit(blank_surface(degree, 1e4), runs) for degree in (4, 1))
+    assert good.scatter is not None
+    assert good.scatter.noise == pytest.approx(1.0, rel=0.5)
+    assert 1.0 < good.scatter.repeatability < 2.0, "noise of force, pressure and length, and the distance of the rows"
+    assert "scatter of data" in str(good)
+    assert not any("does not follow" in note for note in good.notes)
+    assert any("times the scatter of the data" in note and "does not follow" in note for note in poor.notes)
+
+
+def test_a_comparison_states_the_remarks_of_a_fit(tmp_path):
+    runs = read_all(tmp_path, every_other(sweeps(), PRESSURE, ATMOSPHERE))
+    found = compare(runs, [Candidate("surface", blank_surface(3, 1e4))])
+    assert any("are probably absolute" in note for note in found.notes)
+    assert any("two branches" in note for note in found.notes)
+    assert "note: Rows contradict each other" in str(found)
+
+
+def test_a_ramp_held_at_rest_is_not_taken_for_ratios_as_percent(tmp_path):
+    tables = {}
+    for name, table in ramps(sample_time=0.2).items():
+        percent = 100.0 * (1.0 - table.pop(LENGTH) / 300.0)
+        tables[name] = {**table, "contraction [%]": np.round(percent, 4)}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", AirmuscleWarning)
+        read(write(tables, tmp_path), resting_length=RESTING_LENGTH)
+        read([tmp_path / "held_0.csv"], resting_length=RESTING_LENGTH)
