@@ -123,6 +123,7 @@ def test_a_code_for_missing_values_is_named_and_nothing_else_is_blamed(tmp_path,
     (note,) = DataChecks.of(read_all(tmp_path, with_code(sweeps(), column, code))).notes
     assert f"is {code:g} in 72 rows" in note
     assert "a code for a missing value" in note
+    assert f"use missing=DropMissing(codes=({code},)) of read" in note
 
 
 def test_an_elongation_under_contraction_is_named(tmp_path):
@@ -147,6 +148,7 @@ def test_friction_is_not_called_a_delay(tmp_path):
 def test_outliers_are_carried_into_the_notes_with_the_remedy(tmp_path):
     notes = notes_of(tmp_path, with_glitches(sweeps(), 0.01, (100.0, 400.0)))
     assert "suspected outliers of the force" in notes
+    assert "To leave them out, use outliers='drop' of read." in notes
     assert "To reduce their weight, use loss=Huber(" in notes
 
 

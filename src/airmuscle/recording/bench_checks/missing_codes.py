@@ -10,8 +10,10 @@ import numpy as np
 from ...core.arrays import Array
 from ...core.constants import STANDARD_GRAVITY
 from ...core.errors import UnitError
+from ...core.hints import Hint, HintedText
 from ...core.units import conversion
 from ..columns import quantity_of
+from ..missing_values import DropMissing
 from ..recording import Recording
 from .bench_rows import file_list
 
@@ -35,7 +37,7 @@ def is_missing_code(value: float) -> bool:
     return any(abs(abs(value) - code) <= 1e-6 * code for code in CODES)
 
 
-def check_missing_codes(recordings: Sequence[Recording]) -> Iterator[str]:
+def check_missing_codes(recordings: Sequence[Recording]) -> Iterator[HintedText]:
     """A column whose extreme reading is a code for a missing value, far from all other readings."""
     found: dict[tuple[str, float], list[tuple[str, int]]] = {}
     for each in recordings:
@@ -45,10 +47,10 @@ def check_missing_codes(recordings: Sequence[Recording]) -> Iterator[str]:
                 found.setdefault((name, code.value), []).append((each.origin, int(np.count_nonzero(code.rows))))
     for (name, value), places in found.items():
         rows = sum(count for _, count in places)
-        yield (
+        yield HintedText(
             f"{file_list([origin for origin, _ in places])}: the {name} is {value:g} in {rows} rows, far from all "
-            "other readings: this is a code for a missing value, which is read as a number. Empty these cells or "
-            "delete these rows before a fit."
+            "other readings: this is a code for a missing value, which is read as a number.",
+            Hint("To leave these rows out", "missing", DropMissing((value,)), "read"),
         )
 
 
