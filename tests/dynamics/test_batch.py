@@ -631,3 +631,8 @@ def test_a_limit_of_the_validity_range_beyond_its_bounds_names_the_row():
 def test_variations_and_input_in_exchanged_places_are_named():
     with pytest.raises(ParameterError, match="The order of the arguments is: plant, variations, input"):
         simulate_batch(plain(), PULSE, {"mechanism.mass": [5.0, 6.0]}, duration=0.1)
+
+
+def test_the_times_of_a_batch_are_read_by_name_as_its_columns_are():
+    batch = simulate_batch(plain(), {"mechanism.mass": [5.0, 6.0]}, PULSE, duration=0.05, output_times=0.01)
+    np.testing.assert_array_equal(batch["time"], batch.time)

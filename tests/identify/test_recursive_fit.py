@@ -125,3 +125,20 @@ def test_samples_outside_the_limits_are_counted_and_left_out():
 def test_options_out_of_their_range_are_refused(options, message):
     with pytest.raises(ParameterError, match=message):
         RecursiveFit(LIMITS, **options)
+
+
+@pytest.mark.parametrize("forgetting", [1.0, 0.95])
+def test_the_standard_error_is_the_spread_of_the_predictions(forgetting):
+    """Forces of a surface of degree 1 with noise: 250 repetitions at one point; their spread is known to 5 %."""
+    rng = np.random.default_rng(5)
+    pressure, contraction = rng.uniform(0, 6e5, 80), rng.uniform(0, 0.25, 80)
+    clean = 1e-3 * pressure - 900 * contraction
+    found = []
+    for _ in range(250):
+        fit = RecursiveFit(LIMITS, degree=1, forgetting=forgetting)
+        for row in zip(pressure, contraction, clean + SIGMA * rng.standard_normal(80), strict=True):
+            fit = fit.updated(*map(float, row))
+        found.append((*fit.force(4e5, 0.1), fit.noise))
+    force, stated, noise = np.transpose(found)
+    assert np.std(force) == pytest.approx(np.mean(stated), rel=0.15)
+    assert np.sqrt(np.mean(noise**2)) == pytest.approx(SIGMA, rel=0.03)

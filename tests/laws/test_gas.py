@@ -16,7 +16,7 @@ from airmuscle.control.inputs import Schedule
 from airmuscle.core import autodiff
 from airmuscle.mechanism import Isometric
 from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Supply, Valve, VirialGas
+from airmuscle.pneumatics import FillDischarge, Supply, Valve, VirialGas, virial_coefficient_of_air
 from airmuscle.pneumatics.gas import (
     GAS_CONSTANT,
     SPECIFIC_HEAT_CONSTANT_PRESSURE,
@@ -185,18 +185,17 @@ def test_the_slope_of_the_stored_energy_is_the_pressure(gas):
     assert -by_volume == pytest.approx(gas.pressure(mass, volume, AMBIENT), rel=1e-12)
 
 
-def test_the_virial_gas_follows_the_van_der_waals_equation_and_without_coefficient_the_ideal_gas():
-    """p = rho R T/(1 - b rho) - a rho^2 per unit mass of nitrogen; the third virial coefficient b^2 is left out."""
-    a, b = 0.1370 / 0.028013**2, 3.87e-5 / 0.028013
+def test_the_virial_gas_is_air_and_without_coefficient_the_ideal_gas():
+    """Second virial coefficients of air in cm3/mol: -8.64 at 20 °C (CIPM-2007), near -13.4 at 0 °C (tables)."""
+    molar = 28.96546e-3 * 1e6
+    assert VirialGas().virial_coefficient * molar == pytest.approx(-8.64, abs=0.02)
+    assert virial_coefficient_of_air(273.15) * molar == pytest.approx(-13.4, abs=0.4)
+    assert virial_coefficient_of_air(333.15) * molar == pytest.approx(-2.2, abs=0.7)
     for absolute in (1e5, 6.5e5):
         density = VirialGas().air_mass(absolute, 1.0, AMBIENT)
-        nitrogen = 8.314463 / 0.028013  # the relation to the ideal gas is compared, whose constant is that of air
-        waals = density * nitrogen * WARM / (1 - b * density) - a * density**2
-        ideal = density * nitrogen * WARM
         assert VirialGas().pressure(density, 1.0, AMBIENT) == pytest.approx(absolute, rel=1e-14)
-        assert absolute / (density * GAS_CONSTANT * WARM) - 1 == pytest.approx(
-            waals / ideal - 1, abs=(b * density) ** 2 * 1.1
-        )
+        factor = absolute / (density * GAS_CONSTANT * WARM)
+        assert factor == pytest.approx(1.0 + VirialGas().virial_coefficient * density, rel=1e-14)
         assert VirialGas(0.0).air_mass(absolute, 1.0, AMBIENT) == Isothermal().air_mass(absolute, 1.0, AMBIENT)
 
 

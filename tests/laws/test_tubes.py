@@ -9,6 +9,7 @@ compliance for each metre. A front arrives after L over the speed of sound.
 from __future__ import annotations
 
 import importlib.util
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -105,6 +106,24 @@ def test_the_formula_for_a_tubes_conductance_agrees_with_darcys_law(length, diam
     found = orifice.mass_flow(6e5, 5.5e5, 1.0, WARM)
     assert found == pytest.approx(steady(6e5, 5.5e5, length, diameter), rel=0.06)
     assert 0.0 < orifice.critical_ratio < 0.61
+
+
+@pytest.mark.parametrize(("drop", "low", "high"), [(0.02, 0.05, 0.19), (0.08, -0.03, 0.08), (0.3, -0.12, -0.02)])
+def test_the_formula_for_a_tubes_conductance_differs_from_darcys_law_as_stated(drop, low, high):
+    cases = itertools.product((4e5, 5e5, 7e5, 9e5), (0.5, 1.0, 2.0), (4e-3, 6e-3, 8e-3))
+    found = [_excess_of_the_formula(p, drop, length, diameter) for p, length, diameter in cases]
+    assert low <= min(found) <= low + 0.01
+    assert high - 0.01 <= max(found) <= high
+
+
+def test_the_formula_for_a_tubes_conductance_is_too_large_for_laminar_flow():
+    assert _excess_of_the_formula(2e5, 0.02, 8.0, 2e-3) == pytest.approx(0.64, abs=0.01)
+    assert _excess_of_the_formula(2e5, 0.08, 8.0, 2e-3) == pytest.approx(0.31, abs=0.01)
+
+
+def _excess_of_the_formula(pressure, drop, length, diameter):
+    found = TubeOrifice(length, diameter).mass_flow(pressure, (1 - drop) * pressure, 1.0, WARM)
+    return found / steady(pressure, (1 - drop) * pressure, length, diameter) - 1
 
 
 @pytest.mark.parametrize("mass_flow", [2e-4, -2e-4])

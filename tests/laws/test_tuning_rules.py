@@ -190,6 +190,22 @@ def test_the_amplitude_of_a_triangular_oscillation_is_half_its_range(rows):
     )
 
 
+@pytest.mark.parametrize("rows", [60, 200])
+@pytest.mark.parametrize("dead_time", [0.1, 0.3, 1.0])
+def test_the_amplitude_of_a_relay_oscillation_is_that_of_its_corners(dead_time, rows):
+    """First order with gain 2 and T = 1: a = 2 (1 - exp(-L)), half a period L + ln(2 - exp(-L)), exponential arcs."""
+    amplitude, half = 2 * (1 - math.exp(-dead_time)), dead_time + math.log(2 - math.exp(-dead_time))
+    time = 2 * half / (rows + 0.37) * np.arange(20 * rows)
+    part, rising = np.modf(time / half + 0.2)
+    arc = 2.0 - (2.0 + amplitude) * np.exp(-part * half)
+    found = ultimate_point(time, np.where(rising % 2 == 0, arc, -arc), amplitude=1.0)
+    assert found.gain == pytest.approx(4 / (math.pi * amplitude), rel=2e-3)
+    assert found.period == pytest.approx(2 * half, rel=1e-4)
+    exact = exact_ultimate_point(FirstOrderDeadTime(2.0, 1.0, dead_time)).gain
+    assert found.gain / exact - 1 == pytest.approx({0.1: -0.182, 0.3: -0.166, 1.0: -0.109}[dead_time], abs=0.004)
+    assert "-19 % to +27 %" in found.note
+
+
 def test_a_relay_finds_the_ultimate_point_and_the_model():
     exact = exact_ultimate_point(PLANT)
     model = exact.first_order(PLANT.gain)

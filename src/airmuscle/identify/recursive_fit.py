@@ -60,11 +60,15 @@ class RecursiveFit(ShortRepr):
     """Samples outside the limits, which are left out."""
     factor: Array = dataclasses.field(default_factory=lambda: np.empty((0, 0)), repr=False)
     """Triangular factor of the normal equations with the right-hand side, shape (P + 1, P + 1)."""
+    squared_factor: Array = dataclasses.field(default_factory=lambda: np.empty((0, 0)), repr=False)
+    """Triangular factor of the sum of w^2 phi phi^T over the samples of weight w, shape (P, P); without forgetting it
+    is that of the normal equations, and empty here."""
 
     def __post_init__(self) -> None:
         check_field_types(self)
-        if not isinstance(self.factor, np.ndarray):
-            raise ParameterError(f"RecursiveFit: factor must be an array; it is {abridged(self.factor)}.")
+        for name in ("factor", "squared_factor"):
+            if not isinstance(getattr(self, name), np.ndarray):
+                raise ParameterError(f"RecursiveFit: {name} must be an array; it is {abridged(getattr(self, name))}.")
         if not 0 <= self.degree <= 9:
             raise ParameterError(f"RecursiveFit: the degree is {self.degree}; allowed range: 0 to 9.")
         if not self.sigma > 0 or not 0.5 < self.forgetting <= 1.0 or not self.limits.max_force > 0:
@@ -75,18 +79,18 @@ class RecursiveFit(ShortRepr):
         if not self.factor.size:
             size = len(exponents(self.degree)) + 1
             object.__setattr__(self, "factor", np.diag([PRIOR] * (size - 1) + [0.0]))
+            if self.forgetting < 1.0:
+                object.__setattr__(self, "squared_factor", PRIOR * np.eye(size - 1))
 
     def updated(self, pressure: float, contraction: float, force: float) -> RecursiveFit:
         """The fit with one more sample [Pa, 1, N]. A sample outside the limits is counted and left out."""
         if not self.limits.validity_range.contains(pressure, contraction):
             return dataclasses.replace(self, outside=self.outside + 1)
-        size = len(self.factor)
-        rows = np.empty((size + 1, size))
-        rows[:-1] = self.factor if self.forgetting == 1.0 else np.sqrt(self.forgetting) * self.factor
-        rows[-1, :-1] = self._terms(np.array([pressure]), np.array([contraction]))[0]
-        rows[-1, -1] = force
-        factor = np.triu(_lapack().dgeqrf(rows, overwrite_a=True)[0][:size])
-        return dataclasses.replace(self, factor=factor, samples=self.samples + 1)
+        terms, kept, squared = self._terms(np.array([pressure]), np.array([contraction]))[0], 1.0, self.squared_factor
+        if self.forgetting < 1.0:
+            kept, squared = np.sqrt(self.forgetting), _with_row(self.forgetting * squared, terms)
+        factor = _with_row(kept * self.factor, np.append(terms, force))
+        return dataclasses.replace(self, factor=factor, squared_factor=squared, samples=self.samples + 1)
 
     @functools.cached_property
     def coefficients(self) -> Array:
@@ -101,27 +105,26 @@ class RecursiveFit(ShortRepr):
     @property
     def rmse(self) -> float:
         """Root mean square of the residuals [N]; NaN before the first sample."""
-        return float(abs(self.factor[-1, -1]) / np.sqrt(self._weights[0])) if self.samples else np.nan
+        return float(abs(self.factor[-1, -1]) / np.sqrt(self._total_weight)) if self.samples else np.nan
 
     @property
-    def _weights(self) -> tuple[float, float]:
-        """Sum of the weights of the samples, of which the last has 1, and sum of their squares."""
+    def _total_weight(self) -> float:
+        """Sum of the weights of the samples, of which the last has 1."""
         kept, count = self.forgetting, self.samples
-        if kept == 1.0:
-            return float(count), float(count)
-        return (1.0 - kept**count) / (1.0 - kept), (1.0 - kept ** (2 * count)) / (1.0 - kept**2)
+        return float(count) if kept == 1.0 else (1.0 - kept**count) / (1.0 - kept)
 
     @property
     def noise(self) -> float:
         """Standard deviation of a force [N]: of the residuals once their weights add up to twice the coefficients.
 
-        The weighted sum of squares has the expectation sigma^2 (W_1 - P W_2/W_1), with the sums W_1 of the weights and
-        W_2 of their squares, for P coefficients and points that do not change over time.
+        The weighted sum of squares has the expectation sigma^2 (W - tr(M^-1 M_2)), with the sum W of the weights w,
+        M = Sum w phi phi^T and M_2 = Sum w^2 phi phi^T; without forgetting the trace is the number of coefficients.
         """
-        (total, squares), count = self._weights, self.coefficients.size
+        total, count = self._total_weight, self.coefficients.size
         if total < 2 * count:
             return self.sigma
-        return float(abs(self.factor[-1, -1]) / np.sqrt(total - count * squares / total))
+        used = count if self.forgetting == 1.0 else float(np.sum((self.squared_factor @ self._inverse) ** 2))
+        return float(abs(self.factor[-1, -1]) / np.sqrt(total - used))
 
     @property
     def model(self) -> ContractileSurface:
@@ -169,8 +172,12 @@ class RecursiveFit(ShortRepr):
         return NextPoint(float(pressure[best]), float(contraction[best]), float(force[best]), float(error[best]))
 
     def _variance(self, terms: Array) -> Array:
-        """Variance of the predicted force, relative to that of a sample, shape (N,)."""
-        variance: Array = np.sum((terms @ self._inverse) ** 2, axis=1)
+        """Variance of the predicted force, relative to that of a sample, shape (N,): phi^T M^-1 M_2 M^-1 phi, which is
+        phi^T M^-1 phi without forgetting. By the definitions of `noise`."""
+        shares = terms @ self._inverse
+        if self.forgetting < 1.0:
+            shares = shares @ self._inverse.T @ self.squared_factor.T
+        variance: Array = np.sum(shares**2, axis=1)
         return variance
 
     @property
@@ -193,6 +200,11 @@ def _lapack() -> Any:
     from scipy.linalg import lapack
 
     return lapack
+
+
+def _with_row(factor: Array, row: Array) -> Array:
+    """Triangular factor of R^T R + r r^T for a triangular factor R, shape (P, P), and a row r, shape (P,)."""
+    return np.asarray(np.triu(_lapack().dgeqrf(np.vstack([factor, row]), overwrite_a=True)[0][: len(factor)]))
 
 
 def _terms(

@@ -29,7 +29,7 @@ from .supply import AirSource, RegulatedSupply, SharedSupply, Supply, Tank
 from .tube import Tube, TubeOrifice
 from .tube_model import TubeModel
 from .valve import Valve
-from .virial_gas import VirialGas
+from .virial_gas import VirialGas, virial_coefficient_of_air
 from .with_tubes import WithTubes
 
 __all__ = [
@@ -75,4 +75,5 @@ __all__ = [
     "in_parallel",
     "in_series",
     "orifice_flow",
+    "virial_coefficient_of_air",
 ]

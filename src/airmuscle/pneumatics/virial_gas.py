@@ -10,30 +10,43 @@ from ..core.ops import Value
 from ..core.reference import Reference
 from .gas import GAS_CONSTANT, Air, Ambient, BarotropicGas
 
-VAN_DER_WAALS = Reference(
-    "van-der-waals",
-    "W. M. Haynes (ed.)",
-    "CRC Handbook of Chemistry and Physics, van der Waals constants for gases",
-    "CRC Press",
-    note="nitrogen: a = 0.1370 Pa m6/mol2, b = 3.87e-5 m3/mol, 28.013 g/mol",
+CIPM_2007 = Reference(
+    "cipm-2007",
+    "Picard, A., Davis, R. S., Gläser, M., Fujii, K.",
+    "Revised formula for the density of moist air (CIPM-2007)",
+    "Metrologia 45:149-155",
+    2008,
+    doi="10.1088/0026-1394/45/2/004",
+    note="compressibility of dry air, coefficients a_0 to a_2 after published programs; 15 to 27 °C, 60 to 110 kPa",
 )
-NITROGEN_VIRIAL_COEFFICIENT = (3.87e-5 - 0.1370 / (8.314463 * 293.15)) / 0.028013
-"""Second virial coefficient b - a/(R T) of the van der Waals equation [m3/kg]: nitrogen for air, at 293.15 K."""
+_COMPRESSIBILITY = (1.58123e-6, -2.9331e-8, 1.1043e-10)
+"""a_0 [K/Pa], a_1 [1/Pa] and a_2 [1/(K Pa)] of Z = 1 - p/T (a_0 + a_1 t + a_2 t^2) + ..., t in degrees Celsius."""
+
+
+def virial_coefficient_of_air(temperature: float) -> float:
+    """Second virial coefficient B [m3/kg] of dry air at a temperature [K]: B = -R (a_0 + a_1 t + a_2 t^2).
+
+    t temperature in degrees Celsius; a_0 to a_2 of the compressibility in CIPM-2007, fitted from 15 to 27 degrees
+    Celsius. At 20 degrees -2.98e-4 m3/kg or -8.64 cm3/mol; outside of 0 to 60 degrees it is an extrapolation.
+    """
+    celsius = temperature - 273.15
+    a_0, a_1, a_2 = _COMPRESSIBILITY
+    return -GAS_CONSTANT * (a_0 + a_1 * celsius + a_2 * celsius**2)
 
 
 @model
 class VirialGas(BarotropicGas):
     """Isothermal real gas: p = rho R T_amb (1 + B rho), with the second virial coefficient B and rho = m/V.
 
-    B = 0 is the ideal gas. The default is that of the van der Waals equation, B = b - a/(R T), with the constants of
-    nitrogen at 293.15 K. Reference: CRC Handbook of Chemistry and Physics, van der Waals constants.
+    B = 0 is the ideal gas. The default is that of dry air at 293.15 K; `virial_coefficient_of_air(T)` is that at
+    another ambient temperature. Reference: CIPM-2007 (Picard et al. 2008).
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (VAN_DER_WAALS,)
+    references: ClassVar[tuple[Reference, ...]] = (CIPM_2007,)
 
     virial_coefficient: float = parameter(
         "m3/kg", "B", "second virial coefficient of air", bounds=(-5e-3, 5e-3), fitted=False,
-        default=NITROGEN_VIRIAL_COEFFICIENT,
+        default=virial_coefficient_of_air(293.15),
     )  # fmt: skip
 
     def pressure(self, air_mass: Value, volume: Value, ambient: Ambient) -> Value:

@@ -61,12 +61,12 @@ def gas_findings(effects: tuple[Effect, ...]) -> tuple[Claim, ...]:
     """Return the effects of the ideal gas and of the reference density, compared with a negligible change."""
     text = "suspected cause, ideal gas: largest pressure change during filling"
     notes = {
-        "van der Waals": "The virial coefficient is that of the van der Waals equation for nitrogen (CRC Handbook).",
+        "second virial": "The virial coefficient is that of dry air at 20 °C after CIPM-2007.",
         "volume flow": r"Equation (11) multiplies the volume flow by \(P_0\) = 100 kPa; the mass flow by ISO 6358 has "
         rf"\(R\,T_0\,\rho_0\) = {100e3 / VOLUME_FLOW_RATIO / 1e3:.5g} kPa in its place, because the reference density "
         r"of 1.185 kg/m³ is that of humid air and \(R\) that of dry air. The mass flow is the default.",
     }
-    texts = {"van der Waals": text, "volume flow": "reference density of (11): largest pressure change during filling"}
+    texts = {"second virial": text, "volume flow": "reference density of (11): largest pressure change during filling"}
     bound = AtMost(NEGLIGIBLE, chosen=True)
     return tuple(
         Claim(PAPER, texts[key], bound, abs(e.largest("pressure", FILLING)) / 1e3, "kPa",

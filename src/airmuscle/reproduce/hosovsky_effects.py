@@ -119,7 +119,7 @@ def substitutions(parameters: UnpublishedParameters, suspected: SuspectedCauses)
         Substitution("volume", f"braid angle {angles.high:g} rad", braid_angle=angles.high),
         Substitution("volume", "viscoelastic wall", wall=wall),
         Substitution("volume", f"fittings of {dead * 1e6:g} cm³", tube=_dead_volume(dead)),
-        Substitution("gas law", "van der Waals, second virial coefficient", gas=am.pneumatics.VirialGas()),
+        Substitution("gas law", "second virial coefficient of air", gas=am.pneumatics.VirialGas()),
         Substitution("gas law", r"volume flow of (11), \(P_0 Q\)", valve=MATRIX_BY_VOLUME),
         Substitution(COMBINED, r"line, \(b\), first law, spring, wall", heat, hardening, wall,
                      critical, dataclasses.replace(lumped, gas=heat)),

@@ -46,7 +46,9 @@ class BatchSolution:
         return self.status.size
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
-        """A stored column (N, T) by its name."""
+        """A stored column (N, T) by its name, or the times (T,) [s] of all, `batch["time"]`."""
+        if name == "time" and name not in self.columns:
+            return self.time
         if name not in self.columns:
             known = ", ".join(self.columns) or "none; name them in keep"
             raise ColumnError(f"batch: no column '{name}'; kept are {known}.{suggestion(name, self.columns)}")

@@ -13,6 +13,7 @@ from ...core.arrays import Array
 from ...core.errors import ParameterError
 from ...core.field_types import check_field_types
 from ...core.reference import Reference
+from .waveform import waveform_amplitude
 
 SMITH1972 = Reference(
     key="smith-1972",
@@ -34,9 +35,10 @@ UNSETTLED = 0.05
 """Relative change in the last tenth of a step response from which on it is not settled (chosen)."""
 DEAD_BAND = 0.25
 """Part of the amplitude that an oscillation exceeds on both sides of its middle in each period (chosen)."""
-MAX_HARMONICS, ROWS_PER_HARMONIC, SURE_HARMONICS = 15, 4, 5
-"""Maximum number of harmonics of the waveform of an oscillation, rows of a period for each of them, and number of
-harmonics for which two rows of a period are enough (chosen)."""
+NOTE = (
+    "The gain is that of the describing function, which supposes a sine: for first order with dead time, it differs by "
+    "-19 % to +27 % from the exact ultimate gain."
+)
 MIN_ROWS = 10
 """Smallest number of rows of an experiment (chosen)."""
 
@@ -89,6 +91,8 @@ class UltimatePoint:
 
     gain: float
     period: float
+    note: str = ""
+    """How the point was found, with the error of the method."""
 
     def __post_init__(self) -> None:
         check_field_types(self)
@@ -168,8 +172,11 @@ def ultimate_point(
     amplitude     d, half the difference between both commands of the relay [u]
     hysteresis    e, half the width of the relay's hysteresis [y]
 
-    a is half the range of the periodic waveform, so that the noise of the rows does not enlarge it. Reference: Åström
-    and Hägglund (1984). Raises ParameterError for an output that does not oscillate.
+    a is half the range of the periodic waveform, so that the noise of the rows does not enlarge it. The describing
+    function supposes a sine. For first order with dead time L and time constant T, the rule gives an ultimate gain that
+    differs from the exact one by -19 % at L/T = 0 (an integrator), -17 % at 0.3, -11 % at 1, +4 % at 3, and up to +27 %
+    for dead time alone; the `note` of the result says so. Reference: Åström and Hägglund (1984). Raises
+    ParameterError for an output that does not oscillate.
     """
     t, y = _rows(time, output, amplitude)
     late = t >= t[-1] / 2
@@ -182,10 +189,10 @@ def ultimate_point(
     crossings = t[rising] - around[rising] * (t[rising + 1] - t[rising]) / (around[rising + 1] - around[rising])
     period = float(crossings[-1] - crossings[0]) / (rising.size - 1)
     whole = (t >= crossings[0]) & (t < crossings[-1])
-    a = _waveform_amplitude(t[whole], y[whole], period, rising.size - 1)
+    a = waveform_amplitude(t[whole], y[whole], period, rising.size - 1)
     if a <= abs(hysteresis):
         raise _no_oscillation(rising.size, a)
-    return UltimatePoint(4 * amplitude / (math.pi * math.sqrt(a**2 - hysteresis**2)), period)
+    return UltimatePoint(4 * amplitude / (math.pi * math.sqrt(a**2 - hysteresis**2)), period, NOTE)
 
 
 def _no_oscillation(crossings: int, amplitude: float) -> ParameterError:
@@ -193,17 +200,6 @@ def _no_oscillation(crossings: int, amplitude: float) -> ParameterError:
         f"relay experiment: {crossings} rising crossings and an amplitude of {amplitude:.4g} in the second half; at "
         "least three crossings and an amplitude above the hysteresis are needed. Record for longer."
     )
-
-
-def _waveform_amplitude(time: Array, values: Array, period: float, periods: int) -> float:
-    """Half the range of the periodic waveform through the rows (N,), by least squares of its harmonics."""
-    rows = values.size // periods
-    count = max(1, min(MAX_HARMONICS, max(rows // ROWS_PER_HARMONIC, min(SURE_HARMONICS, (rows - 1) // 2))))
-    phases = 2 * math.pi / period * np.outer(time, np.arange(1, count + 1))
-    matrix = np.column_stack([np.ones(time.size), np.cos(phases), np.sin(phases)])
-    coefficients = np.linalg.lstsq(matrix, values, rcond=None)[0]
-    fine = np.outer(np.linspace(0.0, 2 * math.pi, 32 * count, endpoint=False), np.arange(1, count + 1))
-    return 0.5 * float(np.ptp(np.column_stack([np.cos(fine), np.sin(fine)]) @ coefficients[1:]))
 
 
 def _rising_crossings(values: Array, band: float) -> npt.NDArray[np.intp]:
