@@ -217,6 +217,7 @@ ARGUMENTS = {
     "end_radius": "radius at the ends of a straight-fibre muscle [m]",
     "error": "error of a surrogate or of a residual",
     "estimates": "estimates with their standard errors",
+    "parameter_covariance": "covariance of the estimates and what it was estimated from",
     "fibre_length": "length of the fibres of one segment [m]",
     "fibre_sum": "sum of the sines of the fibre angles",
     "fibres": "number of fibres",

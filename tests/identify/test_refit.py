@@ -107,9 +107,10 @@ def test_samples_of_a_bootstrap_are_fits_to_the_drawn_runs():
     counts = np.random.default_rng(3).multinomial(8, np.full(8, 1 / 8), size=5)
     # the groups are numbered in the order of their names
     names = sorted(r.origin for r in runs)
-    by_name = {r.origin: r for r in runs}
-    sample = [by_name[names[i]] for i, n in enumerate(counts[0]) for _ in range(n)]
-    assert drawn.values[0] == pytest.approx(am.fit(fit.model, sample).values, rel=1e-5)
+    repeats = dict(zip(names, counts[0].tolist(), strict=True))
+    sample = [r for r in runs if repeats[r.origin]]
+    sigma = np.concatenate([np.full(len(r), repeats[r.origin] ** -0.5) for r in sample])
+    assert drawn.values[0] == pytest.approx(am.fit(fit.model, sample, sigma=sigma).values, rel=1e-5)
 
 
 def test_samples_far_along_a_valley_and_on_bounds_are_refitted_without_a_search(monkeypatch):

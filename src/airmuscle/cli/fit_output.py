@@ -40,6 +40,7 @@ def fit_to_dict(result: Fit) -> dict[str, Any]:
         "rmse": result.rmse,
         "max_error": dataclasses.asdict(result.max_error),
         "sigma": result.sigma,
+        "standard_errors": result.error_basis,
         "r2": result.r2,
         "correlation_index": result.ik,
         "rank": result.rank,

@@ -137,7 +137,7 @@ def _print(design: ExperimentPlan) -> None:
     echo(
         f"relative D-efficiency {design.relative_d_efficiency:.2f}, compared with the same number of evenly spaced runs"
     )
-    for remark in design.undetermined:
+    for remark in (*design.undetermined, design.assumption):
         echo(f"note: {remark}")
 
 
@@ -151,5 +151,5 @@ def _to_dict(design: ExperimentPlan) -> dict[str, Any]:
         ],
         "parameters": {name: {"value": value, "stderr": stderr} for name, value, stderr in parameters},
         "relative_efficiency": design.relative_d_efficiency,
-        "notes": [str(remark) for remark in design.undetermined],
+        "notes": [*(str(remark) for remark in design.undetermined), design.assumption],
     }

@@ -10,6 +10,7 @@ import numpy as np
 from ..core.arrays import Array
 from ..core.errors import IdentificationError
 from ..recording import Recording
+from .parameter_covariance import student_quantile
 from .pooling import band_terms
 from .problem import RESTING_LENGTH
 from .result import Fit
@@ -27,14 +28,15 @@ def confidence_band(fit: Fit, points: Recording, *, level: float = 0.95, predict
     """The confidence band of a fit at points: value -+ t sqrt(g^T C g), in the fitted quantity [SI].
 
     g is the gradient of the law with respect to its parameters, C their covariance, t the quantile of Student's
-    distribution with N - P degrees of freedom, P the number of parameters that are not on a bound; one on a bound is
-    treated as known. `prediction` gives the prediction band of one further observation: the residual variance is added.
+    distribution; a parameter on a bound is treated as known. Covariance and degrees of freedom follow from the scatter
+    of the runs, or of parts of them, where rows are correlated (`fit.error_basis` states which); for independent rows
+    the latter are N - P. `prediction` gives the prediction band of one further observation of the measured runs: the
+    residual variance is added.
     `points` has the columns that the law takes as arguments, and the constant `resting_length` if the law was fitted to
     several lengths.
 
     The band of a PooledLengthLaw is that of the specimen that `points` state (the constant `specimen`, or else the
-    resting length), or of a new muscle, with the scatter of the specimens. The band assumes independent residuals. Rows
-    of one slow ramp are correlated; `bootstrap` by runs shows the effect.
+    resting length), or of a new muscle, with the scatter of the specimens, for independent rows.
     Raises IdentificationError without degrees of freedom, or for a level outside 0 to 1.
     """
     from scipy.special import stdtrit
@@ -53,12 +55,12 @@ def confidence_band(fit: Fit, points: Recording, *, level: float = 0.95, predict
         columns[RESTING_LENGTH] = np.full(len(points), float(length))
     problem = dataclasses.replace(fit.problem, data=Recording(columns, points.origin))
     value, jacobian = problem.predict(fit.values), problem.jacobian(fit.values)
+    further = prediction * (student_quantile(degrees_of_freedom, level) * fit.sigma) ** 2
     if fit.effects is None:
-        covariance = np.nan_to_num(fit.covariance, nan=0.0)
-        variance = np.einsum("ni,ij,nj->n", jacobian, covariance, jacobian)
+        free = np.array([not estimate.on_bound for estimate in fit.estimates], dtype=bool)
+        variance, freedom = fit.parameter_covariance.variances(jacobian[:, free])
     else:
         offset, variance = band_terms(fit, points, jacobian)
-        value = value + offset
-    quantile = float(stdtrit(degrees_of_freedom, 0.5 + level / 2))
-    half = quantile * np.sqrt(np.maximum(variance, 0.0) + prediction * fit.sigma**2)
+        value, freedom = value + offset, np.full(len(value), float(degrees_of_freedom))
+    half = np.sqrt(stdtrit(freedom, 0.5 + level / 2) ** 2 * np.maximum(variance, 0.0) + further)
     return Band(value, value - half, value + half)

@@ -153,16 +153,16 @@ def label_folds(recordings: Sequence[Recording], leave_out: GroupSplit) -> tuple
     return labels, names
 
 
-def default_split(recordings: Sequence[Recording]) -> GroupSplit:
-    """The first split with three groups or more: specimens, runs, levels of contraction, levels of pressure.
+def default_split(recordings: Sequence[Recording], least: int = 3) -> GroupSplit:
+    """The first split with `least` groups or more: specimens, runs, levels of contraction, levels of pressure.
 
     Raises IdentificationError where there is none.
     """
     splits: tuple[GroupSplit, ...] = (SpecimenSplit(), RunSplit(), LevelSplit("contraction"), LevelSplit("pressure"))
     for split in splits:
-        if len({name for array in split.labels(recordings) for name in array.tolist()}) >= 3:
+        if len({name for array in split.labels(recordings) for name in array.tolist()}) >= least:
             return split
     raise IdentificationError(
-        "cross-validation needs three groups or more, but there are fewer than three specimens, runs, levels of "
-        "contraction and levels of pressure. Measure at more levels."
+        f"{least} groups or more are needed, but there are fewer than {least} specimens, runs, levels of contraction "
+        "and levels of pressure. Measure at more levels."
     )

@@ -77,10 +77,23 @@ class ExperimentPlan:
     names: tuple[str, ...]
     values: Array
     standard_errors: Array
-    """Expected standard error of every parameter [SI]."""
+    """Expected standard error of every parameter [SI], for independent errors and a law that is true.
+
+    An error that a whole run shares, such as the zero or the gain of a sensor, is not contained. With s its standard
+    deviation, n points of a run and sigma that of one point, the standard errors are greater by up to
+    sqrt(1 + n s^2/sigma^2).
+    """
     relative_d_efficiency: float
     """(det M / det M_0)^(1/P), M_0 the information matrix of the same number of evenly spaced runs."""
     undetermined: tuple[UndeterminedCombination, ...]
+
+    @property
+    def assumption(self) -> str:
+        """What the expected standard errors suppose, as a sentence."""
+        return (
+            "the expected standard errors suppose independent errors of the points; errors that a run shares (zero and "
+            "gain of the sensors) are not contained, and several points of a run do not reduce them"
+        )
 
     def recording(self) -> Recording:
         """The points in order, as a set-point list for the test rig: run, pressure, contraction, expected force."""

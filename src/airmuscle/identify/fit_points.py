@@ -17,8 +17,11 @@ from ..muscle.characteristic.base import Characteristic, ForceLaw
 from ..recording import Recording
 from ..recording.segment import ISOBARIC, ISOMETRIC, find_runs
 from .censoring import Censoring, default_censoring, force_limits
+from .cross_validation import specimen_name
 from .data_checks import DataChecks
+from .parameter_covariance import Runs
 from .problem import RESTING_LENGTH, FitProblem, fitted_quantity_of, make_problem
+from .repeated_rows import RepeatedRows, find_repeated_rows
 from .weights import sensor_deviations
 
 LEVEL_BAND = 0.1
@@ -34,7 +37,8 @@ POINT_COLUMNS = ("pressure", "contraction", "force")
 class FitPoints:
     """The points of one or several recordings, for fits of any law; the sensors are estimated once.
 
-    `joined` has all rows of the recordings in order, `missing` is the mask of those that lack a value.
+    `joined` has all rows of the recordings in order. `missing` is the mask of the rows that are not used, because they
+    lack a value or are `repeated` from another recording.
     """
 
     recordings: tuple[Recording, ...]
@@ -42,23 +46,34 @@ class FitPoints:
     """Whether one recording was given, not a sequence."""
     joined: Recording
     missing: npt.NDArray[np.bool_]
+    dropped: int
+    """Number of rows with a missing value."""
+    repeated: tuple[RepeatedRows, ...] = ()
 
     @classmethod
     def from_recordings(cls, recording: Recording | Sequence[Recording]) -> FitPoints:
         """The points of one or several recordings. Raises IdentificationError for an infinite value."""
         single = isinstance(recording, Recording)
         runs = (recording,) if isinstance(recording, Recording) else tuple(recording)
-        return cls(runs, single, *_join_recordings(runs))
+        joined, missing = _join_recordings(runs)
+        dropped, repeated = int(np.count_nonzero(missing)), find_repeated_rows(runs, POINT_COLUMNS)
+        starts = np.cumsum([0, *(len(run) for run in runs)])
+        for each in repeated:
+            missing[starts[each.recording] + each.rows.start : starts[each.recording] + each.rows.stop] = True
+        return cls(runs, single, joined, missing, dropped, repeated)
 
     @functools.cached_property
     def data(self) -> Recording:
-        """The complete rows."""
+        """The complete rows that are not repeated."""
         return self.joined.rows(~self.missing)
 
-    @property
-    def dropped(self) -> int:
-        """Number of rows with a missing value."""
-        return int(np.count_nonzero(self.missing))
+    @functools.cached_property
+    def runs(self) -> Runs:
+        """The run and the specimen of each complete row."""
+        lengths = [len(run) for run in self.recordings]
+        specimens = np.unique([specimen_name(run) for run in self.recordings], return_inverse=True)[1]
+        index, specimen = (np.repeat(each, lengths)[~self.missing] for each in (np.arange(len(lengths)), specimens))
+        return Runs(index, specimen, all("time" in run for run in self.recordings))
 
     @functools.cached_property
     def checks(self) -> DataChecks:

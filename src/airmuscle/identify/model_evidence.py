@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..core.arrays import Array
@@ -18,6 +20,12 @@ def effective_sample_size(residuals: Array) -> float:
     power = float(centred @ centred)
     r = min(max(float(centred[1:] @ centred[:-1]) / power, 0.0), 0.999) if power > 0 else 0.0
     return residuals.size * (1.0 - r) / (1.0 + r)
+
+
+def lag_one_autocorrelation(series: Sequence[Array]) -> float:
+    """The lag-1 autocorrelation of residuals of zero mean in series in order of time; 0 where all residuals are 0."""
+    products = sum(float(each[1:] @ each[:-1]) for each in series)
+    return float(products / max(sum(float(each @ each) for each in series), 1e-300))
 
 
 def aicc(mean_square: float, sample_size: float, parameters: int) -> float:

@@ -44,7 +44,9 @@ def weakly_determined(fit: Fit) -> tuple[str, ...]:
 
     These are highly correlated with another parameter or, in a nonlinear fit, have a large relative standard error.
     """
-    correlation = np.abs(np.nan_to_num(fit.correlations - np.eye(len(fit.estimates)))).max(axis=1, initial=0.0)
+    free = np.array([not e.on_bound for e in fit.estimates], dtype=bool)
+    design, correlation = fit.parameter_covariance.design_correlations, np.zeros(free.size)
+    correlation[free] = np.abs(design - np.eye(len(design))).max(axis=1, initial=0.0)
     nonlinear = not is_linear(fit.problem)  # in a linear fit a standard error is exact, however large
     return tuple(
         e.name
@@ -58,11 +60,10 @@ def profile(fit: Fit, name: str, *, level: float = 0.95) -> ProfileLikelihood:
 
     It holds all values for which the sum of squares, minimised over the other parameters, stays below
     S (1 + F/(N - P)), where F is the quantile of Fisher's distribution with 1 and N - P degrees of freedom; P counts
-    the parameters that are not on a bound. Raises IdentificationError for a robust fit, a parameter on its bound, or
-    without degrees of freedom.
+    the parameters that are not on a bound. Where rows are correlated, F is multiplied by the squared ratio of the half
+    width of the interval by standard errors (`fit.error_basis`) to that for independent rows. Raises
+    IdentificationError for a robust fit, a parameter on its bound, or without degrees of freedom.
     """
-    from scipy.special import stdtrit
-
     if not isinstance(fit.loss, LeastSquares):
         raise IdentificationError(
             "a likelihood profile needs a fit by least squares, because a robust loss is no likelihood of the noise. "
@@ -77,7 +78,10 @@ def profile(fit: Fit, name: str, *, level: float = 0.95) -> ProfileLikelihood:
         )
     index = fit.names.index(name)
     minimum = _sum_of_squares(fit.problem, fit.values)
-    threshold = minimum * (1 + float(stdtrit(degrees_of_freedom, 0.5 + level / 2)) ** 2 / degrees_of_freedom)
+    covariance, free = fit.parameter_covariance, sum(not e.on_bound for e in fit.estimates[:index])
+    independent = covariance.sigma * float(np.linalg.norm(covariance.basis[free]))
+    half = float(covariance.half_widths(level)[free])
+    threshold = minimum * (1 + (half / independent) ** 2 / degrees_of_freedom)
     low, high = (_find_limit(fit, index, sign * estimate.stderr, threshold) for sign in (-1, 1))
     return ProfileLikelihood(name, estimate.unit, estimate.value, low, high, level)
 

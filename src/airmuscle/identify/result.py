@@ -20,6 +20,7 @@ from ..recording import Recording
 from .correlation_index import CorrelationIndex
 from .data_checks.scatter import Scatter
 from .loss import Loss
+from .parameter_covariance import ParameterCovariance
 from .plot import plot_fit
 from .problem import CONTRACTION, FORCE, FitProblem, FittedQuantity, evaluate
 from .specimen_effects import SpecimenEffects
@@ -72,6 +73,8 @@ class Fit(NotebookDisplay):
     estimates: tuple[Estimate, ...]
     correlations: Array
     """Correlation matrix of the estimates, in their order, shape (P, P)."""
+    parameter_covariance: ParameterCovariance
+    """How the covariance of the estimates was computed; for a PooledLengthLaw that of its population law alone."""
     rank: int
     condition: float
     """Condition number of the design matrix at the solution, with columns of unit norm."""
@@ -123,13 +126,28 @@ class Fit(NotebookDisplay):
 
     @property
     def standard_errors(self) -> Array:
-        """Standard errors of the estimates [SI], shape (P,); NaN for a parameter on a bound."""
+        """Standard errors of the estimates [SI], shape (P,); NaN for a parameter on a bound.
+
+        With correlated errors they contain Student's factor, so that 1.96 of them are the half width of a 95 % interval
+        (see `ParameterCovariance`).
+        """
         return np.array([estimate.stderr for estimate in self.estimates])
 
     @property
     def covariance(self) -> Array:
         """Covariance matrix of the estimates, in their order, shape (P, P); NaN for a parameter on a bound."""
         return np.asarray(self.correlations * np.outer(self.standard_errors, self.standard_errors))
+
+    @property
+    def error_basis(self) -> str:
+        """What the standard errors and bands were estimated from, and what they do not contain, as a phrase."""
+        if self.effects is not None:
+            return (
+                "from independent rows and the scatter of the specimens; the correlation within runs is not contained"
+            )
+        bound = [estimate.name for estimate in self.estimates if estimate.on_bound]
+        known = f"; {', '.join(bound)} on the bound counts as known" if bound else ""
+        return self.parameter_covariance.describe() + known
 
     @property
     def rows_used(self) -> int:
@@ -203,6 +221,7 @@ class Fit(NotebookDisplay):
             *([("scatter of data", str(self.scatter))] if self.scatter and str(self.scatter) else []),
             ("maximum error", f"{self.format_residual(worst.error)} {point}"),
             ("residual std", self.format_residual(self.sigma)),
+            ("standard errors", self.error_basis),
             ("R2", r2),
             ("correlation index", index),
             ("rank, condition", f"{self.rank} of {len(self.estimates)}, {self.condition:.3g}"),

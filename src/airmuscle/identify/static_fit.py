@@ -82,7 +82,7 @@ def fit_to_points(
             characteristic, _fit_law(characteristic.population, points, loss, censoring, sigma, fixed), points
         )
     misfit = [] if result.scatter is None else result.scatter.misfit_notes(result.rmse, result.data_ranges["force"][1])
-    return dataclasses.replace(result, notes=(*points.checks.notes, *result.notes, *misfit))
+    return dataclasses.replace(result, notes=(*points.checks.notes, *map(str, points.repeated), *result.notes, *misfit))
 
 
 def _fit_law(
@@ -91,7 +91,7 @@ def _fit_law(
 ) -> Fit:  # fmt: skip
     problem = points.problem(characteristic, censoring=censoring, sigma=sigma, fixed=fixed)
     solution = solve(problem, loss)
-    statistics = compute_statistics(problem, solution, loss)
+    statistics = compute_statistics(problem, solution, loss, points.runs)
     check_determined_by_levels(problem, solution, points.at_levels)
     by_recording = None if sigma is not None else points.deviations(problem.fitted_quantity.name)
     notes = (*_collect_notes(problem, statistics, loss, points.dropped), *_weighting_notes(by_recording, problem))
@@ -165,6 +165,7 @@ def _build_result(
         model=model,
         estimates=_build_estimates(problem, solution, statistics),
         correlations=statistics.correlations,
+        parameter_covariance=statistics.covariance,
         rank=statistics.rank,
         condition=statistics.condition,
         sigma=statistics.sigma,

@@ -15,6 +15,7 @@ from ..recording import Recording
 from ..recording.segment.runs import RELATIVE_BAND
 from .censored_least_squares import RANK_TOLERANCE, uncensored_rank
 from .loss import Loss
+from .parameter_covariance import ParameterCovariance, Runs, estimate_covariance
 from .problem import FitProblem
 from .solver import LeastSquaresSolution
 
@@ -33,25 +34,28 @@ class FitStatistics:
     """Condition number of the design matrix with columns of unit norm."""
     sigma: float
     """Standard deviation of the residuals, in the unit of the fitted quantity; NaN without degrees of freedom."""
+    covariance: ParameterCovariance
+    """Covariance of the parameters that are not on a bound."""
     standard_errors: Array
     correlations: Array
     on_bound: npt.NDArray[np.bool_]
 
 
-def compute_statistics(problem: FitProblem, solution: LeastSquaresSolution, loss: Loss) -> FitStatistics:
+def compute_statistics(problem: FitProblem, solution: LeastSquaresSolution, loss: Loss, runs: Runs) -> FitStatistics:
     """Statistics of a solution. Raises IdentificationError where the design matrix is rank-deficient."""
     values, jacobian = solution.values, solution.jacobian
     on_bound, active, norms, singular, vectors = _decompose(problem, solution)
     residuals = problem.residuals(solution.modelled)[active]
-    sigma = _residual_std(residuals, singular.size, loss)
-    inverse = (vectors.T / singular**2) @ vectors
-    lengths = np.sqrt(np.diag(inverse))
+    sigma, influences = _residual_std(residuals, singular.size, loss)
+    weighted = problem.weights[active, None] * jacobian[np.ix_(active, ~on_bound)]
+    basis = vectors.T / singular / norms[:, None]
+    covariance = estimate_covariance(basis, weighted, influences, sigma, runs.rows(active))
     standard_errors, correlations = np.full(values.size, np.nan), np.full((values.size, values.size), np.nan)
-    standard_errors[~on_bound] = sigma * lengths / norms
-    correlations[np.ix_(~on_bound, ~on_bound)] = inverse / np.outer(lengths, lengths)
+    standard_errors[~on_bound] = np.sqrt(np.diag(covariance.matrix))
+    correlations[np.ix_(~on_bound, ~on_bound)] = covariance.correlations
     condition = float(singular[0] / singular[-1]) if singular.size else 1.0
     measured = uncensored_rank(problem, jacobian[:, ~on_bound]) if problem.censoring.any() else singular.size
-    return FitStatistics(singular.size, measured, condition, sigma, standard_errors, correlations, on_bound)
+    return FitStatistics(singular.size, measured, condition, sigma, covariance, standard_errors, correlations, on_bound)
 
 
 def check_determined(problem: FitProblem, solution: LeastSquaresSolution) -> None:
@@ -102,18 +106,19 @@ def _on_bound(problem: FitProblem, values: Array) -> npt.NDArray[np.bool_]:
     return (values - low <= margin) | (high - values <= margin)
 
 
-def _residual_std(residuals: Array, parameters: int, loss: Loss) -> float:
-    """The sigma for which sigma^2 (J^T J)^-1 is the covariance of the estimates.
+def _residual_std(residuals: Array, parameters: int, loss: Loss) -> tuple[float, Array]:
+    """The sigma for which sigma^2 (J^T J)^-1 is the covariance of the estimates, and psi/mean(psi') of every residual.
 
-    For least squares it is sqrt(SSE/(N - P)); for a loss with influence function psi(e) = e rho' it is
-    sqrt(Sum psi^2/(N - P))/mean(psi'). Reference: Huber, Robust Statistics (1981), section 7.6.
+    For least squares these are sqrt(SSE/(N - P)) and the residuals; for a loss with influence function psi(e) = e rho'
+    sigma is sqrt(Sum psi^2/(N - P))/mean(psi'). Reference: Huber, Robust Statistics (1981), section 7.6.
     """
-    degrees_of_freedom = residuals.size - parameters
-    if degrees_of_freedom <= 0:
-        return float("nan")
     z = (residuals / loss.scale) ** 2
     _, first, second = loss.rho(z)
-    return float(np.sqrt(np.sum((residuals * first) ** 2) / degrees_of_freedom) / np.mean(first + 2 * z * second))
+    influences = residuals * first / (np.mean(first + 2 * z * second) if residuals.size else 1.0)
+    degrees_of_freedom = residuals.size - parameters
+    if degrees_of_freedom <= 0:
+        return float("nan"), influences
+    return float(np.sqrt(np.sum(influences**2) / degrees_of_freedom)), influences
 
 
 def _rank_deficiency(problem: FitProblem, free: npt.NDArray[np.bool_], shares: Array, rank: int) -> IdentificationError:

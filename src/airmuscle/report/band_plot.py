@@ -39,7 +39,7 @@ _CURVE_AXES = {
 _CAPTION = (
     "Left: 95 % confidence bands (dark) and prediction bands of one further measurement (light) at measured levels. "
     "Right: half width of the confidence bands (thick) and the prediction bands (thin), for non-negative forces. The "
-    "bands assume independent errors; the errors within one slow ramp are correlated."
+    "variance of the parameters is estimated "
 )
 
 
@@ -90,7 +90,7 @@ def band_plot(fit: Fit, name: str = "bands") -> Plot | None:
     left.set(xlabel=f"{curve.varying} [{x_unit}]", ylabel=f"{quantity} [{unit}]")
     right.set(xlabel=f"{curve.varying} [{x_unit}]", ylabel=f"half width of the band [{unit}]", ylim=(0.0, None))
     plotting.legend_below(figure, left, columns=MAX_CURVES + 1)
-    return Plot(name, _CAPTION, figure)
+    return Plot(name, f"{_CAPTION}{fit.error_basis}.", figure)
 
 
 def _curve_axes(fit: Fit) -> CurveAxes:

@@ -71,19 +71,18 @@ def _describe_bootstrap(bootstrap: Bootstrap) -> str:
     if bootstrap.failed_refits > MAX_FAILED_SHARE * len(bootstrap.values):
         failed += ", so the intervals are not reliable: add runs, or use a law with fewer parameters"
     groups = f"{bootstrap.group_count} blocks resampled, seed {bootstrap.seed}"
-    return f"bootstrap: {len(bootstrap.values)} refits, {groups}{failed}"
+    caution = f"; {bootstrap.caution}" if bootstrap.caution else ""
+    return f"bootstrap: {len(bootstrap.values)} refits, {groups}{failed}{caution}"
 
 
 def uncertainty_chapter(uncertainty: Uncertainty) -> Chapter:
     """Return the chapter of the 95 % intervals of every parameter by each requested method."""
     sentences = [
-        "95 % intervals. Standard errors assume independent errors and a law that is nearly linear in its parameters."
+        f"95 % intervals. Standard errors are estimated {uncertainty.fit.error_basis}. They hold for a law that is "
+        "nearly linear in its parameters."
     ]
     if uncertainty.bootstrap is not None:
-        sentences.append(
-            f"{_describe_bootstrap(uncertainty.bootstrap).capitalize()}. Wider bootstrap intervals indicate that the "
-            "errors within a block are correlated."
-        )
+        sentences.append(f"{_describe_bootstrap(uncertainty.bootstrap).capitalize()}.")
     if uncertainty.profiles:
         sentences.append(
             "A profile fixes one parameter and estimates all others again; an interval is unbounded where the data do "

@@ -103,6 +103,7 @@ def _bands(fit: am.Fit) -> dict[str, Any] | None:
     return {
         "constant": axes.constant,
         "varying": axes.varying,
+        "basis": fit.error_basis,
         "curves": [
             {
                 "level": each.level, "x": each.points, "value": each.confidence.value,

@@ -13,6 +13,7 @@ from ...core.arrays import Array
 from ...core.errors import IdentificationError, ParameterError
 from ...simulation.integrators import Integrator, Rodas4
 from ..identifiability import analyse_identifiability
+from ..model_evidence import lag_one_autocorrelation
 from ..result import Estimate
 from .ambient import check_ambient
 from .experiment import Experiment, ParameterPaths, RecordUnknown, make_unknowns
@@ -161,9 +162,7 @@ def _describe_model_error(
     problem: DynamicFitProblem, residuals: Array, estimates: Sequence[Estimate], unknowns: int
 ) -> list[str]:
     """Sentences on autocorrelated residuals (R,), which are a sign of model error, and on what they leave open."""
-    series = separate_residuals(problem.record_models, residuals)
-    products = sum(float(each[1:] @ each[:-1]) for each in series)
-    autocorrelation = products / max(sum(float(each @ each) for each in series), 1e-300)
+    autocorrelation = lag_one_autocorrelation(separate_residuals(problem.record_models, residuals))
     if autocorrelation <= MAX_AUTOCORRELATION:
         return []
     factor = np.sqrt((1 + autocorrelation) / (1 - autocorrelation))

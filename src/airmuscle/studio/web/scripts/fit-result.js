@@ -74,7 +74,7 @@
     if (result.bands) {
       const { constant, varying, curves } = result.bands, [fx] = scaleOf(varying), [fc, unit] = scaleOf(constant), scaled = (values, by) => values.map((v) => (v === null ? NaN : v * by));
       const cut = (values, c) => scaled(values, factor).map((v, i) => (parity.quantity === "force" && c.value[i] < 0 ? NaN : v));
-      parts.push(element("h3", {}, "Fitted curves with 95 % bands"), element("p.small.soft", {}, "Dark: confidence band of the curve. Light: prediction band of one further measurement. Both assume independent errors."), hosts[2],
+      parts.push(element("h3", {}, "Fitted curves with 95 % bands"), element("p.small.soft", {}, `Dark: confidence band of the curve. Light: prediction band of one further measurement. The variance of the parameters is estimated ${result.bands.basis}.`), hosts[2],
         element("div.row.small", {}, ...curves.map((c, i) => element("span.row", {}, element(`span.swatch.${GROUP_COLOURS[i]}`), `${shortText(c.level * fc)} ${unit}`))));
       later.push(() => new Scatter(hosts[2], "Fitted curves with bands", 360).show({
         x: labelOf(varying), y: labelOf(parity.quantity), points: { x: parity[varying].map((v) => v * fx), y: measured, colour: "soft" },
