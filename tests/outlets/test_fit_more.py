@@ -136,7 +136,7 @@ def test_the_force_is_zero_where_the_muscle_hangs_free(tmp_path):
         ((*SURFACE, "--bootstrap", "3"), 2, "greater than or equal to 20"),
         ((*SURFACE, "--profile", "coefficients[0]", "--robust", "5 N"), 1, "a robust loss is no likelihood"),
         ((*SURFACE, "--leave-out", "row"), 2, "allowed range: run, specimen, contraction, pressure, block"),
-        (("--characteristic", "ContractileSurface", "--degree", "9"), 1, "--fix 'coefficients"),
+        (("--characteristic", "ContractileSurface", "--degree", "9"), 1, "use --degree 5"),
     ],
 )
 def test_what_cannot_be_asked_is_refused(options, code, message, tmp_path):
@@ -204,7 +204,8 @@ def test_exclusions_of_a_comparison_name_options_everywhere(tmp_path):
     result = airmuscle("fit", tmp_path / "bench.csv", *asked, "--out", tmp_path / "fit")
     assert result.exit_code == 0, result.stderr
     page = (tmp_path / "fit" / "report.html").read_text("utf-8")
-    assert "--fix" in page
+    assert "use --degree" in page
     assert "excluded: surface of degree 6: the data cannot separate" in result.stdout
     assert "fixed=" not in result.stdout + page
+    assert "degree=" not in result.stdout + page
     assert "profile: " in result.stdout

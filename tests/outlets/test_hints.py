@@ -43,7 +43,7 @@ VALUES = {
     "fixed": ("wall_thickness",), "sigma": 1.0, "by": LevelSplit("contraction"), "leave_out": LevelSplit("pressure"),
     "units": {"pressure": ...}, "columns": {1: "pressure [kPa]"}, "decimal": ",", "resting_length": ...,
     "constants": {"length": "73.2 mm"}, "file_name": "held{length [mm]}", "time_base": NoTime(), "ordered": False,
-    "skip_rows": 1, "missing": DropMissing((-999.0,)), "displacement_zero": "12 mm",
+    "degree": 2, "skip_rows": 1, "missing": DropMissing((-999.0,)), "displacement_zero": "12 mm",
     "all_rows": True, "characteristic": ..., "censoring": ..., "free": ("circuit.fill.conductance",), "": ...,
 }  # fmt: skip
 """A value of every argument that a hint of the source names."""
@@ -218,9 +218,9 @@ NO_HEADINGS = "1;2;3\n2;3;4\n"
 THOUSANDS = "pressure [kPa];contraction [%];force [N]\n100;5;1,234\n200;6;0.5\n"
 RISE_AND_FALL = (0.0, 0.15, 0.0)
 CASES: dict[str, tuple[Callable[[Path], Path], Callable[[Path], Any], tuple[Any, ...], str, str]] = {
-    "one parameter fixed": (
+    "greatest degree of a surface": (
         points, lambda file: fit(law(9), read(file)), ("fit", *SURFACE, 9),
-        "use fixed=('coefficients", "To fix one parameter, use --fix 'coefficients"),
+        "use degree=5.", "For the greatest degree that the levels determine, use --degree 5."),
     "parameters fixed": (
         lambda path: points(path, 30), lambda file: fit(law(9), read(file)), ("fit", *SURFACE, 9),
         "use fixed=....", "To fix parameters, use --fix PARAMETER."),

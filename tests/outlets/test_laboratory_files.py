@@ -18,7 +18,9 @@ from typer.testing import CliRunner
 import airmuscle as am
 from airmuscle.cli.app import app
 from airmuscle.core.constants import STANDARD_GRAVITY
-from airmuscle.core.errors import ColumnError, FileError, ParameterError
+from airmuscle.core.errors import ColumnError, FileError, IdentificationError, ParameterError
+from airmuscle.identify import Huber, LeastSquares, LevelSplit, compare, fit
+from airmuscle.muscle.characteristic import ContractileSurface
 from airmuscle.recording import ColumnMapping, DropMissing, InterpolateMissing, Recording, RefuseMissing, read
 from airmuscle.recording.mapping import mapping_of_tables
 
@@ -375,3 +377,74 @@ def test_inspect_and_convert_data_say_what_they_left_out(tmp_path):
     assert shown["rows"] == 399
     converted = airmuscle("convert-data", path, tmp_path / "plain.csv", "--plain", "--outliers", "drop")
     assert "note: ramp.csv: rows left out as suspected outliers: 1 of 400" in " ".join(converted.stderr.split())
+
+
+# Robust comparisons
+
+
+def loops(*, spike: bool) -> Recording:
+    """Three isobaric ramps of a Gaylord muscle with loads of friction and noise; one force may be 9999 N."""
+    contraction = np.concatenate([np.linspace(0.0, 0.2, 40), np.linspace(0.2, 0.0, 40)])
+    pressure = np.repeat([2e5, 3.5e5, 5e5], 80)
+    contraction = np.tile(contraction, 3)
+    noise = np.random.default_rng(3).normal(0.0, 5.0, 240)
+    force = pressure * 4e-4 * (2.2 * (1.0 - contraction) ** 2 - 1.0) + noise
+    force[100] = 9999.0 if spike else force[100]
+    columns = {"time": np.arange(240) * 0.1, "pressure": pressure, "contraction": contraction, "force": force}
+    return Recording(columns, "loops", {"resting_length": 0.3})
+
+
+def test_one_wrong_reading_does_not_spoil_a_robust_comparison():
+    leave_out = LevelSplit("pressure")
+    clean = compare(loops(spike=False), leave_out=leave_out)
+    spoilt = compare(loops(spike=True), leave_out=leave_out)
+    robust = compare(loops(spike=True), leave_out=leave_out, loss=Huber(15.0))
+    name = clean.recommended.candidate.name
+    assert spoilt[name].cross_validated_rmse > 600.0
+    assert robust[name].cross_validated_rmse == pytest.approx(clean[name].cross_validated_rmse, rel=0.1)
+    assert robust[name].limited_rows == 1
+    assert not any("Robust loss" in note for note in clean.notes)
+    assert any("limits 1 of 240 rows" in note for note in robust.notes)
+
+
+def test_without_outliers_the_errors_of_a_robust_comparison_are_hardly_changed():
+    clean, robust = (compare(loops(spike=False), leave_out=LevelSplit("pressure"), loss=loss)
+                     for loss in (LeastSquares(), Huber(15.0)))  # fmt: skip
+    for model in robust.ranking[:3]:
+        assert model.limited_rows == 0
+        assert model.cross_validated_rmse == pytest.approx(clean[model.candidate.name].cross_validated_rmse, rel=0.05)
+
+
+def test_fit_compares_with_a_robust_loss_and_without_outliers(tmp_path):
+    am.write_csv(loops(spike=True), tmp_path / "loops.csv")
+    command = ("fit", tmp_path / "loops.csv", "--compare", "--leave-out", "pressure", "--json", "--out", tmp_path / "o")
+    errors = {}
+    for name, more in {"plain": (), "robust": ("--robust", "15 N"), "dropped": ("--outliers", "drop")}.items():
+        result = airmuscle(*command, *more)
+        assert result.exit_code == 0, result.stderr
+        errors[name] = json.loads(result.stdout)["ranking"][0]["cross_validated"]
+        assert ("rows left out as suspected outliers: 1 of 240" in result.stderr) == (name == "dropped")
+    assert errors["plain"] > 600.0 > 10.0 > max(errors["robust"], errors["dropped"])
+    report = (tmp_path / "o" / "report.html").read_text()
+    assert "rows left out as suspected outliers: 1 of 240" in report
+
+
+def test_a_robust_fit_states_its_error_without_the_limited_rows():
+    found = fit(ContractileSurface.blank(2), loops(spike=True), loss=Huber(15.0))
+    assert re.search(r"rms error +6\d\d\.?\d* N; \d\d?\.?\d* N with 1 row limited to", str(found))
+
+
+# Degree of a surface
+
+
+def test_the_greatest_degree_of_a_surface_is_proposed(tmp_path):
+    with pytest.raises(IdentificationError) as caught:
+        fit(ContractileSurface.blank(5), loops(spike=False))
+    said = str(caught.value)
+    assert re.search(r"cannot separate a\([^ ]+, a\([^)]+\), a\([^)]+\) and \d+ other parameters", said)
+    assert "the coefficient of the powers i of the contraction and j of the pressure" in said
+    assert "use degree=2." in said
+    assert fit(ContractileSurface.blank(2), loops(spike=False)).rank == 6
+    am.write_csv(loops(spike=False), tmp_path / "loops.csv")
+    result = airmuscle("fit", tmp_path / "loops.csv", "--characteristic", "ContractileSurface", "--out", tmp_path / "o")
+    assert "use --degree 2." in " ".join(result.stderr.split())

@@ -10,13 +10,14 @@ import typer
 from ..core.output_folder import check_writable
 from ..identify import UNCENSORED
 from ..identify import fit as fit_model
+from ..identify.problem import fitted_quantity_of
 from ..library.fitted_entry import fitted_entry, missing_geometry
 from ..library.initial_law import find_initial_law
 from ..recording import Recording
 from .bench_files import Files, read_recordings
 from .fit_compare import compare_models
 from .fit_geometry import parse_braid, with_braid
-from .fit_options import FitOptions, FitRequest, loss_of
+from .fit_options import FitOptions, FitRequest, robust_loss
 from .fit_output import fit_to_dict, print_results, with_option_names, write_results
 from .options import Folder, Json
 from .reading_options import NO_OPTIONS, ReadingOptions, with_reading_options
@@ -37,7 +38,10 @@ Fixed = Annotated[
 ]
 Robust = Annotated[
     str | None,
-    typer.Option(metavar="QUANTITY", help="Threshold of the Huber loss, such as '10 N' or '0.5 %'; default: squared."),
+    typer.Option(
+        metavar="QUANTITY",
+        help="Threshold of the Huber loss, such as '10 N' or '0.5 %'; default: squared. With --compare: a force.",
+    ),
 ]
 Uncensored = Annotated[
     bool, typer.Option("--uncensored", help="Fit rows at zero force as measured values, not as censored data.")
@@ -171,7 +175,7 @@ def _fit_one(files: list[Path], recordings: list[Recording], characteristic: str
     result = fit_model(
         law,
         recordings,
-        loss=loss_of(request.robust, law),
+        loss=robust_loss(request.robust, fitted_quantity_of(law).unit),
         censoring=UNCENSORED if request.uncensored else None,
         sigma=1.0 if request.equal_weights else None,
         fixed=(*request.fixed, *initial.fixed),

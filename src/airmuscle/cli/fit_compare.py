@@ -20,7 +20,7 @@ from ..muscle.geometry import Geometry
 from ..recording import Recording
 from ..report.compare_chapter import compare_chapter
 from .fit_geometry import check_one_length, with_braid
-from .fit_options import FitRequest
+from .fit_options import FitRequest, robust_loss
 from .fit_output import fit_to_dict, print_results, write_results
 from .option_hints import in_options
 from .progress import computation_progress
@@ -31,10 +31,9 @@ def compare_models(
     files: list[Path], recordings: list[Recording], characteristic: str | None, request: FitRequest
 ) -> None:
     """Rank all candidates, print the ranking, and write the recommended muscle with its report."""
-    if request.uncensored or request.robust is not None or request.equal_weights:
+    if request.uncensored or request.equal_weights:
         raise typer.BadParameter(
-            "--compare ranks by squared errors of rows with positive force: "
-            "--uncensored, --robust and --equal-weights do not apply"
+            "--compare ranks by errors of rows with positive force: --uncensored and --equal-weights do not apply"
         )
     check_writable(request.out)
     if request.braid is not None:
@@ -64,8 +63,8 @@ def _select(recordings: list[Recording], given: list[Candidate] | None, request:
     both = True if options.purpose == "both" else None if options.purpose is None else False
     with computation_progress("comparison") as show:
         selection = select_law(
-            recordings, given, leave_out=options.split, both=both, workers=available_cores(),
-            progress=lambda name, fraction: show(fraction),
+            recordings, given, leave_out=options.split, both=both, loss=robust_loss(request.robust, "N"),
+            workers=available_cores(), progress=lambda name, fraction: show(fraction),
         )  # fmt: skip
     return dataclasses.replace(selection, comparisons=tuple(_with_option_names(selection.comparisons)))
 

@@ -30,10 +30,9 @@ from ..identify import (
     weakly_determined,
 )
 from ..identify.length_errors import PRIOR_STD
-from ..identify.problem import fitted_quantity_of
 from ..identify.surface.shape import fit_shape_constrained, shape_violations_of_fit
 from ..library.entry import Entry
-from ..muscle.characteristic import Characteristic, ContractileSurface
+from ..muscle.characteristic import ContractileSurface
 from ..recording import Recording
 from ..report.chapter import Chapter
 from ..report.shape_chapter import shape_chapter
@@ -184,11 +183,9 @@ def parse_split(name: str | None, purpose: str | None = None, compare: bool = Tr
     return None if name is None else splits[name]
 
 
-def loss_of(robust: str | None, law: Characteristic) -> Loss:
-    """The loss that --robust gives, with its threshold in the unit of the fitted quantity; squared loss without it."""
-    if robust is None:
-        return LeastSquares()
-    return Huber(quantity(robust, fitted_quantity_of(law).unit, where="--robust"))
+def robust_loss(robust: str | None, unit: str) -> Loss:
+    """The loss that --robust gives, with its threshold in this SI unit; squared loss without it."""
+    return LeastSquares() if robust is None else Huber(quantity(robust, unit, where="--robust"))
 
 
 def _parse_point(text: str) -> tuple[float, float]:

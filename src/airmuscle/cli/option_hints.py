@@ -87,6 +87,7 @@ INSTRUCTIONS: Mapping[str, Mapping[str, Instruction]] = {
     "fit": {
         **_FILES,
         "fixed": _fix,
+        "degree": lambda hint: f"use --degree {hint.value}",
         "censoring": _censoring,
         "loss": lambda hint: f"use --robust '{hint.value.scale:g} N'",
         "sigma": lambda hint: "use --equal-weights",

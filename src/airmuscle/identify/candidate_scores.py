@@ -15,8 +15,9 @@ from .candidates import Candidate
 from .compared_points import ComparedPoints, cause_of, residuals_of_rows
 from .cross_validation import GroupSplit, label_folds
 from .fit_points import FitPoints
-from .loss import Loss
+from .loss import LeastSquares, Loss
 from .model_evidence import aicc
+from .problem import FORCE, fitted_quantity_of
 from .result import Fit
 from .static_fit import fit_to_points
 
@@ -50,6 +51,10 @@ class RankedModel:
     fold_scores: tuple[FoldScore, ...]
     notes: tuple[str, ...] = ()
     """Remarks on the use of the law at the measured points."""
+    limit: float = np.inf
+    """Limit of the residuals in all errors [N], that of a robust loss; infinite for least squares."""
+    limited_rows: int = 0
+    """Number of rows of the fit whose residual is limited."""
 
     @property
     def parameter_count(self) -> int:
@@ -91,33 +96,39 @@ def score_candidate(
 ) -> tuple[Score, ...]:
     """The scores of a candidate for each split; `lowest` are the lowest errors [N] of other laws, if known."""
     try:
-        fit = fit_to_points(candidate.law, splits[0].points, loss=loss, fixed=candidate.fixed)
+        own_loss = in_fitted_quantity(loss, candidate.law, splits[0].points)
+        fit = fit_to_points(candidate.law, splits[0].points, loss=own_loss, fixed=candidate.fixed)
         notes = _slack_notes(fit.model, splits[0])
         residuals = residuals_of_rows(fit.model, splits[0].rows, splits[0].max_force)
     except AirmuscleError as error:
         return (ExcludedModel(candidate.name, error.message, cause_of(error)),) * len(splits)
     bounds = lowest or [np.inf] * len(splits)
+    limit = loss.limit(residuals)
     return tuple(
-        _cross_validate(candidate, points, loss, fit, residuals, notes, bound)
+        _cross_validate(candidate, points, own_loss, fit, residuals, notes, bound, limit)
         for points, bound in zip(splits, bounds, strict=True)
     )
 
 
 def _cross_validate(
-    candidate: Candidate, points: ComparedPoints, loss: Loss, fit: Fit, in_sample: Array, notes: tuple[str, ...],
-    lowest: float,
+    candidate: Candidate, points: ComparedPoints, loss: Loss, fit: Fit, residuals: Array, notes: tuple[str, ...],
+    lowest: float, limit: float,
 ) -> Score:  # fmt: skip
+    """The scores for one split; residuals in force [N] are limited to `limit`, which is infinite for least squares."""
+    in_sample = np.clip(residuals, -limit, limit)
     rmse = _rms(in_sample)
     if rmse > MAX_EXCESS * lowest:
         return _excess_error(candidate.name, rmse, lowest)
     try:
-        left_out = [each for each in points.left_out_residuals(candidate, fit, loss) if each[1].size]
+        found = points.left_out_residuals(candidate, fit, loss)
+        left_out = [(name, np.clip(each, -limit, limit)) for name, each in found if each.size]
     except AirmuscleError as error:
         return ExcludedModel(candidate.name, error.message, cause_of(error))
     scores = tuple(FoldScore(name, _rms(residuals), residuals.size) for name, residuals in left_out)
     out_of_sample = _rms(np.concatenate([residuals for _, residuals in left_out]))
     criterion = aicc(float(np.mean(in_sample**2)), in_sample.size, count_parameters(fit))
-    return RankedModel(candidate, fit, rmse, out_of_sample, criterion, scores, notes)
+    limited = int(np.count_nonzero(np.abs(residuals) > limit))
+    return RankedModel(candidate, fit, rmse, out_of_sample, criterion, scores, notes, limit, limited)
 
 
 def _excess_error(name: str, rmse: float, lowest: float) -> ExcludedModel:
@@ -145,6 +156,17 @@ def _slack_notes(model: Characteristic, points: ComparedPoints) -> tuple[str, ..
         f"it is slack at {slack} of {count} points with a positive force and is ranked with zero force there; its "
         "method force raises SolveError at these points.",
     )
+
+
+def in_fitted_quantity(loss: Loss, law: Characteristic, points: FitPoints) -> Loss:
+    """A robust loss whose scale is a force [N] for a law fitted in another quantity: in proportion to the medians of
+    the magnitudes of both quantities (chosen)."""
+    quantity = fitted_quantity_of(law)
+    if isinstance(loss, LeastSquares) or quantity == FORCE:
+        return loss
+    sizes = [float(np.nanmedian(np.abs(points.joined[name]))) for name in (quantity.name, "force")]
+    scale = loss.scale * sizes[0] / sizes[1] if min(sizes) > 0 else loss.scale
+    return dataclasses.replace(loss, scale=scale)  # type: ignore[type-var]  # each loss is a dataclass
 
 
 def _rms(values: Array) -> float:

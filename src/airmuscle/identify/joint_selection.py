@@ -11,6 +11,7 @@ from ..recording import Recording
 from .candidate_scores import RankedModel
 from .candidates import Candidate
 from .cross_validation import RunSplit, SpecimenSplit
+from .loss import LeastSquares, Loss
 from .model_selection import Comparison, compare_splits, excess_error
 
 SPLITS = (RunSplit(), SpecimenSplit())
@@ -46,12 +47,14 @@ def select_for_both(
     recordings: Sequence[Recording],
     candidates: Sequence[Candidate] | None = None,
     *,
+    loss: Loss = LeastSquares(),
     workers: int = 1,
     progress: Callable[[str, float], None] | None = None,
 ) -> JointSelection:
     """One law for further runs (leave-one-run-out) and for other muscles (leave-one-specimen-out cross-validation).
 
     candidates  by default `standard_candidates`, of which slow laws may be excluded as in `compare`
+    loss        as in `compare`
     workers     number of processes, as in `compare`
     progress    called with the name of each candidate and the completed fraction
 
@@ -60,7 +63,7 @@ def select_for_both(
     than the best law of each purpose, the one with the fewest parameters is recommended.
     Raises IdentificationError where no candidate is determined for both purposes.
     """
-    comparisons = compare_splits(recordings, candidates, SPLITS, workers=workers, progress=progress)
+    comparisons = compare_splits(recordings, candidates, SPLITS, loss=loss, workers=workers, progress=progress)
     rankings = [{model.candidate.name: model for model in each.ranking} for each in comparisons]
     names = [name for name in rankings[0] if all(name in ranking for ranking in rankings)]
     if not names:

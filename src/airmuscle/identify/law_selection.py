@@ -11,6 +11,7 @@ from .candidate_scores import RankedModel
 from .candidates import MIN_POOLED, Candidate
 from .cross_validation import GroupSplit, specimen_name
 from .joint_selection import select_for_both
+from .loss import LeastSquares, Loss
 from .model_selection import Comparison, compare
 
 
@@ -29,6 +30,7 @@ def select_law(
     *,
     leave_out: GroupSplit | None = None,
     both: bool | None = None,
+    loss: Loss = LeastSquares(),
     workers: int = 1,
     progress: Callable[[str, float], None] | None = None,
 ) -> LawSelection:
@@ -38,14 +40,14 @@ def select_law(
     leave_out   the split of a single purpose, as in `compare`
     both        whether one law must serve both purposes; by default if no split is given and the recordings contain
                 three specimens or more, each in several runs
-    workers, progress  as in `compare`
+    loss, workers, progress  as in `compare`
 
     Raises IdentificationError where no candidate is determined.
     """
     if both or (both is None and leave_out is None and serves_both(recordings)):
-        joint = select_for_both(recordings, candidates, workers=workers, progress=progress)
+        joint = select_for_both(recordings, candidates, loss=loss, workers=workers, progress=progress)
         return LawSelection(joint.comparisons, joint.recommended[0], str(joint))
-    comparison = compare(recordings, candidates, leave_out=leave_out, workers=workers, progress=progress)
+    comparison = compare(recordings, candidates, leave_out=leave_out, loss=loss, workers=workers, progress=progress)
     return LawSelection((comparison,), comparison.recommended, comparison.reason)
 
 

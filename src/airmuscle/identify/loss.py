@@ -11,11 +11,21 @@ from ..core.arrays import Array
 from ..core.errors import ParameterError
 from ..core.field_types import check_field_types
 
+ROBUST_LIMIT = 6.0
+"""Limit of the residuals in the errors of a robust fit, in robust standard deviations (chosen)."""
+
 
 class Loss(abc.ABC):
     """A function rho of the squared scaled residuals; a fit minimises the sum of scale^2 rho((residual/scale)^2)."""
 
     scale: float
+
+    def limit(self, residuals: Array) -> float:
+        """The magnitude to which residuals (N,) are limited in errors of a robust fit; infinite for least squares.
+
+        It is six robust standard deviations, 1.4826 times the median magnitude, and at least `scale` (chosen).
+        """
+        return max(self.scale, ROBUST_LIMIT * 1.4826 * float(np.median(np.abs(residuals))))
 
     @abc.abstractmethod
     def rho(self, z: Array) -> Array:
@@ -30,6 +40,9 @@ class LeastSquares(Loss):
 
     def __post_init__(self) -> None:
         check_field_types(self)
+
+    def limit(self, residuals: Array) -> float:
+        return np.inf
 
     def rho(self, z: Array) -> Array:
         return np.stack([z, np.ones_like(z), np.zeros_like(z)])

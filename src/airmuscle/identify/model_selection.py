@@ -20,6 +20,8 @@ from .parallel_scores import score_candidates
 
 MAX_EXCESS = 0.25
 """Maximum excess of the error of a recommended law over the lowest one (chosen)."""
+MAX_LIMITED = 0.01
+"""Fraction of the rows above which limited residuals are no outliers (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -88,6 +90,8 @@ def compare(
     leave_out   RunSplit(), LevelSplit("contraction"), LevelSplit("pressure"), SpecimenSplit() or BlockSplit(); it
                 defines the purpose of the ranking: the best law for other muscles is not the best for the measured
                 ones. By default the first of specimens, runs and levels with three groups or more
+    loss        LeastSquares(), or a robust loss such as Huber(scale) with its scale in force [N]; all errors are then
+                rms errors of residuals that are limited to `loss.limit`, and a note states the limit
     workers     number of processes; a script that asks for several needs `if __name__ == "__main__":`
     progress    called with the name of each candidate and the completed fraction, at the end with an empty name
 
@@ -130,8 +134,23 @@ def _comparison(
         raise IdentificationError(HintedText(f"the data determine none of the {len(excluded)} candidates.", *reasons))
     ranking.sort(key=lambda m: (m.cross_validated_rmse, m.parameter_count))
     recommended, reason = recommend(ranking, split)
-    remarks = (*recommended.fit.notes, *length_notes(find_length_errors(recommended.fit.model, runs)))
+    length_remarks = length_notes(find_length_errors(recommended.fit.model, runs))
+    remarks = (*recommended.fit.notes, *length_remarks, *_limit_notes(recommended))
     return Comparison(tuple(ranking), excluded, split, recommended, reason, unavailable, remarks)
+
+
+def _limit_notes(model: RankedModel) -> tuple[str, ...]:
+    """The definition of the errors for a robust loss, and the number of limited rows of a law."""
+    if not np.isfinite(model.limit):
+        return ()
+    rows = sum(score.rows for score in model.fold_scores)
+    many = model.limited_rows > MAX_LIMITED * rows
+    advice = " These are more than outliers: the law does not describe them, or the files differ." if many else ""
+    return (
+        "In all errors of the ranking, residuals count at most as six robust standard deviations (1.4826 times the "
+        f"median magnitude), at least as the scale of the robust loss: {model.limit:.4g} N for {model.candidate.name}, which "
+        f"limits {model.limited_rows} of {rows} rows.{advice}",
+    )
 
 
 def recommend(ranking: Sequence[RankedModel], split: GroupSplit) -> tuple[RankedModel, str]:

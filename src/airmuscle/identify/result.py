@@ -217,7 +217,7 @@ class Fit(NotebookDisplay):
         contractions = " to ".join(contraction_text(c) for c in ranges["contraction"])
         return [
             ("rows", f"{self.rows_used} used, {self.rows_censored} of them censored; {self.rows_dropped} dropped"),
-            ("rms error", self.format_residual(self.rmse)),
+            ("rms error", self.format_residual(self.rmse) + self._limited_text()),
             *([("scatter of data", str(self.scatter))] if self.scatter and str(self.scatter) else []),
             ("maximum error", f"{self.format_residual(worst.error)} {point}"),
             ("residual std", self.format_residual(self.sigma)),
@@ -227,6 +227,17 @@ class Fit(NotebookDisplay):
             ("rank, condition", f"{self.rank} of {len(self.estimates)}, {self.condition:.3g}"),
             ("data range", f"{_range_text(p0, p1, 'Pa', 'kPa')}, {contractions}, {_range_text(f0, f1, 'N', 'N')}"),
         ]
+
+    def _limited_text(self) -> str:
+        """The rms error of a robust fit with its residuals limited, as in a comparison; empty if none is limited."""
+        residuals = self.residuals[self.censoring == 0]
+        limit = self.loss.limit(residuals)
+        count = int(np.count_nonzero(np.abs(residuals) > limit))
+        if not count:
+            return ""
+        rmse = float(np.sqrt(np.mean(np.clip(residuals, -limit, limit) ** 2)))
+        rows = "1 row" if count == 1 else f"{count} rows"
+        return f"; {self.format_residual(rmse)} with {rows} limited to {self.format_residual(limit)}"
 
     def format_residual(self, residual: float) -> str:
         """A residual [SI] as text in the usual unit of the fitted quantity."""

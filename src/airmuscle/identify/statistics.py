@@ -11,6 +11,7 @@ import numpy.typing as npt
 from ..core.arrays import Array
 from ..core.errors import IdentificationError
 from ..core.hints import Hint
+from ..muscle.characteristic import ContractileSurface
 from ..recording import Recording
 from ..recording.segment.runs import RELATIVE_BAND
 from .censored_least_squares import RANK_TOLERANCE, uncensored_rank
@@ -126,19 +127,37 @@ def _rank_deficiency(problem: FitProblem, free: npt.NDArray[np.bool_], shares: A
     labels = [label for label, is_free in zip(problem.labels, free, strict=True) if is_free]
     names = [label for label, share in zip(labels, shares, strict=True) if share > 1e-3 * shares.max()]
     quantities = problem.fitted_quantity.arguments
-    counts = [f"{count_levels(values)} of {name}" for name, values in zip(quantities, problem.arguments, strict=True)]
+    levels = [count_levels(values) for values in problem.arguments]
+    counts = [f"{count} of {name}" for count, name in zip(levels, quantities, strict=True)]
     path = problem.leaves[problem.free[int(np.flatnonzero(free)[int(np.argmax(shares))])]].path
     law = type(problem.law).__name__
-    what = f"cannot separate {', '.join(names)}" if len(names) > 1 else f"do not depend on {names[0]}"
     ranks = f"(rank {rank} of {len(labels)} parameters)"
-    few = [names[0], f"{len(names) - 1} other parameters"] if len(names) > _MAX_NAMES else names
-    cause = what if len(names) == 1 else f"cannot separate {' and '.join(few)}"
+    listed = ", ".join(names[:_MAX_NAMES])
+    more = f" and {len(names) - _MAX_NAMES} other parameters" if len(names) > _MAX_NAMES else ""
+    few = [names[0], f"{len(names) - 1} other parameters"] if more else names
+    what, cause = f"cannot separate {listed}{more}", f"cannot separate {' and '.join(few)}"
+    if len(names) == 1:
+        what = cause = f"do not depend on {names[0]}"
+    text, hint = _degree_remedy(problem, min(levels) - 1)
     return IdentificationError(
-        f"{problem.data.origin}: the data {what} of {law} {ranks}. Number of levels: {', '.join(counts)}. Measure at "
-        "more levels, or choose a lower degree or a law with fewer parameters.",
-        hint=Hint("To fix one parameter", "fixed", (path,)),
+        f"{problem.data.origin}: the data {what} of {law} {ranks}. Number of levels: {', '.join(counts)}. {text}"
+        "Measure at more levels, or choose a lower degree or a law with fewer parameters.",
+        hint=hint or Hint("To fix one parameter", "fixed", (path,)),
         cause=f"the data {cause} (rank {rank} of {len(labels)})",
     )
+
+
+def _degree_remedy(problem: FitProblem, degree: int) -> tuple[str, Hint | None]:
+    """What the terms of a surface are, and the greatest total degree that the levels determine: one less than their
+    number, for the pure powers of each quantity."""
+    if not isinstance(problem.law, ContractileSurface):
+        return "", None
+    text = (
+        "a(x^i q^j) is the coefficient of the powers i of the contraction and j of the pressure, each scaled to -1..1; "
+        "powers up to n need n + 1 levels. "
+    )
+    possible = 0 < degree < problem.law.degree
+    return text, Hint("For the greatest degree that the levels determine", "degree", degree) if possible else None
 
 
 def count_levels(values: Array) -> int:

@@ -47,7 +47,10 @@ class ContractileSurface(ForceLaw):
     """The parameters in which the model is linear; a fit solves for them by linear least squares."""
 
     coefficients: tuple[float, ...] = parameter(
-        "N", "a_ij", "coefficients of the polynomial in scaled contraction and pressure, ordered by power of pressure"
+        "N",
+        "a_ij",
+        "coefficients of the polynomial: a(x^i q^j) of powers of contraction x and pressure q, each scaled to -1..1 on "
+        "the validity range; ordered by power of pressure",
     )
     min_pressure: float = parameter("Pa", "p_low", "lower limit of the validity range in gauge pressure", fitted=False)
     max_pressure: float = parameter("Pa", "p_high", "upper limit of the validity range in gauge pressure", fitted=False)
