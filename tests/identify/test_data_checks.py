@@ -148,7 +148,7 @@ def test_friction_is_not_called_a_delay(tmp_path):
 def test_outliers_are_carried_into_the_notes_with_the_remedy(tmp_path):
     notes = notes_of(tmp_path, with_glitches(sweeps(), 0.01, (100.0, 400.0)))
     assert "suspected outliers of the force" in notes
-    assert "To leave them out, use outliers='drop' of read." in notes
+    assert "To leave them out, use drop_outliers=True of read." in notes
     assert "To reduce their weight, use loss=Huber(" in notes
 
 

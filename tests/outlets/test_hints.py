@@ -27,7 +27,7 @@ from airmuscle.cli.option_hints import INSTRUCTIONS, in_options
 from airmuscle.core.diagnostics import Diagnostic, DiagnosticCode
 from airmuscle.core.errors import ColumnError, SimulationError
 from airmuscle.core.hints import Hint, HintedText
-from airmuscle.identify import LevelSplit, RunSplit, bootstrap, compare, fit
+from airmuscle.identify import Huber, LevelSplit, RunSplit, bootstrap, compare, fit
 from airmuscle.identify.candidates import blank_surface, standard_candidates
 from airmuscle.identify.hysteresis import find_loops, fit_loop
 from airmuscle.library.location import located_errors
@@ -43,7 +43,7 @@ VALUES = {
     "fixed": ("wall_thickness",), "sigma": 1.0, "by": LevelSplit("contraction"), "leave_out": LevelSplit("pressure"),
     "units": {"pressure": ...}, "columns": {1: "pressure [kPa]"}, "decimal": ",", "resting_length": ...,
     "constants": {"length": "73.2 mm"}, "file_name": "held{length [mm]}", "time_base": NoTime(), "ordered": False,
-    "degree": 2, "skip_rows": 1, "missing": DropMissing((-999.0,)), "displacement_zero": "12 mm",
+    "degree": 2, "skip_rows": 1, "drop_outliers": True, "loss": Huber(10.0), "missing": DropMissing((-999.0,)), "displacement_zero": "12 mm",
     "all_rows": True, "characteristic": ..., "censoring": ..., "free": ("circuit.fill.conductance",), "": ...,
 }  # fmt: skip
 """A value of every argument that a hint of the source names."""

@@ -71,7 +71,7 @@ _FILES: Mapping[str, Instruction] = {
     "displacement_zero": lambda hint: f'use --displacement-zero "{hint.value}"',
     "skip_rows": lambda hint: "use --skip-rows N",
     "missing": _missing,
-    "outliers": lambda hint: f"use --outliers {hint.value}",
+    "drop_outliers": lambda hint: "use --outliers drop",
 }
 _RECORDS: Mapping[str, Instruction] = {
     "units": lambda hint: "write it in the heading under [columns] of the record's mapping file",

@@ -148,8 +148,8 @@ def _limit_notes(model: RankedModel) -> tuple[str, ...]:
     advice = " These are more than outliers: the law does not describe them, or the files differ." if many else ""
     return (
         "In all errors of the ranking, residuals count at most as six robust standard deviations (1.4826 times the "
-        f"median magnitude), at least as the scale of the robust loss: {model.limit:.4g} N for {model.candidate.name}, which "
-        f"limits {model.limited_rows} of {rows} rows.{advice}",
+        f"median magnitude), at least as the scale of the robust loss: {model.limit:.4g} N for {model.candidate.name}, "
+        f"which limits {model.limited_rows} of {rows} rows.{advice}",
     )
 
 
