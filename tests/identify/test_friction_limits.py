@@ -1,18 +1,30 @@
 """Limits of friction parameters: a muscle has no greater friction than its force, and no speed that was not measured.
 
-Terms of speed need loops at clearly different speeds; rows in which valves pulse justify no friction.
+A transition below the resolution of the path is not seen, so that it bounds the stiffness. Terms of speed need loops
+at clearly different speeds; rows in which valves pulse justify no friction.
 """
 
 from __future__ import annotations
 
 import itertools
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from airmuscle.identify.hysteresis import PolynomialCurve, find_loops, fit_hysteresis, fit_loop
+from airmuscle.identify.campaign import classify_records
+from airmuscle.identify.campaign.friction_stage import fit_friction_stage
+from airmuscle.identify.hysteresis import (
+    PolynomialCurve,
+    find_loops,
+    fit_hysteresis,
+    fit_jointly,
+    fit_loop,
+    preferred_fit,
+)
 from airmuscle.identify.hysteresis.limits import data_limits
-from airmuscle.muscle.friction import Dahl, LuGre, MaxwellSlip
+from airmuscle.muscle import CreepElements
+from airmuscle.muscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip
 from airmuscle.recording import Recording
 
 LENGTH = 0.3
@@ -102,3 +114,47 @@ def test_the_pulses_of_valves_are_no_friction():
     assert min(fit.p_value for fit in found.fits) < 0.01, "by the tests alone this would be a friction"
     assert found.recommended is None
     assert "the pulses of valves and the dynamics of the gas appear as friction" in found.fits[0].verdict
+
+
+def sharp_loop(bar, coulomb_force, rows=300, seed=0):
+    """Friction that is complete within a micrometre, on a displacement that is read to 0.01 mm."""
+    random, turns = np.random.default_rng(seed), np.array(TURNS)
+    path = np.interp(np.linspace(0.0, 4.0, rows), np.arange(5.0), turns) * LENGTH
+    contraction = np.round(path / 1e-5) * 1e-5 / LENGTH
+    force = 200.0 * bar * (1.0 - contraction / 0.32) ** 1.5 + random.normal(0.0, 3.0, rows)
+    force -= Dahl(5e7, coulomb_force).force_along(contraction * LENGTH)
+    columns = {"time": 0.1 * np.arange(rows), "pressure": np.full(rows, bar * 1e5), "contraction": contraction}
+    return Recording({**columns, "force": force}, f"{bar} bar", {"resting_length": LENGTH})
+
+
+@pytest.mark.parametrize("initial", [Dahl(1e8, 20.0), BoucWen(1e8, 20.0, 5.0, 0.6)])
+def test_a_stiffness_is_bounded_by_the_resolution_of_the_path(initial):
+    fit = fit_hysteresis(initial, sharp_loop(3.0, 20.0), static_curve=CURVE)
+    assert fit.friction.stiffness < 1.5 * 20.0 / 1e-5
+    assert "stiffness" in fit.undetermined
+
+
+def test_a_stiffness_that_the_path_shows_is_not_bounded():
+    fit = fit_hysteresis(Dahl(1e4, 10.0), loop(Dahl(4e4, 25.0), (2e-3,) * 4), static_curve=CURVE)
+    assert fit.friction.stiffness == pytest.approx(4e4, rel=0.05)
+    assert not fit.undetermined
+
+
+def test_a_law_with_open_parameters_gives_way_to_a_simpler_one_that_fits_as_well():
+    def fit(friction, rmse, undetermined=(), justified=True):
+        return SimpleNamespace(friction=friction, rmse=rmse, undetermined=undetermined, justified=justified)
+
+    dahl, bouc_wen = Dahl(1e5, 20.0), BoucWen(1e5, 20.0, 20.0, 0.6)
+    open_sharpness = fit(bouc_wen, 3.50, ("sharpness",))
+    assert preferred_fit([open_sharpness, fit(dahl, 3.56, ("stiffness",))]).friction is dahl
+    assert preferred_fit([open_sharpness, fit(dahl, 3.90)]).friction is bouc_wen
+    assert preferred_fit([open_sharpness, fit(dahl, 3.56, justified=False)]).friction is bouc_wen
+    assert preferred_fit([fit(bouc_wen, 3.50), fit(dahl, 3.56)]).friction is bouc_wen
+    assert preferred_fit([fit(dahl, 3.5, justified=False)]) is None
+
+
+def test_a_campaign_and_the_loops_alone_prefer_the_same_law():
+    runs = [sharp_loop(bar, force, seed=i) for i, (bar, force) in enumerate([(2.0, 16.0), (3.5, 22.0), (5.0, 28.0)])]
+    alone = preferred_fit(fit_jointly([fit_loop(found) for found in find_loops(runs, all_rows=True)]))
+    stage = fit_friction_stage(classify_records(runs), CreepElements(), lambda _: None)
+    assert alone.name == stage.selected.name == "Dahl"

@@ -123,3 +123,13 @@ def test_a_limit_without_its_unit_is_one_line():
     done = CliRunner().invoke(app, ["plan", "tondu-lopez", "--max-pressure", "5", "--max-force", "400 N"])
     assert done.exit_code == 1
     assert "has no unit" in done.output
+
+
+def test_no_point_is_proposed_where_nothing_pulls():
+    """Below 2 % of the greatest pressure, or below 1 % of the greatest force."""
+    from_zero = BenchLimits(ValidityRange(287.0, 500e3, 0.0, 0.25), 400.0)
+    law = TonduLopez2000(Braid(0.01, 0.44, 0.3), 1.1)
+    runs = candidate_runs(law, from_zero, 15)
+    forces = np.concatenate([run.force for run in runs])
+    assert min(float(run.pressure.min()) for run in runs) >= 10e3
+    assert float(forces.min()) >= 0.01 * float(forces.max())

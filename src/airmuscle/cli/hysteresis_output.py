@@ -9,7 +9,7 @@ from typing import Any
 
 from ..core import leaves
 from ..identify.campaign import HeldCreep
-from ..identify.hysteresis import HysteresisFit, JointFit, LoopFit
+from ..identify.hysteresis import HysteresisFit, JointFit, LoopFit, preferred_fit
 from ..report.hysteresis_chapter import describe_row_counts
 from .terminal import echo, print_table
 
@@ -56,7 +56,7 @@ def print_joint(joint: Sequence[JointFit], not_joined: Sequence[str]) -> None:
     ]  # fmt: skip
     headers = ("model", "depends on pressure", "rms error", "difference in AICc", "runs that disagree", "justified")
     print_table(headers, rows, right=headers[3:5])
-    best = next((fit for fit in joint if fit.justified), joint[0])
+    best = preferred_fit(joint) or joint[0]
     for sentence in (*map(str, best.agreement), *not_joined, str(best)):
         echo(sentence)
     echo()

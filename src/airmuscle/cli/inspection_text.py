@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..recording.constants import CONSTANT_UNITS
+from ..recording.constants import CONSTANT_QUANTITIES
 from ..recording.display_units import display_scale
 from ..recording.segment import Inspection, Run, Sampling
 from ..report.formatting import MISSING
@@ -40,7 +40,7 @@ def column_rows(inspection: Inspection) -> Iterator[tuple[str, ...]]:
 def summary(inspection: Inspection) -> Iterator[str]:
     """Constants, sampling, runs, branches, plateaus, outliers, notes and findings, one line each."""
     for name, value in inspection.recording.constants.items():
-        factor, unit = display_scale({"ambient": "pressure"}.get(name, "length" if name in CONSTANT_UNITS else ""))
+        factor, unit = display_scale(CONSTANT_QUANTITIES.get(name, ""))
         yield f"{name}: {value * factor:.4g} {unit}" if isinstance(value, float) and unit else f"{name}: {value}"
     if inspection.sampling:
         yield f"sampling: {_describe_sampling(inspection.sampling)}"

@@ -26,6 +26,10 @@ from .problem import make_problem
 
 LEVEL_COUNT = 13
 """Levels of pressure, and of contraction, of the candidate runs; chosen."""
+MIN_FORCE_SHARE = 0.01
+"""Minimum force of a point, as a fraction of the maximum force of law and rig; below it nothing pulls (chosen)."""
+MIN_PRESSURE_SHARE = 0.02
+"""Minimum pressure of a point, as a fraction of the maximum pressure of the rig (chosen)."""
 MIN_POINTS = 3
 """Minimum number of feasible points of a run; chosen."""
 REGULARISATION = 1e-9
@@ -34,10 +38,12 @@ REGULARISATION = 1e-9
 
 @dataclasses.dataclass(frozen=True)
 class BenchLimits:
-    """Limits of a test rig: the range of gauge pressure [Pa] and contraction [1], and the maximum force [N]."""
+    """Limits of a test rig: the range of gauge pressure [Pa] and contraction [1], and the range of force [N]."""
 
     validity_range: ValidityRange
     max_force: float
+    min_force: float = 0.0
+    """Minimum force of a point [N]."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -147,7 +153,9 @@ def optimal_design(
 
 
 def candidate_runs(characteristic: Characteristic, bench: BenchLimits, points: int) -> list[PlannedRun]:
-    """Isobaric and isometric runs on evenly spaced levels, each limited to forces above 0 and up to the maximum."""
+    """Isobaric and isometric runs on evenly spaced levels, each limited to points at which the muscle pulls, up to the
+    maximum force."""
+    bench = _pulling(characteristic, bench)
     limits = {"pressure": bench.validity_range.pressure, "contraction": bench.validity_range.contraction}
     runs = []
     for constant, swept in (("pressure", "contraction"), ("contraction", "pressure")):
@@ -160,6 +168,18 @@ def candidate_runs(characteristic: Characteristic, bench: BenchLimits, points: i
             "within the pressures and contractions of the test rig. Widen the limits, or check the units."
         )
     return runs
+
+
+def _pulling(law: Characteristic, bench: BenchLimits) -> BenchLimits:
+    """The limits without the pressures and forces at which nothing pulls."""
+    (low, high), contractions = bench.validity_range.pressure, bench.validity_range.contraction
+    low = max(low, min(MIN_PRESSURE_SHARE * high, high))
+    grid = np.meshgrid(np.linspace(low, high, LEVEL_COUNT), np.linspace(*contractions, LEVEL_COUNT))
+    forces = np.asarray(law.force(*(each.ravel() for each in grid)), dtype=float)
+    reached = forces[np.isfinite(forces) & (forces > 0) & (forces <= bench.max_force)]
+    least = MIN_FORCE_SHARE * float(reached.max()) if reached.size else 0.0
+    pressures = ValidityRange(low, high, *contractions)
+    return dataclasses.replace(bench, validity_range=pressures, min_force=max(bench.min_force, least))
 
 
 def _feasible_run(
@@ -180,7 +200,7 @@ def _is_feasible(
     law: Characteristic, bench: BenchLimits, constant: str, level: float, values: Array
 ) -> npt.NDArray[np.bool_]:
     force = np.asarray(law.force(*_coordinates(constant, level, values)), dtype=float)
-    return np.asarray(np.isfinite(force) & (force > 0) & (force <= bench.max_force))
+    return np.asarray(np.isfinite(force) & (force > 0) & (force >= bench.min_force) & (force <= bench.max_force))
 
 
 def _coordinates(constant: str, level: float, values: Array) -> tuple[Array, Array]:

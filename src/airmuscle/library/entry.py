@@ -20,7 +20,7 @@ OPTIONAL_PARTS = ("spring", "damper", "friction", "wall", "series", "stop", "cre
 """Optional elements of a muscle, as fields of an entry and tables of its file."""
 
 MISSING_GEOMETRY = (
-    "a [geometry], from which a plant takes the enclosed volume. Give it to airmuscle fit with --braid "
+    "a [geometry], from which a plant takes the enclosed volume. Give it to airmuscle fit or campaign with --braid "
     "'radius=10 mm, angle=24.4 deg' and the resting length, or as a table [geometry] of the file or in [plant.muscle]. "
     "It is measured by the outer diameter at rest and at full contraction, or by the fill of a held muscle"
 )

@@ -15,6 +15,11 @@ from .table import RawTable
 
 CONSTANT_UNITS = {"resting_length": "m", "ambient": "Pa", "ambient_temperature": "K", "displacement_zero": "m"}
 """The SI units of the constants that have a unit."""
+CONSTANT_QUANTITIES = {
+    "resting_length": "length", "ambient": "pressure", "ambient_temperature": "temperature",
+    "displacement_zero": "length",
+}  # fmt: skip
+"""The quantities of these constants, which have their display units."""
 CONSTANT_RANGES = {
     "resting_length": (1e-3, 20.0), "ambient": (1e3, 2e5), "ambient_temperature": (200.0, 400.0),
     "displacement_zero": (-20.0, 20.0),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..core import leaves
-from ..identify.hysteresis import JointFit
+from ..identify.hysteresis import JointFit, preferred_fit
 from .chapter import Chapter, Plot, Table
 from .formatting import P_VALUE
 
@@ -15,7 +15,7 @@ def joint_friction_chapter(fits: Sequence[JointFit], not_joined: Sequence[str] =
 
     `not_joined` are sentences on the loops that the joint fit does not use.
     """
-    shown = next((fit for fit in fits if fit.justified), fits[0])
+    shown = preferred_fit(fits) or fits[0]
     summary = [shown.verdict]
     if not shown.justified:
         summary.insert(

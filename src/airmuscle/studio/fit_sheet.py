@@ -12,6 +12,7 @@ import numpy as np
 import airmuscle as am
 
 from ..core.errors import AirmuscleError
+from ..recording.constants import CONSTANT_QUANTITIES
 from ..recording.display_units import display_scale
 from ..recording.segment import Inspection, Run, inspect_all
 from .fit_hints import in_page_words
@@ -117,7 +118,7 @@ def _run(run: Run) -> dict[str, Any]:
 
 
 def _constant(name: str, value: float | str) -> str:
-    factor, unit = display_scale("length" if name == "resting_length" else "pressure" if name == "ambient" else "")
+    factor, unit = display_scale(CONSTANT_QUANTITIES.get(name, ""))
     return f"{value * factor:.5g} {unit}".strip() if isinstance(value, float | int) else str(value)
 
 

@@ -20,7 +20,7 @@ import airmuscle as am
 
 from ..core.errors import AirmuscleError, AirmuscleWarning
 from ..core.output_folder import atomic_folder
-from ..identify.hysteresis import LoopFit, find_loops, fit_jointly, fit_loop, loops_not_joined
+from ..identify.hysteresis import LoopFit, find_loops, fit_jointly, fit_loop, loops_not_joined, preferred_fit
 from ..identify.hysteresis.selection import select_friction
 from ..identify.law_selection import LawSelection, select_law
 from ..library.entry import Entry
@@ -147,11 +147,10 @@ def _friction(recordings: Sequence[am.Recording], folder: Path, report: Report) 
     fits = [fit_loop(loop, progress=progress) for loop in loops]
     joint = fit_jointly(fits, progress=progress)
     _write_friction(folder, fits, joint)
-    best = next((fit for fit in joint if fit.justified), None)
     return {
         "reason": "",
         "loops": [_loop(fit) for fit in fits],
-        "joint": "" if not joint else str(best or joint[0]),
+        "joint": "" if not joint else str(preferred_fit(joint) or joint[0]),
         "remarks": [*remarks, *(loops_not_joined(fits) if joint else ())],
     }
 

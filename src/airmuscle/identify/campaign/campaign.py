@@ -57,6 +57,8 @@ class Campaign(ShortRepr):
     fills: FillStage | LeftOutStage
     release: ReleaseStage | LeftOutStage
     next_experiments: tuple[NextExperiment, ...]
+    given_geometry: Geometry | None = None
+    """The geometry that was given; it is that of the muscle also without fills."""
 
     @property
     def stages(self) -> tuple[tuple[str, StageResult], ...]:
@@ -87,11 +89,11 @@ class Campaign(ShortRepr):
         return law if isinstance(law, ForceLaw) else None
 
     def geometry(self, resting_length: float | None = None) -> Geometry | None:
-        """The geometry of a muscle of a resting length [m], whose volume is proportional to the length; None without
+        """The given geometry or that of the fills, for a resting length [m] with a volume in proportion; None without
         one."""
-        if not isinstance(self.fills, FillStage):
+        own = self.fills.geometry if isinstance(self.fills, FillStage) else self.given_geometry
+        if own is None:
             return None
-        own = self.fills.geometry
         length = resting_length or self.resting_length
         if length is None or abs(length - own.resting_length) < 1e-6:
             return own
@@ -178,7 +180,7 @@ def identify_campaign(
     friction = hysteresis.friction if isinstance(hysteresis, FrictionStage) else NoFriction()
     static = steps.fit("static characteristic", lambda show: fit_static_stage(records, friction, elements, show))
     fills = steps.fit("fills and volume", lambda show: _fit_fills(records, static, geometry, show))
-    partial = Campaign(records, creep, hysteresis, static, fills, LeftOutStage("release", "", ""), ())
+    partial = Campaign(records, creep, hysteresis, static, fills, LeftOutStage("release", "", ""), (), geometry)
     releases = _of_kind(records, RecordKind.RELEASE)
     muscle = partial.muscle(releases[0].resting_length) if releases else None
     release = steps.fit("release", lambda _: fit_release_stage(releases, muscle))

@@ -14,7 +14,16 @@ from ...muscle import CreepElements
 from ...muscle.friction import Friction, NoFriction
 from ...recording import Recording
 from ...recording.segment.sensor import estimate_noise
-from ..hysteresis import HysteresisLoop, JointFit, LoopFit, find_loops, fit_jointly, fit_loop, identified_friction
+from ..hysteresis import (
+    HysteresisLoop,
+    JointFit,
+    LoopFit,
+    find_loops,
+    fit_jointly,
+    fit_loop,
+    identified_friction,
+    preferred_fit,
+)
 from .creep_stage import creep_force
 from .record import CampaignRecord, RecordKind
 from .rows import PREDICTED_ROWS, displacement, held_steady, path_rows, with_force
@@ -41,7 +50,7 @@ class FrictionStage(ShortRepr):
     @property
     def selected(self) -> JointFit | None:
         """The joint fit whose friction is used; None without one."""
-        return next((fit for fit in self.joint if fit.justified), None)
+        return preferred_fit(self.joint)
 
     @property
     def verdict(self) -> str:
@@ -82,7 +91,7 @@ def fit_friction_stage(
         progress(0.5 + 0.5 * min(count[0] / 5.0, 1.0))
 
     joint = fit_jointly(fits, progress=advance)
-    best = next((fit for fit in joint if fit.justified), None)
+    best = preferred_fit(joint)
     return FrictionStage(_friction(best, fits), tuple(fits), joint, len(loops) - len(kept))
 
 

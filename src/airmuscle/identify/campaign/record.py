@@ -107,6 +107,15 @@ def classify_records(recordings: Sequence[Recording]) -> tuple[CampaignRecord, .
     return tuple(records)
 
 
+def static_levels(record: CampaignRecord) -> list[CampaignRecord]:
+    """The rows of each pressure of a record of static points; any other record as it is."""
+    points = record.inspection.static_points
+    if points is None:
+        return [record]
+    parts = [record.recording.rows(points.pressure_level == k) for k in range(int(points.pressure_level.max()) + 1)]
+    return [dataclasses.replace(record, recording=part, inspection=inspect(part)) for part in parts]
+
+
 def _long_runs(record: CampaignRecord) -> list[Recording]:
     """The rows of each long run of a record with time; empty unless there are several."""
     recording = record.recording
@@ -127,6 +136,8 @@ def _classify(inspection: Inspection) -> CampaignRecord:
     unusable = _unusable(recording)
     if unusable:
         return CampaignRecord(recording, RecordKind.UNUSED, unusable, inspection)
+    if inspection.static_points is not None and "force" in recording:
+        return CampaignRecord(recording, RecordKind.STATIC, inspection.static_points.description, inspection)
     if "time" in recording:
         steps = find_pressure_steps(recording, inspection.sensors)
         if steps and not _is_moved(recording):

@@ -16,7 +16,7 @@ from ..result import Fit
 from .creep_stage import creep_force
 from .error_band import ErrorBand, calibrate, calibrate_held
 from .friction_stage import friction_along
-from .record import CampaignRecord, slow_rows
+from .record import CampaignRecord, slow_rows, static_levels
 from .rows import is_held, thin, with_force
 from .stage import LeftOutStage
 
@@ -88,18 +88,31 @@ def fit_static_stage(
     try:
         points = tuple(thin(r, max(FIT_ROWS // len(cleaned), MIN_FIT_ROWS)) for r in cleaned)
         comparison = compare(points, progress=lambda _, fraction: progress(0.9 * fraction))
-        bands = calibrate(comparison.recommended.fit, points, used)
-        held = calibrate_held(comparison.recommended.fit, points, used, bands[0])
+        fit, parts = comparison.recommended.fit, _parts_at_levels(used, points, friction, creep)
+        bands = calibrate(fit, *parts)
+        held = calibrate_held(fit, *parts, bands[0])
     except AirmuscleError as error:
         return LeftOutStage(NAME, str(error.message), "measure at more levels of pressure and contraction")
     progress(1.0)
     return StaticStage(comparison, points, bands, DataChecks.of([record.recording for record in used]).notes, held)
 
 
+def _parts_at_levels(
+    used: Sequence[CampaignRecord], points: Sequence[Recording], friction: Friction, creep: CreepElements
+) -> tuple[list[Recording], list[CampaignRecord]]:
+    """The rows of the fit and their records, those of static points one for each pressure with tension."""
+    parts = []
+    for record, rows in zip(used, points, strict=True):
+        levels = static_levels(record)
+        own = [rows] if len(levels) == 1 else [freed_rows(level, friction, creep) for level in levels]
+        parts += [(part, level) for part, level in zip(own, levels, strict=True) if len(part)]
+    return [part for part, _ in parts], [level for _, level in parts]
+
+
 def freed_rows(record: CampaignRecord, friction: Friction, creep: CreepElements) -> Recording:
     """The quasi-static rows with tension of a record, its force freed of friction and creep."""
     recording = record.recording
-    if record.resting_length is not None:
+    if record.resting_length is not None and record.inspection.static_points is None:
         added = creep_force(creep, recording) + friction_along(friction, recording)
         recording = with_force(recording, added)
     sensors = record.inspection.sensors

@@ -15,6 +15,7 @@ from .holds import Hold, find_holds
 from .joint import fit_jointly, identified_friction, loops_not_joined
 from .joint_result import JointFit
 from .loops import HysteresisLoop, LoopFit, find_loops, fit_loop
+from .preference import preferred_fit
 from .result import HysteresisFit
 
 __all__ = [
@@ -39,4 +40,5 @@ __all__ = [
     "identified_friction",
     "initial_friction_laws",
     "loops_not_joined",
+    "preferred_fit",
 ]

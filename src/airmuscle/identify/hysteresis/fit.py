@@ -17,7 +17,7 @@ from ...muscle.friction import BoucWen, Dahl, Friction, LuGre, MaxwellSlip, Pran
 from ...recording import Recording
 from ...recording.segment import motion_direction
 from .axis import MILLIMETRES, Axis
-from .limits import data_limits
+from .limits import data_limits, resolved_stiffness
 from .result import HysteresisFit, assess_fit
 from .search import free_parameters, search_parameters
 from .series import LoopSeries
@@ -174,7 +174,7 @@ def make_loop_series(
     rows = finite if fitted_rows is None else np.asarray(fitted_rows, dtype=bool) & finite
     path = friction_path.displacement(recording)
     time = recording.columns.get("time")
-    return LoopSeries(
+    series = LoopSeries(
         origin=recording.origin,
         path=path,
         time=time,
@@ -186,6 +186,8 @@ def make_loop_series(
         limits=data_limits(recording["force"], path, time, rows),
         axis=friction_path.axis,
     )
+    stiffness = resolved_stiffness(path[rows], series.fitted_residuals(None))
+    return dataclasses.replace(series, limits=dataclasses.replace(series.limits, stiffness=stiffness))
 
 
 def _resting_length(recording: Recording) -> float:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from ...core.arrays import Array
 from ...core.tree import Leaf, leaves
 from ...muscle.friction import Friction
+from ...recording.segment.sensor import estimate_noise, estimate_resolution
 from ..identifiability import UndeterminedCombination
 from .axis import Axis
 
@@ -22,14 +23,24 @@ SPEED_QUANTILES = (0.05, 0.95)
 MIN_SPEED_RATIO = 3.0
 """Minimum ratio of the highest to the lowest speed for the terms of speed to be determined (chosen)."""
 
+STEP_SHARE = 0.1
+"""Resolution of a path without noise, as a fraction of its median step between two rows (chosen): a transition within
+this part of a step is complete at the next row."""
+AMPLITUDE_QUANTILE = 0.95
+"""Quantile of the forces without the static curve that counts as the amplitude of the hysteresis (chosen)."""
+
 
 @dataclasses.dataclass(frozen=True)
 class DataLimits:
-    """Maximum force [N], and lowest and highest speed [m/s] of the data; the speeds are NaN without a time."""
+    """Maximum force [N], lowest and highest speed [m/s], and maximum stiffness [N/m] that the data show.
+
+    The speeds are NaN without a time. A stiffer transition of the friction lies between two readings of the path.
+    """
 
     force: float
     low_speed: float
     high_speed: float
+    stiffness: float = math.inf
 
     @property
     def has_speed_variation(self) -> bool:
@@ -39,13 +50,15 @@ class DataLimits:
     def bounds(self, leaf: Leaf) -> tuple[float, float]:
         """Bounds of a parameter: the declared ones, narrowed by what a muscle of this force and speed can show.
 
-        A force is at most the maximum force, a viscous force at the highest speed likewise, and a characteristic
-        speed is between the lowest and the highest speed.
+        A force is at most the maximum force, a viscous force at the highest speed likewise, a characteristic speed is
+        between the lowest and the highest speed, and a stiffness is at most what the readings show.
         """
         low, high = leaf.declared.bounds
         narrow_low, narrow_high = -math.inf, math.inf
         if leaf.declared.unit == "N":
             narrow_high = self.force
+        elif leaf.declared.unit == "N/m":
+            narrow_high = self.stiffness
         elif leaf.declared.unit == "N s/m" and self.high_speed > 0:
             narrow_high = self.force / self.high_speed
         elif leaf.declared.unit == "m/s" and 0 < self.low_speed < self.high_speed:
@@ -79,12 +92,30 @@ def data_limits(force: Array, path: Array, time: Array | None, rows: npt.NDArray
     return DataLimits(greatest, float(low), float(high))
 
 
+def resolved_stiffness(path: Array, hysteresis: Array) -> float:
+    """The maximum stiffness that readings show [N/m]: the amplitude of the hysteresis by the resolution of the path.
+
+    The resolution is the greatest of the resolution and the noise of the sensor and a tenth of the median step.
+
+    path        displacement at the fitted rows [m], shape (N,)
+    hysteresis  force without its static curve at these rows [N], shape (N,)
+    """
+    steps = np.abs(np.diff(path))
+    steps = steps[steps > 0]
+    if not steps.size:
+        return math.inf
+    amplitude = float(np.quantile(np.abs(hysteresis), AMPLITUDE_QUANTILE))
+    resolution = max(estimate_resolution(path), estimate_noise(path), STEP_SHARE * float(np.median(steps)))
+    return amplitude / resolution if amplitude > 0 else math.inf
+
+
 def combine_limits(limits: tuple[DataLimits, ...]) -> DataLimits:
     """The limits of several runs together."""
     return DataLimits(
         max(each.force for each in limits),
         float(np.min([each.low_speed for each in limits])),
         float(np.max([each.high_speed for each in limits])),
+        max(each.stiffness for each in limits),
     )
 
 

@@ -37,6 +37,7 @@ from .fit import (
     make_loop_series,
 )
 from .limits import speed_reservation
+from .preference import preferred_fit
 from .result import HysteresisFit
 
 
@@ -74,8 +75,8 @@ class LoopFit(ShortRepr):
 
     @property
     def recommended(self) -> HysteresisFit | None:
-        """The law with the lowest AICc among those that the data justify, or None."""
-        return next((fit for fit in self.fits if fit.justified), None)
+        """The preferred law among those that the data justify, or None."""
+        return preferred_fit(self.fits)
 
     @property
     def usable_in_plant(self) -> bool:

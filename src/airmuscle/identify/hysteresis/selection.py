@@ -9,6 +9,7 @@ from ...muscle.friction import Friction
 from .joint import identified_friction
 from .joint_result import JointFit
 from .loops import LoopFit
+from .preference import preferred_fit
 
 
 class SelectedFriction(NamedTuple):
@@ -22,7 +23,7 @@ class SelectedFriction(NamedTuple):
 def select_friction(fits: Sequence[LoopFit], joint: Sequence[JointFit]) -> SelectedFriction | None:
     """The friction to write: of all runs together or, if they are not several, of the only run a plant can use."""
     if joint:
-        best = next((fit for fit in joint if fit.justified), None)
+        best = preferred_fit(joint)
         if best is None:
             return None
         origin = f"{len(best.series)} runs"

@@ -17,6 +17,7 @@ from .quasi_static import quasi_static_rows
 from .runs import AT_REST, FREE, KINDS, Run, moved_column
 from .sampling import Sampling
 from .sensor import Sensor
+from .static_points import find_static_points
 
 MAX_SATURATED_FRACTION = 0.5
 """Fraction of saturated rows above which too few rows remain for a fit (chosen)."""
@@ -58,6 +59,15 @@ def check_swept(recording: Recording, runs: tuple[Run, ...]) -> None:
 
 
 def _time_findings(recording: Recording, sampling: Sampling | None) -> Iterator[Finding]:
+    points = find_static_points(recording)
+    if points is not None:
+        slack = int(np.count_nonzero(recording["force"] <= 0)) if "force" in recording else 0
+        at_zero = f", {slack} of them without tension" if slack else ""
+        yield Finding(
+            f"no time column: {points.description}{at_zero}. The order of the rows has no meaning, so that noise, "
+            "saturation, branches and outliers are not assessed."
+        )
+        return
     if sampling is None:
         yield Finding("no time column: rows are taken as steady states; sampling and outliers cannot be assessed.")
         return

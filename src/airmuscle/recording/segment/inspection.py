@@ -17,6 +17,7 @@ from .quasi_static import quasi_static_rows
 from .runs import AT_REST, Run, find_runs
 from .sampling import Sampling, analyse_sampling
 from .sensor import Sensor, estimate_sensors
+from .static_points import StaticPoints, find_static_points
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -35,6 +36,8 @@ class Inspection(ShortRepr):
     branch_agreement: float | None
     """Fraction of the rows in which the branch column of the file agrees; None without such a column."""
     findings: tuple[Finding, ...]
+    static_points: StaticPoints | None = None
+    """The levels of a force map without time; None for any other recording."""
 
     def plot(self) -> Any:
         """Pressure, force and length over time with branches, plateaus, outliers and limits; a Matplotlib figure."""
@@ -48,7 +51,8 @@ def inspect(recording: Recording, shared_sensors: Mapping[str, Sensor] | None = 
     sampling = analyse_sampling(recording)
     runs = find_runs(recording, sensors)
     ordered = sampling is None or not (sampling.repeated_rows or sampling.backward_rows)
-    branches = find_branches(recording, sensors.get("pressure"), runs=runs)
+    points = find_static_points(recording)
+    branches = () if points else find_branches(recording, sensors.get("pressure"), runs=runs)
     return Inspection(
         recording,
         sampling,
@@ -60,6 +64,7 @@ def inspect(recording: Recording, shared_sensors: Mapping[str, Sensor] | None = 
         float(quasi_static_rows(recording, sensors).mean()) if len(recording) else 0.0,
         branch_column_agreement(recording, branches) if branches else None,
         collect_findings(recording, sampling, sensors, runs),
+        points,
     )
 
 

@@ -11,6 +11,7 @@ counts as constant.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Iterator, Mapping
 
 import numpy as np
@@ -20,6 +21,7 @@ from ..displacement import MOVED
 from ..recording import Recording
 from .interval import Interval, level_intervals
 from .sensor import Sensor, estimate_sensors
+from .static_points import StaticPoints, find_static_points
 
 RELATIVE_BAND = 0.02
 """Band of a constant quantity, as a fraction of its maximum (chosen)."""
@@ -69,12 +71,29 @@ def find_runs(recording: Recording, sensors: Mapping[str, Sensor] | None = None)
     """The runs of a recording; one run of kind FREE if no quantity is constant, none for an empty recording."""
     if not len(recording):
         return ()
+    points = find_static_points(recording)
+    if points is not None:
+        return _runs_of_points(recording, points)
     bands = _constant_bands(recording, sensors or estimate_sensors(recording))
     whole = _classify(recording, Interval(0, len(recording)), bands)
     if whole.kind != FREE:
         return (whole,)
     candidates = [runs for kind in _kinds_of(recording) if (runs := _runs_at_levels(recording, kind, bands))]
     return max(candidates, key=lambda runs: sum(len(run.interval) for run in runs), default=(whole,))
+
+
+def _runs_of_points(recording: Recording, points: StaticPoints) -> tuple[Run, ...]:
+    """The runs of static points at one pressure or length each, whose rows follow each other; one run of kind FREE if
+    neither do."""
+    for kind, name, levels, swept in (
+        (ISOBARIC, "pressure", points.pressure_level, points.moved),
+        (ISOMETRIC, points.moved, points.length_level, "pressure"),
+    ):
+        edges = [0, *(np.flatnonzero(np.diff(levels)) + 1).tolist(), levels.size]
+        if len(edges) == int(levels.max()) + 2:
+            intervals = [Interval(a, b) for a, b in itertools.pairwise(edges)]
+            return tuple(_constant_run(recording, each, kind, name, (swept, "force")) for each in intervals)
+    return (Run(Interval(0, levels.size), FREE, None, None, ("pressure", points.moved)),)
 
 
 def _kinds_of(recording: Recording) -> tuple[RunKind, ...]:

@@ -17,6 +17,7 @@ from ...core.arrays import Array
 from ..columns import quantity_of
 from ..recording import Recording
 from .interval import Mask, true_intervals
+from .static_points import find_static_points
 
 MIN_DISTINCT_VALUES = 15
 """Minimum number of distinct readings for a resolution; fewer may be the set points of the test (chosen)."""
@@ -65,22 +66,29 @@ def estimate_sensors(recordings: Recording | Sequence[Recording]) -> Mapping[str
     """The sensors of the columns of a recording, or of several recordings from one test rig, by column name.
 
     Several recordings show the limits more reliably, because a single run may hardly reach them. Resolution and noise
-    are medians over the recordings. Recordings without rows do not count.
+    are medians over the recordings. Recordings without rows do not count; static points (`find_static_points`) show the
+    resolution only.
     """
     given = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     several = [recording for recording in given if len(recording)]
     names = dict.fromkeys(n for r in several for n in r.columns if n.rpartition(".")[2] not in _IGNORED)
+    ordered = [recording for recording in several if find_static_points(recording) is None]
     return {
-        name: _estimate_sensor(name, [r.columns[name] for r in several if name in r.columns])
+        name: _estimate_sensor(
+            name, *([r.columns[name] for r in part if name in r.columns] for part in (several, ordered))
+        )
         for name in names
         if quantity_of(name)
     }
 
 
-def _estimate_sensor(name: str, runs: list[Array]) -> Sensor:
-    steps = [step for values in runs if (step := estimate_resolution(values))]
-    together = steps or len(runs) == 1
-    resolution = float(np.median(steps or 0.0)) if together else estimate_resolution(np.concatenate(runs))
+def _estimate_sensor(name: str, all_runs: list[Array], runs: list[Array]) -> Sensor:
+    """The sensor of a column: its resolution from all runs, the rest from those whose order has a meaning."""
+    steps = [step for values in all_runs if (step := estimate_resolution(values))]
+    together = steps or len(all_runs) == 1
+    resolution = float(np.median(steps or 0.0)) if together else estimate_resolution(np.concatenate(all_runs))
+    if not runs:
+        return Sensor(name, resolution, 0.0)
     low, at_low = _upper_limit([-v for v in runs], resolution)
     high, at_high = _upper_limit(runs, resolution)
     sensor = Sensor(name, resolution, 0.0, -low, high, at_low, at_high)
