@@ -18,6 +18,7 @@ from airmuscle.muscle.characteristic import ContractileSurface, TonduLopez2000
 from airmuscle.muscle.geometry.braid import Braid
 from airmuscle.recording import Recording
 from airmuscle.recording.csv_writer import write_csv
+from airmuscle.recording.segment import estimate_sensors
 
 MUSCLE = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.2)
 SURFACE = ContractileSurface.blank(3, max_force=1e5)
@@ -44,6 +45,14 @@ def test_the_deviations_are_those_of_noise_and_rounding():
     fine, coarse = np.hypot(0.3, 0.2 / 12**0.5), np.hypot(15.0, 12.0 / 12**0.5)
     assert found == pytest.approx([fine] * 4 + [coarse] * 4, rel=0.25)
     assert len(set(found.tolist())) == 2, "recordings of one rig share its sensor"
+
+
+def test_readings_that_change_by_few_steps_are_of_one_rig():
+    runs = [ramp(1e5, 4.0, 1.2, seed) for seed in range(12)]
+    noise = [estimate_sensors(run)["force"].noise for run in runs]
+    assert min(noise) == 0.0, "the noise of some is estimated as none"
+    assert max(noise) > 2.0, "and that of others as a step"
+    assert sensor_deviations(runs, "force") is None
 
 
 def test_without_time_the_resolution_decides():

@@ -11,6 +11,7 @@ import typer
 
 from ..core.output_folder import atomic_folder, check_writable
 from ..identify.campaign import HeldCreep, fit_held_creep, free_of_creep
+from ..identify.data_checks import delay_notes, find_delay
 from ..identify.hysteresis import (
     LoopFit,
     find_loops,
@@ -98,7 +99,10 @@ def hysteresis(
     fits = [_with_option_names(fit_loop(loop, elements=elements, progress=progress)) for loop in loops]
     joint = fit_jointly(fits, progress=progress)
     sentences = [] if held is None else [*held.sentences, held.verdict]
-    written = _write(hysteresis_chapters(fits, sentences, joint), select_friction(fits, joint), held, entry, out)
+    remarks = delay_notes(find_delay(recordings))
+    written = _write(
+        hysteresis_chapters(fits, sentences, joint, remarks), select_friction(fits, joint), held, entry, out
+    )
     if json:
         not_joined = list(loops_not_joined(fits)) if joint else []
         data = {
@@ -106,9 +110,11 @@ def hysteresis(
             "joint": [joint_to_dict(fit) for fit in joint],
             "not_joined": not_joined,
         }
-        print_json({**data, **creep_to_dict(held), "written": str(written.get("friction", ""))})
+        print_json({**data, **creep_to_dict(held), "notes": remarks, "written": str(written.get("friction", ""))})
         return
     print_loops(fits)
+    for remark in remarks:
+        echo(f"note: {remark}")
     print_creep(held)
     print_joint(joint, loops_not_joined(fits))
     _print_files(written, out, creep=creep, of_all_runs=bool(joint))

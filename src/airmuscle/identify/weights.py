@@ -36,16 +36,24 @@ def sensor_deviations(runs: Sequence[Recording], quantity: str) -> Array | None:
         if not estimates[-1] > 0:
             return None
     single = np.array(estimates)
-    order = np.argsort(single)
     if not single.size:
         return None
-    rigs = np.split(order, np.flatnonzero(single[order][1:] > MIN_SENSOR_RATIO * single[order][:-1]) + 1)
+    coarse = np.array([_coarse_deviation(run, quantity, timed) for run in runs])
+    order = np.argsort(coarse)
+    rigs = np.split(order, np.flatnonzero(coarse[order][1:] > MIN_SENSOR_RATIO * coarse[order][:-1]) + 1)
     if len(rigs) < 2:
         return None
     deviations = np.empty(single.size)
     for rig in rigs:
         deviations[rig] = np.median(single[rig])
     return deviations
+
+
+def _coarse_deviation(run: Recording, quantity: str, timed: bool) -> float:
+    """The standard deviation with the whole resolution, by which rigs are told apart: the noise of readings that change
+    by few steps of the resolution is estimated as none or as a whole step."""
+    deviation, quantisation = _known[run][quantity]
+    return float(np.hypot(deviation, quantisation * np.sqrt(12.0))) if timed else quantisation
 
 
 def _sensor_deviation(run: Recording, quantity: str, timed: bool) -> float:

@@ -8,12 +8,16 @@ import numpy as np
 
 from ..core.arrays import Array
 from ..core.errors import ColumnError
-from ..core.hints import HintedText
+from ..core.hints import Hint, HintedText
+from .bench_checks.missing_codes import code_of
+from .missing_values import DropMissing
 from .table import RawTable
 from .time_base import AS_RECORDED, UNIFORM, WITHOUT_TIME
 
 CONTRACTION_RANGE = (-0.5, 1.0)
 """Plausible contractions (chosen): a contraction of 1 is impossible, as is a stretch by half of the length."""
+
+CODE_PURPOSE = "If {:g} is a code for a missing value"
 
 MAX_MAGNITUDE = 1e15
 """Maximum magnitude of a measured value in SI units (chosen: no measurement, but its powers do not overflow)."""
@@ -48,7 +52,8 @@ def _check_magnitude(table: RawTable, name: str, values: Array) -> None:
         row = int(np.argmax(excessive))
         raise ColumnError(
             f"{table.location(row)}: {name} is {values[row]:.4g} in SI units; no measurement exceeds "
-            f"{MAX_MAGNITUDE:g}. Correct the value, or delete the row."
+            f"{MAX_MAGNITUDE:g}. Correct the value, or delete the row.",
+            hint=_code_hint(values[row]),
         )
 
 
@@ -71,8 +76,15 @@ def _check_above_vacuum(table: RawTable, pressure: Array, ambient: float) -> Non
         row = int(np.argmax(below))
         raise ColumnError(
             f"{table.location(row)}: a gauge pressure of {pressure[row] / 1e3:.4g} kPa is not above absolute vacuum "
-            f"({-ambient / 1e3:.4g} kPa gauge). Check the unit, and whether the pressure is gauge or absolute."
+            f"({-ambient / 1e3:.4g} kPa gauge). Check the unit, and whether the pressure is gauge or absolute.",
+            hint=_code_hint(pressure[row]),
         )
+
+
+def _code_hint(value: float) -> Hint | None:
+    """The remedy where an impossible value is a code for a missing value."""
+    code = code_of(float(value))
+    return None if code is None else Hint(CODE_PURPOSE.format(code), "missing", DropMissing((code,)), "read")
 
 
 def _check_contraction(table: RawTable, contraction: Array, label: str, remedy: str) -> None:
@@ -89,7 +101,9 @@ def _check_contraction(table: RawTable, contraction: Array, label: str, remedy: 
 def _check_length(table: RawTable, length: Array, resting_length: float | None) -> None:
     if not (length > 0).all():
         row = int(np.argmin(length > 0))
-        raise ColumnError(f"{table.location(row)}: length is {length[row]:.4g} m; it must be positive.")
+        raise ColumnError(
+            f"{table.location(row)}: length is {length[row]:.4g} m; it must be positive.", hint=_code_hint(length[row])
+        )
     if resting_length is not None:
         _check_contraction(
             table,

@@ -18,10 +18,17 @@ from .joint_friction_chapter import joint_friction_chapter
 
 
 def hysteresis_chapters(
-    loop_fits: Sequence[LoopFit], creep: Sequence[str] = (), joint: Sequence[JointFit] = ()
+    loop_fits: Sequence[LoopFit],
+    creep: Sequence[str] = (),
+    joint: Sequence[JointFit] = (),
+    remarks: Sequence[str] = (),
 ) -> list[Chapter]:
-    """Return the chapter of the joint fits, if any, and one per loop; the sentences on creep form the last chapter."""
-    chapters = [joint_friction_chapter(joint, loops_not_joined(loop_fits))] if joint else []
+    """Return the chapter of the joint fits, if any, and one per loop; the sentences on creep form the last chapter.
+
+    Remarks on the data, such as the delay of a sensor, form the first one.
+    """
+    chapters = [Chapter("data", "Remarks on the data", "\n\n".join(remarks))] if remarks else []
+    chapters += [joint_friction_chapter(joint, loops_not_joined(loop_fits))] if joint else []
     chapters += [_chapter(each, "" if len(loop_fits) == 1 else f"-{i}") for i, each in enumerate(loop_fits, 1)]
     if creep:
         chapters.append(Chapter("creep", "Creep", "\n\n".join(creep)))

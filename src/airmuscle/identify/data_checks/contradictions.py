@@ -14,10 +14,13 @@ from .matched_rows import Block, MatchedRuns, Matches
 
 MIN_DIFFERENCE = 0.03
 """Median difference of two runs that contradict each other, as a fraction of the maximum force (chosen)."""
-UNORDERED_DIFFERENCE = 0.15
-"""The same where the direction of the motion is not known, so that it may be hysteresis (chosen)."""
+UNORDERED_DIFFERENCE = 0.05
+"""The same where the direction of the motion is not known (chosen); the remark then names hysteresis, too."""
+MAX_HYSTERESIS = 0.15
+"""The same of two runs of which neither shows a direction, which may be hysteresis (chosen)."""
 MIN_RMS = 0.025
 """Minimum root mean square of the differences of all matched runs, as a fraction of the maximum force (chosen)."""
+HYSTERESIS = " Without time the direction of the motion is not known: it may be hysteresis."
 SHIFT_TOLERANCE = 0.3
 """Relative tolerance of a shift of the pressure that is that of the atmosphere (chosen)."""
 
@@ -25,34 +28,37 @@ SHIFT_TOLERANCE = 0.3
 def repeatability(matches: Matches) -> float | None:
     """The standard deviation of the force of a run from that of another at equal pressure, contraction and direction
     [N]; None where no runs overlap."""
-    if not matches.runs:
-        return None
-    return float(np.sqrt(np.mean([np.mean(each.differences**2) for each in matches.runs]) / 2.0))
+    squares = [float(np.mean(each.differences**2)) for each in matches.runs if not each.is_unordered]
+    return float(np.sqrt(np.mean(squares) / 2.0)) if squares else None
 
 
 def contradiction_notes(matches: Matches) -> list[str]:
     """The remark that runs contradict each other, with its cause; empty if they do not."""
-    spread = repeatability(matches)
-    contradicting = [each for each in matches.runs if abs(each.median) > _limit(each, matches.greatest)]
-    if spread is None or not contradicting or np.sqrt(2.0) * spread < MIN_RMS * matches.greatest:
+    contradicting = [each for each in matches.runs if abs(each.typical) > _limit(each, matches.greatest)]
+    if not contradicting:
         return []
-    typical = float(np.median([abs(each.median) for each in contradicting]))
-    worst = max(contradicting, key=lambda each: abs(each.median))
+    rms = np.sqrt(np.mean([np.mean(each.differences**2) for each in matches.runs]))
+    if rms < MIN_RMS * matches.greatest:
+        return []
+    typical = float(np.median([abs(each.typical) for each in contradicting]))
+    worst = max(contradicting, key=lambda each: abs(each.typical))
+    unordered = all(each.is_unordered for each in contradicting)
+    who = "rows" if unordered else f"{len(contradicting)} of {len(matches.runs)} pairs of runs"
     text = (
-        f"Rows contradict each other: at equal pressure and contraction the forces of {len(contradicting)} of "
-        f"{len(matches.runs)} pairs of runs differ by {typical:.3g} N (median), which no law can follow. "
-        f"{_example(worst)}"
+        f"Rows contradict each other: at equal pressure and contraction the forces of {who} differ by {typical:.3g} N "
+        f"(median), which no law can follow. {_example(worst)}"
     )
-    return [HintedText(text, *_cause(contradicting, matches))]
+    return [HintedText(text, *_cause(contradicting, matches), HYSTERESIS if unordered else "")]
 
 
 def _limit(runs: MatchedRuns, greatest: float) -> float:
-    return (MIN_DIFFERENCE if runs.first.direction else UNORDERED_DIFFERENCE) * greatest
+    limit = UNORDERED_DIFFERENCE if runs.is_unordered else MIN_DIFFERENCE if runs.first.direction else MAX_HYSTERESIS
+    return limit * greatest
 
 
 def _example(runs: MatchedRuns) -> str:
     """The matched rows whose difference is the median one, as a sentence."""
-    i, j = runs.pairs[int(np.argmin(np.abs(runs.differences - runs.median)))]
+    i, j = runs.pairs[int(np.argmin(np.abs(np.abs(runs.differences) - abs(runs.typical))))]
     rows = [(block, int(block.rows[k])) for block, k in ((runs.first, i), (runs.second, j))]
     texts = [
         f"{block.recording.origin}, row {row + 1}: {block.recording['force'][row]:.4g} N at "

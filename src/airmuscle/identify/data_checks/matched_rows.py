@@ -28,6 +28,8 @@ MAX_ROWS = 4000
 """Maximum number of rows of a specimen that are matched (chosen)."""
 MAX_BLOCKS = 80
 """Maximum number of runs of a specimen that are matched (chosen)."""
+NEIGHBOURS = 4
+"""Number of nearest rows of one block that are compared, with the row itself (chosen)."""
 MIN_BRANCH_ROWS = 5
 """Minimum number of rows of a branch (chosen)."""
 MIN_FORCE = 0.02
@@ -62,8 +64,15 @@ class MatchedRuns:
     differences: Array
 
     @property
-    def median(self) -> float:
-        """The median difference of the force [N]."""
+    def is_unordered(self) -> bool:
+        """Whether the rows are of one block without time, so that the direction of the motion is not known."""
+        return self.first is self.second
+
+    @property
+    def typical(self) -> float:
+        """The median difference of the force [N]; of rows of one block, whose signs are random, the upper quartile."""
+        if self.is_unordered:
+            return float(np.quantile(np.abs(self.differences), 0.75))
         return float(np.median(self.differences))
 
     @property
@@ -157,7 +166,7 @@ def _matched_runs(blocks: Sequence[Block], recordings: Sequence[Recording]) -> l
     reach = np.array([PRESSURE_REACH * max(highest, 1.0), CONTRACTION_REACH])
     points = [np.column_stack([b.recording[n][b.rows] for n in ("pressure", "contraction")]) / reach for b in blocks]
     limits = [(x.min(axis=0) - 1.0, x.max(axis=0) + 1.0) for x in points]
-    matched = []
+    matched = [each for block, own in zip(blocks, points, strict=True) for each in _unordered(block, own)]
     for i, j in itertools.combinations(range(len(blocks)), 2):
         apart = (limits[i][0] > limits[j][1]).any() or (limits[j][0] > limits[i][1]).any()
         if not apart and blocks[i].direction == blocks[j].direction:
@@ -166,6 +175,20 @@ def _matched_runs(blocks: Sequence[Block], recordings: Sequence[Recording]) -> l
                 both = blocks[i].residuals[pairs[:, 0]] - blocks[j].residuals[pairs[:, 1]]
                 matched.append(MatchedRuns(blocks[i], blocks[j], pairs, both))
     return matched
+
+
+def _unordered(block: Block, points: Array) -> Iterator[MatchedRuns]:
+    """The pairs of neighbouring rows of a block without time."""
+    from scipy.spatial import cKDTree
+
+    if "time" in block.recording or len(points) < NEIGHBOURS:
+        return
+    distance, index = cKDTree(points).query(points, NEIGHBOURS, distance_upper_bound=1.0)
+    first, place = np.nonzero(np.isfinite(distance))
+    pairs = np.column_stack([first, index[first, place]])
+    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
+    if len(pairs) >= MIN_MATCHES:
+        yield MatchedRuns(block, block, pairs, block.residuals[pairs[:, 0]] - block.residuals[pairs[:, 1]])
 
 
 def _nearest(first: Array, second: Array) -> npt.NDArray[np.intp]:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from ...core.arrays import Array
 from ..recording import Recording
+from ..segment.sensor import estimate_sensors
 
 MIN_FORCE = 0.05
 """Minimum force of a row that surely pulls, as a fraction of the maximum force (chosen)."""
@@ -53,7 +54,7 @@ class BenchRows(NamedTuple):
         """The rows of the recordings that have all three quantities."""
         given = recordings_with(recordings, *cls._fields)
         columns = [np.concatenate([[], *(run[name] for run in given)]) for name in cls._fields]
-        complete = np.isfinite(np.sum(columns, axis=0))
+        complete = np.isfinite(np.sum(columns, axis=0)) & _not_saturated(given)
         return cls(*(column[complete] for column in columns))
 
     def at(self, rows: npt.NDArray[np.bool_]) -> BenchRows:
@@ -80,6 +81,15 @@ class BenchRows(NamedTuple):
         """The forces [N] at zero pressure and shortened length, where a muscle is slack."""
         without = np.abs(self.pressure) < NO_PRESSURE * np.max(self.pressure, initial=0.0)
         return self.force[without & (self.contraction > MAX_ELONGATION)]
+
+
+def _not_saturated(recordings: Sequence[Recording]) -> npt.NDArray[np.bool_]:
+    """Mask (N,) of the rows at which the force sensor is not at its upper limit."""
+    if not recordings:
+        return np.zeros(0, dtype=bool)
+    sensor = estimate_sensors([Recording({"force": each["force"]}, each.origin) for each in recordings])["force"]
+    limit = sensor.upper_limit - 0.25 * sensor.resolution
+    return np.concatenate([each["force"] < limit for each in recordings])
 
 
 class PressureLine(NamedTuple):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -19,6 +20,8 @@ from .bench_rows import file_list
 
 CODES = (99.0, 999.0, 999.9, 9999.0, 9999.9, 99999.0, 999999.0, 32767.0, 32768.0, 1e30, 1e31, 1e36, 1e37, 1e38)
 """Magnitudes that loggers write for a missing value (chosen: the usual ones)."""
+MIN_CODE = 500.0
+"""Minimum magnitude of a code that is recognised in another power of ten of the unit (chosen)."""
 MIN_DISTANCE = 0.2
 """Minimum distance of a code from all other readings, as a fraction of their range (chosen)."""
 MAX_SHARE = 0.5
@@ -37,6 +40,15 @@ def is_missing_code(value: float) -> bool:
     return any(abs(abs(value) - code) <= 1e-6 * code for code in CODES)
 
 
+def code_of(value: float) -> float | None:
+    """The code for a missing value that a number [SI] is, in some power of ten of its unit; None if it is none."""
+    if value == 0.0 or not math.isfinite(value):
+        return None
+    ratios = ((code, abs(value) / code) for code in CODES if code > MIN_CODE)
+    exact = (code for code, ratio in ratios if abs(math.log10(ratio) - round(math.log10(ratio))) < 1e-7)
+    return math.copysign(code, value) if (code := next(exact, None)) is not None else None
+
+
 def check_missing_codes(recordings: Sequence[Recording]) -> Iterator[HintedText]:
     """A column whose extreme reading is a code for a missing value, far from all other readings."""
     found: dict[tuple[str, float], list[tuple[str, int]]] = {}
@@ -48,7 +60,7 @@ def check_missing_codes(recordings: Sequence[Recording]) -> Iterator[HintedText]
     for (name, value), places in found.items():
         rows = sum(count for _, count in places)
         yield HintedText(
-            f"{file_list([origin for origin, _ in places])}: the {name} is {value:g} in {rows} rows, far from all "
+            f"{file_list([origin for origin, _ in places])}: the {name} is {value:g} in {rows} {'row' if rows == 1 else 'rows'}, far from all "
             "other readings: this is a code for a missing value, which is read as a number.",
             Hint("To leave these rows out", "missing", DropMissing((value,)), "read"),
         )
