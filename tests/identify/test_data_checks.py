@@ -29,7 +29,9 @@ from laboratories import (
     with_glitches,
     write,
 )
+from typer.testing import CliRunner
 
+from airmuscle.cli.app import app
 from airmuscle.core.errors import AirmuscleWarning, ColumnError
 from airmuscle.identify import Fit, compare, fit
 from airmuscle.identify.candidates import Candidate, blank_surface
@@ -136,6 +138,16 @@ def test_the_delay_of_a_sensor_is_not_called_friction(tmp_path):
     (note,) = [note for note in result.notes if "delay between the sensors" in note]
     assert "follows the pressure by 39.9 ms" in note or "follows the pressure by 40" in note
     assert not any("To identify the friction" in note for note in result.notes)
+
+
+def test_the_command_hysteresis_states_a_delay(tmp_path):
+    tables = ramps(FRICTIONLESS, duration=12.0, sample_time=0.1, delay=0.4)
+    paths = write({name: tables[name] for name in ("held_4", "held_12")}, tmp_path)
+    options = ["--resting-length", "300 mm", "--elements", "2", "--out", str(tmp_path / "out")]
+    result = CliRunner().invoke(app, ["hysteresis", *map(str, paths), *options])
+    assert result.exit_code == 0, result.output
+    assert "note: The loops of the ramps" in result.output
+    assert "those of a delay between the sensors" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 
 def test_friction_is_not_called_a_delay(tmp_path):

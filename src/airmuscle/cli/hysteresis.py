@@ -13,6 +13,7 @@ from ..core.output_folder import atomic_folder, check_writable
 from ..identify.campaign import HeldCreep, fit_held_creep, free_of_creep
 from ..identify.data_checks import delay_notes, find_delay
 from ..identify.hysteresis import (
+    JointFit,
     LoopFit,
     find_loops,
     fit_jointly,
@@ -104,13 +105,8 @@ def hysteresis(
         hysteresis_chapters(fits, sentences, joint, remarks), select_friction(fits, joint), held, entry, out
     )
     if json:
-        not_joined = list(loops_not_joined(fits)) if joint else []
-        data = {
-            "loops": [loop_to_dict(fit) for fit in fits],
-            "joint": [joint_to_dict(fit) for fit in joint],
-            "not_joined": not_joined,
-        }
-        print_json({**data, **creep_to_dict(held), "notes": remarks, "written": str(written.get("friction", ""))})
+        data = {**_loops_to_dict(fits, joint), **creep_to_dict(held), "notes": remarks}
+        print_json({**data, "written": str(written.get("friction", ""))})
         return
     print_loops(fits)
     for remark in remarks:
@@ -118,6 +114,14 @@ def hysteresis(
     print_creep(held)
     print_joint(joint, loops_not_joined(fits))
     _print_files(written, out, creep=creep, of_all_runs=bool(joint))
+
+
+def _loops_to_dict(fits: Sequence[LoopFit], joint: Sequence[JointFit]) -> dict[str, Any]:
+    return {
+        "loops": [loop_to_dict(fit) for fit in fits],
+        "joint": [joint_to_dict(fit) for fit in joint],
+        "not_joined": list(loops_not_joined(fits)) if joint else [],
+    }
 
 
 def _fit_creep(recordings: Sequence[Recording], entry: Entry | None) -> HeldCreep:

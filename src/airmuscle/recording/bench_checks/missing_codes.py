@@ -59,8 +59,9 @@ def check_missing_codes(recordings: Sequence[Recording]) -> Iterator[HintedText]
                 found.setdefault((name, code.value), []).append((each.origin, int(np.count_nonzero(code.rows))))
     for (name, value), places in found.items():
         rows = sum(count for _, count in places)
+        count = f"{rows} row{'' if rows == 1 else 's'}"
         yield HintedText(
-            f"{file_list([origin for origin, _ in places])}: the {name} is {value:g} in {rows} {'row' if rows == 1 else 'rows'}, far from all "
+            f"{file_list([origin for origin, _ in places])}: the {name} is {value:g} in {count}, far from all "
             "other readings: this is a code for a missing value, which is read as a number.",
             Hint("To leave these rows out", "missing", DropMissing((value,)), "read"),
         )
