@@ -11,6 +11,7 @@ from ..core.output_folder import check_writable
 from ..identify import UNCENSORED
 from ..identify import fit as fit_model
 from ..identify.problem import fitted_quantity_of
+from ..identify.specimen_errors import specimen_errors
 from ..library.fitted_entry import fitted_entry, missing_geometry
 from ..library.initial_law import find_initial_law
 from ..recording import Recording
@@ -181,7 +182,8 @@ def _fit_one(files: list[Path], recordings: list[Recording], characteristic: str
         fixed=(*request.fixed, *initial.fixed),
     )
     extras = request.options.evaluate(result, recordings)
-    entry = extras.constrained_entry(fitted_entry(result, start, files))
+    errors = specimen_errors(result, recordings, (*request.fixed, *initial.fixed))
+    entry = extras.constrained_entry(fitted_entry(result, start, files, recordings=recordings, errors=errors))
     write_results(result, entry, recordings, request.out, extras.chapters())
     if request.json:
         data = fit_to_dict(result)

@@ -13,6 +13,7 @@ from ..core.output_folder import check_writable
 from ..core.processes import available_cores
 from ..identify import Candidate, Comparison, standard_candidates
 from ..identify.law_selection import LawSelection, select_law
+from ..identify.specimen_errors import ranked_specimen_errors
 from ..library.entry import Entry
 from ..library.fitted_entry import fitted_entry, left_out_ratio, missing_geometry
 from ..library.initial_law import InitialLaw, find_initial_law, resting_lengths
@@ -46,7 +47,8 @@ def compare_models(
     extras = request.options.evaluate(best.fit, recordings)
     geometry = named.entry.geometry if named is not None and best.candidate is candidates[-1] else None
     initial, notes = _initial_entry(best.candidate, geometry, recordings, request)
-    entry = fitted_entry(best.fit, initial, files, left_out_ratio(best))
+    errors = ranked_specimen_errors(best, selection.comparisons, recordings)
+    entry = fitted_entry(best.fit, initial, files, left_out_ratio(best), recordings, errors)
     notes += missing_geometry(entry)
     chapters = [compare_chapter(each, best, selection.reason) for each in selection.comparisons]
     write_results(best.fit, entry, recordings, request.out, [*chapters, *extras.chapters()])

@@ -16,7 +16,7 @@ from ..identify.prediction import RecordPrediction
 from ..library.entry_prediction import predict_with_entry
 from ..library.files import is_path, list_plants, read_toml
 from ..library.law_file import describes_plant, load_law
-from ..report.prediction_chapter import describe_band, prediction_chapters, with_unit
+from ..report.prediction_chapter import band_sources, describe_band, prediction_chapters, with_unit
 from ..report.write import write_into
 from ..scenario.prediction import load_plant_model
 from .bench_files import read_recordings
@@ -89,18 +89,24 @@ def predict(
     check_writable(out)
     options = {"--start-time": start_time, "--start-margin": start_margin, "--own": own}
     if _is_plant(model):
-        thing, band, predictions = _transient(model, files, reading, start_time, start_margin, own or ())
+        thing, predictions = _transient(model, files, reading, start_time, start_margin, own or ())
     else:
         unused = [name for name, value in options.items() if value]
         if unused:
             raise typer.BadParameter(f"{', '.join(unused)} is for a scenario; MODEL is a muscle or a law")
-        thing, band, predictions = _static(model, files, reading)
+        thing, predictions = _static(model, files, reading)
     with atomic_folder(out) as folder:
-        write_into(folder, prediction_chapters(Path(model).name, thing, predictions, band), title="Prediction")
+        write_into(folder, prediction_chapters(Path(model).name, thing, predictions), title="Prediction")
     if json:
-        print_json({"model": model, "band": band, "records": [_to_dict(each) for each in predictions]})
+        print_json(
+            {
+                "model": model,
+                "band": "; ".join(band_sources(predictions)),
+                "records": [_to_dict(each) for each in predictions],
+            }
+        )
         return
-    _print(predictions, band)
+    _print(predictions)
     echo(f"report: {out / 'report.html'}")
 
 
@@ -111,19 +117,18 @@ def _is_plant(model: str) -> bool:
     return model in list_plants()
 
 
-def _static(model: str, files: list[Path], reading: ReadingOptions) -> tuple[Any, str, list[RecordPrediction]]:
+def _static(model: str, files: list[Path], reading: ReadingOptions) -> tuple[Any, list[RecordPrediction]]:
     entry = load_law(model)
     tables = [path for path in files if path.suffix == ".toml"]
     if tables:
         raise FileError(f"{tables[0]}: a file of records is for a scenario; give measurement files for a muscle.")
     recordings = read_recordings(files, reading)
-    band = "" if entry.error_band is None else entry.error_band.source
-    return entry, band, [predict_with_entry(entry, recording) for recording in recordings]
+    return entry, [predict_with_entry(entry, recording) for recording in recordings]
 
 
 def _transient(
     model: str, files: list[Path], reading: ReadingOptions, start: str | None, margin: str | None, own: Sequence[str]
-) -> tuple[Any, str, list[RecordPrediction]]:
+) -> tuple[Any, list[RecordPrediction]]:
     loaded = load_plant_model(model)
     begun = 0.0 if start is None else quantity(start, "s", where="--start-time")
     unknowns: list[Any] = list(own)
@@ -138,12 +143,10 @@ def _transient(
     for path in files:
         if path not in measured:
             predictions += loaded.predict_file(path)
-    uncertainty = loaded.scenario.uncertainty
-    band = "" if uncertainty is None else "residuals of the fit of the plant, and the covariance of its parameters"
-    return loaded.scenario.plant, band, predictions
+    return loaded.scenario.plant, predictions
 
 
-def _print(predictions: Sequence[RecordPrediction], band: str) -> None:
+def _print(predictions: Sequence[RecordPrediction]) -> None:
     rows = []
     for each in predictions:
         for item in each.quantities:
@@ -154,8 +157,8 @@ def _print(predictions: Sequence[RecordPrediction], band: str) -> None:
             rows.append((each.origin, item.name, compared, rms, greatest, half, share))
     headers = ("record", "quantity", "rows", "rms error", "maximum error", "95 % band", "within")
     print_table(headers, rows, right=("rows", "rms error", "maximum error", "95 % band", "within"))
-    if band:
-        echo(f"band: {band}")
+    for source in band_sources(predictions):
+        echo(f"band: {source}")
     for each in predictions:
         for note in each.notes:
             echo(f"note: {each.origin}: {note}")
@@ -171,6 +174,7 @@ def _to_dict(prediction: RecordPrediction) -> dict[str, Any]:
                 "rms": each.rms,
                 "max_error": each.max_error,
                 "max_error_row": each.worst_row + 1,
+                "band": each.band,
                 "half_width": None if each.half_width is None else each.half_width.tolist(),
                 "share": each.share,
             }

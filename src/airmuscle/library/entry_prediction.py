@@ -12,6 +12,8 @@ from ..identify.campaign.rows import is_held
 from ..identify.compared_points import law_of_length
 from ..identify.cross_validation import specimen_name
 from ..identify.prediction import RecordPrediction, predict_static
+from ..identify.prediction.fitted_range import length_notes
+from ..identify.prediction.left_out import widening
 from ..identify.problem import fitted_quantity_of
 from ..muscle.characteristic.base import ForceLaw
 from ..muscle.muscle import LENGTH_TOLERANCE
@@ -20,6 +22,10 @@ from ..recording.plausibility import CONTRACTION_RANGE
 from .entry import Entry
 from .length_scaling import scale_to_length
 
+UNKNOWN = "not known for a specimen that was not measured"
+"""Words in place of a band that no specimens left out of the fit give."""
+MAX_NAMES = 6
+"""Maximum number of measured specimens in a note (chosen)."""
 UNUSED_PARTS = ("damper", "wall", "series", "stop")
 """Elements of a muscle that a static prediction leaves out."""
 
@@ -50,16 +56,15 @@ def predict_with_entry(entry: Entry, recording: Recording) -> RecordPrediction:
         notes.append(f"left out of the static prediction: {', '.join(left_out)}")
     own = None if entry.geometry is None else float(entry.geometry.resting_length)
     if None not in (own, length) and abs((own or 0.0) - (length or 0.0)) > LENGTH_TOLERANCE:
-        notes.append(
-            f"the law was scaled from {1e3 * (own or 0.0):.4g} mm to {1e3 * (length or 0.0):.4g} mm; the stated band "
-            "is that of the measured length"
-        )
-    half = _half_width(entry, fitted_quantity_of(law).name, recording)
+        notes.append(f"the law was scaled from {1e3 * (own or 0.0):.4g} mm to {1e3 * (length or 0.0):.4g} mm")
+    half, source, remarks = _band(entry, fitted_quantity_of(law).name, recording)
+    limits = entry.error_band
+    rates = {} if limits is None else {"contraction": limits.max_contraction_rate, "pressure": limits.max_pressure_rate}
     result = predict_static(
         law, recording, friction=entry.friction, creep=entry.creep, half_width=half,
-        validity_range=entry.validity_range,
+        validity_range=entry.validity_range, rates=rates, band=source,
     )  # fmt: skip
-    return dataclasses.replace(result, notes=(*result.notes, *notes))
+    return dataclasses.replace(result, notes=(*result.notes, *notes, *remarks))
 
 
 def _with_resting_length(recording: Recording, length: float) -> tuple[Recording, list[str]]:
@@ -79,11 +84,26 @@ def _with_resting_length(recording: Recording, length: float) -> tuple[Recording
     return completed, [f"{what}, its contraction is {100 * low:.4g} to {100 * high:.4g} %"]
 
 
-def _half_width(entry: Entry, quantity: str, recording: Recording) -> float | None:
-    """The half width of the stated band of a quantity [SI], that of isometric runs for a held length."""
+def _band(entry: Entry, quantity: str, recording: Recording) -> tuple[float | None, str, list[str]]:
+    """The half width of the band of a record [SI], None if it is not known; its source or why not; and notes.
+
+    It is that of the measured specimens, of isometric runs for a held length, or that of other specimens.
+    """
     band = entry.error_band
     if band is None or band.quantity != quantity:
-        return None
-    if band.held_half_width is None or "contraction" not in recording or not is_held(recording):
-        return band.half_width
-    return band.held_half_width
+        return None, "", []
+    held = band.held_half_width is not None and "contraction" in recording and is_held(recording)
+    own = (band.held_half_width or band.half_width) if held else band.half_width
+    name, length = specimen_name(recording), recording.constants.get("resting_length")
+    if not band.specimens or name in band.specimens:
+        return own, band.source, []
+    notes = length_notes(None if length is None else float(length), band.resting_lengths)
+    measured = ", ".join(band.specimens[:MAX_NAMES]) + (", ..." if len(band.specimens) > MAX_NAMES else "")
+    which = f"specimen {name} was not measured (measured: {measured})"
+    if band.new_specimen_half_width is None:
+        return None, UNKNOWN, [f"{which}; the band is {UNKNOWN}", *notes]
+    new = band.new_specimen_half_width
+    if length is not None and band.resting_lengths and hasattr(entry.characteristic, "with_resting_length"):
+        new *= widening(band.resting_lengths, float(length))
+    source = f"for a specimen that was not measured: {band.new_specimen_source}"
+    return max(new, own), source, [f"{which}; the band is that of other specimens", *notes]

@@ -12,7 +12,10 @@ from ..core.reference import cite
 from ..identify import Fit
 from ..identify.candidate_scores import RankedModel
 from ..identify.prediction.result import LEVEL
+from ..identify.specimen_errors import SpecimenErrors, resting_lengths_of, specimens_of
 from ..muscle.geometry import Geometry
+from ..recording import Recording
+from ..recording.segment import maximum_rate
 from .entry import MISSING_GEOMETRY, Entry
 from .stated_band import StatedBand
 
@@ -20,10 +23,15 @@ MAX_NAMES, MAX_NAME = 3, 60
 """Maximum number of file names in a title, and of characters of each (chosen)."""
 
 
-def fitted_entry(result: Fit, initial: Entry, files: Sequence[Path], error_ratio: float = 1.0) -> Entry:
-    """The initial entry with the fitted characteristic, a new provenance and its 95 % band, without its checks.
+def fitted_entry(
+    result: Fit, initial: Entry, files: Sequence[Path], error_ratio: float = 1.0, recordings: Sequence[Recording] = (),
+    errors: SpecimenErrors | None = None,
+) -> Entry:  # fmt: skip
+    """The initial entry with the fitted characteristic, a new provenance and its 95 % bands, without its checks.
 
     error_ratio  rms error of rows left out of the fit over that of its own rows, by which the band is widened
+    recordings   of the fit, whose specimens, resting lengths and rates the band holds for
+    errors       of specimens left out of the fit, for the band of a specimen that was not measured
     """
     summary = dict(result.summary())
     names = list_files([f.name for f in files])
@@ -33,7 +41,7 @@ def fitted_entry(result: Fit, initial: Entry, files: Sequence[Path], error_ratio
     entry = dataclasses.replace(
         initial, name="muscle", title=title, provenance="fitted", note=note, warning="", characteristic=result.model,
         geometry=geometry, validity_range=result.validity_range, checks=(),
-        uncertainty=None, error_band=_error_band(result, error_ratio),
+        uncertainty=None, error_band=_error_band(result, error_ratio, recordings, errors),
         references=tuple(cite((initial.references, result.recording.references))),
     )  # fmt: skip
     return dataclasses.replace(entry, note=" ".join([note, *missing_geometry(entry)]))
@@ -46,8 +54,11 @@ def left_out_ratio(best: RankedModel) -> float:
     return max(best.cross_validated_rmse / best.in_sample_rmse, 1.0)
 
 
-def _error_band(result: Fit, ratio: float) -> StatedBand | None:
-    """The quantile of the residuals of the uncensored rows that contains 95 % of further ones [SI]."""
+def _error_band(
+    result: Fit, ratio: float, recordings: Sequence[Recording], errors: SpecimenErrors | None
+) -> StatedBand | None:
+    """The quantile of the residuals of the uncensored rows that contains 95 % of further ones [SI], for the measured
+    specimens, and the band of others by the errors of specimens left out."""
     residuals = np.abs(result.residuals[result.censoring == 0])
     size = residuals.size
     half = ratio * float(np.quantile(residuals, min(np.ceil((size + 1) * LEVEL) / size, 1.0))) if size else 0.0
@@ -56,7 +67,22 @@ def _error_band(result: Fit, ratio: float) -> StatedBand | None:
     source = f"95 % quantile of the residuals of {size} rows of the fit"
     if ratio != 1.0:
         source += f", times {ratio:.3g}, the ratio of the rms errors of rows left out and of all rows"
-    return StatedBand(result.fitted_quantity.name, half, source)
+    band = band_range(StatedBand(result.fitted_quantity.name, half, source), recordings)
+    if errors is None or band.quantity != "force":
+        return band
+    return dataclasses.replace(band, new_specimen_half_width=errors.half_width, new_specimen_source=str(errors))
+
+
+def band_range(band: StatedBand, recordings: Sequence[Recording]) -> StatedBand:
+    """The band with the specimens, the resting lengths and the maximum rates of the records that it holds for."""
+    timed = [run for run in recordings if "time" in run]
+    return dataclasses.replace(
+        band,
+        specimens=specimens_of(recordings),
+        resting_lengths=tuple(resting_lengths_of(recordings).values()),
+        max_contraction_rate=maximum_rate(timed, "contraction") if timed else None,
+        max_pressure_rate=maximum_rate(timed, "pressure") if timed else None,
+    )
 
 
 def list_files(names: Sequence[str]) -> str:

@@ -31,7 +31,7 @@ def to_toml(entry: Entry) -> str:
         tables["uncertainty"] = uncertainty_table(entry.uncertainty)
     if entry.error_band is not None:
         stated = dataclasses.asdict(entry.error_band)
-        tables["error_band"] = {key: value for key, value in stated.items() if value is not None}
+        tables["error_band"] = {key: value for key, value in stated.items() if value not in (None, (), "")}
     if entry.checks:
         tables["check"] = [_check_table(check) for check in entry.checks]
     if entry.references:
@@ -98,7 +98,10 @@ def _to_text(tables: Mapping[str, Any]) -> str:
 def model_table(thing: Any) -> dict[str, Any]:
     """A model as the table that `build` reads; fields that are None have this default and are left out."""
     fields = {f.name: getattr(thing, f.name) for f in dataclasses.fields(thing) if f.init}
-    return {"model": type(thing).__name__, **{name: value for name, value in fields.items() if value is not None}}
+    return {
+        "model": type(thing).__name__,
+        **{name: value for name, value in fields.items() if value is not None},
+    }
 
 
 def _check_table(check: Check) -> dict[str, Any]:

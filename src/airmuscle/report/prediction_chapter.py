@@ -21,21 +21,24 @@ STEADY_PRESSURE = 0.03
 """Variation of a constant pressure relative to its maximum, without the extreme 4 % of the rows (chosen)."""
 
 
-def prediction_chapters(
-    model: str, thing: Any, predictions: Sequence[RecordPrediction], band: str = ""
-) -> list[Chapter]:
+def prediction_chapters(model: str, thing: Any, predictions: Sequence[RecordPrediction]) -> list[Chapter]:
     """Return the chapters of predicted records: the errors of all records, then one chapter for each.
 
-    `model` names the file of the muscle or plant, `thing` is the muscle or plant, for its references, and `band` says
-    where its stated band comes from.
+    `model` names the file of the muscle or plant, and `thing` is the muscle or plant, for its references.
     """
-    return [_overview(model, thing, predictions, band), *(_record(i, each) for i, each in enumerate(predictions, 1))]
+    return [_overview(model, thing, predictions), *(_record(i, each) for i, each in enumerate(predictions, 1))]
+
+
+def band_sources(predictions: Sequence[RecordPrediction]) -> list[str]:
+    """The sources of the bands of all records, each once."""
+    stated = [quantity for each in predictions for quantity in each.quantities if quantity.half_width is not None]
+    return [source for source in dict.fromkeys(quantity.band for quantity in stated) if source]
 
 
 def describe_band(quantity: QuantityPrediction) -> str:
     """The median half width of the band with its unit, or that there is none."""
     if quantity.half_width is None:
-        return NO_BAND
+        return quantity.band or NO_BAND
     return f"±{with_unit(float(np.median(quantity.half_width[quantity.compared])), quantity.name)}"
 
 
@@ -44,7 +47,7 @@ def with_unit(value: float, name: str) -> str:
     return displayed(name, value)
 
 
-def _overview(model: str, thing: Any, predictions: Sequence[RecordPrediction], band: str) -> Chapter:
+def _overview(model: str, thing: Any, predictions: Sequence[RecordPrediction]) -> Chapter:
     pairs = [(each, quantity) for each in predictions for quantity in each.quantities]
     shares = [quantity.share for _, quantity in pairs]
     columns: dict[str, Any] = {
@@ -55,12 +58,13 @@ def _overview(model: str, thing: Any, predictions: Sequence[RecordPrediction], b
         "maximum error": [with_unit(quantity.max_error, quantity.name) for _, quantity in pairs],
         "95 % band": [describe_band(quantity) for _, quantity in pairs],
         "rows within the band [%]": [None if share is None else 100.0 * share for share in shares],
+        "notes": ["; ".join(each.notes) for each, _ in pairs],
     }
     number = f"{len(predictions)} {'record' if len(predictions) == 1 else 'records'}"
     sentences = [f"{number} that {model} was not fitted to, predicted and compared with the measured values."]
-    if band:
-        sentences.append(f"Band: {band.rstrip('.')}.")
-    elif all(share is None for share in shares):
+    sources = band_sources(predictions)
+    sentences += [f"Band: {source.rstrip('.')}." for source in sources]
+    if not sources and all(share is None for share in shares):
         sentences.append(f"No share of rows within a band is given, because {NO_BAND}.")
     return Chapter(
         paper="prediction",
@@ -83,6 +87,8 @@ def _record(number: int, prediction: RecordPrediction) -> Chapter:
         if quantity.half_width is not None:
             columns[f"half width of the band of {heading}"] = quantity.half_width
         columns[f"compared {quantity.name}"] = quantity.compared.astype(int)
+    if prediction.outside is not None:
+        columns["outside the range of the fit"] = prediction.outside.astype(int)
     errors = "; ".join(
         f"{quantity.name}: rms error {with_unit(quantity.rms, quantity.name)}, maximum error "
         f"{with_unit(quantity.max_error, quantity.name)} in row {quantity.worst_row + 1}"

@@ -15,6 +15,7 @@ from ..core.arrays import Array
 from ..core.errors import AirmuscleError
 from ..identify.campaign import Campaign, CampaignRecord, FillStage, RecordKind, ReleaseStage
 from ..identify.dynamic import stated_ambient
+from ..library.uncertainty import KEYS
 from ..library.write import scenario_toml
 from ..mechanism import Isometric, PrescribedMotion
 from ..muscle import Muscle
@@ -23,7 +24,7 @@ from ..pneumatics import ProportionalRegulator, SecondOrderLag, Supply, Valve
 from ..recording import Recording
 from ..recording.segment.interval import running_median
 from ..recording.segment.runs import CONTRACTION_BAND
-from .plant_uncertainty import DEVIATIONS, SEPARATOR, fit_uncertainty, tail_factor
+from .plant_uncertainty import SEPARATOR, fit_uncertainty
 
 POINTS = 120
 """Number of points of the pressure and of the motion of a slow record (chosen)."""
@@ -88,7 +89,7 @@ def _fill(campaign: Campaign, record: CampaignRecord, muscle: Muscle) -> tuple[s
     plant, known, start = _fitted_record(stage, record, muscle)
     points = {name: [list(point) for point in rows] for name, rows in stage.commands(record).items()}
     run = {"duration": float(record.recording["time"][-1]) - start, "initial_state": {"pressure": known["pressure"]}}
-    table = fit_uncertainty(stage.fit) | {DEVIATIONS: {"pressure": _fill_deviation(stage)}}
+    table = fit_uncertainty(stage.fit, [{"pressure": error} for error in stage.cross_rms])
     fitted = {"uncertainty": _known_in(table, plant)}
     return scenario_toml(record.origin, plant, points, run, _note(record, start), fitted), ""
 
@@ -104,18 +105,11 @@ def _release(campaign: Campaign, record: CampaignRecord, muscle: Muscle) -> tupl
     return scenario_toml(record.origin, plant, {"latched": [[0.0, 0.0]]}, run, _note(record, start), fitted), ""
 
 
-def _fill_deviation(stage: FillStage) -> float:
-    """Standard deviation of the predicted pressure [Pa]: of the fills by each other, or of the joint fit if greater."""
-    fitted = [stage.fit.rms("pressure", i) for i in range(len(stage.records))]
-    deviation = max(float(np.sqrt(np.mean(np.square(rms)))) for rms in (fitted, stage.cross_rms) if len(rms))
-    return deviation * tail_factor(stage.fit, "pressure")
-
-
 def _known_in(table: dict[str, Any], plant: Plant) -> dict[str, Any]:
     """The table without the covariance if the plant lacks one of its parameters."""
     paths = {leaf.path for leaf in tree.leaves(plant)}
     named = {path for name in table.get("parameters", ()) for path in name.split(SEPARATOR)}
-    return table if named <= paths else {DEVIATIONS: table[DEVIATIONS]}
+    return table if named <= paths else {key: value for key, value in table.items() if key not in KEYS}
 
 
 def _fitted_record(

@@ -127,7 +127,10 @@ class DynamicFitSetup:
         duration = float(record_model.times[-1]) - record_model.start_time(fit.values)
         run = {"duration": duration, "initial_state": start}
         named = {name: {"deviation": self.observed[name], "column": column} for name, column in self.columns.items()}
-        fitted = {"observed": {**self.observed, **named}, "uncertainty": fit_uncertainty(fit, cross)}
+        fitted = {
+            "observed": {**self.observed, **named},
+            "uncertainty": fit_uncertainty(fit, [each.rms for each in cross]),
+        }
         return scenario_toml(f"{self.title}, {origin}", plant, self.input_tables[record], run, note, fitted)
 
 

@@ -2,6 +2,10 @@
 
 [uncertainty]                               written by airmuscle fit-dynamic and campaign, read by airmuscle predict
 deviations = { pressure = 620.0 }           standard deviation of the residuals of each observed quantity
+records = 3                                 number of records of the fit
+factors = { pressure = 2.4 }                half width of the 95 % band in deviations, from records predicted by others
+ranges = { pressure = [0.0, 5e5] }          ends of the measured quantities in the records
+rates = { pressure = 1e6 }                  their maximum rates of change
 parameters = ["gas.exponent", "circuit.fill.conductance, circuit.discharge.conductance"]
                                             fitted parameters; several paths have one common value
 standard_errors = [0.01, 2.1e-11]           SI
@@ -10,55 +14,79 @@ correlations = [[1.0, 0.2], [0.2, 1.0]]
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from ..core import tree
+from ..core.arrays import Array
 from ..core.errors import ParameterError
-from ..identify.dynamic import CrossPrediction, DynamicFit
+from ..identify.dynamic import DynamicFit
 from ..identify.dynamic.cross_prediction import OF_RECORD
 from ..identify.prediction import PlantUncertainty
 from ..identify.prediction.dynamic import NORMAL_QUANTILE
+from ..identify.prediction.left_out import degrees_of_freedom, root_mean_square, t_quantile
 from ..identify.prediction.result import LEVEL
 from ..library.location import Location, check_keys, read_finite_number
 from ..library.uncertainty import KEYS, read_uncertainty
 from ..plant.plant import Plant
-from .record import signal_unit
+from ..recording.segment import maximum_rate
+from .record import optional_table, signal_unit
+from .study_tables import read_integer
 
 DEVIATIONS = "deviations"
-ALL_KEYS = (DEVIATIONS, *KEYS)
+ALL_KEYS = (DEVIATIONS, "records", "factors", "ranges", "rates", *KEYS)
 """Keys of the table."""
 SEPARATOR = ", "
 """Between the paths of parameters with a common value."""
 
 
-def fit_uncertainty(fit: DynamicFit, cross: Sequence[CrossPrediction] = ()) -> dict[str, Any]:
-    """The table [uncertainty] of the scenarios of a dynamic fit.
+def fit_uncertainty(fit: DynamicFit, cross: Sequence[Mapping[str, float]] = ()) -> dict[str, Any]:
+    """The table [uncertainty] of the scenarios of a dynamic fit; `cross` are the rms errors [SI] by quantity of each
+    record predicted by the others.
 
-    The deviation of a quantity is the rms residual of all records; where the records were predicted by each other, the
-    rms error of these predictions if it is greater. It is multiplied by the 95 % quantile of the residuals over that of
-    a normal distribution, if that is greater, because model errors are not normally distributed.
+    The deviation of a quantity is the rms residual of all records, or the rms error of the records predicted by each
+    other if that is greater. It is multiplied by the 95 % quantile of the residuals over that of a normal
+    distribution, if that is greater, because model errors are not normally distributed. The factor is the quantile of
+    Student's t for the number of records; one record, or records that do not predict each other, have none.
     """
     models = fit.problem.record_models
-    deviations = {}
+    deviations, factors = {}, {}
     for name in models[0].names:
-        joint = np.mean([fit.rms(name, i) ** 2 for i in range(len(models))])
-        predicted = [each.rms[name] ** 2 for each in cross if name in each.rms]
-        deviation = float(np.sqrt(max([joint, *([np.mean(predicted)] if predicted else [])])))
-        deviations[name] = deviation * tail_factor(fit, name)
+        joint = root_mean_square([fit.rms(name, i) for i in range(len(models))])
+        predicted = [each[name] for each in cross if name in each]
+        error = max([joint, *([root_mean_square(predicted)] if predicted else [])])
+        deviations[name] = error * tail_factor(fit, name)
+        if len(predicted) > 1:
+            factors[name] = t_quantile(degrees_of_freedom(error, joint, len(predicted)))
+    known = {name: value for name, value in deviations.items() if value > 0.0}
+    records = [model.experiment.recording for model in models]
+    table: dict[str, Any] = {DEVIATIONS: known, "records": len(models), **({"factors": factors} if factors else {})}
+    ranges = {name: _ends([record[name] for record in records]) for name in deviations}
+    return {**table, "ranges": ranges, "rates": {n: maximum_rate(records, n) for n in deviations}, **_covariance(fit)}
+
+
+def _ends(columns: Sequence[Array]) -> list[float]:
+    values = np.concatenate(columns)
+    return [float(np.nanmin(values)), float(np.nanmax(values))]
+
+
+def _covariance(fit: DynamicFit) -> dict[str, Any]:
+    """The parameters that all records share, with their standard errors and correlations."""
     common = [
         i
         for i, (estimate, unknown) in enumerate(zip(fit.estimates, fit.unknowns, strict=True))
         if unknown.paths and OF_RECORD not in estimate.name and np.isfinite(estimate.stderr)
     ]
-    table: dict[str, Any] = {DEVIATIONS: {name: value for name, value in deviations.items() if value > 0.0}}
-    if common:
-        table["parameters"] = [SEPARATOR.join(fit.unknowns[i].paths) for i in common]
-        table["standard_errors"] = [fit.estimates[i].stderr for i in common]
-        table["correlations"] = np.clip(fit.correlations[np.ix_(common, common)], -1.0, 1.0).tolist()
-    return table
+    if not common:
+        return {}
+    return {
+        "parameters": [SEPARATOR.join(fit.unknowns[i].paths) for i in common],
+        "standard_errors": [fit.estimates[i].stderr for i in common],
+        "correlations": np.clip(fit.correlations[np.ix_(common, common)], -1.0, 1.0).tolist(),
+    }
 
 
 def tail_factor(fit: DynamicFit, name: str) -> float:
@@ -74,27 +102,54 @@ def read_plant_uncertainty(table: Any, plant: Plant, location: Location) -> Plan
     if not isinstance(table, Mapping):
         raise ParameterError(f"{location} is {table!r}; it must be a table with {', '.join(ALL_KEYS)}.")
     check_keys(table, ALL_KEYS, location)
-    deviations = _read_deviations(table.get(DEVIATIONS), plant, location.inside(DEVIATIONS))
+    found = PlantUncertainty(
+        _read_positive(table.get(DEVIATIONS), plant, location.inside(DEVIATIONS)),
+        records=read_integer(table, "records", 1, location) if "records" in table else None,
+        factors=_read_positive(table["factors"], None, location.inside("factors")) if "factors" in table else {},
+        ranges=_read_ranges(optional_table(table, "ranges", location), plant, location.inside("ranges")),
+        rates=_read_rates(optional_table(table, "rates", location), plant, location.inside("rates")),
+    )
     given = {key: table[key] for key in KEYS if key in table}
     if not given:
-        return PlantUncertainty(deviations)
+        return found
     parameters = read_uncertainty(given, location)
     groups = tuple(tuple(name.split(SEPARATOR)) for name in parameters.parameters)
     paths = {leaf.path for leaf in tree.leaves(plant)}
     unknown = [path for group in groups for path in group if path not in paths]
     if unknown:
         raise ParameterError(f"{location}, parameters: the plant has no parameter '{unknown[0]}'.")
-    return PlantUncertainty(deviations, groups, parameters.covariance)
+    return dataclasses.replace(found, parameters=groups, covariance=parameters.covariance)
 
 
-def _read_deviations(table: Any, plant: Plant, location: Location) -> dict[str, float]:
+def _read_positive(table: Any, plant: Plant | None, location: Location) -> dict[str, float]:
+    """Positive numbers by quantity [SI], or ratios without a plant."""
     if not isinstance(table, Mapping) or not table:
         raise ParameterError(
             f"{location} is {table!r}; it must be a table of standard deviations, such as pressure = 620.0."
         )
-    deviations = {}
+    numbers = {}
     for name, value in table.items():
-        deviations[name] = read_finite_number(value, signal_unit(name, plant) or "1", f"{location}, {name}")
-        if not deviations[name] > 0.0:
+        unit = "1" if plant is None else signal_unit(name, plant) or "1"
+        numbers[name] = read_finite_number(value, unit, f"{location}, {name}")
+        if not numbers[name] > 0.0:
             raise ParameterError(f"{location}, {name} is {value!r}; it must be greater than zero.")
-    return deviations
+    return numbers
+
+
+def _read_ranges(table: Mapping[str, Any], plant: Plant, location: Location) -> dict[str, tuple[float, float]]:
+    """The ends of quantities [SI]."""
+    ranges = {}
+    for name, value in table.items():
+        if not isinstance(value, list) or len(value) != 2:
+            raise ParameterError(f"{location}, {name} is {value!r}; it must be a list of minimum and maximum.")
+        low, high = (read_finite_number(end, signal_unit(name, plant) or "1", f"{location}, {name}") for end in value)
+        ranges[name] = low, high
+    return ranges
+
+
+def _read_rates(table: Mapping[str, Any], plant: Plant, location: Location) -> dict[str, float]:
+    """Maximum rates of change of quantities [SI per s]."""
+    return {
+        name: read_finite_number(value, f"{signal_unit(name, plant) or '1'}/s", f"{location}, {name}")
+        for name, value in table.items()
+    }

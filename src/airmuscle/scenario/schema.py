@@ -97,12 +97,21 @@ def _observed() -> Schema:
 
 def _plant_uncertainty() -> Schema:
     deviations = {"type": "object", "additionalProperties": _quantity("")}
-    return {plant_uncertainty.DEVIATIONS: deviations, **_uncertainty()}
+    ends = {"type": "object", "additionalProperties": _list_of(_quantity(""))}
+    keys = {plant_uncertainty.DEVIATIONS: deviations, "records": {"type": "integer", "minimum": 1}}
+    return {**keys, "factors": deviations, "ranges": ends, "rates": deviations, **_uncertainty()}
 
 
 def _error_band() -> Schema:
-    widths = dict.fromkeys(("half_width", "held_half_width"), _quantity("", 0.0))
-    return {"quantity": {"enum": list(stated_band.PREDICTED)}, "source": _TEXT, **widths}
+    numbers = {**dict.fromkeys(stated_band.WIDTHS, _quantity("", 0.0))}
+    numbers |= {key: _quantity(unit, 0.0) for key, unit in stated_band.RATES.items()}
+    texts = dict.fromkeys(("source", "new_specimen_source"), _TEXT)
+    lists = {"specimens": _list_of(_TEXT), "resting_lengths": _list_of(_quantity("m", 0.0))}
+    return {"quantity": {"enum": list(stated_band.PREDICTED)}, **numbers, **texts, **lists}
+
+
+def _list_of(items: Schema) -> Schema:
+    return {"type": "array", "items": items}
 
 
 def _document(title: str, properties: Schema, required: Sequence[str], models: _ModelSchemas) -> Schema:

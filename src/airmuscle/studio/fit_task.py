@@ -23,6 +23,7 @@ from ..core.output_folder import atomic_folder
 from ..identify.hysteresis import LoopFit, find_loops, fit_jointly, fit_loop, loops_not_joined, preferred_fit
 from ..identify.hysteresis.selection import select_friction
 from ..identify.law_selection import LawSelection, select_law
+from ..identify.specimen_errors import ranked_specimen_errors
 from ..library.entry import Entry
 from ..library.fitted_entry import fitted_entry, left_out_ratio, missing_geometry
 from ..library.initial_law import find_initial_law
@@ -69,7 +70,8 @@ def run_fit(folder: str, out: str, settings: FitSettings, report: Report) -> Non
         raise as_field_error(error, "fit") from None
     best = selection.recommended
     initial = Entry(best.candidate.name, best.candidate.name, "chosen", best.candidate.law, geometry)
-    entry = fitted_entry(best.fit, initial, names, left_out_ratio(best))
+    errors = ranked_specimen_errors(best, selection.comparisons, recordings)
+    entry = fitted_entry(best.fit, initial, names, left_out_ratio(best), recordings, errors)
     chapters = [compare_chapter(each, best, selection.reason) for each in selection.comparisons]
     with atomic_folder(out) as staging, warnings.catch_warnings():
         warnings.simplefilter("ignore", AirmuscleWarning)

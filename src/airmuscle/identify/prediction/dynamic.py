@@ -19,10 +19,13 @@ from ..dynamic.fit import fit_dynamic
 from ..dynamic.record_model import ModelOutputs, RecordModel
 from ..dynamic.reliability import RECORD_CONSEQUENCE
 from ..dynamic.result import DynamicFit
+from .fitted_range import NOISY_MARGIN, range_notes, rate_notes, rows_outside
 from .result import QuantityPrediction, RecordPrediction
 
 NORMAL_QUANTILE = 1.959963984540054
 """97.5 % quantile of the normal distribution."""
+UNKNOWN = "not known from one record"
+"""Words in place of the band of a plant that was fitted to one record, which does not show how records differ."""
 ASSUMED_DEVIATION = 0.01
 """Standard deviation of a quantity without a stated one, relative to its range in the record (chosen)."""
 
@@ -35,14 +38,42 @@ class PlantUncertainty(ShortRepr):
                 records of the fit showed
     parameters  the fitted parameters; several paths have one common value
     covariance  their covariance matrix [SI], shape (P, P)
+    records     number of records of the fit; None if it is not known
+    factors     half width of the band in standard deviations, from records that were predicted by the others; with
+                `records`, a quantity without a factor has no band
+    ranges      ends of the measured quantities in the records of the fit [SI]
+    rates       their maximum rates of change [SI per s]
     """
 
     deviations: Mapping[str, float]
     parameters: tuple[ParameterPaths, ...] = ()
     covariance: Array = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
+    records: int | None = None
+    factors: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    ranges: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
+    rates: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
         check_field_types(self)
+
+    def factor(self, name: str) -> float | None:
+        """Half width of the band of a quantity in standard deviations; None where it is not known."""
+        if name not in self.deviations:
+            return None
+        return self.factors.get(name, None if self.records else NORMAL_QUANTILE)
+
+    def source(self, name: str) -> str:
+        """Where the band of a quantity comes from, or why there is none."""
+        if self.factor(name) is None:
+            if name not in self.deviations:
+                return ""
+            return UNKNOWN if self.records == 1 else "not known, because the records did not predict each other"
+        if not self.records:
+            return "residuals of the fit of the plant, and the covariance of its parameters"
+        return (
+            f"errors of {self.records} records, each predicted by the others, and the covariance of the parameters; "
+            f"half width of {name}: {self.factor(name):.3g} standard deviations (Student's t)"
+        )
 
 
 def predict_dynamic(
@@ -60,8 +91,8 @@ def predict_dynamic(
                  note states
     observed     the quantities to predict, outputs of the plant that the recording has, each with the standard
                  deviation of its sensor [SI], which weights the estimation of `own`; 0 where it is not known
-    uncertainty  of the plant; the half width of the 95 % band is 1.96 sqrt(g^T C g + s^2) with the sensitivities g to
-                 the fitted parameters, their covariance C and the standard deviation s of the residuals of the fit
+    uncertainty  of the plant; the half width of the 95 % band is k sqrt(g^T C g + s^2) with the sensitivities g to the
+                 fitted parameters, their covariance C, the standard deviation s of the residuals and its factor k
     own          unknowns that are estimated from the record itself before the prediction: StartTime(margin),
                  CommandInstants(margin), InitialValue(name, margin) or paths, such as a supply pressure
     method       by default Rodas4(rtol=1e-6)
@@ -79,13 +110,17 @@ def predict_dynamic(
     spread = _parameter_variance(modelled, unknowns, uncertainty)
     recording, quantities = experiment.recording, []
     for i, name in enumerate(observed):
-        half = None
-        if uncertainty is not None and name in uncertainty.deviations:
-            half = NORMAL_QUANTILE * np.sqrt(spread[:, i] + uncertainty.deviations[name] ** 2)
+        half, factor = None, None if uncertainty is None else uncertainty.factor(name)
+        if uncertainty is not None and factor is not None:
+            half = factor * np.sqrt(spread[:, i] + uncertainty.deviations[name] ** 2)
         measured, predicted = recording[name], modelled.values[:, i]
         compared = np.isfinite(measured) & np.isfinite(predicted)
-        quantities.append(QuantityPrediction(name, measured, predicted, half, compared))
-    return RecordPrediction(recording, tuple(quantities), tuple(notes))
+        band = "" if uncertainty is None else uncertainty.source(name)
+        quantities.append(QuantityPrediction(name, measured, predicted, half, compared, band))
+    ranges, rates = ({}, {}) if uncertainty is None else (uncertainty.ranges, uncertainty.rates)
+    notes += [*range_notes(recording, ranges, NOISY_MARGIN), *rate_notes(recording, rates)]
+    notes += [f"the band of {q.name} is {q.band}" for q in quantities if q.half_width is None and q.band]
+    return RecordPrediction(recording, tuple(quantities), tuple(notes), rows_outside(recording, ranges, NOISY_MARGIN))
 
 
 def _describe_estimates(fit: DynamicFit) -> list[str]:

@@ -20,7 +20,8 @@ class QuantityPrediction(ShortRepr):
     """One quantity of a record, measured and predicted [SI], shape (N,) each.
 
     `half_width` (N,) is that of the 95 % band, None where the model states none. `compared` (N,) marks the rows that
-    are compared: a finite measured value, and tension for a static law.
+    are compared: a finite measured value, and for a static law tension, or no tension where the law pulls by more than
+    the half width. `band` says where the band comes from, or why there is none.
     """
 
     name: str
@@ -28,6 +29,7 @@ class QuantityPrediction(ShortRepr):
     predicted: Array
     half_width: Array | None
     compared: npt.NDArray[np.bool_]
+    band: str = ""
 
     @property
     def errors(self) -> Array:
@@ -64,6 +66,8 @@ class RecordPrediction(ShortRepr):
     recording: Recording
     quantities: tuple[QuantityPrediction, ...]
     notes: tuple[str, ...] = ()
+    outside: npt.NDArray[np.bool_] | None = None
+    """Mask (N,) of the rows outside the range of the fit; None where the range is not known."""
 
     @property
     def origin(self) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -18,12 +18,11 @@ from ...recording import Recording
 from ..campaign.predicted_force import predicted_force
 from ..compared_points import FORCE_MARGIN
 from ..problem import FORCE, evaluate, fitted_quantity_of
+from .fitted_range import ends_of, range_notes, rate_notes, rows_outside
 from .result import QuantityPrediction, RecordPrediction
 
 COLUMNS = ("pressure", "contraction", "force")
 """Columns that a static law relates."""
-LIMIT_MARGIN = 1e-3
-"""Noise of the sensors at the limits of the range of a law, relative to the range (chosen)."""
 
 
 def predict_static(
@@ -34,6 +33,8 @@ def predict_static(
     creep: CreepElements | None = None,
     half_width: float | None = None,
     validity_range: ValidityRange | None = None,
+    rates: Mapping[str, float | None] | None = None,
+    band: str = "",
 ) -> RecordPrediction:
     """Predict the quantity that a law gives at the rows of a recording with pressure, contraction and force.
 
@@ -42,29 +43,40 @@ def predict_static(
                     the constant `resting_length`
     half_width      half width of the stated 95 % band of the quantity [SI]
     validity_range  range of the measurements of the law; rows outside it are counted in a note
+    rates           maximum rates of contraction [1/s] and pressure [Pa/s] of these measurements, by quantity; a record
+                    that is faster is named in a note
+    band            where the band comes from, or why there is none
 
-    Rows without tension are not compared. Raises ColumnError for a recording without these columns or without tension.
+    Rows without tension are compared where the predicted force exceeds the half width, or 0 without one. Raises
+    ColumnError for a recording without these columns or without tension.
     """
     _check_columns(recording)
     quantity = fitted_quantity_of(law)
-    compared = (recording["force"] > 0.0) & np.isfinite(sum(recording[name] for name in COLUMNS))
-    if not compared.any():
+    complete = np.isfinite(sum(recording[name] for name in COLUMNS))
+    tension = (recording["force"] > 0.0) & complete
+    if not tension.any():
         raise ColumnError(
             f"{recording.origin}: no row has a positive force, so that no prediction can be compared; a force of "
             "tension is positive."
         )
     moving = [part for part in (friction, creep) if part not in (None, NoFriction(), CreepElements())]
-    notes = _notes(recording, bool(moving) and quantity == FORCE, validity_range)
+    notes = _notes(recording, bool(moving) and quantity == FORCE, validity_range, rates or {})
+    pulling = np.zeros(len(recording), dtype=bool)
     if isinstance(law, ForceLaw):
         limit = FORCE_MARGIN * float(np.nanmax(recording["force"]))
         predicted = predicted_force(law, recording, friction or NoFriction(), creep or CreepElements(), limit)
         predicted = np.maximum(predicted, 0.0)
+        pulling = complete & ~tension & (predicted > (half_width or 0.0))
+        notes += _slack_notes(predicted, pulling, int((complete & ~tension).sum()))
     else:
         predicted = evaluate(law, quantity.method, quantity.arguments, recording)
-    band = None if half_width is None else np.full(len(recording), float(half_width))
-    measured = recording[quantity.name]
-    result = QuantityPrediction(quantity.name, measured, predicted, band, compared & np.isfinite(predicted))
-    return RecordPrediction(recording, (result,), tuple(notes))
+    known = np.isfinite(predicted)
+    if (tension & ~known).any():
+        notes.append(f"the law gives no {quantity.name} at {int((tension & ~known).sum())} rows with tension")
+    widths = None if half_width is None else np.full(len(recording), float(half_width))
+    compared = (tension | pulling) & known
+    result = QuantityPrediction(quantity.name, recording[quantity.name], predicted, widths, compared, band)
+    return RecordPrediction(recording, (result,), tuple(notes), rows_outside(recording, ends_of(validity_range)))
 
 
 def _check_columns(recording: Recording) -> None:
@@ -80,26 +92,20 @@ def _check_columns(recording: Recording) -> None:
     )  # fmt: skip
 
 
-def _notes(recording: Recording, moving: bool, validity_range: ValidityRange | None) -> list[str]:
+def _notes(
+    recording: Recording, moving: bool, limits: ValidityRange | None, rates: Mapping[str, float | None]
+) -> list[str]:
     notes = []
     if moving and recording.constants.get("resting_length") is None:
         notes.append("friction and creep of the muscle are left out, because the record states no resting length")
-    outside = _rows_outside(recording, validity_range)
-    if outside:
-        notes.append(
-            f"{outside} of {len(recording)} rows are outside the range of the measurements of the law; the stated band "
-            "does not apply there"
-        )
-    return notes
+    return [*notes, *range_notes(recording, ends_of(limits)), *rate_notes(recording, rates)]
 
 
-def _rows_outside(recording: Recording, limits: ValidityRange | None) -> int:
-    if limits is None:
-        return 0
-
-    def beyond(values: Array, low: Any, high: Any) -> npt.NDArray[np.bool_]:
-        margin = LIMIT_MARGIN * (high - low)
-        return np.asarray((values < low - margin) | (values > high + margin))
-
-    rows = beyond(recording["pressure"], limits.min_pressure, limits.max_pressure)
-    return int((rows | beyond(recording["contraction"], limits.min_contraction, limits.max_contraction)).sum())
+def _slack_notes(predicted: Array, pulling: npt.NDArray[np.bool_], count: int) -> list[str]:
+    """The rows without tension at which the law pulls, which count as outside the band."""
+    if not pulling.any():
+        return []
+    return [
+        f"the law pulls at {int(pulling.sum())} of {count} rows without tension, up to "
+        f"{float(np.max(predicted[pulling])):.4g} N; these rows count as errors outside the band"
+    ]

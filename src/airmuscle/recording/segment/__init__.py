@@ -7,6 +7,7 @@ from .interval import Interval
 from .outliers import Outlier, find_outliers, without_outliers
 from .plateaus import Plateau, find_plateaus, plateau_points
 from .quasi_static import quasi_static_rows
+from .rates import maximum_rate, rate_of_change
 from .runs import AT_REST, FREE, ISOBARIC, ISOMETRIC, ISOTONIC, Run, find_runs
 from .sampling import Sampling, analyse_sampling
 from .sensor import Sensor, estimate_sensors
@@ -37,8 +38,10 @@ __all__ = [
     "find_runs",
     "inspect",
     "inspect_all",
+    "maximum_rate",
     "motion_direction",
     "plateau_points",
     "quasi_static_rows",
+    "rate_of_change",
     "without_outliers",
 ]
