@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
 
 from ..core.errors import IdentificationError
 from ..identify.campaign import Campaign, CreepStage, ReleaseStage, StaticStage
+from ..identify.specimen_errors import ranked_specimen_errors, resting_lengths_of
 from ..muscle.friction import NoFriction
+from ..muscle.muscle import LENGTH_TOLERANCE
 from .entry import Entry
+from .fitted_entry import band_of_others, band_range
 from .stated_band import StatedBand
 from .uncertainty import ParameterUncertainty
 
@@ -38,7 +42,7 @@ def campaign_entry(campaign: Campaign, title: str, resting_length: float | None 
         note=_note(campaign, stage),
         validity_range=stage.fit.validity_range,
         uncertainty=_uncertainty(campaign, stage),
-        error_band=_stated_band(stage),
+        error_band=_stated_band(campaign, stage, length),
     )
 
 
@@ -49,11 +53,18 @@ def _note(campaign: Campaign, stage: StaticStage) -> str:
     return f"{text} Not identified: {', '.join(left_out)}." if left_out else text
 
 
-def _stated_band(stage: StaticStage) -> StatedBand:
-    held = stage.held_band
-    if held is None or held.half_width == stage.band.half_width:
-        return StatedBand("force", stage.band.half_width, str(stage.band))
-    return StatedBand("force", stage.band.half_width, f"{stage.band} {held}", held.half_width)
+def _stated_band(campaign: Campaign, stage: StaticStage, length: float | None) -> StatedBand:
+    """The bands of the muscle of a resting length [m], whose specimens are those of this length."""
+    held, runs = stage.held_band, [record.recording for record in campaign.records if record.kind.is_static]
+    band = band_range(StatedBand("force", stage.band.half_width, str(stage.band)), runs)
+    if held is not None and held.half_width != stage.band.half_width:
+        band = dataclasses.replace(band, source=f"{stage.band} {held}", held_half_width=held.half_width)
+    if length is not None:
+        lengths = resting_lengths_of(runs)
+        own = tuple(n for n in band.specimens if abs(lengths.get(n, length) - length) <= LENGTH_TOLERANCE)
+        band = dataclasses.replace(band, specimens=own)
+    errors = ranked_specimen_errors(stage.comparison.recommended, [stage.comparison], stage.points)
+    return band_of_others(band, errors)
 
 
 def _uncertainty(campaign: Campaign, stage: StaticStage) -> ParameterUncertainty | None:

@@ -67,7 +67,11 @@ def _error_band(
     source = f"95 % quantile of the residuals of {size} rows of the fit"
     if ratio != 1.0:
         source += f", times {ratio:.3g}, the ratio of the rms errors of rows left out and of all rows"
-    band = band_range(StatedBand(result.fitted_quantity.name, half, source), recordings)
+    return band_of_others(band_range(StatedBand(result.fitted_quantity.name, half, source), recordings), errors)
+
+
+def band_of_others(band: StatedBand, errors: SpecimenErrors | None) -> StatedBand:
+    """The band with that of specimens that were not measured; unchanged without errors, or for a law without force."""
     if errors is None or band.quantity != "force":
         return band
     return dataclasses.replace(band, new_specimen_half_width=errors.half_width, new_specimen_source=str(errors))

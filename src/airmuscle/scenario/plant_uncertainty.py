@@ -33,6 +33,7 @@ from ..library.location import Location, check_keys, read_finite_number
 from ..library.uncertainty import KEYS, read_uncertainty
 from ..plant.plant import Plant
 from ..recording.segment import maximum_rate
+from ..recording.segment.sensor import estimate_noise
 from .record import optional_table, signal_unit
 from .study_tables import read_integer
 
@@ -50,7 +51,8 @@ def fit_uncertainty(fit: DynamicFit, cross: Sequence[Mapping[str, float]] = ()) 
     The deviation of a quantity is the rms residual of all records, or the rms error of the records predicted by each
     other if that is greater. It is multiplied by the 95 % quantile of the residuals over that of a normal
     distribution, if that is greater, because model errors are not normally distributed. The factor is the quantile of
-    Student's t for the number of records; one record, or records that do not predict each other, have none.
+    Student's t for the number of records, as far as their errors exceed the noise; one record, or records that do not
+    predict each other, have none.
     """
     models = fit.problem.record_models
     deviations, factors = {}, {}
@@ -60,12 +62,18 @@ def fit_uncertainty(fit: DynamicFit, cross: Sequence[Mapping[str, float]] = ()) 
         error = max([joint, *([root_mean_square(predicted)] if predicted else [])])
         deviations[name] = error * tail_factor(fit, name)
         if len(predicted) > 1:
-            factors[name] = t_quantile(degrees_of_freedom(error, joint, len(predicted)))
+            factors[name] = t_quantile(degrees_of_freedom(error, _noise(fit, name), len(predicted)))
     known = {name: value for name, value in deviations.items() if value > 0.0}
     records = [model.experiment.recording for model in models]
     table: dict[str, Any] = {DEVIATIONS: known, "records": len(models), **({"factors": factors} if factors else {})}
     ranges = {name: _ends([record[name] for record in records]) for name in deviations}
     return {**table, "ranges": ranges, "rates": {n: maximum_rate(records, n) for n in deviations}, **_covariance(fit)}
+
+
+def _noise(fit: DynamicFit, name: str) -> float:
+    """The rms noise of a quantity [SI] from the second differences of its residuals, which contain no model error."""
+    residuals = [fit.residuals(i)[name] for i in range(len(fit.problem.record_models))]
+    return root_mean_square([estimate_noise(each[np.isfinite(each)]) for each in residuals])
 
 
 def _ends(columns: Sequence[Array]) -> list[float]:

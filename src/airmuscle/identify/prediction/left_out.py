@@ -42,7 +42,7 @@ def degrees_of_freedom(left_out: float, within: float, members: int) -> float:
     """Effective degrees of freedom of the variance of a further member (Satterthwaite, Biometrics 2:110 (1946)).
 
     left_out  rms error of the members that were left out
-    within    rms residual of the fit to all of them; its variance comes from many rows and counts as known
+    within    rms noise of the rows, whose variance comes from many rows and counts as known
     members   number of members
 
     The excess of the squared error, which is the variance between the members, has `members` - 1 degrees of freedom.

@@ -11,7 +11,7 @@ from .sensor import estimate_sensors
 
 RATE_LEVEL = 0.95
 """Share of the rows that change at most at the stated rate (chosen)."""
-MIN_CHANGE = 10.0
+MIN_CHANGE = 30.0
 """Minimum change over an interval of which a rate is computed, in standard deviations of the sensor (chosen)."""
 
 
