@@ -13,16 +13,27 @@ from typing import Any
 
 import numpy as np
 import pytest
+from dynamic_study import plant_table
 from typer.testing import CliRunner
 
 import airmuscle as am
-from airmuscle.cli.app import app
+from airmuscle.cli.app import COMMANDS, app
 from airmuscle.core.constants import STANDARD_GRAVITY
 from airmuscle.core.errors import ColumnError, FileError, IdentificationError, ParameterError
 from airmuscle.identify import Huber, LeastSquares, LevelSplit, compare, fit
 from airmuscle.muscle.characteristic import ContractileSurface
-from airmuscle.recording import ColumnMapping, DropMissing, InterpolateMissing, Recording, RefuseMissing, read
+from airmuscle.recording import (
+    ColumnMapping,
+    DropMissing,
+    InterpolateMissing,
+    Recording,
+    RefuseMissing,
+    RowReader,
+    read,
+)
 from airmuscle.recording.mapping import mapping_of_tables
+from airmuscle.recording.row_notes import row_notes
+from airmuscle.scenario.identification import load_dynamic_fit
 
 PREAMBLE = ("Prüfstand 3 (Zwick Z010)", "Prüfer;Müller", "Datum;12.03.2026;14:05", "Kanal;1;2;3", "Verstärkung;1;10;1")
 HEADINGS = "Zeit;Druck (rel.);Kraft;Weg;Bemerkung"
@@ -362,6 +373,50 @@ def test_every_command_that_reads_has_every_option(command: str):
     assert set(OPTIONS) <= options
 
 
+def test_the_commands_that_name_columns_are_those_with_all_options_and_the_follower_of_a_stream():
+    naming = {row.name for row in COMMANDS if "--column" in airmuscle(row.name, "--help").output}
+    assert naming == {*READING, "bench"}
+
+
+def test_a_stream_has_lines_above_its_headings_and_a_displacement():
+    reader = RowReader("stream", constants={"resting_length": "100 mm", "displacement_zero": "5 mm"}, skip_rows=2)
+    lines = ("1;2;3", "4;5;6", "pressure [kPa];shortening [mm];force [N]", "100;7;20")
+    (row,) = [row for row in map(reader.read, lines) if row]
+    assert row["contraction"] == pytest.approx(0.02)
+    assert row["force"] == 20.0
+
+
+def test_the_mapping_of_a_record_may_be_a_table(tmp_path):
+    """The rows that a record of a dynamic fit leaves out are named."""
+    rows = [f"{0.01 * i:.2f};{'---' if i == 7 else 100 + i};{30 + 0.01 * i:.3f}" for i in range(60)]
+    text(tmp_path, ("logger", "time [s];pressure [kPa];position [mm]", *rows), "run.csv")
+    weight = 'model = "HangingMass"\nmass = "10 kg"'
+    study = plant_table(weight, exponent=1.2, conductance=3e-9) + (
+        '[input]\nfill = [["0.1 s", 1]]\n[observed]\npressure = "500 Pa"\n[fit]\nfree = ["gas.exponent"]\n'
+        '[[record]]\nfile = "run.csv"\nmapping = { missing = "drop", skip_rows = 1 }\n'
+    )
+    (tmp_path / "study.toml").write_text(study, encoding="utf-8")
+    (experiment,) = load_dynamic_fit(tmp_path / "study.toml").experiments
+    assert len(experiment.recording) == 59
+    assert row_notes([experiment.recording]) == [
+        "run.csv: rows left out, because a value is missing: 1 of 60 (line 10)."
+    ]
+    (tmp_path / "study.toml").write_text(study.replace('"drop"', '"fill"'), encoding="utf-8")
+    with pytest.raises(am.AirmuscleError, match="missing is 'fill'; allowed range: error, drop, interpolate"):
+        load_dynamic_fit(tmp_path / "study.toml")
+
+
+@pytest.mark.parametrize("command", ["hysteresis", "predict"])
+def test_reports_name_the_rows_that_were_left_out(tmp_path, command: str):
+    am.write_csv(loops(spike=True), tmp_path / "loops.csv")
+    model = ("dmsp-20-300",) if command == "predict" else ()
+    result = airmuscle(command, *model, tmp_path / "loops.csv", "--outliers", "drop", "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    said = "rows left out as suspected outliers: 1 of 240"
+    assert said in result.stderr
+    assert said in (tmp_path / "out" / "report.html").read_text()
+
+
 @pytest.mark.parametrize("arguments", [("inspect",), ("convert-data", "out.csv"), ("fit", "--compare")])
 @pytest.mark.parametrize("bad", [("--missing", "fill"), ("--outliers", "maybe"), ("--skip-rows", "-1")])
 def test_an_unknown_treatment_is_refused_by_every_command(tmp_path, arguments: tuple[str, ...], bad: tuple[str, str]):
@@ -448,3 +503,25 @@ def test_the_greatest_degree_of_a_surface_is_proposed(tmp_path):
     am.write_csv(loops(spike=False), tmp_path / "loops.csv")
     result = airmuscle("fit", tmp_path / "loops.csv", "--characteristic", "ContractileSurface", "--out", tmp_path / "o")
     assert "use --degree 2." in " ".join(result.stderr.split())
+
+
+@pytest.mark.parametrize(("decimal", "cells"), [(None, ("1,234", "1,5", "0.5")), (".", ("1,23", "1,5", "0.5"))])
+def test_all_cells_with_an_ambiguous_comma_are_named(tmp_path, decimal: str | None, cells: tuple[str, ...]):
+    rows = [f"{i};{cell}" for i, cell in enumerate(cells)]
+    with pytest.raises(ColumnError, match=r"line 2: .*there are 2 such cells \(lines 2 and 3\)"):
+        read(text(tmp_path, ("time [s];force [N]", *rows)), decimal=decimal)
+
+
+def test_the_file_of_the_guide_is_read_as_the_guide_says(tmp_path):
+    guide = (Path(am.__file__).parents[2] / "docs" / "reading.md").read_text(encoding="utf-8")
+    block = guide.partition("    Prüfstand 3")[2].partition("\n\n")[0]
+    path = text(tmp_path, ("Prüfstand 3" + block).replace("\n    ", "\n").split("\n"), "Messung.csv")
+    rig = tmp_path / "rig.toml"
+    toml = guide.partition('    resting_length = "173 mm"\n    missing = "drop"')[2].partition("\n\n### ")[0]
+    rig.write_text(('resting_length = "173 mm"\nmissing = "drop"' + toml).replace("\n    ", "\n"), encoding="utf-8")
+    recording = only(path, mapping=rig)
+    assert recording["force"].tolist() == [61.2, 60.8, 9999.0]
+    assert recording["contraction"] == pytest.approx(np.array([0.0, 0.04, 0.13]) / 173.0)
+    asked = ("--column", "Weg=shortening [mm]", "--resting-length", "173 mm")
+    assert "line 7: force '---' is not a number" in airmuscle("inspect", path, *asked).stderr
+    assert airmuscle("inspect", path, *asked, "--missing", "drop").exit_code == 0

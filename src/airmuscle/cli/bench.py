@@ -20,7 +20,7 @@ from ..library.write import save
 from ..muscle.characteristic import ValidityRange
 from ..recording.follow import RowReader, follow_lines
 from .options import Json, OptionalFolder
-from .reading_options import Columns, Constants, Length, Units, parse_pairs
+from .reading_options import Columns, Constants, DisplacementZero, Length, SkipRows, Units, parse_pairs
 from .terminal import echo, percent
 
 QUANTITIES = ("pressure", "contraction", "force")
@@ -39,6 +39,8 @@ def bench(
     unit: Units = None,
     column: Columns = None,
     constant: Constants = None,
+    displacement_zero: DisplacementZero = None,
+    skip_rows: SkipRows = None,
     degree: Annotated[int, typer.Option(min=1, max=9, metavar="N", help="Degree of the polynomial surface.")] = 5,
     forgetting: Annotated[
         float, typer.Option(metavar="FACTOR", help="Weight of the former samples at each sample; 1: none is forgotten.")
@@ -69,11 +71,11 @@ def bench(
     if out is not None:
         check_writable(out)
     constants: dict[str, float | str] = dict(parse_pairs("--constant", constant))
-    if resting_length is not None:
-        constants["resting_length"] = resting_length
+    stated = {"resting_length": resting_length, "displacement_zero": displacement_zero}
+    constants |= {name: text for name, text in stated.items() if text is not None}
     reader = RowReader("standard input" if follow == "-" else Path(follow).name,
                        columns=parse_pairs("--column", column), units=parse_pairs("--unit", unit),
-                       constants=constants)  # fmt: skip
+                       constants=constants, skip_rows=skip_rows or 0)  # fmt: skip
     fit = _follow(RecursiveFit(limits, degree, forgetting=forgetting), reader, follow, idle, every, json)
     _finish(fit, reader, out, json)
 

@@ -12,7 +12,7 @@ import typer
 from ..core.errors import ParameterError
 from ..library.catalogue import load_data
 from ..recording import ColumnMapping, Recording, read
-from ..recording.row_notes import RowNote
+from ..recording.row_notes import row_notes
 from ..recording.segment import check_contents
 from .completion import complete_data
 from .progress import reading_progress
@@ -33,7 +33,7 @@ _SINGULAR = {"units": "unit", "columns": "column", "constants": "constant", "mis
 
 def print_row_notes(recordings: Iterable[Recording]) -> None:
     """Print the notes on rows that were left out or filled, on the error stream."""
-    for note in dict.fromkeys(note for each in recordings for note in each.notes if isinstance(note, RowNote)):
+    for note in row_notes(recordings):
         echo(f"note: {note}", err=True)
 
 

@@ -21,6 +21,8 @@ from ..muscle.geometry import Geometry
 from ..recording import ColumnMapping, Recording
 from ..recording.reader import complete_bench, find_files, read_file
 from ..report.campaign_chapters import UnreadFile, ValidationRow, campaign_chapters
+from ..report.chapter import Chapter
+from ..report.reading_chapter import reading_chapters
 from ..report.write import as_json, write_into
 from ..scenario.campaign import RecordScenario, campaign_scenarios
 from .bench_files import print_row_notes
@@ -96,7 +98,7 @@ def campaign(
     result = _identify(recordings, geometry, out)
     validation = [row for recording in aside for row in _validation(result, recording)]
     scenarios = campaign_scenarios(result)
-    _write(result, unread, scenarios, validation, out)
+    _write(result, unread, scenarios, validation, out, reading_chapters(complete))
     if json:
         print_json(campaign_to_dict(result, unread, scenarios, validation))
         return
@@ -195,7 +197,7 @@ def _entry(result: Campaign, length: float | None = None) -> Entry | None:
 
 def _write(
     result: Campaign, unread: Sequence[UnreadFile], scenarios: Sequence[RecordScenario],
-    validation: Sequence[ValidationRow], out: Path,
+    validation: Sequence[ValidationRow], out: Path, more: Sequence[Chapter],
 ) -> None:  # fmt: skip
     """Write muscle files, scenarios and report into the folder."""
     entry = _entry(result)
@@ -213,4 +215,4 @@ def _write(
                 (folder / SCENARIOS / scenario.name).write_text(scenario.text, encoding="utf-8")
         named = [(s.record, f"{SCENARIOS}/{s.name}" if s.text else s.reason) for s in scenarios]
         chapters = campaign_chapters(result, entry, unread=unread, scenarios=named, validation=validation)
-        write_into(folder, chapters, title="Bench campaign")
+        write_into(folder, [*chapters, *more], title="Bench campaign")

@@ -12,6 +12,7 @@ import typer
 from ..core.output_folder import atomic_folder, check_writable
 from ..identify.dynamic import CrossPrediction, DynamicFit, describe_cross_predictions
 from ..identify.dynamic.profile import DynamicProfile
+from ..recording.row_notes import row_notes
 from ..recording.segment import inspect
 from ..report.dynamic_chapter import dynamic_chapters
 from ..report.write import write_into
@@ -95,12 +96,10 @@ def fit_dynamic(
 
 
 def _findings(study: DynamicFitSetup) -> list[str]:
-    """Data-quality problems of the records."""
-    return [
-        f"{experiment.recording.origin}: {finding.text}"
-        for experiment in study.experiments
-        for finding in inspect(experiment.recording).findings
-    ]
+    """Rows of the records that were left out, and data-quality problems."""
+    recordings = [experiment.recording for experiment in study.experiments]
+    findings = [f"{each.origin}: {finding.text}" for each in recordings for finding in inspect(each).findings]
+    return [*row_notes(recordings), *findings]
 
 
 def _profiled_names(fit: DynamicFit, names: Sequence[str]) -> list[str]:

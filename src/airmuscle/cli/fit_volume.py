@@ -23,6 +23,8 @@ from ..muscle.characteristic import ValidityRange
 from ..muscle.characteristic.energy_defect import EnergyDefect, maxwell_defect
 from ..muscle.characteristic.validity_range import validity_range_of
 from ..recording import Recording
+from ..report.chapter import Chapter
+from ..report.reading_chapter import reading_chapters
 from ..report.volume_chapter import volume_chapter
 from ..report.write import write_into
 from .bench_files import Files, read_recordings
@@ -65,7 +67,7 @@ def fit_volume_command(
     limits = None if entry is None else _limits(entry, fit)
     defect = None if entry is None or limits is None else _defect(entry, fit, limits)
     fitted = _entry(entry, fit, files) if entry is not None else None
-    _write(fit, entry, fitted, limits, defect, files, out)
+    _write(fit, entry, fitted, limits, defect, files, out, reading_chapters(recordings))
     if json:
         print_json(_to_dict(fit, defect))
         return
@@ -123,7 +125,7 @@ def _summary(fit: VolumeFit) -> str:
 
 def _write(
     fit: VolumeFit, entry: Entry | None, fitted: Entry | None, limits: ValidityRange | None,
-    defect: EnergyDefect | None, files: list[Path], out: Path,
+    defect: EnergyDefect | None, files: list[Path], out: Path, more: Sequence[Chapter],
 ) -> None:  # fmt: skip
     title = fitted.title if fitted else f"Volume fitted to {list_files([f.stem for f in files])}"
     law = entry.characteristic if entry is not None and limits is not None else None
@@ -133,7 +135,7 @@ def _write(
             save(fitted, folder / "muscle.toml")
         else:
             (folder / "geometry.toml").write_text(part_toml("geometry", fit.geometry), encoding="utf-8")
-        write_into(folder, [chapter], title="Volume")
+        write_into(folder, [chapter, *more], title="Volume")
 
 
 def _print(fit: VolumeFit, defect: EnergyDefect | None) -> None:

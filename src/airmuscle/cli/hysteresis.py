@@ -29,6 +29,7 @@ from ..muscle.characteristic.base import ForceLaw
 from ..recording import Recording
 from ..report.chapter import Chapter
 from ..report.hysteresis_chapter import hysteresis_chapters
+from ..report.reading_chapter import reading_chapters
 from ..report.write import write_into
 from .bench_files import Files, read_recordings
 from .hysteresis_output import creep_to_dict, joint_to_dict, loop_to_dict, print_creep, print_joint, print_loops
@@ -101,9 +102,8 @@ def hysteresis(
     joint = fit_jointly(fits, progress=progress)
     sentences = [] if held is None else [*held.sentences, held.verdict]
     remarks = delay_notes(find_delay(recordings))
-    written = _write(
-        hysteresis_chapters(fits, sentences, joint, remarks), select_friction(fits, joint), held, entry, out
-    )
+    chapters = [*hysteresis_chapters(fits, sentences, joint, remarks), *reading_chapters(recordings)]
+    written = _write(chapters, select_friction(fits, joint), held, entry, out)
     if json:
         data = {**_loops_to_dict(fits, joint), **creep_to_dict(held), "notes": remarks}
         print_json({**data, "written": str(written.get("friction", ""))})

@@ -17,6 +17,7 @@ from ..library.entry_prediction import predict_with_entry
 from ..library.files import is_path, list_plants, read_toml
 from ..library.law_file import describes_plant, load_law
 from ..report.prediction_chapter import band_sources, describe_band, prediction_chapters, with_unit
+from ..report.reading_chapter import reading_chapters
 from ..report.write import write_into
 from ..scenario.prediction import load_plant_model
 from .bench_files import read_recordings
@@ -96,7 +97,9 @@ def predict(
             raise typer.BadParameter(f"{', '.join(unused)} is for a scenario; MODEL is a muscle or a law")
         thing, predictions = _static(model, files, reading)
     with atomic_folder(out) as folder:
-        write_into(folder, prediction_chapters(Path(model).name, thing, predictions), title="Prediction")
+        chapters = prediction_chapters(Path(model).name, thing, predictions)
+        chapters += reading_chapters(each.recording for each in predictions)
+        write_into(folder, chapters, title="Prediction")
     if json:
         print_json(
             {

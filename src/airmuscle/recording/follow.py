@@ -35,7 +35,8 @@ class RowReader:
 
     columns    headings by number (from 1) or by the heading in the stream, such as {"1": "pressure [bar]"}
     units      units by quantity, as in `read_csv`
-    constants  resting_length, ambient, or quantities that are held, as in `read`
+    constants  resting_length, ambient, displacement_zero, or quantities that are held, as in `read`
+    skip_rows  number of lines above the headings, or above the first row of numbers without headings
 
     `skipped` counts rows that could not be read: a damaged or incomplete line of a serial log is left out. `notes` are
     the assumptions on units, as of `read_csv`.
@@ -43,12 +44,12 @@ class RowReader:
 
     def __init__(
         self, origin: str, *, columns: Mapping[str, str] | None = None, units: Mapping[str, str] | None = None,
-        constants: Mapping[str, float | str] | None = None,
+        constants: Mapping[str, float | str] | None = None, skip_rows: int = 0,
     ) -> None:  # fmt: skip
         for name, given in (("columns", columns), ("units", units), ("constants", constants)):
             if not (given is None or isinstance(given, Mapping)):
                 raise ParameterError(f"RowReader: {name} must be a mapping or None; it is {abridged(given)}.")
-        self.origin, self.skipped = origin, 0
+        self.origin, self.skipped, self.skip_rows = origin, 0, skip_rows
         self.notes: tuple[str, ...] = ()
         self._names, self._units, self._constants = dict(columns or {}), dict(units or {}), dict(constants or {})
         self._head: list[tuple[int, str]] = []
@@ -62,7 +63,7 @@ class RowReader:
         rows in succession.
         """
         self._line += 1
-        if not has_content(line):
+        if not has_content(line) or self._line <= self.skip_rows:
             return None
         if self._conversions is None:
             return self._read_header(line.rstrip("\r\n"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,8 @@ from ..core.errors import ColumnError, FileError
 from ..core.hints import Hint
 from .file_kind import check_text_file
 from .header import COMMA_NUMBER, POINT_NUMBER
+from .missing_cells import MAX_LISTED
+from .row_notes import list_rows
 from .table import Cells, RawTable
 from .text_format import (
     NumberedLines,
@@ -101,26 +104,36 @@ def _to_cells(cells: list[str]) -> Cells:
 
 def _check_thousands(origin: str, body: NumberedLines, rows: list[list[str]], decimal: str) -> None:
     """Raise ColumnError where the sign that is not the stated decimal sign cannot separate thousands, as in `0.5`."""
-    for (line, _), row in zip(body, rows, strict=True):
-        for cell in row:
-            if (COMMA_NUMBER if decimal == "." else POINT_NUMBER).fullmatch(cell) and not _THOUSANDS.fullmatch(cell):
-                raise ColumnError(
-                    f"{origin}, line {line}: '{cell}' contradicts the decimal sign '{decimal}', which is stated: the "
-                    "other sign separates groups of three digits. Correct the decimal sign or the number."
-                )
+    other = COMMA_NUMBER if decimal == "." else POINT_NUMBER
+    wrong = [(i, cell) for i, cell in _cells(body, rows) if other.fullmatch(cell) and not _THOUSANDS.fullmatch(cell)]
+    if wrong:
+        line, cell = wrong[0]
+        raise ColumnError(
+            f"{origin}, line {line}: '{cell}' contradicts the decimal sign '{decimal}', which is stated: the other "
+            f"sign separates groups of three digits{_further(wrong)}. Correct the decimal sign or the numbers."
+        )
 
 
 def _check_decimal_sign(origin: str, body: NumberedLines, rows: list[list[str]]) -> None:
     """Raise ColumnError if both signs occur: next to `0.5`, the comma in `1,234` may separate thousands."""
-    first_use: dict[str, tuple[int, str]] = {}
-    for (line, _), row in zip(body, rows, strict=True):
-        for cell in row:
-            sign = "," if COMMA_NUMBER.fullmatch(cell) else "." if POINT_NUMBER.fullmatch(cell) else ""
-            first_use.setdefault(sign, (line, cell))
-    if "," in first_use and "." in first_use:
-        (line, cell), (other, example) = first_use[","], first_use["."]
+    commas = [(i, cell) for i, cell in _cells(body, rows) if COMMA_NUMBER.fullmatch(cell)]
+    point = next(((i, cell) for i, cell in _cells(body, rows) if POINT_NUMBER.fullmatch(cell)), None)
+    if commas and point is not None:
+        (line, cell), (other, example) = commas[0], point
         raise ColumnError(
             f"{origin}, line {line}: the comma in '{cell}' is ambiguous, because line {other} contains a decimal point "
-            f"('{example}'). Write all numbers with the same decimal sign and without thousands separators.",
+            f"('{example}'){_further(commas)}. Write all numbers with the same decimal sign and without thousands "
+            "separators.",
             hint=Hint("To specify the decimal sign", "decimal", ",", function="read"),
         )
+
+
+def _cells(body: NumberedLines, rows: list[list[str]]) -> Iterator[tuple[int, str]]:
+    """All cells with the numbers of their lines."""
+    return ((line, cell) for (line, _), row in zip(body, rows, strict=True) for cell in row)
+
+
+def _further(cells: list[tuple[int, str]]) -> str:
+    """The number of all such cells and their first lines; empty for one."""
+    lines = list(dict.fromkeys(line for line, _ in cells))
+    return f"; there are {len(cells)} such cells ({list_rows('line', lines, MAX_LISTED)})" if len(cells) > 1 else ""

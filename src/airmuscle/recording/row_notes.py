@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
+
+from .recording import Recording
 
 
 class RowNote(str):
     """Note on rows that were left out or filled, which the commands print and the reports contain."""
 
     __slots__ = ()
+
+
+def row_notes(recordings: Iterable[Recording]) -> list[str]:
+    """The notes of the recordings on rows that were left out or filled, each once."""
+    return list(dict.fromkeys(note for each in recordings for note in each.notes if isinstance(note, RowNote)))
 
 
 def list_rows(label: str, rows: Sequence[Any] | Any, most: int) -> str:
