@@ -64,12 +64,14 @@ def test_the_code_on_dynamic_identification_runs(capsys):
     exponent = found["fit"]["gas.exponent"]
     assert exponent.value == pytest.approx(1.2, abs=4 * exponent.stderr)
     assert exponent.stderr < 0.02
-    assert "gas.exponent" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "gas.exponent" in printed
+    assert "initial left.pressure of record 1" in printed
 
 
 def test_the_code_on_prediction_runs(capsys):
     run("prediction.md")
-    assert capsys.readouterr().out == "14.6 N, 39.1 N in row 125\n"
+    assert capsys.readouterr().out == "15 N, 39.1 N in row 125\n"
 
 
 def loop(seed):
