@@ -143,6 +143,11 @@ def test_points_by_hand_are_independent_rows():
     assert found.standard_errors == pytest.approx(expected, rel=1e-6)
 
 
+def test_as_many_points_as_parameters_leave_the_standard_errors_unknown():
+    points = runs_of("by hand", np.random.default_rng(1))[0].rows([0, 5, 12])
+    assert fit(blank_surface(1, 1e5), points).error_basis == "unknown, because there are no more rows than parameters"
+
+
 def reference(found: Fit, group: np.ndarray, combinations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Variance and degrees of freedom of combinations of the parameters (K, P), with the matrices of N rows."""
     x, e = found.problem.jacobian(found.values), found.problem.target - found.problem.predict(found.values)
@@ -172,7 +177,9 @@ def test_covariance_by_runs_is_the_jackknife_formula():
     gradients = np.array(found.model.basis(PLACES["pressure"], PLACES["contraction"])).T
     variances, freedoms = reference(found, group, gradients)
     value, low, high = confidence_band(found, PLACES)
-    assert (high - low) / 2 == pytest.approx(student.ppf(0.975, freedoms) * np.sqrt(variances), rel=1e-8)
+    assert (high - low) / 2 == pytest.approx(
+        student.ppf(0.975, np.maximum(freedoms, 2.0)) * np.sqrt(variances), rel=1e-8
+    )
     assert value == pytest.approx((low + high) / 2)
 
 

@@ -63,7 +63,7 @@ PLANE = ContractileSurface((600.0, -200.0, 250.0), 1e5, 6e5, 0.0, 0.22, -1e6, 1e
 
 @pytest.fixture(scope="module")
 def experiments():
-    return [fit(PLANE, experiment(seed, PLANE)) for seed in range(1000)]
+    return [fit(PLANE, together(experiment(seed, PLANE))) for seed in range(1000)]
 
 
 def share_held(fits, law, *, prediction: bool = False) -> np.ndarray:
@@ -102,7 +102,7 @@ def test_intervals_of_parameters_hold_the_truth_in_95_of_100_experiments(experim
 @pytest.mark.slow
 def test_bands_of_a_law_that_is_not_linear_hold_it_as_often():
     """Its three parameters nearly replace each other, so that their own intervals are a little wide (97.2 %)."""
-    held = share_held([fit(TRUTH, experiment(seed)) for seed in range(1000)], TRUTH)
+    held = share_held([fit(TRUTH, together(experiment(seed))) for seed in range(1000)], TRUTH)
     assert ((held >= 0.93) & (held <= 0.97)).all(), held
 
 

@@ -39,8 +39,6 @@ def confidence_band(fit: Fit, points: Recording, *, level: float = 0.95, predict
     resting length), or of a new muscle, with the scatter of the specimens, for independent rows.
     Raises IdentificationError without degrees of freedom, or for a level outside 0 to 1.
     """
-    from scipy.special import stdtrit
-
     degrees_of_freedom = fit.degrees_of_freedom
     if degrees_of_freedom <= 0 or not np.isfinite(fit.sigma):
         raise IdentificationError(
@@ -55,12 +53,12 @@ def confidence_band(fit: Fit, points: Recording, *, level: float = 0.95, predict
         columns[RESTING_LENGTH] = np.full(len(points), float(length))
     problem = dataclasses.replace(fit.problem, data=Recording(columns, points.origin))
     value, jacobian = problem.predict(fit.values), problem.jacobian(fit.values)
-    further = prediction * (student_quantile(degrees_of_freedom, level) * fit.sigma) ** 2
+    quantile = float(student_quantile(degrees_of_freedom, level))
     if fit.effects is None:
         free = np.array([not estimate.on_bound for estimate in fit.estimates], dtype=bool)
-        variance, freedom = fit.parameter_covariance.variances(jacobian[:, free])
+        half = fit.parameter_covariance.half_widths(jacobian[:, free], level)
     else:
         offset, variance = band_terms(fit, points, jacobian)
-        value, freedom = value + offset, np.full(len(value), float(degrees_of_freedom))
-    half = np.sqrt(stdtrit(freedom, 0.5 + level / 2) ** 2 * np.maximum(variance, 0.0) + further)
+        value, half = value + offset, quantile * np.sqrt(np.maximum(variance, 0.0))
+    half = np.hypot(half, prediction * quantile * fit.sigma)
     return Band(value, value - half, value + half)

@@ -80,7 +80,7 @@ def profile(fit: Fit, name: str, *, level: float = 0.95) -> ProfileLikelihood:
     minimum = _sum_of_squares(fit.problem, fit.values)
     covariance, free = fit.parameter_covariance, sum(not e.on_bound for e in fit.estimates[:index])
     independent = covariance.sigma * float(np.linalg.norm(covariance.basis[free]))
-    half = float(covariance.half_widths(level)[free])
+    half = float(covariance.parameter_half_widths(level)[free])
     threshold = minimum * (1 + (half / independent) ** 2 / degrees_of_freedom)
     low, high = (_find_limit(fit, index, sign * estimate.stderr, threshold) for sign in (-1, 1))
     return ProfileLikelihood(name, estimate.unit, estimate.value, low, high, level)
