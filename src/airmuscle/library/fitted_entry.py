@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..core.errors import printable
 from ..core.reference import cite
 from ..identify import Fit
 from ..identify.candidate_scores import RankedModel
@@ -91,7 +92,8 @@ def band_range(band: StatedBand, recordings: Sequence[Recording]) -> StatedBand:
 
 def list_files(names: Sequence[str]) -> str:
     """The names of files for a title: up to three of them, else their number with the first and the last."""
-    short = [name if len(name) <= MAX_NAME else f"{name[: MAX_NAME // 2]}…{name[-MAX_NAME // 2 :]}" for name in names]
+    shown = map(printable, names)
+    short = [name if len(name) <= MAX_NAME else f"{name[: MAX_NAME // 2]}…{name[-MAX_NAME // 2 :]}" for name in shown]
     if len(short) <= MAX_NAMES:
         return ", ".join(short)
     return f"{len(short)} files, {short[0]} to {short[-1]}"

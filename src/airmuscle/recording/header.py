@@ -122,7 +122,7 @@ def parse_constant_comment(line: str) -> tuple[str, float | str] | None:
         return None
     try:
         value = json.loads(text)
-    except json.JSONDecodeError:
+    except (ValueError, RecursionError):  # no JSON, an integer of thousands of digits, or lists in lists
         stated = f"{text} {match['unit']}" if match["unit"] and is_number(text) else text  # `1013.` is no JSON
         return (name, stated) if known else None
     if not isinstance(value, float | int | str) or isinstance(value, bool):

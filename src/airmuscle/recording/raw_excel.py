@@ -40,19 +40,27 @@ def read_excel_tables(
 
     Raises FileError or ColumnError.
     """
-    openpyxl = import_lab_package("openpyxl", path)
+    import_lab_package("openpyxl", path)
+    excel = import_lab_package("openpyxl.reader.excel", path)
 
     def read() -> dict[str, Rows]:
-        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+        book = _load_worksheets(path, excel.ExcelReader)
         try:
             check_sheet_exists(path, sheet, book.sheetnames)
-            tables = [w.title for w in book.worksheets if hasattr(w, "iter_rows")]  # a chart sheet has no rows
-            names = tables if sheet is None else [sheet]
+            names = [w.title for w in book.worksheets] if sheet is None else [sheet]
             return {name: nonempty_rows(book[name].iter_rows(values_only=True)) for name in names}
         finally:
             book.close()
 
     return tables_of_sheets(path, run_reader(path, "an Excel workbook", read), text_format)
+
+
+def _load_worksheets(path: Path, reader_of: Any) -> Any:
+    """The workbook without its chart sheets, which contain no cells, and on which openpyxl fails if they are empty."""
+    reader = reader_of(path, read_only=True, data_only=True)
+    reader.read_chartsheet = lambda sheet, relation: None
+    reader.read()
+    return reader.wb
 
 
 def tables_of_sheets(path: Path, contents: dict[str, Rows], text_format: TextFormat) -> tuple[RawTable, ...]:

@@ -23,7 +23,7 @@ from .large_mat import LargeContents, is_version_7_3, read_large_mat
 from .mat_objects import READABLE, MatlabObject, find_objects, read_objects
 from .optional_dependency import import_lab_package, run_reader
 from .pieces import Reduction, with_reduction
-from .raw_columnar import check_no_external_links, check_own_values
+from .raw_columnar import check_no_external_links, check_own_values, read_hdf5_tables
 from .separate_process import read_in_separate_process
 from .table import RawTable
 
@@ -55,6 +55,8 @@ def read_mat_tables_here(
 ) -> tuple[RawTable, ...]:
     """As `read_mat_tables`, in this process."""
     pymatreader = import_lab_package("pymatreader", path)
+    if _is_plain_hdf5(path):
+        return read_hdf5_tables(path, group, downsampling)
     _check_links(path)
     large = run_reader(path, "MATLAB", lambda: read_large_mat(path, pymatreader, downsampling))
 
@@ -91,6 +93,16 @@ def read_mat_tables_here(
     if large is not None:
         made, notes = _with_reductions(selected, made, large, downsampling), notes + large.notes
     return tuple(dataclasses.replace(table, notes=(*table.notes, *notes)) for table in made)
+
+
+def _is_plain_hdf5(path: Path) -> bool:
+    """Whether a file is HDF5 without the header of MATLAB, as h5py writes it."""
+    try:
+        with path.open("rb") as file:
+            begins_as_matlab = file.read(6) == b"MATLAB"
+    except OSError:
+        return False  # the reader states the reason
+    return not begins_as_matlab and bool(import_lab_package("h5py", path).is_hdf5(path))
 
 
 def _with_reductions(

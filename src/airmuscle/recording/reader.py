@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 import glob
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
-from ..core.errors import FileError
+from ..core.errors import FileError, printable
 from .bench_checks import warn_of_suspicious_values
 from .downsampling import Decimation, Downsampling, downsample
 from .file_kind import check_text_file
@@ -139,8 +140,13 @@ def read_file(
             missing=missing or mapping.missing_values,
         )
         for table in read_tables(path, mapping, downsampling, progress)
-        for part in split_specimens(apply_mapping(table, mapping))
+        for part in split_specimens(apply_mapping(_with_printable_origin(table), mapping))
     ]
+
+
+def _with_printable_origin(table: RawTable) -> RawTable:
+    """The table under a name that figures and reports can contain: a name of a file may be no text."""
+    return dataclasses.replace(table, origin=printable(table.origin))
 
 
 def complete_bench(recordings: Sequence[Recording], mapping: ColumnMapping) -> list[Recording]:

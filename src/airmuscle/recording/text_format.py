@@ -111,8 +111,17 @@ def split_cells(line: str, delimiter: str) -> list[str]:
     return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))]
 
 
+def check_cell_sizes(origin: str, lines: NumberedLines) -> None:
+    """Raise FileError for a cell with more characters than the parser of the cells takes."""
+    limit = csv.field_size_limit()
+    for i, line in lines:
+        if len(line) > limit and max(map(len, re.split("[\t;,| ]", line))) > limit:
+            raise FileError(f"{origin}, line {i}: a cell has more than {limit} characters. It is no table of numbers.")
+
+
 def parse_header(origin: str, lines: NumberedLines, text_format: TextFormat) -> TextHeader:
     """Parse the header of a table from its first non-empty lines. Raises FileError or ColumnError."""
+    check_cell_sizes(origin, lines)
     comments = [(i, line) for i, line in lines if is_comment(line)]
     body = [(i, line) for i, line in lines if not is_comment(line)]
     if not body:

@@ -83,8 +83,8 @@ def _rows(irregular_steps: npt.NDArray[np.bool_]) -> tuple[int, ...]:
 
 
 def count_rows(seconds: float, time: Array | None, min_rows: int) -> int:
-    """The number of rows in a time span; `min_rows` without time or if the rows are far apart."""
+    """The number of rows in a time span, at most all; `min_rows` without time or if the rows are far apart."""
     if time is None or len(time) < 2:
         return min_rows
     sample_time = _sample_time(np.diff(time))
-    return max(min_rows, round(seconds / sample_time)) if sample_time else min_rows
+    return max(min_rows, round(min(seconds / sample_time, len(time)))) if sample_time else min_rows
