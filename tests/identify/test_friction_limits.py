@@ -15,6 +15,7 @@ import pytest
 from airmuscle.identify.campaign import classify_records
 from airmuscle.identify.campaign.friction_stage import fit_friction_stage
 from airmuscle.identify.hysteresis import (
+    ContractionPath,
     PolynomialCurve,
     find_loops,
     fit_hysteresis,
@@ -22,6 +23,7 @@ from airmuscle.identify.hysteresis import (
     fit_loop,
     preferred_fit,
 )
+from airmuscle.identify.hysteresis.fit import make_loop_series
 from airmuscle.identify.hysteresis.limits import data_limits
 from airmuscle.muscle import CreepElements
 from airmuscle.muscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip
@@ -129,8 +131,12 @@ def sharp_loop(bar, coulomb_force, rows=300, seed=0):
 
 @pytest.mark.parametrize("initial", [Dahl(1e8, 20.0), BoucWen(1e8, 20.0, 5.0, 0.6)])
 def test_a_stiffness_is_bounded_by_the_resolution_of_the_path(initial):
+    """Rows at a tenth of a millimetre, then rows that repeat the readings of a hundredth."""
+    for rows in (1680, 30_000):
+        run = sharp_loop(3.0, 20.0, rows)
+        assert 1e6 < make_loop_series(run, CURVE, ContractionPath(), None).limits.stiffness < 1.5 * 20.0 / 1e-5
     fit = fit_hysteresis(initial, sharp_loop(3.0, 20.0), static_curve=CURVE)
-    assert fit.friction.stiffness < 1.5 * 20.0 / 1e-5
+    assert fit.friction.stiffness < 1e6
     assert "stiffness" in fit.undetermined
 
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from ...core.arrays import Array
 from ...core.tree import Leaf, leaves
 from ...muscle.friction import Friction
-from ...recording.segment.sensor import estimate_noise, estimate_resolution
+from ...recording.segment.sensor import estimate_noise
 from ..identifiability import UndeterminedCombination
 from .axis import Axis
 
@@ -26,6 +26,8 @@ MIN_SPEED_RATIO = 3.0
 STEP_SHARE = 0.1
 """Resolution of a path without noise, as a fraction of its median step between two rows (chosen): a transition within
 this part of a step is complete at the next row."""
+MAX_REPEATED = 0.1
+"""Share of the rows that repeat a reading during the motion, above which a step is that of a reading (chosen)."""
 AMPLITUDE_QUANTILE = 0.95
 """Quantile of the forces without the static curve that counts as the amplitude of the hysteresis (chosen)."""
 
@@ -95,18 +97,24 @@ def data_limits(force: Array, path: Array, time: Array | None, rows: npt.NDArray
 def resolved_stiffness(path: Array, hysteresis: Array) -> float:
     """The maximum stiffness that readings show [N/m]: the amplitude of the hysteresis by the resolution of the path.
 
-    The resolution is the greatest of the resolution and the noise of the sensor and a tenth of the median step.
-
     path        displacement at the fitted rows [m], shape (N,)
     hysteresis  force without its static curve at these rows [N], shape (N,)
     """
-    steps = np.abs(np.diff(path))
-    steps = steps[steps > 0]
-    if not steps.size:
-        return math.inf
-    amplitude = float(np.quantile(np.abs(hysteresis), AMPLITUDE_QUANTILE))
-    resolution = max(estimate_resolution(path), estimate_noise(path), STEP_SHARE * float(np.median(steps)))
+    resolution = _path_resolution(path)
+    amplitude = float(np.quantile(np.abs(hysteresis), AMPLITUDE_QUANTILE)) if resolution else 0.0
     return amplitude / resolution if amplitude > 0 else math.inf
+
+
+def _path_resolution(path: Array) -> float:
+    """The displacement below which nothing is seen [m]: the noise, a tenth of the median step, or the step of a reading
+    that is repeated during the motion; 0 without a motion."""
+    steps = np.abs(np.diff(path))
+    moving = steps > 0
+    if not moving.any():
+        return 0.0
+    repeated = np.count_nonzero(~moving[1:-1] & (moving[:-2] | moving[2:]))
+    share = 1.0 if repeated > MAX_REPEATED * steps.size else STEP_SHARE
+    return max(estimate_noise(path), share * float(np.median(steps[moving])))
 
 
 def combine_limits(limits: tuple[DataLimits, ...]) -> DataLimits:
