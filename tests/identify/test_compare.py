@@ -28,7 +28,7 @@ from airmuscle.identify.candidate_scores import FoldScore
 from airmuscle.identify.candidates import blank_surface
 from airmuscle.identify.cross_validation import ALWAYS_FITTED, default_split
 from airmuscle.identify.force_evaluation import evaluate_force
-from airmuscle.identify.model_selection import excess_error, recommend
+from airmuscle.identify.recommendation import excess_error, recommend
 from airmuscle.muscle.characteristic import ContractileSurface, Hunt2017, InverseLength, TonduLopez2000
 from airmuscle.muscle.geometry.braid import Braid
 from airmuscle.recording import Recording, write_csv

@@ -16,14 +16,16 @@ from .compared_points import ComparedPoints, cause_of, residuals_of_rows
 from .cross_validation import GroupSplit, label_folds
 from .fit_points import FitPoints
 from .loss import LeastSquares, Loss
-from .model_evidence import aicc
+from .model_evidence import aicc, effective_sample_size
 from .problem import FORCE, fitted_quantity_of
 from .result import Fit
+from .slack_rows import SlackPull
 from .static_fit import fit_to_points
 
 MAX_EXCESS = 2.0
-"""Ratio of the error on the rows of the fit to the lowest cross-validated error of other laws above which a law is not
-cross-validated (chosen). The error on rows left out is never lower than that on the rows of the fit."""
+"""Ratio to the lowest cross-validated error of other laws above which a law is not cross-validated further (chosen).
+The error on rows left out is never lower than that on the rows of the fit, nor the sum of squares over all folds lower
+than that over some."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -32,8 +34,16 @@ class FoldScore:
 
     fold: str
     rmse: float
-    """Root mean square error in force [N]."""
+    """Root mean square error in force [N] of the measured rows; the squared forces of the law at slack rows are
+    added."""
     rows: int
+    """Number of rows with a positive force; of a fold without any, the number of its slack rows."""
+
+    @classmethod
+    def of(cls, fold: str, residuals: Array, measured: int) -> FoldScore:
+        """The score for residuals (N,), `measured` of them at a positive force."""
+        rows = measured or residuals.size
+        return cls(fold, float(np.sqrt(residuals @ residuals / rows)), rows)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -43,12 +53,16 @@ class RankedModel:
     candidate: Candidate
     fit: Fit
     in_sample_rmse: float
-    """Root mean square error in force [N] on the rows of the fit."""
+    """Root mean square error in force [N] on the rows of the fit, as in `FoldScore`."""
     cross_validated_rmse: float
     """Root mean square error in force [N] on the rows left out, over all folds."""
     aicc: float
     """Akaike's information criterion of the in-sample errors in force, corrected for small samples."""
     fold_scores: tuple[FoldScore, ...]
+    slack: SlackPull
+    """The force of the law at the slack rows of the fit."""
+    effective_rows: float
+    """Number of independent rows that are equivalent to those of the fit, by the autocorrelation of the residuals."""
     notes: tuple[str, ...] = ()
     """Remarks on the use of the law at the measured points."""
     limit: float = np.inf
@@ -92,9 +106,9 @@ def points_of_splits(runs: Sequence[Recording], splits: Sequence[GroupSplit]) ->
 
 
 def score_candidate(
-    candidate: Candidate, splits: Sequence[ComparedPoints], loss: Loss, lowest: Sequence[float] = ()
+    candidate: Candidate, splits: Sequence[ComparedPoints], loss: Loss, limits: Sequence[float] = ()
 ) -> tuple[Score, ...]:
-    """The scores of a candidate for each split; `lowest` are the lowest errors [N] of other laws, if known."""
+    """The scores of a candidate for each split; above `limits` [N] it is not cross-validated further."""
     try:
         own_loss = in_fitted_quantity(loss, candidate.law, splits[0].points)
         fit = fit_to_points(candidate.law, splits[0].points, loss=own_loss, fixed=candidate.fixed)
@@ -102,8 +116,8 @@ def score_candidate(
         residuals = residuals_of_rows(fit.model, splits[0].rows, splits[0].max_force)
     except AirmuscleError as error:
         return (ExcludedModel(candidate.name, error.message, cause_of(error)),) * len(splits)
-    bounds = lowest or [np.inf] * len(splits)
-    limit = loss.limit(residuals)
+    bounds = limits or [np.inf] * len(splits)
+    limit = loss.limit(residuals[splits[0].measured])
     return tuple(
         _cross_validate(candidate, points, own_loss, fit, residuals, notes, bound, limit)
         for points, bound in zip(splits, bounds, strict=True)
@@ -112,35 +126,41 @@ def score_candidate(
 
 def _cross_validate(
     candidate: Candidate, points: ComparedPoints, loss: Loss, fit: Fit, residuals: Array, notes: tuple[str, ...],
-    lowest: float, limit: float,
+    bound: float, limit: float,
 ) -> Score:  # fmt: skip
     """The scores for one split; residuals in force [N] are limited to `limit`, which is infinite for least squares."""
-    in_sample = np.clip(residuals, -limit, limit)
-    rmse = _rms(in_sample)
-    if rmse > MAX_EXCESS * lowest:
-        return _excess_error(candidate.name, rmse, lowest)
+    in_sample, left_out = np.clip(residuals, -limit, limit), list[FoldScore]()
+    rmse = points.rms(in_sample)
+    if rmse > bound:
+        return _excess_error(candidate.name, rmse, bound, "on the rows of the fit")
+    count = sum(points.rows_of_folds)
     try:
-        found = points.left_out_residuals(candidate, fit, loss)
-        left_out = [(name, np.clip(each, -limit, limit)) for name, each in found if each.size]
+        for name, each, measured in points.left_out_residuals(candidate, fit, loss):
+            left_out += [FoldScore.of(name, np.clip(each, -limit, limit), measured)] if each.size else []
+            least = float(np.sqrt(sum(score.rmse**2 * score.rows for score in left_out) / count))
+            if least > bound:
+                return _excess_error(candidate.name, least, bound, f"without {name} and the groups before it alone")
     except AirmuscleError as error:
         return ExcludedModel(candidate.name, error.message, cause_of(error))
-    scores = tuple(FoldScore(name, _rms(residuals), residuals.size) for name, residuals in left_out)
-    out_of_sample = _rms(np.concatenate([residuals for _, residuals in left_out]))
-    criterion = aicc(float(np.mean(in_sample**2)), in_sample.size, count_parameters(fit))
-    limited = int(np.count_nonzero(np.abs(residuals) > limit))
-    return RankedModel(candidate, fit, rmse, out_of_sample, criterion, scores, notes, limit, limited)
+    rows = np.array([each.rows for each in left_out])
+    return RankedModel(
+        candidate, fit, rmse,
+        cross_validated_rmse=float(np.sqrt(np.average([each.rmse**2 for each in left_out], weights=rows))),
+        aicc=aicc(rmse**2, int(np.count_nonzero(points.measured)), count_parameters(fit)),
+        fold_scores=tuple(left_out),
+        slack=points.slack_pull(residuals, rmse),
+        effective_rows=effective_sample_size(in_sample[points.measured]),
+        notes=notes,
+        limit=limit,
+        limited_rows=int(np.count_nonzero(np.abs(residuals) > limit)),
+    )  # fmt: skip
 
 
-def _excess_error(name: str, rmse: float, lowest: float) -> ExcludedModel:
-    error = (
-        f"error on the rows of the fit, {rmse:.4g} N, is more than {MAX_EXCESS:g} times the lowest cross-validated "
-        f"error, {lowest:.4g} N"
-    )
-    cause = f"its cross-validation takes long, and its {error}"
-    reason = (
-        f"Its {error}, and its cross-validation takes long, so it was omitted. To cross-validate it, give it as a "
-        "candidate."
-    )
+def _excess_error(name: str, rmse: float, limit: float, where: str) -> ExcludedModel:
+    error = f"error {where}, {rmse:.4g} N, is above {limit:.4g} N, so that it cannot be recommended"
+    cause = f"its cross-validation takes long and was not completed: its {error}"
+    omitted = "its cross-validation takes long and was not completed. To complete it, give the law as a candidate."
+    reason = f"Its {error}; {omitted}"
     return ExcludedModel(name, reason, cause)
 
 
@@ -167,7 +187,3 @@ def in_fitted_quantity(loss: Loss, law: Characteristic, points: FitPoints) -> Lo
     sizes = [float(np.nanmedian(np.abs(points.joined[name]))) for name in (quantity.name, "force")]
     scale = loss.scale * sizes[0] / sizes[1] if min(sizes) > 0 else loss.scale
     return dataclasses.replace(loss, scale=scale)  # type: ignore[type-var]  # each loss is a dataclass
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))

@@ -26,6 +26,8 @@ from .loss import LeastSquares, Loss
 from .pooling import Pooling, make_pooling
 from .problem import FitProblem
 from .result import Fit
+from .slack_bounds import with_slack_bounds
+from .slack_rows import SlackPull, pull_limit, slack_pull
 from .solver import LeastSquaresSolution, design_matrix, is_linear
 from .static_fit import refit
 
@@ -34,7 +36,8 @@ FORCE_MARGIN = 3.0
 
 
 class EvaluatedRows(NamedTuple):
-    """The rows of a recording with a positive force [SI], and its resting length [m] if it is known."""
+    """The complete rows of a recording [SI], and its resting length [m] if it is known; a force of 0 or less is that of
+    a slack muscle."""
 
     pressure: Array
     contraction: Array
@@ -42,11 +45,16 @@ class EvaluatedRows(NamedTuple):
     resting_length: float | None
     specimen: str = ""
 
+    @property
+    def measured(self) -> npt.NDArray[np.bool_]:
+        """Mask of the rows with a positive force."""
+        return np.asarray(self.force > 0)
+
 
 def evaluated_rows(run: Recording, rows: npt.NDArray[np.bool_] | None = None) -> EvaluatedRows:
     """The rows of a recording, or those of a mask, in which the errors of laws in force are evaluated."""
     pressure, contraction, force = (run[name] for name in ("pressure", "contraction", "force"))
-    mask = (force > 0) & np.isfinite(pressure + contraction + force)
+    mask = np.isfinite(pressure + contraction + force)
     if rows is not None:
         mask &= rows
     length = run.constants.get("resting_length")
@@ -68,12 +76,12 @@ def force_residuals(model: Characteristic, runs: Sequence[Recording], max_force:
 
     `max_force` [N] limits the force of laws that give contraction or pressure.
     """
-    return residuals_of_rows(model, [evaluated_rows(run) for run in runs], max_force)
+    return residuals_of_rows(model, [evaluated_rows(run, run["force"] > 0) for run in runs], max_force)
 
 
 def residuals_of_rows(model: Characteristic, parts: Sequence[EvaluatedRows], max_force: float) -> Array:
-    """Residuals (model - measured) in force [N] at these rows; one evaluation of the law for each resting length,
-    of a pooled law for each specimen."""
+    """Residuals (model - measured) in force [N] at these rows, at a slack row the force of the law, which should be 0;
+    one evaluation of the law for each resting length, of a pooled law for each specimen."""
     residuals: list[Array] = [np.zeros(0)] * len(parts)
     by_specimen = isinstance(model, PooledLengthLaw)
     muscles = [(part.resting_length, part.specimen if by_specimen else "") for part in parts]
@@ -83,7 +91,7 @@ def residuals_of_rows(model: Characteristic, parts: Sequence[EvaluatedRows], max
         forces = evaluate_force(law_of_length(model, *muscle), pressure, contraction, max_force)
         ends = np.cumsum([parts[i].force.size for i in same])[:-1]
         for i, modelled in zip(same, np.split(forces, ends), strict=True):
-            residuals[i] = modelled - parts[i].force
+            residuals[i] = modelled - np.maximum(parts[i].force, 0.0)
     return np.concatenate(residuals)
 
 
@@ -135,6 +143,12 @@ class ComparedPoints:
         ]
 
     @functools.cached_property
+    def rows_of_folds(self) -> list[int]:
+        """The number of rows that count in each fold, as in `FoldScore`."""
+        counts = [[(int(np.count_nonzero(p.measured)), p.force.size) for p in parts] for parts in self._left_out_rows]
+        return [sum(n for n, _ in fold) or sum(n for _, n in fold) for fold in counts]
+
+    @functools.cached_property
     def _group(self) -> npt.NDArray[np.intp]:
         """The index of the fold of each complete row; one more than the last for rows that are never left out."""
         group = np.full(len(self.points.joined), len(self.folds))
@@ -142,21 +156,48 @@ class ComparedPoints:
             group[np.concatenate(fold.masks)] = i
         return group[~self.points.missing]
 
+    @functools.cached_property
+    def measured(self) -> npt.NDArray[np.bool_]:
+        """Mask of the evaluated rows with a positive force."""
+        return np.concatenate([part.measured for part in self.rows])
+
+    @functools.cached_property
+    def joined_rows(self) -> dict[str, npt.NDArray[Any]]:
+        """Pressure, contraction, force and specimen of the evaluated rows."""
+        columns = {n: np.concatenate([getattr(r, n) for r in self.rows]) for n in ("pressure", "contraction", "force")}
+        return {**columns, "specimen": np.repeat([r.specimen for r in self.rows], [r.force.size for r in self.rows])}
+
+    def rms(self, residuals: Array) -> float:
+        """Root mean square [N] of the residuals of the evaluated rows (N,); those of slack rows are added to the rows
+        with a positive force."""
+        return float(np.sqrt(residuals @ residuals / max(int(np.count_nonzero(self.measured)), 1)))
+
+    def slack_pull(self, residuals: Array, rmse: float) -> SlackPull:
+        """The force at the slack rows of a law with these residuals of the evaluated rows (N,) and this error [N]."""
+        rows = self.joined_rows
+        limit = pull_limit(rmse, float(np.max(rows["force"], initial=0.0)))
+        modelled = residuals + np.maximum(rows["force"], 0.0)
+        return slack_pull(rows["pressure"], rows["contraction"], rows["force"], modelled, limit, rows["specimen"])
+
     def slack_count(self, model: Characteristic) -> tuple[int, int]:
         """The number of rows with a positive force at which a law is slack, and the number of all of them.
 
         Raises IdentificationError where the law gives no force although it is not slack.
         """
-        masks = [slack_rows(law_of_length(model, r.resting_length), r.pressure, r.contraction) for r in self.rows]
+        masks = [
+            slack_rows(law_of_length(model, r.resting_length), r.pressure[r.measured], r.contraction[r.measured])
+            for r in self.rows
+        ]
         return sum(int(np.count_nonzero(mask)) for mask in masks), sum(mask.size for mask in masks)
 
-    def left_out_residuals(self, candidate: Candidate, fit: Fit, loss: Loss) -> Iterator[tuple[str, Array]]:
-        """The name of each fold and the residuals in force [N] on its rows of the law fitted to all other rows.
+    def left_out_residuals(self, candidate: Candidate, fit: Fit, loss: Loss) -> Iterator[tuple[str, Array, int]]:
+        """The name of each fold, the residuals in force [N] on its rows of the law fitted to all other rows, and the
+        number of its rows with a positive force.
 
         Raises IdentificationError where the other rows do not determine the parameters.
         """
         models = (
-            _FoldModels(fit, self._group, len(self.folds), self._pooling(candidate, fit))
+            _FoldModels(fit, self._group, len(self.folds), self.points, self._pooling(candidate, fit))
             if isinstance(loss, LeastSquares)
             else None
         )
@@ -164,7 +205,8 @@ class ComparedPoints:
             model = None if models is None else models.without(i)
             if model is None:
                 model = self._refit_exactly(candidate, fit, fold, loss)
-            yield fold.name, residuals_of_rows(model, rows, self.max_force)
+            count = sum(int(np.count_nonzero(part.measured)) for part in rows)
+            yield fold.name, residuals_of_rows(model, rows, self.max_force), count
 
     def _pooling(self, candidate: Candidate, fit: Fit) -> Pooling | None:
         law = candidate.law
@@ -187,9 +229,13 @@ class ComparedPoints:
 class _FoldModels:
     """The laws fitted to all groups but one, from the fit to all rows."""
 
-    def __init__(self, fit: Fit, group: npt.NDArray[np.intp], count: int, pooling: Pooling | None = None) -> None:
+    def __init__(
+        self, fit: Fit, group: npt.NDArray[np.intp], count: int, points: FitPoints, pooling: Pooling | None = None
+    ) -> None:
         self._problem, self._group, self._count, self._pooling = fit.problem, group, count, pooling
-        self._refits = GroupRefits(fit.problem, _solution(fit), group, count + 1)
+        bounded = with_slack_bounds(fit.problem, points)
+        solution = _solution(bounded.problem, fit.values)
+        self._refits = GroupRefits(bounded.problem, solution, bounded.groups(group, points, count), count + 1)
 
     def without(self, index: int) -> Characteristic | None:
         """The law without one group; None where the refit is not certain."""
@@ -206,10 +252,9 @@ class _FoldModels:
         return model
 
 
-def _solution(fit: Fit) -> LeastSquaresSolution:
-    """The solution of a fit, with its Jacobian."""
-    problem: FitProblem = fit.problem
+def _solution(problem: FitProblem, values: Array) -> LeastSquaresSolution:
+    """The solution with these parameters (P,), with its Jacobian."""
     if not is_linear(problem):
-        return LeastSquaresSolution(fit.values, problem.predict(fit.values), problem.jacobian(fit.values))
+        return LeastSquaresSolution(values, problem.predict(values), problem.jacobian(values))
     matrix, constant = design_matrix(problem)
-    return LeastSquaresSolution(fit.values, matrix @ fit.values + constant, matrix)
+    return LeastSquaresSolution(values, matrix @ values + constant, matrix)

@@ -12,7 +12,8 @@ from .candidate_scores import RankedModel
 from .candidates import Candidate
 from .cross_validation import RunSplit, SpecimenSplit
 from .loss import LeastSquares, Loss
-from .model_selection import Comparison, compare_splits, excess_error
+from .model_selection import Comparison, compare_splits
+from .recommendation import eligible_models, is_equivalent
 
 SPLITS = (RunSplit(), SpecimenSplit())
 """The splits of the two purposes."""
@@ -35,7 +36,7 @@ class JointSelection(ShortRepr):
         name, count = self.recommended[0].candidate.name, self.recommended[0].parameter_count
         lines = [f"One law for all purposes: {name} with {count} parameters."]
         for comparison, model, ratio in zip(self.comparisons, self.recommended, self.ratios, strict=True):
-            best = comparison.ranking[0]
+            best = eligible_models(comparison.ranking)[0]
             lines.append(
                 f"For {comparison.purpose}: rms error {model.cross_validated_rmse:.4g} N, {100 * (ratio - 1):.2g} % "
                 f"above the lowest, {best.cross_validated_rmse:.4g} N of {best.candidate.name}."
@@ -58,13 +59,14 @@ def select_for_both(
     workers     number of processes, as in `compare`
     progress    called with the name of each candidate and the completed fraction
 
-    The best law has the smallest maximum, over the purposes, of the ratio of its error to the lowest one. Of the
+    Laws that pull where a muscle was measured slack are not eligible. The best law has the smallest maximum, over the
+    purposes, of the ratio of its error to the lowest one. Of the
     candidates that are worse for neither purpose by more than one standard error of the difference, and by at most 5 %
     than the best law of each purpose, the one with the fewest parameters is recommended.
     Raises IdentificationError where no candidate is determined for both purposes.
     """
     comparisons = compare_splits(recordings, candidates, SPLITS, loss=loss, workers=workers, progress=progress)
-    rankings = [{model.candidate.name: model for model in each.ranking} for each in comparisons]
+    rankings = [{model.candidate.name: model for model in eligible_models(each.ranking)} for each in comparisons]
     names = [name for name in rankings[0] if all(name in ranking for ranking in rankings)]
     if not names:
         raise IdentificationError(
@@ -72,18 +74,18 @@ def select_for_both(
             "and contraction, or give candidates with fewer parameters."
         )
 
+    lowest = [min(model.cross_validated_rmse for model in ranking.values()) for ranking in rankings]
+
     def ratios(name: str) -> tuple[float, ...]:
-        pairs = zip(rankings, comparisons, strict=True)
-        return tuple(r[name].cross_validated_rmse / c.ranking[0].cross_validated_rmse for r, c in pairs)
+        return tuple(r[name].cross_validated_rmse / error for r, error in zip(rankings, lowest, strict=True))
 
     best = min(names, key=lambda name: (max(ratios(name)), rankings[0][name].parameter_count))
     limit = max(1 + MAX_EXCESS, *ratios(best))
-    equivalent = [name for name in names if max(ratios(name)) <= limit and _is_equivalent(name, best, rankings)]
+    equivalent = [name for name in names if max(ratios(name)) <= limit and _equivalent_for_both(name, best, rankings)]
     chosen = min(equivalent, key=lambda name: (rankings[0][name].parameter_count, max(ratios(name))))
     return JointSelection(comparisons, tuple(ranking[chosen] for ranking in rankings), ratios(chosen))
 
 
-def _is_equivalent(name: str, best: str, rankings: Sequence[Mapping[str, RankedModel]]) -> bool:
-    """Whether a law is not worse than the best one by more than one standard error of the difference, for each
-    purpose."""
-    return all(excess_error(ranking[name], ranking[best]) <= 0 for ranking in rankings)
+def _equivalent_for_both(name: str, best: str, rankings: Sequence[Mapping[str, RankedModel]]) -> bool:
+    """Whether a law is equivalent to the best one for each purpose."""
+    return all(is_equivalent(ranking[name], ranking[best]) for ranking in rankings)

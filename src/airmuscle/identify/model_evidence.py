@@ -59,3 +59,22 @@ def f_test_p_value(mean_square: float, reduced: float, sample_size: float, param
 def format_p_value(p: float) -> str:
     """A p-value as text: `p < 0.001`, or two significant digits."""
     return "p < 0.001" if p < 0.001 else f"p = {p:.2g}"
+
+
+def batch_sample_size(residuals: Array) -> float:
+    """As `effective_sample_size`, by means of batches of sqrt(N) residuals, for correlations of any kind.
+
+    N var(r)/(m var(mean of m residuals)), limited to N and to the number of batches. An error of a law is correlated
+    over a whole ramp while the noise on it is not, so that the lag-1 autocorrelation is too small a measure.
+    Reference: Fishman (1978), "Grouping observations in digital simulation", Management Science 24, 510-521.
+    """
+    size = residuals.size
+    length = max(int(np.sqrt(size)), 1)
+    count = size // length
+    centred = residuals - np.mean(residuals)
+    power = float(np.mean(centred**2))
+    if count < 2 or power == 0:
+        return float(size)
+    means = centred[: count * length].reshape(count, length).mean(axis=1)
+    ratio = length * float(np.mean(means**2)) / power
+    return float(np.clip(size / max(ratio, 1e-300), min(count, size), size))

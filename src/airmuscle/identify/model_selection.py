@@ -17,9 +17,8 @@ from .cross_validation import GroupSplit, default_split
 from .length_errors import find_length_errors, length_notes
 from .loss import LeastSquares, Loss
 from .parallel_scores import score_candidates
+from .recommendation import recommend
 
-MAX_EXCESS = 0.25
-"""Maximum excess of the error of a recommended law over the lowest one (chosen)."""
 MAX_LIMITED = 0.01
 """Fraction of the rows above which limited residuals are no outliers (chosen)."""
 
@@ -60,17 +59,31 @@ class Comparison(ShortRepr):
             f"{self.purpose}."
         )
         width = max(40, *(len(m.candidate.name) + 1 for m in self.ranking))
-        head = f"{'law':<{width}}{'parameters':>11}{'in sample':>12}{'left out':>12}{'AICc excess':>13}"
+        slack = any(m.slack.rows for m in self.ranking)
+        head = f"{'law':<{width}}{'parameters':>11}{'in sample':>12}{'left out':>12}"
+        head += f"{'at slack':>13}" * slack + f"{'AICc excess':>13}"
         lowest = min(m.aicc for m in self.ranking)
         rows = [
             f"{m.candidate.name:<{width}}{m.parameter_count:>11}{m.in_sample_rmse:>10.4g} N"
-            f"{m.cross_validated_rmse:>10.4g} N{m.aicc - lowest:>13.1f}"
+            f"{m.cross_validated_rmse:>10.4g} N" + _at_slack(m) * slack + f"{m.aicc - lowest:>13.1f}"
             for m in self.ranking
         ]
         notes = [f"note: {note}" for note in self.notes]
         notes += [f"note: {m.candidate.name}: {note}" for m in self.ranking for note in m.notes]
         excluded = [f"{word}: {e}" for word, models in self._left_out() for e in models]
-        return "\n".join([title, "", head, *rows, "", self.reason, *notes, *excluded])
+        remark = [_SLACK_REMARK] if slack else []
+        return "\n".join([title, "", head, *rows, *remark, "", self.reason, *notes, *excluded])
+
+
+_SLACK_REMARK = (
+    "at slack: greatest force of the law where the muscle was measured slack and no measured force contradicts it; "
+    "* more than three rms errors and 2 % of the greatest force: not recommended."
+)
+
+
+def _at_slack(model: RankedModel) -> str:
+    """The column of the greatest force at slack rows."""
+    return f"{model.slack.greatest:>10.3g} N{'*' if model.slack.pulling else ' '}"
 
 
 def compare(
@@ -98,7 +111,10 @@ def compare(
     The recommended law is the one with the fewest parameters among those whose error is not larger than the lowest one
     by more than one standard error of the difference (Breiman et al., Classification and Regression Trees (1984),
     section 3.4.3), and by at most a quarter (chosen): where one group dominates the difference, its standard error is
-    as large as the difference. Raises IdentificationError where no candidate is determined.
+    as large as the difference. With fewer than six groups (chosen) the standard error is uncertain, and a simpler law
+    is preferred only where AICc on the rows of the fit does not exclude it. A law that pulls where a muscle was
+    measured slack, and no measured force contradicts it, is not recommended. Raises IdentificationError where no
+    candidate is determined.
     """
     runs = [recordings] if isinstance(recordings, Recording) else list(recordings)
     splits = (leave_out or default_split(runs),)
@@ -151,34 +167,3 @@ def _limit_notes(model: RankedModel) -> tuple[str, ...]:
         f"median magnitude), at least as the scale of the robust loss: {model.limit:.4g} N for {model.candidate.name}, "
         f"which limits {model.limited_rows} of {rows} rows.{advice}",
     )
-
-
-def recommend(ranking: Sequence[RankedModel], split: GroupSplit) -> tuple[RankedModel, str]:
-    """The model by the one-standard-error rule within `MAX_EXCESS`, and the reason as a sentence with the numbers.
-
-    ranking  models with the folds of one split, lowest cross-validated error first
-    """
-    best = ranking[0]
-    limit = (1 + MAX_EXCESS) * best.cross_validated_rmse
-    equivalent = [m for m in ranking if m.cross_validated_rmse <= limit and excess_error(m, best) <= 0]
-    recommended = min(equivalent, key=lambda m: (m.parameter_count, m.cross_validated_rmse))
-    text = (
-        f"Recommended for {split.purpose}: {recommended.candidate.name} with {recommended.parameter_count} parameters, "
-        f"rms error {recommended.cross_validated_rmse:.4g} N in leave-one-{split.group_name}-out cross-validation"
-    )
-    if recommended is best:
-        return recommended, f"{text}, the lowest of all."
-    return recommended, (
-        f"{text}. The error of {best.candidate.name} with {best.parameter_count} parameters, "
-        f"{best.cross_validated_rmse:.4g} N, is not lower by more than one standard error of the difference."
-    )
-
-
-def excess_error(model: RankedModel, best: RankedModel) -> float:
-    """Difference of the mean square errors [N^2], minus one standard error of it over the folds."""
-    pairs = zip(model.fold_scores, best.fold_scores, strict=True)
-    difference = np.array([a.rmse**2 - b.rmse**2 for a, b in pairs])
-    rows = np.array([score.rows for score in best.fold_scores], dtype=float)
-    mean = float(np.average(difference, weights=rows))
-    spread = float(np.sqrt(np.average((difference - mean) ** 2, weights=rows) / max(difference.size - 1, 1)))
-    return mean - spread

@@ -11,10 +11,11 @@ from concurrent.futures import Executor, as_completed
 from ..core import tree
 from ..core.processes import check_running, process_pool
 from ..muscle.characteristic import PooledLengthLaw
-from .candidate_scores import RankedModel, Score, score_candidate
+from .candidate_scores import MAX_EXCESS, RankedModel, Score, score_candidate
 from .candidates import Candidate
 from .compared_points import ComparedPoints
 from .loss import Loss
+from .recommendation import MAX_EXCESS as RECOMMENDED_EXCESS
 from .variable_projection import linear_fields
 
 Progress = Callable[[str, float], None]
@@ -32,22 +33,33 @@ def score_candidates(
 ) -> Scores:
     """The scores of each candidate for each split, in the order of the candidates.
 
-    With `can_exclude` the laws that are linear in some parameters only, whose fits take longest, are scored last, and
-    not cross-validated where they cannot have the lowest error. The scores do not depend on the number of workers.
+    With `can_exclude` the laws that are not linear in all parameters, whose fits take longest, are scored last, and not
+    cross-validated further where they cannot be recommended. The scores do not depend on the number of workers.
     """
-    late = [i for i, each in enumerate(candidates) if can_exclude and is_fitted_by_projection(each)]
+    late = [i for i, each in enumerate(candidates) if can_exclude and max_excess(each) < float("inf")]
     early = [i for i in range(len(candidates)) if i not in late]
     scores_of: dict[int, tuple[Score, ...]] = {}
     with process_pool(workers, one_thread_each=True) as pool:
         for indices in (early, late):
             lowest = _lowest_errors(scores_of.values(), len(splits)) if indices is late else ()
-            for position, scores in _results(pool, splits, loss, [_Task(candidates[i], lowest) for i in indices]):
+            tasks = [_Task(candidates[i], tuple(max_excess(candidates[i]) * each for each in lowest)) for i in indices]
+            for position, scores in _results(pool, splits, loss, tasks):
                 scores_of[indices[position]] = scores
                 if progress is not None:
                     progress(candidates[indices[position]].name, (len(scores_of) - 1) / len(candidates))
     if progress is not None:
         progress("", 1.0)
     return [scores_of[i] for i in range(len(candidates))]
+
+
+def max_excess(candidate: Candidate) -> float:
+    """The ratio to the lowest error of other laws above which a law is not cross-validated further.
+
+    That of a recommended law for those whose fits take longest, a greater one for other laws that are not linear.
+    """
+    if is_fitted_by_projection(candidate):
+        return 1.0 + RECOMMENDED_EXCESS
+    return float("inf") if linear_fields(candidate.law) or isinstance(candidate.law, PooledLengthLaw) else MAX_EXCESS
 
 
 def is_fitted_by_projection(candidate: Candidate) -> bool:
@@ -59,10 +71,10 @@ def is_fitted_by_projection(candidate: Candidate) -> bool:
 
 @dataclasses.dataclass(frozen=True)
 class _Task:
-    """A candidate with the lowest errors [N] of other laws."""
+    """A candidate with the errors [N] above which it is not cross-validated further."""
 
     candidate: Candidate
-    lowest: Sequence[float]
+    limits: Sequence[float]
 
 
 def _results(
@@ -71,7 +83,7 @@ def _results(
     """The position of each task with its scores, as they are completed."""
     if pool is None:
         for position, task in enumerate(tasks):
-            yield position, score_candidate(task.candidate, splits, loss, task.lowest)
+            yield position, score_candidate(task.candidate, splits, loss, task.limits)
         return
     shared = pickle.dumps((tuple(splits), loss))
     largest_first = sorted(range(len(tasks)), key=lambda i: -sum(1 for _ in tree.leaves(tasks[i].candidate.law)))
@@ -83,7 +95,7 @@ def _results(
 def _score_in_worker(shared: bytes, task: _Task) -> tuple[Score, ...]:
     check_running()
     splits, loss = _load(shared)
-    return score_candidate(task.candidate, splits, loss, task.lowest)
+    return score_candidate(task.candidate, splits, loss, task.limits)
 
 
 @functools.lru_cache(maxsize=1)

@@ -4,25 +4,33 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from ..core import tree
 from ..core.arrays import Array
 from ..core.errors import IdentificationError
 from ..muscle.characteristic import Characteristic, ContractileSurface, PooledLengthLaw
 from ..recording import Recording
+from .bounded_effects import BoundedRows, bounded_coefficients
 from .candidates import UNREACHED_FORCE
 from .correlation_index import correlation_index
 from .cross_validation import specimen_name
-from .fit_points import POINT_COLUMNS, FitPoints
-from .problem import SPECIMEN, FitProblem, evaluate
-from .result import Fit, WorstPoint
+from .fit_points import FitPoints
+from .model_evidence import batch_sample_size
+from .problem import RESTING_LENGTH, SPECIMEN, FitProblem, evaluate, of_length
+from .result import Fit
+from .row_errors import WorstPoint, rms_of_rows, row_errors
+from .slack_rows import PULL_RATIO, Slackness
 from .solver import design_matrix
 from .specimen_effects import SpecimenEffects, Sums, predict_effects
 
 Rows = npt.NDArray[np.bool_]
+DECAY_RANGE = 0.05
+"""Force below zero of the population, as a fraction of the greatest measured force, at which the effects have decayed
+(chosen): where the population is far from pulling, no specimen pulls."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -64,6 +72,19 @@ def _lengths(recordings: Sequence[Recording], names: Sequence[str]) -> dict[str,
     return lengths
 
 
+class PredictedEffects(NamedTuple):
+    """The effects of the specimens, the surface whose scaling they have, and their decay [1/N] below zero force."""
+
+    effects: SpecimenEffects
+    surface: ContractileSurface
+    decay: float
+
+
+def _decayed(basis: Array, population: Array, decay: float) -> Array:
+    """The basis (N, K) of the effects with their share at these unclamped forces of the population (N,) [N]."""
+    return np.asarray(basis * np.clip(1.0 + decay * population, 0.0, 1.0)[:, None])
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Pooling:
     """The rows from which effects of specimens are predicted: the problem of the population law and the specimens."""
@@ -73,21 +94,61 @@ class Pooling:
     effect: ContractileSurface
     """Structure of the effect of one specimen."""
 
-    def predict(self, values: Array, rows: Rows | None = None) -> tuple[SpecimenEffects, ContractileSurface]:
-        """The effects for these population parameters (P,) from all rows, or those of a mask (N,), and the surface
-        whose scaling they have. Censored rows count where the population law violates their bound."""
+    def predict(self, values: Array, rows: Rows | None = None) -> PredictedEffects:
+        """The effects for these population parameters (P,) from all rows, or those of a mask (N,).
+
+        The variances follow from the rows that are active in the population law. Rows of one run are correlated: the
+        likelihood counts them with their effective number, so that effects are shrunk as by independent rows. With
+        these variances the effects of each specimen are limited by its slack rows: a bound counts where the law of the
+        specimen violates it.
+        """
         problem, (pressure, contraction) = self.problem, self.problem.arguments
         matrix, constant = self._design
         modelled = matrix @ values + constant
-        used = problem.active_rows(modelled) & (np.ones(len(modelled), dtype=bool) if rows is None else rows)
-        ranges = [(float(x[used].min()), float(x[used].max())) for x in (pressure, contraction)]
+        kept = np.ones(len(modelled), dtype=bool) if rows is None else rows
+        ranges = [(float(x[kept].min()), float(x[kept].max())) for x in (pressure, contraction)]
         surface = self.effect.with_validity_range(*ranges)
+        decay = 1.0 / (DECAY_RANGE * max(float(np.max(problem.data["force"][kept])), 1e-9))
+        basis = _decayed(np.array(surface.basis(pressure, contraction)).T, modelled, decay)
+        used = problem.active_rows(modelled) & kept
         weights = np.where(used, problem.weights, 0.0)  # no sum changes with a row of zeros
-        basis = (weights * np.array(surface.basis(pressure, contraction))).T
-        residuals = weights * (problem.target - modelled)
         members = self.specimens.member, len(self.specimens.names)
-        sums = Sums.of(weights[:, None] * matrix, basis, residuals, *members, int(np.count_nonzero(used)))
-        return predict_effects(sums, self.specimens.names), surface
+        rest = problem.target - modelled
+        sums = Sums.of(weights[:, None] * matrix, weights[:, None] * basis, weights * rest, *members,
+                       int(np.count_nonzero(used)))  # fmt: skip
+        effects = predict_effects(sums, self.specimens.names)
+        left = (weights * (rest - np.sum(basis * effects.coefficients[members[0]], axis=1)))[used]
+        effects = predict_effects(sums.scaled(batch_sample_size(left) / left.size), self.specimens.names)
+        predicted = PredictedEffects(effects, surface, decay)
+        if not (problem.censoring > 0).any():
+            return predicted
+        measured = [
+            BoundedRows(basis[own], rest[own], problem.censoring[own], problem.weights[own])
+            for own in (kept & (self.specimens.member == i) for i in range(members[1]))
+        ]
+        regions = [self._slack_region(i, predicted, values, kept) for i in range(members[1])]
+        ratio = (effects.sigma / effects.deviation) ** 2 * left.size / batch_sample_size(left)
+        limited = [
+            bounded_coefficients(own.joined(region), ratio, start)
+            for own, region, start in zip(measured, regions, effects.coefficients, strict=True)
+        ]
+        effects = dataclasses.replace(effects, coefficients=np.array(limited))
+        return predicted._replace(effects=effects)
+
+    def _slack_region(self, index: int, predicted: PredictedEffects, values: Array, kept: Rows) -> BoundedRows:
+        """The bounds in the slack region of one specimen, which weigh together as much as its rows."""
+        problem, own, surface = self.problem, kept & (self.specimens.member == index), predicted.surface
+        pressure, contraction = (x[own] for x in problem.arguments)
+        side, weights, force = problem.censoring[own], problem.weights[own], problem.data["force"][own]
+        pulls = (side == 0) & (force > PULL_RATIO * predicted.effects.sigma)
+        steps = Slackness.of(pressure, contraction, side > 0, pulls)
+        region = steps.region(surface.min_pressure, surface.max_contraction)
+        law = tree.with_parameters(problem.law, problem.leaf_values(values))
+        modelled = np.asarray(of_length(law, self.specimens.lengths[index]).unclamped_force(*region))
+        count = modelled.size
+        equal = np.full(count, np.sqrt(float(weights @ weights) / max(count, 1)))
+        basis = _decayed(np.array(surface.basis(*region)).T, modelled, predicted.decay)
+        return BoundedRows(basis, -modelled, np.ones(count), equal)
 
     @property
     def _design(self) -> tuple[Array, Array]:
@@ -98,16 +159,15 @@ class Pooling:
 
     def law(self, population: Any, values: Array, rows: Rows | None = None) -> PooledLengthLaw:
         """The pooled law of a population law with these parameters."""
-        return _pooled(population, self.specimens, *self.predict(values, rows))
+        return _pooled(population, self.specimens, self.predict(values, rows))
 
 
-def _pooled(
-    population: Any, specimens: Specimens, predicted: SpecimenEffects, surface: ContractileSurface
-) -> PooledLengthLaw:
+def _pooled(population: Any, specimens: Specimens, predicted: PredictedEffects) -> PooledLengthLaw:
     limits: dict[str, Any] = {"min_force": -UNREACHED_FORCE, "max_force": UNREACHED_FORCE}
-    rows = predicted.coefficients.tolist()
+    rows, surface = predicted.effects.coefficients.tolist(), predicted.surface
     effects = tuple(dataclasses.replace(surface, coefficients=tuple(row), **limits) for row in rows)
-    return PooledLengthLaw(population, effects, specimens.names, specimens.lengths)
+    names, lengths = specimens.names, specimens.lengths
+    return PooledLengthLaw(population, effects, names, lengths, effect_decay=predicted.decay)
 
 
 def check_poolable(law: PooledLengthLaw, points: FitPoints) -> Specimens:
@@ -133,11 +193,11 @@ def pool(law: PooledLengthLaw, population: Fit, points: FitPoints) -> Fit:
     those of the specimens. The problem remains that of the population law.
     """
     pooling = make_pooling(law, points, population.problem)
-    effects, surface = pooling.predict(population.values)
-    model = _pooled(population.model, pooling.specimens, effects, surface)
+    predicted = pooling.predict(population.values)
+    model, effects = _pooled(population.model, pooling.specimens, predicted), predicted.effects
     data = population.recording.with_columns(**{SPECIMEN: pooling.specimens.member.astype(float)})
-    residuals, measured = _residuals(model, population, data)
-    worst = int(np.argmax(np.abs(np.where(measured, residuals, 0.0))))
+    modelled = evaluate(model, "force", population.fitted_quantity.arguments, data)
+    errors, measured = row_errors(population.problem, modelled), population.censoring == 0
     deviations = np.sqrt(np.diag(effects.population_covariance))
     estimates = zip(population.estimates, deviations.tolist(), strict=True)
     target = data["force"]
@@ -147,19 +207,13 @@ def pool(law: PooledLengthLaw, population: Fit, points: FitPoints) -> Fit:
         estimates=tuple(dataclasses.replace(each, stderr=error) for each, error in estimates),
         correlations=effects.population_covariance / np.outer(deviations, deviations),
         sigma=effects.sigma,
-        rmse=float(np.sqrt(np.mean(residuals[measured] ** 2))),
-        max_error=WorstPoint(float(residuals[worst]), *(float(data[name][worst]) for name in POINT_COLUMNS)),
-        correlation_index=correlation_index(target[measured], (target + residuals)[measured]),
+        rmse=rms_of_rows(errors, measured),
+        max_error=WorstPoint.of(errors, data),
+        correlation_index=correlation_index(target[measured], modelled[measured]),
         recording=data,
         effects=effects,
         notes=(*population.notes, *_notes(effects)),
     )
-
-
-def _residuals(model: PooledLengthLaw, fit: Fit, data: Recording) -> tuple[Array, Rows]:
-    """The residuals [N] of all rows and the mask of the uncensored ones, shape (N,) each."""
-    modelled = evaluate(model, "force", fit.fitted_quantity.arguments, data)
-    return modelled - data["force"], np.asarray(fit.censoring == 0)
 
 
 def _notes(effects: SpecimenEffects) -> tuple[str, ...]:
@@ -181,7 +235,10 @@ def band_terms(fit: Fit, points: Recording, jacobian: Array) -> tuple[Array, Arr
     assert effects is not None
     assert isinstance(model, PooledLengthLaw)
     surface: Any = model.effects[0]
-    basis = np.array(surface.basis(points["pressure"], points["contraction"])).T
+    state = points["pressure"], points["contraction"]
+    length = points.constants.get(RESTING_LENGTH)
+    law = of_length(model.population, None if length is None else float(length))
+    basis = np.array(surface.basis(*state)).T * np.asarray(model.effect_share(law.unclamped_force(*state)))[:, None]
     name, size = specimen_name(points), basis.shape[1]
     gradient = np.zeros((len(points), len(effects.covariance)))
     gradient[:, : jacobian.shape[1]] = jacobian

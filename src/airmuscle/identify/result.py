@@ -23,6 +23,7 @@ from .loss import Loss
 from .parameter_covariance import ParameterCovariance
 from .plot import plot_fit
 from .problem import CONTRACTION, FORCE, FitProblem, FittedQuantity, evaluate
+from .row_errors import WorstPoint
 from .specimen_effects import SpecimenEffects
 
 
@@ -50,16 +51,6 @@ class Estimate:
         return f"{2 * self.stderr:.3g}" if np.isfinite(self.stderr) else "unknown"
 
 
-@dataclasses.dataclass(frozen=True)
-class WorstPoint:
-    """The residual (model - measured) of maximum magnitude and the point where it occurs, all SI."""
-
-    error: float
-    pressure: float
-    contraction: float
-    force: float
-
-
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Fit(NotebookDisplay):
     """A fitted characteristic with its data and statistics; `print` it, or `.plot()` it.
@@ -81,7 +72,9 @@ class Fit(NotebookDisplay):
     sigma: float
     """Standard deviation of the residuals with N - P degrees of freedom [SI]."""
     rmse: float
+    """Root mean square error of the measured rows [SI]; violations of the bounds of censored rows are added."""
     max_error: WorstPoint
+    """The greatest error of all rows; that of a censored row is the violation of its bound."""
     correlation_index: CorrelationIndex | None
     """IK and R^2; None where the measured values do not vary."""
     rows_censored: int

@@ -60,9 +60,15 @@ class Sums(NamedTuple):
     xx: Array
     xz: Array
     zz: Array
+    xr: Array
     zr: Array
     rr: float
-    rows: int
+    rows: float
+
+    def scaled(self, share: float) -> Sums:
+        """The sums for rows that count only as this share of independent ones."""
+        xx, xz, zz, xr, zr = (share * each for each in (self.xx, self.xz, self.zz, self.xr, self.zr))
+        return Sums(xx, xz, zz, xr, zr, share * self.rr, share * self.rows)
 
     @classmethod
     def of(
@@ -72,7 +78,7 @@ class Sums(NamedTuple):
         residuals: Array,
         member: npt.NDArray[np.intp],
         count: int,
-        rows: int | None = None,
+        rows: float | None = None,
     ) -> Sums:
         """The sums for a basis (N, K); the rows of each specimen, `member` (N,), have their own coefficients.
 
@@ -85,8 +91,9 @@ class Sums(NamedTuple):
             xz[:, own], zz[own, own] = matrix[part].T @ basis[part], basis[part].T @ basis[part]
             zr[own] = basis[part].T @ residuals[part]
         return cls(
-            matrix.T @ matrix, xz, zz, zr, float(residuals @ residuals), len(residuals) if rows is None else rows
-        )
+            matrix.T @ matrix, xz, zz, matrix.T @ residuals, zr, float(residuals @ residuals),
+            len(residuals) if rows is None else rows,
+        )  # fmt: skip
 
 
 def predict_effects(sums: Sums, specimens: tuple[str, ...]) -> SpecimenEffects:
@@ -97,7 +104,9 @@ def predict_effects(sums: Sums, specimens: tuple[str, ...]) -> SpecimenEffects:
     within = sums.zz - sums.xz.T @ projected
     within = (within + within.T) / 2
     size, freedom = len(within), sums.rows - len(sums.xx)
-    ratio, sigma = _variance_ratio(within, sums.zr, sums.rr, freedom)
+    taken_up = inverse @ sums.xr  # not 0 where bounds keep the population law from the least squares of these rows
+    gradient, squares = sums.zr - sums.xz.T @ taken_up, sums.rr - float(sums.xr @ taken_up)
+    ratio, sigma = _variance_ratio(within, gradient, squares, freedom)
     shrunk = np.linalg.inv(sums.zz + ratio * np.eye(size))
     smoother = shrunk @ within
     by_effects = np.vstack([projected, smoother - np.eye(size)])
@@ -110,7 +119,7 @@ def predict_effects(sums: Sums, specimens: tuple[str, ...]) -> SpecimenEffects:
     return SpecimenEffects(specimens, coefficients, deviation, sigma, covariance, float(np.trace(smoother)))
 
 
-def _variance_ratio(within: Array, gradient: Array, squares: float, freedom: int) -> tuple[float, float]:
+def _variance_ratio(within: Array, gradient: Array, squares: float, freedom: float) -> tuple[float, float]:
     """The ratio of variances with the largest restricted likelihood, and the standard deviation of the residuals.
 
     `within` and `gradient` are the normal matrix and the right-hand side of the effects, orthogonal to the population.

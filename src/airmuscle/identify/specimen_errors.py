@@ -11,7 +11,7 @@ import numpy as np
 from ..core.errors import AirmuscleError
 from ..muscle.characteristic.base import Characteristic
 from ..recording import Recording
-from .candidate_scores import RankedModel
+from .candidate_scores import FoldScore, RankedModel
 from .candidates import Candidate
 from .compared_points import ComparedPoints
 from .cross_validation import SpecimenSplit, label_folds, specimen_name
@@ -76,8 +76,8 @@ def specimen_errors(fit: Fit, recordings: Sequence[Recording], fixed: tuple[str,
         parts = [p for p in points.left_out_residuals(Candidate("", fit.model, fixed), fit, fit.loss) if p[1].size]
     except AirmuscleError:  # the others do not determine the law, so that no error is known
         return None
-    rms = [float(np.sqrt(np.mean(values**2))) for _, values in parts]
-    return _checked([name for name, _ in parts], rms, fit.model, recordings)
+    scores = [FoldScore.of(*part) for part in parts]
+    return _checked([each.fold for each in scores], [each.rmse for each in scores], fit.model, recordings)
 
 
 def ranked_specimen_errors(

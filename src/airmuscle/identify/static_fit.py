@@ -19,13 +19,15 @@ from .branch_residuals import branch_distance, branch_notes
 from .censoring import UNCENSORED, Censoring, default_censoring
 from .correlation_index import correlation_index
 from .fit_arguments import check_arguments
-from .fit_points import POINT_COLUMNS, FitPoints
+from .fit_points import FitPoints
 from .gauss_newton import gauss_newton
 from .loss import LeastSquares, Loss
 from .pooling import check_poolable, pool, refit_pooled
 from .problem import FORCE, FitProblem, evaluate
-from .result import Estimate, Fit, WorstPoint
-from .solver import LeastSquaresSolution, is_linear, solve
+from .result import Estimate, Fit
+from .row_errors import WorstPoint, rms_of_rows, row_errors
+from .slack_bounds import solve_bounded
+from .solver import LeastSquaresSolution, is_linear
 from .statistics import FitStatistics, check_determined, check_determined_by_levels, compute_statistics
 from .variable_projection import find_initial_values
 
@@ -90,7 +92,7 @@ def _fit_law(
     sigma: npt.ArrayLike | None, fixed: Collection[str],
 ) -> Fit:  # fmt: skip
     problem = points.problem(characteristic, censoring=censoring, sigma=sigma, fixed=fixed)
-    solution = solve(problem, loss)
+    solution = solve_bounded(problem, points, loss)
     statistics = compute_statistics(problem, solution, loss, points.runs)
     check_determined_by_levels(problem, solution, points.at_levels)
     by_recording = None if sigma is not None else points.deviations(problem.fitted_quantity.name)
@@ -120,12 +122,12 @@ def refit(
     near = None if is_linear(problem) or loss != LeastSquares() else gauss_newton(problem, problem.initial_values)
     try:
         solution = (
-            solve(problem, loss, find_initial_values(problem, multi_start=False))
+            solve_bounded(problem, points, loss, find_initial_values(problem, multi_start=False))
             if near is None
             else LeastSquaresSolution(*near)
         )
     except IdentificationError:
-        solution = solve(problem, loss)
+        solution = solve_bounded(problem, points, loss)
     check_determined(problem, solution)
     model: Characteristic = tree.with_parameters(problem.law, problem.leaf_values(solution.values))
     return model
@@ -156,10 +158,7 @@ def _build_result(
     model = tree.with_parameters(problem.law, problem.leaf_values(solution.values))
     clamped = evaluate(model, quantity, problem.fitted_quantity.arguments, data)
     measured = problem.censoring == 0
-    residuals = clamped - data[quantity]
-    # a censored row has a residual only where the law violates its bound; its reading is not a measured value
-    violations = np.where(measured, residuals, problem.residuals(clamped) / problem.weights)
-    worst = int(np.argmax(np.abs(violations)))
+    errors = row_errors(problem, clamped)
     varies = bool(np.ptp(data[quantity][measured]) > 0)
     return Fit(
         model=model,
@@ -169,8 +168,8 @@ def _build_result(
         rank=statistics.rank,
         condition=statistics.condition,
         sigma=statistics.sigma,
-        rmse=float(np.sqrt(np.mean(residuals[measured] ** 2))),
-        max_error=WorstPoint(float(violations[worst]), *(float(data[name][worst]) for name in POINT_COLUMNS)),
+        rmse=rms_of_rows(errors, measured),
+        max_error=WorstPoint.of(errors, data),
         correlation_index=correlation_index(data[quantity][measured], clamped[measured]) if varies else None,
         rows_censored=int(np.count_nonzero(~measured)),
         rows_dropped=dropped,

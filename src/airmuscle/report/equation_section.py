@@ -40,7 +40,7 @@ def _specimen_effects(fit: Fit, validity: str) -> tuple[list[DisplayedEquation],
     for i, (name, effect) in enumerate(zip(law.specimens, law.effects, strict=True), 1):
         equations = law_equation(effect, quantity.name, quantity.arguments, fit.data_ranges)
         titled = dataclasses.replace(
-            equations[-1], title=f"Effect of specimen {name}, added to the law of the population"
+            equations[-1], title=f"Effect of specimen {name}, added to the law of the population {_share(law)}".rstrip()
         )
         shown.append(_displayed(titled, f"effect-{i}", validity))
     surface: Any = law.effects[0]
@@ -49,6 +49,13 @@ def _specimen_effects(fit: Fit, validity: str) -> tuple[list[DisplayedEquation],
         columns |= {f"{name} [N]": list(values), f"{name}, standard error [N]": list(errors)}
     title = f"Specimen effects (standard deviation of the prior {format_number(effects.deviation)} N)"
     return shown, [Table("specimen-effects", title, columns)]
+
+
+def _share(law: PooledLengthLaw) -> str:
+    """The share of the effects where the population is slack, as a remark."""
+    if not law.effect_decay:
+        return ""
+    return f"(below zero force of the population it decreases to zero within {format_number(1 / law.effect_decay)} N)"
 
 
 def _displayed(equation: LawEquation, name: str, validity: str) -> DisplayedEquation:

@@ -13,13 +13,16 @@ from .base import ForceLaw
 
 @model
 class PooledLengthLaw(ForceLaw):
-    """Mixed-effects law of muscles of one type: F = max(0, F_pop(p, eps; L_0) + F_s(p, eps)).
+    """Mixed-effects law of muscles of one type: F = max(0, F_pop(p, eps; L_0) + s F_s(p, eps)).
+
+        s = 1 where F_pop >= 0, otherwise max(0, 1 + c F_pop)
 
     F_pop: law of the population, for any resting length L_0; F_s: effect of specimen s (a random effect), drawn from a
-    normal distribution of mean 0. A new muscle has the mean of this prior, F_s = 0; `with_resting_length` returns its
-    law. `for_specimen` returns the law of a measured muscle. Without names of specimens the one effect gives the
-    structure for a fit. Force limits of the inner models are not applied. Developed for airmuscle; the prediction of
-    random effects is from Robinson, Statistical Science 6:15 (1991).
+    normal distribution of mean 0; c: decay of the effects below zero force, so that a specimen is slack where the
+    population is far from pulling; 0 keeps the effects everywhere. A new muscle has the mean of this prior, F_s = 0;
+    `with_resting_length` returns its law. `for_specimen` returns the law of a measured muscle. Without names of
+    specimens the one effect gives the structure for a fit. Force limits of the inner models are not applied. Developed
+    for airmuscle; the prediction of random effects is from Robinson, Statistical Science 6:15 (1991).
     """
 
     population: ForceLaw
@@ -29,6 +32,10 @@ class PooledLengthLaw(ForceLaw):
         "m", "L_s", "resting lengths of the specimens", bounds=(1e-3, 20.0), fitted=False, default=()
     )
     specimen: str = ""
+    effect_decay: float = parameter(
+        "1/N", "c", "relative decay of the specimen effects below zero force of the population",
+        bounds=(0.0, 1e3), fitted=False, default=0.0,
+    )  # fmt: skip
 
     def check(self) -> None:
         named = len(self.specimens)
@@ -74,7 +81,12 @@ class PooledLengthLaw(ForceLaw):
         force = self.population.unclamped_force(pressure, contraction)
         if not self.specimen:
             return force
-        return force + self.effects[self.specimens.index(self.specimen)].unclamped_force(pressure, contraction)
+        effect = self.effects[self.specimens.index(self.specimen)].unclamped_force(pressure, contraction)
+        return force + self.effect_share(force) * effect
+
+    def effect_share(self, force: Value) -> Value:
+        """The share s of the effects [1] at this unclamped force of the population [N]."""
+        return ops.clip(1.0 + self.effect_decay * force, 0.0, 1.0)
 
     def _index(self, specimen: str) -> int:
         if specimen not in self.specimens:

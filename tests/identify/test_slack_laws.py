@@ -1,0 +1,172 @@
+"""A law that is recommended does not pull where a muscle was measured slack.
+
+The effects of a specimen are limited by its slack rows, by the points that these imply, and by the decay of the effects
+where the population does not pull. A law of any length is slack at further lengths far below the pressure at which it
+starts to pull. Errors at slack rows count in every score, and a law that pulls there is not recommended.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import airmuscle as am
+from airmuscle.core import tree
+from airmuscle.errors import IdentificationError
+from airmuscle.identify import Candidate, RunSplit, SpecimenSplit, compare, fit, standard_candidates
+from airmuscle.identify.candidates import blank_surface
+from airmuscle.identify.fit_points import FitPoints
+from airmuscle.identify.loss import LeastSquares
+from airmuscle.identify.model_evidence import batch_sample_size
+from airmuscle.identify.recommendation import recommend
+from airmuscle.identify.slack_rows import Slackness, SlackPull, slack_pull
+from airmuscle.identify.solver import solve
+from airmuscle.muscle.characteristic import LogarithmicLength, PooledLengthLaw
+from airmuscle.muscle.geometry import Braid
+from airmuscle.recording import Recording
+
+NAME = "pooled, ln L0, degree 3, change of degree 1, effects of degree 3"
+MUSCLES = ((0.083, 5.2e-3, 25.5, 1.25), (0.182, 5.3e-3, 24.6, 1.15), (0.382, 5.4e-3, 24.2, 1.08))
+"""Resting length [m], radius [m], braid angle [degrees] and end correction (chosen)."""
+
+
+def ramps(rows: int = 120) -> list[Recording]:
+    """Ramps of pressure of three muscles with a dead zone that grows with the contraction; slack sensors read -2 N."""
+    random, made = np.random.default_rng(1), []
+    for length, radius, angle, correction in MUSCLES:
+        law = am.characteristic.TonduLopez2000(Braid(radius, np.radians(angle), length), correction)
+        for repeat in (1, 2):
+            for held in (0.0, 0.04, 0.08, 0.12):
+                time = np.linspace(0.0, 28.0, rows)
+                pressure = 8e3 + 6.12e5 * (1 - np.abs(time / 14 - 1))
+                contraction = np.full(rows, held)
+                effective = np.maximum(pressure - 6e4 - 1.2e6 * held, 0.0) * (1 + 0.02 * np.sin(pressure / 1.5e5))
+                force = np.maximum(law.force(effective, contraction) - 2e3 * held * (effective > 0), 0.0)
+                force = force + random.normal(0, 1, rows) - 2.0
+                columns = {"time": time, "pressure": pressure, "contraction": contraction, "force": force}
+                made.append(Recording(columns, f"{length * 1e3:.0f} mm, {held}, {repeat}", {"resting_length": length}))
+    return made
+
+
+@pytest.fixture(scope="module")
+def measured() -> list[Recording]:
+    return ramps()
+
+
+@pytest.fixture(scope="module")
+def pooled(measured: list[Recording]) -> am.identify.Fit:
+    candidate = next(each for each in standard_candidates(measured) if each.name == NAME)
+    return fit(candidate.law, measured)
+
+
+def test_the_law_of_a_specimen_does_not_pull_at_its_slack_rows(pooled):
+    slack = pooled.recording["force"] <= 0
+    assert np.count_nonzero(slack) > 500
+    assert pooled.modelled[slack].max() < 20.0
+
+
+def test_the_law_of_a_specimen_does_not_pull_at_pressures_below_its_slack_rows(pooled, measured):
+    law = pooled.model.for_specimen("182 mm")
+    own = [run for run in measured if run.constants["resting_length"] == 0.182]
+    contraction = np.linspace(0.04, 0.12, 9)
+    pressure = min(float(run["pressure"].min()) for run in own)
+    assert np.max(law.force(np.full(9, pressure), contraction)) < 5.0
+
+
+def test_the_effects_decay_where_the_population_does_not_pull():
+    population = LogarithmicLength(
+        _surface(-100.0), blank_surface(1).with_validity_range((1e5, 6e5), (0.0, 0.2)), 0.2, 0.2
+    )
+    law = PooledLengthLaw(population, (_surface(400.0),), ("a",), (0.2,), "a", effect_decay=1 / 20)
+    assert law.force(3e5, 0.1) == 0.0
+    assert dataclasses.replace(law, effect_decay=0.0).force(3e5, 0.1) == pytest.approx(300.0)
+    weak = dataclasses.replace(law, population=dataclasses.replace(population, inner=_surface(-5.0)))
+    assert weak.force(3e5, 0.1) == pytest.approx(-5.0 + 0.75 * 400.0)
+
+
+def _surface(force: float):
+    surface = blank_surface(1).with_validity_range((1e5, 6e5), (0.0, 0.2))
+    return dataclasses.replace(surface, coefficients=(force, 0.0, 0.0), min_force=-1e6, max_force=1e6)
+
+
+def test_the_greatest_error_of_a_pooled_fit_includes_slack_rows(pooled):
+    violated = np.where(pooled.recording["force"] <= 0, pooled.modelled, pooled.residuals)
+    assert abs(pooled.max_error.error) == pytest.approx(float(np.abs(violated).max()))
+    measured = pooled.recording["force"] > 0
+    assert pooled.rmse == pytest.approx(float(np.sqrt(np.sum(violated**2) / np.count_nonzero(measured))))
+
+
+def test_a_law_of_any_length_pulls_less_where_a_length_that_was_not_measured_is_slack(measured):
+    law = LogarithmicLength(blank_surface(3), blank_surface(1), 0.2, 0.2)
+    others = [run for run in measured if run.constants["resting_length"] != 0.083]
+    problem = FitPoints.from_recordings(others).problem(law)
+    values = solve(problem, LeastSquares()).values
+    laws = fit(law, others).model, tree.with_parameters(problem.law, problem.leaf_values(values))
+    pulls = [float(each.with_resting_length(0.083).force(8e3, 0.12)) for each in laws]
+    assert pulls[0] < 0.7 * pulls[1]
+    assert pulls[0] < 30.0
+
+
+def test_a_law_that_pulls_at_slack_rows_of_a_specimen_left_out_loses(measured):
+    """The constant law meets no slack row; its score must contain them."""
+    comparison = compare(measured, [Candidate("plane", blank_surface(1))], leave_out=SpecimenSplit())
+    (score,) = [s for s in comparison.ranking[0].fold_scores if s.fold == "83 mm"]
+    others = [run for run in measured if run.constants["resting_length"] != 0.083]
+    law = fit(blank_surface(1), others).model
+    own = [run for run in measured if run.constants["resting_length"] == 0.083]
+    force, modelled = (np.concatenate(each) for each in (
+        [run["force"] for run in own], [law.force(run["pressure"], run["contraction"]) for run in own]))  # fmt: skip
+    squares = np.sum((modelled - np.maximum(force, 0.0)) ** 2)
+    assert score.rmse == pytest.approx(float(np.sqrt(squares / np.count_nonzero(force > 0))), rel=1e-6)
+
+
+def test_a_law_that_pulls_where_a_muscle_is_slack_is_not_recommended(measured):
+    candidates = [Candidate("rich", blank_surface(3)), Candidate("plain", blank_surface(2))]
+    ranking = compare(measured[:8], candidates, leave_out=RunSplit()).ranking
+    pulls = dataclasses.replace(
+        ranking[0],
+        slack=SlackPull(100, 7, 20.0, 461.0, 8e3, 0.124),
+        cross_validated_rmse=0.5 * ranking[1].cross_validated_rmse,
+    )
+    recommended, reason = recommend([pulls, ranking[1]], RunSplit())
+    assert recommended is ranking[1]
+    assert "it pulls at 7 of 100 slack rows, up to 461 N at 8 kPa and 12.40 %" in reason
+    assert pulls.candidate.name in reason
+
+
+def test_a_slack_row_that_a_measured_force_contradicts_does_not_exclude_a_law():
+    pressure, contraction = np.array([1e5, 2e5, 3e5, 4e5]), np.full(4, 0.1)
+    force, modelled = np.array([0.0, 50.0, 0.0, 150.0]), np.array([2.0, 50.0, 100.0, 150.0])
+    found = slack_pull(pressure, contraction, force, modelled, limit=10.0)
+    assert (found.rows, found.pulling, found.greatest) == (2, 0, 2.0)
+    modelled[0] = 60.0
+    assert slack_pull(pressure, contraction, force, modelled, limit=10.0).pulling == 1
+
+
+def test_the_slack_region_lies_below_the_pressure_and_above_the_contraction_of_slack_rows():
+    pressure = np.array([1e5, 3e5, 2e5])
+    contraction = np.array([0.05, 0.1, 0.12])
+    steps = Slackness.of(pressure, contraction, np.array([True, True, False]), np.array([False, False, True]))
+    assert steps.slack_limit(np.array([0.04, 0.05, 0.2])).tolist() == [-np.inf, 1e5, 3e5]
+    assert steps.pull_limit(np.array([0.05, 0.12, 0.13])).tolist() == [2e5, 2e5, np.inf]
+    p, c = steps.region(0.0, 0.12)
+    assert p.max() == 2e5
+    assert c.min() == 0.05
+
+
+def test_the_batch_sample_size_is_that_of_independent_groups():
+    random = np.random.default_rng(2)
+    assert batch_sample_size(random.normal(size=10_000)) == pytest.approx(10_000, rel=0.35)
+    groups = np.repeat(random.normal(size=1000), 10) + 0.1 * random.normal(size=10_000)
+    assert batch_sample_size(groups) == pytest.approx(1000, rel=0.35)
+    assert batch_sample_size(np.zeros(9)) == 9
+
+
+def test_all_rows_slack_is_a_clear_error(measured):
+    slack = [run.with_columns(force=np.full(len(run), -1.0)) for run in measured]
+    with pytest.raises(IdentificationError, match="no measured value"):
+        fit(
+            PooledLengthLaw(LogarithmicLength(blank_surface(2), blank_surface(1), 0.2, 0.2), (blank_surface(2),)), slack
+        )
