@@ -175,17 +175,19 @@ def estimate_covariance(
     independent = ParameterCovariance(basis, sigma, spare, count, specimens)
     if spare <= 0 or not parameters or not sigma > 0:
         return independent
-    rows = np.column_stack([weighted @ basis, residuals])
+    rows = weighted @ basis
     levels = [(SPECIMENS, runs.specimen)] if specimens < count else []
     for unit, group in (*levels, (RUNS, runs.run)):
-        found = _group(independent, rows, group, unit) if np.unique(group).size >= MIN_GROUPS else independent
+        found = (
+            _group(independent, rows, residuals, group, unit) if np.unique(group).size >= MIN_GROUPS else independent
+        )
         if found.groups is not None and found.degrees_of_freedom >= MIN_DEGREES_OF_FREEDOM:
             return found
     if not (runs.in_time or _is_correlated(residuals, runs.run)):
         return independent
     parts = max(-(-(parameters + SPARE_GROUPS) // count), 2)
     while count * parts * MIN_GROUP_ROWS <= len(residuals):
-        found = _group(independent, rows, successive_parts(runs.run, parts), PARTS)
+        found = _group(independent, rows, residuals, successive_parts(runs.run, parts), PARTS)
         if found.degrees_of_freedom >= MIN_DEGREES_OF_FREEDOM:
             return found
         parts += 1
@@ -213,11 +215,13 @@ def successive_parts(run: Indices, parts: int) -> Indices:
     return groups
 
 
-def _group(independent: ParameterCovariance, rows: Array, group: Indices, unit: str) -> ParameterCovariance:
-    """The covariance by groups (N,), from the Jacobian in its orthonormal basis and the residuals, (N, P + 1)."""
+def _group(
+    independent: ParameterCovariance, rows: Array, residuals: Array, group: Indices, unit: str
+) -> ParameterCovariance:
+    """The covariance by groups (N,), from the Jacobian in its orthonormal basis (N, P) and the residuals (N,)."""
     parts = _split(rows, group)
-    sums = np.array([part[:, :-1].T @ part for part in parts])
-    leverages, raw = sums[:, :, :-1], sums[:, :, -1]
+    leverages = np.array([part.T @ part for part in parts])
+    raw = np.array([part.T @ errors for part, errors in zip(parts, _split(residuals, group), strict=True)])
     values, vectors = np.linalg.eigh(leverages)
     values = np.clip(values, 0.0, _MAX_LEVERAGE)
     enlarged = (vectors * (values / (1.0 - values))[:, None, :]) @ np.swapaxes(vectors, 1, 2)
@@ -227,8 +231,10 @@ def _group(independent: ParameterCovariance, rows: Array, group: Indices, unit: 
 
 def _split(rows: Array, group: Indices) -> list[Array]:
     """The rows of each group, in their order."""
-    order = np.argsort(group, kind="stable")
-    return np.split(rows[order], np.flatnonzero(np.diff(group[order])) + 1)
+    if (np.diff(group) < 0).any():
+        order = np.argsort(group, kind="stable")
+        rows, group = rows[order], group[order]
+    return np.split(rows, np.flatnonzero(np.diff(group)) + 1)
 
 
 def _degrees_of_freedom(leverages: Array, rows: Array) -> Array:
