@@ -72,6 +72,7 @@ class Ratings:
     )
     min_length: float = _lower_limit("m", "L_min", "minimum nominal length", LENGTH_BOUNDS)
     max_length: float = _upper_limit("m", "L_max", "maximum nominal length", LENGTH_BOUNDS)
+    diameter: float = _lower_limit("m", "D", "nominal inner diameter at rest; 0 is not stated", (0.0, 1.0))
     min_temperature: float = _lower_limit("K", "T_min", "minimum permitted ambient temperature", TEMPERATURE_BOUNDS)
     max_temperature: float = _upper_limit("K", "T_max", "maximum permitted ambient temperature", TEMPERATURE_BOUNDS)
 

@@ -47,6 +47,7 @@ def choice_row(choice: MuscleChoice) -> dict[str, Any]:
         "force, short [N]": last.force,
         "reserve [%]": 100 * choice.design.reserve,
         "air a cycle [l (ANR)]": _scaled(choice.reference_volume, 1e3),
+        "air a minute [l (ANR)]": _scaled(choice.reference_volume, 6e4 / choice.conditions.cycle_time),
         "energy of the air [J]": choice.air_energy,
         "efficiency [%]": _scaled(choice.efficiency, 100.0),
         "diameter [mm]": _scaled(choice.diameter, 1e3),
@@ -73,12 +74,14 @@ def choice_tables(result: SizingResult) -> tuple[Table, Table]:
     points = {header: values for header, values in columns.items() if header.startswith((*COMMON, *ends))}
     others = {header: values for header, values in columns.items() if not header.startswith(ends)}
     note = (
-        "Long and short: the end points of each muscle. Reserve: force beyond the load at the largest working pressure."
+        "Long and short: the end points of each muscle. Reserve: force beyond the load at the largest working "
+        "pressure. Rows of one product (DMSP-20, say) are different published laws of it: the spread of their lengths is the "
+        "uncertainty of the models, not a choice between muscles."
     )
     air = (
         "Air: that of all muscles, at the reference atmosphere of ISO 8778, without tubes; – where the law has no "
         "geometry. Energy: available energy of this air at the supply pressure. Efficiency: work against the load "
-        "divided by it. Diameter: at the contracted end, without the wall."
+        "divided by it. A minute: without pauses. Diameter: at the contracted end, without the wall."
     )
     return Table("choices", "Choices, best first", points, note), Table("air", "Air and dimensions", others, air)
 

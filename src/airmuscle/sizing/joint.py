@@ -19,6 +19,9 @@ ZOOMS = 12
 """Refinements of the search, each by a factor of 8."""
 MARGIN = 1.1
 """Ratio of the length for which the range of radii is stated to the shortest one (chosen)."""
+MOUNTING = 1.1
+"""Ratio of the distance of the muscles on both sides of a pulley, its diameter, to their outer diameter at pressure: a
+tenth for wall and clearance (chosen)."""
 ROUNDING = 1e-9
 """Part of the length by which a condition may be missed through rounding (chosen)."""
 
@@ -28,10 +31,12 @@ class JointSearch:
     """Search of the lengths and radii with which a joint of 2 x `count` equal muscles meets its requirement.
 
         n r (F_max(eps_c) - F_min(eps_e)) >= S_F M,   n r (F_max(eps_e) - F_min(eps_c)) >= S_F (M + M_J),
-        eps_c - eps_e = r Theta/L
+        eps_c - eps_e = r Theta/L,   2 r >= 1.1 D(eps_c)
 
     at either end of the range; eps_c, eps_e contraction of the contracted and the extended muscle, F_max capacity,
-    F_min force at the least pressure, M_J torque that accelerates the inertia, which the extended muscle gives.
+    F_min force at the least pressure, M_J torque that accelerates the inertia, which the extended muscle gives, D outer
+    diameter at pressure: the muscles on both sides of the pulley do not touch. Those of one side are side by side along
+    the axis of the joint.
     """
 
     requirement: JointRequirement
@@ -49,7 +54,8 @@ class JointSearch:
         return np.asarray(self._needed_of_each(muscle, extended, contracted).max(axis=0))
 
     def _needed_of_each(self, muscle: StaticMuscle, extended: Array, contracted: Array) -> Array:
-        """Needed lengths [m] (2, E, C) for the torques of the contracted and of the extended muscle."""
+        """Needed lengths [m] (3, E, C) for the torques of the contracted and of the extended muscle, and for a pulley
+        that leaves room for the muscles."""
         torques = self._torques
         upper, lower = muscle.capacity(contracted), muscle.floor(extended)[:, None]
         upper_extended, lower_contracted = muscle.capacity(extended)[:, None], muscle.floor(contracted)
@@ -58,6 +64,7 @@ class JointSearch:
         with np.errstate(divide="ignore", invalid="ignore"):
             lengths = [self.conditions.safety_factor * torque / (self.count * gain)
                        for torque, gain in zip(torques, gains, strict=True)]  # fmt: skip
+            lengths.append(0.5 * MOUNTING * muscle.outer_diameter(contracted) / ratio)
         possible = (ratio > 0.0) & (gains[0] > 0.0) & (gains[1] > 0.0)
         return np.where(possible, np.array(lengths), math.inf)
 
@@ -132,8 +139,15 @@ class JointSearch:
     def shortfall(self, muscle: StaticMuscle, length: float) -> str:
         """Reason why a length [m] is not sufficient."""
         shortest, extended, contracted = self._best(muscle)
-        lengths = self._needed_of_each(muscle, np.array([extended]), np.array([contracted]))
-        limiting = int(np.argmax(lengths))  # the muscle whose torque determines the shortest length
+        lengths = self._needed_of_each(muscle, np.array([extended]), np.array([contracted])).ravel()
+        limiting = int(np.argmax(lengths[:2]))  # the muscle whose torque determines the shortest length
+        if lengths[2] > lengths[limiting]:
+            return (
+                f"with {1e3 * length:.4g} mm, the pulley has a radius of at most "
+                f"{1e3 * self._radius(length, contracted - extended):.4g} mm; the muscles on both sides, "
+                f"{1e3 * float(muscle.outer_diameter(np.array(contracted))):.4g} mm thick at pressure, need "
+                f"{1e3 * self._radius(shortest, contracted - extended):.4g} mm"
+            )
         needed = self.conditions.safety_factor * self._torques[limiting]
         reached = needed * length / shortest  # the needed length is proportional to the torque
         inertia = " with that of the inertia" if limiting else ""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,28 +29,57 @@ MAX_GROWTH = 50.0
 """Maximum ratio of the length to that of the end points alone (chosen)."""
 
 
+class LoadRange(NamedTuple):
+    """Least and greatest load of one muscle [N] at a position: at rest, and accelerated in a harmonic motion."""
+
+    least: Any
+    greatest: Any
+
+
 @dataclasses.dataclass(frozen=True)
 class LiftSearch:
-    """Search of the lengths and mountings with which `count` muscles in parallel meet a lift."""
+    """Search of the lengths and mountings with which `count` muscles in parallel meet a lift.
+
+    At each position, the muscle holds the safety factor times the load, and can yield to it, both at rest and in a
+    harmonic motion over the stroke with the cycle time.
+    """
 
     requirement: LiftRequirement
     conditions: SizingConditions
     count: int
 
-    @property
-    def _loads(self) -> tuple[float, float]:
-        """Load of one muscle [N] at the start and at the end."""
-        return self.requirement.load(0.0) / self.count, self.requirement.load(self.requirement.stroke) / self.count
+    def _loads(self, displacement: Array) -> LoadRange:
+        """Least and greatest load of one muscle [N] at displacements [m]. Raises SolveError if it overshoots."""
+        least, greatest = self.requirement.loads(displacement, self.conditions.cycle_time)
+        if not least.min() > 0.0:
+            at = 1e3 * float(displacement[least.argmin()])
+            raise SolveError(
+                f"with a cycle of {self.conditions.cycle_time:.4g} s, the load pulls with {least.min():.4g} N at "
+                f"{at:.4g} mm, where it is decelerated: it would overshoot. Give a longer cycle time"
+            )
+        return LoadRange(least / self.count, greatest / self.count)
 
-    def margin(self, muscle: StaticMuscle, contraction: Array, load: Array | float) -> Array:
+    @property
+    def _ends(self) -> tuple[LoadRange, LoadRange]:
+        """Loads of one muscle [N] at the start and at the end."""
+        least, greatest = self._loads(np.array([0.0, self.requirement.stroke]))
+        return LoadRange(least[0], greatest[0]), LoadRange(least[1], greatest[1])
+
+    @property
+    def _path(self) -> tuple[Array, LoadRange]:
+        """Displacements [m] along the stroke and the loads [N] there, (PATH_POINTS,) each."""
+        displacement, _ = self.requirement.path
+        return displacement, self._loads(displacement)
+
+    def margin(self, muscle: StaticMuscle, contraction: Array, load: LoadRange) -> Array:
         """Force [N] by which a load is inside the limits of the muscle at a contraction [1]; negative outside."""
-        upper = muscle.capacity(contraction) - self.conditions.safety_factor * load
-        return np.asarray(np.minimum(upper, load - muscle.floor(contraction)))
+        upper = muscle.capacity(contraction) - self.conditions.safety_factor * load.greatest
+        return np.asarray(np.minimum(upper, load.least - muscle.floor(contraction)))
 
     @functools.lru_cache(maxsize=256)  # noqa: B019 - a search and its muscles are small
     def end_limits(self, muscle: StaticMuscle) -> tuple[float, float]:
         """Minimum contraction at the start and maximum at the end. Raises SolveError, with the reason."""
-        start, end = self._loads
+        start, end = self._ends
         grid = np.linspace(*muscle.contraction_range, GRID)
         possible = [np.flatnonzero(self.margin(muscle, grid, load) >= 0.0) for load in (start, end)]
         for load, rows, place in zip((start, end), possible, ("start", "end"), strict=True):
@@ -65,7 +95,7 @@ class LiftSearch:
             )
         return low, high
 
-    def _edge(self, muscle: StaticMuscle, load: float, inside: float, outside: float) -> float:
+    def _edge(self, muscle: StaticMuscle, load: LoadRange, inside: float, outside: float) -> float:
         """The contraction between two neighbours of the grid at which the margin is zero, from inside."""
         for _ in range(ZOOMS):
             grid = np.linspace(inside, outside, GRID)
@@ -75,15 +105,15 @@ class LiftSearch:
             inside, outside = float(grid[last]), float(grid[last + 1])
         return float(inside)
 
-    def _no_contraction(self, muscle: StaticMuscle, grid: Array, load: float, place: str) -> str:
-        capacity, needed = muscle.capacity(grid), self.conditions.safety_factor * load
+    def _no_contraction(self, muscle: StaticMuscle, grid: Array, load: LoadRange, place: str) -> str:
+        capacity, needed = muscle.capacity(grid), self.conditions.safety_factor * float(load.greatest)
         best = int(np.argmax(capacity))
         if capacity[best] < needed:
             permitted = ", which the maker permits" if capacity[best] >= muscle.max_force else ""
             return f"{_force_at(muscle, float(grid[best]))}{permitted}; {needed:.4g} N is needed"
         least = float(muscle.floor(grid).min())
         return (
-            f"the load at the {place}, {load:.4g} N, is less than the force at the least pressure of "
+            f"the load at the {place}, {load.least:.4g} N, is less than the force at the least pressure of "
             f"{muscle.pressure_range[0] / 1e5:.4g} bar, {least:.4g} N"
         )
 
@@ -94,10 +124,10 @@ class LiftSearch:
         if used > (high - low) * (1.0 + ROUNDING):
             return None
         starts = np.unique(np.linspace(low, max(low, high - used), MOUNTINGS))
-        displacement, load = self.requirement.path
+        displacement, load = self._path
         contractions = np.minimum(starts[:, None] + displacement / length, muscle.contraction_range[1])
-        margins = self.margin(muscle, contractions, load / self.count)
-        possible = np.flatnonzero((margins >= -ROUNDING * load / self.count).all(axis=1))
+        margins = self.margin(muscle, contractions, load)
+        possible = np.flatnonzero((margins >= -ROUNDING * load.greatest).all(axis=1))
         return float(starts[possible[0]]) if possible.size else None
 
     def required_length(self, muscle: StaticMuscle) -> float:
@@ -118,11 +148,12 @@ class LiftSearch:
             return None
         contractions = (start, min(start + self.requirement.stroke / length, muscle.contraction_range[1]))
         extended, contracted = (
-            muscle.end_point(eps, load) for eps, load in zip(contractions, self._loads, strict=True)
+            muscle.end_point(eps, self.requirement.load(at) / self.count)
+            for eps, at in zip(contractions, (0.0, self.requirement.stroke), strict=True)
         )
-        displacement, load = self.requirement.path
+        displacement, load = self._path
         along = np.minimum(start + displacement / length, muscle.contraction_range[1])
-        reserve = float(np.min(muscle.capacity(along) / (load / self.count))) - 1.0
+        reserve = float(np.min(muscle.capacity(along) / load.greatest)) - 1.0
         return MuscleDesign(extended, contracted, reserve)
 
     def shortfall(self, muscle: StaticMuscle, length: float) -> str:
@@ -135,7 +166,7 @@ class LiftSearch:
                 f"{100 * highest:.4g} % is allowed"
             )
         if needed > high:
-            force = self.conditions.safety_factor * self._loads[1]
+            force = self.conditions.safety_factor * float(self._ends[1].greatest)
             return f"with {1e3 * length:.4g} mm, {_force_at(muscle, needed)}; {force:.4g} N is needed"
         return f"with {1e3 * length:.4g} mm, the load exceeds the force between the ends of the stroke"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from ..core.arrays import Array
 from ..core.constants import STANDARD_GRAVITY
@@ -23,6 +23,7 @@ class LiftRequirement:
     """Lift: muscles in parallel move a load over a stroke; F(s) = m g + F_0 + k s at a displacement s from the start.
 
     m mass, F_0 constant force, k stiffness of a spring that is relaxed at the start. The load must pull at both ends.
+    The mass adds the force of a harmonic motion over the stroke with the cycle time, m (S/2 - s) (2 pi/T)^2.
     """
 
     from_file: ClassVar[bool] = False
@@ -40,22 +41,30 @@ class LiftRequirement:
                     "be greater than 0, because a muscle only pulls. Give a mass, a force, or a spring with a preload."
                 )
 
-    def load(self, displacement: float) -> float:
-        """Force of the load [N] at a displacement [m] from the start of the stroke."""
+    def load(self, displacement: Any) -> Any:
+        """Force of the load at rest [N] at a displacement [m] from the start of the stroke; arrays as well."""
         return self.mass * STANDARD_GRAVITY + self.force + self.stiffness * displacement
 
     @property
     def path(self) -> tuple[Array, Array]:
-        """Displacements [m] and loads [N] along the stroke, (PATH_POINTS,) each."""
+        """Displacements [m] and loads at rest [N] along the stroke, (PATH_POINTS,) each."""
         import numpy as np
 
         displacement = np.linspace(0.0, self.stroke, PATH_POINTS)
-        return displacement, np.array([self.load(s) for s in displacement.tolist()])
+        return displacement, np.broadcast_to(self.load(displacement), displacement.shape)
+
+    def loads(self, displacement: Array, cycle_time: float) -> tuple[Array, Array]:
+        """Least and greatest force of the load [N] at displacements [m], at rest or moving with a cycle time [s]."""
+        import numpy as np
+
+        held = self.load(displacement)
+        moving = held + self.mass * (0.5 * self.stroke - displacement) * (2 * math.pi / cycle_time) ** 2
+        return np.minimum(held, moving), np.maximum(held, moving)
 
     @property
     def work(self) -> float:
         """Work against the load over the stroke [J]."""
-        return 0.5 * (self.load(0.0) + self.load(self.stroke)) * self.stroke
+        return float(0.5 * (self.load(0.0) + self.load(self.stroke)) * self.stroke)
 
     def reduced(self, load: float = 1.0, travel: float = 1.0) -> LiftRequirement:
         """The requirement with a fraction of the load and of the stroke."""
@@ -68,6 +77,7 @@ class LiftRequirement:
         """Load and stroke as text."""
         first, last = self.load(0.0), self.load(self.stroke)
         load = f"{first:.4g} N" if math.isclose(first, last) else f"{first:.4g} to {last:.4g} N"
+        load = f"{self.mass:.4g} kg ({load})" if self.mass else load
         return f"{load} over {1e3 * self.stroke:.4g} mm"
 
 

@@ -22,6 +22,14 @@ from ..muscle.characteristic.validity_range import validity_range_of
 from ..muscle.ratings import LENGTH_BOUNDS
 from .requirement import SizingConditions
 
+LEAST_DIAMETERS = 3.0
+"""Least nominal length over the nominal diameter (chosen). The makers state one range of lengths for all diameters; a
+muscle shorter than three diameters is its two end fittings, to which no law of a cylinder applies."""
+EXPANSION = 1.75
+"""Ratio of the diameter at pressure to that at rest, for a law without a geometry (chosen): that of a braid of 25
+degrees at a contraction of 25 %."""
+OUTLINE_POINTS = 33
+"""Contractions at which the diameter is evaluated; linear between them (chosen)."""
 BISECTIONS = 80
 """Bisections of the force of a law that is not solved for it; they reach rounding precision."""
 TRIAL_RATIO = 1.001
@@ -111,6 +119,22 @@ class StaticMuscle(ShortRepr):
         _, radii = self.entry.geometry.outline(contraction)
         return 2.0 * float(np.max(radii))
 
+    def outer_diameter(self, contraction: Array) -> Array:
+        """Outer diameter at pressure [m] at contractions (N,), without the wall; 0 if it is not known.
+
+        That of the geometry; without one, 1.75 times the nominal diameter of the product.
+        """
+        if self.entry.geometry is None:
+            nominal = self.entry.ratings.diameter if self.entry.ratings is not None else 0.0
+            return np.full(np.shape(contraction), EXPANSION * nominal)
+        return np.interp(contraction, *self._outline)
+
+    @functools.cached_property
+    def _outline(self) -> tuple[Array, Array]:
+        """Contractions [1] and outer diameters [m], (OUTLINE_POINTS,) each."""
+        contractions = np.linspace(*self.contraction_range, OUTLINE_POINTS)
+        return contractions, np.array([self.diameter(float(each)) for each in contractions])
+
 
 def static_muscle(entry: Entry, conditions: SizingConditions) -> StaticMuscle:
     """The static muscle of an entry. Raises ParameterError if it has no working range, with the reason."""
@@ -150,7 +174,7 @@ def own_length(entry: Entry) -> float | None:
 
 
 def length_range(entry: Entry, max_length: float) -> LengthRange:
-    """Nominal lengths [m] for which the law of an entry can be used, up to `max_length`.
+    """Nominal lengths [m] for which the law of an entry can be used, from three diameters (chosen) up to `max_length`.
 
     Raises ParameterError if there are none, with the reason.
     """
@@ -158,6 +182,8 @@ def length_range(entry: Entry, max_length: float) -> LengthRange:
     length = own_length(entry)
     if length is not None and not _can_be_scaled(entry, length):
         low = high = length
+    elif entry.ratings is not None:
+        low = max(low, LEAST_DIAMETERS * entry.ratings.diameter)
     if low > max_length:
         what = "only length" if low == high else "least length"
         raise ParameterError(f"its {what} is {1e3 * low:.4g} mm; at most {1e3 * max_length:.4g} mm is allowed")
