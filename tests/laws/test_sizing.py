@@ -203,7 +203,7 @@ def test_the_muscles_on_both_sides_of_a_pulley_do_not_touch(name: str, torque: f
     assert choice.length == 3 * nominal or not (room & (loads >= 1.5 * torque)).any()  # none is shorter
 
 
-@pytest.mark.parametrize(("torque", "inertia", "deciding"), [(2.0, 0.0, 0), (0.3, 1.0, 1)])
+@pytest.mark.parametrize(("torque", "inertia", "deciding"), [(0.3, 0.0, 0), (0.1, 2.0, 1)])
 def test_the_reserve_of_a_joint_is_that_of_the_end_with_less(torque: float, inertia: float, deciding: int):
     requirement = dataclasses.replace(JOINT, torque=torque, inertia=inertia)
     choice = choose(am.load("dmsp-20-300"), requirement, SIX_BAR)  # longer than the torques need: the pulley decides
@@ -213,7 +213,7 @@ def test_the_reserve_of_a_joint_is_that_of_the_end_with_less(torque: float, iner
     needed = torque, torque + inertia * 0.5 * JOINT.angle * (2 * math.pi / SIX_BAR.cycle_time) ** 2
     factors = [arm * (high - low) / each for high, low, each in zip(full, least, needed, strict=True)]
     assert np.argmin(factors) == deciding
-    assert factors[deciding] > 1.6
+    assert factors[deciding] > 1.59
     assert factors[1 - deciding] > 1.2 * factors[deciding]
     assert choice.design.reserve == pytest.approx(factors[deciding] - 1.0, rel=1e-9)
 

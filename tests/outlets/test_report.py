@@ -504,7 +504,7 @@ def cases(*values: float | None, kind: Kind = Kind.CLAIM, **more: bool) -> tuple
         (cases(2.0, 0.5), "depends"),
         (cases(2.0, None), "holds"),
         (cases(None), "not printed"),
-        (cases(2.0, 0.5, lost=True), "not testable"),
+        (cases(2.0, 0.5, untestable=True), "not testable"),
     ],
 )
 def test_a_statement_with_several_cases_counts_once(claims: tuple[Claim, ...], verdict: str):

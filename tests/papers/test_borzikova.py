@@ -172,14 +172,17 @@ def test_linearised_as_gauss_newton_the_fit_is_least_squares():
 
 def test_the_catalogue_contradicts_itself_and_the_measurements():
     lifted, smaller, diameter, *contracted = muscle_claims.catalogue_claims(CURVES)
-    assert (lifted.printed.value, lifted.reproduced, lifted.verdict) == (35.0, 30.0, DIFFERS)
-    assert (smaller.printed.value, smaller.reproduced, smaller.verdict) == (12.0, 12.0, HOLDS)
+    assert (lifted.printed.value, lifted.reproduced, lifted.verdict) == (
+        35.0,
+        30.0,
+        NOT_TESTABLE,
+    )  # force, and load at 25 %
+    assert (smaller.printed.value, smaller.reproduced, smaller.verdict) == (12.0, 12.0, NOT_TESTABLE)
     assert (diameter.printed.value, diameter.reproduced, diameter.verdict) == (6.0, 12.0, DIFFERS)
     assert [c.case.split(",")[0] for c in contracted] == ["3 kg", "12 kg", "30 kg", "75 kg"]
-    assert [c.verdict for c in contracted] == [NOT_TESTABLE, NOT_TESTABLE, DIFFERS, NOT_TESTABLE]
+    assert [c.verdict for c in contracted] == [NOT_TESTABLE] * 4  # the pressure is not printed
     contracted = contracted[2]
     assert contracted.reproduced == pytest.approx(19.734, abs=5e-4)
-    assert contracted.verdict == DIFFERS
 
 
 def test_the_saturation_is_not_reached_within_the_pressure_range():

@@ -341,7 +341,7 @@ def test_the_step_lies_in_the_range_of_the_sensor_only_as_absolute_pressure():
 def test_own_checks_and_derived_numbers_stand_apart_from_the_claims(chapter):
     claims = chapter.claims
     checks = {s.claim for s in statements(claims, Kind.CHECK)}
-    assert len(checks) == 9
+    assert len(checks) == 10
     assert any("number of steps" in text for text in checks)
     assert not any("coefficients" in s.claim or "Rodas4" in s.claim for s in statements(claims))
     published = {c.as_dict()["published"] for c in claims}

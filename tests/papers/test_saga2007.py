@@ -493,13 +493,17 @@ def test_claim_5_is_not_testable_and_compared_with_the_exact_meridian_on_every_l
 
 
 def test_200_newton_are_reached_as_a_maximum_of_its_own():
-    assert {c.verdict for c in further.largest_force_claims()} == {HOLDS}
+    assert {c.verdict for c in further.largest_force_claims()} == {NOT_TESTABLE}  # at 0 % every law reaches any force
+    assert all(c.reproduced > 200.0 for c in further.largest_force_claims())
     weak = replace(exact_mechanics(LINE_A), wall_thickness=0.0022)
     assert further.tension(weak, 0.11e6, 0.01) < 200.0
 
 
-def test_the_tube_expands_by_more_than_the_rubber_test():
-    outline, exact = further.expansion_claims()
+def test_the_tube_expands_by_300_per_cent_near_20_and_by_more_at_35_per_cent():
+    early, _, outline, exact = further.expansion_claims()
+    assert early.reproduced == pytest.approx(100 * 1.5 * math.sqrt(24 * 0.2 * 0.8), rel=1e-12)
+    assert early.verdict == HOLDS
+    assert {s.verdict for s in statements(further.expansion_claims())} == {DEPENDS}
     assert outline.reproduced == pytest.approx(100 * 1.5 * math.sqrt(24 * 0.35 * 0.65), rel=1e-12)
     assert (round(outline.reproduced), outline.verdict, exact.verdict) == (350, DIFFERS, DIFFERS)
     assert exact.reproduced > outline.reproduced
@@ -508,8 +512,10 @@ def test_the_tube_expands_by_more_than_the_rubber_test():
 def test_a_ring_reduces_the_force_at_equal_pressure_and_contraction():
     """Without rubber the exact tension at 5 % is 1652.5 instead of 4863.3 mm2 times the pressure."""
     found = further.ring_force_claims()
-    assert len(found) == 4
-    assert all(claim.verdict == DIFFERS and claim.reproduced < 0.5 for claim in found)
+    equal = [claim for claim in found if claim.case.endswith("equal pressure")]
+    assert (len(equal), len(found)) == (4, 8)
+    assert all(claim.verdict == DIFFERS and claim.reproduced < 0.5 for claim in equal)
+    assert {s.verdict for s in statements(found)} == {DEPENDS}  # the paper's reason is a higher supply pressure
     free = [replace(exact_mechanics(LINE_A, n), rubber=RubberLine(0.0, 0.0)).force(0.11e6, 0.05) for n in (0, 1)]
     assert free[1] / free[0] == pytest.approx(1652.497 / 4863.313, rel=0.1)
 
@@ -522,12 +528,11 @@ def test_little_change_of_the_pressure_depends_on_load_and_model():
     assert exact.verdict == DIFFERS
 
 
-def test_a_thinner_wall_and_a_larger_diameter_lower_the_pressure_for_a_small_contraction():
-    found = further.dimension_claims()
-    assert len(found) == 8
-    assert all(c.reproduced < 0.75 for c in found)
-    halves = [c.reproduced for c in found if "wall" in c.case]
-    assert halves == pytest.approx([0.5] * 4, rel=1e-5), "unloaded, the pressure is proportional to the wall"
+def test_a_thicker_wall_raises_the_pressure_for_a_small_contraction():
+    found = further.wall_claims()
+    assert {c.verdict for c in found} == {HOLDS}
+    ratios = [c.reproduced for c in found]
+    assert ratios == pytest.approx([1.5] * 4, rel=1e-5), "unloaded, the pressure is proportional to the wall"
 
 
 def test_the_wall_thins_as_incompressible_rubber_does():

@@ -100,7 +100,8 @@ class Claim:
 
     `case` names the interpretation, load or range for which the statement is evaluated; a statement with several cases
     counts once. `printed` is None if the paper gives no value to compare with, `reproduced` is None if no value can be
-    computed; in both cases the verdict is "not printed". `lost` marks a statement about measurements that are lost: its
+    computed; in both cases the verdict is "not printed". `untestable` marks a statement that no
+    computation can decide, because its measurements are lost, its condition is not printed or every law fulfils it: its
     verdict is "not testable". `note` gives the reason of a difference, or the values chosen.
     """
 
@@ -112,7 +113,7 @@ class Claim:
     note: str = ""
     case: str = ""
     kind: Kind = Kind.CLAIM
-    lost: bool = False
+    untestable: bool = False
 
     @property
     def text(self) -> str:
@@ -121,7 +122,7 @@ class Claim:
 
     @property
     def verdict(self) -> str:
-        if self.lost:
+        if self.untestable:
             return NOT_TESTABLE
         if self.printed is None or self.reproduced is None or not math.isfinite(self.reproduced):
             return NOT_PRINTED

@@ -33,7 +33,7 @@ MEANINGS = {
     HOLDS: "The reproduced value agrees with the expected one within the tolerance, in every reading.",
     DIFFERS: "The reproduced value does not agree with the expected one, in any reading.",
     DEPENDS: "It agrees in some readings of the paper and not in others.",
-    NOT_TESTABLE: "The paper compares with measurements that are lost.",
+    NOT_TESTABLE: "Its measurements are lost, its condition is not printed, or every law fulfils it.",
     NOT_PRINTED: "The paper gives no value to compare with, or no value can be computed.",
 }
 """Meaning of each verdict."""

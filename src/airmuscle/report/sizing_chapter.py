@@ -75,8 +75,8 @@ def choice_tables(result: SizingResult) -> tuple[Table, Table]:
     others = {header: values for header, values in columns.items() if not header.startswith(ends)}
     note = (
         "Long and short: the end points of each muscle. Reserve: force beyond the load at the largest working "
-        "pressure. Rows of one product (DMSP-20, say) are different published laws of it: the spread of their lengths is the "
-        "uncertainty of the models, not a choice between muscles."
+        "pressure. Rows of one product (DMSP-20, say) are different published laws of it: the spread of their lengths "
+        "is the uncertainty of the models, not a choice between muscles."
     )
     air = (
         "Air: that of all muscles, at the reference atmosphere of ISO 8778, without tubes; – where the law has no "

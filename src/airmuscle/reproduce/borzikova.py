@@ -77,7 +77,7 @@ def curve_claims(curves: PlaneCurves) -> tuple[Claim, ...]:
             "1",
             "The index compares the curve with the measured points, which are lost, so it cannot be computed.",
             case=f"{curve.force:g} N",
-            lost=True,
+            untestable=True,
         )
         for curve in curves.curves
     )

@@ -52,7 +52,7 @@ def measurement_claims() -> tuple[Claim, ...]:
         Claim(PAPER, text, AtMost(SENSOR_RANGE), SUPPLY_PRESSURE / 1e6, "MPa", inferred, "step absolute"),
         Claim(PAPER, text, AtMost(SENSOR_RANGE), 0.65, "MPa", inferred, "step gauge"),
         Claim(
-            PAPER, "the hysteresis of a fluidic muscle is less pronounced", None, None, "%", hysteresis, lost=True
+            PAPER, "the hysteresis of a fluidic muscle is less pronounced", None, None, "%", hysteresis, untestable=True
         ),
     )  # fmt: skip
 

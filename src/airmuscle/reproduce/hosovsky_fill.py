@@ -88,7 +88,7 @@ def claims(fill: FillRun, explanation: str = "") -> tuple[Claim, ...]:
     return (
         *_valve_claims(fill),
         *_integrator_claims(fill),
-        Claim(PAPER, deviations, None, None, "kPa", note, lost=True),
+        Claim(PAPER, deviations, None, None, "kPa", note, untestable=True),
     )
 
 
@@ -121,7 +121,8 @@ def _valve_claims(fill: FillRun) -> tuple[Claim, ...]:
             Equal(650.0, 0.1),
             float(filled) / 1e3,
             "kPa abs",
-            "650 kPa is assumed to be absolute (inferred).",
+            "650 kPa is the supply pressure that is put in, assumed to be absolute (inferred).",
+            kind=Kind.CHECK,
         ),
     )
 

@@ -8,7 +8,7 @@ from ..muscle.geometry.pleated import DAERDEN_LEFEBER_2001
 from ..report.chapter import Chapter
 from .saga2007_claims import ACCURACY_LIMIT, LOW_PRESSURE, all_claims
 from .saga2007_figures import plots
-from .saga2007_further_claims import FIRST_PERCENT, LITTLE_CHANGE, THIN_WALL, WIDE_DIAMETER
+from .saga2007_further_claims import FIRST_PERCENT, HIGHER_PRESSURE, LITTLE_CHANGE, THICK_WALL
 from .saga2007_joint import LIMIT
 from .saga2007_muscle import PAPER
 from .saga2007_tables import tables
@@ -40,7 +40,8 @@ CHOSEN = (
     ("limit of accuracy in the comparisons on claim 5", f"{100 * ACCURACY_LIMIT:g} % of the pressure", "chosen"),
     ("contraction at which 200 N is a maximum of its own", f"{100 * FIRST_PERCENT:g} %", "chosen"),
     ("little change of the pressure", f"{100 * LITTLE_CHANGE:g} % from 10 to 30 % contraction", "chosen"),
-    ("thinner wall, larger diameter", f"{1e3 * THIN_WALL:g} mm, {1e3 * WIDE_DIAMETER:g} mm", "chosen"),
+    ("thicker wall", f"{1e3 * THICK_WALL:g} mm", "chosen"),
+    ("pressure that a muscle with rings withstands", f"{HIGHER_PRESSURE:g} times that without", "chosen"),
     ("pressures and load of Fig. 1", "0.11 and 0.16 MPa, 100 N", "chosen"),
     ("pair of muscles under feed-forward control", "radius 12 mm, 8 % at angle 0, 50 N, to 15 degrees", "chosen"),
     ("error of the angle of this pair", f"{LIMIT:g} % of the greatest angle", "chosen"),

@@ -76,7 +76,7 @@ def force_limit_claim() -> Claim:
 
 
 def initial_pressure_claims(law: am.characteristic.Saga2007, name: str) -> tuple[Claim, Claim]:
-    """Return claim 3, low initial pressure, and the paper's contradicting sentence, high initial pressure."""
+    """Return claim 3, low initial pressure, and the general sentence on a high initial pressure."""
     first, later = (float(law.equilibrium_pressure(c, 0.0)) for c in (0.01, 0.10))
     needed = max(law.threshold_pressure, first)
     low = _claim(
@@ -94,8 +94,8 @@ def initial_pressure_claims(law: am.characteristic.Saga2007, name: str) -> tuple
         needed / later,
         "1",
         name,
-        "Ratio of the pressures for 1 % and for 10 %, without load. The sentence supports line A and contradicts claim "
-        "3.",
+        "Ratio of the pressures for 1 % and for 10 %, without load. The paper says this of such muscles in general. It "
+        "supports line A.",
     )
     return low, high
 
@@ -144,7 +144,7 @@ def accuracy_claims() -> tuple[Claim, ...]:
         "The measurements and the wall thickness at rest and under pressure are lost; the paper suspects this cause."
     )
     return tuple(
-        Claim(PAPER, text, None, None, "%", reason, lost=True)
+        Claim(PAPER, text, None, None, "%", reason, untestable=True)
         for text, reason in (
             ("5. The model is accurate below 20 %", note),
             ("5. The model deviates above 20 %", note),
