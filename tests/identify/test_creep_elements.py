@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -96,3 +98,17 @@ def test_a_hold_that_ends_within_the_dead_time_is_no_fit_of_the_motion():
     with pytest.raises(IdentificationError, match=r"the hold ends 0\.18 s after"):
         HeldRows.after(record, 0.12)
     assert HeldRows.after(record, 0.05).recording["force"] == pytest.approx(340.0)
+
+
+@pytest.mark.parametrize("step", [0.01, -0.02])
+def test_compliance_and_stiffness_of_the_conversion_are_reciprocal(step):
+    """D(s) (K + Sum k_i s tau_i/(1 + s tau_i)) = 1 at every s, exactly: the conversion is algebra."""
+    stiffness, length, creep, times = 2.5e4, 0.3, np.array([0.003, 0.002]) * np.sign(step), np.array([0.8, 12.0])
+    fit = SimpleNamespace(unit="", creep=SimpleNamespace(amplitudes=tuple(creep), time_constants=tuple(times)))
+    found = creep_elements(fit, step=step, stiffness=stiffness, resting_length=length)
+    load = stiffness * (step + length * creep.sum())
+    relaxation = np.array(found.relaxation_times)
+    for s in (0.0, 1e-3, 0.1, 1.0, 30.0, 1e6):
+        compliance = (step + length * np.sum(creep / (1 + s * times))) / load
+        dynamic = stiffness + np.sum(np.array(found.stiffnesses) * s * relaxation / (1 + s * relaxation))
+        assert compliance * dynamic == pytest.approx(1.0, abs=1e-9)
