@@ -29,7 +29,7 @@ MAX_GROWTH = 50.0
 """Maximum ratio of the length to that of the end points alone (chosen)."""
 
 
-class LoadRange(NamedTuple):
+class LoadLimits(NamedTuple):
     """Least and greatest load of one muscle [N] at a position: at rest, and accelerated in a harmonic motion."""
 
     least: Any
@@ -48,7 +48,7 @@ class LiftSearch:
     conditions: SizingConditions
     count: int
 
-    def _loads(self, displacement: Array) -> LoadRange:
+    def _loads(self, displacement: Array) -> LoadLimits:
         """Least and greatest load of one muscle [N] at displacements [m]. Raises SolveError if it overshoots."""
         least, greatest = self.requirement.loads(displacement, self.conditions.cycle_time)
         if not least.min() > 0.0:
@@ -57,21 +57,21 @@ class LiftSearch:
                 f"with a cycle of {self.conditions.cycle_time:.4g} s, the load pulls with {least.min():.4g} N at "
                 f"{at:.4g} mm, where it is decelerated: it would overshoot. Give a longer cycle time"
             )
-        return LoadRange(least / self.count, greatest / self.count)
+        return LoadLimits(least / self.count, greatest / self.count)
 
     @property
-    def _ends(self) -> tuple[LoadRange, LoadRange]:
+    def _ends(self) -> tuple[LoadLimits, LoadLimits]:
         """Loads of one muscle [N] at the start and at the end."""
         least, greatest = self._loads(np.array([0.0, self.requirement.stroke]))
-        return LoadRange(least[0], greatest[0]), LoadRange(least[1], greatest[1])
+        return LoadLimits(least[0], greatest[0]), LoadLimits(least[1], greatest[1])
 
     @property
-    def _path(self) -> tuple[Array, LoadRange]:
+    def _path(self) -> tuple[Array, LoadLimits]:
         """Displacements [m] along the stroke and the loads [N] there, (PATH_POINTS,) each."""
         displacement, _ = self.requirement.path
         return displacement, self._loads(displacement)
 
-    def margin(self, muscle: StaticMuscle, contraction: Array, load: LoadRange) -> Array:
+    def margin(self, muscle: StaticMuscle, contraction: Array, load: LoadLimits) -> Array:
         """Force [N] by which a load is inside the limits of the muscle at a contraction [1]; negative outside."""
         upper = muscle.capacity(contraction) - self.conditions.safety_factor * load.greatest
         return np.asarray(np.minimum(upper, load.least - muscle.floor(contraction)))
@@ -95,7 +95,7 @@ class LiftSearch:
             )
         return low, high
 
-    def _edge(self, muscle: StaticMuscle, load: LoadRange, inside: float, outside: float) -> float:
+    def _edge(self, muscle: StaticMuscle, load: LoadLimits, inside: float, outside: float) -> float:
         """The contraction between two neighbours of the grid at which the margin is zero, from inside."""
         for _ in range(ZOOMS):
             grid = np.linspace(inside, outside, GRID)
@@ -105,7 +105,7 @@ class LiftSearch:
             inside, outside = float(grid[last]), float(grid[last + 1])
         return float(inside)
 
-    def _no_contraction(self, muscle: StaticMuscle, grid: Array, load: LoadRange, place: str) -> str:
+    def _no_contraction(self, muscle: StaticMuscle, grid: Array, load: LoadLimits, place: str) -> str:
         capacity, needed = muscle.capacity(grid), self.conditions.safety_factor * float(load.greatest)
         best = int(np.argmax(capacity))
         if capacity[best] < needed:
