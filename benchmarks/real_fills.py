@@ -96,13 +96,18 @@ def make_model(
 
 MODELS = (
     make_model("isothermal, constant volume", am.Isothermal()),
-    make_model("polytropic 1.2, growing volume", am.Polytropic(), growing=True),
-    make_model("polytropic 1.2, growing volume with lag", am.Polytropic(), growing=True, lagging=True),
-    make_model("tube, constant volume, sensor in the tube", am.Polytropic(), line=True),
+    make_model("polytropic 1.2, growing volume", am.Polytropic(1.2), growing=True),
+    make_model("polytropic 1.2, growing volume with lag", am.Polytropic(1.2), growing=True, lagging=True),
+    make_model("tube, constant volume, sensor in the tube", am.Polytropic(1.2), line=True),
     make_model(
-        "tube, growing volume with lag, sensor in the tube", am.Polytropic(), growing=True, lagging=True, line=True
+        "tube, growing volume with lag, sensor in the tube", am.Polytropic(1.2), growing=True, lagging=True, line=True
     ),
 )
+
+GASES = (
+    am.Isothermal(), am.Polytropic(1.2), *(am.pneumatics.WallHeatTransfer(h) for h in (12.5, 25.0, 50.0)),
+)  # fmt: skip
+"""Gas models that are compared with the same unknowns, the default with half and twice its coefficient, too."""
 
 
 def read_record(path: pathlib.Path) -> am.Recording:
@@ -159,6 +164,15 @@ def show_record(name: str, fits: list[DynamicFit]) -> None:
             print(fits[-1].profile(path, 4))
 
 
+def compare_gases(records: list[am.Recording], starts: int) -> None:
+    """Print the rms errors of the gas models, for which nothing of the gas is fitted."""
+    print("\n## Gas models, rms error of each record [kPa]: constant volume, growing volume, tube and constant volume")
+    for gas in GASES:
+        variants = (make_model("", gas), make_model("", gas, growing=True), make_model("", gas, line=True))
+        errors = [[fit_record(v, r, starts).rms(v.sensor) / 1e3 for r in records] for v in variants]
+        print(f"{gas!s:35}", " | ".join(" ".join(f"{e:6.2f}" for e in each) for each in errors))
+
+
 def main() -> None:
     """Print the results of each record, and the prediction errors of each fit on the other records."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -176,6 +190,7 @@ def main() -> None:
         print(f"\n## Prediction of other records, rms error [kPa]; only {refitted} are fitted")
         for i, fit in enumerate(last):
             print(files[i].name, *(f"{prediction_rms(fit, MODELS[-1], r, wall) / 1e3:8.2f}" for r in records))
+    compare_gases(records, options.starts)
     print(f"{time.perf_counter() - start:.0f} s")
 
 

@@ -11,16 +11,17 @@ from airmuscle.control import PID, AntagonisticInverse, Decentralised, SplitRang
 from airmuscle.mechanism import AntagonisticJoint, HangingMass
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
+from airmuscle.pneumatics.gas import Polytropic
 from airmuscle.simulation import Solution
 
 VALVE = Valve(2.6e-9, 0.4)
 LARGE = Valve(1e-8, 0.4)
 SPLIT = SplitRange("fill", "discharge")
-LIFT = Plant(chosen_muscle(), FillDischarge(Supply(5.5e5), VALVE, VALVE), HangingMass(2.0))
+LIFT = Plant(chosen_muscle(), FillDischarge(Supply(5.5e5), VALVE, VALVE), HangingMass(2.0), Polytropic(1.2))
 MUSCLES = tuple(dataclasses.replace(chosen_muscle(), name=name) for name in ("left", "right"))
 MECHANISM = AntagonisticJoint(radius=0.02, inertia=0.02, damping=0.05, weight_torque=0.5, offset=0.08)
 CIRCUIT = FillDischarge(Supply(5.5e5), LARGE, LARGE)
-JOINT = Plant(MUSCLES, (CIRCUIT, CIRCUIT), MECHANISM)
+JOINT = Plant(MUSCLES, (CIRCUIT, CIRCUIT), MECHANISM, Polytropic(1.2))
 PRESSURES = Decentralised(
     tuple(
         PID(f"{name}.pressure", SplitRange(f"{name}.fill", f"{name}.discharge"), gain=2e-5)

@@ -23,7 +23,7 @@ from airmuscle.core.variables import StateVariable
 from airmuscle.mechanism import HangingMass
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
-from airmuscle.pneumatics.gas import Isothermal
+from airmuscle.pneumatics.gas import Isothermal, Polytropic
 from airmuscle.reproduce.hosovsky_plant import UnpublishedParameters, hanging_load
 from airmuscle.reproduce.hosovsky_plant import plant as third_paper
 from airmuscle.simulation import simulate
@@ -42,7 +42,7 @@ def paper():
 
 def plain():
     valve = Valve(5e-9, 0.433)
-    return Plant(chosen_muscle(), FillDischarge(Supply(6e5), valve, valve), HangingMass(10.0))
+    return Plant(chosen_muscle(), FillDischarge(Supply(6e5), valve, valve), HangingMass(10.0), Polytropic(1.2))
 
 
 def around(values, count, seed=1, share=0.05):

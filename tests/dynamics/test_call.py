@@ -26,6 +26,7 @@ from airmuscle.core.variables import Input, StateVariable
 from airmuscle.mechanism import HangingMass
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
+from airmuscle.pneumatics.gas import Polytropic
 from airmuscle.simulation import Problem, advance, simulate, solve
 from airmuscle.simulation import output_times as rows_of_a_run
 from airmuscle.simulation.output_times import merge_few_output_times, merge_output_times
@@ -36,7 +37,7 @@ TICKS = st.integers(0, 400).map(lambda i: i / 64)
 
 def lifting() -> Plant:
     valve = Valve(5e-9, 0.433)
-    return Plant(chosen_muscle(), FillDischarge(Supply(6e5), valve, valve), HangingMass(10.0))
+    return Plant(chosen_muscle(), FillDischarge(Supply(6e5), valve, valve), HangingMass(10.0), Polytropic(1.2))
 
 
 # Rows

@@ -193,7 +193,7 @@ def test_more_plants_than_go_side_by_side_are_taken_in_blocks(monkeypatch):
 
 def of_mechanism(mechanism, rows):
     """A plant, and a table of such plants with these parameters of its mechanism."""
-    plant = Plant(chosen_muscle(), ClosedChamber(), mechanism)
+    plant = Plant(chosen_muscle(), ClosedChamber(), mechanism, Polytropic(1.2))
     table = np.repeat(tree.flatten(plant)[None, :], len(rows), axis=0)
     places = [i for i, leaf in enumerate(tree.leaves(plant)) if leaf.path.startswith("mechanism")]
     table[:, places] = rows

@@ -35,7 +35,7 @@ FILL = Schedule({"fill": ((0.05, 1.0),)})
 
 def test_a_fixed_step_that_is_too_long_is_not_called_a_result():
     """A huge valve empties and overfills the muscle within one step; polytropic air of negative mass has no pressure."""
-    plant = Plant(chosen_muscle(), FillDischarge(Supply(5e5), HUGE, HUGE), HangingMass(10.0))
+    plant = Plant(chosen_muscle(), FillDischarge(Supply(5e5), HUGE, HUGE), HangingMass(10.0), Polytropic(1.2))
     start = plant.state_at(pressure=1e5)
     with pytest.raises(
         SimulationError, match=r"ended at .* because .*not finite.*air_mass .*fixed step too long"

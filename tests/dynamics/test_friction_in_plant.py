@@ -32,6 +32,7 @@ from airmuscle.muscle.friction import (
 from airmuscle.plant.energy_balance import WithEnergyMeters
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
+from airmuscle.pneumatics.gas import Polytropic
 from airmuscle.simulation import simulate
 from airmuscle.simulation.equilibrium import find_equilibrium
 from airmuscle.simulation.integrators import DormandPrince8, Rodas4
@@ -54,7 +55,7 @@ def name(law):
 
 
 def plant_with(friction):
-    return Plant(replace(chosen_muscle(), friction=friction), CIRCUIT, HangingMass(10.0))
+    return Plant(replace(chosen_muscle(), friction=friction), CIRCUIT, HangingMass(10.0), Polytropic(1.2))
 
 
 def loops_of(friction, duration=9.0, output=2e-3, method=None):
@@ -86,7 +87,7 @@ class TwoPull(Mechanism):
 
 def test_without_friction_a_plant_is_what_it_was():
     plant = plant_with(NoFriction())
-    assert plant == Plant(chosen_muscle(), CIRCUIT, HangingMass(10.0))
+    assert plant == Plant(chosen_muscle(), CIRCUIT, HangingMass(10.0), Polytropic(1.2))
     assert [s.name for s in plant.states] == ["air_mass", "position", "speed"]
     found = trace_system(plant)
     assert "friction" not in found.output_names
@@ -163,7 +164,7 @@ def test_the_books_close_and_friction_gives_nothing():
 def test_bristles_carry_the_name_of_their_muscle():
     left = replace(chosen_muscle(), name="left", friction=SLIP)
     right = replace(chosen_muscle(), name="right", friction=Dahl(5e4, 20.0))
-    plant = Plant((left, right), (CIRCUIT, CIRCUIT), TwoPull())
+    plant = Plant((left, right), (CIRCUIT, CIRCUIT), TwoPull(), Polytropic(1.2))
     by_name = {s.name: s for s in plant.states}
     assert list(by_name)[4:] == ["left.bristle1", "left.bristle2", "left.bristle3", "right.bristle"]
     assert (by_name["left.bristle2"].unit, by_name["left.bristle2"].nominal) == ("m", 8e-4)

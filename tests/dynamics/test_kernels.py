@@ -18,13 +18,14 @@ from airmuscle.core.variables import StateVariable
 from airmuscle.mechanism import HangingMass
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
+from airmuscle.pneumatics.gas import Polytropic
 from airmuscle.simulation import advance, simulate
 from airmuscle.simulation.integrators import DormandPrince8, Rodas4, RungeKutta4
 
 
 def hanging() -> Plant:
     valve = Valve(5e-9, 0.433)
-    return Plant(chosen_muscle(), FillDischarge(Supply(6e5), valve, valve), HangingMass(10.0))
+    return Plant(chosen_muscle(), FillDischarge(Supply(6e5), valve, valve), HangingMass(10.0), Polytropic(1.2))
 
 
 CASES = {

@@ -82,7 +82,7 @@ def test_the_weights_of_a_design_are_tuned():
 
 def test_a_loop_without_designs_remains_the_same_object():
     plain = loop(WithSetpointDelay(PID("pressure", VALVES, gain=1e-6), 2))
-    assert designed_loop(plain) is plain
+    assert designed_loop(plain, LIFT) is plain
     nested = WithSetpointDelay(Placement(0.2), 2)
     assert with_designed_laws(nested) == replace(nested, law=Placement(0.2).law)
 

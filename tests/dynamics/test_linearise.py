@@ -27,7 +27,7 @@ from airmuscle.pneumatics import (
     Valve,
     WithTubes,
 )
-from airmuscle.pneumatics.gas import EnergyBalance, Isothermal
+from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
 from airmuscle.simulation import Problem, simulate, solve
 from airmuscle.simulation.equilibrium import find_equilibrium
 from airmuscle.simulation.integrators import Rodas4
@@ -36,7 +36,7 @@ VALVE = Valve(2.6e-9, 0.433)
 LEFT, RIGHT = (replace(chosen_muscle(), name=name) for name in ("left", "right"))
 JOINT = AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.12)
 PROPORTIONAL = ProportionalValve(Supply(6e5), VALVE, VALVE, SecondOrderLag(50.0), muscle_count=2)
-HANGING = Plant(chosen_muscle(), FillDischarge(Supply(6e5), VALVE, VALVE), HangingMass(20.0))
+HANGING = Plant(chosen_muscle(), FillDischarge(Supply(6e5), VALVE, VALVE), HangingMass(20.0), Polytropic(1.2))
 REGULATED = Plant(
     replace(chosen_muscle(), series=SeriesSpring(5e4)),
     WithTubes(ProportionalRegulator(Supply(6e5), VALVE, VALVE, SecondOrderLag(20.0)), Tube(Valve(1e-8, 0.2), 2e-5)),

@@ -20,7 +20,7 @@ from airmuscle.core.errors import AirmuscleError, ParameterError
 
 pytest.importorskip("daqp", reason="the package daqp is not installed")
 H = 0.01
-REGULATED = am.load("joint-dmsp-20-regulators").plant
+REGULATED = replace(am.load("joint-dmsp-20-regulators").plant, gas=am.Polytropic(1.2))
 REST = am.find_equilibrium(REGULATED, pressure=2.5e5)
 SETPOINT = 2.5e5
 AT = linearise(REGULATED, {**REST}, {"left.setpoint": SETPOINT, "right.setpoint": SETPOINT})

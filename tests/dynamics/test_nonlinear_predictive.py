@@ -20,7 +20,7 @@ pytest.importorskip("daqp", reason="the package daqp is not installed")
 H = 0.01
 MUSCLE = replace(am.load("dmsp-20-300").muscle, damper=am.LinearDamper(300.0))
 VALVE = am.Valve(1e-9, 0.35)
-PLANT = am.Plant(MUSCLE, am.FillDischarge(am.Supply(6e5), VALVE, VALVE), am.HangingMass(10.0))
+PLANT = am.Plant(MUSCLE, am.FillDischarge(am.Supply(6e5), VALVE, VALVE), am.HangingMass(10.0), am.Polytropic(1.2))
 REST = find_equilibrium(PLANT, pressure=2e5)
 NOISE = {"air_mass": 1e-6, "speed": 0.02, "speed.disturbance": 1.0}
 SENSOR = {"position": 1e-5}

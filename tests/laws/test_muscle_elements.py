@@ -39,7 +39,7 @@ from airmuscle.muscle.friction import Dahl, LuGre
 from airmuscle.plant.energy_balance import WithEnergyMeters
 from airmuscle.plant.plant import Plant
 from airmuscle.pneumatics import ClosedChamber, FillDischarge, Supply, Valve
-from airmuscle.pneumatics.gas import Isothermal
+from airmuscle.pneumatics.gas import Isothermal, Polytropic
 from airmuscle.simulation import simulate
 from airmuscle.simulation.integrators import Rodas4
 
@@ -160,7 +160,9 @@ def test_a_wall_comes_to_rest_where_it_says_and_nowhere_without_pressure(wall):
 def test_the_air_in_a_lagging_wall_counts_and_its_work_is_booked():
     muscle = replace(chosen_muscle(), wall=ViscoelasticWall(5e-11, 0.05))
     valve = Valve(5e-9, 0.4)
-    metered = WithEnergyMeters(Plant(muscle, FillDischarge(Supply(5e5), valve, valve), HangingMass(15.0)))
+    metered = WithEnergyMeters(
+        Plant(muscle, FillDischarge(Supply(5e5), valve, valve), HangingMass(15.0), Polytropic(1.2))
+    )
     start = metered.extend_state(metered.plant.state_at(pressure=2e5))
     command = Schedule({"fill": ((0.1, 1), (0.4, 0)), "discharge": ((0.8, 1), (1.0, 0))})
     run = simulate(metered, command, duration=1.5, initial_state=start, integrator=Rodas4(1e-9))
@@ -283,7 +285,9 @@ def test_the_books_of_load_muscle_and_air_close_with_everything_in_it():
         wall=ViscoelasticWall(2e-11, 0.02),
     )  # fmt: skip
     valve = Valve(2e-8, 0.4)
-    metered = WithEnergyMeters(Plant(muscle, FillDischarge(Supply(6e5), valve, valve), HangingMass(20.0)))
+    metered = WithEnergyMeters(
+        Plant(muscle, FillDischarge(Supply(6e5), valve, valve), HangingMass(20.0), Polytropic(1.2))
+    )
     start = metered.extend_state(metered.plant.state_at(pressure=2e5, position=0.005))
     command = Schedule({"fill": ((0.1, 1), (0.6, 0)), "discharge": ((0.8, 1), (1.1, 0))})
     run = simulate(metered, command, duration=1.5, initial_state=start, integrator=Rodas4(1e-9))

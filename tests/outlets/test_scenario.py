@@ -36,6 +36,7 @@ from airmuscle.muscle import LinearDamper
 from airmuscle.muscle.geometry import Braid
 from airmuscle.pneumatics import ClosedChamber
 from airmuscle.pneumatics.gas import Isothermal, Polytropic
+from airmuscle.pneumatics.wall_heat_transfer import WallHeatTransfer
 from airmuscle.report.run_chapter import _input_plot
 from airmuscle.scenario.scenario import load_scenario
 from airmuscle.simulation.integrators import DormandPrince8, Rodas4, RungeKutta4
@@ -116,7 +117,7 @@ def test_what_is_optional_has_the_defaults_of_the_page(tmp_path: Path):
     path = written(tmp_path, ("[input]\n", ""), text=path.read_text(encoding="utf-8"))
     scenario = load_scenario(path)
     assert (scenario.title, scenario.problem.output_times, scenario.problem.integrator) == ("scenario", None, Rodas4())
-    assert scenario.plant.gas == Polytropic()
+    assert scenario.plant.gas == WallHeatTransfer()
     assert scenario.problem.input == Schedule({})
     assert scenario.plant.muscle_states(scenario.initial_state)[0].pressure == pytest.approx(0.0, abs=1e-6)
 

@@ -57,7 +57,7 @@ console.log(JSON.stringify(cases.map(({key, task, gain, sampleTime, share, besid
   if (law.row.bias) law.set(law.row.bias, 0.5 * (point.first - point.second));
   const setpoints = airmuscle.taskSignals(statics, task, point, share, times.slice(0, -1), { ahead: true, pressures: true });
   const {state} = statics.rest(point.angle, point.first, point.second), torque = task.torque.map(([t, v]) => [t, share * v]);
-  state[0] *= 1 + beside; state[1] *= 1 - beside;
+  run.program.states.forEach((name, i) => { if (/(air_mass|internal_energy)$/.test(name)) state[i] *= name.startsWith("left.") ? 1 + beside : 1 - beside; });
   const result = airmuscle.runLoop(run, law, { duration: task.duration, sampleTime, state, setpoints, torque, torqueInput: "external_torque" });
   return { ...result, point, times, setpoints: Object.fromEntries(Object.entries(setpoints).map(([k, v]) => [k, Array.from(v)])), state: Array.from(state), values: Array.from(law.values), torque };
 })));

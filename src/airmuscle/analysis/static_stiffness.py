@@ -45,10 +45,10 @@ def stiffness(plant: Plant, state: Mapping[str, float]) -> Stiffness:
                                                           (polytropic: -n p_abs/V dV/deps)
 
     With closed valves, the pressure increases when a muscle is stretched, so that the muscle is stiffer. Isothermal and
-    polytropic gases follow their process; EnergyBalance is evaluated as adiabatic, for a fast motion; use Isothermal
-    for a slow one. A series spring acts in series: 1/k = 1/k_inner + 1/k_SE. The states of friction, creep and wall are
-    constant. A slack muscle has zero stiffness. Raises ParameterError for an unknown or missing name and for an
-    impossible state, GeometryLimitError for a contraction beyond the limits of a geometry.
+    polytropic gases follow their process; a FirstLawGas, the default, is evaluated as adiabatic, for a fast motion; use
+    Isothermal for a slow one. A series spring acts in series: 1/k = 1/k_inner + 1/k_SE. The states of friction, creep
+    and wall are constant. A slack muscle has zero stiffness. Raises ParameterError for an unknown or missing name and
+    for an impossible state, GeometryLimitError for a contraction beyond the limits of a geometry.
     """
     state_vector(plant, state)
     plant.check_state(state)

@@ -143,7 +143,7 @@ class WithEnergyMeters(System):
             powers["work_of_tension"] += muscle.tension * muscle.speed
             powers["work_of_air"] += muscle.air.pressure * muscle.volume_rate
             powers["energy_of_flow"] += plant.gas.energy_flow(muscle.states, flow, muscle.volume, plant.ambient)
-            powers["heat_to_air"] += plant.gas.heat_flow(muscle.air, plant.ambient)
+            powers["heat_to_air"] += plant.gas.heat_flow(muscle.states, muscle.air, plant.ambient)
             for name, power in _muscle_powers(part, muscle).items():
                 powers[name] += power
         powers["mechanism_loss"] += plant.mechanism.dissipated_power(state, state, at.forces, inputs)

@@ -17,8 +17,9 @@ from ..core.variables import Input, StateVariable, add_prefix, select_prefix, wi
 from ..mechanism import Mechanism
 from ..muscle import Muscle
 from ..pneumatics import Circuit, CircuitFlows
-from ..pneumatics.gas import Air, Ambient, Gas, Polytropic
+from ..pneumatics.gas import Air, Ambient, Gas
 from ..pneumatics.ports import key_by_muscle, key_by_port
+from ..pneumatics.wall_heat_transfer import DEFAULT_GAS
 from . import diagnostics
 from .display import PlantDisplay
 from .evaluation import PlantEvaluation
@@ -45,7 +46,7 @@ class Plant(PlantDisplay, System):
     muscle: Muscle | tuple[Muscle, ...]
     circuit: Circuit | tuple[Circuit, ...]
     mechanism: Mechanism
-    gas: Gas = Polytropic()
+    gas: Gas = DEFAULT_GAS
     ambient: Ambient = Ambient()
 
     def check(self) -> None:

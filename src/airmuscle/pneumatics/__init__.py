@@ -14,6 +14,7 @@ from .gas import (
     Air,
     Ambient,
     EnergyBalance,
+    FirstLawGas,
     Flow,
     Gas,
     Isothermal,
@@ -30,6 +31,7 @@ from .tube import Tube, TubeOrifice
 from .tube_model import TubeModel
 from .valve import Valve
 from .virial_gas import VirialGas, virial_coefficient_of_air
+from .wall_heat_transfer import WallHeatTransfer
 from .with_tubes import WithTubes
 
 __all__ = [
@@ -46,6 +48,7 @@ __all__ = [
     "DistributedTube",
     "EnergyBalance",
     "FillDischarge",
+    "FirstLawGas",
     "Flow",
     "Gas",
     "Isothermal",
@@ -66,6 +69,7 @@ __all__ = [
     "TubeOrifice",
     "Valve",
     "VirialGas",
+    "WallHeatTransfer",
     "WithLeak",
     "WithTubes",
     "absolute_pressure",

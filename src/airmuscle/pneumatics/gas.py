@@ -129,7 +129,7 @@ class Gas(abc.ABC):
     def sound_speed(self, air: Air) -> Value:
         """Speed of sound [m/s]: sqrt(dp/drho) along the process."""
 
-    def heat_flow(self, air: Air, ambient: Ambient) -> Value:
+    def heat_flow(self, state: Mapping[str, Value], air: Air, ambient: Ambient) -> Value:
         """Heat flow [W] from the wall to the air; 0 for a gas model without heat transfer."""
         return 0.0
 
@@ -228,17 +228,13 @@ class Polytropic(BarotropicGas):
         return ops.sqrt(self.exponent * GAS_CONSTANT * air.temperature)
 
 
-@model
-class EnergyBalance(Gas):
-    """Energy balance (first law) of the air in a chamber, with heat transfer from a wall at ambient temperature.
+class FirstLawGas(Gas):
+    """Energy balance (first law) of dry ideal air in a chamber whose wall is at ambient temperature (interface).
 
-        m' = sum m'_i,   U' = sum c_p T_i m'_i - p V' + hA (T_amb - T),   T = U/(m c_v),   p = (gamma - 1) U/V
+        m' = sum m'_i,   U' = sum c_p T_i m'_i - p V' + Q',   T = U/(m c_v),   p = (gamma - 1) U/V
 
-    m air mass, U internal energy, T_i upstream temperature of each flow, hA heat transfer coefficient times area.
-    hA = 0 is adiabatic, a large hA isothermal. Dry ideal air, gamma = 1.4.
+    m air mass, U internal energy, T_i upstream temperature of each flow, Q' heat flow from the wall; gamma = 1.4.
     """
-
-    heat_transfer: float = parameter("W/K", "hA", "heat transfer coefficient times wall area", bounds=(0.0, 1e5))
 
     def states(self, volume: Value, ambient: Ambient) -> tuple[StateVariable, ...]:
         rest = self.state_at(ambient.pressure, volume, ambient)
@@ -261,7 +257,7 @@ class EnergyBalance(Gas):
     def rates(
         self, state: Mapping[str, Value], air: Air, flow: Flow, volume_rate: Value, ambient: Ambient
     ) -> dict[str, Value]:
-        energy = flow.enthalpy - air.pressure * volume_rate + self.heat_flow(air, ambient)
+        energy = flow.enthalpy - air.pressure * volume_rate + self.heat_flow(state, air, ambient)
         return {"air_mass": flow.mass, "internal_energy": energy}
 
     def available_energy(self, state: Mapping[str, Value], volume: Value, ambient: Ambient) -> Value:
@@ -274,5 +270,15 @@ class EnergyBalance(Gas):
         """Adiabatic speed of sound [m/s]; a heat transfer that is fast against the period reduces it to isothermal."""
         return ops.sqrt(HEAT_CAPACITY_RATIO * GAS_CONSTANT * air.temperature)
 
-    def heat_flow(self, air: Air, ambient: Ambient) -> Value:
+
+@model
+class EnergyBalance(FirstLawGas):
+    """Energy balance with Q' = hA (T_amb - T), the heat transfer coefficient times the area of the wall of a chamber.
+
+    hA = 0 is adiabatic, a large hA isothermal. The equations are those of FirstLawGas.
+    """
+
+    heat_transfer: float = parameter("W/K", "hA", "heat transfer coefficient times wall area", bounds=(0.0, 1e5))
+
+    def heat_flow(self, state: Mapping[str, Value], air: Air, ambient: Ambient) -> Value:
         return self.heat_transfer * (ambient.temperature - air.temperature)

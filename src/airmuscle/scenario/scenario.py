@@ -3,7 +3,7 @@
     [plant]
     muscle = "dmsp-20-300"                      a library name or a muscle file; or a table [plant.muscle] with
                                                 library = "dmsp-20-300" and the parts to replace, or with all parts
-    gas = "Isothermal"                          optional; polytropic by default
+    gas = "Isothermal"                          optional; WallHeatTransfer by default
     [plant.circuit]                             model = "FillDischarge" with supply, fill and discharge
     [plant.mechanism]                           model = "HangingMass", mass = "5 kg"
     [input]                                     see inputs.py; with a controller, controller.py

@@ -60,6 +60,7 @@ def sheet_of_tables(
         "start_equilibrium": initial_pressure(tables, location, scenario.plant) is not None,
         "duration": scenario.problem.duration,
         "values": program.system.defaults.tolist(),
+        "temperature_index": [leaf.path for leaf in leaves(plant)].index("ambient.temperature"),
         "parameters": _parameter_rows(plant, sources),
         "inputs": _input_rows(plant),
         "columns": _column_rows(program.columns, program.system.units),

@@ -16,6 +16,7 @@ from ...muscle.geometry import Vessel
 from ...plant.plant import Plant
 from ...pneumatics import FillDischarge, Valve
 from ...pneumatics.gas import EnergyBalance
+from ...pneumatics.wall_heat_transfer import WallHeatTransfer
 from ...recording import Recording
 from .experiment import Experiment
 from .initial_conditions import InitialConditions
@@ -145,7 +146,8 @@ class _Context:
         length = float(self.plant.muscles[0].geometry.resting_length)
         vessel = Muscle.ideal(Vessel(float(np.clip(volume, 2e-7, 5e-2)), length))
         plant = dataclasses.replace(self.plant, muscle=vessel, circuit=circuit, mechanism=Isometric(0.0))
-        changed = ("gas.heat_transfer",) if isinstance(plant.gas, EnergyBalance) else ()
+        coefficients = {EnergyBalance: ("gas.heat_transfer",), WallHeatTransfer: ("gas.coefficient",)}
+        changed = coefficients.get(type(plant.gas), ())
         text = f"a fill of a rigid tank of known volume, about {1e6 * volume:.3g} cm3, through the same valve"
         yield CandidateRecord(text, self._of(plant, Schedule({"fill": ((0.0, 1.0),)}), 0.0), changed, "muscle.")
 

@@ -22,6 +22,7 @@ from ...pneumatics import (
     EnergyBalance,
     FillDischarge,
     Orifice,
+    Polytropic,
     SubsonicIndexValve,
     Supply,
     Tube,
@@ -140,7 +141,7 @@ def _joint(**changes: float) -> JointWithExternalTorque:
 def model_plant(
     conductance: float, *, damping: float = 200.0, supply: float = SUPPLY, **joint: float
 ) -> Plant:  # fmt: skip
-    """The model of the benchmark: MartensBoblan2017, Valve after ISO 6358, polytropic gas, no tube, no friction.
+    """The model of the benchmark: MartensBoblan2017, Valve after ISO 6358, Polytropic(1.2), no tube, no friction.
 
     Sonic conductance [m3/(s Pa)] of each valve, damping of a muscle [N s/m], supply pressure [Pa], and parameters of
     AntagonisticJoint.
@@ -148,7 +149,8 @@ def model_plant(
     valve = Valve(conductance, 0.35)
     circuit = FillDischarge(Supply(supply), valve, valve)
     muscle = load_law("dmsp-20-300").muscle
-    return Plant(_pair(muscle, damper=LinearDamper(damping)), (circuit, circuit), _joint(**joint))
+    pair = _pair(muscle, damper=LinearDamper(damping))
+    return Plant(pair, (circuit, circuit), _joint(**joint), Polytropic(1.2))
 
 
 def true_plant(conductance: float) -> Plant:

@@ -91,7 +91,7 @@
           u[sheet.inputs.findIndex((input) => input.name === `${prefix}setpoint`)] = wanted[k];
           x[place(`${prefix}lagged_setpoint`)] = wanted[k];
         }
-        const mass = place(`${prefix}air_mass`), pressure = program.outputs.indexOf(`${prefix}pressure`), value = (m) => { x[mass] = m; program.outputsOf(x, u, run.held, o); return o[pressure] - wanted[k]; };
+        const mass = place(`${prefix}air_mass`), pressure = program.outputs.indexOf(`${prefix}pressure`), value = (m) => { airmuscle.setAir(run, x, prefix, m); program.outputsOf(x, u, run.held, o); return o[pressure] - wanted[k]; };
         let m = x[mass];
         for (let i = 0; i < ITERATIONS; i++) {   /* the pressure rises with the air mass */
           const h = 1e-6 * Math.max(m, 1e-6), error = value(m), slope = (value(m + h) - value(m - h)) / (2 * h), next = Math.max(1e-3 * m, m - error / slope);
@@ -99,7 +99,7 @@
           m = next;
           if (done) break;
         }
-        x[mass] = m;
+        airmuscle.setAir(run, x, prefix, m);
       });
       return { state: x, inputs: u };
     }

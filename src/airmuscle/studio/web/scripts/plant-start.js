@@ -4,7 +4,7 @@
 
 (() => {
   const ITERATIONS = 80, HALVINGS = 30, TOLERANCE = 1e-12;
-  const KEPT = /(^|\.)(air_mass|bristle\w*|lagged_\w+|spool\w*)$/;
+  const KEPT = /(^|\.)(air_mass|internal_energy|bristle\w*|lagged_\w+|spool\w*)$/;
 
   /* run: a PlantRun; returns {state, settled}: the original state where no start is found */
   function startState(run) {
@@ -28,11 +28,19 @@
     program.outputsOf(original, u, held, o);
     const wanted = pressures.map((i) => o[i]);
     const residual = (x) => {
+      sheet.muscles.forEach((m, k) => setAir(run, x, m.prefix, x[masses[k]]));
       program.outputsOf(x, u, run.held, o);
       return [...pressures.map((i, k) => (o[i] - wanted[k]) / 1e5), ...accelerations.map((i) => o[i])];
     };
     const unknown = [...masses, ...free.map(place)], sizes = unknown.map((i, k) => (k < masses.length ? Math.max(original[i], 1e-5) : 0.1));
     return { residual, unknown, sizes };
+  }
+
+  /* Sets the air mass of a muscle, and its internal energy at ambient temperature where this is a state. */
+  function setAir({ sheet, program, values }, x, prefix, mass) {
+    const place = program.states.indexOf(`${prefix}air_mass`), energy = program.states.indexOf(`${prefix}internal_energy`), { initial } = program.run, ambient = sheet.temperature_index;
+    x[place] = mass;
+    if (energy >= 0) x[energy] = mass * initial[energy] / initial[place] * values[ambient] / sheet.values[ambient];
   }
 
   const speedOf = (name, states) => states[states.indexOf(name) + 1];
@@ -82,5 +90,5 @@
     return x;
   }
 
-  Object.assign(airmuscle, { startState });
+  Object.assign(airmuscle, { startState, setAir });
 })();
