@@ -34,8 +34,13 @@ from typer.testing import CliRunner
 from airmuscle.cli.app import app
 from airmuscle.core.errors import AirmuscleWarning, ColumnError
 from airmuscle.identify import Fit, compare, fit
+from airmuscle.identify.campaign import StaticStage
+from airmuscle.identify.campaign.record import classify_records
+from airmuscle.identify.campaign.static_stage import fit_static_stage
 from airmuscle.identify.candidates import Candidate, blank_surface
 from airmuscle.identify.data_checks import DataChecks
+from airmuscle.muscle import CreepElements
+from airmuscle.muscle.friction import NoFriction
 from airmuscle.recording import Recording, read
 
 OTHER = dataclasses.replace(MUSCLE, radius=0.0128)
@@ -198,3 +203,16 @@ def test_a_ramp_held_at_rest_is_not_taken_for_ratios_as_percent(tmp_path):
         warnings.simplefilter("error", AirmuscleWarning)
         read(write(tables, tmp_path), resting_length=RESTING_LENGTH)
         read([tmp_path / "held_0.csv"], resting_length=RESTING_LENGTH)
+
+
+def test_a_repeated_run_within_the_tolerance_of_a_bench_is_no_contradiction(tmp_path):
+    again = changed(sweeps(seed=30), FORCE, lambda f: 1.03 * f)
+    assert "contradict" not in notes_of(tmp_path, sweeps() | {f"again_{n}": t for n, t in again.items()})
+
+
+def test_a_campaign_states_what_it_finds_in_its_static_records(tmp_path):
+    runs = read_all(tmp_path, every_other(ramps(sample_time=0.2), PRESSURE, ATMOSPHERE))
+    stage = fit_static_stage(classify_records(runs), NoFriction(), CreepElements(), lambda _: None)
+    assert isinstance(stage, StaticStage)
+    assert any("absolute and gauge pressures are mixed" in note for note in stage.data_notes)
+    assert "absolute and gauge pressures are mixed" in stage.verdict

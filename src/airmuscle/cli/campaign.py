@@ -163,8 +163,9 @@ def _with_option_names(result: Campaign) -> Campaign:
                 dataclasses.replace(each, reason=in_options(each.reason, "campaign"))
                 for each in stage.comparison.excluded
             )
+            notes = tuple(in_options(note, "campaign") for note in stage.data_notes)
             changes[field.name] = dataclasses.replace(
-                stage, comparison=dataclasses.replace(stage.comparison, excluded=excluded)
+                stage, comparison=dataclasses.replace(stage.comparison, excluded=excluded), data_notes=notes
             )
     return dataclasses.replace(result, **changes)
 

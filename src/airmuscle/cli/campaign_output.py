@@ -38,8 +38,11 @@ def print_campaign(
     echo()
     for name, stage in campaign.stages:
         echo(f"{name}: {stage_result(stage)}")
-    for band in campaign.static.all_bands if isinstance(campaign.static, StaticStage) else ():
-        echo(str(band))
+    if isinstance(campaign.static, StaticStage):
+        for band in campaign.static.all_bands:
+            echo(str(band))
+        for note in campaign.static.data_notes:
+            echo(f"note: {note}")
     for row in validation:
         echo(
             f"kept aside: {row.record}: rms error {row.rmse:.4g} N, {100 * row.share:.3g} % of {row.rows} rows within "
@@ -89,7 +92,8 @@ def _values(result: object) -> dict[str, Any]:
         parameters = {} if isinstance(friction, NoFriction) else {leaf.path: leaf.value for leaf in leaves(friction)}
         return {"model": result.selected.name if result.selected else None, "parameters": parameters}
     if isinstance(result, StaticStage):
-        return {"bands": [dataclasses.asdict(band) for band in result.all_bands], "fit": fit_to_dict(result.fit)}
+        bands = [dataclasses.asdict(band) for band in result.all_bands]
+        return {"bands": bands, "notes": list(result.data_notes), "fit": fit_to_dict(result.fit)}
     if isinstance(result, FillStage):
         estimate = None if result.estimate is None else dataclasses.asdict(result.estimate)
         values = [dataclasses.asdict(each) for each in result.fit.estimates]

@@ -75,6 +75,10 @@ class FitPoints:
         index, specimen = (np.repeat(each, lengths)[~self.missing] for each in (np.arange(len(lengths)), specimens))
         return Runs(index, specimen, all("time" in run for run in self.recordings))
 
+    def prepare(self) -> None:
+        """Compute the checks of the data before copies of the points are sent to other processes."""
+        _ = self.checks
+
     @functools.cached_property
     def checks(self) -> DataChecks:
         """Contradictions, suspicious values and scatter of the recordings."""

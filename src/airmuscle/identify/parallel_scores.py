@@ -85,6 +85,8 @@ def _results(
         for position, task in enumerate(tasks):
             yield position, score_candidate(task.candidate, splits, loss, task.limits)
         return
+    for each in splits:
+        each.points.prepare()
     shared = pickle.dumps((tuple(splits), loss))
     largest_first = sorted(range(len(tasks)), key=lambda i: -sum(1 for _ in tree.leaves(tasks[i].candidate.law)))
     futures = {pool.submit(_score_in_worker, shared, tasks[i]): i for i in largest_first}

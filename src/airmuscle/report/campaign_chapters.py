@@ -81,7 +81,7 @@ def _overview(campaign: Campaign, unread: Sequence[UnreadFile], scenarios: dict[
     left_out = [name for name, stage in campaign.stages if isinstance(stage, LeftOutStage)]
     sentences.append(f"Not identified: {', '.join(left_out)}." if left_out else "All stages are identified.")
     if isinstance(campaign.static, StaticStage):
-        sentences += [f"{band}" for band in campaign.static.all_bands]
+        sentences += [*(f"{band}" for band in campaign.static.all_bands), *campaign.static.data_notes]
     columns: dict[str, Any] = {
         "stage": [name for name, _ in campaign.stages],
         "records": [count_records(campaign, name) for name, _ in campaign.stages],

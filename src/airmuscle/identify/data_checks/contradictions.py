@@ -12,13 +12,13 @@ from ...core.units import AMBIENT_PRESSURE
 from ...recording.bench_checks.bench_rows import file_list
 from .matched_rows import Block, MatchedRuns, Matches
 
-MIN_DIFFERENCE = 0.03
+MIN_DIFFERENCE = 0.04
 """Median difference of two runs that contradict each other, as a fraction of the maximum force (chosen)."""
 UNORDERED_DIFFERENCE = 0.05
 """The same where the direction of the motion is not known (chosen); the remark then names hysteresis, too."""
 MAX_HYSTERESIS = 0.15
 """The same of two runs of which neither shows a direction, which may be hysteresis (chosen)."""
-MIN_RMS = 0.025
+MIN_RMS = 0.03
 """Minimum root mean square of the differences of all matched runs, as a fraction of the maximum force (chosen)."""
 HYSTERESIS = " Without time the direction of the motion is not known: it may be hysteresis."
 SHIFT_TOLERANCE = 0.3

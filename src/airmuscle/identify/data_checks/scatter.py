@@ -41,10 +41,11 @@ class Scatter:
             parts.append(f"branches {self.branches:.3g} N apart")
         return ", ".join(parts)
 
-    def misfit_notes(self, rmse: float, greatest: float) -> list[str]:
+    def misfit_notes(self, rmse: float, greatest: float, lengths: int = 1) -> list[str]:
         """The remark that a residual [N] is greater than the scatter explains.
 
-        A static law follows the middle of two branches. `greatest` is the maximum force of the data [N].
+        A static law follows the middle of two branches. `greatest` is the maximum force of the data [N], `lengths` the
+        number of resting lengths that a law without an effect of the length is fitted to.
         """
         known = [each for each in (self.noise, self.repeatability) if each is not None]
         expected = max([*known, 0.5 * self.branches], default=0.0)
@@ -52,6 +53,7 @@ class Scatter:
             return []
         return [
             f"The rms error, {rmse:.3g} N, is {rmse / expected:.2g} times the scatter of the data ({self}): the "
-            "law does not follow them. Compare other "
-            "laws, and check the remarks on contradicting or suspicious data."
+            "law does not follow them. "
+            + (f"It is one law for {lengths} resting lengths. " if lengths > 1 else "")
+            + "Compare other laws, and check the remarks on contradicting or suspicious data."
         ]
