@@ -40,6 +40,7 @@ from typing import Any
 from ..core import tree
 from ..core.absolute_pressure import ambient_pressure
 from ..core.errors import ParameterError
+from ..core.short_repr import ShortRepr
 from ..identify.dynamic import (
     CrossPrediction,
     DynamicFit,
@@ -72,8 +73,8 @@ _TABLES = ("title", "plant", "input", "observed", "fit", "record")
 _FIT = ("free", "own", "start_time", "initial_state", "starts", "seed", "integrator", "bounds")
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class DynamicFitSetup:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class DynamicFitSetup(ShortRepr):
     """Plant, records and unknowns of a dynamic fit; all numbers SI."""
 
     title: str

@@ -34,6 +34,7 @@ from ..control.control_loop import ControlLoop
 from ..control.inputs import InputSignal
 from ..core.absolute_pressure import ambient_pressure
 from ..core.errors import FileError, ParameterError, suggestion
+from ..core.short_repr import ShortRepr
 from ..identify.prediction import PlantUncertainty
 from ..library.build import build
 from ..library.files import is_path, list_plants, read_toml
@@ -55,8 +56,8 @@ DEFAULT_INITIAL_STATE: Mapping[str, Any] = MappingProxyType({"pressure": 0.0})
 """Default initial state of a run: equilibrium at ambient pressure."""
 
 
-@dataclasses.dataclass(frozen=True)
-class Scenario:
+@dataclasses.dataclass(frozen=True, repr=False)
+class Scenario(ShortRepr):
     """A simulation problem with a title and the columns to write; all numbers SI."""
 
     title: str
