@@ -15,14 +15,15 @@ import pytest
 import airmuscle as am
 from airmuscle.core import tree
 from airmuscle.errors import IdentificationError
-from airmuscle.identify import Candidate, RunSplit, SpecimenSplit, compare, fit, standard_candidates
+from airmuscle.identify import Candidate, LevelSplit, RunSplit, SpecimenSplit, compare, fit, standard_candidates
 from airmuscle.identify.candidates import blank_surface
 from airmuscle.identify.fit_points import FitPoints
 from airmuscle.identify.loss import LeastSquares
 from airmuscle.identify.model_evidence import batch_sample_size
-from airmuscle.identify.recommendation import recommend
+from airmuscle.identify.recommendation import excess_error, recommend
 from airmuscle.identify.slack_rows import Slackness, SlackPull, slack_pull
 from airmuscle.identify.solver import solve
+from airmuscle.identify.specimen_errors import SpecimenErrors, odd_specimen_notes
 from airmuscle.muscle.characteristic import LogarithmicLength, PooledLengthLaw
 from airmuscle.muscle.geometry import Braid
 from airmuscle.recording import Recording
@@ -170,3 +171,51 @@ def test_all_rows_slack_is_a_clear_error(measured):
         fit(
             PooledLengthLaw(LogarithmicLength(blank_surface(2), blank_surface(1), 0.2, 0.2), (blank_surface(2),)), slack
         )
+
+
+@pytest.mark.parametrize(
+    ("rms", "odd"),
+    [
+        ((9.0, 8.0, 23.2, 10.0), "c"),
+        ((9.0, 8.0, 15.0, 10.0), None),
+        ((9.0, 8.0, 23.2), None),
+    ],
+)
+def test_the_specimen_that_does_not_follow_the_others_is_named(rms: tuple[float, ...], odd: str | None):
+    errors = SpecimenErrors(tuple("abcd"[: len(rms)]), rms, (0.1, 0.2, 0.4, 0.3)[: len(rms)])
+    assert (errors.odd or (None,))[0] == odd
+    notes = odd_specimen_notes(errors)
+    assert len(notes) == (odd is not None)
+    if odd is not None:
+        assert notes[0].startswith("Specimen c does not follow the others: left out, its rms error is 23.2 N")
+        assert "extrapolated" in notes[0]
+    assert odd_specimen_notes(None) == []
+
+
+def isobars(curve: float = 40.0, rows: int = 200) -> list[Recording]:
+    """Three isobars that are curved, the last one little, with a force that is not linear in pressure (chosen)."""
+    random, made = np.random.default_rng(1), []
+    for pressure, shift, bend in ((1e5, 3.0, 1.4), (3e5, -3.0, 0.9), (5e5, 3.0, 0.15)):
+        contraction = np.linspace(0.02, 0.12, rows)
+        x = (contraction - 0.07) / 0.05
+        force = 2e-3 * pressure - 3000 * (contraction - 0.02) + bend * curve * (x * x - 1 / 3) + shift + 200
+        columns = {"pressure": pressure + random.normal(0, 300, rows), "contraction": contraction}
+        columns["force"] = force + random.normal(0, 3, rows)
+        made.append(Recording(columns, f"{pressure / 1e5:.0f} bar", {"resting_length": 0.17}))
+    return made
+
+
+def test_with_three_levels_a_law_is_not_recommended_that_the_measured_points_contradict():
+    """One standard error of three folds admits straight isobars through curved points, 12 N against 7 N."""
+    candidates = [
+        Candidate("straight", blank_surface(1)),
+        Candidate("curved", blank_surface(2), ("coefficients[4]", "coefficients[5]")),
+    ]
+    found = compare(isobars(), candidates, leave_out=LevelSplit("pressure"))
+    straight, curved = found["straight"], found["curved"]
+    assert excess_error(straight, curved) <= 0
+    assert straight.cross_validated_rmse < 1.25 * curved.cross_validated_rmse
+    assert straight.in_sample_rmse > 1.5 * curved.in_sample_rmse
+    assert found.recommended is curved
+    plain = compare(isobars(curve=0.0), candidates, leave_out=LevelSplit("pressure"))
+    assert plain.recommended.candidate.name == "straight"

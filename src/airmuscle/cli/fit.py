@@ -11,7 +11,7 @@ from ..core.output_folder import check_writable
 from ..identify import UNCENSORED
 from ..identify import fit as fit_model
 from ..identify.problem import fitted_quantity_of
-from ..identify.specimen_errors import specimen_errors
+from ..identify.specimen_errors import odd_specimen_notes, specimen_errors
 from ..library.fitted_entry import fitted_entry, missing_geometry
 from ..library.initial_law import find_initial_law
 from ..recording import Recording
@@ -185,11 +185,9 @@ def _fit_one(files: list[Path], recordings: list[Recording], characteristic: str
     errors = specimen_errors(result, recordings, (*request.fixed, *initial.fixed))
     entry = extras.constrained_entry(fitted_entry(result, start, files, recordings=recordings, errors=errors))
     write_results(result, entry, recordings, request.out, extras.chapters())
+    notes = [*odd_specimen_notes(errors), *missing_geometry(entry)]
     if request.json:
         data = fit_to_dict(result)
-        print_json(data | {"notes": [*data["notes"], *missing_geometry(entry)]} | extras.to_dict())
+        print_json(data | {"notes": [*data["notes"], *notes]} | extras.to_dict())
         return
-    print_results(
-        [str(with_option_names(result)), *extras.lines(), *(f"note: {note}" for note in missing_geometry(entry))],
-        request.out,
-    )
+    print_results([str(with_option_names(result)), *extras.lines(), *(f"note: {note}" for note in notes)], request.out)

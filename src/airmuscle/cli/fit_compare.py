@@ -13,7 +13,7 @@ from ..core.output_folder import check_writable
 from ..core.processes import available_cores
 from ..identify import Candidate, Comparison, standard_candidates
 from ..identify.law_selection import LawSelection, select_law
-from ..identify.specimen_errors import ranked_specimen_errors
+from ..identify.specimen_errors import odd_specimen_notes, ranked_specimen_errors
 from ..library.entry import Entry
 from ..library.fitted_entry import fitted_entry, left_out_ratio, missing_geometry
 from ..library.initial_law import InitialLaw, find_initial_law, resting_lengths
@@ -49,7 +49,7 @@ def compare_models(
     initial, notes = _initial_entry(best.candidate, geometry, recordings, request)
     errors = ranked_specimen_errors(best, selection.comparisons, recordings)
     entry = fitted_entry(best.fit, initial, files, left_out_ratio(best), recordings, errors)
-    notes += missing_geometry(entry)
+    notes += [*odd_specimen_notes(errors), *missing_geometry(entry)]
     chapters = [compare_chapter(each, best, selection.reason) for each in selection.comparisons]
     write_results(best.fit, entry, recordings, request.out, [*chapters, *extras.chapters()])
     if request.json:

@@ -98,8 +98,7 @@ def compare(
     """Fit all candidates, rank them by their cross-validated error in force, and recommend one.
 
     candidates  by default `standard_candidates`, the laws whose initial values follow from the data; of these, a law
-                that is fitted by variable projection is excluded without cross-validation if its error in sample is
-                more than twice the lowest cross-validated error of the others
+                that is not linear in its parameters is excluded as soon as its error shows that it is not recommended
     leave_out   RunSplit(), LevelSplit("contraction"), LevelSplit("pressure"), SpecimenSplit() or BlockSplit(); it
                 defines the purpose of the ranking: the best law for other muscles is not the best for the measured
                 ones. By default the first of specimens, runs and levels with three groups or more

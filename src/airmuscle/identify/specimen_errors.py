@@ -19,6 +19,13 @@ from .model_selection import Comparison
 from .prediction.left_out import MIN_MEMBERS, specimen_deviation, t_quantile
 from .result import Fit
 
+MIN_JUDGED = 4
+"""Number of specimens from which one that does not follow the others is named (chosen): of three, the others are two,
+which hardly determine how the law depends on the length."""
+ODD_RATIO = 2.0
+"""Ratio of the error of a specimen to the median of those of the others above which it does not follow them (chosen:
+the median is robust against the one; normal errors of ten rows or more differ by less)."""
+
 
 @dataclasses.dataclass(frozen=True)
 class SpecimenErrors:
@@ -40,6 +47,16 @@ class SpecimenErrors:
         count = len(self.rms)
         return t_quantile(count - 1) * self.deviation * math.sqrt(1.0 + 1.0 / count)
 
+    @property
+    def odd(self) -> tuple[str, float, float] | None:
+        """The specimen that does not follow the others, its rms error, and the median of those of the others [N].
+
+        None unless there are four specimens or more and the greatest error exceeds `ODD_RATIO` times that median.
+        """
+        worst = int(np.argmax(self.rms))
+        median = float(np.median(np.delete(self.rms, worst))) if len(self.rms) >= MIN_JUDGED else math.inf
+        return (self.names[worst], self.rms[worst], median) if self.rms[worst] > ODD_RATIO * median else None
+
     def __str__(self) -> str:
         count = len(self.rms)
         each = ", ".join(f"{name} {error:.3g} N" for name, error in zip(self.names, self.rms, strict=True))
@@ -49,6 +66,24 @@ class SpecimenErrors:
             f"with {count - 1} degrees of freedom, and increased by the uncertainty of the law, which grows with the "
             "distance from the measured lengths"
         )
+
+
+def odd_specimen_notes(errors: SpecimenErrors | None) -> list[str]:
+    """The remark on a specimen that does not follow the others; empty without one."""
+    found = None if errors is None else errors.odd
+    if errors is None or found is None:
+        return []
+    name, error, others = found
+    extrapolated = ""
+    if errors.lengths and len(errors.lengths) == len(errors.names):
+        own = errors.lengths[errors.names.index(name)]
+        if own in (min(errors.lengths), max(errors.lengths)):
+            extrapolated = " Its length is outside those of the others, so that the law is extrapolated to it."
+    return [
+        f"Specimen {name} does not follow the others: left out, its rms error is {error:.3g} N, that of the others "
+        f"{others:.3g} N (median).{extrapolated} Compare its length, its product and its fittings with those of the "
+        "others; '--length-error' tests whether its length is recorded wrongly."
+    ]
 
 
 def specimens_of(recordings: Sequence[Recording]) -> tuple[str, ...]:
