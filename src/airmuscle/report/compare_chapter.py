@@ -34,8 +34,8 @@ def compare_chapter(comparison: Comparison, recommended: RankedModel | None = No
         title="Model selection",
         summary=f"{joint}{comparison.reason}\n\n"
         f"Cross-validation: each {comparison.leave_out.group_name} is left out in turn. "
-        "All errors are errors of the force, over the rows with a positive force; the squared force of the law at slack "
-        "rows is added.",
+        "All errors are errors of the force, over the rows with a positive force; the squared force of the law at "
+        "slack rows is added.",
         tables=tuple(table for table in tables if table is not None),
         plots=(
             Plot("left-out", "Cross-validation error of the laws on each fold.", _fold_figure(comparison)),
