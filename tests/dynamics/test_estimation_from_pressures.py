@@ -1,6 +1,6 @@
 """Contraction and force of a joint follow from its two pressures alone: within 3 % of their ranges if the friction is
 known, and within 8 % if it is 30 % smaller or greater. The muscles have the friction of a DMSP-20; pressures have
-noise and the resolution of 12 bits.
+noise and the resolution of 12 bits. The air is polytropic.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ QUANTITIES = ("left.contraction", "right.contraction", "left.force", "right.forc
 def joint(scale):
     """The joint of the library with pressure regulators, with the friction of both muscles times `scale`."""
     friction = PressureScaledFriction(Dahl(34e3, 38.0 * scale), ambient_ratio=0.21, reference_pressure=6e5)
-    plant = am.load("joint-dmsp-20-regulators").plant
+    plant = replace(am.load("joint-dmsp-20-regulators").plant, gas=am.Polytropic(1.2))
     return replace(plant, muscle=tuple(replace(muscle, friction=friction) for muscle in plant.muscles))
 
 
