@@ -203,6 +203,27 @@ def test_the_muscles_on_both_sides_of_a_pulley_do_not_touch(name: str, torque: f
     assert choice.length == 3 * nominal or not (room & (loads >= 1.5 * torque)).any()  # none is shorter
 
 
+def test_where_the_pulley_decides_the_muscles_are_as_close_as_permitted():
+    choice = choose(am.load("dmsp-20-300"), dataclasses.replace(JOINT, torque=0.05), SIX_BAR)
+    assert 2 * choice.design.radius == pytest.approx(1.1 * choice.diameter, rel=2e-3)  # the outline has 33 points
+
+
+def test_the_radii_of_a_longer_muscle_are_those_with_which_it_meets_the_requirement():
+    requirement = dataclasses.replace(JOINT, torque=20.0)
+    choice = choose(am.load("dmsp-20-300"), requirement, SIX_BAR)
+    muscle, eps = choice.muscle, np.linspace(*choice.muscle.contraction_range, 1201)
+    radius = (eps - eps[:, None]) * 1.1 * choice.length / JOINT.angle  # rows: extended
+    inertial = requirement.acceleration_torque(SIX_BAR.cycle_time)
+    enough = radius * (muscle.capacity(eps) - muscle.floor(eps)[:, None]) >= 1.5 * 20.0
+    enough &= radius * (muscle.capacity(eps)[:, None] - muscle.floor(eps)) >= 1.5 * (20.0 + inertial)
+    possible = radius[enough & (2 * radius >= 1.1 * muscle.outer_diameter(eps))]
+    step = 2 * 1.1 * choice.length / JOINT.angle * np.ptp(eps) / 128  # of the grid of the search
+    assert choice.design.radii[0] == pytest.approx(possible.min(), abs=step)
+    assert choice.design.radii[1] == pytest.approx(possible.max(), abs=step)
+    used = np.array(choice.design.radii) * JOINT.angle / (1.1 * choice.length)
+    assert used * 128 / np.ptp(eps) == pytest.approx(np.round(used * 128 / np.ptp(eps)), abs=1e-6)  # of that length
+
+
 @pytest.mark.parametrize(("torque", "inertia", "deciding"), [(0.3, 0.0, 0), (0.1, 2.0, 1)])
 def test_the_reserve_of_a_joint_is_that_of_the_end_with_less(torque: float, inertia: float, deciding: int):
     requirement = dataclasses.replace(JOINT, torque=torque, inertia=inertia)
