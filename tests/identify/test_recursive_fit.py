@@ -142,3 +142,14 @@ def test_the_standard_error_is_the_spread_of_the_predictions(forgetting):
     force, stated, noise = np.transpose(found)
     assert np.std(force) == pytest.approx(np.mean(stated), rel=0.15)
     assert np.sqrt(np.mean(noise**2)) == pytest.approx(SIGMA, rel=0.03)
+
+
+def test_the_noise_is_by_the_weights_of_the_samples_and_their_squares():
+    """sigma^2 = SS/(W - tr(M^-1 M_2)), with the sums of all samples at once."""
+    fit, count, kept = fitted(60, degree=2, forgetting=0.93), 60, 0.93
+    pressure, contraction, force = samples(count)
+    terms, weights = fit._terms(pressure, contraction), kept ** np.arange(count - 1.0, -1.0, -1.0)
+    first, second = ((terms.T * w) @ terms for w in (weights, weights**2))
+    residuals = force - terms @ np.linalg.solve(first, terms.T @ (weights * force))
+    freedom = weights.sum() - np.trace(np.linalg.solve(first, second))
+    assert fit.noise == pytest.approx(np.sqrt(np.sum(weights * residuals**2) / freedom), rel=1e-4)

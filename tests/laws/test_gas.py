@@ -190,7 +190,7 @@ def test_the_virial_gas_is_air_and_without_coefficient_the_ideal_gas():
     molar = 28.96546e-3 * 1e6
     assert VirialGas().virial_coefficient * molar == pytest.approx(-8.64, abs=0.02)
     assert virial_coefficient_of_air(273.15) * molar == pytest.approx(-13.4, abs=0.4)
-    assert virial_coefficient_of_air(333.15) * molar == pytest.approx(-2.2, abs=0.7)
+    assert virial_coefficient_of_air(333.15) * molar == pytest.approx(-1.82, abs=0.01)  # by hand from a_0 to a_2
     for absolute in (1e5, 6.5e5):
         density = VirialGas().air_mass(absolute, 1.0, AMBIENT)
         assert VirialGas().pressure(density, 1.0, AMBIENT) == pytest.approx(absolute, rel=1e-14)

@@ -24,6 +24,7 @@ from airmuscle.muscle import Ratings
 from airmuscle.muscle.characteristic import EffectiveLength, MartensBoblan2017, ValidityRange
 from airmuscle.muscle.characteristic.base import PressureLaw
 from airmuscle.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY
+from airmuscle.report.sizing_chapter import choice_row
 from airmuscle.sizing import (
     JointRequirement,
     LiftRequirement,
@@ -565,3 +566,27 @@ def test_a_new_muscle_of_ones_own_is_sized_as_those_of_the_library():
     own = Entry("own", "A muscle of my own", "chosen", law, law.geometry,
                 validity_range=ValidityRange(3e4, 7e5, 0.0, 0.25), ratings=Ratings(max_force=1200.0))  # fmt: skip
     assert choose(own, LIFT, SIX_BAR).length < choose(am.load("dmsp-20-300"), LIFT, SIX_BAR).length * 1.01
+
+
+def test_the_work_of_a_joint_is_the_torque_over_the_angle_in_both_directions():
+    assert JOINT.work == pytest.approx(2 * 5.0 * math.radians(60.0), rel=1e-12)
+
+
+def test_the_diameter_is_twice_the_largest_radius_or_that_of_a_braid_at_25_per_cent():
+    """Without a geometry: a braid of 25 degrees, contracted by 25 %, is sin(theta)/sin(25) = 1.75 times as thick."""
+    cylinder = choose(am.load("dmsp-20-300"), LIFT, SIX_BAR).muscle
+    assert cylinder.diameter(0.1) == pytest.approx(2 * max(cylinder.entry.geometry.outline(0.1)[1]), rel=1e-12)
+    assert cylinder.outer_diameter(np.array([0.1])) == pytest.approx(cylinder.diameter(0.1), rel=1e-3)
+    theta = math.acos(0.75 * math.cos(math.radians(25.0)))
+    table = choose(am.load("festo-tool-dmsp-40"), LIFT, SIX_BAR).muscle
+    ratio = table.outer_diameter(np.array([0.1])) / 0.040
+    assert ratio == pytest.approx(math.sin(theta) / math.sin(math.radians(25.0)), rel=0.01)
+
+
+def test_the_row_of_a_choice_states_air_a_minute_and_efficiency_of_the_choice():
+    choice = choose(am.load("dmsp-20-300"), LIFT, dataclasses.replace(SIX_BAR, cycle_time=3.0))
+    row = choice_row(choice)
+    assert row["air a minute [l (ANR)]"] == pytest.approx(20 * row["air a cycle [l (ANR)]"], rel=1e-12)
+    assert row["air a cycle [l (ANR)]"] == pytest.approx(1e3 * choice.reference_volume, rel=1e-12)
+    assert row["efficiency [%]"] == pytest.approx(100 * choice.efficiency, rel=1e-12)
+    assert row["diameter [mm]"] == pytest.approx(1e3 * choice.diameter, rel=1e-12)

@@ -11,6 +11,7 @@ from widths import widened
 from airmuscle.core.errors import AirmuscleWarning, SolveError
 from airmuscle.library import catalogue
 from airmuscle.muscle.characteristic.chou_hannaford1996 import ChouHannaford1996
+from airmuscle.muscle.characteristic.error_search import estimate_maximum
 from airmuscle.muscle.characteristic.polynomial_surrogate import as_force_law, forces_or_nan
 from airmuscle.muscle.characteristic.tabulated import Tabulated
 from airmuscle.muscle.characteristic.validity_range import ValidityRange
@@ -36,6 +37,7 @@ def test_no_point_errs_by_more_than_the_estimated_maximum_error(name, limits):
     p, c = _points(validity_range)
     error = np.abs(surrogate.force(p, c) - forces_or_nan(entry.characteristic, p, c))
     assert 0.5 * surrogate.max_error <= np.nanmax(error) <= surrogate.max_error
+    assert 1.05 * np.nanmax(error) <= surrogate.max_error * (1 + 2e-3)  # the margin remains for what is not searched
     assert 1.0 - np.isnan(error).mean() == pytest.approx(surrogate.coverage, abs=0.03)
 
 
@@ -89,3 +91,29 @@ def test_a_surrogate_of_an_unbounded_force_is_refused():
     with pytest.raises(SolveError, match=r"force of Saga2007 is unbounded at a contraction of 0 % and 50 kPa"):
         as_force_law(law, ValidityRange(5e4, 2e5, 0.0, 0.3))
     assert as_force_law(law, ValidityRange(5e4, 2e5, 0.02, 0.3)).max_error < 5.0
+
+
+NODES = np.linspace(-1.0, 1.0, 39)
+
+
+def _estimated(error) -> float:
+    y, x = np.meshgrid(NODES, NODES, indexing="ij")
+    return estimate_maximum(error, error(x, y), NODES)
+
+
+def test_the_search_finds_a_peak_between_the_points_of_the_grid():
+    def cone(x, y):
+        return 1.0 - 12.0 * np.hypot(x - 0.0263, y + 0.4474)
+
+    y, x = np.meshgrid(NODES, NODES)
+    assert cone(x, y).max() < 0.75
+    assert _estimated(cone) == pytest.approx(1.0, abs=0.01)
+
+
+def test_the_search_finds_the_maximum_at_the_edge_of_the_region_with_a_solution():
+    def steep(x, y):
+        return np.where(x <= 0.3423, np.exp(200.0 * (x - 0.3423)), np.nan)
+
+    y, x = np.meshgrid(NODES, NODES)
+    assert np.nanmax(steep(x, y)) < 0.1
+    assert _estimated(steep) == pytest.approx(1.0, abs=0.01)
