@@ -29,6 +29,8 @@ from .table import RawTable
 
 _INTERNAL_PREFIXES = ("__", "#")
 """Beginnings of names that no MATLAB variable has: header, function workspace, references, subsystem."""
+HDF5_SIGNATURE, HDF5_BLOCK = b"\x89HDF\r\n\x1a\n", 512
+"""Signature of an HDF5 file, and the least size of the block before it [bytes] (HDF5 file format, superblock)."""
 _UNNAMED = "None"
 """Name that SciPy gives to objects."""
 
@@ -44,6 +46,8 @@ def read_mat_tables(
     A file with a variable of more than `downsampling.max_rows` rows is reduced while it is read, see `read_large_mat`.
     The packages for this format are native code, therefore a separate process reads the file.
     """
+    if _is_plain_hdf5(path):
+        return read_hdf5_tables(path, group, downsampling)
     tables: tuple[RawTable, ...] = read_in_separate_process(
         "pymatreader", __name__, "read_mat_tables_here", path, group, tuple(columns), downsampling
     )
@@ -55,8 +59,6 @@ def read_mat_tables_here(
 ) -> tuple[RawTable, ...]:
     """As `read_mat_tables`, in this process."""
     pymatreader = import_lab_package("pymatreader", path)
-    if _is_plain_hdf5(path):
-        return read_hdf5_tables(path, group, downsampling)
     _check_links(path)
     large = run_reader(path, "MATLAB", lambda: read_large_mat(path, pymatreader, downsampling))
 
@@ -97,12 +99,15 @@ def read_mat_tables_here(
 
 def _is_plain_hdf5(path: Path) -> bool:
     """Whether a file is HDF5 without the header of MATLAB, as h5py writes it."""
+    if not path.is_file():  # a pipe may have no end; the reader states the reason
+        return False
     try:
         with path.open("rb") as file:
-            begins_as_matlab = file.read(6) == b"MATLAB"
+            beginning = file.read(2 * HDF5_BLOCK)
     except OSError:
-        return False  # the reader states the reason
-    return not begins_as_matlab and bool(import_lab_package("h5py", path).is_hdf5(path))
+        return False
+    starts = (0, HDF5_BLOCK)  # without and with the least user block
+    return not beginning.startswith(b"MATLAB") and any(beginning.startswith(HDF5_SIGNATURE, i) for i in starts)
 
 
 def _with_reductions(
