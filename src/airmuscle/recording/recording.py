@@ -132,7 +132,9 @@ class Recording(NotebookDisplay):
         return self[name]
 
     def rows(self, selection: Any) -> Recording:
-        """The recording reduced to the rows that a mask, slice or index array selects."""
+        """The recording reduced to the rows that a mask, slice or index array selects; itself for a mask of all."""
+        if isinstance(selection, np.ndarray) and selection.dtype == bool and selection.all():
+            return self
         return dataclasses.replace(self, columns={name: values[selection] for name, values in self.columns.items()})
 
     def with_columns(self, **columns: Any) -> Recording:

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 from ...recording import Recording
 from ...recording.bench_checks import find_suspicious, without_missing_codes
+from ...recording.segment.remembered import remembered
 from .contradictions import contradiction_notes, repeatability
 from .matched_rows import match_rows
 from .outlier_notes import outlier_notes
@@ -35,7 +36,12 @@ class DataChecks:
     @classmethod
     def of(cls, recordings: Sequence[Recording]) -> DataChecks:
         """The checks of recordings, without the rows in which a code stands for a missing value."""
-        measured = without_missing_codes([recording for recording in recordings if len(recording)])
-        matches, delay = match_rows(measured), find_delay(measured)
-        found = (*contradiction_notes(matches), *outlier_notes(measured), *delay_notes(delay))
-        return cls((*find_suspicious(recordings), *found), Scatter.of(measured, repeatability(matches)), delay)
+        return _check(recordings)
+
+
+@remembered
+def _check(recordings: Sequence[Recording]) -> DataChecks:
+    measured = without_missing_codes([recording for recording in recordings if len(recording)])
+    matches, delay = match_rows(measured), find_delay(measured)
+    found = (*contradiction_notes(matches), *outlier_notes(measured), *delay_notes(delay))
+    return DataChecks((*find_suspicious(recordings), *found), Scatter.of(measured, repeatability(matches)), delay)

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from ...core.arrays import Array
 from ..recording import Recording
+from ..segment.remembered import remembered
 from ..segment.sensor import estimate_sensors
 
 MIN_FORCE = 0.05
@@ -52,10 +53,7 @@ class BenchRows(NamedTuple):
     @classmethod
     def of(cls, recordings: Sequence[Recording]) -> BenchRows:
         """The rows of the recordings that have all three quantities."""
-        given = recordings_with(recordings, *cls._fields)
-        columns = [np.concatenate([[], *(run[name] for run in given)]) for name in cls._fields]
-        complete = np.isfinite(np.sum(columns, axis=0)) & _not_saturated(given)
-        return cls(*(column[complete] for column in columns))
+        return _rows_of(recordings)
 
     def at(self, rows: npt.NDArray[np.bool_]) -> BenchRows:
         """The rows of a mask (N,)."""
@@ -81,6 +79,14 @@ class BenchRows(NamedTuple):
         """The forces [N] at zero pressure and shortened length, where a muscle is slack."""
         without = np.abs(self.pressure) < NO_PRESSURE * np.max(self.pressure, initial=0.0)
         return self.force[without & (self.contraction > MAX_ELONGATION)]
+
+
+@remembered
+def _rows_of(recordings: Sequence[Recording]) -> BenchRows:
+    given = recordings_with(recordings, *BenchRows._fields)
+    columns = [np.concatenate([[], *(run[name] for run in given)]) for name in BenchRows._fields]
+    complete = np.isfinite(np.sum(columns, axis=0)) & _not_saturated(given)
+    return BenchRows(*(column[complete] for column in columns))
 
 
 def _not_saturated(recordings: Sequence[Recording]) -> npt.NDArray[np.bool_]:

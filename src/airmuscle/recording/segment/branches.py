@@ -19,6 +19,7 @@ import numpy as np
 from ...core.arrays import Array
 from ..recording import Recording
 from .interval import Interval, running_median
+from .remembered import remembered
 from .runs import AT_REST, ISOBARIC, ISOMETRIC, ISOTONIC, Run, find_runs, moved_column
 from .sampling import count_rows
 from .sensor import Sensor, estimate_noise
@@ -56,6 +57,7 @@ def branch_name(column: str, direction: int) -> str:
     return names[0] if direction > 0 else names[1]
 
 
+@remembered
 def find_branches(
     recording: Recording,
     sensor: Sensor | None = None,

@@ -20,6 +20,7 @@ from ...core.arrays import Array
 from ..displacement import MOVED
 from ..recording import Recording
 from .interval import Interval, level_intervals
+from .remembered import remembered
 from .sensor import Sensor, estimate_sensors
 from .static_points import StaticPoints, find_static_points
 
@@ -67,6 +68,7 @@ class Run:
     swept_columns: tuple[str, ...]
 
 
+@remembered
 def find_runs(recording: Recording, sensors: Mapping[str, Sensor] | None = None) -> tuple[Run, ...]:
     """The runs of a recording; one run of kind FREE if no quantity is constant, none for an empty recording."""
     if not len(recording):

@@ -17,6 +17,7 @@ from ...core.arrays import Array
 from ..columns import quantity_of
 from ..recording import Recording
 from .interval import Mask, true_intervals
+from .remembered import remembered
 from .static_points import find_static_points
 
 MIN_DISTINCT_VALUES = 15
@@ -62,6 +63,7 @@ class Sensor:
         return at_lower * 1.0 - at_upper * 1.0
 
 
+@remembered
 def estimate_sensors(recordings: Recording | Sequence[Recording]) -> Mapping[str, Sensor]:
     """The sensors of the columns of a recording, or of several recordings from one test rig, by column name.
 
