@@ -55,5 +55,5 @@ def test_names_that_are_imported_on_use_are_available():
     assert am.Fit is sys.modules["airmuscle.identify"].Fit
     assert am.identify is sys.modules["airmuscle.identify"]
     assert {"fit", "Fit"} <= set(dir(am))
-    with pytest.raises(AttributeError, match="No airmuscle attribute fitt"):
+    with pytest.raises(AttributeError, match="module 'airmuscle' has no attribute 'fitt'"):
         am.fitt  # noqa: B018

@@ -141,7 +141,7 @@ def test_a_prediction_has_rows_counted_from_1_shares_in_per_cent_and_display_uni
     compared = np.array([True, True, True, False])
     quantity = QuantityPrediction("pressure", measured, predicted, np.full(4, 2e3), compared)
     record = RecordPrediction(Recording({"pressure": measured}, "a.csv"), (quantity,))
-    columns = _overview("plant.toml", VirtualWork(BRAID), [record], "").tables[0].columns
+    columns = _overview("plant.toml", VirtualWork(BRAID), [record]).tables[0].columns
     rms = np.sqrt((1e3**2 + 5e3**2) / 3)
     assert columns["rms error"] == [f"{rms / 1e3:.4g} kPa"]
     assert columns["maximum error"] == ["-5 kPa"]

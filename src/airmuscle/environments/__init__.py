@@ -3,6 +3,6 @@
 Each name is imported when it is first used, because Gymnasium calls `register_environments` at every start.
 """
 
-import lazy_loader as _lazy_loader
+from .. import _attach_stub
 
-__getattr__, __dir__, __all__ = _lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = _attach_stub(__name__, __file__)

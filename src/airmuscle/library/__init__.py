@@ -1,5 +1,5 @@
 """Library: parameter sets of muscles, laws, valves, plants and products as TOML files, with sources and checks."""
 
-import lazy_loader as _lazy_loader
+from .. import _attach_stub
 
-__getattr__, __dir__, __all__ = _lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = _attach_stub(__name__, __file__)

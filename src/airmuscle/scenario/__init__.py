@@ -1,5 +1,5 @@
 """Scenario files: plants, commands, runs and dynamic fits as TOML."""
 
-import lazy_loader as _lazy_loader
+from .. import _attach_stub
 
-__getattr__, __dir__, __all__ = _lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = _attach_stub(__name__, __file__)
