@@ -6,7 +6,7 @@ import math
 from typing import ClassVar
 
 from airmuscle.control import ControlLaw
-from airmuscle.core.declaration import model, parameter
+from airmuscle.core import model, parameter
 from airmuscle.study.control_benchmark import Contender, ControlTask, SineMotion, proportional_joint
 
 JOINT = proportional_joint()

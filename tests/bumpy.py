@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from airmuscle.core.declaration import model, parameter
-from airmuscle.mechanism.base import Coordinate, Mechanism
+from airmuscle.core import model, parameter
+from airmuscle.mechanism import Coordinate, Mechanism
 
 
 @model

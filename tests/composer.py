@@ -17,17 +17,15 @@ from plants import EXAMPLES
 
 from airmuscle.control import SampledSignal, Schedule
 from airmuscle.control.control_loop import CombinedSignal
+from airmuscle.core import parameters
 from airmuscle.core.annotation import conforms, type_hints
-from airmuscle.core.declaration import parameters
-from airmuscle.core.errors import AirmuscleError
+from airmuscle.errors import AirmuscleError
 from airmuscle.library.models import model_names
 from airmuscle.mechanism import ExternalLoad, Mechanism
 from airmuscle.mechanism.external_load import SHORTENING, SHORTENING_SPEED
 from airmuscle.muscle import Muscle
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import Circuit, SharedSupply
-from airmuscle.pneumatics.gas import Ambient, Gas
-from airmuscle.pneumatics.supply import AirSource
+from airmuscle.plant import Plant
+from airmuscle.pneumatics import AirSource, Ambient, Circuit, Gas, SharedSupply
 
 ATTEMPTS = 40
 """Compositions of one component that its constructor may refuse."""

@@ -9,9 +9,8 @@ from plants import chosen_muscle
 
 from airmuscle.control import PID, AntagonisticInverse, Decentralised, SplitRange
 from airmuscle.mechanism import AntagonisticJoint, HangingMass
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Supply, Valve
-from airmuscle.pneumatics.gas import Polytropic
+from airmuscle.plant import Plant
+from airmuscle.pneumatics import FillDischarge, Polytropic, Supply, Valve
 from airmuscle.simulation import Solution
 
 VALVE = Valve(2.6e-9, 0.4)

@@ -10,7 +10,7 @@ import numpy as np
 from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
-from airmuscle.scenario.scenario import load_scenario
+from airmuscle.scenario import load_scenario
 
 VALVES = '["circuit.fill.conductance", "circuit.discharge.conductance"]'
 

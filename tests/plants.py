@@ -15,6 +15,7 @@ from airmuscle.mechanism import (
     CrankProfile,
     ExternalLoad,
     HangingMass,
+    HuntCrossley,
     Isometric,
     Isotonic,
     JointWithEndStops,
@@ -32,7 +33,6 @@ from airmuscle.mechanism import (
     WithLatch,
     WithOffsets,
 )
-from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import (
     CreepElements,
     CubicSeriesSpring,
@@ -62,17 +62,14 @@ from airmuscle.muscle.characteristic import (
     LogarithmicLength,
     PooledLengthLaw,
     RubberLine,
+    ValidityRange,
     VirtualWork,
     as_force_law,
 )
-from airmuscle.muscle.characteristic.validity_range import ValidityRange
-from airmuscle.muscle.geometry.catenary import Catenary
+from airmuscle.muscle.geometry import Catenary, Parabola, TrueArcParabola, Vessel
 from airmuscle.muscle.geometry.chebyshev import as_polynomial
-from airmuscle.muscle.geometry.parabola import Parabola, TrueArcParabola
-from airmuscle.muscle.geometry.vessel import Vessel
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Supply, Valve
-from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
+from airmuscle.plant import Plant
+from airmuscle.pneumatics import EnergyBalance, FillDischarge, Isothermal, Polytropic, Supply, Valve
 
 VALVE, OTHER = Valve(1e-8, 0.4), Valve(3e-9, 0.2)
 TWO_VALVES = FillDischarge(Supply(5e5), VALVE, OTHER)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from airmuscle.compile.program import compile_system
-from airmuscle.core.errors import GeometryLimitError
+from airmuscle.errors import GeometryLimitError
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Wshadow", "-Werror")
 """Warnings that printed C must not cause."""

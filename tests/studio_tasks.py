@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from airmuscle.core.errors import InputError
 from airmuscle.core.output_folder import atomic_folder
+from airmuscle.errors import InputError
 from airmuscle.studio.fit_settings import FieldError
 
 

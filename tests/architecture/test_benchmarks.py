@@ -23,9 +23,9 @@ import static_fit
 from filling import runs
 
 from airmuscle.compile.program import compile_system
-from airmuscle.control.inputs import Schedule
+from airmuscle.control import Schedule
 from airmuscle.core import tree
-from airmuscle.simulation.integrators import DormandPrince8, Rodas4
+from airmuscle.simulation import DormandPrince8, Rodas4
 
 
 @pytest.mark.parametrize("states", [3, 6, 8, 10])

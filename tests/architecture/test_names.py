@@ -8,7 +8,7 @@ import inspect
 from pathlib import Path
 
 import airmuscle
-from airmuscle.core.declaration import parameters
+from airmuscle.core import parameters
 from airmuscle.library.models import model_class, model_names
 from airmuscle.recording import QUANTITIES
 

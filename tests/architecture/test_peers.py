@@ -21,9 +21,9 @@ import rodas4
 from filling import lifting_run, runs
 
 from airmuscle.compile.program import compile_system
-from airmuscle.control.inputs import Schedule
-from airmuscle.plant.plant import Plant
-from airmuscle.simulation.integrators import DormandPrince8, Rodas4, RungeKutta4
+from airmuscle.control import Schedule
+from airmuscle.plant import Plant
+from airmuscle.simulation import DormandPrince8, Rodas4, RungeKutta4
 
 
 def reference(run):

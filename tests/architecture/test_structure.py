@@ -297,3 +297,15 @@ def test_all_exceptions_are_in_airmuscle_errors():
     assert defined == set(errors.__all__)
     assert all(getattr(errors, name) is getattr(core_errors, name) for name in errors.__all__)
     assert all(name in (errors.__doc__ or "") for name in errors.__all__)
+
+
+def test_tests_import_inner_modules_500_times_at_most():
+    """They import from the faces, so that a file can be moved; what they test within a room they import from its file."""
+    inner = [
+        (path, node.module)
+        for path in (ROOT / "tests").rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("airmuscle.")
+        if face_of(node.module) is None
+    ]
+    assert len(inner) <= 500

@@ -14,11 +14,11 @@ import airmuscle as am
 from airmuscle.control.law_design import designed_loop
 from airmuscle.core import tree
 from airmuscle.core.absolute_pressure import AbsolutePressure, ambient_pressure
-from airmuscle.core.errors import ParameterError
-from airmuscle.core.units import quantity
-from airmuscle.pneumatics.gas import Ambient
-from airmuscle.scenario.scenario import load_scenario
-from airmuscle.study.study import load_study
+from airmuscle.errors import ParameterError
+from airmuscle.pneumatics import Ambient
+from airmuscle.scenario import load_scenario
+from airmuscle.study import load_study
+from airmuscle.units import quantity
 
 AMBIENT = 8e4
 MUSCLE = am.load("dmsp-20-300").muscle

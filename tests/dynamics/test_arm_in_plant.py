@@ -22,10 +22,8 @@ from airmuscle.mechanism import (
     MuscleRoute,
     PlanarArm,
 )
-from airmuscle.plant.energy_balance import WithEnergyMeters
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Supply, Valve
-from airmuscle.pneumatics.gas import Polytropic
+from airmuscle.plant import Plant, WithEnergyMeters
+from airmuscle.pneumatics import FillDischarge, Polytropic, Supply, Valve
 from airmuscle.simulation import Rodas4, find_equilibrium, simulate
 
 NAMES = ("s_flex", "s_ext", "e_flex", "e_ext", "bi_flex", "bi_ext")

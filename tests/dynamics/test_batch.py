@@ -14,22 +14,24 @@ import numpy as np
 import pytest
 from joints import chosen_muscle, joint, joint_start
 
-from airmuscle.control.inputs import ZERO_INPUT, SampledSignal, Schedule
-from airmuscle.core import ops, tree
-from airmuscle.core.declaration import model, parameter
-from airmuscle.core.errors import ColumnError, FileError, GeometryLimitError, ParameterError
-from airmuscle.core.system import System
-from airmuscle.core.variables import StateVariable
+from airmuscle.control import ZERO_INPUT, SampledSignal, Schedule
+from airmuscle.core import StateVariable, System, model, ops, parameter, tree
+from airmuscle.errors import ColumnError, FileError, GeometryLimitError, ParameterError
 from airmuscle.mechanism import HangingMass
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Supply, Valve
-from airmuscle.pneumatics.gas import Isothermal, Polytropic
+from airmuscle.plant import Plant
+from airmuscle.pneumatics import FillDischarge, Isothermal, Polytropic, Supply, Valve
 from airmuscle.reproduce.hosovsky_plant import UnpublishedParameters, hanging_load
 from airmuscle.reproduce.hosovsky_plant import plant as third_paper
-from airmuscle.simulation import simulate
+from airmuscle.simulation import (
+    DormandPrince8,
+    ExplicitRungeKutta,
+    Rodas4,
+    RungeKutta4,
+    WithSensitivities,
+    sensitivity,
+    simulate,
+)
 from airmuscle.simulation.batch import BatchSolution, Single, simulate_batch, thread_pool, variations
-from airmuscle.simulation.integrators import DormandPrince8, ExplicitRungeKutta, Rodas4, RungeKutta4
-from airmuscle.simulation.with_sensitivities import WithSensitivities, sensitivity
 
 PULSE = Schedule({"fill": ((0.0303, 1), (0.2, 0)), "discharge": ((0.31, 1), (0.42, 0))})
 JOINT_PULSE = Schedule({"left.fill": ((0.02, 1), (0.07, 0)), "right.discharge": ((0.0217, 1), (0.07, 0))})

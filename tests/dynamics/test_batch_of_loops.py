@@ -12,6 +12,7 @@ import pytest
 from called_controller import Called
 from control_plants import LIFT, SPLIT
 
+from airmuscle import Status
 from airmuscle.control import (
     PID,
     PWM,
@@ -22,10 +23,9 @@ from airmuscle.control import (
     Schedule,
     SolenoidDriver,
 )
-from airmuscle.core.errors import ParameterError
-from airmuscle.core.status import Status
+from airmuscle.errors import ParameterError
 from airmuscle.mechanism import HangingMass
-from airmuscle.plant.plant import Plant
+from airmuscle.plant import Plant
 from airmuscle.simulation import Problem, Rodas4, RungeKutta4, solve
 from airmuscle.simulation.batch import Single, simulate_batch
 from airmuscle.simulation.bound_integrator import BoundIntegrator

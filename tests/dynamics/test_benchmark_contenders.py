@@ -13,8 +13,8 @@ import pytest
 from benchmark_contender import JOINT, MINE, SHORT
 from called_controller import Called
 
-from airmuscle.control.controller import Measurement
-from airmuscle.core.errors import ParameterError
+from airmuscle.control import Measurement
+from airmuscle.errors import ParameterError
 from airmuscle.study.control_benchmark import (
     Contender,
     StuckValve,

@@ -9,20 +9,17 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.control.inputs import Schedule
+from airmuscle.control import Schedule
 from airmuscle.core import autodiff
-from airmuscle.core.errors import EquilibriumError, ParameterError
-from airmuscle.library.catalogue import load
+from airmuscle.errors import EquilibriumError, ParameterError
+from airmuscle.library import load
 from airmuscle.mechanism import HangingMass, Isometric, WithLatch
 from airmuscle.muscle import LinearDamper
+from airmuscle.plant import Plant, WithEnergyMeters
 from airmuscle.plant.diagnostics import percent_of_rows
-from airmuscle.plant.energy_balance import WithEnergyMeters
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import ClosedChamber, FillDischarge, Supply, Valve
-from airmuscle.pneumatics.gas import Ambient, Isothermal, Polytropic
-from airmuscle.simulation import simulate
+from airmuscle.pneumatics import Ambient, ClosedChamber, FillDischarge, Isothermal, Polytropic, Supply, Valve
+from airmuscle.simulation import DormandPrince8, Rodas4, simulate
 from airmuscle.simulation.equilibrium import find_equilibria, find_equilibrium
-from airmuscle.simulation.integrators import DormandPrince8, Rodas4
 
 VALVE = Valve(2.6167e-9, 0.433)
 CIRCUIT = FillDischarge(Supply(548675.0), VALVE, VALVE)

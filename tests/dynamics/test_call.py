@@ -14,19 +14,14 @@ from joints import chosen_muscle
 
 from airmuscle.compile.cache.kernel import record
 from airmuscle.compile.program import compile_system
-from airmuscle.control.control_loop import ControlLoop
-from airmuscle.control.driver import PWM, Driver, PwmState
-from airmuscle.control.inputs import InputSignal, SampledSignal, Schedule
-from airmuscle.control.pid import PID
-from airmuscle.control.piecewise_linear import PiecewiseLinear, merge_columns
-from airmuscle.core import arrays
-from airmuscle.core.errors import AirmuscleWarning, GeometryLimitError, ParameterError
-from airmuscle.core.system import System
-from airmuscle.core.variables import Input, StateVariable
+from airmuscle.control import PID, PWM, ControlLoop, Driver, InputSignal, PiecewiseLinear, SampledSignal, Schedule
+from airmuscle.control.driver import PwmState
+from airmuscle.control.piecewise_linear import merge_columns
+from airmuscle.core import Input, StateVariable, System, arrays
+from airmuscle.errors import AirmuscleWarning, GeometryLimitError, ParameterError
 from airmuscle.mechanism import HangingMass
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Supply, Valve
-from airmuscle.pneumatics.gas import Polytropic
+from airmuscle.plant import Plant
+from airmuscle.pneumatics import FillDischarge, Polytropic, Supply, Valve
 from airmuscle.simulation import Problem, advance, simulate, solve
 from airmuscle.simulation import output_times as rows_of_a_run
 from airmuscle.simulation.output_times import merge_few_output_times, merge_output_times

@@ -17,27 +17,38 @@ import pytest
 from plants import chosen_muscle
 from scipy.linalg import expm
 
-from airmuscle.analysis.linear_model import linearise
+from airmuscle import Status
+from airmuscle.analysis import linearise
 from airmuscle.compile.program import Description
-from airmuscle.control import PID, OnOffController, SplitRange
-from airmuscle.control.control_loop import ControlLoop
-from airmuscle.control.controller import Controller
-from airmuscle.control.driver import PWM, SolenoidDriver
-from airmuscle.control.inputs import Periodic, SampledSignal, Schedule
-from airmuscle.core.declaration import model, parameter
-from airmuscle.core.errors import ParameterError, SimulationError
-from airmuscle.core.reference import cite
-from airmuscle.core.status import Status
-from airmuscle.core.system import System
-from airmuscle.core.variables import StateVariable
+from airmuscle.control import (
+    PID,
+    PWM,
+    Controller,
+    ControlLoop,
+    OnOffController,
+    Periodic,
+    SampledSignal,
+    Schedule,
+    SolenoidDriver,
+    SplitRange,
+)
+from airmuscle.core import StateVariable, System, cite, model, parameter
+from airmuscle.errors import ParameterError, SimulationError
 from airmuscle.mechanism import HangingMass, Isometric, WithLatch
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, ProportionalRegulator, ProportionalValve, SecondOrderLag, Supply, Valve
-from airmuscle.pneumatics.gas import Isothermal, Polytropic
-from airmuscle.simulation import Problem, closed_loop, simulate, solve
+from airmuscle.plant import Plant
+from airmuscle.pneumatics import (
+    FillDischarge,
+    Isothermal,
+    Polytropic,
+    ProportionalRegulator,
+    ProportionalValve,
+    SecondOrderLag,
+    Supply,
+    Valve,
+)
+from airmuscle.simulation import DormandPrince8, Problem, Rodas4, RungeKutta4, closed_loop, simulate, solve
 from airmuscle.simulation.batch import simulate_batch
 from airmuscle.simulation.bound_integrator import BoundIntegrator
-from airmuscle.simulation.integrators import DormandPrince8, Rodas4, RungeKutta4
 
 VALVE = Valve(2.6e-9, 0.4)
 TICK = 2.0**-6
@@ -595,8 +606,7 @@ def test_a_memory_belongs_to_its_instant(start_time):
 
 
 def test_an_experiment_takes_the_commands_of_a_loop():
-    from airmuscle.identify.dynamic.experiment import Experiment
-    from airmuscle.identify.dynamic.initial_conditions import InitialConditions
+    from airmuscle.identify.dynamic import Experiment, InitialConditions
 
     loop, plant = ControlLoop(VALVES, 0.1, PRESSURE), lifting()
     run = simulate(plant, loop, duration=0.2)

@@ -10,9 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airmuscle import Recording, read_csv
-from airmuscle.control.inputs import Periodic, SampledSignal, Schedule
-from airmuscle.control.piecewise_linear import PiecewiseLinear
-from airmuscle.core.errors import ColumnError, ParameterError
+from airmuscle.control import Periodic, PiecewiseLinear, SampledSignal, Schedule
+from airmuscle.errors import ColumnError, ParameterError
 
 
 def course(command, start: float, duration: float, times: np.ndarray) -> np.ndarray:

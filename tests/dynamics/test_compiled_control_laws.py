@@ -35,7 +35,7 @@ from airmuscle.control import (
     WithSensors,
 )
 from airmuscle.core.diagnostics import DiagnosticCode
-from airmuscle.core.errors import ParameterError
+from airmuscle.errors import ParameterError
 from airmuscle.mechanism import HangingMass
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
 from airmuscle.simulation import Problem, RungeKutta4, solve

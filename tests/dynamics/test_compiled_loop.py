@@ -18,6 +18,7 @@ from control_plants import LIFT, SPLIT, assert_identical
 from hypothesis import given
 from hypothesis import strategies as st
 
+from airmuscle import Status
 from airmuscle.control import (
     PID,
     PWM,
@@ -30,8 +31,7 @@ from airmuscle.control import (
 )
 from airmuscle.core import model, ops, parameter
 from airmuscle.core.diagnostics import DiagnosticCode
-from airmuscle.core.errors import ParameterError, TraceError
-from airmuscle.core.status import Status
+from airmuscle.errors import ParameterError, TraceError
 from airmuscle.mechanism import Isometric
 from airmuscle.simulation import DormandPrince8, Problem, Rodas4, RungeKutta4, closed_loop, compiled_loop, solve
 

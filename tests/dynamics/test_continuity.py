@@ -15,10 +15,9 @@ import pytest
 from plants import EXAMPLES, of
 
 from airmuscle.compile.program import compile_system
-from airmuscle.core import ops
-from airmuscle.core.declaration import model
+from airmuscle.core import model, ops
 from airmuscle.library.models import model_class, model_names
-from airmuscle.mechanism.contact import HuntCrossley
+from airmuscle.mechanism import HuntCrossley
 from airmuscle.muscle import (
     Damper,
     EndStop,

@@ -15,7 +15,7 @@ from benchmark_contender import JOINT, MINE, SHORT, AngleLaw
 
 import airmuscle as am
 from airmuscle.core import model
-from airmuscle.core.errors import ParameterError
+from airmuscle.errors import ParameterError
 from airmuscle.muscle.friction import LuGre, NoFriction
 from airmuscle.recording import Recording
 from airmuscle.study.control_benchmark import (
@@ -29,6 +29,7 @@ from airmuscle.study.control_benchmark import (
     StuckValve,
     SumOfMotions,
     compare_controllers,
+    find_tasks,
     learn,
     on_off_joint,
     standard_contenders,
@@ -36,7 +37,6 @@ from airmuscle.study.control_benchmark import (
 from airmuscle.study.control_benchmark.contenders import complete
 from airmuscle.study.control_benchmark.joints import check_truth_differs, kinds_of
 from airmuscle.study.control_benchmark.task_signals import task_signals
-from airmuscle.study.control_benchmark.tasks import find_tasks
 from airmuscle.study.control_benchmark.tracking_metrics import RATED_STROKES, track
 
 DEGREE = math.pi / 180

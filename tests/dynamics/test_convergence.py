@@ -11,16 +11,23 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.control.inputs import ZERO_INPUT, SampledSignal, Schedule
+from airmuscle.control import ZERO_INPUT, SampledSignal, Schedule
 from airmuscle.mechanism import HangingMass
 from airmuscle.muscle import CreepElements, CubicSpring, LinearDamper, Muscle, ViscoelasticWall
 from airmuscle.muscle.characteristic import VirtualWork
 from airmuscle.muscle.geometry import Braid
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import ClosedChamber, DistributedTube, FillDischarge, Supply, Valve, WithTubes
-from airmuscle.pneumatics.gas import EnergyBalance, Polytropic
-from airmuscle.simulation import simulate
-from airmuscle.simulation.integrators import DormandPrince8, Rodas4, RungeKutta4
+from airmuscle.plant import Plant
+from airmuscle.pneumatics import (
+    ClosedChamber,
+    DistributedTube,
+    EnergyBalance,
+    FillDischarge,
+    Polytropic,
+    Supply,
+    Valve,
+    WithTubes,
+)
+from airmuscle.simulation import DormandPrince8, Rodas4, RungeKutta4, simulate
 
 BRAID = Braid(0.01, 0.4363, 0.2)
 HEAT = EnergyBalance(0.5)

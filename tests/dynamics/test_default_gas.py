@@ -10,9 +10,8 @@ import pytest
 
 import airmuscle as am
 from airmuscle.environments.default_tasks import arm_task, joint_task, lift_task
-from airmuscle.library.files import list_plants
-from airmuscle.pneumatics import EnergyBalance, WallHeatTransfer
-from airmuscle.pneumatics.gas import Ambient
+from airmuscle.library import list_plants
+from airmuscle.pneumatics import Ambient, EnergyBalance, WallHeatTransfer
 from airmuscle.pneumatics.wall_heat_transfer import DEFAULT_GAS
 from airmuscle.sizing import LiftRequirement, SizingConditions, size_muscles
 

@@ -15,18 +15,19 @@ import numpy as np
 import pytest
 
 from airmuscle.control import ControlLoop, Measurement, Schedule
-from airmuscle.core.errors import ParameterError
-from airmuscle.core.tree import leaves
+from airmuscle.core import leaves
+from airmuscle.errors import ParameterError
 from airmuscle.simulation import find_equilibrium, simulate
 from airmuscle.simulation.compiled_law import LawSample
 from airmuscle.study.control_benchmark import (
     ControlTask,
     SineMotion,
     StepMotion,
+    TunedContender,
     proportional_joint,
     standard_contenders,
 )
-from airmuscle.study.control_benchmark.benchmark import TunedContender, run_task, tune_contender
+from airmuscle.study.control_benchmark.benchmark import run_task, tune_contender
 from airmuscle.study.control_benchmark.contenders import complete
 from airmuscle.study.control_benchmark.designed_controllers import joint_design_model
 from airmuscle.study.control_benchmark.motion_dynamics import angular_acceleration

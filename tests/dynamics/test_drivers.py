@@ -28,11 +28,8 @@ from airmuscle import (
     load,
     simulate,
 )
-from airmuscle.control.driver import PWM, SolenoidDriver
-from airmuscle.control.inputs import SampledSignal, Schedule
-from airmuscle.control.piecewise_linear import PiecewiseLinear
-from airmuscle.control.with_drivers import WithDrivers
-from airmuscle.core.errors import ParameterError
+from airmuscle.control import PWM, PiecewiseLinear, SampledSignal, Schedule, SolenoidDriver, WithDrivers
+from airmuscle.errors import ParameterError
 from airmuscle.simulation.output_times import output_times
 
 INPUTS = ("other", "fill")

@@ -13,12 +13,13 @@ from joints import chosen_muscle
 from widths import widened
 
 from airmuscle.compile.program import compile_system
-from airmuscle.control.inputs import ZERO_INPUT, Schedule
+from airmuscle.control import ZERO_INPUT, Schedule
 from airmuscle.core import ops
-from airmuscle.core.errors import EquilibriumError, GeometryLimitError, ParameterError, UnitError
+from airmuscle.errors import EquilibriumError, GeometryLimitError, ParameterError, UnitError
 from airmuscle.mechanism import (
     AntagonisticJoint,
     HangingMass,
+    HuntCrossley,
     Isometric,
     JointWithEndStops,
     Lever,
@@ -28,12 +29,20 @@ from airmuscle.mechanism import (
     WithLatch,
     WithOffsets,
 )
-from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import CreepElements, SeriesSpring, ViscoelasticWall
 from airmuscle.muscle.friction import Dahl
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import ClosedChamber, FillDischarge, ProportionalValve, SecondOrderLag, Supply, Valve
-from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
+from airmuscle.plant import Plant
+from airmuscle.pneumatics import (
+    ClosedChamber,
+    EnergyBalance,
+    FillDischarge,
+    Isothermal,
+    Polytropic,
+    ProportionalValve,
+    SecondOrderLag,
+    Supply,
+    Valve,
+)
 from airmuscle.simulation import simulate
 from airmuscle.simulation.equilibrium import find_equilibria, find_equilibrium
 from airmuscle.simulation.equilibrium.single_dof import grid

@@ -12,30 +12,39 @@ from joints import chosen_muscle
 from plants import BRAID, EXAMPLES, TWO_VALVES, of, pulled
 
 from airmuscle.compile.program import compile_system
-from airmuscle.control.inputs import ZERO_INPUT
+from airmuscle.control import ZERO_INPUT
 from airmuscle.core import ops, tree
-from airmuscle.core.errors import AirmuscleError, EquilibriumError, ParameterError
+from airmuscle.errors import AirmuscleError, EquilibriumError, ParameterError
 from airmuscle.mechanism import (
     AntagonisticJoint,
     HangingMass,
+    HuntCrossley,
     Isometric,
     JointWithEndStops,
     Lever,
     MusclesInSeries,
     SpringLoad,
 )
-from airmuscle.mechanism.contact import HuntCrossley
 from airmuscle.muscle import LinearSpring, SeriesSpring, ViscoelasticWall
 from airmuscle.muscle.characteristic import MartensBoblan2017, VirtualWork
 from airmuscle.muscle.geometry import Braid
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import ClosedChamber, FillDischarge, ProportionalRegulator, Supply, Tube, Valve, WithTubes
-from airmuscle.pneumatics.gas import Ambient, Polytropic
+from airmuscle.plant import Plant
+from airmuscle.pneumatics import (
+    Ambient,
+    ClosedChamber,
+    FillDischarge,
+    Polytropic,
+    ProportionalRegulator,
+    Supply,
+    Tube,
+    Valve,
+    WithTubes,
+)
+from airmuscle.simulation import RungeKutta4
 from airmuscle.simulation.batch import simulate_batch
 from airmuscle.simulation.equilibrium import find_equilibria, find_equilibrium, find_equilibrium_of_each
 from airmuscle.simulation.equilibrium.single_dof import grid
 from airmuscle.simulation.equilibrium.statics import Statics
-from airmuscle.simulation.integrators import RungeKutta4
 
 SPREAD = 0.05
 FAST = RungeKutta4(1e-3)

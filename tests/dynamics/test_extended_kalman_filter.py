@@ -15,7 +15,7 @@ import airmuscle as am
 from airmuscle.analysis import ExtendedKalmanFilter, StateEstimate, consistency_band, normalised_error_squared
 from airmuscle.compile.jacobians import derivatives
 from airmuscle.compile.program import compile_system
-from airmuscle.core.errors import ParameterError, SolveError
+from airmuscle.errors import ParameterError, SolveError
 from airmuscle.simulation import RungeKutta4, Stepper, advance
 
 H = 5e-3

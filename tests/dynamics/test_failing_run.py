@@ -9,24 +9,31 @@ import pytest
 from joints import chosen_muscle
 from widths import widened
 
-from airmuscle.analysis.linear_model import linearise
-from airmuscle.analysis.static_stiffness import stiffness
+from airmuscle import Status
+from airmuscle.analysis import linearise, stiffness
 from airmuscle.compile.program import compile_system
-from airmuscle.control.inputs import Schedule
-from airmuscle.control.piecewise_linear import PiecewiseLinear
+from airmuscle.control import PiecewiseLinear, Schedule
 from airmuscle.core.diagnostics import Columns, DiagnosticCode
-from airmuscle.core.errors import AirmuscleError, SimulationError
-from airmuscle.core.status import Status
-from airmuscle.mechanism import HangingMass, MusclesInSeries, WithEndStops, WithLatch
-from airmuscle.mechanism.contact import HuntCrossley
+from airmuscle.errors import AirmuscleError, SimulationError
+from airmuscle.mechanism import HangingMass, HuntCrossley, MusclesInSeries, WithEndStops, WithLatch
 from airmuscle.muscle import LinearDamper, SeriesSpring
-from airmuscle.plant.plant import Plant
+from airmuscle.plant import Plant
 from airmuscle.plant.state import state_vector
-from airmuscle.pneumatics import FillDischarge, Manifold, SharedSupply, Supply, Tube, Valve, WithLeak, WithTubes
-from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
-from airmuscle.simulation import Problem, advance, bound_integrator, simulate, solve
+from airmuscle.pneumatics import (
+    EnergyBalance,
+    FillDischarge,
+    Isothermal,
+    Manifold,
+    Polytropic,
+    SharedSupply,
+    Supply,
+    Tube,
+    Valve,
+    WithLeak,
+    WithTubes,
+)
+from airmuscle.simulation import Problem, Rodas4, RungeKutta4, advance, bound_integrator, simulate, solve
 from airmuscle.simulation.batch import simulate_batch
-from airmuscle.simulation.integrators import Rodas4, RungeKutta4
 
 HUGE = Valve(9e-6, 0.3)
 VALVE = Valve(2.6e-9, 0.4)

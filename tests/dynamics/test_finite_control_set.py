@@ -14,7 +14,7 @@ from control_plants import LIFT
 import airmuscle as am
 from airmuscle.analysis import ExtendedKalmanFilter, FiniteControlSet, StateEstimate
 from airmuscle.control import ControlLoop
-from airmuscle.core.errors import ParameterError
+from airmuscle.errors import ParameterError
 from airmuscle.simulation import Problem, solve
 
 H = 0.01

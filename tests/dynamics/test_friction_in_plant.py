@@ -14,11 +14,10 @@ from joints import chosen_muscle
 from widths import widened
 
 from airmuscle.compile.functions import trace_system
-from airmuscle.control.inputs import Schedule
-from airmuscle.core.declaration import model, parameter
-from airmuscle.core.errors import ParameterError
-from airmuscle.mechanism import HangingMass
-from airmuscle.mechanism.base import Coordinate, Mechanism
+from airmuscle.control import Schedule
+from airmuscle.core import model, parameter
+from airmuscle.errors import ParameterError
+from airmuscle.mechanism import Coordinate, HangingMass, Mechanism
 from airmuscle.muscle.friction import (
     BoucWen,
     Dahl,
@@ -29,13 +28,10 @@ from airmuscle.muscle.friction import (
     PrandtlIshlinskii,
     PressureScaledFriction,
 )
-from airmuscle.plant.energy_balance import WithEnergyMeters
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Supply, Valve
-from airmuscle.pneumatics.gas import Polytropic
-from airmuscle.simulation import simulate
+from airmuscle.plant import Plant, WithEnergyMeters
+from airmuscle.pneumatics import FillDischarge, Polytropic, Supply, Valve
+from airmuscle.simulation import DormandPrince8, Rodas4, simulate
 from airmuscle.simulation.equilibrium import find_equilibrium
-from airmuscle.simulation.integrators import DormandPrince8, Rodas4
 
 VALVE = Valve(3e-10, 0.433)
 CIRCUIT = FillDischarge(Supply(548675.0), VALVE, VALVE)

@@ -13,14 +13,13 @@ import pytest
 
 import airmuscle as am
 from airmuscle.analysis import joint_statics, plot_reachable_region, stiffness
-from airmuscle.core.errors import ColumnError, ParameterError, SolveError
-from airmuscle.mechanism import AntagonisticJoint, CrankProfile, HangingMass, JointWithEndStops, WithLatch
-from airmuscle.mechanism.contact import HuntCrossley
+from airmuscle.errors import ColumnError, ParameterError, SolveError
+from airmuscle.mechanism import AntagonisticJoint, CrankProfile, HangingMass, HuntCrossley, JointWithEndStops, WithLatch
 from airmuscle.muscle import LinearSpring, SeriesSpring, SwellingWall
 from airmuscle.muscle.characteristic import Clamped, ContractileSurface, VirtualWork
 from airmuscle.muscle.characteristic.contractile_surface import exponents
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
+from airmuscle.plant import Plant
+from airmuscle.pneumatics import EnergyBalance, Isothermal, Polytropic
 from airmuscle.simulation import find_equilibria, find_equilibrium
 
 DMSP = am.load("dmsp-20-300").muscle

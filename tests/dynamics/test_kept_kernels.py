@@ -27,10 +27,9 @@ from airmuscle.compile.cache.object_code import build
 from airmuscle.compile.function import Function
 from airmuscle.compile.llvm.jit import object_code
 from airmuscle.compile.program import compile_system
-from airmuscle.control.inputs import Schedule
-from airmuscle.core.errors import AirmuscleWarning
-from airmuscle.simulation import simulate
-from airmuscle.simulation.integrators import DormandPrince8, Rodas4
+from airmuscle.control import Schedule
+from airmuscle.errors import AirmuscleWarning
+from airmuscle.simulation import DormandPrince8, Rodas4, simulate
 
 CASE = lifting_run(1)
 READY = compile_system(CASE.system)

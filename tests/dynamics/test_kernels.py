@@ -9,18 +9,13 @@ from joints import chosen_muscle, joint, joint_start
 from scipy.integrate import solve_ivp
 
 from airmuscle.compile.program import compile_system
-from airmuscle.control.inputs import ZERO_INPUT, SampledSignal, Schedule
-from airmuscle.core import ops
-from airmuscle.core.declaration import model, parameter
-from airmuscle.core.errors import SimulationError
-from airmuscle.core.system import System
-from airmuscle.core.variables import StateVariable
+from airmuscle.control import ZERO_INPUT, SampledSignal, Schedule
+from airmuscle.core import StateVariable, System, model, ops, parameter
+from airmuscle.errors import SimulationError
 from airmuscle.mechanism import HangingMass
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Supply, Valve
-from airmuscle.pneumatics.gas import Polytropic
-from airmuscle.simulation import advance, simulate
-from airmuscle.simulation.integrators import DormandPrince8, Rodas4, RungeKutta4
+from airmuscle.plant import Plant
+from airmuscle.pneumatics import FillDischarge, Polytropic, Supply, Valve
+from airmuscle.simulation import DormandPrince8, Rodas4, RungeKutta4, advance, simulate
 
 
 def hanging() -> Plant:

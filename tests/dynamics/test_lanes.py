@@ -15,7 +15,7 @@ from airmuscle.compile.ir.instructions import Operation
 from airmuscle.compile.llvm import emit, vector_math
 from airmuscle.compile.llvm.jit import jit_compile
 from airmuscle.compile.llvm.types import LlvmType
-from airmuscle.core.errors import TraceError
+from airmuscle.errors import TraceError
 from airmuscle.simulation.batch.lanes import aligned_arrays
 
 NUMBERS = {"16 doubles": LlvmType(64, 16), "8 doubles": LlvmType(64, 8), "32 singles": LlvmType(32, 32)}

@@ -15,7 +15,7 @@ import airmuscle as am
 from airmuscle.control import PID, ControlLaw, ControlLoop, LawDesign, SplitRange, WithFeedForward, WithSetpointDelay
 from airmuscle.control.law_design import designed_loop, with_designed_laws
 from airmuscle.core import model, parameter
-from airmuscle.core.errors import ParameterError
+from airmuscle.errors import ParameterError
 from airmuscle.simulation import RungeKutta4, simulate
 from airmuscle.simulation.batch import simulate_batch
 from airmuscle.study import LoopCase, tune

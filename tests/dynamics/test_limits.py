@@ -13,14 +13,16 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.control.inputs import ZERO_INPUT, Schedule
-from airmuscle.mechanism import AntagonisticJoint, HangingMass, Isometric, SpringLoad, WithEndStops
-from airmuscle.mechanism.contact import HuntCrossley
+from airmuscle.control import ZERO_INPUT, Schedule
+from airmuscle.mechanism import AntagonisticJoint, HangingMass, HuntCrossley, Isometric, SpringLoad, WithEndStops
 from airmuscle.muscle.friction import Dahl
 from airmuscle.plant import Plant, total_air
 from airmuscle.pneumatics import (
     ClosedChamber,
+    EnergyBalance,
     FillDischarge,
+    Isothermal,
+    Polytropic,
     ProportionalRegulator,
     ProportionalValve,
     SecondOrderLag,
@@ -31,10 +33,8 @@ from airmuscle.pneumatics import (
     WithLeak,
     WithTubes,
 )
-from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
-from airmuscle.simulation import simulate
+from airmuscle.simulation import Rodas4, simulate
 from airmuscle.simulation.equilibrium import find_equilibrium
-from airmuscle.simulation.integrators import Rodas4
 
 GASES = [Isothermal(), Polytropic(1.2), EnergyBalance(0.2), EnergyBalance(0.0)]
 MUSCLE = chosen_muscle()

@@ -8,17 +8,20 @@ import numpy as np
 import pytest
 from joints import chosen_muscle, joint, joint_start
 
-from airmuscle.analysis.linear_model import linearise
+from airmuscle.analysis import linearise
 from airmuscle.compile.program import compile_system
-from airmuscle.control.inputs import Schedule
-from airmuscle.core.errors import AirmuscleError, ParameterError
+from airmuscle.control import Schedule
+from airmuscle.errors import AirmuscleError, ParameterError
 from airmuscle.mechanism import AntagonisticJoint, HangingMass, SpringLoad
 from airmuscle.muscle import SeriesSpring
 from airmuscle.muscle.friction import LuGre
-from airmuscle.plant.plant import Plant
+from airmuscle.plant import Plant
 from airmuscle.pneumatics import (
     ClosedChamber,
+    EnergyBalance,
     FillDischarge,
+    Isothermal,
+    Polytropic,
     ProportionalRegulator,
     ProportionalValve,
     SecondOrderLag,
@@ -27,10 +30,8 @@ from airmuscle.pneumatics import (
     Valve,
     WithTubes,
 )
-from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
-from airmuscle.simulation import Problem, simulate, solve
+from airmuscle.simulation import Problem, Rodas4, simulate, solve
 from airmuscle.simulation.equilibrium import find_equilibrium
-from airmuscle.simulation.integrators import Rodas4
 
 VALVE = Valve(2.6e-9, 0.433)
 LEFT, RIGHT = (replace(chosen_muscle(), name=name) for name in ("left", "right"))

@@ -11,7 +11,7 @@ from control_plants import LIFT, PRESSURE
 import airmuscle as am
 from airmuscle.control import PID, PWM, Cascade, ColumnSensor, ControlLoop, SampledSignal, Schedule, WithSensors
 from airmuscle.core import tree
-from airmuscle.core.errors import AirmuscleError, ParameterError
+from airmuscle.errors import AirmuscleError, ParameterError
 from airmuscle.simulation import (
     RungeKutta4,
     differentiate_loop,

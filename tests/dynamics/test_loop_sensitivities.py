@@ -31,11 +31,8 @@ from airmuscle.control import (
     WithFeedForward,
     WithSensors,
 )
-from airmuscle.core import tree
-from airmuscle.core.declaration import model, parameter
-from airmuscle.core.errors import ParameterError
-from airmuscle.core.system import System
-from airmuscle.core.variables import Input, StateVariable
+from airmuscle.core import Input, StateVariable, System, model, parameter, tree
+from airmuscle.errors import ParameterError
 from airmuscle.simulation import (
     LawWithSensitivities,
     Rodas4,

@@ -12,12 +12,12 @@ from joints import HEAT_CAPACITY, chosen_muscle, joint, joint_start
 from widths import widened
 
 from airmuscle.compile.program import compile_system
-from airmuscle.control.inputs import ZERO_INPUT, SampledSignal, Schedule
-from airmuscle.control.trajectory import spline_trajectory
-from airmuscle.core.errors import ParameterError
+from airmuscle.control import ZERO_INPUT, SampledSignal, Schedule, spline_trajectory
+from airmuscle.errors import ParameterError
 from airmuscle.mechanism import (
     AntagonisticJoint,
     HangingMass,
+    HuntCrossley,
     Isotonic,
     JointWithEndStops,
     Lever,
@@ -28,14 +28,16 @@ from airmuscle.mechanism import (
     WithEndStops,
     WithOffsets,
 )
-from airmuscle.mechanism.contact import HuntCrossley
-from airmuscle.plant.energy_balance import WithEnergyMeters
-from airmuscle.plant.plant import Plant
+from airmuscle.plant import Plant, WithEnergyMeters
 from airmuscle.pneumatics import (
+    GAS_CONSTANT,
     ClosedChamber,
     DistributedTube,
+    EnergyBalance,
     FillDischarge,
+    Isothermal,
     Manifold,
+    Polytropic,
     ProportionalValve,
     SecondOrderLag,
     SharedSupply,
@@ -45,10 +47,8 @@ from airmuscle.pneumatics import (
     Valve,
     WithTubes,
 )
-from airmuscle.pneumatics.gas import GAS_CONSTANT, EnergyBalance, Isothermal, Polytropic
-from airmuscle.simulation import simulate
+from airmuscle.simulation import Rodas4, simulate
 from airmuscle.simulation.equilibrium import find_equilibrium
-from airmuscle.simulation.integrators import Rodas4
 
 LEFT, RIGHT = (replace(chosen_muscle(), name=name) for name in ("left", "right"))
 VALVE = Valve(2.6e-8, 0.433)

@@ -16,7 +16,7 @@ import airmuscle as am
 from airmuscle.analysis import design_predictive, linearise
 from airmuscle.analysis.riccati import regulator
 from airmuscle.control import ControlLoop, Measurement
-from airmuscle.core.errors import AirmuscleError, ParameterError
+from airmuscle.errors import AirmuscleError, ParameterError
 
 pytest.importorskip("daqp", reason="the package daqp is not installed")
 H = 0.01

@@ -13,7 +13,7 @@ import pytest
 import airmuscle as am
 from airmuscle.analysis import ExtendedKalmanFilter, NonlinearModelPredictive, design_predictive, linearise
 from airmuscle.control import ControlLoop, Measurement
-from airmuscle.core.errors import ParameterError
+from airmuscle.errors import ParameterError
 from airmuscle.simulation import find_equilibrium
 
 pytest.importorskip("daqp", reason="the package daqp is not installed")

@@ -11,7 +11,7 @@ import pytest
 
 from airmuscle.control import SampledSignal, Schedule
 from airmuscle.control.control_loop import CombinedSignal
-from airmuscle.core.errors import ParameterError
+from airmuscle.errors import ParameterError
 from airmuscle.mechanism import ExternalLoad
 from airmuscle.plant import WithEnergyMeters, open_plant
 from airmuscle.simulation import Problem, Rodas4, solve

@@ -15,11 +15,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airmuscle.compile.program import compile_system
-from airmuscle.core import autodiff, ops
-from airmuscle.core.declaration import model, parameter
-from airmuscle.core.errors import ParameterError, TraceError
-from airmuscle.core.system import System
-from airmuscle.core.variables import StateVariable
+from airmuscle.core import StateVariable, System, autodiff, model, ops, parameter
+from airmuscle.errors import ParameterError, TraceError
 
 FORMULAS = {
     "arithmetic": lambda x, y: (x + 2 * y) * (x - y) / (4 + y * y) - x,

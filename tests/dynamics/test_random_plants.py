@@ -15,14 +15,12 @@ import numpy as np
 import pytest
 from composer import STOCK, Composer, models_in
 
+from airmuscle import Status
 from airmuscle.core.diagnostics import DiagnosticCode
-from airmuscle.core.errors import AirmuscleError, ParameterError
-from airmuscle.core.status import Status
+from airmuscle.errors import AirmuscleError, ParameterError
 from airmuscle.mechanism import HangingMass, WithLatch
-from airmuscle.plant.energy_balance import WithEnergyMeters
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, RegulatedSupply, Supply, Tank, Valve
-from airmuscle.pneumatics.gas import Ambient, EnergyBalance, Isothermal
+from airmuscle.plant import Plant, WithEnergyMeters
+from airmuscle.pneumatics import Ambient, EnergyBalance, FillDischarge, Isothermal, RegulatedSupply, Supply, Tank, Valve
 from airmuscle.simulation import Problem, Rodas4, solve
 
 # Laws and geometries of different lengths are combined.

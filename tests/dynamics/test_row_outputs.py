@@ -13,7 +13,7 @@ from widths import widened
 
 from airmuscle.compile.functions_simd import ROWS
 from airmuscle.compile.program import compile_system
-from airmuscle.control.piecewise_linear import PiecewiseLinear
+from airmuscle.control import PiecewiseLinear
 from airmuscle.mechanism import HangingMass
 from airmuscle.simulation.rows import RowRecorder
 

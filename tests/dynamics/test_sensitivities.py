@@ -13,14 +13,10 @@ import pytest
 from filling import hanging, runs
 
 from airmuscle.compile.program import compile_system
-from airmuscle.control.inputs import SampledSignal, Schedule
-from airmuscle.core import ops, tree
-from airmuscle.core.declaration import model, parameter
-from airmuscle.core.errors import ParameterError
-from airmuscle.core.system import System
-from airmuscle.core.variables import StateVariable
-from airmuscle.simulation.integrators import Rodas4, RungeKutta4
-from airmuscle.simulation.with_sensitivities import WithSensitivities, sensitivity
+from airmuscle.control import SampledSignal, Schedule
+from airmuscle.core import StateVariable, System, model, ops, parameter, tree
+from airmuscle.errors import ParameterError
+from airmuscle.simulation import Rodas4, RungeKutta4, WithSensitivities, sensitivity
 
 PATHS = (
     "circuit.fill.conductance",

@@ -20,15 +20,12 @@ from airmuscle.compile.ir.branches import COMMANDED, STEADY, VARYING, skipping
 from airmuscle.compile.ir.instructions import Code, Instruction, Operand, Operation
 from airmuscle.compile.ir.scheduling import ConditionalBlock
 from airmuscle.compile.program import Program, compile_system
-from airmuscle.control.inputs import Schedule
-from airmuscle.core import ops
-from airmuscle.core.declaration import model, parameter
-from airmuscle.core.system import System
-from airmuscle.core.variables import StateVariable
-from airmuscle.plant.plant import Plant
+from airmuscle.control import Schedule
+from airmuscle.core import StateVariable, System, model, ops, parameter
+from airmuscle.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, ThreePositionValve, Valve
+from airmuscle.simulation import RungeKutta4
 from airmuscle.simulation.batch import simulate_batch
-from airmuscle.simulation.integrators import RungeKutta4
 
 BINARY = (
     Operation.ADD,

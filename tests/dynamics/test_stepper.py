@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 from control_plants import JOINT, LIFT
 
-from airmuscle.control.inputs import Schedule
-from airmuscle.core.errors import ParameterError, SimulationError
+from airmuscle.control import Schedule
+from airmuscle.errors import ParameterError, SimulationError
 from airmuscle.library import catalogue
-from airmuscle.plant.energy_balance import WithEnergyMeters
+from airmuscle.plant import WithEnergyMeters
 from airmuscle.simulation import Rodas4, RungeKutta4, Stepper, simulate
 
 START = JOINT.state_at(pressure=2e5)

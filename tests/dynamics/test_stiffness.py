@@ -13,18 +13,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joints import chosen_muscle
 
-from airmuscle.analysis.static_stiffness import stiffness
-from airmuscle.control.trajectory import spline_trajectory
+from airmuscle.analysis import stiffness
+from airmuscle.control import spline_trajectory
 from airmuscle.mechanism import AntagonisticJoint, HangingMass, Isometric, Lever, MusclesInSeries, PrescribedMotion
 from airmuscle.muscle import LinearSpring, Muscle, SeriesSpring
-from airmuscle.muscle.characteristic.virtual_work import VirtualWork
+from airmuscle.muscle.characteristic import VirtualWork
 from airmuscle.muscle.geometry import Braid
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import ClosedChamber
-from airmuscle.pneumatics.gas import HEAT_CAPACITY_RATIO, EnergyBalance, Isothermal, Polytropic, absolute_pressure
-from airmuscle.simulation import simulate
+from airmuscle.plant import Plant
+from airmuscle.pneumatics import ClosedChamber, EnergyBalance, Isothermal, Polytropic, absolute_pressure
+from airmuscle.pneumatics.gas import HEAT_CAPACITY_RATIO
+from airmuscle.simulation import Rodas4, simulate
 from airmuscle.simulation.equilibrium import find_equilibrium
-from airmuscle.simulation.integrators import Rodas4
 
 BRAID = Braid(0.01, 0.4363, 0.2)
 MUSCLE = Muscle(VirtualWork(BRAID), BRAID, LinearSpring(3000.0))

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import airmuscle as am
-from airmuscle.core.errors import AirmuscleWarning, TraceError
-from airmuscle.plant.energy_balance import WithEnergyMeters
+from airmuscle.errors import AirmuscleWarning, TraceError
+from airmuscle.plant import WithEnergyMeters
 
 
 @pytest.fixture(scope="module")

@@ -11,19 +11,23 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.control.driver import SolenoidDriver
-from airmuscle.control.inputs import Schedule
-from airmuscle.control.with_drivers import WithDrivers
-from airmuscle.mechanism import HangingMass
-from airmuscle.mechanism.contact import HuntCrossley
+from airmuscle.control import Schedule, SolenoidDriver, WithDrivers
+from airmuscle.mechanism import HangingMass, HuntCrossley
 from airmuscle.muscle import CreepElements, DirectionalDamper, EndStop, SeriesSpring, ViscoelasticWall
 from airmuscle.muscle.friction import LuGre, MaxwellSlip
-from airmuscle.plant.energy_balance import WithEnergyMeters
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import DistributedTube, FillDischarge, RegulatedSupply, Supply, Tank, Tube, Valve, WithTubes
-from airmuscle.pneumatics.gas import EnergyBalance
-from airmuscle.simulation import simulate
-from airmuscle.simulation.integrators import Rodas4
+from airmuscle.plant import Plant, WithEnergyMeters
+from airmuscle.pneumatics import (
+    DistributedTube,
+    EnergyBalance,
+    FillDischarge,
+    RegulatedSupply,
+    Supply,
+    Tank,
+    Tube,
+    Valve,
+    WithTubes,
+)
+from airmuscle.simulation import Rodas4, simulate
 
 SWITCHINGS = 10_000
 

@@ -15,9 +15,8 @@ from airmuscle.analysis import (
     consistency_band,
     normalised_error_squared,
 )
-from airmuscle.core import System, model, parameter
-from airmuscle.core.errors import ParameterError
-from airmuscle.core.variables import StateVariable
+from airmuscle.core import StateVariable, System, model, parameter
+from airmuscle.errors import ParameterError
 
 H = 5e-3
 NOISE = {"air_mass": 2e-6, "speed": 0.02}

@@ -15,16 +15,25 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from airmuscle.control.inputs import Schedule
+from airmuscle.control import Schedule
 from airmuscle.mechanism import Isometric
 from airmuscle.muscle import Muscle
-from airmuscle.muscle.characteristic.chou_hannaford1996 import ChouHannaford1996
-from airmuscle.muscle.geometry.braid import Braid
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import CheckValve, FillDischarge, Orifice, SubsonicIndexValve, Supply, Valve
-from airmuscle.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, Ambient, Isothermal
-from airmuscle.simulation import simulate
-from airmuscle.simulation.integrators import Rodas4
+from airmuscle.muscle.characteristic import ChouHannaford1996
+from airmuscle.muscle.geometry import Braid
+from airmuscle.plant import Plant
+from airmuscle.pneumatics import (
+    GAS_CONSTANT,
+    REFERENCE_DENSITY,
+    Ambient,
+    CheckValve,
+    FillDischarge,
+    Isothermal,
+    Orifice,
+    SubsonicIndexValve,
+    Supply,
+    Valve,
+)
+from airmuscle.simulation import Rodas4, simulate
 
 SOURCE, T0, CONDUCTANCE = 7e5, 293.15, 1e-9
 AMBIENT = Ambient(100e3, T0)

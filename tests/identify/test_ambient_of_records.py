@@ -8,16 +8,13 @@ import numpy as np
 import pytest
 
 from airmuscle import load
-from airmuscle.core.errors import ColumnError, ParameterError, UnitError
+from airmuscle.errors import ColumnError, ParameterError, UnitError
 from airmuscle.identify.campaign import Campaign, LeftOutStage, classify_records
 from airmuscle.identify.campaign.fill_stage import fit_fill_stage
 from airmuscle.pneumatics import Ambient
-from airmuscle.recording import Recording, read
-from airmuscle.recording.follow import RowReader
+from airmuscle.recording import Recording, RowReader, read
+from airmuscle.scenario import load_dynamic_fit, load_plant_model, load_scenario
 from airmuscle.scenario.campaign import campaign_scenarios
-from airmuscle.scenario.identification import load_dynamic_fit
-from airmuscle.scenario.prediction import load_plant_model
-from airmuscle.scenario.scenario import load_scenario
 
 PLANT = """
 title = "rig"

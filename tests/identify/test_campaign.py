@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from made_campaign import THREE_LENGTHS, TrueMuscle, unseen_records, write_campaign, write_german
 
-from airmuscle.core.errors import IdentificationError
+from airmuscle.errors import IdentificationError
 from airmuscle.identify.campaign import (
     CreepStage,
     FillStage,

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from airmuscle.control import Schedule
-from airmuscle.core.errors import IdentificationError
+from airmuscle.errors import IdentificationError
+from airmuscle.identify import fit
+from airmuscle.identify.campaign import classify_records, fit_held_creep
 from airmuscle.identify.campaign.error_band import _band, _inner, _left_out_residuals
-from airmuscle.identify.campaign.held_creep import fit_held_creep
-from airmuscle.identify.campaign.record import classify_records
 from airmuscle.identify.campaign.release_stage import _mass
 from airmuscle.identify.campaign.rig import check_one_rig
 from airmuscle.identify.campaign.rows import with_force
@@ -22,14 +22,12 @@ from airmuscle.identify.dynamic.candidate_records import _Context
 from airmuscle.identify.dynamic.fit import _describe_model_error
 from airmuscle.identify.dynamic.reliability import searches_at_lowest
 from airmuscle.identify.dynamic.sensing import SensorLocation
-from airmuscle.identify.hysteresis import creep_elements
-from airmuscle.identify.hysteresis.creep import fit_creep
-from airmuscle.identify.static_fit import fit
+from airmuscle.identify.hysteresis import creep_elements, fit_creep
 from airmuscle.mechanism import Isometric
 from airmuscle.muscle import Muscle
 from airmuscle.muscle.characteristic import VirtualWork
 from airmuscle.muscle.geometry import Braid
-from airmuscle.plant.plant import Plant
+from airmuscle.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Polytropic, Supply, Valve
 from airmuscle.recording import Recording
 from airmuscle.recording.segment import estimate_sensors

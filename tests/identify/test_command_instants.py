@@ -9,15 +9,14 @@ import math
 import numpy as np
 import pytest
 
-from airmuscle.control.inputs import SampledSignal, Schedule
-from airmuscle.core.errors import ParameterError
+from airmuscle.control import SampledSignal, Schedule
+from airmuscle.errors import ParameterError
 from airmuscle.identify.dynamic import CommandInstants, Experiment, InitialConditions, StartTime, fit_dynamic
 from airmuscle.mechanism import Isometric
 from airmuscle.muscle import Muscle
 from airmuscle.muscle.geometry import Braid
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Supply, Valve
-from airmuscle.pneumatics.gas import EnergyBalance
+from airmuscle.plant import Plant
+from airmuscle.pneumatics import EnergyBalance, FillDischarge, Supply, Valve
 from airmuscle.simulation import Rodas4, simulate
 
 MUSCLE = Muscle.ideal(Braid(0.01, math.radians(25), 0.3))

@@ -22,7 +22,7 @@ import airmuscle as am
 from airmuscle import load_data
 from airmuscle.cli.app import app
 from airmuscle.cli.fit_options import parse_split
-from airmuscle.core.errors import IdentificationError, ParameterError
+from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.identify import BlockSplit, Candidate, LevelSplit, RunSplit, SpecimenSplit, compare, standard_candidates
 from airmuscle.identify.candidate_scores import FoldScore
 from airmuscle.identify.candidates import blank_surface
@@ -30,7 +30,7 @@ from airmuscle.identify.cross_validation import ALWAYS_FITTED, default_split
 from airmuscle.identify.force_evaluation import evaluate_force
 from airmuscle.identify.recommendation import excess_error, recommend
 from airmuscle.muscle.characteristic import ContractileSurface, Hunt2017, InverseLength, TonduLopez2000
-from airmuscle.muscle.geometry.braid import Braid
+from airmuscle.muscle.geometry import Braid
 from airmuscle.recording import Recording, write_csv
 from airmuscle.report.compare_chapter import compare_chapter
 

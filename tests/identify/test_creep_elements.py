@@ -7,10 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airmuscle.core.errors import IdentificationError, ParameterError
+from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.identify.campaign.creep_stage import HeldRows
-from airmuscle.identify.hysteresis import creep_elements, find_holds, fit_creep
-from airmuscle.identify.hysteresis.creep import Creep, CreepFit
+from airmuscle.identify.hysteresis import Creep, creep_elements, find_holds, fit_creep
+from airmuscle.identify.hysteresis.creep import CreepFit
 from airmuscle.muscle import CreepElements
 from airmuscle.recording import Recording
 

@@ -32,12 +32,11 @@ from laboratories import (
 from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
-from airmuscle.core.errors import AirmuscleWarning, ColumnError
-from airmuscle.identify import Fit, compare, fit
-from airmuscle.identify.campaign import StaticStage
-from airmuscle.identify.campaign.record import classify_records
+from airmuscle.errors import AirmuscleWarning, ColumnError
+from airmuscle.identify import Candidate, Fit, compare, fit
+from airmuscle.identify.campaign import StaticStage, classify_records
 from airmuscle.identify.campaign.static_stage import fit_static_stage
-from airmuscle.identify.candidates import Candidate, blank_surface
+from airmuscle.identify.candidates import blank_surface
 from airmuscle.identify.data_checks import DataChecks
 from airmuscle.muscle import CreepElements
 from airmuscle.muscle.friction import NoFriction

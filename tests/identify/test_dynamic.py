@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from filling import hanging
 
-from airmuscle.control.inputs import Schedule
+from airmuscle import Status
+from airmuscle.control import Schedule
 from airmuscle.core import tree
-from airmuscle.core.errors import IdentificationError, ParameterError
-from airmuscle.core.status import Status
+from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.identify.dynamic import (
     Experiment,
     InitialConditions,
@@ -29,9 +29,8 @@ from airmuscle.mechanism import HangingMass, Isometric
 from airmuscle.muscle import Muscle, SwellingWall
 from airmuscle.muscle.friction import Dahl
 from airmuscle.muscle.geometry import Vessel
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Supply, Tube, Valve, WithLeak, WithTubes
-from airmuscle.pneumatics.gas import EnergyBalance, Polytropic
+from airmuscle.plant import Plant
+from airmuscle.pneumatics import EnergyBalance, FillDischarge, Polytropic, Supply, Tube, Valve, WithLeak, WithTubes
 from airmuscle.simulation import simulate
 from airmuscle.simulation.bound_integrator import BoundIntegrator
 from airmuscle.simulation.equilibrium import find_equilibrium

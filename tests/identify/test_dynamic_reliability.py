@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from airmuscle.control import Schedule
+from airmuscle.identify import Estimate
 from airmuscle.identify.dynamic import Experiment, InitialConditions, fit_dynamic
 from airmuscle.identify.dynamic.reliability import (
     describe_bounds,
@@ -21,11 +22,10 @@ from airmuscle.identify.dynamic.reliability import (
     distinct_optima,
     searches_at_lowest,
 )
-from airmuscle.identify.result import Estimate
-from airmuscle.library.catalogue import load
+from airmuscle.library import load
 from airmuscle.mechanism import Isometric
 from airmuscle.muscle import Muscle
-from airmuscle.plant.plant import Plant
+from airmuscle.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Polytropic, Supply, Valve
 from airmuscle.report.dynamic_chapter import dynamic_chapters
 from airmuscle.simulation import simulate

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from airmuscle.core import autodiff
-from airmuscle.core.errors import IdentificationError
+from airmuscle.errors import IdentificationError
 from airmuscle.identify.correlation_index import correlation_index
 from airmuscle.identify.surface.basis import Chebyshev, LoadRange, Monomials, conditioning
 from airmuscle.identify.surface.exponential import SurfaceProblem, fit_linearised, fit_nonlinear
@@ -22,7 +22,8 @@ from airmuscle.identify.surface.monotone import (
     fit_monotone,
     slope_constraints,
 )
-from airmuscle.muscle.characteristic.borzikova import SAM_30X290, BorzikovaExponential
+from airmuscle.muscle.characteristic import BorzikovaExponential
+from airmuscle.muscle.characteristic.borzikova import SAM_30X290
 from airmuscle.recording import Recording
 from airmuscle.reproduce.borzikova_surfaces import sample
 

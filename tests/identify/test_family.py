@@ -12,13 +12,12 @@ import numpy as np
 import pytest
 from widths import widened
 
-from airmuscle.core.errors import IdentificationError, ParameterError
-from airmuscle.identify import Candidate, SpecimenSplit, compare, fit
-from airmuscle.identify.candidates import blank_surface, standard_candidates
+from airmuscle.errors import IdentificationError, ParameterError
+from airmuscle.identify import Candidate, SpecimenSplit, compare, fit, standard_candidates
+from airmuscle.identify.candidates import blank_surface
+from airmuscle.library import Entry, to_toml
 from airmuscle.library.build import build
-from airmuscle.library.entry import Entry
 from airmuscle.library.location import Location
-from airmuscle.library.write import to_toml
 from airmuscle.muscle.characteristic import (
     ContractileSurface,
     EffectiveLength,
@@ -26,7 +25,7 @@ from airmuscle.muscle.characteristic import (
     LogarithmicLength,
     TonduLopez2000,
 )
-from airmuscle.muscle.geometry.braid import Braid
+from airmuscle.muscle.geometry import Braid
 from airmuscle.recording import Recording
 
 LENGTHS = (0.08, 0.12, 0.2, 0.4)

@@ -13,8 +13,8 @@ import pytest
 from widths import widened
 
 from airmuscle import load
-from airmuscle.control.inputs import Schedule
-from airmuscle.core.errors import ParameterError
+from airmuscle.control import Schedule
+from airmuscle.errors import ParameterError
 from airmuscle.identify.campaign import FillStage, classify_records
 from airmuscle.identify.campaign.fill_stage import fit_fill_stage
 from airmuscle.identify.campaign.release_stage import fit_release_stage
@@ -24,9 +24,8 @@ from airmuscle.mechanism import HangingMass, Isometric, WithLatch
 from airmuscle.muscle import LinearDamper, Muscle
 from airmuscle.muscle.characteristic import VirtualWork
 from airmuscle.muscle.geometry import Braid
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import Ambient, ClosedChamber, FillDischarge, Supply, Valve
-from airmuscle.pneumatics.gas import EnergyBalance, Polytropic
+from airmuscle.plant import Plant
+from airmuscle.pneumatics import Ambient, ClosedChamber, EnergyBalance, FillDischarge, Polytropic, Supply, Valve
 from airmuscle.recording import Recording
 from airmuscle.simulation import Rodas4, simulate
 

@@ -19,21 +19,23 @@ from scipy.optimize import curve_fit
 from widths import widened
 
 import airmuscle
-from airmuscle.core import ops
-from airmuscle.core.declaration import model, parameter
-from airmuscle.core.errors import IdentificationError, ParameterError
+from airmuscle.core import model, ops, parameter
+from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.identify import UNCENSORED, Censoring, Fit, Huber, LeastSquares, Loss, SoftL1, confidence_band, fit
-from airmuscle.library.catalogue import load, load_data
-from airmuscle.muscle.characteristic.base import ContractionLaw, PressureLaw
-from airmuscle.muscle.characteristic.clamped import Clamped
-from airmuscle.muscle.characteristic.contractile_surface import ContractileSurface, exponents
-from airmuscle.muscle.characteristic.martens_boblan2017 import MartensBoblan2017
-from airmuscle.muscle.characteristic.saga2007 import LINE_A, Saga2007
-from airmuscle.muscle.characteristic.sarosi2012 import Sarosi2012
-from airmuscle.muscle.characteristic.tondu_lopez2000 import TonduLopez2000
-from airmuscle.muscle.geometry.braid import Braid
-from airmuscle.muscle.geometry.parabola import Parabola
-from airmuscle.muscle.geometry.straight_fibre import StraightFibre
+from airmuscle.library import load, load_data
+from airmuscle.muscle.characteristic import (
+    Clamped,
+    ContractileSurface,
+    ContractionLaw,
+    MartensBoblan2017,
+    PressureLaw,
+    Saga2007,
+    Sarosi2012,
+    TonduLopez2000,
+)
+from airmuscle.muscle.characteristic.contractile_surface import exponents
+from airmuscle.muscle.characteristic.saga2007 import LINE_A
+from airmuscle.muscle.geometry import Braid, Parabola, StraightFibre
 from airmuscle.recording import Recording, read_csv
 
 DATA = Path(airmuscle.__file__).parent / "library" / "data"

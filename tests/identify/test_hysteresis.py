@@ -11,22 +11,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airmuscle.core.errors import IdentificationError, ParameterError
+from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.identify.hysteresis import (
     ContractionPath,
+    Creep,
     FixedCharacteristic,
     PolynomialCurve,
     PressurePath,
+    fit_creep,
     fit_hysteresis,
     initial_friction_laws,
 )
 from airmuscle.identify.hysteresis.branches import branch_gap, repeat_difference
-from airmuscle.identify.hysteresis.creep import Creep, fit_creep
 from airmuscle.identify.hysteresis.plot import loop_path, plot_loops
 from airmuscle.identify.model_evidence import aicc, effective_sample_size, f_test_p_value
-from airmuscle.muscle.characteristic.virtual_work import VirtualWork
+from airmuscle.muscle.characteristic import VirtualWork
 from airmuscle.muscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip, PrandtlIshlinskii
-from airmuscle.muscle.geometry.braid import Braid
+from airmuscle.muscle.geometry import Braid
 from airmuscle.recording import Recording
 from airmuscle.recording.segment import motion_direction
 

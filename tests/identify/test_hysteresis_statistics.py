@@ -9,21 +9,23 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from airmuscle.core.errors import AirmuscleWarning, ColumnError, IdentificationError
+from airmuscle.errors import AirmuscleWarning, ColumnError, IdentificationError
 from airmuscle.identify.hysteresis import (
+    Creep,
     HysteresisFit,
     LoopFit,
     PolynomialCurve,
     RunAgreement,
     find_holds,
     find_loops,
+    fit_creep,
     fit_hysteresis,
     fit_jointly,
     identified_friction,
 )
 from airmuscle.identify.hysteresis.agreement import agreement_of_run, force_amplitude
 from airmuscle.identify.hysteresis.axis import Axis
-from airmuscle.identify.hysteresis.creep import Creep, _fit_elements, fit_creep
+from airmuscle.identify.hysteresis.creep import _fit_elements
 from airmuscle.identify.hysteresis.holds import _drifts
 from airmuscle.identify.hysteresis.limits import DataLimits, data_limits, parameters_on_bounds
 from airmuscle.identify.volume_fit import VolumePoints, fit_volume, volume_points

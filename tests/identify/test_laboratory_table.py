@@ -35,7 +35,7 @@ from laboratories import (
     write,
 )
 
-from airmuscle.core.errors import AirmuscleError, AirmuscleWarning
+from airmuscle.errors import AirmuscleError, AirmuscleWarning
 from airmuscle.identify import Fit, fit
 from airmuscle.identify.candidates import blank_surface
 from airmuscle.recording import read

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import airmuscle as am
-from airmuscle.core.errors import IdentificationError, ParameterError
+from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.identify import (
     Candidate,
     RunSplit,
@@ -25,7 +25,7 @@ from airmuscle.identify import (
 from airmuscle.identify.candidates import blank_surface
 from airmuscle.identify.length_errors import corrected_length
 from airmuscle.muscle.characteristic import EffectiveLength, LogarithmicLength, TonduLopez2000
-from airmuscle.muscle.geometry.braid import Braid
+from airmuscle.muscle.geometry import Braid
 from airmuscle.recording import Recording
 
 LAW = EffectiveLength(blank_surface(3), 0.3, 0.005)

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from airmuscle.core.errors import AirmuscleWarning, IdentificationError
+from airmuscle.errors import AirmuscleWarning, IdentificationError
 from airmuscle.identify.hysteresis import find_loops, fit_loop
 from airmuscle.muscle.friction import MaxwellSlip
 from airmuscle.recording import Recording

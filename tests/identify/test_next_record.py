@@ -13,17 +13,16 @@ import pytest
 from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
-from airmuscle.control.inputs import Schedule
-from airmuscle.core.errors import IdentificationError, ParameterError
+from airmuscle.control import Schedule
+from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.identify.dynamic import Experiment, InitialConditions, StartTime, fit_dynamic, rank_records
 from airmuscle.identify.dynamic.candidate_records import candidate_records
-from airmuscle.library.catalogue import load
+from airmuscle.library import load
 from airmuscle.mechanism import Isometric
 from airmuscle.muscle import Muscle
 from airmuscle.muscle.geometry import Vessel
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Supply, Valve
-from airmuscle.pneumatics.gas import EnergyBalance, Polytropic
+from airmuscle.plant import Plant
+from airmuscle.pneumatics import EnergyBalance, FillDischarge, Polytropic, Supply, Valve
 from airmuscle.recording import Recording
 from airmuscle.simulation import simulate
 

@@ -12,19 +12,17 @@ import pytest
 from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
-from airmuscle.core.errors import IdentificationError, ParameterError
+from airmuscle.errors import IdentificationError, ParameterError
+from airmuscle.identify import BenchLimits, fit
 from airmuscle.identify.experiment_design import (
-    BenchLimits,
     _exchange,
     _log_determinant,
     _select_greedily,
     candidate_runs,
     optimal_design,
 )
-from airmuscle.identify.static_fit import fit
-from airmuscle.muscle.characteristic.tondu_lopez2000 import TonduLopez2000
-from airmuscle.muscle.characteristic.validity_range import ValidityRange
-from airmuscle.muscle.geometry.braid import Braid
+from airmuscle.muscle.characteristic import TonduLopez2000, ValidityRange
+from airmuscle.muscle.geometry import Braid
 from airmuscle.recording import Recording, read_csv
 
 BENCH = BenchLimits(ValidityRange(50e3, 500e3, 0.0, 0.25), 400.0)

@@ -16,13 +16,19 @@ from typer.testing import CliRunner
 import airmuscle as am
 from airmuscle.cli.app import app
 from airmuscle.cli.fit_options import parse_split
-from airmuscle.core.errors import IdentificationError, ParameterError
-from airmuscle.identify import Candidate, RunSplit, SpecimenSplit, compare, confidence_band, select_for_both
-from airmuscle.identify.candidates import blank_surface, standard_candidates
+from airmuscle.errors import IdentificationError, ParameterError
+from airmuscle.identify import (
+    Candidate,
+    RunSplit,
+    SpecimenSplit,
+    compare,
+    confidence_band,
+    select_for_both,
+    standard_candidates,
+)
+from airmuscle.identify.candidates import blank_surface
 from airmuscle.identify.specimen_effects import Sums, predict_effects
-from airmuscle.library.catalogue import load
-from airmuscle.library.entry import Entry
-from airmuscle.library.write import save
+from airmuscle.library import Entry, load, save
 from airmuscle.muscle.characteristic import ContractileSurface, LogarithmicLength, PooledLengthLaw
 from airmuscle.recording import Recording
 from airmuscle.report.equation_section import equation_section

@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import airmuscle as am
-from airmuscle.core.errors import IdentificationError
+from airmuscle.errors import IdentificationError
 from airmuscle.identify import fit, fit_points
 from airmuscle.identify.statistics import count_levels
-from airmuscle.library.catalogue import load
+from airmuscle.library import load
 from airmuscle.muscle.characteristic import ContractileSurface
 from airmuscle.recording import Recording
 

@@ -13,15 +13,11 @@ import numpy as np
 import pytest
 
 from airmuscle.core import tree
-from airmuscle.core.errors import AirmuscleWarning, IdentificationError
-from airmuscle.identify import UNCENSORED, confidence_band, fit
+from airmuscle.errors import AirmuscleWarning, IdentificationError
+from airmuscle.identify import UNCENSORED, confidence_band, fit, weakly_determined
 from airmuscle.identify.problem import fitted_quantity_of
-from airmuscle.identify.profile_likelihood import weakly_determined
 from airmuscle.library import catalogue, files
-from airmuscle.muscle.characteristic import ValidityRange
-from airmuscle.muscle.characteristic.base import ContractionLaw, ForceLaw
-from airmuscle.muscle.characteristic.clamped import Clamped
-from airmuscle.muscle.characteristic.tabulated import Tabulated
+from airmuscle.muscle.characteristic import Clamped, ContractionLaw, ForceLaw, Tabulated, ValidityRange
 from airmuscle.recording import Recording
 
 HELD = {

@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from airmuscle.core.errors import IdentificationError, ParameterError
-from airmuscle.identify import fit
-from airmuscle.identify.censoring import UNCENSORED
-from airmuscle.identify.experiment_design import BenchLimits
-from airmuscle.identify.recursive_fit import NextPoint, RecursiveFit
+from airmuscle.errors import IdentificationError, ParameterError
+from airmuscle.identify import UNCENSORED, BenchLimits, RecursiveFit, fit
+from airmuscle.identify.recursive_fit import NextPoint
 from airmuscle.muscle.characteristic import ContractileSurface, ValidityRange
 from airmuscle.recording import Recording
 

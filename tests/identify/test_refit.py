@@ -24,7 +24,7 @@ from airmuscle.identify.solver import LeastSquaresSolution, solve, solve_iterati
 from airmuscle.identify.static_fit import refit
 from airmuscle.identify.variable_projection import find_initial_values
 from airmuscle.muscle.characteristic import ContractileSurface, EffectiveLength, Hunt2017, InverseLength, TonduLopez2000
-from airmuscle.muscle.geometry.braid import Braid
+from airmuscle.muscle.geometry import Braid
 from airmuscle.recording import Recording
 
 LAWS = {

@@ -14,12 +14,11 @@ import pytest
 
 import airmuscle
 from airmuscle import read_csv
-from airmuscle.core.errors import IdentificationError
-from airmuscle.core.tree import leaves
-from airmuscle.identify import UNCENSORED, Candidate, LevelSplit, compare, fit
-from airmuscle.identify.candidates import blank_surface, standard_candidates
+from airmuscle.core import leaves
+from airmuscle.errors import IdentificationError
+from airmuscle.identify import UNCENSORED, Candidate, Censoring, LevelSplit, compare, fit, standard_candidates
+from airmuscle.identify.candidates import blank_surface
 from airmuscle.identify.censored_least_squares import solve_censored_least_squares
-from airmuscle.identify.censoring import Censoring
 from airmuscle.identify.cross_validation import label_folds
 from airmuscle.identify.problem import make_problem
 from airmuscle.identify.variable_projection import find_initial_values, is_linear_parameter

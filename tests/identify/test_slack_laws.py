@@ -15,10 +15,18 @@ import pytest
 import airmuscle as am
 from airmuscle.core import tree
 from airmuscle.errors import IdentificationError
-from airmuscle.identify import Candidate, LevelSplit, RunSplit, SpecimenSplit, compare, fit, standard_candidates
+from airmuscle.identify import (
+    Candidate,
+    LeastSquares,
+    LevelSplit,
+    RunSplit,
+    SpecimenSplit,
+    compare,
+    fit,
+    standard_candidates,
+)
 from airmuscle.identify.candidates import blank_surface
 from airmuscle.identify.fit_points import FitPoints
-from airmuscle.identify.loss import LeastSquares
 from airmuscle.identify.model_evidence import batch_sample_size
 from airmuscle.identify.recommendation import excess_error, recommend
 from airmuscle.identify.slack_rows import Slackness, SlackPull, slack_pull

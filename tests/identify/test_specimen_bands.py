@@ -14,10 +14,9 @@ import airmuscle as am
 from airmuscle.identify import fit, standard_candidates
 from airmuscle.identify.prediction.left_out import degrees_of_freedom, leverages, t_quantile
 from airmuscle.identify.specimen_errors import SpecimenErrors, specimen_errors, specimens_of
-from airmuscle.library.entry import Entry
+from airmuscle.library import Entry, save
 from airmuscle.library.entry_prediction import predict_with_entry
 from airmuscle.library.fitted_entry import fitted_entry
-from airmuscle.library.write import save
 from airmuscle.muscle.characteristic import ContractileSurface
 from airmuscle.recording import Recording
 

@@ -28,7 +28,7 @@ from airmuscle.identify.bootstrapping import RELIABLE_GROUPS
 from airmuscle.identify.candidates import blank_surface
 from airmuscle.identify.parameter_covariance import NORMAL_QUANTILE
 from airmuscle.muscle.characteristic import TonduLopez2000
-from airmuscle.muscle.geometry.braid import Braid
+from airmuscle.muscle.geometry import Braid
 from airmuscle.recording import Recording, write_csv
 from airmuscle.report.uncertainty_chapter import Uncertainty, uncertainty_chapter
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from airmuscle.core.errors import IdentificationError
+from airmuscle.errors import IdentificationError
 from airmuscle.identify import (
     Huber,
     LevelSplit,
@@ -27,7 +27,7 @@ from airmuscle.identify import (
 from airmuscle.identify.bootstrapping import _assign_groups, _refit_iteratively
 from airmuscle.identify.candidates import blank_surface
 from airmuscle.muscle.characteristic import ContractileSurface, Sarosi2012, TonduLopez2000
-from airmuscle.muscle.geometry.braid import Braid
+from airmuscle.muscle.geometry import Braid
 from airmuscle.recording import Recording
 
 TRUTH = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.2)

@@ -10,9 +10,9 @@ import pytest
 from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
-from airmuscle.core.errors import ColumnError, IdentificationError
+from airmuscle.errors import ColumnError, IdentificationError
 from airmuscle.identify.volume_fit import VolumePoints, fit_volume, volume_points
-from airmuscle.library.catalogue import load
+from airmuscle.library import load
 from airmuscle.muscle.characteristic import ValidityRange, VirtualWork
 from airmuscle.muscle.characteristic.energy_defect import maxwell_defect
 from airmuscle.muscle.geometry import Braid, ChebyshevGeometry

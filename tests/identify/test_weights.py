@@ -15,9 +15,8 @@ from airmuscle.cli.app import app
 from airmuscle.identify import fit
 from airmuscle.identify.weights import sensor_deviations
 from airmuscle.muscle.characteristic import ContractileSurface, TonduLopez2000
-from airmuscle.muscle.geometry.braid import Braid
-from airmuscle.recording import Recording
-from airmuscle.recording.csv_writer import write_csv
+from airmuscle.muscle.geometry import Braid
+from airmuscle.recording import Recording, write_csv
 from airmuscle.recording.segment import estimate_sensors
 
 MUSCLE = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.2)

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from control_plants import INVERSE, MECHANISM
 
-from airmuscle.control import AngleAndStiffness
-from airmuscle.control.controller import Measurement
+from airmuscle.control import AngleAndStiffness, Measurement
 
 NAMES = ("left.pressure", "right.pressure")
 LAW = AngleAndStiffness(INVERSE, NAMES)

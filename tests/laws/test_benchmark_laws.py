@@ -14,6 +14,7 @@ from airmuscle.control import (
     CoContraction,
     ColumnSensor,
     FrictionFeedForward,
+    Measurement,
     MotionFeedForward,
     ProportionalFeedback,
     SetpointLead,
@@ -22,8 +23,7 @@ from airmuscle.control import (
     WithSetpointDelay,
     WithStuckValve,
 )
-from airmuscle.control.controller import Measurement
-from airmuscle.core.errors import ParameterError
+from airmuscle.errors import ParameterError
 from airmuscle.mechanism import AntagonisticJoint, HangingMass, JointWithExternalTorque
 
 PRESSURES = ("left.pressure", "right.pressure")

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from airmuscle.core import autodiff
-from airmuscle.core.errors import GeometryLimitError, ParameterError, SolveError
-from airmuscle.library.catalogue import load
-from airmuscle.muscle.characteristic.borzikova import SAM_30X290, BorzikovaDirect, BorzikovaExponential
+from airmuscle.errors import GeometryLimitError, ParameterError, SolveError
+from airmuscle.library import load
+from airmuscle.muscle.characteristic import BorzikovaDirect, BorzikovaExponential
+from airmuscle.muscle.characteristic.borzikova import SAM_30X290
 from airmuscle.reproduce.borzikova_surfaces import sample
 
 # Coefficients of the exponent that the three printed curves determine, by Lagrange interpolation in F;

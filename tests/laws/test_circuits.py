@@ -13,16 +13,21 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.control.inputs import ZERO_INPUT, Schedule
-from airmuscle.core.errors import ParameterError
+from airmuscle.control import ZERO_INPUT, Schedule
+from airmuscle.errors import ParameterError
 from airmuscle.mechanism import HangingMass, Isometric
-from airmuscle.plant.energy_balance import WithEnergyMeters
-from airmuscle.plant.plant import Plant
+from airmuscle.plant import Plant, WithEnergyMeters
 from airmuscle.pneumatics import (
+    GAS_CONSTANT,
+    Air,
+    Ambient,
     CheckValve,
     ClosedChamber,
     DistributedTube,
+    EnergyBalance,
     FillDischarge,
+    Flow,
+    Isothermal,
     Manifold,
     ProportionalRegulator,
     ProportionalValve,
@@ -37,11 +42,10 @@ from airmuscle.pneumatics import (
     Valve,
     WithLeak,
     WithTubes,
+    orifice_flow,
 )
-from airmuscle.pneumatics.flow import orifice_flow
-from airmuscle.pneumatics.gas import GAS_CONSTANT, NO_FLOW, Air, Ambient, EnergyBalance, Flow, Isothermal
-from airmuscle.simulation import simulate
-from airmuscle.simulation.integrators import Rodas4
+from airmuscle.pneumatics.gas import NO_FLOW
+from airmuscle.simulation import Rodas4, simulate
 
 AMBIENT = Ambient()
 VALVE, WIDE, NARROW = Valve(1e-8, 0.4), Valve(5e-8, 0.4), Valve(2e-9, 0.3)

@@ -13,7 +13,7 @@ from control_plants import CIRCUIT, MECHANISM, MUSCLES
 import airmuscle as am
 from airmuscle.analysis import stiffness
 from airmuscle.control import AntagonisticInverse, ComputedTorque, ControlLoop, Measurement
-from airmuscle.core.errors import ParameterError
+from airmuscle.errors import ParameterError
 from airmuscle.muscle import LinearDamper
 
 DAMPED = tuple(replace(muscle, damper=LinearDamper(150.0)) for muscle in MUSCLES)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airmuscle.core.errors import ParameterError
+from airmuscle.errors import ParameterError
 from airmuscle.muscle.characteristic import ContractileSurface
 from airmuscle.muscle.characteristic.contractile_surface import exponents
 

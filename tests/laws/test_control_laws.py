@@ -19,6 +19,7 @@ from airmuscle.control import (
     Decentralised,
     GainSchedule,
     IterativeLearning,
+    Measurement,
     SetpointCommand,
     SigmaDelta,
     SlidingMode,
@@ -27,9 +28,8 @@ from airmuscle.control import (
     WithFeedForward,
     WithSensors,
 )
-from airmuscle.control.controller import Measurement
 from airmuscle.control.random_numbers import drawn, drawn_normal, seeded
-from airmuscle.core.errors import ParameterError
+from airmuscle.errors import ParameterError
 
 H = 0.01
 SPLIT = SplitRange("fill", "discharge")

@@ -15,11 +15,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airmuscle.control import PID, OnOffController, SplitRange
-from airmuscle.control.controller import Measurement, relative_unit
-from airmuscle.core.errors import ParameterError
-from airmuscle.core.reference import cite
-from airmuscle.core.tree import leaves
+from airmuscle.control import PID, Measurement, OnOffController, SplitRange
+from airmuscle.control.controller import relative_unit
+from airmuscle.core import cite, leaves
+from airmuscle.errors import ParameterError
 
 WIDE = {"fill": (-math.inf, math.inf)}
 H = 0.01

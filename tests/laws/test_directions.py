@@ -14,12 +14,10 @@ import numpy as np
 import pytest
 
 from airmuscle.core import autodiff
-from airmuscle.core.errors import AirmuscleWarning, ParameterError, SolveError
-from airmuscle.library import catalogue, files
-from airmuscle.library.entry import Entry
-from airmuscle.muscle.characteristic.base import Characteristic, ContractionLaw, ForceLaw, PressureLaw
+from airmuscle.errors import AirmuscleWarning, ParameterError, SolveError
+from airmuscle.library import Entry, catalogue, files
+from airmuscle.muscle.characteristic import Characteristic, ContractionLaw, ForceLaw, PressureLaw, ValidityRange
 from airmuscle.muscle.characteristic.solve import find_first_root
-from airmuscle.muscle.characteristic.validity_range import ValidityRange
 
 ARGUMENTS = {
     "force": ("pressure", "contraction"),

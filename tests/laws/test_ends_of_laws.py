@@ -15,9 +15,8 @@ import pandas as pd
 import pytest
 
 from airmuscle.core import autodiff
-from airmuscle.core.errors import AirmuscleWarning, GeometryLimitError, ParameterError, PhysicsError
-from airmuscle.library import catalogue
-from airmuscle.library.files import list_laws
+from airmuscle.errors import AirmuscleWarning, GeometryLimitError, ParameterError, PhysicsError
+from airmuscle.library import catalogue, list_laws
 from airmuscle.muscle import Muscle
 from airmuscle.muscle.characteristic import (
     Characteristic,
@@ -38,13 +37,18 @@ from airmuscle.muscle.characteristic import (
 )
 from airmuscle.muscle.characteristic.borzikova import SAM_30X290
 from airmuscle.muscle.characteristic.energy_defect import maxwell_defect, virtual_work_defect
-from airmuscle.muscle.geometry import Braid, StraightFibre
-from airmuscle.muscle.geometry.catenary import Catenary
-from airmuscle.muscle.geometry.chebyshev import ChebyshevGeometry, as_polynomial
-from airmuscle.muscle.geometry.circular_arc import CircularArc
-from airmuscle.muscle.geometry.parabola import Parabola, TrueArcParabola
-from airmuscle.muscle.geometry.pleated import PleatedTube
-from airmuscle.muscle.geometry.vessel import Vessel
+from airmuscle.muscle.geometry import (
+    Braid,
+    Catenary,
+    ChebyshevGeometry,
+    CircularArc,
+    Parabola,
+    PleatedTube,
+    StraightFibre,
+    TrueArcParabola,
+    Vessel,
+)
+from airmuscle.muscle.geometry.chebyshev import as_polynomial
 
 BRAID = Braid(0.01, 0.4363, 0.2)
 RUBBER = RubberLine(3e5, 1e5)

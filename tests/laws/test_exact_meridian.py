@@ -13,14 +13,10 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from airmuscle.core import autodiff
-from airmuscle.core.errors import GeometryLimitError, ParameterError, SolveError
-from airmuscle.muscle.characteristic.circle_virtual_work import CircleVirtualWork
-from airmuscle.muscle.characteristic.exact_meridian import ExactMeridian
-from airmuscle.muscle.characteristic.rubber import RubberLine
+from airmuscle.errors import GeometryLimitError, ParameterError, SolveError
+from airmuscle.muscle.characteristic import CircleVirtualWork, ExactMeridian, RubberLine
 from airmuscle.muscle.characteristic.saga2007 import LINE_A, LINE_B
-from airmuscle.muscle.geometry.catenary import Catenary
-from airmuscle.muscle.geometry.pleated import PleatedTube
-from airmuscle.muscle.geometry.straight_fibre import StraightFibre
+from airmuscle.muscle.geometry import Catenary, PleatedTube, StraightFibre
 
 L0, D0, WALL = 0.072, 0.012, 0.002
 CONTRACTIONS = np.array([0.01, 0.05, 0.10, 0.20, 0.30, 0.40])

@@ -17,8 +17,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from airmuscle.core.errors import ParameterError
-from airmuscle.core.tree import leaves
+from airmuscle.core import leaves
+from airmuscle.errors import ParameterError
 from airmuscle.muscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip, NoFriction, PrandtlIshlinskii
 from airmuscle.muscle.friction.path import stop_operators
 

@@ -12,24 +12,26 @@ from hypothesis import strategies as st
 from joints import chosen_muscle
 from scipy.integrate import quad, solve_ivp
 
-from airmuscle.control.inputs import Schedule
+from airmuscle.control import Schedule
 from airmuscle.core import autodiff
 from airmuscle.mechanism import Isometric
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Supply, Valve, VirialGas, virial_coefficient_of_air
-from airmuscle.pneumatics.gas import (
+from airmuscle.plant import Plant
+from airmuscle.pneumatics import (
     GAS_CONSTANT,
-    SPECIFIC_HEAT_CONSTANT_PRESSURE,
-    SPECIFIC_HEAT_CONSTANT_VOLUME,
     Air,
     Ambient,
     EnergyBalance,
+    FillDischarge,
     Flow,
     Isothermal,
     Polytropic,
+    Supply,
+    Valve,
+    VirialGas,
+    virial_coefficient_of_air,
 )
-from airmuscle.simulation import simulate
-from airmuscle.simulation.integrators import Rodas4
+from airmuscle.pneumatics.gas import SPECIFIC_HEAT_CONSTANT_PRESSURE, SPECIFIC_HEAT_CONSTANT_VOLUME
+from airmuscle.simulation import Rodas4, simulate
 
 AMBIENT = Ambient()
 WARM, SUPPLY = AMBIENT.temperature, 650e3

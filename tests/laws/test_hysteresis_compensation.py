@@ -13,7 +13,7 @@ from plants import chosen_muscle
 
 import airmuscle as am
 from airmuscle.control import ControlLoop, HysteresisCompensation, HysteresisOperator, SetpointCommand
-from airmuscle.core.errors import ParameterError
+from airmuscle.errors import ParameterError
 from airmuscle.muscle.friction import MaxwellSlip
 from airmuscle.pneumatics import Valve
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from joints import chosen_muscle
 
 from airmuscle.core import autodiff
-from airmuscle.core.errors import ParameterError
+from airmuscle.errors import ParameterError
 from airmuscle.mechanism import (
     AntagonisticJoint,
     ArmLink,
@@ -23,6 +23,7 @@ from airmuscle.mechanism import (
     CrankProfile,
     ExternalLoad,
     HangingMass,
+    HuntCrossley,
     Isometric,
     Isotonic,
     JointWithEndStops,
@@ -41,10 +42,8 @@ from airmuscle.mechanism import (
     WithLatch,
     WithOffsets,
 )
-from airmuscle.mechanism.contact import HuntCrossley
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import ClosedChamber
-from airmuscle.pneumatics.gas import Isothermal
+from airmuscle.plant import Plant
+from airmuscle.pneumatics import ClosedChamber, Isothermal
 
 CONTACT = HuntCrossley(1e7, 0.4)
 JOINT = AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.12)

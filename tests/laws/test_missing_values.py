@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from airmuscle.core import ops
-from airmuscle.core.errors import AirmuscleWarning, PhysicsError
-from airmuscle.library.catalogue import load
-from airmuscle.library.files import list_laws
-from airmuscle.muscle.characteristic.base import Characteristic
+from airmuscle.errors import AirmuscleWarning, PhysicsError
+from airmuscle.library import list_laws, load
+from airmuscle.muscle.characteristic import Characteristic
 
 NAN = float("nan")
 

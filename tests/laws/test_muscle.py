@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airmuscle.core.errors import AirmuscleWarning
+from airmuscle.errors import AirmuscleWarning
 from airmuscle.muscle import CubicSpring, LinearDamper, LinearSpring, Muscle, PressureDamper
 from airmuscle.muscle.characteristic import (
     ChouHannaford1996,
@@ -19,7 +19,7 @@ from airmuscle.muscle.characteristic import (
     Reynolds2003,
 )
 from airmuscle.muscle.geometry import Braid
-from airmuscle.pneumatics.gas import GAS_CONSTANT, Ambient, Isothermal, Polytropic, absolute_pressure, gauge_pressure
+from airmuscle.pneumatics import GAS_CONSTANT, Ambient, Isothermal, Polytropic, absolute_pressure, gauge_pressure
 
 BRAID = Braid(0.01, 0.44, 0.3)
 AMBIENT = Ambient()

@@ -15,10 +15,9 @@ from joints import chosen_muscle
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from airmuscle.control.inputs import ZERO_INPUT, Schedule
-from airmuscle.core.errors import ParameterError
-from airmuscle.mechanism import HangingMass, Isometric
-from airmuscle.mechanism.contact import HuntCrossley
+from airmuscle.control import ZERO_INPUT, Schedule
+from airmuscle.errors import ParameterError
+from airmuscle.mechanism import HangingMass, HuntCrossley, Isometric
 from airmuscle.muscle import (
     CreepElements,
     CubicSeriesSpring,
@@ -36,12 +35,9 @@ from airmuscle.muscle import (
 )
 from airmuscle.muscle.characteristic import Reynolds2003, Serres2009
 from airmuscle.muscle.friction import Dahl, LuGre
-from airmuscle.plant.energy_balance import WithEnergyMeters
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import ClosedChamber, FillDischarge, Supply, Valve
-from airmuscle.pneumatics.gas import Isothermal, Polytropic
-from airmuscle.simulation import simulate
-from airmuscle.simulation.integrators import Rodas4
+from airmuscle.plant import Plant, WithEnergyMeters
+from airmuscle.pneumatics import ClosedChamber, FillDischarge, Isothermal, Polytropic, Supply, Valve
+from airmuscle.simulation import Rodas4, simulate
 
 pressures, speeds = st.floats(-1e5, 8e5), st.floats(-2, 2)
 DAMPERS = [

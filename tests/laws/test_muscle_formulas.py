@@ -13,10 +13,8 @@ import numpy as np
 import pytest
 
 from airmuscle.muscle import Ratings, SwellingWall
-from airmuscle.muscle.geometry import Braid
+from airmuscle.muscle.geometry import Braid, TabulatedGeometry, Vessel
 from airmuscle.muscle.geometry.chebyshev import as_polynomial
-from airmuscle.muscle.geometry.tabulated import TabulatedGeometry
-from airmuscle.muscle.geometry.vessel import Vessel
 from airmuscle.muscle.series_equilibrium import find_largest_nonnegative
 
 BRAID = Braid(0.01, 0.4363, 0.2)

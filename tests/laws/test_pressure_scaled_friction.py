@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.core.errors import ParameterError
+from airmuscle.errors import ParameterError
 from airmuscle.muscle import Muscle
 from airmuscle.muscle.friction import (
     BoucWen,

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import airmuscle as am
-from airmuscle.core.declaration import model
-from airmuscle.core.errors import AirmuscleWarning, ParameterError, UnitError
-from airmuscle.muscle.characteristic.base import ForceLaw, PressureLaw
+from airmuscle.core import model
+from airmuscle.errors import AirmuscleWarning, ParameterError, UnitError
+from airmuscle.muscle.characteristic import ForceLaw, PressureLaw
 
 BRAID = am.geometry.Braid(0.01, 0.4363, 0.3)
 MUSCLE = am.Muscle(am.load("tondu-lopez").characteristic, BRAID, damper=am.LinearDamper(100.0))

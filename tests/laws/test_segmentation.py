@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from airmuscle.core.errors import ColumnError
+from airmuscle.errors import ColumnError
 from airmuscle.recording import Recording
 from airmuscle.recording.segment import (
     AT_REST,

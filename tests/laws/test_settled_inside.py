@@ -10,7 +10,7 @@ import pytest
 from joints import chosen_muscle
 
 from airmuscle.core import autodiff, tree
-from airmuscle.mechanism.contact import HuntCrossley
+from airmuscle.mechanism import HuntCrossley
 from airmuscle.muscle import CubicSpring, EndStop, LinearSpring, SeriesSpring
 from airmuscle.muscle.characteristic import VirtualWork
 from airmuscle.muscle.series_equilibrium import find_largest_nonnegative

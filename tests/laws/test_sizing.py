@@ -18,12 +18,11 @@ from scipy.interpolate import PchipInterpolator
 
 import airmuscle as am
 from airmuscle.core.constants import STANDARD_GRAVITY
-from airmuscle.core.errors import AirmuscleError, ParameterError, SolveError
-from airmuscle.library.entry import Entry
+from airmuscle.errors import AirmuscleError, ParameterError, SolveError
+from airmuscle.library import Entry
 from airmuscle.muscle import Ratings
-from airmuscle.muscle.characteristic import EffectiveLength, MartensBoblan2017, ValidityRange
-from airmuscle.muscle.characteristic.base import PressureLaw
-from airmuscle.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY
+from airmuscle.muscle.characteristic import EffectiveLength, MartensBoblan2017, PressureLaw, ValidityRange
+from airmuscle.pneumatics import GAS_CONSTANT, REFERENCE_DENSITY
 from airmuscle.report.sizing_chapter import choice_row
 from airmuscle.sizing import (
     JointRequirement,
@@ -34,11 +33,13 @@ from airmuscle.sizing import (
     by_reserve,
     catalogue,
     choose,
+    discharge_valve,
+    fill_valve,
     scenario_text,
     size_muscles,
 )
 from airmuscle.sizing.static_muscle import static_muscle
-from airmuscle.sizing.valve_sizing import air_path, discharge_valve, fill_valve
+from airmuscle.sizing.valve_sizing import air_path
 
 pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
 

@@ -9,8 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from airmuscle.control import StateFeedback
-from airmuscle.control.controller import Measurement
+from airmuscle.control import Measurement, StateFeedback
 
 H, RANDOM = 0.02, np.random.default_rng(4)
 A, B, C = (0.4 * RANDOM.normal(size=shape) for shape in ((3, 3), (3, 2), (2, 3)))

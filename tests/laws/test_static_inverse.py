@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 import airmuscle as am
 from airmuscle.control import AngleAndStiffness, StaticFeedForward, StaticInverse
 from airmuscle.core import autodiff
-from airmuscle.core.errors import ParameterError
+from airmuscle.errors import ParameterError
 from airmuscle.library.files import LAWS as LAW_FILES
-from airmuscle.mechanism.contact import HuntCrossley
+from airmuscle.mechanism import HuntCrossley
 from airmuscle.muscle import CubicSpring, EndStop, SeriesSpring
 from airmuscle.muscle.characteristic import ForceLaw, ValidityRange, as_force_law
 

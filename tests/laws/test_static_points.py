@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from airmuscle import load_data
-from airmuscle.identify.campaign import RecordKind, classify_records
-from airmuscle.identify.campaign.static_stage import StaticStage, fit_static_stage
+from airmuscle.identify.campaign import RecordKind, StaticStage, classify_records
+from airmuscle.identify.campaign.static_stage import fit_static_stage
 from airmuscle.muscle import CreepElements
 from airmuscle.muscle.friction import NoFriction
 from airmuscle.recording import Recording

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from airmuscle.core.errors import ParameterError
+from airmuscle.errors import ParameterError
 from airmuscle.library import catalogue
 from airmuscle.muscle.characteristic import Hunt2017, Reynolds2003, Serres2009
 

@@ -12,13 +12,19 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 from airmuscle.core import autodiff
-from airmuscle.core.errors import GeometryLimitError, ParameterError
-from airmuscle.muscle.geometry.catenary import Catenary
-from airmuscle.muscle.geometry.circular_arc import CircularArc
-from airmuscle.muscle.geometry.fibre_sum import HalfShellFibreSum, PrintedFibreSum, UniformFibreSum, UserDefinedFibreSum
-from airmuscle.muscle.geometry.parabola import Parabola, TrueArcParabola
-from airmuscle.muscle.geometry.pleated import PleatedTube
-from airmuscle.muscle.geometry.straight_fibre import StraightFibre
+from airmuscle.errors import GeometryLimitError, ParameterError
+from airmuscle.muscle.geometry import (
+    Catenary,
+    CircularArc,
+    HalfShellFibreSum,
+    Parabola,
+    PleatedTube,
+    PrintedFibreSum,
+    StraightFibre,
+    TrueArcParabola,
+    UniformFibreSum,
+    UserDefinedFibreSum,
+)
 from airmuscle.muscle.geometry.stumpff import stumpff
 
 L0, D0 = 0.072, 0.012

@@ -8,14 +8,12 @@ import numpy as np
 import pytest
 from widths import widened
 
-from airmuscle.core.errors import AirmuscleWarning, SolveError
+from airmuscle.errors import AirmuscleWarning, SolveError
 from airmuscle.library import catalogue
-from airmuscle.muscle.characteristic.chou_hannaford1996 import ChouHannaford1996
+from airmuscle.muscle.characteristic import ChouHannaford1996, Tabulated, ValidityRange, as_force_law
 from airmuscle.muscle.characteristic.error_search import estimate_maximum
-from airmuscle.muscle.characteristic.polynomial_surrogate import as_force_law, forces_or_nan
-from airmuscle.muscle.characteristic.tabulated import Tabulated
-from airmuscle.muscle.characteristic.validity_range import ValidityRange
-from airmuscle.muscle.geometry.braid import Braid
+from airmuscle.muscle.characteristic.polynomial_surrogate import forces_or_nan
+from airmuscle.muscle.geometry import Braid
 
 SMALL = Tabulated((1e5, 1e5, 1e5, 2e5, 2e5), (0.0, 0.05, 0.1, 0.0, 0.2), (100.0, 40.0, 0.0, 200.0, 0.0))
 PARTLY_SOLVED = [(5e4, 4e5, 0.01, 0.12), (1e5, 3.5e5, 0.02, 0.3)]

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from airmuscle.core.errors import GeometryLimitError, ParameterError, SolveError
+from airmuscle.errors import GeometryLimitError, ParameterError, SolveError
 from airmuscle.library import catalogue
-from airmuscle.muscle.characteristic.tabulated import Tabulated
-from airmuscle.muscle.geometry.tabulated import TabulatedGeometry
+from airmuscle.muscle.characteristic import Tabulated
+from airmuscle.muscle.geometry import TabulatedGeometry
 
 TOOL = ("festo-tool-dmsp-10", "festo-tool-dmsp-20", "festo-tool-dmsp-40")
 SMALL = Tabulated((1e5, 1e5, 1e5, 2e5, 2e5), (0.0, 0.05, 0.1, 0.0, 0.2), (100.0, 40.0, 0.0, 200.0, 0.0))

@@ -19,22 +19,26 @@ from hypothesis import strategies as st
 from joints import chosen_muscle
 from scipy.optimize import brentq
 
-from airmuscle.control.inputs import Schedule
+from airmuscle.control import Schedule
 from airmuscle.mechanism import Isometric
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import DistributedTube, FillDischarge, Supply, Tube, TubeOrifice, Valve, WithTubes
-from airmuscle.pneumatics.gas import (
+from airmuscle.plant import Plant
+from airmuscle.pneumatics import (
     GAS_CONSTANT,
-    NO_FLOW,
-    SPECIFIC_HEAT_CONSTANT_PRESSURE,
     Air,
     Ambient,
+    DistributedTube,
     EnergyBalance,
+    FillDischarge,
     Isothermal,
     Polytropic,
+    Supply,
+    Tube,
+    TubeOrifice,
+    Valve,
+    WithTubes,
 )
-from airmuscle.simulation import simulate
-from airmuscle.simulation.integrators import Rodas4
+from airmuscle.pneumatics.gas import NO_FLOW, SPECIFIC_HEAT_CONSTANT_PRESSURE
+from airmuscle.simulation import Rodas4, simulate
 
 AMBIENT = Ambient()
 WARM = AMBIENT.temperature

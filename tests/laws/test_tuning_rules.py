@@ -14,7 +14,7 @@ from control_plants import LIFT, PRESSURE
 
 import airmuscle as am
 from airmuscle.control import ControlLoop, OnOffController, Schedule, SplitRange
-from airmuscle.core.errors import ParameterError
+from airmuscle.errors import ParameterError
 from airmuscle.study import (
     FirstOrderDeadTime,
     IntegratorDeadTime,

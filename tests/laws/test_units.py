@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airmuscle.core import units
-from airmuscle.core.errors import UnitError
+from airmuscle.errors import UnitError
 
 COMMON = {name: entry for name, entry in units._FACTORS.items() if name not in ("", "-", "min")}
 """Without those that pint reads otherwise, or not at all."""

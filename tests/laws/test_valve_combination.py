@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from airmuscle.core.errors import ParameterError
+from airmuscle.errors import ParameterError
 from airmuscle.pneumatics import SubsonicIndexValve, Valve, in_parallel, in_series
 
 P1, T0 = 7e5, 293.15

@@ -11,10 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airmuscle.core.errors import ParameterError
-from airmuscle.pneumatics import Valve
+from airmuscle.errors import ParameterError
+from airmuscle.pneumatics import Ambient, Valve
 from airmuscle.pneumatics import conversion as c
-from airmuscle.pneumatics.gas import Ambient
 
 LITRE_PER_MINUTE = 1e-3 / 60
 sizes = st.floats(1e-11, 9e-6)

@@ -11,11 +11,16 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from airmuscle.core import autodiff, ops
-from airmuscle.core.errors import ParameterError
-from airmuscle.core.reference import cite
-from airmuscle.pneumatics import CheckValve, Orifice, SubsonicIndexValve, Valve
-from airmuscle.pneumatics.gas import REFERENCE_DENSITY, REFERENCE_TEMPERATURE
+from airmuscle.core import autodiff, cite, ops
+from airmuscle.errors import ParameterError
+from airmuscle.pneumatics import (
+    REFERENCE_DENSITY,
+    REFERENCE_TEMPERATURE,
+    CheckValve,
+    Orifice,
+    SubsonicIndexValve,
+    Valve,
+)
 
 T0 = REFERENCE_TEMPERATURE
 pressures = st.floats(2e4, 1.2e6)

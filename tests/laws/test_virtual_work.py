@@ -14,16 +14,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airmuscle.core.errors import SolveError, TraceError
+from airmuscle.errors import SolveError, TraceError
 from airmuscle.library import catalogue
-from airmuscle.muscle.characteristic.chou_hannaford1996 import ChouHannaford1996
+from airmuscle.muscle.characteristic import ChouHannaford1996, TonduLopez2000, ValidityRange, VirtualWork
 from airmuscle.muscle.characteristic.energy_defect import maxwell_defect, virtual_work_defect
-from airmuscle.muscle.characteristic.tondu_lopez2000 import TonduLopez2000
-from airmuscle.muscle.characteristic.validity_range import ValidityRange
-from airmuscle.muscle.characteristic.virtual_work import VirtualWork
-from airmuscle.muscle.geometry.braid import Braid
+from airmuscle.muscle.geometry import Braid, TabulatedGeometry
 from airmuscle.muscle.geometry.chebyshev import as_polynomial
-from airmuscle.muscle.geometry.tabulated import TabulatedGeometry
 
 BRAID = Braid(0.01, np.radians(25.0), 0.3)
 BOX = ValidityRange(5e4, 6e5, 0.0, 0.28)

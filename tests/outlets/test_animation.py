@@ -8,7 +8,7 @@ import pytest
 from control_plants import JOINT, LIFT
 
 import airmuscle as am
-from airmuscle.core.errors import ColumnError, FileError, ParameterError
+from airmuscle.errors import ColumnError, FileError, ParameterError
 from airmuscle.library import catalogue
 from airmuscle.muscle.geometry import Braid
 from airmuscle.plant.drawing import muscle_outline

@@ -14,11 +14,10 @@ from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
 from airmuscle.identify import UNCENSORED, fit
-from airmuscle.library.catalogue import load
+from airmuscle.library import load
 from airmuscle.muscle.characteristic import ContractileSurface, TonduLopez2000
-from airmuscle.muscle.geometry.braid import Braid
-from airmuscle.recording import Recording, read
-from airmuscle.recording.csv_writer import write_csv
+from airmuscle.muscle.geometry import Braid
+from airmuscle.recording import Recording, read, write_csv
 
 MUSCLE = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.2)
 SURFACE = ("--characteristic", "ContractileSurface", "--degree", "3", "--resting-length", "300 mm")

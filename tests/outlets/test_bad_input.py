@@ -21,17 +21,19 @@ from widths import SAME_LAW, widened
 from airmuscle import advance, load, load_data, read_csv, simulate
 from airmuscle.cli.app import app
 from airmuscle.compile.cache.kernel import BoundKernel, fixed_step
-from airmuscle.control.inputs import SampledSignal, Schedule
-from airmuscle.core.declaration import model, parameter
-from airmuscle.core.errors import FileError, ParameterError, SolveError, UnitError
+from airmuscle.control import SampledSignal, Schedule
+from airmuscle.core import model, parameter
 from airmuscle.core.output_folder import atomic_folder, check_writable
-from airmuscle.core.units import ABSOLUTE, conversion, quantity
-from airmuscle.library.files import list_laws, read_toml
+from airmuscle.core.units import ABSOLUTE
+from airmuscle.errors import FileError, ParameterError, SolveError, UnitError
+from airmuscle.library import list_laws
+from airmuscle.library.files import read_toml
 from airmuscle.mechanism import HangingMass
-from airmuscle.plant.plant import Plant
+from airmuscle.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
 from airmuscle.simulation import bound_integrator
 from airmuscle.simulation.equilibrium import find_equilibrium
+from airmuscle.units import conversion, quantity
 
 MUSCLE = "dmsp-20-300"
 HEAD = "pressure [bar],length [mm],force [N]"

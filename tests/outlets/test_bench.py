@@ -15,10 +15,10 @@ import pytest
 from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
-from airmuscle.core.errors import ColumnError, FileError
-from airmuscle.library.catalogue import load
-from airmuscle.recording import read_csv
-from airmuscle.recording.follow import MAX_UNREADABLE, RowReader, follow_lines
+from airmuscle.errors import ColumnError, FileError
+from airmuscle.library import load
+from airmuscle.recording import RowReader, follow_lines, read_csv
+from airmuscle.recording.follow import MAX_UNREADABLE
 
 RIG = ("--max-pressure", "6 bar", "--max-force", "1.5 kN")
 

@@ -16,11 +16,11 @@ from made_campaign import THREE_LENGTHS, TrueMuscle, unseen_records, write_campa
 from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
-from airmuscle.core.errors import ParameterError
-from airmuscle.library.catalogue import load
+from airmuscle.errors import ParameterError
+from airmuscle.library import load
 from airmuscle.library.uncertainty import ParameterUncertainty
 from airmuscle.recording import read
-from airmuscle.scenario.scenario import load_scenario
+from airmuscle.scenario import load_scenario
 
 pytestmark = pytest.mark.slow  # the whole campaign takes a minute
 

@@ -28,13 +28,13 @@ import airmuscle as airmuscle_package
 from airmuscle.cli.app import COMMANDS, app
 from airmuscle.cli.cite import as_bibtex
 from airmuscle.cli.terminal import print_json, print_table
-from airmuscle.core.errors import UnknownNameError, printable
-from airmuscle.core.reference import Reference
-from airmuscle.library.catalogue import load
-from airmuscle.library.files import list_laws, list_plants, list_products, list_valves
-from airmuscle.muscle.characteristic.contractile_surface import ContractileSurface
+from airmuscle.core import Reference
+from airmuscle.core.errors import printable
+from airmuscle.errors import UnknownNameError
+from airmuscle.library import list_laws, list_plants, list_products, list_valves, load
+from airmuscle.muscle.characteristic import ContractileSurface
 from airmuscle.recording import read_csv
-from airmuscle.report.chapter import Chapter, Claim, Equal
+from airmuscle.report import Chapter, Claim, Equal
 from airmuscle.reproduce import run
 
 MUSCLE = "dmsp-20-300"

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 import airmuscle as am
 from airmuscle.cli.app import app
 from airmuscle.cli.completion import SHELLS, complete_data, complete_entry, complete_plant
-from airmuscle.core.errors import UnknownNameError
+from airmuscle.errors import UnknownNameError
 
 
 def completed(words: str, monkeypatch: pytest.MonkeyPatch) -> list[str]:

@@ -12,13 +12,13 @@ import pytest
 from plants import EXAMPLES
 from widths import widened
 
-from airmuscle.core.errors import ParameterError
+from airmuscle.errors import ParameterError
 from airmuscle.library import write
 from airmuscle.library.files import read_toml
 from airmuscle.library.location import Location
 from airmuscle.library.models import model_class, model_names
 from airmuscle.library.plant_file import build_plant
-from airmuscle.scenario.scenario import load_scenario
+from airmuscle.scenario import load_scenario
 
 
 def text_of(plant):

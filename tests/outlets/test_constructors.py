@@ -27,9 +27,9 @@ from airmuscle import (
     recording,
 )
 from airmuscle.control import PID
-from airmuscle.core.errors import AirmuscleError, AirmuscleWarning, ParameterError, UnitError
+from airmuscle.errors import AirmuscleError, AirmuscleWarning, ParameterError, UnitError
 from airmuscle.identify import dynamic, prediction
-from airmuscle.library.files import list_laws
+from airmuscle.library import list_laws
 from airmuscle.mechanism import HangingMass
 from airmuscle.muscle import characteristic, friction, geometry
 from airmuscle.pneumatics import Supply, Tank, Valve

@@ -20,16 +20,23 @@ from scenario_files import writer_of
 from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
-from airmuscle.control import PID, OnOffController, SplitRange
-from airmuscle.control.control_loop import ControlLoop
-from airmuscle.control.driver import PWM, SolenoidDriver
-from airmuscle.control.inputs import ZERO_INPUT, Periodic, SampledSignal, Schedule
-from airmuscle.control.with_drivers import WithDrivers
-from airmuscle.core.errors import AirmuscleError, ColumnError, ParameterError, UnitError, UnknownNameError
+from airmuscle.control import (
+    PID,
+    PWM,
+    ZERO_INPUT,
+    ControlLoop,
+    OnOffController,
+    Periodic,
+    SampledSignal,
+    Schedule,
+    SolenoidDriver,
+    SplitRange,
+    WithDrivers,
+)
+from airmuscle.errors import AirmuscleError, ColumnError, ParameterError, UnitError, UnknownNameError
 from airmuscle.report.run_chapter import describe_input, run_chapter
-from airmuscle.scenario.scenario import load_scenario
-from airmuscle.scenario.schema import scenario_schema
-from airmuscle.study.study import load_study
+from airmuscle.scenario import load_scenario, scenario_schema
+from airmuscle.study import load_study
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "pressure_loop.toml"

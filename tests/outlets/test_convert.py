@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
-from airmuscle.library.catalogue import load
+from airmuscle.library import load
 
 MUSCLE = "dmsp-20-300"
 

@@ -17,16 +17,16 @@ from airmuscle.core.display import (
     CONFIG_FILE,
     contraction_text,
     current_units,
-    display,
     heading_scale,
     in_display_unit,
     level_text,
     quantity_text,
     scaled_numbers,
 )
-from airmuscle.core.errors import FileError, UnitError
 from airmuscle.core.plotting import new_figure, rendered
-from airmuscle.core.processes import process_pool
+from airmuscle.errors import FileError, UnitError
+from airmuscle.study import process_pool
+from airmuscle.units import display
 
 
 @pytest.fixture(autouse=True)

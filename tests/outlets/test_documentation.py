@@ -21,7 +21,7 @@ from book.sources import COPIED, index, site_text
 
 import airmuscle
 from airmuscle.cli.app import COMMANDS, app
-from airmuscle.core.declaration import parameters
+from airmuscle.core import parameters
 from airmuscle.library.models import model_class, model_names
 from airmuscle.report.formula import to_display_mathml
 

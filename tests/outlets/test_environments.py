@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from control_plants import JOINT, LIFT
 
-from airmuscle.core.errors import ParameterError
 from airmuscle.environments import (
     FactorRange,
     FitUncertainty,
@@ -23,6 +22,7 @@ from airmuscle.environments import (
     ValueRange,
     register_environments,
 )
+from airmuscle.errors import ParameterError
 from airmuscle.library.uncertainty import ParameterUncertainty
 from airmuscle.simulation import RungeKutta4, Stepper
 from airmuscle.simulation.batch import Double, Single

@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
-from airmuscle.core.errors import ColumnError, FileError, ParameterError
+from airmuscle.errors import ColumnError, FileError, ParameterError
 from airmuscle.recording import Recording, from_pandas, read, read_csv, to_xarray, write, write_csv
 
 pd = pytest.importorskip("pandas", reason="needs the package pandas")

@@ -23,12 +23,11 @@ from widths import widened
 from airmuscle.cli.app import app
 from airmuscle.control import SampledSignal, Schedule
 from airmuscle.core import autodiff
-from airmuscle.core.errors import AirmuscleWarning, FileError, ParameterError
+from airmuscle.errors import AirmuscleWarning, FileError, ParameterError
 from airmuscle.export import C99, JavaScript, Octave, make_identifiers, write_fmu, write_law, write_program
 from airmuscle.export.building import build_and_run
 from airmuscle.export.identifiers import LONGEST, RESERVED
-from airmuscle.library.files import list_laws
-from airmuscle.library.law_file import load_law
+from airmuscle.library import list_laws, load_law
 from airmuscle.mechanism import HangingMass
 from airmuscle.muscle.characteristic import Tabulated
 from airmuscle.simulation import DormandPrince8, Problem, Rodas4, RungeKutta4, solve

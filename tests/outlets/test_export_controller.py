@@ -32,7 +32,7 @@ from airmuscle.control import (
     WithSensors,
     WithStuckValve,
 )
-from airmuscle.core.errors import FileError, ParameterError
+from airmuscle.errors import FileError, ParameterError
 from airmuscle.export import write_controller
 from airmuscle.export.microcontroller import COMPILER, EMULATOR, PROCESSORS, run_in_emulator
 from airmuscle.export.printed_controller import print_controller

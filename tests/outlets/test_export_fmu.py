@@ -27,10 +27,10 @@ from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
 from airmuscle.control import PID, ControlLoop, Schedule
-from airmuscle.core.errors import FileError, ParameterError
+from airmuscle.errors import FileError, ParameterError
 from airmuscle.export import compiler, write_fmu
 from airmuscle.export.fmi_units import BASE, base_powers
-from airmuscle.muscle.characteristic.validity_range import ValidityRange
+from airmuscle.muscle.characteristic import ValidityRange
 from airmuscle.simulation import Problem, Rodas4, RungeKutta4, solve
 
 JUMPS = ((0.0, 0.0), (0.1, 0.5), (0.3, 0.1), (0.4, 0.4))

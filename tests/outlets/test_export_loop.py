@@ -28,7 +28,7 @@ from airmuscle.control import (
     SolenoidDriver,
     WithSensors,
 )
-from airmuscle.core.errors import ParameterError
+from airmuscle.errors import ParameterError
 from airmuscle.export import C99, JavaScript, Octave, write_program
 from airmuscle.simulation import Problem, RungeKutta4, solve
 

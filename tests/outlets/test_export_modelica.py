@@ -20,7 +20,7 @@ from typer.testing import CliRunner
 from airmuscle.cli.app import app
 from airmuscle.compile.program import compile_system
 from airmuscle.control import PID, ControlLoop, Schedule
-from airmuscle.core.errors import ParameterError
+from airmuscle.errors import ParameterError
 from airmuscle.export import write_modelica
 from airmuscle.simulation import Problem
 

@@ -19,7 +19,7 @@ from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
 from airmuscle.control import Schedule
-from airmuscle.core.errors import ParameterError
+from airmuscle.errors import ParameterError
 from airmuscle.export import compiler, mujoco_plugin, write_mujoco_plugin
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
 from airmuscle.simulation import Problem, Rodas4, RungeKutta4, find_equilibrium, solve

@@ -17,12 +17,12 @@ from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
 from airmuscle.control import Schedule
-from airmuscle.core.errors import ParameterError
-from airmuscle.core.tree import leaves
+from airmuscle.core import leaves
+from airmuscle.errors import ParameterError
 from airmuscle.export import C99, platforms, write_fmu, write_law
 from airmuscle.export.compiler import run_command
 from airmuscle.export.platforms import PLATFORMS, find_cross_compiler, find_platform, this_platform
-from airmuscle.library.law_file import load_law
+from airmuscle.library import load_law
 from airmuscle.simulation import Problem, RungeKutta4
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "fill_discharge.toml"

@@ -13,15 +13,13 @@ import pytest
 from dynamic_study import airmuscle, noisy_run
 
 import airmuscle as am
-from airmuscle.core.errors import EquilibriumError, ParameterError
+from airmuscle.errors import EquilibriumError, ParameterError
 from airmuscle.identify.dynamic import InitialConditions
 from airmuscle.library.location import Location
 from airmuscle.mechanism import HangingMass
-from airmuscle.recording import Recording
-from airmuscle.recording.csv_writer import write_csv
-from airmuscle.scenario.identification import load_dynamic_fit
+from airmuscle.recording import Recording, write_csv
+from airmuscle.scenario import load_dynamic_fit, load_scenario
 from airmuscle.scenario.initial_state import build_initial_conditions
-from airmuscle.scenario.scenario import load_scenario
 
 MUSCLE = """
 [[plant.muscle]]

@@ -12,11 +12,10 @@ import pytest
 from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
-from airmuscle.core.errors import ParameterError, UnknownNameError
+from airmuscle.errors import ParameterError, UnknownNameError
 from airmuscle.identify.candidates import blank_surface
-from airmuscle.library.catalogue import load
+from airmuscle.library import load, save
 from airmuscle.library.length_scaling import scale_to_length
-from airmuscle.library.write import save
 from airmuscle.muscle.characteristic import EffectiveLength, MartensBoblan2017
 from airmuscle.muscle.geometry import Braid
 

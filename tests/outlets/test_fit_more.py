@@ -25,11 +25,9 @@ from airmuscle.identify import (
     weakly_determined,
 )
 from airmuscle.identify.candidates import blank_surface
-from airmuscle.library.catalogue import load
-from airmuscle.muscle.characteristic import ContractileSurface, Sarosi2012
-from airmuscle.muscle.characteristic.validity_range import ValidityRange
-from airmuscle.recording import Recording
-from airmuscle.recording.csv_writer import write_csv
+from airmuscle.library import load
+from airmuscle.muscle.characteristic import ContractileSurface, Sarosi2012, ValidityRange
+from airmuscle.recording import Recording, write_csv
 from airmuscle.report.band_plot import band_plot
 from airmuscle.report.levels import levels_of
 

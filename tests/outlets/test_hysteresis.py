@@ -20,17 +20,15 @@ from airmuscle.identify.campaign import fit_held_creep
 from airmuscle.identify.campaign.creep_stage import creep_force
 from airmuscle.identify.hysteresis import PressurePath, find_holds, find_loops, fit_loop
 from airmuscle.identify.hysteresis.plot import plot_loops
-from airmuscle.library.catalogue import load
+from airmuscle.library import load, save
 from airmuscle.library.location import Location
 from airmuscle.library.plant_file import build_muscle
-from airmuscle.library.write import save
 from airmuscle.muscle import CreepElements
 from airmuscle.muscle.friction import MaxwellSlip
-from airmuscle.recording import Recording, read
-from airmuscle.recording.csv_writer import write_csv
+from airmuscle.recording import Recording, read, write_csv
 from airmuscle.recording.segment import motion_direction
 from airmuscle.report.hysteresis_chapter import hysteresis_chapters
-from airmuscle.scenario.scenario import load_scenario
+from airmuscle.scenario import load_scenario
 
 SLIP = MaxwellSlip((2e4, 1e4, 3e3), (3e-4, 1.2e-3, 5e-3))
 TURNS = (0.02, 0.14, 0.08, 0.12, 0.05, 0.14, 0.02)

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from airmuscle import read
-from airmuscle.control.inputs import Schedule
+from airmuscle.control import Schedule
 from airmuscle.identify.dynamic import Experiment, InitialConditions
-from airmuscle.library.catalogue import load
+from airmuscle.library import load
 from airmuscle.muscle.friction import MaxwellSlip
 from airmuscle.pneumatics import WallHeatTransfer
 from airmuscle.recording import Recording, write_csv

@@ -15,7 +15,7 @@ import pytest
 from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
-from airmuscle.core.errors import AirmuscleError, ColumnError
+from airmuscle.errors import AirmuscleError, ColumnError
 from airmuscle.recording import ColumnMapping, NoTime, Recording, UniformTime, read
 from airmuscle.recording.file_name import FileNamePattern
 from airmuscle.recording.segment import find_runs, inspect

@@ -14,16 +14,24 @@ import pytest
 from joints import chosen_muscle
 
 from airmuscle.core import tree
-from airmuscle.core.errors import AirmuscleWarning, TraceError
-from airmuscle.library.catalogue import load
-from airmuscle.library.files import list_laws
-from airmuscle.mechanism import HangingMass
-from airmuscle.mechanism.contact import HuntCrossley
+from airmuscle.errors import AirmuscleWarning, TraceError
+from airmuscle.library import list_laws, load
+from airmuscle.mechanism import HangingMass, HuntCrossley
 from airmuscle.muscle import CreepElements, EndStop, SeriesSpring, ViscoelasticWall
 from airmuscle.muscle.friction import MaxwellSlip
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Supply, Tank, Tube, Valve, WithLeak, WithTubes
-from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
+from airmuscle.plant import Plant
+from airmuscle.pneumatics import (
+    EnergyBalance,
+    FillDischarge,
+    Isothermal,
+    Polytropic,
+    Supply,
+    Tank,
+    Tube,
+    Valve,
+    WithLeak,
+    WithTubes,
+)
 from airmuscle.simulation.equilibrium import find_equilibrium
 
 jax = pytest.importorskip("jax")

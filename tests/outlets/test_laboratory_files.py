@@ -19,7 +19,7 @@ from typer.testing import CliRunner
 import airmuscle as am
 from airmuscle.cli.app import COMMANDS, app
 from airmuscle.core.constants import STANDARD_GRAVITY
-from airmuscle.core.errors import ColumnError, FileError, IdentificationError, ParameterError
+from airmuscle.errors import ColumnError, FileError, IdentificationError, ParameterError
 from airmuscle.identify import Huber, LeastSquares, LevelSplit, compare, fit
 from airmuscle.muscle.characteristic import ContractileSurface
 from airmuscle.recording import (
@@ -33,7 +33,7 @@ from airmuscle.recording import (
 )
 from airmuscle.recording.mapping import mapping_of_tables
 from airmuscle.recording.row_notes import row_notes
-from airmuscle.scenario.identification import load_dynamic_fit
+from airmuscle.scenario import load_dynamic_fit
 
 PREAMBLE = ("Prüfstand 3 (Zwick Z010)", "Prüfer;Müller", "Datum;12.03.2026;14:05", "Kanal;1;2;3", "Verstärkung;1;10;1")
 HEADINGS = "Zeit;Druck (rel.);Kraft;Weg;Bemerkung"

@@ -12,28 +12,18 @@ from pathlib import Path
 
 import pytest
 
-from airmuscle.core.errors import (
-    AirmuscleError,
-    AirmuscleWarning,
-    FileError,
-    ParameterError,
-    UnitError,
-    UnknownNameError,
-)
-from airmuscle.core.reference import cite
+from airmuscle.core import cite
+from airmuscle.errors import AirmuscleError, AirmuscleWarning, FileError, ParameterError, UnitError, UnknownNameError
 from airmuscle.identify import fit
-from airmuscle.library import catalogue, files, write
-from airmuscle.library.entry import Entry
+from airmuscle.library import Entry, catalogue, files, write
 from airmuscle.library.location import Location
 from airmuscle.library.models import model_class, model_names
 from airmuscle.library.plant_file import build_muscle
-from airmuscle.mechanism.contact import HuntCrossley
+from airmuscle.mechanism import HuntCrossley
 from airmuscle.muscle import CreepElements, EndStop, LinearDamper, LinearSpring, PressureDamper, SwellingWall
-from airmuscle.muscle.characteristic.chou_hannaford1996 import ChouHannaford1996
-from airmuscle.muscle.characteristic.clamped import Clamped
-from airmuscle.muscle.characteristic.contractile_surface import ContractileSurface
+from airmuscle.muscle.characteristic import ChouHannaford1996, Clamped, ContractileSurface
 from airmuscle.muscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip, NoFriction, PrandtlIshlinskii
-from airmuscle.muscle.geometry.braid import Braid
+from airmuscle.muscle.geometry import Braid
 
 GOOD = """
 title = "A muscle of our own"

@@ -13,11 +13,10 @@ from typer.testing import CliRunner
 
 import airmuscle as am
 from airmuscle.cli.app import app
-from airmuscle.core.errors import ParameterError, UnknownNameError
-from airmuscle.library.files import PLANTS, list_plants
-from airmuscle.library.law_file import load_law
-from airmuscle.library.plant_file import PlantEntry
-from airmuscle.scenario.scenario import load_scenario
+from airmuscle.errors import ParameterError, UnknownNameError
+from airmuscle.library import PlantEntry, list_plants, load_law
+from airmuscle.library.files import PLANTS
+from airmuscle.scenario import load_scenario
 
 pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
 each = pytest.mark.parametrize("name", list_plants())

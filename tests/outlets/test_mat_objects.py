@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle.core.errors import FileError
+from airmuscle.errors import FileError
 from airmuscle.recording import mat_objects, read
 from airmuscle.recording.mat_objects import MatlabObject, find_objects
 from airmuscle.recording.raw_mat import read_mat_tables_here

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from airmuscle import mechanism
+from airmuscle.library import list_plants
 from airmuscle.library.build import build
-from airmuscle.library.files import list_plants
 from airmuscle.library.location import Location
 from airmuscle.library.models import model_names
 from airmuscle.mechanism import AntagonisticJoint, JointWithEndStops, Mechanism
-from airmuscle.simulation.with_sensitivities import sensitivity
+from airmuscle.simulation import sensitivity
 
 DOCS = Path(__file__).parents[2] / "docs"
 

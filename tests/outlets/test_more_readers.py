@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle.core.errors import ColumnError, FileError, InputError
+from airmuscle.errors import ColumnError, FileError, InputError
 from airmuscle.recording import Recording, read
 
 TIME = np.linspace(0.0, 2.0, 41)

@@ -48,13 +48,12 @@ from airmuscle.control import (
     WithSetpointDelay,
     WithStuckValve,
 )
-from airmuscle.core.errors import AirmuscleError, ParameterError, UnitError, UnknownNameError
+from airmuscle.errors import AirmuscleError, ParameterError, UnitError, UnknownNameError
 from airmuscle.library.models import model_class, model_names
-from airmuscle.scenario.scenario import Scenario, load_scenario
-from airmuscle.scenario.write import save_scenario, scenario_text
+from airmuscle.scenario import Scenario, load_scenario, save_scenario, scenario_text
 from airmuscle.simulation import Problem
 from airmuscle.study.control_benchmark import proportional_joint, scenario_contender
-from airmuscle.study.tuning.scenario_loop import load_scenario_loop
+from airmuscle.study.tuning import load_scenario_loop
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "joint_cascade.toml"
 TEXT = EXAMPLE.read_text(encoding="utf-8")

@@ -15,10 +15,10 @@ import pytest
 
 import airmuscle as am
 from airmuscle.core.axes import given_axes
-from airmuscle.core.errors import ParameterError
 from airmuscle.core.notebook import MAX_NOTES, MAX_ROWS, Card, NotebookDisplay, render_card
 from airmuscle.core.plotting import new_figure
 from airmuscle.core.short_repr import MAX_LINES, ShortRepr
+from airmuscle.errors import ParameterError
 from airmuscle.muscle.characteristic import ContractileSurface
 from airmuscle.muscle.display import parameter_rows
 from airmuscle.recording.panels import panels_of

@@ -14,16 +14,15 @@ import pytest
 from dynamic_study import VALVES, airmuscle, noisy_run, plant_table, run_table
 
 import airmuscle as am
-from airmuscle.core.errors import ColumnError, ParameterError
-from airmuscle.core.tree import leaves, with_parameters
+from airmuscle.core import leaves, with_parameters
+from airmuscle.errors import ColumnError, ParameterError
 from airmuscle.identify.dynamic import Experiment, InitialConditions, StartTime
 from airmuscle.identify.prediction import PlantUncertainty, predict_dynamic, predict_static
 from airmuscle.library.entry_prediction import predict_with_entry
 from airmuscle.library.stated_band import StatedBand
 from airmuscle.muscle.friction import Dahl
-from airmuscle.recording import Recording
-from airmuscle.recording.csv_writer import write_csv
-from airmuscle.scenario.scenario import load_scenario
+from airmuscle.recording import Recording, write_csv
+from airmuscle.scenario import load_scenario
 from airmuscle.simulation import Rodas4
 
 NOISE = 4.0

@@ -24,7 +24,7 @@ from airmuscle.compile.program import compile_system
 from airmuscle.compile.text.c import CLanguage
 from airmuscle.compile.text.javascript import JavaScriptLanguage
 from airmuscle.compile.text.matlab import DEFINITION, MatlabLanguage
-from airmuscle.core.errors import TraceError
+from airmuscle.errors import TraceError
 
 SOME = ("dmsp-20-300", "overlap", "shaped joint with friction", "manifold on tank and regulator")
 """Plants with every kind of block: valves that are shut, clamps, selections, a spool, several coordinates."""

@@ -18,7 +18,7 @@ from airmuscle import load
 from airmuscle.cli.app import app
 from airmuscle.core.plotting import save
 from airmuscle.identify import Fit, fit
-from airmuscle.library.entry import Entry
+from airmuscle.library import Entry
 from airmuscle.library.fitted_entry import list_files
 from airmuscle.muscle.characteristic import ContractileSurface
 from airmuscle.muscle.isobars import compute_isobars

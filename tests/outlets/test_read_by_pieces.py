@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle.core.errors import AirmuscleError, ColumnError
+from airmuscle.errors import AirmuscleError, ColumnError
 from airmuscle.recording import BlockMeans, Decimation, pieces, raw_columnar, raw_mat, raw_mdf, read
 from airmuscle.recording.large_mat import read_large_mat
 from airmuscle.recording.optional_dependency import is_installed

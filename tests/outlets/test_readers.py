@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle.core.errors import AirmuscleWarning, ColumnError, FileError, InputError, ParameterError, UnitError
+from airmuscle.errors import AirmuscleWarning, ColumnError, FileError, InputError, ParameterError, UnitError
 from airmuscle.recording import BlockMeans, ColumnMapping, Decimation, Recording, large_csv, read, separate_process
 from airmuscle.recording.clock import seconds_from_clock
 from airmuscle.recording.mapping import read_mapping

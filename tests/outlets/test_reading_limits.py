@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle.core.errors import AirmuscleWarning, ColumnError, UnitError
+from airmuscle.errors import AirmuscleWarning, ColumnError, UnitError
 from airmuscle.recording import Recording, UniformTime, read, read_csv
 from airmuscle.recording.header import parse_unit_row
 from airmuscle.recording.reader import check_bench

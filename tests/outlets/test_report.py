@@ -23,17 +23,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle.core import plotting
-from airmuscle.core.display import display
-from airmuscle.core.errors import FileError, SolveError, UnknownNameError
+from airmuscle.core import Reference, plotting
 from airmuscle.core.output_folder import atomic_folder, check_writable
-from airmuscle.core.reference import Reference
-from airmuscle.report.chapter import AtLeast, AtMost, Chapter, Claim, Equal, Kind, Plot, Table, statements
+from airmuscle.errors import FileError, SolveError, UnknownNameError
+from airmuscle.report import AtLeast, AtMost, Chapter, Claim, Equal, Kind, Plot, Table, write_report
+from airmuscle.report.chapter import statements
 from airmuscle.report.formatting import MARKS, MEANINGS, count_verdicts, format_number, format_published
 from airmuscle.report.formula import to_mathtext, to_plain
 from airmuscle.report.html import MAX_SVG_BYTES, render_cell, render_header
-from airmuscle.report.write import as_json, write_report
+from airmuscle.report.write import as_json
 from airmuscle.reproduce import run
+from airmuscle.units import display
 
 pytestmark = pytest.mark.drawn
 DATE = datetime.date(2024, 5, 17)

@@ -11,18 +11,17 @@ import pytest
 
 import airmuscle as am
 from airmuscle.control import Schedule
-from airmuscle.identify import Bootstrap
+from airmuscle.identify import Bootstrap, fit
 from airmuscle.identify.dynamic import Experiment, InitialConditions, fit_dynamic
 from airmuscle.identify.hysteresis import LoopFit, find_loops, fit_hysteresis, fit_jointly
 from airmuscle.identify.prediction import QuantityPrediction, RecordPrediction
-from airmuscle.identify.static_fit import fit
 from airmuscle.identify.volume_fit import VolumePoints, fit_volume
 from airmuscle.mechanism import Isometric
 from airmuscle.muscle import Muscle
 from airmuscle.muscle.characteristic import VirtualWork
 from airmuscle.muscle.friction import MaxwellSlip
 from airmuscle.muscle.geometry import Braid
-from airmuscle.plant.plant import Plant
+from airmuscle.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Polytropic, Supply, Valve
 from airmuscle.recording import Recording
 from airmuscle.report.campaign_chapters import ValidationRow, _band_table, _plan_table, _validation_table

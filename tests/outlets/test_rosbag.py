@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
-from airmuscle.core.errors import FileError
+from airmuscle.errors import FileError
 from airmuscle.recording import read
 
 

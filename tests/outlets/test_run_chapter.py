@@ -8,11 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle.control.driver import PWM
-from airmuscle.control.inputs import Periodic, SampledSignal, Schedule
-from airmuscle.control.with_drivers import WithDrivers
+from airmuscle.control import PWM, Periodic, SampledSignal, Schedule, WithDrivers
 from airmuscle.report.run_chapter import MAX_DRIVER_SEGMENTS, describe_input, run_chapter
-from airmuscle.scenario.scenario import load_scenario
+from airmuscle.scenario import load_scenario
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "fill_discharge.toml"
 

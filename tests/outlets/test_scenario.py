@@ -14,10 +14,8 @@ import numpy as np
 import pytest
 from scenario_files import writer_of
 
-from airmuscle.control.driver import PWM, SolenoidDriver
-from airmuscle.control.inputs import Periodic, SampledSignal, Schedule
-from airmuscle.control.with_drivers import WithDrivers
-from airmuscle.core.errors import (
+from airmuscle.control import PWM, Periodic, SampledSignal, Schedule, SolenoidDriver, WithDrivers
+from airmuscle.errors import (
     AirmuscleError,
     ColumnError,
     EquilibriumError,
@@ -27,19 +25,14 @@ from airmuscle.core.errors import (
     UnitError,
     UnknownNameError,
 )
-from airmuscle.library.build import load_valve
-from airmuscle.library.catalogue import load
-from airmuscle.library.entry import Entry
-from airmuscle.library.write import save
+from airmuscle.library import Entry, load, load_valve, save
 from airmuscle.mechanism import HangingMass, Isometric, WithLatch
 from airmuscle.muscle import LinearDamper
 from airmuscle.muscle.geometry import Braid
-from airmuscle.pneumatics import ClosedChamber
-from airmuscle.pneumatics.gas import Isothermal, Polytropic
-from airmuscle.pneumatics.wall_heat_transfer import WallHeatTransfer
+from airmuscle.pneumatics import ClosedChamber, Isothermal, Polytropic, WallHeatTransfer
 from airmuscle.report.run_chapter import _input_plot
-from airmuscle.scenario.scenario import load_scenario
-from airmuscle.simulation.integrators import DormandPrince8, Rodas4, RungeKutta4
+from airmuscle.scenario import load_scenario
+from airmuscle.simulation import DormandPrince8, Rodas4, RungeKutta4
 
 PAGE = (Path(__file__).parents[2] / "docs" / "scenario.md").read_text(encoding="utf-8")
 WHOLE, FITTED, FROM_LIBRARY, PAIR, DRIVEN, LINE = re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)

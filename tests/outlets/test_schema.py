@@ -16,15 +16,14 @@ import pytest
 from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
-from airmuscle.core.declaration import parameters
-from airmuscle.core.errors import AirmuscleError
-from airmuscle.library.catalogue import load
+from airmuscle.core import parameters
+from airmuscle.errors import AirmuscleError
+from airmuscle.library import list_laws, list_plants, load, to_toml
 from airmuscle.library.entry_file import build_entry
-from airmuscle.library.files import PLANTS, list_laws, list_plants
+from airmuscle.library.files import PLANTS
 from airmuscle.library.models import model_class
-from airmuscle.library.write import to_toml
-from airmuscle.scenario.scenario import TABLES, load_scenario
-from airmuscle.scenario.schema import muscle_schema, scenario_schema
+from airmuscle.scenario import load_scenario, muscle_schema, scenario_schema
+from airmuscle.scenario.scenario import TABLES
 
 ROOT = Path(__file__).parents[2]
 LIBRARY = sorted((ROOT / "src" / "airmuscle" / "library").glob("*.toml"))

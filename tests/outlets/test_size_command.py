@@ -13,9 +13,9 @@ from typer.testing import CliRunner, Result
 
 import airmuscle as am
 from airmuscle.cli.app import app
-from airmuscle.scenario.scenario import load_scenario
-from airmuscle.sizing import JointRequirement, LiftRequirement, SizingConditions, choose
-from airmuscle.sizing.scenario import MOVING, RESTING, scenario_text
+from airmuscle.scenario import load_scenario
+from airmuscle.sizing import JointRequirement, LiftRequirement, SizingConditions, choose, scenario_text
+from airmuscle.sizing.scenario import MOVING, RESTING
 
 LIFT = ("size", "--load", "20 kg", "--stroke", "40 mm", "--supply", "6 bar")
 ONE = ("--muscle", "dmsp-20-300", "--max-count", "1")

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import airmuscle as am
+from airmuscle.library import to_toml
 from airmuscle.library.location import Location
-from airmuscle.library.write import to_toml
 from airmuscle.scenario.scenario import build_scenario
 
 pytest.importorskip("starlette", reason="needs starlette")

@@ -10,7 +10,7 @@ from studio_pages import run_script, scripts
 
 from airmuscle.analysis import linearise
 from airmuscle.control import ControlLoop, SampledSignal, Schedule
-from airmuscle.core.tree import with_parameters
+from airmuscle.core import with_parameters
 from airmuscle.library.plant_file import plant_tables
 from airmuscle.scenario.scenario import build_scenario
 from airmuscle.simulation import Problem, solve

@@ -16,13 +16,11 @@ from typer.testing import CliRunner
 
 import airmuscle as am
 from airmuscle.cli.app import app
-from airmuscle.core import flatten, leaves
-from airmuscle.core.errors import FileError, ParameterError, PhysicsError, TraceError
-from airmuscle.core.tree import with_parameters
+from airmuscle.core import flatten, leaves, with_parameters
+from airmuscle.errors import FileError, ParameterError, PhysicsError, TraceError
+from airmuscle.library import list_laws, list_plants, to_toml
 from airmuscle.library.build import build
-from airmuscle.library.files import list_laws, list_plants
 from airmuscle.library.location import Location
-from airmuscle.library.write import to_toml
 from airmuscle.muscle.geometry import Braid, PleatedTube, StraightFibre
 from airmuscle.scenario.scenario import build_scenario
 from airmuscle.studio import export_page

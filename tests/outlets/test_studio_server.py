@@ -17,9 +17,9 @@ from widths import widened
 pytest.importorskip("starlette", reason="needs starlette")
 
 from airmuscle import load
-from airmuscle.core.errors import InputError, ParameterError
+from airmuscle.errors import InputError, ParameterError
+from airmuscle.library import to_toml
 from airmuscle.library.location import Location
-from airmuscle.library.write import to_toml
 from airmuscle.studio import app as studio_app
 from airmuscle.studio.app import MAX_PAGE, create_app
 from airmuscle.studio.page import self_contained_page

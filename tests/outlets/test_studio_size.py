@@ -11,7 +11,7 @@ from studio_pages import InThisProcess, request
 pytest.importorskip("starlette", reason="needs starlette")
 
 from airmuscle import load
-from airmuscle.core.errors import ParameterError, SolveError
+from airmuscle.errors import ParameterError, SolveError
 from airmuscle.sizing import JointRequirement, LiftRequirement, SizingConditions, choose, scenario_text, size_muscles
 from airmuscle.studio.app import create_app
 from airmuscle.studio.joint_sheet import joint_names

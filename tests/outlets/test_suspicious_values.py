@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle.core.errors import AirmuscleWarning, ColumnError
+from airmuscle.errors import AirmuscleWarning, ColumnError
 from airmuscle.muscle.characteristic import TonduLopez2000
-from airmuscle.muscle.geometry.braid import Braid
+from airmuscle.muscle.geometry import Braid
 from airmuscle.recording import read
 
 MUSCLE = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.2)

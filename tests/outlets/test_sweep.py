@@ -29,9 +29,9 @@ from typer.testing import CliRunner
 from airmuscle.cli.app import app
 from airmuscle.cli.interruption import check_interrupted, deferred_sigint
 from airmuscle.core import fingerprint
-from airmuscle.core.errors import AirmuscleError, ColumnError, FileError, InputError, SimulationError
+from airmuscle.errors import AirmuscleError, ColumnError, FileError, InputError, SimulationError
 from airmuscle.report.write import save_table
-from airmuscle.scenario.scenario import load_scenario
+from airmuscle.scenario import load_scenario
 from airmuscle.simulation import simulate, solve
 from airmuscle.study import chunk, dask_cluster, load_study, process_pool, run_study
 from airmuscle.study.chapter import study_chapter, write_study

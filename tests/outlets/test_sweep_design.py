@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from airmuscle.core.errors import ParameterError
+from airmuscle.errors import ParameterError
 from airmuscle.library.location import Location
 from airmuscle.study.design import Grid, LatinHypercube, MonteCarlo, Saltelli, Sobol
 from airmuscle.study.distributions import (

@@ -17,8 +17,8 @@ from typer.testing import CliRunner
 
 from airmuscle.cli import tune as command
 from airmuscle.cli.app import app
-from airmuscle.core.errors import AirmuscleError, FileError, ParameterError
-from airmuscle.scenario.scenario import load_scenario
+from airmuscle.errors import AirmuscleError, FileError, ParameterError
+from airmuscle.scenario import load_scenario
 from airmuscle.study import Perturbations, load_scenario_loop, tune
 
 MUSCLE = f"""{MUSCLE_FILE}

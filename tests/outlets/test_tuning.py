@@ -18,10 +18,10 @@ from plants import chosen_muscle
 import airmuscle as am
 from airmuscle.control import PID, ColumnSensor, ControlLaw, ControlLoop, Schedule, WithSensors
 from airmuscle.core import model, ops, parameter
-from airmuscle.core.errors import ColumnError, ParameterError, SimulationError
+from airmuscle.errors import ColumnError, ParameterError, SimulationError
 from airmuscle.library.uncertainty import ParameterUncertainty
 from airmuscle.mechanism import HangingMass, Isometric
-from airmuscle.plant.plant import Plant
+from airmuscle.plant import Plant
 from airmuscle.pneumatics import ProportionalRegulator, SecondOrderLag, Supply, Valve
 from airmuscle.study import (
     CaseMetrics,

@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
-from airmuscle.core.errors import FileError
+from airmuscle.errors import FileError
 from airmuscle.recording import read
 from airmuscle.recording.segment import inspect
 

@@ -14,19 +14,26 @@ from typer.testing import CliRunner
 
 import airmuscle as am
 from airmuscle.cli.app import app
-from airmuscle.core.errors import AirmuscleWarning, FileError, ParameterError, UnitError, UnknownNameError
-from airmuscle.core.reference import cite
-from airmuscle.library.build import build, load_valve
-from airmuscle.library.catalogue import load
-from airmuscle.library.entry import Entry
-from airmuscle.library.files import list_laws, list_library, list_plants, list_products, list_valves
-from airmuscle.library.law_file import load_law
+from airmuscle.core import cite
+from airmuscle.errors import AirmuscleWarning, FileError, ParameterError, UnitError, UnknownNameError
+from airmuscle.library import (
+    Entry,
+    PlantEntry,
+    ValveEntry,
+    list_laws,
+    list_library,
+    list_plants,
+    list_products,
+    list_valves,
+    load,
+    load_law,
+    load_valve,
+)
+from airmuscle.library.build import build
 from airmuscle.library.location import Location
-from airmuscle.library.plant_file import PlantEntry
-from airmuscle.library.valve_entry import ValveEntry
 from airmuscle.pneumatics import CheckValve, Valve, in_series
 from airmuscle.reproduce.hosovsky_plant import MATRIX
-from airmuscle.scenario.scenario import load_scenario
+from airmuscle.scenario import load_scenario
 
 pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
 every_valve = pytest.mark.parametrize("name", list_valves())

@@ -9,10 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airmuscle.core.errors import FileError
-from airmuscle.recording import Recording, read_csv
-from airmuscle.recording.columns import QUANTITIES
-from airmuscle.recording.csv_writer import write_csv
+from airmuscle.errors import FileError
+from airmuscle.recording import QUANTITIES, Recording, read_csv, write_csv
 
 
 def run(rows: int = 50) -> Recording:

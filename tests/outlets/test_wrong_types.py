@@ -13,15 +13,12 @@ import numpy as np
 import pytest
 
 from airmuscle import cite, fit, load, load_data, read, read_csv, save, write_csv
-from airmuscle.control.driver import PWM
-from airmuscle.control.inputs import Periodic, SampledSignal, Schedule
-from airmuscle.control.trajectory import spline_trajectory
-from airmuscle.control.with_drivers import WithDrivers
-from airmuscle.core.errors import AirmuscleError, ColumnError, FileError, ParameterError, UnknownNameError
+from airmuscle.control import PWM, Periodic, SampledSignal, Schedule, WithDrivers, spline_trajectory
+from airmuscle.errors import AirmuscleError, ColumnError, FileError, ParameterError, UnknownNameError
 from airmuscle.mechanism import HangingMass, WithOffsets
 from airmuscle.muscle import LinearDamper, Muscle
 from airmuscle.muscle.characteristic import ContractileSurface
-from airmuscle.plant.plant import Plant
+from airmuscle.plant import Plant
 from airmuscle.pneumatics import FillDischarge, Supply, Valve, in_parallel, in_series
 from airmuscle.recording import Recording
 from airmuscle.simulation import advance, integrators, simulate

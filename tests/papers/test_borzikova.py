@@ -11,7 +11,8 @@ import pytest
 
 from airmuscle.identify.surface.basis import LoadRange
 from airmuscle.muscle.characteristic.borzikova import SAM_30X290
-from airmuscle.report.chapter import DIFFERS, HOLDS, NOT_TESTABLE, Kind
+from airmuscle.report import Kind
+from airmuscle.report.chapter import DIFFERS, HOLDS, NOT_TESTABLE
 from airmuscle.reproduce import borzikova
 from airmuscle.reproduce import borzikova_muscle_claims as muscle_claims
 from airmuscle.reproduce.borzikova_surfaces import (
@@ -196,7 +197,7 @@ def test_the_saturation_is_not_reached_within_the_pressure_range():
 
 
 def test_the_library_holds_the_monotone_fit_of_the_chapter(laws):
-    from airmuscle.library.catalogue import load
+    from airmuscle.library import load
 
     kept = load("borzikova-monotone").characteristic
     data = sample(CURVES)

@@ -7,16 +7,25 @@ import dataclasses
 import numpy as np
 import pytest
 
-from airmuscle.control.inputs import ZERO_INPUT, SampledSignal
-from airmuscle.identify.static_fit import fit
+from airmuscle.control import ZERO_INPUT, SampledSignal
+from airmuscle.identify import fit
 from airmuscle.mechanism import HangingMass, Isometric
 from airmuscle.muscle import CubicSeriesSpring, CubicSpring, LinearDamper, LinearSpring, Muscle, ViscoelasticWall
-from airmuscle.muscle.characteristic.contractile_surface import ContractileSurface
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import ClosedChamber, SubsonicIndexValve, Tube, Valve, VirialGas
-from airmuscle.pneumatics.gas import EnergyBalance, Isothermal, Polytropic
+from airmuscle.muscle.characteristic import ContractileSurface
+from airmuscle.plant import Plant
+from airmuscle.pneumatics import (
+    ClosedChamber,
+    EnergyBalance,
+    Isothermal,
+    Polytropic,
+    SubsonicIndexValve,
+    Tube,
+    Valve,
+    VirialGas,
+)
 from airmuscle.recording import Recording
-from airmuscle.report.chapter import DIFFERS, HOLDS, NOT_TESTABLE, Kind, statements
+from airmuscle.report import Kind
+from airmuscle.report.chapter import DIFFERS, HOLDS, NOT_TESTABLE, statements
 from airmuscle.reproduce import hosovsky, hosovsky_claims, hosovsky_effect_ranges
 from airmuscle.reproduce import hosovsky_effects as causing
 from airmuscle.reproduce import hosovsky_fill as filling
@@ -33,9 +42,8 @@ from airmuscle.reproduce.hosovsky_plant import (
     surface_fit,
 )
 from airmuscle.reproduce.hosovsky_schedule import FILLING
-from airmuscle.simulation import simulate
+from airmuscle.simulation import DormandPrince8, RungeKutta4, simulate
 from airmuscle.simulation.equilibrium import find_equilibrium
-from airmuscle.simulation.integrators import DormandPrince8, RungeKutta4
 
 NUMBERS = UnpublishedParameters()
 

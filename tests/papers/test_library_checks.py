@@ -7,10 +7,8 @@ import warnings
 
 import pytest
 
-from airmuscle.core.errors import AirmuscleWarning
-from airmuscle.library import catalogue, files
-from airmuscle.library.entry import Entry
-from airmuscle.library.verification import verify
+from airmuscle.errors import AirmuscleWarning
+from airmuscle.library import Entry, catalogue, files, verify
 
 
 def quietly_loaded(name: str) -> Entry:

@@ -14,7 +14,7 @@ import pytest
 
 from airmuscle.core import ops
 from airmuscle.library import catalogue
-from airmuscle.muscle.characteristic.martens_boblan2017 import MartensBoblan2017
+from airmuscle.muscle.characteristic import MartensBoblan2017
 from airmuscle.units import degree
 
 ROWS = {"dmsp-20-300": 126, "dmsp-10-250": 85}

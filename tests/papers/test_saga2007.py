@@ -14,17 +14,21 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from airmuscle.core import autodiff
-from airmuscle.core.errors import GeometryLimitError, ParameterError, SolveError
-from airmuscle.core.tree import flatten, structure
-from airmuscle.library.catalogue import load
-from airmuscle.muscle.characteristic.rubber import AxialIntegral, RubberLine
-from airmuscle.muscle.characteristic.saga2007 import LINE_A, LINE_B, Saga2007
-from airmuscle.muscle.geometry.circular_arc import CircularArc
-from airmuscle.muscle.geometry.fibre_sum import PrintedFibreSum, UniformFibreSum, UserDefinedFibreSum
-from airmuscle.muscle.geometry.parabola import Parabola
-from airmuscle.muscle.geometry.straight_fibre import StraightFibre
-from airmuscle.report.chapter import DEPENDS, DIFFERS, HOLDS, NOT_PRINTED, NOT_TESTABLE, Kind, statements
+from airmuscle.core import autodiff, flatten, structure
+from airmuscle.errors import GeometryLimitError, ParameterError, SolveError
+from airmuscle.library import load
+from airmuscle.muscle.characteristic import AxialIntegral, RubberLine, Saga2007
+from airmuscle.muscle.characteristic.saga2007 import LINE_A, LINE_B
+from airmuscle.muscle.geometry import (
+    CircularArc,
+    Parabola,
+    PrintedFibreSum,
+    StraightFibre,
+    UniformFibreSum,
+    UserDefinedFibreSum,
+)
+from airmuscle.report import Kind
+from airmuscle.report.chapter import DEPENDS, DIFFERS, HOLDS, NOT_PRINTED, NOT_TESTABLE, statements
 from airmuscle.reproduce import saga2007_claims as claims
 from airmuscle.reproduce import saga2007_further_claims as further
 from airmuscle.reproduce import saga2007_joint as joining

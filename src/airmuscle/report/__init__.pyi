@@ -1,0 +1,12 @@
+from .chapter import AtLeast as AtLeast
+from .chapter import AtMost as AtMost
+from .chapter import Chapter as Chapter
+from .chapter import Claim as Claim
+from .chapter import DisplayedEquation as DisplayedEquation
+from .chapter import Equal as Equal
+from .chapter import Kind as Kind
+from .chapter import Plot as Plot
+from .chapter import PublishedValue as PublishedValue
+from .chapter import Statement as Statement
+from .chapter import Table as Table
+from .write import write_report as write_report
