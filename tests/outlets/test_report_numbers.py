@@ -27,12 +27,12 @@ from airmuscle.recording import Recording
 from airmuscle.report.campaign_chapters import ValidationRow, _band_table, _plan_table, _validation_table
 from airmuscle.report.compare_chapter import _ranking
 from airmuscle.report.dynamic_chapter import _estimate_table, _estimates, _optima_table, _record
-from airmuscle.report.fit_chapter import _rows
 from airmuscle.report.hysteresis_chapter import _law_table, describe_row_counts
 from airmuscle.report.joint_friction_chapter import _run_table
 from airmuscle.report.prediction_chapter import _overview, with_unit
 from airmuscle.report.prediction_chapter import _record as predicted_record
 from airmuscle.report.sizing_chapter import _valve_settings, choice_row
+from airmuscle.report.static_fit_chapter import _rows
 from airmuscle.report.uncertainty_chapter import Uncertainty, _table
 from airmuscle.report.volume_chapter import _compared, _volumes
 from airmuscle.sizing import LiftRequirement, SizingConditions, choose

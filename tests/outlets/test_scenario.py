@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from scenario_files import writer_of
 
+import airmuscle as am
 from airmuscle.control import PWM, Periodic, SampledSignal, Schedule, SolenoidDriver, WithDrivers
 from airmuscle.errors import (
     AirmuscleError,
@@ -30,7 +31,7 @@ from airmuscle.mechanism import HangingMass, Isometric, WithLatch
 from airmuscle.muscle import LinearDamper
 from airmuscle.muscle.geometry import Braid
 from airmuscle.pneumatics import ClosedChamber, Isothermal, Polytropic, WallHeatTransfer
-from airmuscle.report.run_chapter import _input_plot
+from airmuscle.report.simulation_chapter import _input_plot
 from airmuscle.scenario import load_scenario
 from airmuscle.simulation import DormandPrince8, Rodas4, RungeKutta4
 
@@ -663,3 +664,11 @@ def test_too_many_rows_are_refused_before_they_fill_the_memory(tmp_path: Path):
         ParameterError, match=r"spacing of output_times of 1e-12 s makes 3e\+11 rows .* 10000000 are allowed"
     ):
         scenario.simulate()
+
+
+def test_a_scenario_is_loaded_run_and_reported_from_the_faces(tmp_path):
+    scenario = am.scenario.load_scenario(Path(__file__).parents[2] / "examples" / "fill_discharge.toml")
+    page = am.report.write_report([am.report.run_chapter(scenario, scenario.simulate())], tmp_path / "run")
+    assert scenario.title in page.read_text(encoding="utf-8")
+    again = am.scenario.load_scenario(am.scenario.save_scenario(scenario, tmp_path / "again.toml"))
+    assert again.problem.system == scenario.problem.system

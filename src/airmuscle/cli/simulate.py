@@ -12,7 +12,7 @@ from ..core.output_folder import atomic_folder, check_writable
 from ..recording import Recording, write_csv
 from ..recording.recording import column_heading
 from ..report.formatting import format_number
-from ..report.run_chapter import run_chapter
+from ..report.simulation_chapter import run_chapter
 from ..report.write import write_into
 from ..scenario.scenario import Scenario, load_scenario
 from .completion import complete_plant

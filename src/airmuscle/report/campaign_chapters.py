@@ -23,9 +23,9 @@ from .campaign_stages import USES, count_records, stage_result
 from .chapter import Chapter, Plot, Table
 from .compare_chapter import compare_chapter
 from .dynamic_chapter import dynamic_chapters
-from .fit_chapter import fit_chapter
 from .hysteresis_chapter import hysteresis_chapters
 from .joint_friction_chapter import joint_friction_chapter
+from .static_fit_chapter import fit_chapter
 
 
 @dataclasses.dataclass(frozen=True)

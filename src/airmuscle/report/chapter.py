@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..core.reference import Reference
+from ..core.short_repr import ShortRepr
 from .formula import to_plain
 
 HOLDS, DIFFERS, DEPENDS = "holds", "differs", "depends"
@@ -177,8 +178,8 @@ def statements(claims: Iterable[Claim], kind: Kind = Kind.CLAIM) -> tuple[Statem
     return tuple(Statement(text, tuple(group)) for (_, text), group in cases.items())
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Table:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Table(ShortRepr):
     """A titled table; `columns` maps headers with units, `pressure [MPa]`, to values. Written to data/<name>.csv."""
 
     name: str
@@ -216,8 +217,8 @@ class DisplayedEquation:
     sources: Mapping[str, str]
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Chapter:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Chapter(ShortRepr):
     """A chapter of a report: summary, claims, tables, figures, references and the sources of all values."""
 
     paper: str

@@ -10,7 +10,7 @@ from ..library.entry import Entry
 from ..library.write import save
 from ..recording import Recording
 from .chapter import Chapter
-from .fit_chapter import fit_chapter
+from .static_fit_chapter import fit_chapter
 from .write import write_into
 
 
