@@ -26,7 +26,7 @@ from airmuscle.identify import (
 )
 from airmuscle.identify.bootstrapping import RELIABLE_GROUPS
 from airmuscle.identify.candidates import blank_surface
-from airmuscle.identify.parameter_covariance import NORMAL_QUANTILE
+from airmuscle.identify.parameter_covariance import NORMAL_QUANTILE, _degrees_of_freedom
 from airmuscle.muscle.characteristic import TonduLopez2000
 from airmuscle.muscle.geometry import Braid
 from airmuscle.recording import Recording, write_csv
@@ -285,3 +285,16 @@ def test_single_equal_rows_of_two_files_are_two_measurements():
         runs.append(Recording({"pressure": pressure, "contraction": contraction, "force": np.maximum(force, 0)}, name))
     assert (runs[0]["force"] == runs[1]["force"]).sum() > 5
     assert fit(START, runs).rows_used == 96
+
+
+def test_degrees_of_freedom_are_between_one_and_the_number_of_groups():
+    """Also where rounding makes the trace of the squared form zero or negative."""
+    rng = np.random.default_rng(4)
+    for scale in (1e-160, 1e-8, 1.0, 1e8):
+        halves = rng.standard_normal((5, 3, 3))
+        leverages = np.einsum("gij,gkj->gik", halves, halves)
+        freedom = _degrees_of_freedom(leverages, scale * rng.standard_normal((40, 3)))
+        assert np.isfinite(freedom).all()
+        assert (freedom >= 1.0).all()
+        assert (freedom <= 5.0 * (1 + 1e-12)).all()
+    assert _degrees_of_freedom(leverages, np.zeros((1, 3))).tolist() == [1.0]

@@ -238,8 +238,9 @@ def _split(rows: Array, group: Indices) -> list[Array]:
 
 
 def _degrees_of_freedom(leverages: Array, rows: Array) -> Array:
-    """tr(M)^2/tr(M^2) of the quadratic forms M (G, G) in independent errors, for combinations (K, P); at least 1.
+    """tr(M)^2/tr(M^2) of the quadratic forms M (G, G) in independent errors, for combinations (K, P): 1 to G.
 
+    The upper bound is that of the rank of M, which rounding in tr(M^2) would exceed.
     With u_g = H_g (I - H_g)^-1 a it is M = diag(a^T u_g + |u_g|^2) - U U^T.
     """
     projected = np.einsum("gij,kj->kgi", leverages, rows, optimize=True)
@@ -248,7 +249,9 @@ def _degrees_of_freedom(leverages: Array, rows: Array) -> Array:
     products = np.swapaxes(projected, 1, 2) @ projected
     trace = np.sum(weights - lengths, axis=1)
     squares = np.sum(weights**2 - 2 * weights * lengths, axis=1) + np.sum(products**2, axis=(1, 2))
-    return np.asarray(np.maximum(trace**2 / np.maximum(squares, 1e-300), 1.0))
+    at_rank = trace**2 / len(leverages)
+    known = np.maximum(squares, at_rank)
+    return np.where(known > 0.0, np.maximum(trace**2 / np.where(known > 0.0, known, 1.0), 1.0), 1.0)
 
 
 def _is_correlated(residuals: Array, run: Indices) -> bool:
