@@ -321,11 +321,11 @@ def _hung(law_of_contraction: Any) -> Recording:
 def test_laws_that_are_left_out_of_a_ranking_name_options(tmp_path: Path):
     runs = [points(tmp_path / f"{i}.csv", 18 + 6 * i) for i in range(3)]
     reasons = [each.reason for each in compare(read(runs), leave_out=RunSplit()).excluded]
-    assert any("use fixed=" in reason for reason in reasons)
+    assert any("use degree=" in reason for reason in reasons)
     command = ("--compare", "--leave-out", "run", "--json", "--out", tmp_path / "out")
     excluded = json.loads(airmuscle("fit", *runs, *command).stdout)["excluded"]
-    assert [reason for reason in excluded.values() if "fixed=" in reason] == []
-    assert any("--fix" in reason for reason in excluded.values())
+    assert [reason for reason in excluded.values() if "degree=" in reason] == []
+    assert any("--degree" in reason for reason in excluded.values())
 
 
 def test_rigs_with_different_sensors_name_the_option_for_equal_weights():
