@@ -1,6 +1,7 @@
 """MuJoCo plugin: a muscle that MuJoCo integrates moves a load as in the library.
 
-With RK4 of the same step both programs evaluate the same formulas; against an accurate solution the error is that of RK4.
+Under Euler, implicit and implicitfast of MuJoCo the muscle is integrated within the step, with the load that it feels. With RK4
+of the same step both programs evaluate the same formulas; against an accurate solution the error is that of RK4.
 """
 
 from __future__ import annotations
@@ -16,17 +17,18 @@ import plants
 import printed
 import pytest
 from typer.testing import CliRunner
+from widths import widened
 
 from airmuscle.cli.app import app
 from airmuscle.control import Schedule
 from airmuscle.errors import ParameterError
 from airmuscle.export import compiler, mujoco_plugin, write_mujoco_plugin
+from airmuscle.mechanism import AntagonisticJoint
 from airmuscle.pneumatics import FillDischarge, Supply, Valve
 from airmuscle.simulation import Problem, Rodas4, RungeKutta4, find_equilibrium, solve
 
 VALVE = Valve(2.6167e-9, 0.433)
 PLANT = replace(plants.EXAMPLES["dmsp-20-300"], circuit=FillDischarge(Supply(5.5e5), VALVE, VALVE))
-LENGTH = PLANT.muscle.geometry.resting_length
 SCHEDULE = Schedule({"fill": ((0.0, 0.0), (0.1, 1.0), (0.4, 0.0)), "discharge": ((0.0, 0.0), (0.5, 1.0), (0.6, 0.0))})
 ENDS = np.array([0.1, 0.4, 0.5, 0.6, 0.8])
 
@@ -47,16 +49,17 @@ def actuator(mujoco, tmp_path_factory):
     return write_mujoco_plugin(PLANT, tmp_path_factory.mktemp("plugin"), name="festo")
 
 
-def hanging_mass(mujoco, actuator, integrator="RK4", step=1e-3, transmission="tendon", **options):
+def hanging_mass(mujoco, actuator, integrator="RK4", step=1e-3, transmission="tendon", plant=PLANT, **options):
     """A mass on a muscle, the position upwards from where the muscle is at rest."""
+    rest = plant.muscle.geometry.resting_length
     spec = mujoco.MjSpec()
     spec.option.timestep = step
     spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
     spec.option.gravity = [0, 0, -9.80665]
     spec.worldbody.add_site(name="top", pos=[0, 0, 1])
-    body = spec.worldbody.add_body(name="load", pos=[0, 0, 1 - LENGTH])
+    body = spec.worldbody.add_body(name="load", pos=[0, 0, 1 - rest])
     body.add_joint(name="z", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 0, 1])
-    body.add_geom(size=[0.05, 0, 0], mass=PLANT.mechanism.mass, contype=0, conaffinity=0)
+    body.add_geom(size=[0.05, 0, 0], mass=plant.mechanism.mass, contype=0, conaffinity=0)
     body.add_site(name="hook")
     if transmission == "tendon":
         tendon = spec.add_tendon(name="t")
@@ -67,7 +70,7 @@ def hanging_mass(mujoco, actuator, integrator="RK4", step=1e-3, transmission="te
         actuator.add_to(spec, name="muscle", joint="z", gear=-1.0, rest_length=0.0, **options)
     model = spec.compile()
     data = mujoco.MjData(model)
-    state = find_equilibrium(PLANT, pressure=1e5)
+    state = find_equilibrium(plant, pressure=1e5)
     data.qpos[0] = state["position"]
     actuator.initialise(model, data, "muscle", pressure=1e5)
     return model, data, state
@@ -85,9 +88,33 @@ def run(mujoco, model, data):
     return np.array(found)
 
 
-def expected(state, integrator):
-    problem = Problem(PLANT, SCHEDULE, ENDS[-1], state, integrator=integrator, output_times=ENDS)
+def expected(state, integrator, plant=PLANT):
+    problem = Problem(plant, SCHEDULE, ENDS[-1], state, integrator=integrator, output_times=ENDS)
     return solve(problem).recording["position"][-ENDS.size :]
+
+
+def joint_angle(mujoco, plant, made, step):
+    """Angles of an antagonistic joint every 20 ms."""
+    spec, mechanism = mujoco.MjSpec(), plant.mechanism
+    spec.option.timestep, spec.option.gravity = step, [0, 0, 0]
+    body = spec.worldbody.add_body(name="arm")
+    body.add_joint(name="angle", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 1, 0], damping=mechanism.damping)
+    body.mass, body.inertia, body.explicitinertial = 1.0, [mechanism.inertia] * 3, 1
+    for muscle, gear in zip(made, (-1.0, 1.0), strict=True):
+        rest = mechanism.offset * muscle.plant.muscles[0].geometry.resting_length
+        muscle.add_to(spec, name=muscle.name, joint="angle", gear=gear * mechanism.radius, rest_length=rest)
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    data.qpos[0] = find_equilibrium(plant, pressure=2e5)["angle"]
+    for muscle in made:
+        muscle.initialise(model, data, muscle.name, pressure=2e5)
+    found = []
+    for k in range(round(0.5 / step)):
+        data.ctrl[0] = 1.0 if 0.1 <= k * step + 1e-9 < 0.3 else 0.0
+        mujoco.mj_step(model, data)
+        if (k + 1) % round(0.02 / step) == 0:
+            found.append(data.qpos[0])
+    return np.array(found)
 
 
 @pytest.mark.parametrize("transmission", ["tendon", "joint"])
@@ -99,9 +126,75 @@ def test_a_mass_moves_as_in_the_library(transmission, mujoco, actuator):
     assert np.abs(found - expected(state, RungeKutta4(1e-3))).max() <= 1e-12
 
 
+STIFF = ["LuGre", "Dahl", "Bouc-Wen", "Maxwell slip", "heat", "tube with inertia", "pressure damper, creep", "real gas"]
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
+def test_at_the_default_step_of_mujoco_a_mass_moves_as_in_the_library(integrator, mujoco, actuator):
+    model, data, state = hanging_mass(mujoco, actuator, integrator, 2e-3)
+    assert np.abs(run(mujoco, model, data) - expected(state, Rodas4(1e-10))).max() <= 1e-8
+
+
+@pytest.mark.parametrize("name", widened(STIFF, lambda name: name in ("LuGre", "tube with inertia")))
+def test_stiff_muscles_move_as_in_the_library_at_the_default_step(name, mujoco, tmp_path):
+    plant = plants.EXAMPLES[name]
+    made = write_mujoco_plugin(plant, tmp_path, name=f"stiff_{STIFF.index(name)}")
+    model, data, state = hanging_mass(mujoco, made, "Euler", 2e-3, plant=plant)
+    found = run(mujoco, model, data)
+    assert np.ptp(found) > 0.01
+    assert np.abs(found - expected(state, Rodas4(1e-10), plant)).max() <= 1e-6
+
+
+def test_two_muscles_on_a_joint_move_it_as_in_the_library(mujoco, tmp_path):
+    """Each muscle knows the force of the other from the step before; the error at 2 ms is of second order."""
+    plant = replace(plants.EXAMPLES["joint with an external torque"], mechanism=AntagonisticJoint(0.03, 0.05))
+    made = [write_mujoco_plugin(plant, tmp_path / m.name, name=f"joint_{m.name}", muscle=m.name) for m in plant.muscles]
+    angles = [joint_angle(mujoco, plant, made, step) for step in (2e-3, 1e-3)]
+    state = find_equilibrium(plant, pressure=2e5)
+    schedule = Schedule({"m0.fill": ((0.0, 0.0), (0.1, 1.0), (0.3, 0.0))})
+    right = solve(Problem(plant, schedule, 0.5, state, integrator=Rodas4(1e-10), output_times=2e-2)).recording["angle"]
+    errors = [np.abs(found - right[1:]).max() for found in angles]
+    assert np.ptp(right) > 0.05
+    assert errors[0] * plant.mechanism.radius <= 1e-5
+    assert errors[1] <= errors[0] / 3.5
+
+
+def test_a_step_of_rk4_that_does_not_resolve_the_muscle_is_said(mujoco, tmp_path, capfd, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its log into the working folder
+    plant = plants.EXAMPLES["LuGre"]
+    made = write_mujoco_plugin(plant, tmp_path, name="coarse")
+    model, data, _ = hanging_mass(mujoco, made, "RK4", 2e-3, plant=plant)
+    run(mujoco, model, data)
+    text = "".join(capfd.readouterr())
+    assert "does not resolve the muscle under RK4; use Euler or implicitfast" in text
+
+
+def test_states_that_are_not_physical_stop_the_run(mujoco, actuator, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    model, data, _ = hanging_mass(mujoco, actuator, "Euler", 2e-3)
+    data.act[0] = float("nan")
+    with pytest.raises(mujoco.FatalError, match=r"actuator 0 cannot be integrated from 0 s on"):
+        mujoco.mj_forward(model, data)
+
+
+def test_two_different_plugins_of_one_name_are_refused(mujoco, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    def add(folder, plant):
+        made = write_mujoco_plugin(plant, tmp_path / folder, name="twice")
+        spec = mujoco.MjSpec()
+        spec.worldbody.add_body(name="b").add_joint(name="z")
+        made.add_to(spec, name="m", joint="z")
+
+    add("one", PLANT)
+    add("same", PLANT)
+    with pytest.raises(ParameterError, match=r"airmuscle\.twice of this process is another one .* another name"):
+        add("other", plants.EXAMPLES["LuGre"])
+
+
 def test_the_states_are_in_act_and_begin_at_the_pressure(mujoco, actuator):
     model, data, state = hanging_mass(mujoco, actuator)
-    assert model.na == len(actuator.plant.states) == 1
+    assert model.na == len(actuator.plant.states) + 1 == 2
     assert data.act[0] == pytest.approx(state["air_mass"], rel=1e-12)
     mujoco.mj_forward(model, data)
     assert data.actuator_force[0] == pytest.approx(-PLANT.mechanism.mass * 9.80665, rel=1e-9)
@@ -126,10 +219,10 @@ def test_the_model_can_be_written_as_mjcf_and_read_again(mujoco, actuator):
         actuator.add_to(spec, name=name, joint="elbow", gear=gear, rest_length=0.01)
     spec.compile()
     again = mujoco.MjModel.from_xml_string(spec.to_xml())
-    assert (again.nu, again.na) == (2, 2)
+    assert (again.nu, again.na) == (2, 4)
     copied = mujoco.MjData(again)
     actuator.initialise(again, copied, "extensor", pressure=2e5)
-    assert copied.act[0] == 0.0 < copied.act[1]
+    assert copied.act[0] == 0.0 < copied.act[2]
 
 
 def test_a_copied_state_runs_on_by_itself(mujoco, actuator):
@@ -179,7 +272,7 @@ def test_an_unsuitable_mujoco_is_refused_and_the_source_is_written(version, tmp_
     made = write_mujoco_plugin(PLANT, tmp_path, name="festo")
     assert made.library is None
     assert f"MuJoCo {version} is not supported" in made.remark
-    assert [p.name for p in tmp_path.iterdir()] == ["festo_plugin.c"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["festo.c", "festo.h", "festo_plugin.c"]
 
 
 def test_without_a_compiler_the_source_is_written_and_the_remedy_stated(mujoco, tmp_path, monkeypatch):
@@ -187,7 +280,7 @@ def test_without_a_compiler_the_source_is_written_and_the_remedy_stated(mujoco, 
     made = write_mujoco_plugin(PLANT, tmp_path, name="festo")
     assert made.library is None
     assert "no C compiler (gcc, clang, cc) was found; install the package gcc or clang" in made.remark
-    assert [p.name for p in tmp_path.iterdir()] == ["festo_plugin.c"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["festo.c", "festo.h", "festo_plugin.c"]
 
 
 def test_without_mujoco_the_remedy_is_stated(monkeypatch):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import hashlib
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -11,19 +12,20 @@ from pathlib import Path
 from typing import Any
 
 from ..compile.program import compile_system
-from ..compile.text.c import CLanguage
 from ..core.arrays import Array
 from ..core.errors import ParameterError
 from ..core.output_folder import atomic_folder
 from ..core.short_repr import ShortRepr
 from ..core.tree import leaves, with_parameters
 from ..core.variables import Input
-from ..mechanism import ExternalLoad
+from ..mechanism import ExternalLoad, HangingMass
 from ..mechanism.external_load import SHORTENING, SHORTENING_SPEED
 from ..plant import Plant, open_plant
-from .c_text import c_array, c_number, c_strings
+from ..simulation.integrators import Rodas4
+from .c_source import CSource
+from .c_text import c_number, c_strings
 from .compiler import compile_library
-from .printed_system import ExportedSystem, export_system
+from .printed_system import export_system
 from .provenance import block_comment, provenance
 from .targets import program_name
 from .templates import filled
@@ -31,11 +33,16 @@ from .write import checked_name
 
 OLDEST, BROKEN = (3, 17), ("4.0.0",)
 """First version of MuJoCo whose plugin actuators have several states, and versions in which they do not work."""
+TOLERANCE = 1e-7
+"""Relative tolerance of the integration of the muscle within a step of MuJoCo; chosen."""
 REST_LENGTH = "rest_length"
 """Attribute: the length of the transmission [m] at which the muscle has its resting length."""
+_LOADED: dict[str, str] = {}
+"""The plugins of this process by name, each with the digest of its library."""
 NOTE = (
     "The actuator does not report where a run leaves the validity range of a characteristic or of another component. "
-    "The integrator and its step are those of MuJoCo: RK4 and at most 1 ms are recommended (chosen)."
+    "Under Euler, implicit and implicitfast its own solver integrates the muscle within each step of MuJoCo; RK4 of "
+    "MuJoCo integrates it with MuJoCo's step, which does not resolve fast states."
 )
 
 
@@ -95,7 +102,7 @@ class MuscleActuator(ShortRepr):
                 )
         if rest_length is not None:
             config[REST_LENGTH] = _text(REST_LENGTH, rest_length)
-        _load(str(self.library))
+        _load(self.plugin_name, self.library)
         if self.plugin_name not in {p.plugin_name for p in spec.plugins}:
             spec.activate_plugin(self.plugin_name)
         instance = spec.add_plugin(name=f"{name}_plugin", plugin_name=self.plugin_name)
@@ -103,7 +110,7 @@ class MuscleActuator(ShortRepr):
         actuator = spec.add_actuator(name=name, target=tendon or joint)
         actuator.trntype = mujoco.mjtTrn.mjTRN_TENDON if tendon else mujoco.mjtTrn.mjTRN_JOINT
         actuator.gear[0] = gear
-        actuator.dyntype, actuator.actdim = mujoco.mjtDyn.mjDYN_USER, len(self.plant.states)
+        actuator.dyntype, actuator.actdim = mujoco.mjtDyn.mjDYN_USER, len(self.plant.states) + 1
         actuator.ctrlrange, actuator.ctrllimited = list(self.control_range), 1
         actuator.plugin.name, actuator.plugin.plugin_name = instance.name, self.plugin_name
         actuator.plugin.active = True
@@ -123,7 +130,7 @@ class MuscleActuator(ShortRepr):
         shortening = rest - float(data.actuator_length[which])
         state = open_plant(plant, (shortening,)).state_at(pressure=pressure)
         first = int(model.actuator_actadr[which])
-        data.act[first : first + len(state)] = list(state.values())
+        data.act[first : first + len(state) + 1] = [*state.values(), 0.0]
         initial: Array = data.act[first : first + len(state)]
         return initial
 
@@ -139,8 +146,9 @@ def write_mujoco_plugin(plant: Plant, folder: str | Path, *, name: str = "", mus
     plant   its load is left out: MuJoCo carries it
     muscle  name of the muscle, if the plant has several, each with its own circuit
 
-    The folder contains the C source `NAME_plugin.c` and the shared library, which belongs to the version of MuJoCo that
-    it was built with. Raises ParameterError for a plant that cannot be exported, and FileError.
+    The folder contains the C sources `NAME_plugin.c`, `NAME.c` and `NAME.h`, and the shared library, which belongs to
+    the version of MuJoCo that it was built with. Raises ParameterError for a plant that cannot be exported, and
+    FileError.
     """
     part = open_plant(_single(plant, muscle))
     program = checked_name(name) or program_name(part.muscles[0].name)
@@ -150,17 +158,17 @@ def write_mujoco_plugin(plant: Plant, folder: str | Path, *, name: str = "", mus
             "an actuator of MuJoCo has one control; a circuit with a single input, or two valves that open from 0, "
             f"can be exported, but the inputs are {', '.join(i.name for i in controls)}."
         )
-    system = export_system(compile_system(part))
     lines = provenance(f"Muscle {part.muscles[0].name} for MuJoCo", part, (), [NOTE])
-    text = _source(system, program, controls, lines)
+    files = _sources(part, program, controls, lines)
     target = Path(folder)
     library, remark = b"", ""
     try:
-        library = _build(program, text)
+        library = _build(program, files)
     except ParameterError as reason:
         remark = str(reason)
     with atomic_folder(target) as staging:
-        (staging / f"{program}_plugin.c").write_text(text, encoding="utf-8")
+        for source, text in files.items():
+            (staging / source).write_bytes(text)
         if library:
             (staging / f"lib{program}_plugin.so").write_bytes(library)
     file = target / f"lib{program}_plugin.so" if library else None
@@ -201,34 +209,37 @@ def _single(plant: Plant, muscle: str) -> Plant:
     return dataclasses.replace(plant, muscle=plant.muscles[k], circuit=plant.circuits[k], mechanism=ExternalLoad())
 
 
-def _source(system: ExportedSystem, name: str, controls: Sequence[Input], lines: Sequence[str]) -> str:
-    functions, sizes = system.printed(CLanguage("double", f"{name}_"), implicit=False)
-    inputs, paths = list(system.input_names), [leaf.path for leaf in system.tunable]
-    places = [*(inputs.index(i.name) for i in controls), -1, -1]
-    plant = system.compiled.system
-    assert isinstance(plant, Plant)
-    length = plant.muscles[0].geometry.resting_length
+def _sources(part: Plant, name: str, controls: Sequence[Input], lines: Sequence[str]) -> dict[str, bytes]:
+    """The C files by name: the muscle with a load whose mass and gravity the plugin sets, and the plugin."""
+    system = export_system(compile_system(dataclasses.replace(part, mechanism=HangingMass(1.0))))
+    paths, states = [leaf.path for leaf in system.tunable], list(system.state_names)
+    own = [leaf.path for leaf in leaves(part)]
+    places = [*(system.input_names.index(i.name) for i in controls), -1, -1]
     constants = [
-        c_strings("static const char *const attributes[]", [*paths, REST_LENGTH]),
-        c_array("static const double defaults[PARAMETERS + 1]", system.defaults, 1),
-        f"static const double rest_length = {c_number(length)};\n",
+        c_strings("static const char *const attributes[]", [*own, REST_LENGTH]),
+        _integers("places", [paths.index(path) for path in own]),
+        _integers("own_states", [states.index(state.name) for state in part.states]),
+        f"static const double rest_length = {c_number(part.muscles[0].geometry.resting_length)};\n",
     ]
     values = {
-        "provenance": block_comment(lines), "name": f"airmuscle.{name}", "states": str(sizes.states),
-        "inputs": str(sizes.inputs), "outputs": str(sizes.outputs), "parameters": str(len(paths)),
-        "held": str(sizes.held), "shortening": str(inputs.index(SHORTENING)),
-        "speed": str(inputs.index(SHORTENING_SPEED)), "force": str(system.output_names.index("force")),
-        "first": str(places[0]), "second": str(places[1]), "constants": "".join(constants), "functions": functions,
+        "provenance": block_comment(lines), "name": f"airmuscle.{name}", "file": name, "constants": "".join(constants),
+        "attributes": str(len(own) + 1), "first": str(places[0]), "second": str(places[1]),
     }  # fmt: skip
-    return filled("mujoco_plugin.c", values, name)
+    texts = CSource(name, system, Rodas4(TOLERANCE), lines).files()
+    texts[f"{name}_plugin.c"] = filled("mujoco_plugin.c", values, name)
+    return {file: text.encode() for file, text in texts.items()}
 
 
-def _build(name: str, text: str) -> bytes:
+def _integers(name: str, values: Sequence[int]) -> str:
+    return f"static const int {name}[] = {{{', '.join(map(str, values))}}};\n"
+
+
+def _build(name: str, files: Mapping[str, bytes]) -> bytes:
     """The shared library. Raises ParameterError without MuJoCo or a compiler."""
     folder = Path(check_mujoco().__file__).parent
     linked = [str(path) for path in sorted(folder.glob("libmujoco.*"))[:1]]
-    file = f"{name}_plugin.c"
-    return compile_library({file: text.encode()}, [file], f"lib{name}_plugin.so", [f"-I{folder / 'include'}", *linked])
+    units = [file for file in files if file.endswith(".c")]
+    return compile_library(files, units, f"lib{name}_plugin.so", [f"-I{folder / 'include'}", *linked])
 
 
 def _text(name: str, value: float) -> str:
@@ -238,10 +249,23 @@ def _text(name: str, value: float) -> str:
     return repr(float(value))
 
 
-@functools.cache
-def _load(library: str) -> None:
-    """Load a plugin once in a process."""
-    check_mujoco().mj_loadPluginLibrary(library)
+def _load(plugin: str, library: Path) -> None:
+    """Load a plugin once in a process. Raises ParameterError where another one has its name."""
+    digest = hashlib.sha256(library.read_bytes()).hexdigest()
+    if _LOADED.get(plugin) == digest:
+        return
+    mujoco = check_mujoco()
+    try:
+        if plugin not in _LOADED:
+            mujoco.mj_loadPluginLibrary(str(library))
+            _LOADED[plugin] = digest
+            return
+    except mujoco.FatalError as reason:
+        _LOADED.setdefault(plugin, f"refused: {reason}")
+    raise ParameterError(
+        f"the plugin {plugin} of this process is another one than {library}, and MuJoCo cannot replace it; write this "
+        "plugin with another name, or start a new process."
+    )
 
 
 def _configuration(model: Any, instance: int, attributes: Sequence[str]) -> dict[str, str]:
