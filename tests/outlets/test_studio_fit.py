@@ -537,3 +537,73 @@ def test_a_saved_page_contains_no_fit():
     page = self_contained_page([], {})
     assert "fitSource" not in page
     assert "MuscleTab" in page
+
+
+# Settings of the files, as on the command line
+
+
+def logged(outliers=()):
+    """A table below a preamble, with a displacement, codes of missing values, and outliers in some rows."""
+    rows = [[f"{0.1 * i:.1f}", "100", f"{12 + 0.1 * i:.1f}", f"{90 - 0.9 * i + 0.1 * (i % 3):.2f}"] for i in range(80)]
+    rows[5][3], rows[9][3] = "-999", "OL"
+    for row in outliers:
+        rows[row][3] = "400"
+    head = ["Bench 3,Monday,,", "time [s],pressure [kPa],displacement [mm],force [N]"]
+    return "\n".join([*head, *map(",".join, rows)]).encode()
+
+
+LOGGED = {
+    "resting_length": "300 mm", "displacement_zero": "12 mm", "missing": "drop", "missing_codes": "-999; OL",
+    "skip_rows": "1",
+}  # fmt: skip
+
+
+def test_the_page_has_the_reading_settings_of_the_command_line(app, tmp_path):
+    """Lines above the headings, codes of missing values, and the zero of a displacement give the same columns."""
+    content = logged()
+    name = upload(app, "a.csv", content).json()["set"]
+    (recording,) = post(app, "read", set=name, settings=LOGGED).json()["recordings"]
+    (tmp_path / "a.csv").write_bytes(content)
+    (expected,) = read(
+        tmp_path / "a.csv", resting_length="300 mm", displacement_zero="12 mm", skip_rows=1,
+        missing=am.recording.DropMissing((-999.0, "OL")),
+    )  # fmt: skip
+    assert recording["rows"] == len(expected) == 78
+    assert recording["points"]["contraction"] == pytest.approx(expected["contraction"], abs=1e-8)
+    assert recording["points"]["contraction"][0] == 0
+
+
+@pytest.mark.parametrize(
+    ("setting", "value"),
+    [("missing", "zero"), ("skip_rows", "-1"), ("skip_rows", "two"), ("outliers", "mend"), ("displacement_zero", "nan mm"),
+     ("displacement_zero", "12")],
+)  # fmt: skip
+def test_reading_settings_that_are_not_possible_name_their_field(app, setting, value):
+    name = upload(app, "a.csv", logged()).json()["set"]
+    answer = post(app, "read", set=name, settings={**LOGGED, setting: value})
+    assert (answer.status, answer.json()["field"]) == (422, setting)
+
+
+def test_missing_values_name_the_field_that_treats_them(app):
+    name = upload(app, "a.csv", logged()).json()["set"]
+    found = problems(post(app, "read", set=name, settings={**LOGGED, "missing": "", "missing_codes": "-999, OL"}))
+    assert "select 'leave out the rows' in the field 'Missing values'" in found["missing"]
+
+
+def test_outliers_are_left_out_as_by_the_command_line(app, tmp_path):
+    """More outliers than are listed are found by the function of `drop_outliers`; rules keep the rows of the file."""
+    content = logged(range(12, 80, 8))
+    name = upload(app, "a.csv", content).json()["set"]
+    rule = {"recordings": ["a.csv"], "rows": [70, 78], "keep": False}
+    (recording,) = post(app, "read", set=name, settings={**LOGGED, "outliers": "drop", "rules": [rule]}).json()[
+        "recordings"
+    ]
+    (tmp_path / "a.csv").write_bytes(content)
+    stated = {"resting_length": "300 mm", "displacement_zero": "12 mm", "skip_rows": 1}
+    missing = am.recording.DropMissing((-999.0, "OL"))
+    (complete,) = read(tmp_path / "a.csv", **stated, missing=missing)
+    (expected,) = read(tmp_path / "a.csv", **stated, missing=missing, drop_outliers=True)
+    left_out = np.flatnonzero(~np.isin(complete["time"], expected["time"]))
+    assert recording["outliers"] == len(left_out) > 5
+    assert recording["left_out"] == list(left_out)
+    assert recording["used"] == 78 - len({*left_out, *range(70, 78)})

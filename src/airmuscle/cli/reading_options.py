@@ -13,6 +13,7 @@ import typer
 
 from ..recording import ColumnMapping
 from ..recording.mapping import read_mapping
+from ..recording.missing_values import parse_code
 
 Command = TypeVar("Command", bound=Callable[..., None])
 MappingFile = Annotated[
@@ -146,7 +147,7 @@ class ReadingOptions:
         return base.with_overrides(
             columns=parse_pairs("--column", self.column),
             constants=parse_pairs("--constant", self.constant),
-            missing_codes=tuple(map(_code, self.missing_code)) if self.missing_code else None,
+            missing_codes=tuple(map(parse_code, self.missing_code)) if self.missing_code else None,
             **{name: getattr(self, name) for name in _SAME_IN_MAPPING},
         )
 
@@ -157,14 +158,6 @@ _SAME_IN_MAPPING = (
     "delimiter", "decimal", "sheet", "group",
 )  # fmt: skip
 _FIELDS = tuple(field.name for field in dataclasses.fields(ReadingOptions))
-
-
-def _code(text: str) -> float | str:
-    """The code of a missing value: a number, or else a text."""
-    try:
-        return float(text)
-    except ValueError:
-        return text
 
 
 def with_reading_options(command: Command) -> Command:

@@ -118,6 +118,14 @@ MISSING_VALUES: dict[str, type[RefuseMissing] | type[DropMissing] | type[Interpo
 """Treatments by their names in mapping files and on the command line."""
 
 
+def parse_code(text: str) -> float | str:
+    """The code of a missing value that a text states: a number, or else the text without outer blanks."""
+    try:
+        return float(text)
+    except ValueError:
+        return text.strip()
+
+
 def _refuse(table: RawTable, columns: Sequence[ExaminedColumn], *, missing: bool = False) -> None:
     """Raise ColumnError for the cells that are no numbers, and with `missing` also for those without a value."""
     found = faulty_cells(columns, missing=missing)

@@ -4,9 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+import airmuscle as am
+
 from ..core.errors import AirmuscleError
 from ..core.hints import Hint, HintedText
 from .fit_settings import FieldError
+
+
+def _missing(hint: Hint) -> str:
+    """The field of a treatment of missing values, and that of its codes."""
+    codes = ", ".join(map(str, hint.value.codes))
+    choice = (
+        "interpolate short gaps" if isinstance(hint.value, am.recording.InterpolateMissing) else "leave out the rows"
+    )
+    return f"select '{choice}' in the field 'Missing values'" + (
+        f" and write {codes} into the field 'Codes of missing values'" if codes else ""
+    )
+
 
 _INSTRUCTIONS: Mapping[str, tuple[str, Callable[[Hint], str]]] = {
     "units": ("columns", lambda hint: f"select it in the table Columns, row {', '.join(map(str, hint.value))}"),
@@ -16,6 +30,13 @@ _INSTRUCTIONS: Mapping[str, tuple[str, Callable[[Hint], str]]] = {
     "time_base": ("time", lambda hint: "select another time base"),
     "ordered": ("time", lambda hint: "select the time base 'unordered'"),
     "decimal": ("decimal", lambda hint: "select the decimal mark"),
+    "missing": ("missing", _missing),
+    "drop_outliers": ("outliers", lambda hint: "select 'leave out' in the field 'Suspected outliers'"),
+    "skip_rows": ("skip_rows", lambda hint: "write it into the field 'Lines above the headings'"),
+    "displacement_zero": (
+        "displacement_zero",
+        lambda hint: "write it into the field 'Displacement at the resting length'",
+    ),
     "resting_length": ("resting_length", lambda hint: "write it into the field 'Resting length'"),
     "by": ("leave_out", lambda hint: f"select {hint.value.quantity} in the field 'Cross-validation leaves out'"),
     "leave_out": ("leave_out", lambda hint: f"select {hint.value.quantity} in the field 'Cross-validation leaves out'"),

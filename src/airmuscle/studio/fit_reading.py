@@ -16,11 +16,11 @@ from ..recording.constants import parse_constant_name
 from ..recording.heading import Heading, parse_heading
 from ..recording.interpret import interpret, resolve_headings, unit_conversion
 from ..recording.mapping import apply_mapping
-from ..recording.reader import read_tables
+from ..recording.reader import check_bench, read_tables
 from ..recording.segment import check_contents
+from ..recording.segment.outliers import Outlier, find_bench_outliers
 from ..recording.specimens import split_specimens
 from ..recording.table import RawTable
-from ..recording.unit_consistency import check_unit_consistency
 from .fit_hints import as_field_error, in_page_words
 from .fit_settings import FieldError, FitSettings
 from .fit_uploads import FILES
@@ -62,6 +62,8 @@ class ReadSet:
     """The name of the file of each recording."""
     problems: list[FieldError] = dataclasses.field(default_factory=list)
     remarks: list[str] = dataclasses.field(default_factory=list)
+    outliers: Sequence[Sequence[Outlier]] = ()
+    """The suspected outliers of each recording that are left out."""
 
     def complain(self, error: AirmuscleError, field: str = "") -> None:
         """Add a problem, once."""
@@ -78,10 +80,14 @@ def read_set(folder: Path, settings: FitSettings) -> ReadSet:
         for path in sorted((folder / FILES).iterdir()):
             _read_file(path, settings, read)
         try:
-            check_unit_consistency(read.recordings)
+            check_bench(read.recordings)
         except AirmuscleError as error:
             read.complain(error, "columns")
-    read.remarks += dict.fromkeys(in_page_words(str(each.message)) for each in caught)
+    read.remarks += dict.fromkeys(
+        in_page_words(each.message.args[0]) for each in caught if isinstance(each.message, Warning)
+    )
+    dropped = settings.texts["outliers"] == "drop"
+    read.outliers = find_bench_outliers(read.recordings) if dropped else [()] * len(read.recordings)
     for recording, file in zip(read.recordings, read.files, strict=True):
         _check_needed(recording, file, read)
     if not read.problems and read.recordings:
@@ -115,9 +121,10 @@ def _read_file(path: Path, settings: FitSettings, read: ReadSet) -> None:
             read.complain(problem)
         if problems:
             continue
+        missing = settings.mapping({}).missing_values
         try:
             parts = [
-                interpret(part, units={}, constants=constants, time_base=_time_base(settings))
+                interpret(part, units={}, constants=constants, time_base=_time_base(settings), missing=missing)
                 for part in split_specimens(mapped)
             ]
         except AirmuscleError as error:
@@ -234,15 +241,18 @@ def _check_needed(recording: am.Recording, file: str, read: ReadSet) -> None:
     for name in NEEDED:
         if name in recording:
             continue
-        if name == "contraction" and "length" in recording.columns:
-            text = f"{recording.origin}: the resting length is not known, which converts the length to a contraction."
+        moved = next((each for each in ("length", "shortening") if each in recording.columns), "")
+        if name == "contraction" and moved:
+            text = f"{recording.origin}: the resting length is not known, which converts the {moved} to a contraction."
             read.complain(
                 FieldError(f"{text} Write it into the field 'Resting length', such as 300 mm.", "resting_length")
             )
         elif name == "contraction":
-            text = f"{recording.origin}: there is neither a contraction nor a length. Select its column, or write the "
-            read.complain(
-                FieldError(f"{text}length at which the muscle was held into the row of the file.", f"file:{file}")
+            text = (
+                f"{recording.origin}: there is neither a contraction nor a length. Select its column, which may "
+                "be a shortening or an elongation, or write the length at which the muscle was held into the row of "
+                "the file."
             )
+            read.complain(FieldError(text, f"file:{file}"))
         else:
             read.complain(FieldError(f"{recording.origin}: no column is a {name}. Select its column.", "columns"))

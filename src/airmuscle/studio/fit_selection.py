@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 import airmuscle as am
 
+from ..recording.segment.outliers import Outlier, kept_rows, leave_out
 from .fit_settings import FieldError, Rule
 
 Mask = npt.NDArray[np.bool_]
@@ -29,9 +30,10 @@ def inside(rule: Rule, recording: am.Recording) -> Mask:
     return mask
 
 
-def used_rows(recording: am.Recording, rules: Sequence[Rule]) -> Mask:
-    """The rows of a recording that the rules leave, shape (N,). Raises FieldError for an unknown column."""
-    used = np.ones(len(recording), dtype=bool)
+def used_rows(recording: am.Recording, rules: Sequence[Rule], outliers: Sequence[Outlier] = ()) -> Mask:
+    """The rows of a recording that the rules leave, without outliers, shape (N,). Raises FieldError for an unknown
+    column."""
+    used = kept_rows(recording, outliers)
     for rule in rules:
         if rule.recordings and recording.origin not in rule.recordings:
             continue
@@ -40,14 +42,18 @@ def used_rows(recording: am.Recording, rules: Sequence[Rule]) -> Mask:
     return used
 
 
-def selected(recordings: Sequence[am.Recording], rules: Sequence[Rule]) -> list[am.Recording]:
+def selected(
+    recordings: Sequence[am.Recording], rules: Sequence[Rule], outliers: Sequence[Sequence[Outlier]]
+) -> list[am.Recording]:
     """The recordings reduced to the selected rows, with a note on what was left out; without those that are empty.
 
-    Raises FieldError if no row is left.
+    The rows of the rules and of the outliers of each recording are those of the file. Raises FieldError if no row is
+    left.
     """
     kept = []
-    for recording in recordings:
-        used = used_rows(recording, rules)
+    for complete, found in zip(recordings, outliers, strict=True):
+        recording = leave_out(complete, found)
+        used = used_rows(complete, rules)[kept_rows(complete, found)]
         count = int(np.count_nonzero(~used))
         note = f"{recording.origin}: {count} of {len(recording)} rows are left out, as specified by the user."
         if used.all():

@@ -15,13 +15,19 @@ import airmuscle as am
 from ..core.errors import AirmuscleError, InputError
 from ..core.units import quantity
 from ..library.files import list_laws
+from ..recording.missing_values import parse_code
 
 MAX_RULES = 200
 """Maximum number of selections of rows (chosen)."""
 MAX_CHOICES = 500
 """Maximum number of corrected columns, or of files with facts of their own (chosen)."""
-TEXTS = ("resting_length", "ambient", "file_name", "decimal", "delimiter", "sheet", "group", "time")
+TEXTS = (
+    "resting_length", "ambient", "displacement_zero", "file_name", "decimal", "delimiter", "sheet", "group", "time",
+    "skip_rows", "missing", "missing_codes", "outliers",
+)  # fmt: skip
 """Fields with a text that applies to all files."""
+CONSTANTS = {"resting_length": "300 mm", "ambient": "98 kPa", "displacement_zero": "12 mm"}
+"""Those that are constants of the runs, with an example."""
 FILE_FACTS = ("resting_length", "length", "specimen")
 """Facts that may be stated for one file."""
 COLUMN_CHOICES = (*am.recording.QUANTITIES, "resting_length", "ambient")
@@ -35,7 +41,7 @@ SPLITS: Mapping[str, am.identify.GroupSplit | None] = {
     "block": am.identify.BlockSplit(),
 }
 """Groups that are left out in turn; by default those that the data allow."""
-_UNITS = {"resting_length": "m", "ambient": "Pa", "length": "m"}
+_UNITS = {"resting_length": "m", "ambient": "Pa", "displacement_zero": "m", "length": "m"}
 
 
 class FieldError(InputError):
@@ -80,13 +86,17 @@ class FitSettings:
 
     def mapping(self, columns: Mapping[str, str] | None = None) -> am.recording.ColumnMapping:
         """The interpretation of all files, with these columns in place of all. Raises FieldError."""
-        texts = {name: text for name, text in self.texts.items() if text}
-        constants: dict[str, float | str] = {
-            name: texts.pop(name) for name in ("resting_length", "ambient") if name in texts
-        }
+        texts: dict[str, Any] = {name: text for name, text in self.texts.items() if text}
+        constants = {name: texts.pop(name) for name in CONSTANTS if name in texts}
+        codes = texts.pop("missing_codes", "").replace(";", ",").split(",")
+        if "skip_rows" in texts:
+            texts["skip_rows"] = _line_count(texts["skip_rows"])
         try:
             chosen = self.columns if columns is None else columns
-            mapping = am.recording.ColumnMapping().with_overrides(columns=chosen, constants=constants, **texts)
+            mapping = am.recording.ColumnMapping().with_overrides(
+                columns=chosen, constants=constants,
+                missing_codes=tuple(parse_code(each) for each in codes if each.strip()), **texts,
+            )  # fmt: skip
             _ = mapping.text_format  # checks delimiter and decimal mark
             return mapping
         except AirmuscleError as error:
@@ -114,13 +124,13 @@ def read_settings(data: Any) -> FitSettings:
 
 
 def _check(settings: FitSettings) -> None:
-    for name in ("resting_length", "ambient"):
+    for name in CONSTANTS:
         if settings.texts[name]:
-            _check_positive(settings.texts[name], name, name)
+            _check_quantity(settings.texts[name], name, name)
     for file, facts in settings.facts.items():
         for name in ("resting_length", "length"):
             if facts.get(name):
-                _check_positive(facts[name], name, f"file:{file}")
+                _check_quantity(facts[name], name, f"file:{file}")
     if settings.entry and settings.entry not in list_laws():
         raise FieldError(f"the library has no muscle or law '{settings.entry}'.", "entry")
     if settings.leave_out not in SPLITS:
@@ -130,15 +140,25 @@ def _check(settings: FitSettings) -> None:
     settings.mapping()
 
 
-def _check_positive(text: str, name: str, field: str) -> None:
+def _check_quantity(text: str, name: str, field: str) -> None:
     words = name.replace("_", " ")
-    example = "98 kPa" if name == "ambient" else "300 mm"
+    example = CONSTANTS.get(name, "300 mm")
     try:
         value = quantity(text, _UNITS[name], ambient=0.0, where=words)
     except AirmuscleError as error:
         raise FieldError(f"{error.message} Write a number with its unit, such as {example}.", field) from None
-    if not (math.isfinite(value) and value > 0):
-        raise FieldError(f"{words} is {text}; it must be positive, such as {example}.", field)
+    signed = name == "displacement_zero"
+    if not (math.isfinite(value) and (signed or value > 0)):
+        allowed = "finite" if signed else "positive"
+        raise FieldError(f"{words} is {text}; it must be {allowed}, such as {example}.", field)
+
+
+def _line_count(text: str) -> int:
+    if not (text.isdecimal() and len(text) < 8):
+        raise FieldError(
+            f"lines above the headings is {text}; it must be a whole number from 0, such as 7.", "skip_rows"
+        )
+    return int(text)
 
 
 def _text(value: Any, field: str, longest: int = 200) -> str:

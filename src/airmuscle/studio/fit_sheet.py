@@ -15,6 +15,7 @@ from ..core.errors import AirmuscleError
 from ..recording.constants import CONSTANT_QUANTITIES
 from ..recording.display_units import display_scale
 from ..recording.segment import Inspection, Run, inspect_all
+from ..recording.segment.outliers import Outlier, kept_rows
 from .fit_hints import in_page_words
 from .fit_reading import ReadSet, read_set
 from .fit_selection import used_rows
@@ -24,7 +25,7 @@ from .fit_uploads import FILES
 MAX_POINTS = 9000
 """Maximum number of points of the chart; of more rows every n-th one is shown (chosen)."""
 MAX_LISTED = 60
-"""Maximum number of runs, outliers or findings of a recording that are listed (chosen)."""
+"""Maximum number of runs or findings of a recording that are listed (chosen)."""
 DIGITS = 7
 """Significant digits of a point of the chart (chosen)."""
 SHOWN = ("time", "pressure", "contraction", "length", "force")
@@ -41,10 +42,10 @@ def sheet_of_files(folder: str, settings: FitSettings) -> dict[str, Any]:
     except AirmuscleError as error:
         read.complain(error, "files")
     step = max(1, math.ceil(sum(map(len, read.recordings)) / MAX_POINTS))
-    rows = zip(read.recordings, read.files, inspections, used, strict=True)
+    rows = zip(read.recordings, read.files, inspections, used, read.outliers, strict=True)
     return {
         "files": [{"name": name, "columns": [_column(each) for each in read.columns.get(name, [])]} for name in names],
-        "recordings": [_recording(recording, file, each, rule, step) for recording, file, each, rule in rows],
+        "recordings": [_recording(*row, step) for row in rows],
         "problems": [{"field": each.field, "text": str(each.message)} for each in read.problems],
         "remarks": read.remarks,
         "step": step,
@@ -55,9 +56,9 @@ def sheet_of_files(folder: str, settings: FitSettings) -> dict[str, Any]:
 def _selected_rows(read: ReadSet, rules: Sequence[Rule]) -> list[Any]:
     """The used rows of each recording; all where a rule is not possible, which becomes a problem."""
     used = []
-    for recording in read.recordings:
+    for recording, outliers in zip(read.recordings, read.outliers, strict=True):
         try:
-            used.append(used_rows(recording, rules))
+            used.append(used_rows(recording, rules, outliers))
         except FieldError as error:
             read.complain(error)
             used.append(np.ones(len(recording), dtype=bool))
@@ -75,7 +76,7 @@ def _column(column: Any) -> dict[str, Any]:
 
 
 def _recording(
-    recording: am.Recording, file: str, inspection: Inspection | None, used: Any, step: int
+    recording: am.Recording, file: str, inspection: Inspection | None, used: Any, outliers: Sequence[Outlier], step: int
 ) -> dict[str, Any]:
     columns = [name for name in SHOWN if name in recording]
     return {
@@ -87,6 +88,7 @@ def _recording(
         "notes": [in_page_words(note) for note in recording.notes],
         "ranges": {name: _range(name, recording) for name in recording if len(recording)},
         **({} if inspection is None else _inspected(inspection)),
+        "left_out": [int(row) for row in np.flatnonzero(~kept_rows(recording, outliers)) if row % step == 0],
         "points": {name: _rounded(recording[name][::step]) for name in columns},
     }
 
@@ -98,8 +100,7 @@ def _inspected(inspection: Inspection) -> dict[str, Any]:
         "run_count": len(inspection.runs),
         "branches": len(inspection.branches),
         "sampling": None if sampling is None else {"rate": sampling.rate, "duration": sampling.duration},
-        "outliers": [{"column": each.column, "row": each.row} for each in inspection.outliers[:MAX_LISTED]],
-        "outlier_count": len(inspection.outliers),
+        "outliers": len({each.row for each in inspection.outliers}),
         "findings": [
             {"text": in_page_words(each.text), "serious": each.serious} for each in inspection.findings[:MAX_LISTED]
         ],

@@ -91,7 +91,7 @@ def _recordings(folder: Path, settings: FitSettings) -> tuple[list[am.Recording]
         raise read.problems[0]
     if not read.recordings:
         raise FieldError("there is no file; drop a measurement file first.", "files")
-    recordings = selected(read.recordings, settings.rules)
+    recordings = selected(read.recordings, settings.rules, read.outliers)
     try:
         check_contents(recordings)
     except AirmuscleError as error:

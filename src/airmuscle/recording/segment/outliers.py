@@ -11,6 +11,7 @@ import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from ...core.arrays import Array
 from ..display_units import display_scale
@@ -65,18 +66,31 @@ def find_outliers(recording: Recording, sensors: Mapping[str, Sensor] | None = N
 
 def without_outliers(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
     """The recordings of one test rig without the rows of suspected outliers; a note on each recording lists them."""
+    found = find_bench_outliers(recordings)
+    return tuple(leave_out(recording, outliers) for recording, outliers in zip(recordings, found, strict=True))
+
+
+def find_bench_outliers(recordings: Sequence[Recording]) -> tuple[tuple[Outlier, ...], ...]:
+    """The suspected outliers of each recording of one test rig, whose files share the noise of the sensors."""
     sensors = estimate_sensors(recordings) if recordings else {}
-    return tuple(_without(recording, find_outliers(recording, sensors)) for recording in recordings)
+    return tuple(find_outliers(recording, sensors) for recording in recordings)
 
 
-def _without(recording: Recording, outliers: Sequence[Outlier]) -> Recording:
+def kept_rows(recording: Recording, outliers: Sequence[Outlier]) -> npt.NDArray[np.bool_]:
+    """The rows that contain none of the outliers, shape (N,)."""
+    kept = np.ones(len(recording), dtype=bool)
+    kept[[outlier.row for outlier in outliers]] = False
+    return kept
+
+
+def leave_out(recording: Recording, outliers: Sequence[Outlier]) -> Recording:
+    """The recording without the rows of these outliers, which a note lists."""
     if "time" not in recording:
         note = f"{recording.origin}: without time, rows are no neighbours, and no outlier is left out."
         return dataclasses.replace(recording, notes=(*recording.notes, RowNote(note)))
     if not outliers:
         return recording
-    kept = np.ones(len(recording), dtype=bool)
-    kept[[outlier.row for outlier in outliers]] = False
+    kept = kept_rows(recording, outliers)
     count = int(np.count_nonzero(~kept))
     more = f"; and {len(outliers) - MAX_LISTED} more" if len(outliers) > MAX_LISTED else ""
     note = (

@@ -11,7 +11,7 @@
 
   /* Whether a shown row is used: the rules of the server, for the points of the chart. */
   function isUsed(rules, recording, k, row) {
-    return rules.every((rule) => (rule.recordings.length && !rule.recordings.includes(recording.origin)) || isInside(rule, recording, k, row) === rule.keep);
+    return !recording.left_out.includes(row) && rules.every((rule) => (rule.recordings.length && !rule.recordings.includes(recording.origin)) || isInside(rule, recording, k, row) === rule.keep);
   }
 
   function ruleText(rule) {
@@ -172,10 +172,8 @@
       const open = this.runs.open, total = this.sheet.recordings.reduce((n, r) => n + (r.run_count ?? 0), 0);
       this.runs.replaceChildren(element("summary", {}, `Runs (${total})`), element("div.scroll", {}, element("table", {}, element("thead", {}, element("tr", {}, ...["Use", "Recording", "Run", "Rows"].map((t) => element("th", { scope: "col" }, t)))), element("tbody", {}, ...rows))));
       this.runs.open = open;
-      const found = this.sheet.recordings.flatMap((r) => (r.outliers ?? []).map((o) => [r.origin, o.row]));
-      const fresh = found.filter(([origin, row]) => !this.rules.some((r) => r.rows && r.rows[0] === row && r.recordings[0] === origin));
-      this.outliers.replaceChildren(...(fresh.length ? [element("span", {}, `${fresh.length} suspected outlier${fresh.length > 1 ? "s" : ""}: readings that contradict their neighbours in time.`),
-        element("button", { type: "button", onclick: () => { this.rules.push(...fresh.slice(0, 200 - this.rules.length).map(([origin, row]) => ({ recordings: [origin], rows: [row, row + 1], keep: false }))); this.ruled(); } }, "Leave them out")] : []));
+      const count = this.sheet.recordings.reduce((n, r) => n + (r.outliers ?? 0), 0);
+      this.outliers.textContent = count ? `${count} row${count > 1 ? "s" : ""} with suspected outliers: readings that contradict their neighbours in time.` : "";
     }
   }
 

@@ -3,7 +3,7 @@
 
 (() => {
   const { element, shortText } = airmuscle;
-  const QUANTITIES = ["time", "pressure", "contraction", "length", "force", "position", "branch", "volume", "temperature", "speed", "angle", "resting_length", "ambient"];
+  const QUANTITIES = ["time", "pressure", "contraction", "length", "shortening", "elongation", "force", "position", "branch", "volume", "temperature", "speed", "angle", "resting_length", "ambient"];
   const SPECIAL = { resting_length: "resting length (constant)", ambient: "ambient pressure (constant)" };
 
   const problemOf = (texts) => (texts?.length ? element("p.message.error", {}, texts.join(" ")) : null);

@@ -4,7 +4,8 @@
 (() => {
   const { element, source, fitSource, say, problemOf } = airmuscle;
   const PAUSE = 800;
-  const TEXTS = ["resting_length", "file_name", "ambient", "decimal", "delimiter", "time", "sheet", "group"];
+  const TEXTS = ["resting_length", "file_name", "ambient", "displacement_zero", "decimal", "delimiter", "time", "sheet", "group", "skip_rows", "missing", "missing_codes", "outliers"];
+  const SHOWN = ["resting_length", "outliers"];
   const SPLITS = [["", "automatic"], ["run", "one run at a time"], ["specimen", "one specimen at a time"], ["contraction", "one level of contraction"], ["pressure", "one level of pressure"], ["block", "blocks within each run"]];
   const empty = () => ({ columns: {}, files: {}, rules: [], entry: "", leave_out: "", hysteresis: false, ...Object.fromEntries(TEXTS.map((name) => [name, ""])) });
 
@@ -46,11 +47,15 @@
       this.bar = element("progress", { max: 1, value: 0, hidden: true, "aria-label": "Progress of the fit" });
       this.progressText = element("p.small", { role: "status" });
       const laws = [["", "none"], ...library.laws.map((law) => [law.name, `${law.name} – ${law.title}`])];
-      this.dataCard = card("Measured rows", hosts.data);
+      this.dataCard = card("Measured rows", this.choice("outliers", "Suspected outliers", [["", "keep"], ["drop", "leave out"]]), hosts.data);
       this.columnsCard = card("Columns", element("p.small.soft", {}, "What each column was read as. Correct the quantity or the unit where it is wrong."), hosts.columns);
       this.resultHost = element("div.stack");
       this.further = element("details", {}, element("summary", {}, "More on the files"),
         this.text("file_name", "Values in file names", { placeholder: "cut{specimen}_held{length [mm]}mm" }), this.text("ambient", "Ambient pressure (for absolute pressures)", { placeholder: "98 kPa" }),
+        this.text("displacement_zero", "Displacement at the resting length", { placeholder: "0 mm" }),
+        this.choice("missing", "Missing values", [["", "are an error"], ["drop", "leave out the rows"], ["interpolate", "interpolate short gaps"]]),
+        this.text("missing_codes", "Codes of missing values", { placeholder: "-999, OL" }),
+        this.text("skip_rows", "Lines above the headings", { placeholder: "detected", inputmode: "numeric" }),
         this.choice("time", "Time base", [["", "as recorded"], ["uniform", "uniform, for rounded stamps"], ["unordered", "unordered"], ["none", "none"]]),
         this.choice("decimal", "Decimal mark of text files", [["", "detected"], [",", "comma"], [".", "point"]]), this.choice("delimiter", "Column delimiter of text files", [["", "detected"], [";", "semicolon"], [",", "comma"], ["\t", "tab"], [" ", "blank"]]),
         this.text("sheet", "Worksheet of Excel files"), this.text("group", "Group or struct of TDMS, MDF, HDF5 and MAT files"));
@@ -86,7 +91,7 @@
       Object.assign(this, { set: state.set, task: typeof state.task === "string" ? state.task : "", names: [] });
       for (const name of [...TEXTS, "entry", "leave_out"]) this.fields[name].value = this.settings[name];
       this.fields.hysteresis.checked = this.settings.hysteresis;
-      this.further.open = TEXTS.some((name) => name !== "resting_length" && this.settings[name]);
+      this.further.open = TEXTS.some((name) => !SHOWN.includes(name) && this.settings[name]);
       this.data.rules = this.settings.rules;
     }
 
