@@ -23,16 +23,31 @@ from airmuscle import load_data
 from airmuscle.cli.app import app
 from airmuscle.cli.fit_options import parse_split
 from airmuscle.errors import IdentificationError, ParameterError
-from airmuscle.identify import BlockSplit, Candidate, LevelSplit, RunSplit, SpecimenSplit, compare, standard_candidates
+from airmuscle.identify import (
+    BlockSplit,
+    Candidate,
+    LevelSplit,
+    RunSplit,
+    SpecimenSplit,
+    compare,
+    select_for_both,
+    standard_candidates,
+)
 from airmuscle.identify.candidate_scores import FoldScore
 from airmuscle.identify.candidates import blank_surface
 from airmuscle.identify.cross_validation import ALWAYS_FITTED, default_split
 from airmuscle.identify.force_evaluation import evaluate_force
 from airmuscle.identify.recommendation import excess_error, recommend
-from airmuscle.muscle.characteristic import ContractileSurface, Hunt2017, InverseLength, TonduLopez2000
+from airmuscle.muscle.characteristic import (
+    ContractileSurface,
+    Hunt2017,
+    InverseLength,
+    LogarithmicLength,
+    TonduLopez2000,
+)
 from airmuscle.muscle.geometry import Braid
 from airmuscle.recording import Recording, write_csv
-from airmuscle.report.compare_chapter import compare_chapter
+from airmuscle.report.compare_chapter import compare_chapter, compare_chapters
 
 TRUTH = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.2)
 START = TonduLopez2000(Braid(0.012, 0.4, 0.3), 1.0)
@@ -130,6 +145,20 @@ def test_the_figure_of_the_folds_is_sorted_by_level_and_names_the_quantity_once(
     assert axes.get_xlabel() == "contraction"
     errors = {score.fold: score.rmse for score in comparison.ranking[0].fold_scores}
     assert axes.lines[0].get_ydata().tolist() == [errors[f"contraction {label}"] for label in labels]
+
+
+def test_the_figures_of_the_recommended_fit_are_in_one_of_two_chapters():
+    def run(length: float, held: float) -> Recording:
+        pressure = np.linspace(1e5, 6e5, 12)
+        force = pressure * (1.5e-3 + 2e-4 * np.log(length)) * (1 - held / 0.3) ** 1.5 + np.cos(pressure)
+        columns = {"pressure": pressure, "contraction": np.full(12, held), "force": force}
+        return Recording(columns, f"{length}, {held}", {"resting_length": length})
+
+    law = LogarithmicLength(ContractileSurface.blank(2), ContractileSurface.blank(1), 0.2, 0.2)
+    runs = [run(length, held) for length in (0.1, 0.2, 0.3) for held in (0.0, 0.06, 0.12, 0.18)]
+    joint = select_for_both(runs, [Candidate("one", law)])
+    names = [[p.name for p in c.plots] for c in compare_chapters(joint.comparisons, joint.recommended[0], str(joint))]
+    assert names == [["run-left-out", "run-residuals", "run-correlations"], ["specimen-left-out"]]
 
 
 def test_aicc_is_hurvich_and_tsais():

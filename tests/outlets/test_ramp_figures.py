@@ -1,7 +1,7 @@
 """Figures of a fit to isometric ramps: force over pressure by contraction and length, and titles of any length.
 
 The pressures of isobars are round where the pressure was swept. The names of many files are abridged in figures, in the
-muscle file and in the report.
+muscle file and in the report. Many markers are an image in SVG files, whose size they would multiply.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from airmuscle import load
 from airmuscle.cli.app import app
-from airmuscle.core.plotting import save
+from airmuscle.core.plotting import MAX_VECTOR_MARKERS, new_figure, rendered, save
 from airmuscle.identify import Fit, fit
 from airmuscle.library import Entry
 from airmuscle.library.fitted_entry import list_files
@@ -147,3 +147,13 @@ def test_the_muscle_file_of_many_recordings_has_a_short_title_and_note(tmp_path:
     assert "12 files" in muscle["title"]
     assert muscle["note"].count(".csv") == 2
     assert load(tmp_path / "fit" / "muscle.toml").title == muscle["title"]
+
+
+@pytest.mark.parametrize(("count", "image"), [(MAX_VECTOR_MARKERS // 10, False), (MAX_VECTOR_MARKERS + 1, True)])
+def test_many_markers_are_an_image_and_few_are_vectors(count, image):
+    figure, axes = new_figure()
+    axes.plot(np.arange(count), np.arange(count) % 7, "o")
+    axes.plot([0, 1], [0, 1])
+    svg = rendered(figure, ("svg",))["svg"]
+    assert (b"<image" in svg) is image
+    assert (svg.count(b"<use") > count) is not image

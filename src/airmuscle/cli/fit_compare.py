@@ -19,7 +19,7 @@ from ..library.fitted_entry import fitted_entry, left_out_ratio, missing_geometr
 from ..library.initial_law import InitialLaw, find_initial_law, resting_lengths
 from ..muscle.geometry import Geometry
 from ..recording import Recording
-from ..report.compare_chapter import compare_chapter
+from ..report.compare_chapter import compare_chapters
 from .fit_geometry import check_one_length, with_braid
 from .fit_options import FitRequest, robust_loss
 from .fit_output import fit_to_dict, print_results, write_results
@@ -50,7 +50,7 @@ def compare_models(
     errors = ranked_specimen_errors(best, selection.comparisons, recordings)
     entry = fitted_entry(best.fit, initial, files, left_out_ratio(best), recordings, errors)
     notes += [*odd_specimen_notes(errors), *missing_geometry(entry)]
-    chapters = [compare_chapter(each, best, selection.reason) for each in selection.comparisons]
+    chapters = compare_chapters(selection.comparisons, best, selection.reason)
     write_results(best.fit, entry, recordings, request.out, [*chapters, *extras.chapters()])
     if request.json:
         print_json(_selection_to_dict(selection) | {"notes": notes} | extras.to_dict())

@@ -18,6 +18,9 @@ DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)
 """Line styles in the order of the curves, which remain distinguishable in greyscale print."""
 MARKERS = ("o", "s", "^", "D", "v", "x", "+")
 """Markers in the order of the curves."""
+MAX_VECTOR_MARKERS = 2000
+"""Number of markers in a figure above which they are an image in SVG files (chosen): as vectors they take most of the
+time of a report, and a browser draws them slowly."""
 
 _STYLE: Any = {
     "font.size": 9, "axes.titlesize": 9, "axes.labelsize": 9, "legend.fontsize": 8, "xtick.labelsize": 8,
@@ -62,6 +65,7 @@ def rendered(
 
     relabel_in_display_units(figure.axes)
     _apply_text_style(figure)
+    _rasterise_markers(figure)
     files = {}
     layout = figure.get_layout_engine()
     with mpl.rc_context(_STYLE):
@@ -89,6 +93,14 @@ def _apply_text_style(figure: Any) -> None:
             text.set_fontsize(_STYLE["legend.fontsize"])
     for axes in figure.axes:
         axes.title.set_fontsize(_STYLE["axes.titlesize"])
+
+
+def _rasterise_markers(figure: Any) -> None:
+    """Draw the lines that consist of markers only as images where the figure has many of them."""
+    lines = [line for axes in figure.axes for line in axes.lines if line.get_linestyle() in ("None", "none", "", " ")]
+    if sum(len(line.get_xdata(orig=False)) for line in lines) > MAX_VECTOR_MARKERS:
+        for line in lines:
+            line.set_rasterized(True)
 
 
 def legend_outside(axes: Any, **options: Any) -> Any:

@@ -40,7 +40,9 @@ def solve_censored_least_squares(problem: FitProblem, jacobian: Array, constant:
 
     weights, x = np.ones(len(target)), np.zeros(len(norms))
     for iteration in range(_MAX_ITERATIONS):
-        step = np.linalg.lstsq(weights[:, None] * matrix, weights * target, rcond=_RCOND)[0] - x
+        counted = slice(None) if weights.all() else weights > 0
+        rows, right = weights[counted, None] * matrix[counted], weights[counted] * target[counted]
+        step = np.linalg.lstsq(rows, right, rcond=_RCOND)[0] - x
         if iteration:
             current = sum_of_squares(x)
             step = next((t * step for t in 0.5 ** np.arange(30) if sum_of_squares(x + t * step) <= current), 0.0 * step)

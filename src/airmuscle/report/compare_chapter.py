@@ -21,7 +21,14 @@ _MAX_LABELS = 24
 _MAX_CURVES = 6
 
 
-def compare_chapter(comparison: Comparison, recommended: RankedModel | None = None, reason: str = "") -> Chapter:
+def compare_chapters(comparisons: Sequence[Comparison], recommended: RankedModel, reason: str) -> list[Chapter]:
+    """Return a chapter for each purpose; the figures of the fit of the recommended law are in the first."""
+    return [compare_chapter(each, recommended, reason, figures_of_fit=each is comparisons[0]) for each in comparisons]
+
+
+def compare_chapter(
+    comparison: Comparison, recommended: RankedModel | None = None, reason: str = "", *, figures_of_fit: bool = True
+) -> Chapter:
     """Return the chapter of a comparison: ranking, exclusions, errors by fold, figures of the recommended fit.
 
     `recommended` is the law that was selected for several purposes, for the given reason.
@@ -39,11 +46,17 @@ def compare_chapter(comparison: Comparison, recommended: RankedModel | None = No
         tables=tuple(table for table in tables if table is not None),
         plots=(
             Plot("left-out", "Cross-validation error of the laws on each fold.", _fold_figure(comparison)),
-            Plot("residuals", "Residuals of the recommended law over each variable.", residual_figure(fit)),
-            Plot("correlations", "Correlations of the parameters of the recommended law.", correlation_figure(fit)),
+            *(_plots_of_fit(fit) if figures_of_fit else ()),
         ),
     )
     return _of_one_purpose(chapter, comparison) if joint else chapter
+
+
+def _plots_of_fit(fit: Fit) -> tuple[Plot, ...]:
+    return (
+        Plot("residuals", "Residuals of the recommended law over each variable.", residual_figure(fit)),
+        Plot("correlations", "Correlations of the parameters of the recommended law.", correlation_figure(fit)),
+    )
 
 
 def _of_one_purpose(chapter: Chapter, comparison: Comparison) -> Chapter:

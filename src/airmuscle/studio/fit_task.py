@@ -29,7 +29,7 @@ from ..library.fitted_entry import fitted_entry, left_out_ratio, missing_geometr
 from ..library.initial_law import find_initial_law
 from ..library.write import part_toml
 from ..recording.segment import check_contents, motion_direction
-from ..report.compare_chapter import compare_chapter
+from ..report.compare_chapter import compare_chapters
 from ..report.fit_files import write_fit
 from ..report.hysteresis_chapter import hysteresis_chapters
 from ..report.write import as_json, write_into
@@ -72,7 +72,7 @@ def run_fit(folder: str, out: str, settings: FitSettings, report: Report) -> Non
     initial = Entry(best.candidate.name, best.candidate.name, "chosen", best.candidate.law, geometry)
     errors = ranked_specimen_errors(best, selection.comparisons, recordings)
     entry = fitted_entry(best.fit, initial, names, left_out_ratio(best), recordings, errors)
-    chapters = [compare_chapter(each, best, selection.reason) for each in selection.comparisons]
+    chapters = compare_chapters(selection.comparisons, best, selection.reason)
     with atomic_folder(out) as staging, warnings.catch_warnings():
         warnings.simplefilter("ignore", AirmuscleWarning)
         sheet = {**result_sheet(selection, best.fit), "rows": sum(map(len, recordings))}
