@@ -14,7 +14,7 @@ import pytest
 from joints import chosen_muscle
 
 from airmuscle.core import tree
-from airmuscle.errors import AirmuscleWarning, TraceError
+from airmuscle.errors import AirmuscleWarning, ParameterError, TraceError
 from airmuscle.library import list_laws, load
 from airmuscle.mechanism import HangingMass, HuntCrossley
 from airmuscle.muscle import CreepElements, EndStop, SeriesSpring, ViscoelasticWall
@@ -99,6 +99,23 @@ def test_a_gradient_by_every_parameter_is_the_difference_quotient():
         quotient = (inflow(leaves + step) - inflow(leaves - step)) / (2e-6 * leaves[i])
         assert gradient[i] == pytest.approx(float(quotient), rel=1e-6), path
         assert gradient[i] != 0.0
+
+
+def test_single_precision_is_refused_by_equations():
+    """Rates of a plant near rest were wrong by up to 63 %."""
+    plant = plant_of_everything(EnergyBalance(1.0))
+    state = find_equilibrium(plant, pressure=2e5)
+    message = r"JAX array of the type float32; it must be float64.*jax_enable_x64"
+    with pytest.raises(ParameterError, match=message):
+        jax.jit(plant.rates)({name: jnp.float32(value) for name, value in state.items()}, INPUTS)
+    jax.config.update("jax_enable_x64", False)
+    try:
+        with pytest.raises(ParameterError, match=message):
+            plant.outputs(as_jax(state), INPUTS)
+        with pytest.raises(ParameterError, match=message):
+            jax.jit(load("dmsp-20-300").muscle.contractile.force)(2e5, 0.1)
+    finally:
+        jax.config.update("jax_enable_x64", True)
 
 
 @pytest.mark.parametrize("direction", ["contraction", "pressure", "force"])

@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from .errors import ParameterError
+
 Value = Any
 """A float, a NumPy array, a CasADi symbol or a JAX array."""
 
@@ -41,9 +43,21 @@ def _library(*operands: Value) -> ModuleType | None:
         if root == "casadi":
             return sys.modules["casadi"]
         if root in ("jax", "jaxlib"):
+            _check_double(operand)
             return sys.modules["jax.numpy"]
         library = np
     return library
+
+
+def _check_double(array: Any) -> None:
+    """Raise ParameterError for a JAX array in single or half precision."""
+    dtype = np.dtype(array.dtype)
+    if dtype.kind not in "biuf" or (dtype.kind == "f" and dtype.itemsize < 8):
+        raise ParameterError(
+            f"an equation received a JAX array of the type {dtype}; it must be float64, because pressures, lengths and "
+            'rates are differences of nearly equal numbers. Write jax.config.update("jax_enable_x64", True) before the '
+            "first array is made, and omit dtype=float32."
+        )
 
 
 def is_symbol(*operands: Value) -> bool:
