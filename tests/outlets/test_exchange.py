@@ -8,7 +8,17 @@ from typer.testing import CliRunner
 
 from airmuscle.cli.app import app
 from airmuscle.errors import ColumnError, FileError, ParameterError
-from airmuscle.recording import Recording, from_pandas, read, read_csv, to_xarray, write, write_csv
+from airmuscle.recording import (
+    Decimation,
+    Recording,
+    from_pandas,
+    large_csv,
+    read,
+    read_csv,
+    to_xarray,
+    write,
+    write_csv,
+)
 
 pd = pytest.importorskip("pandas", reason="needs the package pandas")
 RUN = Recording(
@@ -155,3 +165,29 @@ def test_the_command_converts_one_file_and_several(tmp_path):
     done = airmuscle("convert-data", tmp_path / "run0.csv", tmp_path / "run0.csv")
     assert "run0.csv: is a file to be converted and would be lost" in done.stderr
     assert (tmp_path / "run0.csv").read_bytes() == before
+
+
+# Rows
+
+
+def test_convert_data_keeps_all_rows_unless_fewer_are_asked_for(tmp_path, monkeypatch):
+    """A long file, which `read` reduces: with limits that are a thousandth of the usual ones."""
+    monkeypatch.setattr(large_csv, "LARGE_FILE_BYTES", 20_000)
+    monkeypatch.setitem(read.__kwdefaults__, "downsampling", Decimation(2000))
+    path = tmp_path / "long.csv"
+    rows = "\n".join(f"{k / 1000},{k % 700}" for k in range(6500))
+    path.write_text(f"time [s],pressure [kPa]\n{rows}\n")
+    assert len(read(path)[0]) == 1625
+    done = airmuscle("convert-data", path, tmp_path / "all.csv")
+    assert done.exit_code == 0, done.output
+    assert len(read_csv(tmp_path / "all.csv")) == 6500
+    done = airmuscle("convert-data", path, tmp_path / "few.csv", "--max-rows", 1000)
+    assert "note: The file has 6500 rows; one in 7 is kept as measured, 929 in total" in " ".join(done.output.split())
+    assert len(read_csv(tmp_path / "few.csv")) == 929
+
+
+def test_the_other_commands_say_that_rows_are_left_out(tmp_path, monkeypatch):
+    monkeypatch.setitem(read.__kwdefaults__, "downsampling", Decimation(20))
+    path = tmp_path / "long.csv"
+    path.write_text("time [s],pressure [kPa]\n" + "\n".join(f"{k / 1000},{k % 70}" for k in range(100)))
+    assert "The file has 100 rows; one in 5 is kept" in " ".join(airmuscle("inspect", path).output.split())

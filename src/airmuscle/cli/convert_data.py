@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ..core.errors import FileError
-from ..recording import Recording, read, write
+from ..recording import Decimation, Recording, read, write
 from ..recording.csv_writer import write_csv
 from ..recording.reader import find_files
 from ..recording.writer import EXTENSIONS
@@ -17,19 +17,28 @@ from .options import Json
 from .reading_options import NO_OPTIONS, ReadingOptions, with_reading_options
 from .terminal import echo, print_json
 
+EVERY_ROW = 2**62
+"""A number of rows that no file has."""
+
 Source = Annotated[str, typer.Argument(metavar="FILE", help="A file, folder or glob pattern, as for inspect.")]
 Target = Annotated[Path, typer.Argument(metavar="TARGET", help=f"The file to write: {', '.join(EXTENSIONS)}.")]
+MaxRows = Annotated[
+    int | None,
+    typer.Option("--max-rows", min=1, metavar="N", help="Keep every n-th row, N at most; default: all rows."),
+]
 Plain = Annotated[bool, typer.Option("--plain", help="CSV without comments, as pandas and spreadsheets expect it.")]
 
 
 @with_reading_options
 def convert_data(
-    source: Source, target: Target, plain: Plain = False, reading: ReadingOptions = NO_OPTIONS, json: Json = False
-) -> None:
+    source: Source, target: Target, plain: Plain = False, max_rows: MaxRows = None,
+    reading: ReadingOptions = NO_OPTIONS, json: Json = False,
+) -> None:  # fmt: skip
     """Write measurement files as CSV, Parquet or HDF5.
 
     \b
-    Values are in SI units. One recording becomes TARGET; several become files with a number before the extension.
+    Values are in SI units, and all rows are kept. One recording becomes TARGET; several become files with a number
+    before the extension.
 
     \b
     Examples:
@@ -42,7 +51,8 @@ def convert_data(
         raise typer.BadParameter("--plain belongs to a target that ends in .csv.")
     if target.suffix.lower() not in EXTENSIONS:
         raise FileError(f"{target}: the extension must be one of {', '.join(EXTENSIONS)}.")
-    recordings = read(source, mapping=reading.column_mapping(), units=reading.units)
+    rows = Decimation(max_rows or EVERY_ROW)
+    recordings = read(source, mapping=reading.column_mapping(), units=reading.units, downsampling=rows)
     print_row_notes(recordings)
     paths = [_path(target, i, len(recordings)) for i in range(len(recordings))]
     _check_no_source(paths, source)

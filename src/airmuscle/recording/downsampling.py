@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from ..core.errors import ParameterError
 from ..core.field_types import check_field_types
+from .row_notes import RowNote
 from .table import Cells, RawTable
 
 
@@ -46,7 +47,7 @@ class Decimation(Downsampling):
 
     def note(self, rows: int, step: int) -> str:
         kept = math.ceil(rows / step)
-        return f"The file has {rows} rows; one in {step} is kept as measured, {kept} in total (max_rows)."
+        return RowNote(f"The file has {rows} rows; one in {step} is kept as measured, {kept} in total (max_rows).")
 
 
 class BlockMeans(Downsampling):
@@ -64,7 +65,8 @@ class BlockMeans(Downsampling):
 
     def note(self, rows: int, step: int) -> str:
         kept = math.ceil(rows / step)
-        return f"The file has {rows} rows; each block of {step} is replaced by its mean, {kept} in total (max_rows)."
+        replaced = f"each block of {step} is replaced by its mean, {kept} in total (max_rows)"
+        return RowNote(f"The file has {rows} rows; {replaced}.")
 
 
 def downsample(table: RawTable, downsampling: Downsampling) -> RawTable:
