@@ -61,6 +61,60 @@ def test_a_valve_of_a_slower_topic_switches_between_two_values(tmp_path, kind):
     assert run["valve"].tolist() == [0.0] * 10 + [1.0] * 10 + [0.0]
 
 
+@pytest.fixture
+def standard_messages(tmp_path):
+    """A bag with a vector, a wrench, an inertial sensor, a pose, joints with awkward names, a pressure, a temperature."""
+    rosbag2 = pytest.importorskip("rosbags.rosbag2", reason="needs the package rosbags")
+    typesys = pytest.importorskip("rosbags.typesys", reason="needs the package rosbags")
+    store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+    of = store.types
+    vector, point = of["geometry_msgs/msg/Vector3"](1.0, 2.0, 3.0), of["geometry_msgs/msg/Point"](1.0, 2.0, 3.0)
+    turn, nine = of["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0), np.zeros(9)
+    header = of["std_msgs/msg/Header"](of["builtin_interfaces/msg/Time"](1, 0), "")
+    of_joints = np.array([0.1, 0.2])
+    messages = {
+        "acc": vector,
+        "ft": of["geometry_msgs/msg/Wrench"](vector, vector),
+        "imu": of["sensor_msgs/msg/Imu"](header, turn, nine, vector, nine, vector, nine),
+        "pose": of["geometry_msgs/msg/Pose"](point, turn),
+        "joints": of["sensor_msgs/msg/JointState"](header, ["y", "wrist"], of_joints, of_joints, of_joints),
+        "line": of["sensor_msgs/msg/FluidPressure"](header, 301325.0, 0.0),
+        "air": of["sensor_msgs/msg/Temperature"](header, 20.0, 0.0),
+    }
+    with rosbag2.Writer(tmp_path / "bag", version=9) as writer:
+        for topic, message in messages.items():
+            connection = writer.add_connection(f"/{topic}", message.__msgtype__, typestore=store)
+            for k in range(5):
+                writer.write(connection, 10**9 + k * 10**7, store.serialize_cdr(message, message.__msgtype__))
+    return tmp_path / "bag"
+
+
+def test_fields_of_standard_messages_are_no_quantities(standard_messages):
+    (run,) = read(standard_messages)
+    for name in ("acc.y", "ft.force.y", "ft.torque.y", "imu.linear_acceleration.y", "pose.position.y"):
+        assert run[name].tolist() == [2.0] * 5
+    assert run["joints.effort.y"].tolist() == [0.1] * 5
+    assert run["joints.position.wrist"].tolist() == [0.2] * 5
+    assert run["line.pressure"] == pytest.approx(np.full(5, 2e5))
+    assert run["air.temperature"] == pytest.approx(np.full(5, 293.15))
+
+
+def test_a_note_proposes_the_mapping_of_a_field_with_the_unit_of_its_message(standard_messages):
+    (run,) = read(standard_messages)
+    text = " ".join(run.notes)
+    assert "Column 'ft.force.y' in N is a field of a message" in text
+    assert "[columns] 'joints.effort.y' = 'torque [N m]' maps it" in text
+    (mapped,) = read(standard_messages, columns={"joints.effort.y": "torque", "joints.position.y": "angle [deg]"})
+    assert mapped["torque"].tolist() == [0.1] * 5
+    assert mapped["angle"] == pytest.approx(np.radians(np.full(5, 0.1)))
+
+
+def test_the_command_converts_a_bag_of_standard_messages(standard_messages, tmp_path):
+    done = CliRunner().invoke(app, ["convert-data", str(standard_messages), str(tmp_path / "run.csv")])
+    assert done.exit_code == 0, done.output
+    assert read(tmp_path / "run.csv")[0]["acc.y"].tolist() == [2.0] * 5
+
+
 def test_one_topic_can_be_chosen(bag):
     (run,) = read(bag, group="/arm/joints")
     assert list(run) == ["time", "arm.joints.position.elbow", "arm.joints.position.wrist"]

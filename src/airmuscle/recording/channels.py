@@ -16,12 +16,16 @@ from .table import Cells, RawTable
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Channel:
-    """A channel as stored in a file: `values` (N,), their times (N,) [s] if the file states any, and the unit."""
+    """A channel as stored in a file: `values` (N,), their times (N,) [s] if the file states any, and the unit.
+
+    is_quantity  whether its name may state a quantity
+    """
 
     name: str
     values: Any
     time: Array | None = None
     unit: str = ""
+    is_quantity: bool = True
 
 
 def merge_channels(
@@ -134,7 +138,8 @@ def _make_table(
     units = tuple("s" if np.asarray(c.values).dtype.kind in "Mm" else c.unit for c in channels)  # see `to_cells`
     columns = tuple(to_cells(c.values) for c in channels)
     rows = np.arange(1, len(channels[0].values) + 1)
-    return RawTable(origin, headings, units if any(units) else None, columns, rows, row_label, constants, notes)
+    fields = frozenset(c.name for c in channels if not c.is_quantity)
+    return RawTable(origin, headings, units if any(units) else None, columns, rows, row_label, constants, notes, fields)
 
 
 def to_cells(values: Any) -> Cells:

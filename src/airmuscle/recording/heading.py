@@ -63,6 +63,8 @@ class Heading:
 def find_quantity_name(text: str) -> str | None:
     """The quantity of a name or synonym in upper or lower case (`left.p` gives `left.pressure`); None if unknown."""
     prefix, dot, last = text.strip().rpartition(".")
+    if prefix and last.lower() == "y":
+        return None  # the component of a vector, such as imu.acceleration.y, not a position
     name = _CASE_SENSITIVE.get(last) or _SYNONYMS.get(re.sub(r"[\s-]+", "_", last.strip()).lower())
     return prefix + dot + name if name else None
 

@@ -127,7 +127,7 @@ def _apply_time_base(table: RawTable, columns: dict[str, Array], time_base: Time
 
 def resolve_headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]:
     """The headings with their units, from the user, the unit row or the heading itself, in this order of precedence."""
-    parsed = [parse_heading(text) for text in table.headings]
+    parsed = [Heading(h, h, None, False) if h in table.fields else parse_heading(h) for h in table.headings]
     user_units = {find_quantity_name(key) or key: unit for key, unit in units.items()}
     keys = [key for heading in parsed for key in (heading.name, heading.text)]
     for key in user_units:
@@ -232,9 +232,19 @@ def _keep_unknown_column(table: RawTable, heading: Heading, cells: Cells, column
     if constant:
         return f"Column '{heading.text}' is constant and states the {constant[0]}: {constant[1]:.4g} (SI)."
     columns[heading.text or "unnamed"] = cells
+    if heading.text in table.fields:
+        return _field_note(heading)
     near = difflib.get_close_matches(heading.text.partition(" ")[0].lower(), QUANTITIES, n=1)
     hint = proposal(heading.text) or (f" Did you mean '{near[0]}'?" if near else "")
     return f"Column '{heading.text}' is not a known quantity and is kept without conversion.{hint}"
+
+
+def _field_note(heading: Heading) -> str:
+    """The note on a field of a message, with the mapping that makes it a quantity."""
+    fits = [name for name, quantity in QUANTITIES.items() if quantity.unit == heading.unit]
+    mapped = f"'{heading.text}' = '{fits[0] if fits else 'force'} [{heading.unit if fits else 'N'}]'"
+    unit = f" in {heading.unit}" if heading.unit else ""
+    return f"Column '{heading.text}'{unit} is a field of a message and kept as it is; [columns] {mapped} maps it."
 
 
 def _keep_labels(heading: Heading, cells: list[str], columns: dict[str, Array]) -> str:

@@ -31,6 +31,8 @@ class RawTable:
     row_label: str = "line"
     constants: Mapping[str, float | str] = dataclasses.field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    fields: frozenset[str] = frozenset()
+    """Headings that are names of fields of a message and state no quantity."""
 
     def location(self, row: int) -> str:
         """The location of a row in the file, for messages: `bench.csv, line 41`."""
