@@ -22,6 +22,7 @@ from laboratories import (
     by_hand,
     changed,
     every_other,
+    measured,
     one_file,
     ramps,
     sweeps,
@@ -74,7 +75,23 @@ def test_two_muscles_in_one_file_are_named_with_the_column_that_tells_them_apart
     notes = notes_of(tmp_path, one_file(sweeps(), sweeps(OTHER, seed=90), column="muscle", values=values))
     assert "Rows contradict each other" in notes
     assert "both.csv, row" in notes
-    assert "To state it as the specimen, use columns={'muscle': 'specimen'} of read." in notes
+    assert "To state it as the specimen, use columns={'muscle': 'specimen'} of read. Fit each specimen" in notes
+
+
+def force_map(muscle, shift):
+    """Static points without time on a grid of pressures and contractions; the shift is a fraction of a step of each."""
+    p, c = np.linspace(1e5, 5e5, 5) + shift[0] * 1e5, np.linspace(0.0, 0.2, 11) + shift[1] * 0.02
+    pressure, contraction = (grid.ravel() for grid in np.meshgrid(p, c, indexing="ij"))
+    return {"map": measured(np.arange(55.0), pressure, contraction, np.zeros(55), 7, muscle)}
+
+
+@pytest.mark.parametrize("shift", [(0.5, 0.0), (0.0, 0.5), (0.3, 0.4)], ids=["pressures", "lengths", "both"])
+def test_force_maps_of_two_muscles_without_time_and_without_a_common_point_contradict_each_other(tmp_path, shift):
+    two = one_file(force_map(MUSCLE, (0.0, 0.0)), force_map(OTHER, shift))
+    notes = notes_of(tmp_path / "two", two)
+    assert "Rows contradict each other: apart from a smooth dependence on both quantities" in notes
+    one = one_file(force_map(MUSCLE, (0.0, 0.0)), force_map(MUSCLE, shift))
+    assert notes_of(tmp_path / "one", one) == ""
 
 
 def test_a_column_that_names_the_specimen_divides_the_file(tmp_path):

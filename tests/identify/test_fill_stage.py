@@ -27,6 +27,7 @@ from airmuscle.muscle.geometry import Braid
 from airmuscle.plant import Plant
 from airmuscle.pneumatics import Ambient, ClosedChamber, EnergyBalance, FillDischarge, Polytropic, Supply, Valve
 from airmuscle.recording import Recording
+from airmuscle.report.campaign_stages import stage_result
 from airmuscle.simulation import Rodas4, simulate
 
 BRAID = Braid(0.01, math.radians(25), 0.3)
@@ -182,3 +183,16 @@ def test_what_a_record_does_not_state_is_that_of_the_default():
     assert stated_ambient(Recording({"time": np.zeros(1)}, "x")) == STANDARD
     warm = Recording({"time": np.zeros(1)}, "x", {"ambient_temperature": 300.0})
     assert stated_ambient(warm, Ambient(9e4)) == Ambient(9e4, 300.0)
+
+
+def test_a_partial_discharge_that_is_no_detected_step_is_reported_as_a_misfit():
+    partial = {"fill": ((0.5, 1.0), (3.2, 0.0)), "discharge": ((3.2, 1.0), (3.3, 0.0))}
+    stage = stage_of([record(c, partial, i) for i, c in enumerate(CONTRACTIONS[:2])])
+    assert [len(each.steps) for each in stage.records] == [1, 1]
+    assert "times the noise of the pressure sensor" in stage.misfit
+    assert stage.misfit in stage.verdict
+    assert stage.misfit in stage_result(stage)
+
+
+def test_records_that_the_model_follows_have_no_remark_on_a_misfit():
+    assert stage_of([record(c, BOTH, i) for i, c in enumerate(CONTRACTIONS[:2])]).misfit == ""

@@ -52,8 +52,8 @@ def _row_notes(problem: FitProblem, statistics: FitStatistics, dropped: int) -> 
     if censored:
         notes.append(
             HintedText(
-                f"{censored} rows are censored (at zero force, or at the limit of the force range) and contribute only "
-                "where the law violates their bound.",
+                f"{censored} {'row is' if censored == 1 else 'rows are'} censored (at zero force, or at the limit of "
+                "the force range): counted only where the law violates the bound.",
                 Hint("To treat them as measured values", "censoring", UNCENSORED, constant="UNCENSORED"),
             )
         )

@@ -77,4 +77,5 @@ def _fill_result(stage: FillStage) -> str:
     conductance = getattr(circuit.fill, "conductance", None)
     if conductance is not None:
         text += f"Conductance {conductance:.3g} m3/(s Pa), "
-    return f"{text}volume at zero contraction {1e6 * float(stage.geometry.volume(0.0)):.3g} cm3."
+    volume = f"{text}volume at zero contraction {1e6 * float(stage.geometry.volume(0.0)):.3g} cm3."
+    return f"{volume} {stage.misfit}".rstrip()

@@ -39,6 +39,10 @@ REMEDY = (
     "record a fill from ambient pressure and a discharge through the valve at a held length, at three lengths with the "
     "same valve and supply, at 100 rows per second or more, until the pressure has settled"
 )
+MAX_NOISE_RATIO = 4.0
+"""Ratio of the residual to the noise of the pressure sensor above which the model does not follow a record (chosen)."""
+MIN_MISFIT = 0.01
+"""Minimum residual that is reported, as a fraction of the greatest change of the pressure (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -74,6 +78,24 @@ class FillStage(ShortRepr):
         return command.changes
 
     @property
+    def misfit(self) -> str:
+        """The remark that the model does not follow the pressure of the records, with its cause; empty if it does."""
+        noise = pressure_deviation(self.records)
+        change = max(abs(step.change) for record in self.records for step in record.steps)
+        worst, rms = max(
+            ((record, self.fit.rms("pressure", i)) for i, record in enumerate(self.records)), key=lambda each: each[1]
+        )
+        if rms <= max(MAX_NOISE_RATIO * noise, MIN_MISFIT * change):
+            return ""
+        return (
+            f"The rms residual of {worst.origin}, {rms / 1e3:.3g} kPa, is {rms / noise:.3g} times the noise of the "
+            "pressure sensor: the model does not follow the records, and conductances, heat transfer and volume are "
+            "not to be used. Changes of the pressure by less than half of the range, such as a partial discharge, are "
+            "not detected as steps: cut such rows off, or write each change to a file of its own. Check also that "
+            "the supply pressure was constant and that no tube or leak lies between valve and muscle."
+        )
+
+    @property
     def verdict(self) -> str:
         """Cross-prediction, volume and residuals, as sentences."""
         rms = [self.fit.rms("pressure", i) / 1e3 for i in range(len(self.records))]
@@ -92,7 +114,7 @@ class FillStage(ShortRepr):
             )
         else:
             text += " The volume is that of the given geometry."
-        return " ".join([text, *self.supposed])
+        return " ".join(each for each in (text, self.misfit, *self.supposed) if each)
 
 
 def fit_fill_stage(

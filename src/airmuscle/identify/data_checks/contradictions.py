@@ -44,8 +44,10 @@ def contradiction_notes(matches: Matches) -> list[str]:
     worst = max(contradicting, key=lambda each: abs(each.typical))
     unordered = all(each.is_unordered for each in contradicting)
     who = "rows" if unordered else f"{len(contradicting)} of {len(matches.runs)} pairs of runs"
+    at_one_place = all(each.are_near for each in contradicting)
+    where = "at equal pressure and contraction" if at_one_place else "apart from a smooth dependence on both quantities"
     text = (
-        f"Rows contradict each other: at equal pressure and contraction the forces of {who} differ by {typical:.3g} N "
+        f"Rows contradict each other: {where} the forces of {who} differ by {typical:.3g} N "
         f"(median), which no law can follow. {_example(worst)}"
     )
     return [HintedText(text, *_cause(contradicting, matches), HYSTERESIS if unordered else "")]
@@ -75,7 +77,7 @@ def _cause(contradicting: Sequence[MatchedRuns], matches: Matches) -> list[str |
         return [
             f" Column '{column}' tells the contradicting rows apart: it probably names the specimen.",
             Hint("To state it as the specimen", "columns", {re.sub(r"\s*[\[(].*", "", column): "specimen"}, "read"),
-            "Fit each specimen by itself, or at least three together with --compare.",
+            " Fit each specimen by itself, or at least three together with --compare.",
         ]
     shifts = np.array([each.pressure_shift for each in contradicting])
     if np.mean(np.abs(np.abs(shifts) / AMBIENT_PRESSURE - 1.0) < SHIFT_TOLERANCE) > 0.5:

@@ -30,8 +30,12 @@ MAX_BLOCKS = 80
 """Maximum number of runs of a specimen that are matched (chosen)."""
 NEIGHBOURS = 4
 """Number of nearest rows of one block that are compared, with the row itself (chosen)."""
+SPREAD_NEIGHBOURS = 9
+"""The same of rows of which no two have one place: also those at the next pressures (chosen)."""
 MIN_BRANCH_ROWS = 5
 """Minimum number of rows of a branch (chosen)."""
+MIN_SPREAD_ROWS = 30
+"""Minimum number of rows without time of which no two have one place, and neighbours are compared (chosen)."""
 MIN_FORCE = 0.02
 """Minimum force of a matched row, as a fraction of the maximum (chosen); slack rows agree in any case."""
 MAX_VALUES = 8
@@ -62,6 +66,9 @@ class MatchedRuns:
     pairs: npt.NDArray[np.intp]
     """Indices of the matched rows in both blocks, shape (M, 2)."""
     differences: Array
+    are_near: bool = True
+    """Whether the matched rows are at equal pressure and contraction; otherwise they are neighbouring static points,
+    and the polynomial accounts for their distance."""
 
     @property
     def is_unordered(self) -> bool:
@@ -174,21 +181,44 @@ def _matched_runs(blocks: Sequence[Block], recordings: Sequence[Recording]) -> l
             if len(pairs) >= MIN_MATCHES:
                 both = blocks[i].residuals[pairs[:, 0]] - blocks[j].residuals[pairs[:, 1]]
                 matched.append(MatchedRuns(blocks[i], blocks[j], pairs, both))
-    return matched
+    return matched or list(_spread(blocks))
 
 
 def _unordered(block: Block, points: Array) -> Iterator[MatchedRuns]:
     """The pairs of neighbouring rows of a block without time."""
+    if "time" not in block.recording and len(points) >= NEIGHBOURS:
+        pairs = _neighbours(points, NEIGHBOURS, 1.0)
+        if len(pairs) >= MIN_MATCHES:
+            yield _paired(block, pairs, are_near=True)
+
+
+def _spread(blocks: Sequence[Block]) -> Iterator[MatchedRuns]:
+    """The pairs of neighbouring rows of recordings without time, whatever their runs and their distance."""
+    parts: dict[int, list[Block]] = {}
+    for block in blocks:
+        if "time" not in block.recording:
+            parts.setdefault(id(block.recording), []).append(block)
+    for own in parts.values():
+        joined = [np.concatenate([getattr(block, n) for block in own]) for n in ("rows", "residuals", "slopes")]
+        if len(joined[0]) >= MIN_SPREAD_ROWS:
+            block = Block(own[0].recording, joined[0], 0, (), *joined[1:])
+            points = np.column_stack([block.recording[n][block.rows] for n in ("pressure", "contraction")])
+            spread = points / np.maximum(np.ptp(points, axis=0), 1e-9)
+            yield _paired(block, _neighbours(spread, SPREAD_NEIGHBOURS, np.inf), are_near=False)
+
+
+def _paired(block: Block, pairs: npt.NDArray[np.intp], are_near: bool) -> MatchedRuns:
+    return MatchedRuns(block, block, pairs, block.residuals[pairs[:, 0]] - block.residuals[pairs[:, 1]], are_near)
+
+
+def _neighbours(points: Array, count: int, reach: float) -> npt.NDArray[np.intp]:
+    """Each point (N, 2) with its nearest ones within the reach, without itself; shape (M, 2)."""
     from scipy.spatial import cKDTree
 
-    if "time" in block.recording or len(points) < NEIGHBOURS:
-        return
-    distance, index = cKDTree(points).query(points, NEIGHBOURS, distance_upper_bound=1.0)
+    distance, index = cKDTree(points).query(points, count, distance_upper_bound=reach)
     first, place = np.nonzero(np.isfinite(distance))
-    pairs = np.column_stack([first, index[first, place]])
-    pairs = pairs[pairs[:, 0] != pairs[:, 1]]
-    if len(pairs) >= MIN_MATCHES:
-        yield MatchedRuns(block, block, pairs, block.residuals[pairs[:, 0]] - block.residuals[pairs[:, 1]])
+    pairs: npt.NDArray[np.intp] = np.column_stack([first, index[first, place]])
+    return np.asarray(pairs[pairs[:, 0] != pairs[:, 1]])
 
 
 def _nearest(first: Array, second: Array) -> npt.NDArray[np.intp]:
