@@ -338,3 +338,16 @@ def test_a_fit_of_another_process_states_its_errors_in_the_unit_of_the_force():
     copy = pickle.loads(pickle.dumps(fit))
     assert copy.format_residual(12.5) == fit.format_residual(12.5) == "12.5 N"
     assert copy.summary() == fit.summary()
+
+
+def test_the_text_lists_the_first_laws_and_the_recommended_one():
+    """Laws that are excluded by their errors stand in one line; `ranking` and `excluded` contain all."""
+    comparison = compare(load_data("dmsp-20-300"), leave_out=LevelSplit("contraction"))
+    long = dataclasses.replace(comparison, ranking=comparison.ranking * 3, recommended=comparison.ranking[-1])
+    lines = str(long).splitlines()
+    more = next(i for i, line in enumerate(lines) if line.startswith("and "))
+    assert more - lines.index(next(line for line in lines if line.startswith("law "))) - 1 <= 11
+    assert f"and {len(long.ranking) - 10} more" in lines[more] or f"and {len(long.ranking) - 11} more" in lines[more]
+    (excluded,) = (line for line in lines if line.startswith("excluded, as the error is too large"))
+    named = [each.name for each in comparison.excluded if each.error is not None]
+    assert named and all(name in excluded for name in named)

@@ -8,6 +8,7 @@ starts to pull. Errors at slack rows count in every score, and a law that pulls 
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -28,7 +29,7 @@ from airmuscle.identify import (
 from airmuscle.identify.candidates import blank_surface
 from airmuscle.identify.fit_points import FitPoints
 from airmuscle.identify.model_evidence import batch_sample_size
-from airmuscle.identify.recommendation import excess_error, recommend
+from airmuscle.identify.recommendation import eligible_models, excess_error, recommend
 from airmuscle.identify.slack_rows import Slackness, SlackPull, slack_pull
 from airmuscle.identify.solver import solve
 from airmuscle.identify.specimen_errors import SpecimenErrors, odd_specimen_notes
@@ -227,3 +228,15 @@ def test_with_three_levels_a_law_is_not_recommended_that_the_measured_points_con
     assert found.recommended is curved
     plain = compare(isobars(curve=0.0), candidates, leave_out=LevelSplit("pressure"))
     assert plain.recommended.candidate.name == "straight"
+
+
+def test_a_law_is_not_preferred_because_its_larger_error_permits_more_force_at_slack_rows():
+    """The limit of three rms errors excludes a law only where another law pulls less."""
+    exact, coarse, wild = (
+        SimpleNamespace(slack=SlackPull(9, pulling, limit, greatest))
+        for pulling, limit, greatest in ((1, 26.4, 30.9), (0, 44.0, 43.3), (5, 20.0, 461.0))
+    )
+    assert eligible_models([exact, coarse, wild]) == [exact, coarse]
+    careful = SimpleNamespace(slack=SlackPull(9, 0, 44.0, 20.0))
+    assert eligible_models([exact, coarse, careful]) == [coarse, careful]
+    assert eligible_models([exact, wild]) == [exact, wild]

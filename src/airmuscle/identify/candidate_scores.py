@@ -91,6 +91,8 @@ class ExcludedModel:
     """The complete reason, with what to do."""
     cause: str
     """The cause in one phrase."""
+    error: float | None = None
+    """Error in force [N] at which the cross-validation of a law that cannot be recommended was ended."""
 
     def __str__(self) -> str:
         return f"{self.name}: {self.cause}."
@@ -161,7 +163,7 @@ def _excess_error(name: str, rmse: float, limit: float, where: str) -> ExcludedM
     cause = f"its cross-validation takes long and was not completed: its {error}"
     omitted = "its cross-validation takes long and was not completed. To complete it, give the law as a candidate."
     reason = f"Its {error}; {omitted}"
-    return ExcludedModel(name, reason, cause)
+    return ExcludedModel(name, reason, cause, rmse)
 
 
 def _slack_notes(model: Characteristic, points: ComparedPoints) -> tuple[str, ...]:

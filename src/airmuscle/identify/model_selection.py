@@ -22,6 +22,9 @@ from .recommendation import recommend
 MAX_LIMITED = 0.01
 """Fraction of the rows above which limited residuals are no outliers (chosen)."""
 
+MAX_LISTED = 10
+"""Maximum number of laws in the text of a comparison, besides the recommended one (chosen)."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Comparison(ShortRepr):
@@ -53,12 +56,17 @@ class Comparison(ShortRepr):
     def _left_out(self) -> tuple[tuple[str, tuple[ExcludedModel, ...]], ...]:
         return (("excluded", self.excluded), ("not compared", self.unavailable))
 
+    def _listed(self) -> tuple[RankedModel, ...]:
+        """The first models of the ranking, and the recommended one."""
+        first = self.ranking[:MAX_LISTED]
+        return first if self.recommended in first else (*first, self.recommended)
+
     def __str__(self) -> str:
         title = (
             f"Leave-one-{self.leave_out.group_name}-out cross-validation, rms errors in force; the ranking is for "
             f"{self.purpose}."
         )
-        width = max(40, *(len(m.candidate.name) + 1 for m in self.ranking))
+        width = max(40, *(len(m.candidate.name) + 1 for m in self._listed()))
         slack = any(m.slack.rows for m in self.ranking)
         head = f"{'law':<{width}}{'parameters':>11}{'in sample':>12}{'left out':>12}"
         head += f"{'at slack':>13}" * slack + f"{'AICc excess':>13}"
@@ -66,18 +74,22 @@ class Comparison(ShortRepr):
         rows = [
             f"{m.candidate.name:<{width}}{m.parameter_count:>11}{m.in_sample_rmse:>10.4g} N"
             f"{m.cross_validated_rmse:>10.4g} N" + _at_slack(m) * slack + f"{m.aicc - lowest:>13.1f}"
-            for m in self.ranking
+            for m in self._listed()
         ]
+        more = len(self.ranking) - len(rows)
+        rows += [f"and {more} more, with larger errors; the report and `ranking` contain all."] if more else []
         notes = [f"note: {note}" for note in self.notes]
-        notes += [f"note: {m.candidate.name}: {note}" for m in self.ranking for note in m.notes]
-        excluded = [f"{word}: {e}" for word, models in self._left_out() for e in models]
+        notes += [f"note: {m.candidate.name}: {note}" for m in self._listed() for note in m.notes]
+        excluded = [f"{word}: {e}" for word, models in self._left_out() for e in models if e.error is None]
+        errors = [f"{e.name} ({e.error:.4g} N)" for e in self.excluded if e.error is not None]
+        excluded += [f"excluded, as the error is too large (cross-validation ended early): {', '.join(errors)}."] if errors else []
         remark = [_SLACK_REMARK] if slack else []
         return "\n".join([title, "", head, *rows, *remark, "", self.reason, *notes, *excluded])
 
 
 _SLACK_REMARK = (
-    "at slack: greatest force of the law where the muscle was measured slack and no measured force contradicts it; "
-    "* more than three rms errors and 2 % of the greatest force: not recommended."
+    "at slack: greatest force of the law where the muscle was measured slack.\n"
+    "*: more than three rms errors of the law and 2 % of the greatest force; not recommended if another law pulls less."
 )
 
 

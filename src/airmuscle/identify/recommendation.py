@@ -21,8 +21,11 @@ Inference (2002), section 2.6)."""
 
 
 def eligible_models(ranking: Sequence[RankedModel]) -> list[RankedModel]:
-    """The models that do not pull where a muscle was measured slack, in their order; all of them where each does."""
-    return [model for model in ranking if not model.slack.pulling] or list(ranking)
+    """The models that do not pull where a muscle was measured slack, in their order, and those that pull no more there
+    than any of them does: the limit of a law grows with its error, which must not favour a worse law. All models where
+    each pulls."""
+    least = min((model.slack.greatest for model in ranking if not model.slack.pulling), default=np.inf)
+    return [model for model in ranking if not model.slack.pulling or model.slack.greatest <= least]
 
 
 def recommend(ranking: Sequence[RankedModel], split: GroupSplit) -> tuple[RankedModel, str]:
@@ -69,8 +72,9 @@ def _contradiction(simpler: RankedModel, recommended: RankedModel, best: RankedM
 def _pulling(ranking: Sequence[RankedModel], recommended: RankedModel) -> str:
     """The sentence on laws with a lower error that pull where a muscle is slack; empty without them."""
     if recommended.slack.pulling:
-        return f" Every law pulls where a muscle was measured slack; of this one, {recommended.slack}."
-    better = [m for m in ranking if m.slack.pulling and m.cross_validated_rmse < recommended.cross_validated_rmse]
+        return f" No law pulls less where a muscle was measured slack; of this one, {recommended.slack}."
+    eligible = eligible_models(ranking)
+    better = [m for m in ranking if m not in eligible and m.cross_validated_rmse < recommended.cross_validated_rmse]
     if not better:
         return ""
     more = f" and {len(better) - 1} more" if len(better) > 1 else ""
