@@ -120,6 +120,13 @@ def test_clang_builds_the_loop_as_gcc_does(tmp_path):
     check_loop(*printed.finished([printed.built(tmp_path, compiler="clang")], tmp_path), problem)
 
 
+def test_the_sources_of_a_loop_are_c_plus_plus_too(tmp_path):
+    write_program(CASES["pulses through solenoids"], tmp_path, C99(), name="loop")
+    options = ["-std=c++17", "-Wall", "-Wextra", "-Werror", "-pedantic", "-fsyntax-only"]
+    command = [printed.require("g++"), *options, "-x", "c++", "main.c", "loop.c", "loop_controller.c"]
+    printed.finished(command, tmp_path)
+
+
 @pytest.mark.slow
 def test_the_program_has_no_undefined_behaviour(tmp_path):
     problem = CASES["pulses through solenoids"]

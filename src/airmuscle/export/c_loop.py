@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ..compile.kernel_text import CKernels
 from .c_source import csv_header
 from .c_text import c_array, c_integers, c_number, c_string
 from .exported_loop import ExportedLoop
@@ -14,6 +15,11 @@ from .templates import filled
 
 NOT_COMMANDED = '         : status == NOT_COMMANDED      ? "a measurement or a command is not finite\\n"\n'
 """A further reason for which a control loop ends early."""
+
+APPLY_DRIVERS = """  apply_drivers(driver_kinds, driver_settings, driver_states, driver_states, signals, counts,
+                scratch, begin, nextafter(fabs(end), HUGE_VAL) - fabs(end));
+"""
+"""The lines that pass commands through their drivers."""
 
 
 def loop_main(
@@ -26,12 +32,23 @@ def loop_main(
         "provenance": block_comment(provenance), "file": name, "rows": str(run.times.size),
         "samples": str(loop.samples), "segments": str(loop.others.ends.size),
         "pieces": str(loop.prepared.setpoint_signal.ends.size), "columns": str(len(columns)), "drivers": str(drivers),
-        "capacity": str(loop.capacity), "drivers_source": filled("drivers.c", {}, name) if drivers else "",
-        "apply_drivers": "  apply_drivers(begin);\n" if drivers else "",
+        "capacity": str(loop.capacity), "apply_drivers": APPLY_DRIVERS if drivers else "",
+        "kernels": CKernels(_shapes(f"{name.upper()}_INPUTS")).text("driven_inputs", loop.kernels),
         "valid": filled("valid.c", {}, name), "program": filled("program.c", {"failures": NOT_COMMANDED}, name),
         "constants": _constants(name, system, run, loop, columns),
     }  # fmt: skip
     return filled("loop.c", places, name)
+
+
+def _shapes(inputs: str) -> dict[str, tuple[str, ...]]:
+    """The sizes of the arrays of the printed kernels."""
+    signal, table, common = ("", "CAPACITY"), ("DRIVERS", "4"), ("", inputs)
+    return {
+        "columns": (inputs, "3", "CAPACITY"), "scratch": ("2", "3", "CAPACITY"), "kinds": ("DRIVERS", "2"),
+        **dict.fromkeys(("signal", "result", "events"), signal),
+        **dict.fromkeys(("settings", "states", "later"), table),
+        **dict.fromkeys(("values", "slopes"), common),
+    }  # fmt: skip
 
 
 def _constants(name: str, system: ExportedSystem, run: RunData, loop: ExportedLoop, columns: Sequence[str]) -> str:
@@ -54,8 +71,10 @@ def _constants(name: str, system: ExportedSystem, run: RunData, loop: ExportedLo
         text += c_array(f"static const double {kind}values[{count}][{width} + 1]", signal.values, 1)
         text += c_array(f"static const double {kind}slopes[{count}][{width} + 1]", signal.slopes, 1)
     if len(loop.drivers.kinds):
-        text += c_integers("static const int driver_inputs[DRIVERS]", loop.drivers.kinds[:, 0].tolist())
-        text += c_integers("static const int driver_kinds[DRIVERS]", loop.drivers.kinds[:, 1].tolist())
-        text += c_array("static const double driver_settings[DRIVERS][4]", loop.drivers.settings)
+        text += c_integers(
+            "static int driver_kinds[DRIVERS][2]", [(int(i), int(kind)) for i, kind in loop.drivers.kinds]
+        )
+        text += c_array("static double driver_settings[DRIVERS][4]", loop.drivers.settings)
         text += c_array("static double driver_states[DRIVERS][4]", loop.driver_states)
+        text += "static double scratch[2][3][CAPACITY];\n"
     return text

@@ -75,6 +75,11 @@ class ExportedLoop:
         return [next((k, list(of).index(n)) for k, of in enumerate(groups) if n in of) for n in columns]
 
     @property
+    def kernels(self) -> list[str]:
+        """The kernels of `driven_inputs` that the program calls."""
+        return ["merge_columns", *(["apply_drivers"] if len(self.drivers.kinds) else [])]
+
+    @property
     def driver_states(self) -> Array:
         """The states of the drivers at rest (D, 4)."""
         return self.drivers.kept

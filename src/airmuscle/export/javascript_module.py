@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..compile.kernel_text import JavaScriptKernels
 from ..compile.text.javascript import JavaScriptLanguage
 from ..simulation.integrators import ExplicitRungeKutta, Rodas4
 from .c_source import COEFFICIENTS, csv_header
@@ -17,6 +18,24 @@ from .printed_system import ExportedSystem
 from .provenance import block_comment
 from .run_data import RunData, tableau_arrays
 from .templates import filled
+
+ULP = """/** The distance from a number to the next. */
+function ulp(value) {
+  const bits = new DataView(new ArrayBuffer(8));
+  bits.setFloat64(0, Math.abs(value));
+  bits.setBigInt64(0, bits.getBigInt64(0) + 1n);
+  return bits.getFloat64(0) - Math.abs(value);
+}
+
+"""
+DRIVER_ARRAYS = """  const {kinds, settings} = loop.drivers;
+  const driverStates = loop.drivers.states.map((state) => [...state]);
+  const scratch = [[[], [], []], [[], [], []]];
+"""
+APPLY_DRIVERS = (
+    "      apply_drivers(kinds, settings, driverStates, driverStates, signals, counts, scratch, begin, ulp(end));\n"
+)
+"""The lines that pass commands through their drivers."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -120,17 +139,15 @@ class JavaScriptModule:
         if self.loop is None:
             return filled("simulate.mjs", {}, self.name)
         driven = len(self.loop.drivers.kinds)
-        apply = "for (const driver of drivers) signals[driver.input] = driven(driver, signals[driver.input], begin);"
         places = {
-            "drivers": filled("drivers.mjs", {}, self.name) if driven else "",
-            "apply_drivers": f"      {apply}\n" if driven else "",
-        }
+            "kernels": f"{ULP if driven else ''}{JavaScriptKernels().text('driven_inputs', self.loop.kernels)}",
+            "driver_arrays": DRIVER_ARRAYS if driven else "", "apply_drivers": APPLY_DRIVERS if driven else "",
+        }  # fmt: skip
         return filled("loop.mjs", places, self.name)
 
     def _loop_data(self, loop: ExportedLoop) -> dict[str, Any]:
         """The constants of a control loop."""
         law, signal, table = loop.controller.law, loop.prepared.setpoint_signal, loop.drivers
-        drivers = zip(table.kinds.tolist(), table.settings.tolist(), loop.driver_states.tolist(), strict=True)
         return {
             "sampleTime": loop.sample_time,
             "samples": loop.samples,
@@ -144,10 +161,7 @@ class JavaScriptModule:
             "parameters": [leaf.path for leaf in loop.controller.tunable],
             "parameterDefaults": [float(leaf.value) for leaf in loop.controller.tunable],
             "setpoint": {"ends": signal.ends, "values": signal.values, "slopes": signal.slopes},
-            "drivers": [
-                {"input": i, "kind": kind, "settings": settings, "state": state}
-                for (i, kind), settings, state in drivers
-            ],
+            "drivers": {"kinds": table.kinds, "settings": table.settings, "states": loop.driver_states},
         }
 
     def _method(self) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..compile.kernel_text import MatlabKernels
 from ..compile.text.matlab import DEFINITION, MatlabBody, MatlabLanguage
 from ..core.errors import printable
 from ..simulation.integrators import ExplicitRungeKutta, Rodas4
@@ -24,10 +25,11 @@ _IN_LINE = 6
 LOOP_HELP = """% In addition: controller_parameters, those of the control law; setpoint, with the fields ends, values
 % and slopes.
 """
-DRIVE = """    for j = 1:numel(drivers)
-      i = drivers{j}.input;
-      [signals{i}, drivers{j}] = driven(drivers{j}, signals{i}, start);
-    end
+DRIVER_ARRAYS = """  states = loop.driver_states;
+  scratch = {zeros(3, 0), zeros(3, 0)};
+"""
+APPLY_DRIVERS = """    [states, signals, counts, scratch] = apply_drivers( ...
+      loop.driver_kinds, loop.driver_settings, states, states, signals, counts, scratch, start, eps(finish));
 """
 """The lines that pass commands through their drivers."""
 
@@ -68,8 +70,9 @@ class OctaveFunctions:
             return filled("simulate.m", steps, self.name)
         driven = len(self.loop.drivers.kinds)
         places = {
-            "drivers": filled("drivers.m", {}, self.name) if driven else "",
-            "apply_drivers": DRIVE if driven else "",
+            "kernels": MatlabKernels().text("driven_inputs", self.loop.kernels),
+            "driver_arrays": DRIVER_ARRAYS if driven else "",
+            "apply_drivers": APPLY_DRIVERS if driven else "",
         }
         return filled("loop.m", {**places, **steps}, self.name)
 
@@ -120,12 +123,10 @@ class OctaveFunctions:
             "setpoint.ends": m_array(signal.ends),
             "setpoint.values": m_array(signal.values),
             "setpoint.slopes": m_array(signal.slopes),
-            "drivers": "{}",
+            "driver_kinds": m_array(table.kinds),
+            "driver_settings": m_array(table.settings),
+            "driver_states": m_array(loop.driver_states),
         }
-        drivers = zip(table.kinds.tolist(), table.settings, loop.driver_states, strict=True)
-        for k, ((i, kind), settings, state) in enumerate(drivers, 1):
-            values[f"drivers{{{k}}}.input"], values[f"drivers{{{k}}}.kind"] = str(i + 1), str(kind)
-            values[f"drivers{{{k}}}.settings"], values[f"drivers{{{k}}}.state"] = m_array(settings), m_array(state)
         return "".join(f"  model.loop.{name} = {text};\n" for name, text in values.items())
 
 

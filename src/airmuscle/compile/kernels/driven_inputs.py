@@ -35,22 +35,28 @@ def load_columns(ends: Any, values: Any, slopes: Any, first: Any, pieces: Any, c
 
 @PART
 def apply_drivers(
-    kinds: Any, settings: Any, states: Any, new: Any, columns: Any, counts: Any, scratch: Any, start: Any, ulp: Any
+    kinds: Any, settings: Any, states: Any, later: Any, columns: Any, counts: Any, scratch: Any, start: Any, ulp: Any
 ) -> None:
     """Pass the signals of inputs, columns (m, 3, capacity) with their counts (m,), through their drivers (D,).
 
-    kinds (D, 2)  input and kind of each driver, in the order of the signal; scratch (2, 3, capacity)
+    kinds (D, 2)  input and kind of each driver, in the order of the signal
+    states        of each driver; `later` receives those at the end of the signals, and may be the same array
+    ulp           distance from the end of the signals to the next floating-point number
+    scratch       (2, 3, capacity): workspace
     """
     for d in range(kinds.shape[0]):
         i = kinds[d, 0]
-        result = scratch[0]
         if kinds[d, 1] == MODULATOR:
-            count = pulse_width_modulation(settings[d], states[d], new[d], columns[i], counts[i], start, ulp, result)
+            count = pulse_width_modulation(
+                settings[d], states[d], later[d], columns[i], counts[i], start, ulp, scratch[0]
+            )
         else:
-            count = delayed_switch(settings[d], states[d], new[d], columns[i], counts[i], start, scratch[1], result)
+            count = delayed_switch(
+                settings[d], states[d], later[d], columns[i], counts[i], start, scratch[1], scratch[0]
+            )
         for part in range(3):
             for k in range(count):
-                columns[i, part, k] = result[part, k]
+                columns[i, part, k] = scratch[0, part, k]
         counts[i] = count
 
 

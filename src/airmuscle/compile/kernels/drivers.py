@@ -1,7 +1,8 @@
 """Drivers of an input inside a kernel: pulse width modulation, and a switch with delays and ramps.
 
-They compute what `control.driver.PWM` and `control.driver.SolenoidDriver` compute, operation by operation. A signal is
-an array (3, capacity): end, value at the start, and slope of each segment; `count` of them are used.
+They compute what `control.driver.PWM` and `control.driver.SolenoidDriver` compute, operation by operation, and are
+printed as such in exported programs. A signal is an array (3, capacity): end, value at the start, and slope of each
+segment; `count` of them are used.
 """
 
 from __future__ import annotations
@@ -39,12 +40,12 @@ def hold_levels(result: Any, levels: Any, end: Any) -> None:
 
 @PART
 def pulse_width_modulation(
-    settings: Any, state: Any, new: Any, signal: Any, count: Any, start: Any, ulp: Any, result: Any
+    settings: Any, state: Any, later: Any, signal: Any, count: Any, start: Any, ulp: Any, result: Any
 ) -> Any:
     """Modulate a signal from `start`; the number of segments of the result.
 
     settings  frequency, smallest pulse
-    state     origin of the carrier, periods begun, end of the last pulse; `new` receives it at the end of the signal
+    state     origin of the carrier, periods begun, end of the last pulse; `later` receives it at the end of the signal
     ulp       distance from the end of the signal to the next floating-point number
     """
     end = signal[0, count - 1]
@@ -61,7 +62,7 @@ def pulse_width_modulation(
     last = end - 4.0 * ulp
     total = int(np.ceil((end - origin) * frequency - begun)) + 1
     k, begin, periods = 0, start, 0
-    for i in range(max(total, 0)):
+    for i in range(total):
         time = origin + (begun + i) / frequency
         if time < last:
             time = max(time, start)
@@ -81,7 +82,7 @@ def pulse_width_modulation(
                 levels += 1
             periods += 1
     hold_levels(result, levels, end)
-    new[0], new[1], new[2] = origin, begun + periods, pulse_end
+    later[0], later[1], later[2] = origin, begun + periods, pulse_end
     return levels
 
 
@@ -111,11 +112,13 @@ def move_towards(target: Any, opening: Any, edge: Any, stop: Any, settings: Any,
     """Write the motion of the opening from `edge` to `stop`, and the rest after it; the opening, and the segments."""
     ramp = settings[2] if target > opening else settings[3]
     distance = abs(target - opening)
-    left = distance - ((stop - edge) / ramp if ramp > 0.0 else INFINITY)
+    travel = (stop - edge) / ramp if ramp > 0.0 else INFINITY
+    left = distance - travel
     after = target
     if left > ARRIVED:
-        after = target + (left if opening - target >= 0.0 else -left)
-    arrival = min(edge + (ramp * distance if after == target else INFINITY), stop)
+        after = target + left if opening - target >= 0.0 else target - left
+    arrival = edge + ramp * distance if after == target else INFINITY
+    arrival = min(arrival, stop)
     if arrival > edge:
         result[0, segments], result[1, segments] = arrival, opening
         result[2, segments] = (after - opening) / (arrival - edge)
@@ -128,12 +131,12 @@ def move_towards(target: Any, opening: Any, edge: Any, stop: Any, settings: Any,
 
 @PART
 def delayed_switch(
-    settings: Any, state: Any, new: Any, signal: Any, count: Any, start: Any, events: Any, result: Any
+    settings: Any, state: Any, later: Any, signal: Any, count: Any, start: Any, events: Any, result: Any
 ) -> Any:
     """Opening of a switch that follows a signal from `start`; the number of segments of the result.
 
     settings  opening delay, closing delay, opening ramp, closing ramp
-    state     coil, pending instant, target, opening; `new` receives it at the end of the signal
+    state     coil, pending instant, target, opening; `later` receives it at the end of the signal
     events    (3, capacity): workspace
     """
     end = signal[0, count - 1]
@@ -152,6 +155,7 @@ def delayed_switch(
             edge, target = pending, coil
         if k < switchings:
             coil = events[1, k]
-            pending = instant + (settings[0] if coil > 0.0 else settings[1])
-    new[0], new[1], new[2], new[3] = coil, pending if pending >= end else INFINITY, target, opening
+            delay = settings[0] if coil > 0.0 else settings[1]
+            pending = instant + delay
+    later[0], later[1], later[2], later[3] = coil, pending if pending >= end else INFINITY, target, opening
     return segments

@@ -19,6 +19,7 @@
 #define COMMANDS MODEL_CONTROLLER_COMMANDS
 #define NOT_COMMANDED 4
 
+@kernels@
 @constants@
 /* The run: solver, parameters in the form that the functions need, memory and arrays of the controller, inputs just
    before a sample, and the next row, segment of the other inputs and segment of the set points. */
@@ -30,6 +31,9 @@ static double segment_start, piece_start;
 /* Each input between two samples: ends, values at the starts, and slopes of its segments. */
 static double signals[MODEL_INPUTS][3][CAPACITY];
 static int counts[MODEL_INPUTS];
+/* The common segments of all inputs between two samples. */
+static double common_ends[MODEL_INPUTS * CAPACITY];
+static double common_values[MODEL_INPUTS * CAPACITY][MODEL_INPUTS], common_slopes[MODEL_INPUTS * CAPACITY][MODEL_INPUTS];
 
 static double instant_of(long sample)
 {
@@ -43,7 +47,6 @@ static void setpoints_at(double time, double *result)
   for (i = 0; i < SETPOINTS; i++) result[i] = setpoint_values[piece][i] + (time - piece_start) * setpoint_slopes[piece][i];
 }
 
-@drivers_source@
 @valid@
 static int write_row(FILE *out, double time, const double *x, const double *u)
 {
@@ -121,22 +124,12 @@ static int sample(double begin, double end)
 /* From one sample to the next, in the common segments of all inputs. */
 static int run_interval(FILE *out, double begin, double end)
 {
-  double u[MODEL_INPUTS + 1], w[MODEL_INPUTS + 1], begins[MODEL_INPUTS], time = begin;
-  int i, at[MODEL_INPUTS], status = MODEL_DONE;
-  for (i = 0; i < MODEL_INPUTS; i++) {
-    at[i] = 0;
-    begins[i] = begin;
-  }
-  while (time < end && status == MODEL_DONE) {
-    double following = end;
-    for (i = 0; i < MODEL_INPUTS; i++) {
-      while (at[i] < counts[i] - 1 && signals[i][0][at[i]] <= time) begins[i] = signals[i][0][at[i]++];
-      u[i] = signals[i][1][at[i]] + (time - begins[i]) * signals[i][2][at[i]];
-      w[i] = signals[i][2][at[i]];
-      if (at[i] < counts[i] - 1) following = fmin(following, signals[i][0][at[i]]);
-    }
-    status = run_segment(out, following, time > begin, following < end ? NEAR : MODEL_CLOSE, u, w);
-    time = following;
+  double begins[MODEL_INPUTS];
+  int at[MODEL_INPUTS], i, status = MODEL_DONE;
+  const int count = merge_columns(signals, counts, at, begins, begin, common_ends, common_values, common_slopes, 0);
+  for (i = 0; i < count && status == MODEL_DONE; i++) {
+    const double margin = common_ends[i] < end ? NEAR : MODEL_CLOSE;
+    status = run_segment(out, common_ends[i], i > 0, margin, common_values[i], common_slopes[i]);
   }
   model_inputs_at(&s, end, applied);
   for (i = 0; i < MODEL_STATES; i++)

@@ -15,8 +15,8 @@ function r = simulate(model, changes)
   r.names = [{'time'}, model.states, model.inputs, model.output_names, loop.columns];
   rows.data = zeros(numel(rows.times), numel(r.names));
   memory = loop.initial_memory;
-  drivers = loop.drivers;
-  applied = run.values(1, :)';
+  inputs = numel(model.inputs);
+@driver_arrays@  applied = run.values(1, :)';
   status = 0;
   r.samples = 0;
   for k = 0:loop.samples - 1
@@ -33,7 +33,8 @@ function r = simulate(model, changes)
     end
     r.samples = r.samples + 1;
     signals = segments_of(run, loop, start, finish, rows.command);
-@apply_drivers@    [s, rows, applied, status] = run_interval(s, rows, start, finish, signals);
+    counts = size(signals{1}, 2) * ones(1, inputs);
+@apply_drivers@    [s, rows, applied, status] = run_interval(s, rows, start, finish, signals, counts);
     if status ~= 0
       break
     end
@@ -63,10 +64,10 @@ function values = setpoints_at(signal, time, start)
   values = signal.values(piece, :)' + (time - start) * signal.slopes(piece, :)';
 end
 
-% The segments of every input between two samples, with the columns end, value and slope: a command is held, others are
+% The segments of every input between two samples, with the rows end, value and slope: a command is held, others are
 % those of the run.
 function signals = segments_of(run, loop, start, finish, command)
-  signals = cell(1, size(run.values, 2));
+  signals = repmat({zeros(3, 0)}, 1, size(run.values, 2));
   time = start;
   while time < finish
     k = min(sum(run.ends(:) <= time) + 1, numel(run.ends));
@@ -79,46 +80,30 @@ function signals = segments_of(run, loop, start, finish, command)
       from = run.ends(k - 1);
     end
     for i = 1:numel(signals)
-      signals{i}(end + 1, :) = [following, run.values(k, i) + (time - from) * run.slopes(k, i), run.slopes(k, i)];
+      signals{i}(:, end + 1) = [following; run.values(k, i) + (time - from) * run.slopes(k, i); run.slopes(k, i)];
     end
     time = following;
   end
   for j = 1:numel(command)
     i = loop.commanded(j) + 1;
-    signals{i}(:, 2) = command(j);
-    signals{i}(:, 3) = 0;
+    signals{i}(2, :) = command(j);
+    signals{i}(3, :) = 0;
   end
 end
 
 % From one sample to the next, in the common segments of all inputs.
-function [s, rows, applied, status] = run_interval(s, rows, start, finish, signals)
-  count = numel(signals);
-  at = ones(count, 1);
-  starts = start * ones(count, 1);
-  u = zeros(count, 1);
-  w = u;
-  time = start;
+function [s, rows, applied, status] = run_interval(s, rows, start, finish, signals, counts)
+  [count, ~, ~, ends, values, slopes] = merge_columns(signals, counts, [], [], start, [], [], [], 0);
   status = 0;
-  while time < finish && status == 0
-    following = finish;
-    for i = 1:count
-      parts = signals{i};
-      while at(i) < size(parts, 1) && parts(at(i), 1) <= time
-        starts(i) = parts(at(i), 1);
-        at(i) = at(i) + 1;
-      end
-      u(i) = parts(at(i), 2) + (time - starts(i)) * parts(at(i), 3);
-      w(i) = parts(at(i), 3);
-      if at(i) < size(parts, 1)
-        following = min(following, parts(at(i), 1));
-      end
-    end
+  for k = 1:count
     margin = @close@;
-    if following < finish
+    if ends(k) < finish
       margin = rows.near;
     end
-    [s, rows, status] = run_segment(s, rows, following, time > start, margin, u, w);
-    time = following;
+    [s, rows, status] = run_segment(s, rows, ends(k), k > 1, margin, values(k, :)', slopes(k, :)');
+    if status ~= 0
+      break
+    end
   end
   applied = inputs_at(s, finish);
 end
@@ -163,4 +148,4 @@ function rows = write_row(rows, time, s)
   rows.data(rows.count, :) = [time; x; u; outputs(x, u, s.c); shown; rows.measured; rows.command]';
 end
 
-@drivers@
+@kernels@

@@ -6,25 +6,29 @@ const setpointsAt = (signal, time, start, result) => {
     result[i] = signal.values[piece][i] + (time - begin) * signal.slopes[piece][i];
 };
 
-/** The segments {end, value, slope} of every input from `begin` to `end`: a command is held, others are those of the run. */
-function segmentsOf({ends, values, slopes}, begin, end, start, command) {
-  const signals = inputs.map(() => []);
-  let k = 0, time = begin, segmentStart = start;
+/** The segments of every input from `begin` to `end`, in the rows end, value and slope of its signal: a command is held,
+ * others are those of the run. Returns how many there are. */
+function loadSignals({ends, values, slopes}, begin, end, start, command, signals) {
+  let k = 0, count = 0, time = begin, segmentStart = start;
   while (time < end) {
     while (k < ends.length - 1 && ends[k] <= time) segmentStart = ends[k++];
     const following = k < ends.length - 1 ? Math.min(end, ends[k]) : end;
-    for (let i = 0; i < inputs.length; i++)
-      signals[i].push({end: following, value: values[k][i] + (time - segmentStart) * slopes[k][i], slope: slopes[k][i]});
+    signals.forEach((signal, i) => {
+      signal[0][count] = following;
+      signal[1][count] = values[k][i] + (time - segmentStart) * slopes[k][i];
+      signal[2][count] = slopes[k][i];
+    });
+    loop.commanded.forEach((i, j) => {
+      signals[i][1][count] = command[j];
+      signals[i][2][count] = 0;
+    });
+    count++;
     time = following;
   }
-  loop.commanded.forEach((i, j) => signals[i].forEach((part) => {
-    part.value = command[j];
-    part.slope = 0;
-  }));
-  return signals;
+  return count;
 }
 
-@drivers@
+@kernels@
 /**
  * Run of the control loop. Every argument is optional: by default the exported run. `controllerParameters` are those of
  * the control law, `setpoint` {ends, values, slopes} its set points, `segments` the inputs that it does not command.
@@ -47,8 +51,9 @@ export function simulate(changes = {}) {
   const measured = new Float64Array(loop.measuredAt.length), wanted = new Float64Array(loop.setpoints.length);
   const shown = new Float64Array(loop.setpoints.length), command = new Float64Array(loop.commanded.length);
   const memory = Float64Array.from(loop.initialMemory), later = new Float64Array(memory.length);
-  const drivers = loop.drivers.map((driver) => ({...driver, state: [...driver.state]}));
-  prepare(numbers, c);
+  const signals = inputs.map(() => [[], [], []]), counts = inputs.map(() => 0);
+  const at = [], begins = [], commonEnds = [], commonValues = [], commonSlopes = [];
+@driver_arrays@  prepare(numbers, c);
   const s = new Solver(c, start, initial);
   let row = 0, result = status.done, samples = 0;
   const applied = Float64Array.from(segments.values[0]);
@@ -77,21 +82,16 @@ export function simulate(changes = {}) {
     while (row < times.length && margin > CLOSE && times[row] < end) row++; // rows close to the instant `end`
     return found;
   };
-  const runInterval = (begin, end, signals) => {
-    const at = inputs.map(() => 0), begins = inputs.map(() => begin);
-    const values = new Float64Array(inputs.length), slopes = new Float64Array(inputs.length);
-    let time = begin, found = status.done;
-    while (time < end && found === status.done) {
-      let following = end;
-      signals.forEach((signal, i) => {
-        while (at[i] < signal.length - 1 && signal[at[i]].end <= time) begins[i] = signal[at[i]++].end;
-        const part = signal[at[i]];
-        values[i] = part.value + (time - begins[i]) * part.slope;
-        slopes[i] = part.slope;
-        if (at[i] < signal.length - 1) following = Math.min(following, part.end);
-      });
-      found = runSegment(following, time > begin, following < end ? loop.near : CLOSE, values, slopes);
-      time = following;
+  const runInterval = (begin, end) => {
+    while (commonValues.length < counts.reduce((sum, count) => sum + count, 0)) {
+      commonValues.push(new Float64Array(inputs.length));
+      commonSlopes.push(new Float64Array(inputs.length));
+    }
+    const count = merge_columns(signals, counts, at, begins, begin, commonEnds, commonValues, commonSlopes, 0);
+    let found = status.done;
+    for (let k = 0; k < count && found === status.done; k++) {
+      const following = commonEnds[k], margin = following < end ? loop.near : CLOSE;
+      found = runSegment(following, k > 0, margin, commonValues[k], commonSlopes[k]);
     }
     s.inputsAt(end, applied);
     return found;
@@ -107,8 +107,8 @@ export function simulate(changes = {}) {
     else {
       memory.set(later);
       samples++;
-      const signals = segmentsOf(segments, begin, end, start, command);
-@apply_drivers@      result = runInterval(begin, end, signals);
+      counts.fill(loadSignals(segments, begin, end, start, command, signals));
+@apply_drivers@      result = runInterval(begin, end);
     }
   }
   while (result === status.done && row < times.length) write(times[row++]);

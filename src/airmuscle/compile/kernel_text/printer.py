@@ -1,0 +1,199 @@
+"""Printer of kernels: the walk through statements and expressions that all languages share."""
+
+from __future__ import annotations
+
+import abc
+import ast
+import math
+from collections.abc import Iterator, Sequence
+
+from .expressions import ExpressionPrinter
+from .source import KernelSource, read_kernels
+from .types import TypedKernel, pairs, stored_names, typed
+
+
+class KernelPrinter(ExpressionPrinter):
+    """Text of functions of kernels in a language; a subclass states what its language writes.
+
+    The functions that a printed function calls are printed before it.
+    """
+
+    close = "}"
+
+    def text(self, module: str, names: Sequence[str]) -> str:
+        """The functions of a module of `compile/kernels/` with these names, and the constants that they use.
+
+        Raises TraceError, with file and line, for a construct that has no printed form.
+        """
+        self.kernels: dict[str, TypedKernel] = {}
+        for name in names:
+            self._add(read_kernels(module), name)
+        return self.printed(self.kernels)
+
+    def printed(self, kernels: dict[str, TypedKernel]) -> str:
+        """Text of typed functions, each after those that it calls, and the constants that they use."""
+        bodies = [self.function(kernel) for kernel in kernels.values()]
+        return "\n".join([*self.constants(kernels), *bodies])
+
+    def _add(self, sources: dict[str, KernelSource], name: str) -> None:
+        if name in self.kernels:
+            return
+        source = sources[name]
+        for node in ast.walk(source.node):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in source.imported:
+                module = source.imported[node.func.id]
+                self._add(read_kernels(module) if f"{module}.py" != source.file else sources, node.func.id)
+        self.kernels[name] = typed(source, self.kernels)
+
+    def constants(self, kernels: dict[str, TypedKernel]) -> list[str]:
+        """Lines that define the finite constants of the functions."""
+        used = {name: value for kernel in kernels.values() for name, value in used_constants(kernel).items()}
+        return [*(self.constant(name, value) for name, value in used.items()), ""] if used else []
+
+    def function(self, kernel: TypedKernel) -> str:
+        """The text of one function."""
+        self.kernel, self.source = kernel, kernel.source
+        self.begin()
+        lines = [*self.comment(self.source.description), *self.head()]
+        return "\n".join([*lines, *indented(self.block(self.source.body)), self.close, ""])
+
+    # What a language writes
+
+    @abc.abstractmethod
+    def constant(self, name: str, value: float) -> str:
+        """The line that defines a constant."""
+
+    @abc.abstractmethod
+    def comment(self, lines: Sequence[str]) -> list[str]:
+        """The comment before a function."""
+
+    @abc.abstractmethod
+    def remark(self, text: str) -> str:
+        """A comment at the end of a line."""
+
+    @abc.abstractmethod
+    def head(self) -> list[str]:
+        """The first lines of a function."""
+
+    @abc.abstractmethod
+    def assign(self, target: ast.expr, value: ast.expr, node: ast.stmt) -> list[str]:
+        """The lines that assign a value."""
+
+    @abc.abstractmethod
+    def call_lines(self, call: ast.Call, targets: Sequence[ast.expr], node: ast.stmt) -> list[str]:
+        """The lines of a call of a printed function as a statement, with the targets of its results."""
+
+    @abc.abstractmethod
+    def finish(self, values: Sequence[ast.expr], last: bool) -> list[str]:
+        """The lines that return values; `last`: at the end of the function."""
+
+    @abc.abstractmethod
+    def loop(self, variable: str, first: str, limit: ast.expr) -> str:
+        """The line that begins a loop from `first` to before `limit`."""
+
+    @abc.abstractmethod
+    def branch(self, word: str, test: str) -> str:
+        """The line that begins a branch, `word` is if or while."""
+
+    otherwise = "} else {"
+
+    @abc.abstractmethod
+    def begin(self) -> None:
+        """Prepare for the function `self.kernel`."""
+
+    # Statements
+
+    def block(self, nodes: Sequence[ast.stmt]) -> list[str]:
+        """The lines of statements."""
+        lines: list[str] = []
+        for node in nodes:
+            lines += self.statement(node)
+            remark = None if hasattr(node, "body") else self.source.comments.get(node.end_lineno or 0)
+            if remark:
+                lines[-1] += f"  {self.remark(remark)}"
+        return lines
+
+    def statement(self, node: ast.stmt) -> list[str]:
+        """The lines of a statement."""
+        match node:
+            case ast.Assign(targets=[ast.Tuple(elts=elements)], value=ast.Call() as call):
+                return self.call_lines(call, elements, node)
+            case ast.Assign(targets=[_]):
+                return [
+                    line for target, value in self._checked_pairs(node) for line in self._assigned(target, value, node)
+                ]
+            case ast.AugAssign(target=target, op=operator, value=value):
+                loaded = ast.parse(ast.unparse(target), mode="eval").body
+                return self.assign(target, ast.copy_location(ast.BinOp(loaded, operator, value), node), node)
+            case ast.Expr(value=ast.Call() as call):
+                return self.call_lines(call, [], node)
+            case ast.Return(value=value):
+                last = node is self.source.node.body[-1]
+                values = [] if value is None else value.elts if isinstance(value, ast.Tuple) else [value]
+                return self.finish(values, last)
+            case ast.If() | ast.While(orelse=[]) | ast.For(orelse=[]):
+                return self._compound(node)
+            case ast.Break():
+                return [self.word("break")]
+            case ast.Continue():
+                return [self.word("continue")]
+        raise self.source.unprintable(node, f"the statement {type(node).__name__}")
+
+    def word(self, word: str) -> str:
+        """A statement of one word."""
+        return f"{word};"
+
+    def _checked_pairs(self, node: ast.Assign) -> Iterator[tuple[ast.expr, ast.expr]]:
+        """Targets and values, which must not read a target before them."""
+        before: set[str] = set()
+        for target, value in pairs(node):
+            assert value is not None
+            if before & {n.id for n in ast.walk(value) if isinstance(n, ast.Name)}:
+                raise self.source.unprintable(node, "an assignment that reads a variable which it changes")
+            before |= set(stored_names([ast.Assign([target], value)]))
+            yield target, value
+
+    def _assigned(self, target: ast.expr, value: ast.expr, node: ast.stmt) -> list[str]:
+        called = isinstance(value, ast.Call) and isinstance(value.func, ast.Name) and value.func.id in self.kernel.calls
+        return self.call_lines(value, [target], node) if called else self.assign(target, value, node)  # type: ignore[arg-type]
+
+    def _compound(self, node: ast.If | ast.While | ast.For) -> list[str]:
+        if isinstance(node, ast.For):
+            lines = [self._for(node)]
+        else:
+            lines = [self.branch("if" if isinstance(node, ast.If) else "while", self.expression(node.test))]
+        lines += indented(self.block(node.body))
+        if node.orelse:
+            lines += [self.otherwise, *indented(self.block(node.orelse))]
+        return [*lines, self.close]
+
+    def _for(self, node: ast.For) -> str:
+        if not isinstance(node.target, ast.Name) or ast.unparse(node.iter).partition("(")[0] != "range":
+            raise self.source.unprintable(node.iter, "a loop over something else than a range")
+        assert isinstance(node.iter, ast.Call)
+        if len(node.iter.args) > 2:
+            raise self.source.unprintable(node.iter, "a range with a step")
+        sizes = {n.value for n in ast.walk(node.iter) if isinstance(n, ast.Attribute) and n.attr == "shape"}
+        bounds = [n.id for n in ast.walk(node.iter) if isinstance(n, ast.Name) and n not in sizes]
+        if {node.target.id, *bounds} & {*stored_names(node.body)}:
+            raise self.source.unprintable(node.iter, "a loop that changes its variable or its range")
+        mentions = [n for n in ast.walk(self.source.node) if isinstance(n, ast.Name) and n.id == node.target.id]
+        loops = [
+            n for n in ast.walk(self.source.node) if isinstance(n, ast.For) and ast.unparse(n.target) == node.target.id
+        ]
+        if len(mentions) != sum(n.id == node.target.id for f in loops for n in ast.walk(f) if isinstance(n, ast.Name)):
+            raise self.source.unprintable(node.target, "the variable of a loop outside it")
+        first = self.expression(node.iter.args[0]) if len(node.iter.args) > 1 else "0"
+        return self.loop(self.name(node.target.id), first, node.iter.args[-1])
+
+
+def used_constants(kernel: TypedKernel) -> dict[str, float]:
+    """The finite constants that a function uses."""
+    names = [n.id for n in ast.walk(kernel.source.node) if isinstance(n, ast.Name) and n.id not in kernel.kinds]
+    found = {name: kernel.source.constants.get(name, math.inf) for name in names}
+    return {name: value for name, value in found.items() if math.isfinite(value)}
+
+
+def indented(lines: Sequence[str]) -> list[str]:
+    """Lines of an inner block."""
+    return ["  " + line for line in lines]
