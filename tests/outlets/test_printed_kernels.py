@@ -196,3 +196,15 @@ def test_a_conditional_value_within_an_expression_has_no_form_in_matlab():
     kernel = typed(read_text("def f(a, b):\n    return a + (1.0 if b > 0.0 else 2.0)\n", "wrong.py")["f"], {})
     with pytest.raises(TraceError, match=r"line 2, f: a conditional value that does not stand alone in an assignment"):
         MatlabKernels().printed({"f": kernel})
+
+
+@pytest.mark.parametrize(
+    "expression", ["a - (b - 1.0)", "a / (b * 3.0)", "-(a + b) * 2.0", "a - b - 1.0", "int(a - 0.5)"]
+)
+@pytest.mark.parametrize("language", LANGUAGES, ids=lambda language: type(language).__name__)
+def test_the_order_of_operations_is_kept(expression, language):
+    kernel = typed(read_text(f"def f(a, b):\n    return {expression}\n", "order.py")["f"], {})
+    text = language.printed({"f": kernel}).replace(".0", "")
+    for own in ("(int)", "Math.trunc", "fix"):
+        text = text.replace(own, "int")
+    assert expression.replace(".0", "") in text
