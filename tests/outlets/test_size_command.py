@@ -177,3 +177,11 @@ def test_wrong_usage_is_exit_code_2(arguments):
     result = airmuscle("size", *arguments)
     assert result.exit_code == 2
     assert "Usage: " in result.stderr
+
+
+def test_an_equal_force_at_both_ends_is_one_number():
+    arguments = ["size", "--load", "40 kg", "--stroke", "60 mm", "--supply", "6 bar", "--muscle", "dmsp-20-300"]
+    result = CliRunner().invoke(app, arguments, env={"COLUMNS": "200"})
+    assert result.exit_code == 0, result.output
+    assert "392" in result.stdout
+    assert "392 to 392" not in result.stdout

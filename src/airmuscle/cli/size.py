@@ -204,7 +204,7 @@ def _row(row: Mapping[str, Any]) -> dict[str, str]:
     shown = {header: format_number(row[header]) for header in FIRST if header in row}
     for header, name in RANGES.items():
         ends = [value for key, value in row.items() if key.startswith(f"{name}, ")]
-        shown[header] = " to ".join(format_number(value, 3) for value in ends)
+        shown[header] = " to ".join(dict.fromkeys(format_number(value, 3) for value in ends))
     return shown | {short: format_number(row[header], 3) for header, short in LAST.items()}
 
 

@@ -82,7 +82,11 @@ class Comparison(ShortRepr):
         notes += [f"note: {m.candidate.name}: {note}" for m in self._listed() for note in m.notes]
         excluded = [f"{word}: {e}" for word, models in self._left_out() for e in models if e.error is None]
         errors = [f"{e.name} ({e.error:.4g} N)" for e in self.excluded if e.error is not None]
-        excluded += [f"excluded, as the error is too large (cross-validation ended early): {', '.join(errors)}."] if errors else []
+        excluded += (
+            [f"excluded, as the error is too large (cross-validation ended early): {', '.join(errors)}."]
+            if errors
+            else []
+        )
         remark = [_SLACK_REMARK] if slack else []
         return "\n".join([title, "", head, *rows, *remark, "", self.reason, *notes, *excluded])
 
