@@ -30,6 +30,7 @@ from airmuscle.control import PID, ControlLoop, Schedule
 from airmuscle.errors import FileError, ParameterError
 from airmuscle.export import compiler, write_fmu
 from airmuscle.export.fmi_units import BASE, base_powers
+from airmuscle.export.fmi_variables import per_second
 from airmuscle.muscle.characteristic import ValidityRange
 from airmuscle.simulation import Problem, Rodas4, RungeKutta4, solve
 
@@ -142,7 +143,7 @@ def test_a_second_checker_finds_no_error(fmi, fmus):
 class Instance:
     """An FMI 3 instance for Co-Simulation, through FMPy; messages are collected."""
 
-    def __init__(self, path, folder):
+    def __init__(self, path, folder, logging=True, tolerance=None, start=None):
         fmpy = pytest.importorskip("fmpy", reason="needs the package fmpy")
         from fmpy.fmi3 import FMU3Slave
 
@@ -155,8 +156,10 @@ class Instance:
             guid=self.about.guid, unzipDirectory=str(folder), instanceName="test",
             modelIdentifier=self.about.coSimulation.modelIdentifier,
         )  # fmt: skip
-        self.fmu.instantiate(logMessage=lambda e, status, category, text: self.log.append((status, text.decode())))
-        self.fmu.enterInitializationMode(startTime=0.0)
+        log = lambda e, status, category, text: self.log.append((status, text.decode()))  # noqa: E731
+        self.fmu.instantiate(loggingOn=logging, logMessage=log)
+        self.set(**(start or {}))
+        self.fmu.enterInitializationMode(tolerance=tolerance, startTime=0.0)
 
     def get(self, *names):
         return np.array(self.fmu.getFloat64([self.number[n] for n in names]))
@@ -254,6 +257,73 @@ def test_what_cannot_be_set_is_refused(instance, name, value):
     with pytest.raises(Exception, match="fmi3SetFloat64"):
         instance.set(**{name: value})
     assert any("cannot be set, or its value is not finite" in text for _, text in instance.log)
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_the_tolerance_of_the_scenario_is_that_of_a_run(fmi, fmus):
+    fmpy = pytest.importorskip("fmpy", reason="needs the package fmpy")
+    for given, expected in (
+        ({}, 1e-9),
+        ({"relative_tolerance": 1e-7}, 1e-7),
+        ({"start_values": {"relative_tolerance": 1e-10}}, 1e-10),
+    ):
+        result = fmpy.simulate_fmu(
+            str(fmus("dmsp-20-300", fmi)),
+            fmi_type="CoSimulation",
+            stop_time=0.02,
+            output=["relative_tolerance"],
+            **given,
+        )
+        assert result["relative_tolerance"][-1] == expected, given
+
+
+@pytest.mark.parametrize("value", [-5.0, 0.0, 1e9])
+def test_a_parameter_beyond_its_bounds_is_refused(instance, value):
+    with pytest.raises(Exception, match="fmi3SetFloat64"):
+        instance.set(parameters__mechanism__mass=value)
+    assert re.search(r"mechanism\.mass is .*; allowed are 0\.0001 to 100000 kg", instance.log[-1][1])
+
+
+def test_after_a_step_that_failed_the_instance_stands_where_it_stood(instance):
+    right = instance.get("air_mass")[0]
+    instance.step(0.0, 0.01)
+    instance.set(air_mass=-1e-3)
+    with pytest.raises(Exception, match="fmi3DoStep"):
+        instance.step(0.01, 0.01)
+    assert instance.get("time", "air_mass").tolist() == [0.01, -1e-3]
+    instance.set(air_mass=right)
+    instance.step(0.01, 0.01)
+    assert instance.get("time")[0] == 0.02
+
+
+def test_only_parameters_that_act_on_the_run_are_tunable(tmp_path):
+    plant = plants.EXAMPLES["dmsp-20-300"]
+    limited = replace(plant.muscle, validity_range=ValidityRange(0.0, 1.5e5, -0.1, 0.3))
+    write_fmu(replace(problem_of(), system=replace(plant, muscle=limited)), tmp_path / "a.fmu", binary=False)
+    with zipfile.ZipFile(tmp_path / "a.fmu") as archive:
+        text = archive.read("modelDescription.xml").decode()
+    names = re.findall(r'name="parameters\.([^"]+)"', text)
+    assert "mechanism.mass" in names
+    assert not [name for name in names if "validity" in name or "ratings" in name]
+
+
+def test_warnings_are_logged_on_request_only(fmus, tmp_path):
+    quiet = Instance(fmus("dmsp-20-300", 3), tmp_path / "unzipped", logging=False)
+    quiet.fmu.exitInitializationMode()
+    quiet.set(fill=1.5)
+    quiet.step(0.0, 0.001)
+    quiet.fmu.freeInstance()
+    assert quiet.log == []
+
+
+def test_units_are_those_that_importers_know(fmus):
+    with zipfile.ZipFile(fmus("dmsp-20-300", 3)) as archive:
+        text = archive.read("modelDescription.xml").decode()
+    assert re.search(r'name="der\(speed\)"[^>]* unit="m/s2"', text)
+    assert re.search(r'name="pressure"[^>]* description="gauge pressure in the muscle"', text)
+    assert "Pa(a)" not in text
+    assert 'tolerance="1e-09"' in text
+    assert [per_second(unit) for unit in ("1", "kg", "rad/s", "J/kg")] == ["1/s", "kg/s", "rad/s2", "J/(kg s)"]
 
 
 def test_a_state_of_another_fmu_is_refused(instance):

@@ -1,6 +1,6 @@
 """Modelica package: its C functions give the rates and outputs of the library, and its text declares what it uses.
 
-No Modelica tool takes part: the text is checked for its form only.
+rumoca and pymoca, where they are installed, parse it; neither executes external C.
 """
 
 from __future__ import annotations
@@ -70,6 +70,23 @@ def test_its_text_declares_what_it_uses(name, tmp_path):
         assert text.count(opening) == text.count(closing)
     words = re.findall(r"^ *(?:block|function|package) (\w+)", text, flags=re.MULTILINE)
     assert sorted(words) == sorted(re.findall(r"^ *end (\w+);", text, flags=re.MULTILINE))
+
+
+@pytest.mark.parametrize("name", ["dmsp-20-300", "overlap", "closed"])
+def test_rumoca_resolves_and_flattens_the_package(name, tmp_path):
+    rumoca = pytest.importorskip("rumoca", reason="needs the package rumoca")
+    plant, paths = package(name, tmp_path)
+    model = rumoca.Session(roots=[str(tmp_path)]).load(str(paths[0]), model="joint.Plant")
+    assert len(model.states) == 1  # the vector of all states
+    assert len(model.inputs) == len(plant.inputs)
+
+
+@pytest.mark.parametrize("name", ["dmsp-20-300", "overlap", "closed"])
+def test_pymoca_parses_the_package(name, tmp_path):
+    parser = pytest.importorskip("pymoca.parser", reason="needs the package pymoca")
+    _, paths = package(name, tmp_path)
+    tree = parser.parse(paths[0].read_text(encoding="utf-8"))
+    assert "Plant" in tree.classes["joint"].classes
 
 
 def test_a_controller_is_refused_by_name(tmp_path):

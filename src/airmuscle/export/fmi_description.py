@@ -10,6 +10,7 @@ from importlib import metadata
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from ..compile.partials import Place
+from ..simulation.integrators import Rodas4
 from .fmi_units import add_units, has_unit
 from .fmi_variables import Variable, references_of
 from .printed_system import ExportedSystem
@@ -58,8 +59,9 @@ class FmuDescription:
 
     def _experiment(self, root: Element) -> None:
         times = self.run.times
-        attributes = {"startTime": repr(self.run.start), "stopTime": repr(float(times[-1])), "tolerance": "1e-06"}
-        SubElement(root, "DefaultExperiment", attributes)
+        tolerance = self.run.integrator.rtol if isinstance(self.run.integrator, Rodas4) else 1e-6
+        attributes = {"startTime": self.run.start, "stopTime": float(times[-1]), "tolerance": tolerance}
+        SubElement(root, "DefaultExperiment", {key: repr(float(x)) for key, x in attributes.items()})
 
     def _categories(self, root: Element) -> None:
         categories = SubElement(root, "LogCategories")

@@ -10,6 +10,7 @@ import math
 
 from ..compile.partials import Place
 from ..core.errors import ParameterError, printable
+from ..recording.columns import quantity_of
 from ..simulation.integrators import Rodas4
 from .printed_system import ExportedSystem
 from .run_data import RunData
@@ -53,14 +54,16 @@ def make_variables(system: ExportedSystem, run: RunData, indicators: int = 0) ->
         texts = {"unit": state.unit, "description": state.meaning}
         add(state.name, "output", initial="exact", start=start, nominal=state.nominal, **texts)
     for i, state in enumerate(known.states, 1):
-        unit = "1/s" if state.unit in ("", "1") else f"{state.unit}/s" if "/" not in state.unit else ""
+        unit = per_second(state.unit)
         about = f"derivative of {state.name}"
         add(f"der({state.name})", "local", initial="calculated", unit=unit, derivative_of=i, description=about)
     for given, start in zip(known.input_variables, first_inputs(run), strict=True):
         limits = {"minimum": given.minimum, "maximum": given.maximum}
         add(given.name, "input", start=start, unit=given.unit, description=given.meaning, **limits)
     for name in system.output_names:
-        add(name, "output", initial="calculated", unit=units[name])
+        known_quantity = quantity_of(name)
+        about = known_quantity.meaning if known_quantity else ""
+        add(name, "output", initial="calculated", unit=units[name], description=about)
     for leaf in system.tunable:
         low, high = leaf.declared.bounds
         about = f"{leaf.declared.symbol}: {leaf.declared.meaning}"
@@ -76,6 +79,26 @@ def make_variables(system: ExportedSystem, run: RunData, indicators: int = 0) ->
         about = "changes its sign where the rates are not smooth"
         add(f"event_indicator[{i}]", "local", is_indicator=True, description=about)
     return _checked(variables)
+
+
+def per_second(unit: str) -> str:
+    """The unit of the derivative of a quantity by time."""
+    if unit in ("", "1"):
+        return "1/s"
+    above, slash, below = unit.partition("/")
+    if not slash:
+        return f"{unit}/s"
+    return f"{above}/s2" if below == "s" else f"{above}/({below.strip('()')} s)"
+
+
+def _stated(v: Variable) -> Variable:
+    """The variable with a unit that importers know, and a description that states gauge or absolute."""
+    name, about, unit = printable(v.name), printable(v.description), v.unit.replace("Pa(a)", "Pa")
+    kind = "absolute" if unit != v.unit else "gauge"
+    is_stated = any(word in about for word in ("gauge", "absolute"))
+    if unit == "Pa" and not is_stated and ("pressure" in f"{name} {about}" or kind == "absolute"):
+        about = f"{about or 'pressure'}, {kind}"
+    return dataclasses.replace(v, name=name, description=about, unit=unit)
 
 
 def first_inputs(run: RunData) -> list[float]:
@@ -100,4 +123,4 @@ def _checked(variables: list[Variable]) -> list[Variable]:
                 f"the FMU would have two variables '{variable.name}'; rename the muscle or signal of this name."
             )
         seen.add(variable.name)
-    return [dataclasses.replace(v, name=printable(v.name), description=printable(v.description)) for v in variables]
+    return [_stated(v) for v in variables]

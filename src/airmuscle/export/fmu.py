@@ -26,6 +26,7 @@ from .fmi_description import FmuDescription
 from .fmi_units import has_unit
 from .fmi_variables import first_inputs, make_variables
 from .platforms import Platform, this_platform
+from .printed_system import acting_parameters
 from .provenance import block_comment
 from .targets import ExportedRun
 from .templates import filled, template
@@ -74,7 +75,8 @@ def write_fmu(
     problem  a system with its initial state, the inputs at its start, and the integrator of Co-Simulation
     fmi      version of the standard, 2 or 3
     name     identifier of the model; by default the title
-    tunable  paths of the parameters that are variables of the FMU; all by default, the others become constants
+    tunable  paths of the parameters that are variables of the FMU; the others become constants. By default all that act
+             on the run, which validity ranges and ratings do not
     binary   False: sources only. Without a C compiler the FMU contains sources only, which `remark` states
     platforms  instead of this machine, platforms for which zig compiles the binaries; it needs the package ziglang
 
@@ -86,7 +88,8 @@ def write_fmu(
     target = Path(path)
     if target.suffix != ".fmu":
         raise ParameterError(f"write_fmu: '{target.name[:80]}' must end in .fmu, as importers expect.")
-    program = make_run(problem, name=name, title=title, tunable=tunable, notes=[NOTE])
+    chosen = acting_parameters(problem.compiled) if tunable is None else tunable
+    program = make_run(problem, name=name, title=title, tunable=chosen, notes=[NOTE])
     files = fmu_files(program, fmi)
     folders, remark = list[str](), "none was requested"
     if binary:
@@ -161,13 +164,15 @@ def _instance(
     rows = "".join(
         f"  {{{column}, {c_number(low)}, {c_number(high)}, {c_string(text)}}},\n" for column, low, high, text in limits
     )
-    upper = name.upper()
+    upper, bounds = name.upper(), [leaf.declared.bounds for leaf in system.tunable]
     scales = indicators.scales(run.initial, run.segments.values[0], system.defaults, system.nominal)
     constants = [
         c_strings(f"static const char *const {name}_names[]", system.columns),
         c_array(f"static const double {name}_minimum[]", lowest),
         c_array(f"static const double {name}_start_states[{upper}_STATES]", run.initial),
         c_array(f"static const double {name}_start_inputs[{upper}_INPUTS + 1]", first_inputs(run), 1),
+        c_array(f"static const double {name}_lowest[{upper}_PARAMETERS + 1]", [low for low, _ in bounds], 1),
+        c_array(f"static const double {name}_highest[{upper}_PARAMETERS + 1]", [high for _, high in bounds], 1),
         c_array(f"static const double {name}_scales[{upper}_INDICATORS + 1]", scales, 1),
         _indices(f"{name}_rows", [row for row, _ in derivatives.places]),
         _indices(f"{name}_columns", [column for _, column in derivatives.places]),

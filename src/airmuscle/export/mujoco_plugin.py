@@ -23,7 +23,7 @@ from ..mechanism.external_load import SHORTENING, SHORTENING_SPEED
 from ..plant import Plant, open_plant
 from ..simulation.integrators import Rodas4
 from .c_source import CSource
-from .c_text import c_number, c_strings
+from .c_text import c_integers, c_number, c_strings
 from .compiler import compile_library
 from .printed_system import export_system
 from .provenance import block_comment, provenance
@@ -217,8 +217,8 @@ def _sources(part: Plant, name: str, controls: Sequence[Input], lines: Sequence[
     places = [*(system.input_names.index(i.name) for i in controls), -1, -1]
     constants = [
         c_strings("static const char *const attributes[]", [*own, REST_LENGTH]),
-        _integers("places", [paths.index(path) for path in own]),
-        _integers("own_states", [states.index(state.name) for state in part.states]),
+        c_integers("static const int places[]", [paths.index(path) for path in own]),
+        c_integers("static const int own_states[]", [states.index(state.name) for state in part.states]),
         f"static const double rest_length = {c_number(part.muscles[0].geometry.resting_length)};\n",
     ]
     values = {
@@ -228,10 +228,6 @@ def _sources(part: Plant, name: str, controls: Sequence[Input], lines: Sequence[
     texts = CSource(name, system, Rodas4(TOLERANCE), lines).files()
     texts[f"{name}_plugin.c"] = filled("mujoco_plugin.c", values, name)
     return {file: text.encode() for file, text in texts.items()}
-
-
-def _integers(name: str, values: Sequence[int]) -> str:
-    return f"static const int {name}[] = {{{', '.join(map(str, values))}}};\n"
 
 
 def _build(name: str, files: Mapping[str, bytes]) -> bytes:

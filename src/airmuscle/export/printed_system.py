@@ -90,6 +90,16 @@ def export_system(compiled: CompiledSystem, tunable: Sequence[str] | None = None
     return ExportedSystem(compiled, dataclasses.replace(traced, p=symbols, f=f, o=o), tuple(known[i] for i in chosen))
 
 
+def acting_parameters(compiled: CompiledSystem) -> list[str]:
+    """The paths of the parameters on which a rate or an output depends."""
+    import casadi
+
+    traced = compiled.program.traced
+    paths = [leaf.path for leaf in leaves(compiled.system)]
+    acts = casadi.which_depends(casadi.vertcat(traced.f, traced.o), traced.p, 1, False) if paths else []
+    return [path for path, used in zip(paths, acts, strict=True) if used]
+
+
 def find_leaf(model: Any, known: Sequence[Leaf], path: str) -> int:
     """The number of the parameter at a path. Raises ParameterError; for a part of the structure it says so."""
     paths = [leaf.path for leaf in known]

@@ -8,6 +8,7 @@ typedef struct {
   fmi2CallbackLogger logger;
   fmi2ComponentEnvironment environment;
   char name[256];
+  int warns;
 } Component;
 #define C ((Component *)c)
 #define UNUSED(x) ((void)(x))
@@ -15,7 +16,7 @@ typedef struct {
 static void report(void *owner, int is_error, const char *text)
 {
   Component *i = owner;
-  if (i->logger)
+  if (i->logger && (is_error || i->warns))
     i->logger(i->environment, i->name, is_error ? fmi2Error : fmi2Warning,
               is_error ? "logStatusError" : "logStatusWarning", "%s", text);
 }
@@ -31,7 +32,10 @@ const char *fmi2GetVersion(void) { return fmi2Version; }
 
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String categories[])
 {
-  UNUSED(c), UNUSED(on), UNUSED(n), UNUSED(categories);
+  size_t i;
+  int named = n == 0;
+  for (i = 0; i < n; i++) named |= strcmp(categories[i], "logStatusWarning") == 0;
+  if (named) ((Component *)c)->warns = on != fmi2False;
   return fmi2OK;
 }
 
@@ -39,7 +43,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
                               const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean logging)
 {
   Component *i;
-  UNUSED(type), UNUSED(resources), UNUSED(visible), UNUSED(logging);
+  UNUSED(type), UNUSED(resources), UNUSED(visible);
   if (!functions) return NULL;
   if (!name || !name[0] || !guid || strcmp(guid, MODEL_TOKEN) != 0) {
     if (functions->logger)
@@ -51,6 +55,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
   if (!i) return NULL;
   i->logger = functions->logger;
   i->environment = functions->componentEnvironment;
+  i->warns = logging != fmi2False;
   strncpy(i->name, name, sizeof i->name - 1);
   model_reset(&i->m);
   return i;
@@ -63,7 +68,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, f
 {
   UNUSED(stop_defined), UNUSED(stop);
   C->m.s.t = start;
-  if (tolerance_defined) (void)model_set(&C->m, MODEL_TOLERANCE, tolerance);
+  if (tolerance_defined) model_set_default_tolerance(&C->m, tolerance);
   return fmi2OK;
 }
 
@@ -82,10 +87,10 @@ fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference v[], size_t n, 
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference v[], size_t n, const fmi2Real values[])
 {
+  char text[480];
   size_t i;
   for (i = 0; i < n; i++)
-    if (model_set(&C->m, v[i], values[i]))
-      return refuse(c, "a variable cannot be set, or its value is not finite, or a tolerance is not in 0 to 1");
+    if (model_set(&C->m, v[i], values[i])) return refuse(c, model_refusal(v[i], values[i], text, sizeof text));
   return fmi2OK;
 }
 

@@ -7,6 +7,7 @@ typedef struct {
   model_instance m;
   fmi3LogMessageCallback log;
   fmi3InstanceEnvironment environment;
+  int warns;
 } Component;
 #define C ((Component *)instance)
 #define UNUSED(x) ((void)(x))
@@ -14,7 +15,7 @@ typedef struct {
 static void report(void *owner, int is_error, const char *text)
 {
   Component *i = owner;
-  if (i->log)
+  if (i->log && (is_error || i->warns))
     i->log(i->environment, is_error ? fmi3Error : fmi3Warning, is_error ? "logStatusError" : "logStatusWarning", text);
 }
 
@@ -30,7 +31,7 @@ static fmi3Status none(fmi3Instance instance, size_t count)
 }
 
 static fmi3Instance create(fmi3String name, fmi3String token, fmi3InstanceEnvironment environment,
-                           fmi3LogMessageCallback log)
+                           fmi3LogMessageCallback log, fmi3Boolean warns)
 {
   Component *i;
   if (!name || !name[0] || !token || strcmp(token, MODEL_TOKEN) != 0) {
@@ -42,6 +43,7 @@ static fmi3Instance create(fmi3String name, fmi3String token, fmi3InstanceEnviro
   if (!i) return NULL;
   i->log = log;
   i->environment = environment;
+  i->warns = warns;
   model_reset(&i->m);
   return i;
 }
@@ -54,7 +56,10 @@ const char *fmi3GetVersion(void)
 fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories,
                                const fmi3String categories[])
 {
-  UNUSED(instance), UNUSED(loggingOn), UNUSED(nCategories), UNUSED(categories);
+  size_t i;
+  int named = nCategories == 0;
+  for (i = 0; i < nCategories; i++) named |= strcmp(categories[i], "logStatusWarning") == 0;
+  if (named) C->warns = loggingOn;
   return fmi3OK;
 }
 
@@ -65,8 +70,8 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String in
                                           fmi3InstanceEnvironment instanceEnvironment,
                                           fmi3LogMessageCallback logMessage)
 {
-  UNUSED(resourcePath), UNUSED(visible), UNUSED(loggingOn);
-  return create(instanceName, instantiationToken, instanceEnvironment, logMessage);
+  UNUSED(resourcePath), UNUSED(visible);
+  return create(instanceName, instantiationToken, instanceEnvironment, logMessage, loggingOn);
 }
 
 fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String instantiationToken,
@@ -78,13 +83,13 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
                                          fmi3LogMessageCallback logMessage,
                                          fmi3IntermediateUpdateCallback intermediateUpdate)
 {
-  UNUSED(resourcePath), UNUSED(visible), UNUSED(loggingOn), UNUSED(earlyReturnAllowed),
+  UNUSED(resourcePath), UNUSED(visible), UNUSED(earlyReturnAllowed),
     UNUSED(requiredIntermediateVariables), UNUSED(nRequiredIntermediateVariables), UNUSED(intermediateUpdate);
   if (eventModeUsed) {
     if (logMessage) logMessage(instanceEnvironment, fmi3Error, "logStatusError", "there is no event mode");
     return NULL;
   }
-  return create(instanceName, instantiationToken, instanceEnvironment, logMessage);
+  return create(instanceName, instantiationToken, instanceEnvironment, logMessage, loggingOn);
 }
 
 fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3String instantiationToken,
@@ -111,7 +116,7 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
 {
   UNUSED(stopTimeDefined), UNUSED(stopTime);
   C->m.s.t = startTime;
-  if (toleranceDefined) (void)model_set(&C->m, MODEL_TOLERANCE, tolerance);
+  if (toleranceDefined) model_set_default_tolerance(&C->m, tolerance);
   return fmi3OK;
 }
 
@@ -151,11 +156,12 @@ fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
 fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                           size_t nValueReferences, const fmi3Float64 values[], size_t nValues)
 {
+  char text[480];
   size_t i;
   if (nValues != nValueReferences) return refuse(instance, "every variable has one value");
   for (i = 0; i < nValues; i++)
     if (model_set(&C->m, valueReferences[i], values[i]))
-      return refuse(instance, "a variable cannot be set, or its value is not finite, or a tolerance is not in 0 to 1");
+      return refuse(instance, model_refusal(valueReferences[i], values[i], text, sizeof text));
   return fmi3OK;
 }
 

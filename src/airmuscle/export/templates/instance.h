@@ -117,7 +117,26 @@ static int model_get(model_instance *m, unsigned v, double *value)
   return 0;
 }
 
-/* Set a state, an input, a parameter or the tolerance; 1 for any other variable, or a value that is not finite. */
+/* The tolerance of an importer, which is often the default of the description; a start value of the variable has
+   precedence. */
+static void model_set_default_tolerance(model_instance *m, double value)
+{
+  if (m->s.rtol == MODEL_RTOL_START && value > 0.0 && value < 1.0) m->s.rtol = value;
+}
+
+/* Why a variable cannot be set to a value. */
+static const char *model_refusal(unsigned v, double value, char *text, size_t size)
+{
+  const unsigned k = v - MODEL_FIRST_PARAMETER;
+  if (v < MODEL_FIRST_PARAMETER || v >= MODEL_TOLERANCE || !isfinite(value))
+    return "a variable cannot be set, or its value is not finite, or a tolerance is not in 0 to 1";
+  snprintf(text, size, "%.300s is %.6g; allowed are %.6g to %.6g %.40s", model_parameter_names[k], value,
+           model_lowest[k], model_highest[k], model_parameter_units[k]);
+  return text;
+}
+
+/* Set a state, an input, a parameter or the tolerance; 1 for any other variable, a value that is not finite, or a
+   parameter beyond its bounds. */
 static int model_set(model_instance *m, unsigned v, double value)
 {
   if (!isfinite(value)) return 1;
@@ -129,6 +148,7 @@ static int model_set(model_instance *m, unsigned v, double value)
     m->u[v - MODEL_FIRST_INPUT] = value;
     m->w[v - MODEL_FIRST_INPUT] = 0.0;
   } else if (v >= MODEL_FIRST_PARAMETER && v < MODEL_TOLERANCE) {
+    if (value < model_lowest[v - MODEL_FIRST_PARAMETER] || value > model_highest[v - MODEL_FIRST_PARAMETER]) return 1;
     m->p[v - MODEL_FIRST_PARAMETER] = value;
     m->unprepared = 1;
   } else if (v == MODEL_TOLERANCE && MODEL_RTOL_START > 0.0 && value > 0.0 && value < 1.0) {
@@ -170,8 +190,7 @@ static int model_check(model_instance *m, model_report report, void *owner)
   return 0;
 }
 
-/* Advance from time t by h; inputs are linear in time within the step. 1 if it failed, which is reported. */
-static int model_do_step(model_instance *m, double t, double h, model_report report, void *owner)
+static int model_advance(model_instance *m, double t, double h, model_report report, void *owner)
 {
   const double end = t + h;
   int i, status = MODEL_DONE;
@@ -192,6 +211,16 @@ static int model_do_step(model_instance *m, double t, double h, model_report rep
     return 1;
   }
   return model_check(m, report, owner);
+}
+
+/* Advance from time t by h; inputs are linear in time within the step. 1 if it failed, which is reported; the instance
+   is then as before. */
+static int model_do_step(model_instance *m, double t, double h, model_report report, void *owner)
+{
+  const model_instance before = *m;
+  if (!model_advance(m, t, h, report, owner)) return 0;
+  *m = before;
+  return 1;
 }
 
 /* The row of a rate or output, or -1 - i for the state i; -1 - MODEL_STATES for anything else. */
