@@ -30,7 +30,6 @@ from airmuscle.control import PID, ControlLoop, Schedule
 from airmuscle.errors import FileError, ParameterError
 from airmuscle.export import compiler, write_fmu
 from airmuscle.export.fmi_units import BASE, base_powers
-from airmuscle.export.fmi_variables import per_second
 from airmuscle.muscle.characteristic import ValidityRange
 from airmuscle.simulation import Problem, Rodas4, RungeKutta4, solve
 
@@ -322,8 +321,8 @@ def test_units_are_those_that_importers_know(fmus):
     assert re.search(r'name="der\(speed\)"[^>]* unit="m/s2"', text)
     assert re.search(r'name="pressure"[^>]* description="gauge pressure in the muscle"', text)
     assert "Pa(a)" not in text
+    assert re.search(r'name="der\(air_mass\)"[^>]* unit="kg/s"', text)
     assert 'tolerance="1e-09"' in text
-    assert [per_second(unit) for unit in ("1", "kg", "rad/s", "J/kg")] == ["1/s", "kg/s", "rad/s2", "J/(kg s)"]
 
 
 def test_a_state_of_another_fmu_is_refused(instance):
