@@ -45,7 +45,8 @@ def opened(browser, address, *, width=1280, height=900, scheme="light", offline=
         "console", lambda m: errors.append(m.text) if m.type in ("error", "warning") and REFUSED not in m.text else None
     )
     page.on("pageerror", lambda e: errors.append(str(e)))
-    page.on("request", lambda r: None if r.url.startswith((address, "data:", "blob:")) else errors.append(r.url))
+    origin = address.partition("?")[0]
+    page.on("request", lambda r: None if r.url.startswith((origin, "data:", "blob:")) else errors.append(r.url))
     page.goto(address)
     page.wait_for_selector("html[data-ready]", timeout=WAIT)
     yield page

@@ -35,7 +35,7 @@ class Answer:
 
 def request(app, method, path, body=b"", *, headers=None, query=b"", chunk=8192, raw=None):
     """The answer of an ASGI application. `headers` replace the usual ones; those that are None are left out."""
-    usual = {"host": HOST, "x-airmuscle": "1" if method == "POST" else None}
+    usual = {"host": HOST, "x-airmuscle": "1" if method == "POST" or path.startswith("/api/") else None}
     given = {**usual, **(headers or {})}
     scope = {
         "type": "http", "asgi": {"version": "3.0", "spec_version": "2.4"}, "http_version": "1.1", "method": method, "scheme": "http",

@@ -250,6 +250,8 @@ def test_the_number_of_sets_is_bounded_and_those_in_use_are_kept(tmp_path, monke
     monkeypatch.setattr(fit_uploads, "MAX_SETS", 2)
     store = UploadStore(tmp_path)
     first, second = (store.new_set(lambda name: False) for _ in range(2))
+    for name in (first, second):
+        (store.folder(name) / "files" / "a.csv").touch()
     with pytest.raises(BadRequest, match="all are in use"):
         store.new_set(lambda name: False)
     monkeypatch.setattr(fit_uploads, "MAX_IDLE", -1.0)
@@ -257,6 +259,16 @@ def test_the_number_of_sets_is_bounded_and_those_in_use_are_kept(tmp_path, monke
     assert store.folder(first).is_dir()
     with pytest.raises(BadRequest, match="drop them again"):
         store.folder(second)
+
+
+def test_refused_uploads_and_removed_files_occupy_no_set(app, tmp_path, monkeypatch):
+    monkeypatch.setattr(fit_uploads, "MAX_SETS", 2)
+    assert {upload(app, "a.csv", b"").status for _ in range(5)} == {400}
+    for _ in range(4):
+        name = upload(app, "a.csv", b"x").json()["set"]
+        assert post(app, "remove", set=name, name="a.csv").status == 200
+    assert upload(app, "a.csv", german_table()).status == 200
+    assert {path.name for path in tmp_path.rglob("*") if path.is_file()} == {"a.csv"}
 
 
 def test_the_files_of_a_killed_server_are_removed_by_the_next_one(tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import base64
 import hashlib
 import re
@@ -25,7 +26,7 @@ from airmuscle.studio.app import MAX_PAGE, create_app
 from airmuscle.studio.page import self_contained_page
 from airmuscle.studio.plant_sheet import sheet_of_tables
 from airmuscle.studio.security import Access, is_loopback
-from airmuscle.studio.server import access_of, bound_socket
+from airmuscle.studio.server import access_of, bound_socket, reachable_host, warning_of
 from airmuscle.studio.uploads import MAX_TEXT, read_text_tables
 from airmuscle.studio.worker import LimitError, WorkerPool
 
@@ -99,7 +100,7 @@ def test_other_addresses_do_not_exist(app, path):
         "127.0.0.1.evil.example",
         "[::2]:8765",
         "0.0.0.0",
-        "localhost.",
+        "localhost.evil.example.",
         "a" * 500,
     ],
 )
@@ -108,7 +109,7 @@ def test_another_host_name_is_refused(app, host):
     assert request(app, "GET", "/api/library", headers={"host": None}).status == 421
 
 
-@pytest.mark.parametrize("host", ["127.0.0.1", "localhost:80", "[::1]:8765", "[::1]"])
+@pytest.mark.parametrize("host", ["127.0.0.1", "localhost:80", "[::1]:8765", "[::1]", "LOCALHOST", "localhost.:80"])
 def test_the_names_of_this_machine_are_accepted(app, host):
     assert request(app, "GET", "/", headers={"host": host}).status == 200
 
@@ -247,7 +248,16 @@ def test_names_in_the_program_of_a_saved_page_remain_names(name, tmp_path):
 
 
 ALLOWED = ('note = "a/b.toml"', 'x = "2.6 m3/(s Pa)"', 'x = "-1.5e-3 1/bar"', '[[reference]]\nwhere = "https://x/y"')
-REFUSED = ('x = "/etc/passwd"', 'x = "a.toml"', 'x = ["../y"]', "x = { file = 1 }", 'x = "2 a/../b"', 'x = "C:\\\\y"')
+REFUSED = (
+    'x = "/etc/passwd"',
+    'x = "a.toml"',
+    'x = ["../y"]',
+    "x = { file = 1 }",
+    'x = "2 a/../b"',
+    'x = "1 /etc/passwd"',
+    'x = "1 x/etc"',
+    'x = "C:\\\\y"',
+)
 
 
 def test_a_text_may_contain_units_and_references_but_no_paths():
@@ -262,21 +272,54 @@ def test_other_machines_need_the_token():
     app = create_app(Access((), token), pool=InThisProcess())
     assert request(app, "GET", "/").status == 401
     assert request(app, "GET", "/api/library", query=b"token=wrong").status == 401
-    assert request(app, "GET", "/", headers={"cookie": "airmuscle_token=wrong"}).status == 401
+    assert request(app, "GET", "/", headers={"cookie": "airmuscle_token_8765=wrong"}).status == 401
     assert request(app, "GET", "/", query=b"token=" + b"&token=" * 50).status == 401
     first = request(app, "GET", "/", query=f"token={token}".encode())
     assert (first.status, first.headers["location"]) == (303, "/")
     cookie = first.headers["set-cookie"]
     assert "HttpOnly" in cookie
-    assert "samesite=strict" in cookie.lower()
+    assert "samesite=lax" in cookie.lower()
     assert request(app, "GET", "/", headers={"cookie": cookie.split(";")[0], "host": "any.example"}).status == 200
 
 
-def test_only_this_machine_needs_no_token():
-    assert [is_loopback(h) for h in ("127.0.0.1", "127.8.8.8", "localhost", "::1", "[::1]")] == [True] * 5
+def test_a_loopback_address_is_recognised_and_has_a_token_as_well():
+    """Another user of this machine reaches it too."""
+    assert [is_loopback(h) for h in ("127.0.0.1", "127.8.8.8", "localhost", "::1", "[::1]", "LOCALHOST.")] == [True] * 6
     assert [is_loopback(h) for h in ("0.0.0.0", "192.168.1.2", "::", "example.org", "")] == [False] * 5
-    assert access_of("127.0.0.1").token == ""
-    assert len(access_of("0.0.0.0").token) > 30
+    assert min(len(access_of(host).token) for host in ("127.0.0.1", "0.0.0.0")) > 30
+
+
+def test_another_address_of_this_machine_answers_for_its_own_name():
+    assert "127.0.0.2" in access_of("127.0.0.2").hosts
+    assert access_of("0.0.0.0").hosts == ()
+
+
+def test_the_printed_address_can_be_opened_and_an_unencrypted_connection_is_remarked():
+    assert reachable_host("127.0.0.2") == "127.0.0.2"
+    assert [reachable_host(host) in ("0.0.0.0", "::") for host in ("0.0.0.0", "::")] == [False, False]
+    assert "not encrypted" in warning_of("0.0.0.0")
+    assert warning_of("127.0.0.1") == ""
+
+
+@pytest.mark.parametrize("path", ["/api/law/dmsp-20-300", "/api/plant/lift", "/api/joint/joint-dmsp-20-matrix"])
+@pytest.mark.parametrize("headers", [{"x-airmuscle": None}, {"sec-fetch-site": "cross-site"}])
+def test_what_is_read_but_computed_must_come_from_the_page(app, path, headers):
+    assert request(app, "GET", path, headers=headers).status == 403
+
+
+def test_a_tab_that_is_closed_during_its_request_raises_nothing(app):
+    sent = []
+
+    async def receive():
+        return {"type": "http.disconnect"}
+
+    async def send(message):
+        sent.append(message)
+
+    headers = [(b"host", HOST.encode()), (b"x-airmuscle", b"1")]
+    scope = {"type": "http", "http_version": "1.1", "method": "POST", "path": "/api/law", "headers": headers}
+    asyncio.run(app({**scope, "query_string": b"", "root_path": "", "scheme": "http"}, receive, send))
+    assert sent[0]["status"] == 400
 
 
 def test_a_port_in_use_is_named():

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from ..studio import export_page, serve
+from ..studio.server import warning_of
 from ..studio.single_file import open_sheets
 from .completion import complete_law
 from .terminal import echo
@@ -26,7 +27,9 @@ def studio(
     port: Annotated[int, typer.Option(metavar="N", help="Port of the server; 0 stands for any free one.")] = 8765,
     host: Annotated[
         str,
-        typer.Option(metavar="ADDRESS", help="Address of the server. Other machines are admitted with a token only."),
+        typer.Option(
+            metavar="ADDRESS", help="Address of the server; 0.0.0.0 admits other machines, without encryption."
+        ),
     ] = "127.0.0.1",
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
     export: Annotated[
@@ -39,7 +42,8 @@ def studio(
     \b
     The page computes laws and plants itself; the server reads files of the library, texts that are pasted into the
     page and measurement files that are dropped on it, and fits these.
-    It answers this machine only, unless another --host is given. Ctrl-C ends it.
+    It answers this machine only, unless another --host is given, and requires the token of the printed address.
+    Ctrl-C ends it.
 
     \b
     Examples:
@@ -54,6 +58,8 @@ def studio(
 
     def started(address: str) -> None:
         echo(f"studio: {address}  (Ctrl-C ends it)")
+        if remark := warning_of(host):
+            echo(f"note: {remark}", err=True)
         if browser:
             webbrowser.open(address)
 

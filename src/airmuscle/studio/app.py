@@ -19,7 +19,7 @@ from .fit_settings import FieldError
 from .joint_sheet import joint_names, sheet_of_joint
 from .page import self_contained_page, server_page, web_files
 from .requests import BadRequest, decoded, json_answer, limited_body
-from .security import COOKIE, Access, Application, given_token, secured
+from .security import Access, Application, cookie_name, given_token, secured
 from .size_sheet import size_sheet
 from .tasks import (
     plant_names,
@@ -32,8 +32,10 @@ from .tasks import (
 from .uploads import MAX_TEXT
 from .worker import LimitError, WorkerPool
 
-WORKERS = 2
-"""Number of worker processes (chosen)."""
+WORKERS = 4
+"""Number of worker processes for sheets, of which one more than are occupied is kept ready (chosen)."""
+LONG_WORKERS = 3
+"""The same for what may take long: measurement files, sizings and joints (chosen)."""
 TIME_LIMIT = 20.0
 """Limit [s] of the computation of a sheet of a user (chosen)."""
 LIBRARY_LIMIT = 120.0
@@ -44,13 +46,15 @@ MAX_PAGE = 256 * 1024
 """Largest size of a request for a self-contained page [bytes] (chosen)."""
 MAX_PAGE_SHEETS = 12
 """Maximum number of muscles and plants in a self-contained page (chosen)."""
+LONG_TASKS = (sheet_of_joint, size_sheet)
+"""Tasks that leave the workers of the other sheets free."""
 
 
 class Sheets:
     """The sheets that were requested last, by their identifier."""
 
-    def __init__(self, pool: WorkerPool) -> None:
-        self._pool = pool
+    def __init__(self, pool: WorkerPool, long_pool: WorkerPool) -> None:
+        self._pool, self._long_pool = pool, long_pool
         self._kept: collections.OrderedDict[str, dict[str, Any]] = collections.OrderedDict()
         self._of_library: dict[tuple[str, str], str] = {}
         self._lock = threading.Lock()
@@ -71,7 +75,8 @@ class Sheets:
 
     def of_text(self, task: Callable[[str], dict[str, Any]], text: str, limit: float | None = None) -> dict[str, Any]:
         """The sheet that a task makes of a text, within a limit of time [s], by default TIME_LIMIT."""
-        return self.keep(self._pool.call(task, text, limit=TIME_LIMIT if limit is None else limit))
+        pool = self._long_pool if task in LONG_TASKS else self._pool
+        return self.keep(pool.call(task, text, limit=TIME_LIMIT if limit is None else limit))
 
     def keep(self, sheet: dict[str, Any]) -> dict[str, Any]:
         """The sheet, which is kept."""
@@ -97,14 +102,18 @@ def _texts(tables: Mapping[str, Any]) -> dict[str, Any]:
 
 def create_app(
     access: Access = Access(), pool: WorkerPool | None = None, opened: tuple[dict[str, Any], ...] = (),
-    fits: FitService | None = None,
+    fits: FitService | None = None, long_pool: WorkerPool | None = None,
 ) -> Application:  # fmt: skip
-    """The ASGI application. `opened` are sheets with which the page begins. Raises ImportError without starlette."""
+    """The ASGI application. `opened` are sheets with which the page begins. Raises ImportError without starlette.
+
+    `long_pool` computes joints and sizings, by default `pool`.
+    """
     from starlette.applications import Starlette
+    from starlette.requests import ClientDisconnect
     from starlette.routing import Route
 
     pool = pool or WorkerPool(WORKERS)
-    sheets = Sheets(pool)
+    sheets = Sheets(pool, long_pool or pool)
     handlers = Handlers(sheets, access, opened)
     routes = [
         Route("/", handlers.page),
@@ -120,7 +129,9 @@ def create_app(
         Route("/api/page", handlers.save_page, methods=["POST"]),
         *(fits or FitService(pool)).routes(),
     ]
-    errors: dict[Any, Any] = {AirmuscleError: _refused, 404: _missing, 405: _missing, 500: _failed}
+    errors: dict[Any, Any] = {
+        AirmuscleError: _refused, ClientDisconnect: _closed, 404: _missing, 405: _missing, 500: _failed,
+    }  # fmt: skip
     return secured(Starlette(routes=routes, exception_handlers=errors), access)
 
 
@@ -139,7 +150,8 @@ class Handlers:
 
         if self._access.token and given_token(request.scope):
             answer = RedirectResponse("/", status_code=303)
-            answer.set_cookie(COOKIE, self._access.token, httponly=True, samesite="strict")
+            # "lax": a link to the page in a text opens it; requests that cost computation need their header as well
+            answer.set_cookie(cookie_name(request.scope), self._access.token, httponly=True, samesite="lax")
             return answer
         return HTMLResponse(self._page)
 
@@ -247,6 +259,11 @@ async def _refused(request: Any, error: Exception) -> Any:
 
 async def _missing(request: Any, error: Any) -> Any:
     return json_answer({"error": "there is no such address."}, int(error.status_code))
+
+
+async def _closed(request: Any, error: Exception) -> Any:
+    """Nobody receives this answer: the tab was closed during its request."""
+    return json_answer({"error": "the connection was closed."}, 400)
 
 
 async def _failed(request: Any, error: Exception) -> Any:

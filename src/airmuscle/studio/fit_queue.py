@@ -166,6 +166,5 @@ class FitQueue:
         if state != DONE:  # what a process that was ended has left
             shutil.rmtree(task.folder, ignore_errors=True)
         with self._changed:
-            task.error, task.field = error, field
             if task.state == RUNNING:
-                task.state = state
+                task.state, task.error, task.field = state, error, field

@@ -57,10 +57,7 @@ class FitService:
         """Store a file, in a new set unless one is given; returns the set and its files."""
         name = check_file_name(request.query_params.get("name", ""))
         given = request.query_params.get("set", "")
-        if given:
-            self._uploads.folder(given)
-        identifier = given or self._uploads.new_set(self._queue.is_needed)
-        await self._uploads.add(identifier, name, request.stream())
+        identifier = await self._uploads.add(given, name, request.stream(), self._queue.is_needed)
         return json_answer({"set": identifier, "files": self._uploads.names(identifier)})
 
     async def remove_file(self, request: Any) -> Any:
@@ -101,6 +98,7 @@ class FitService:
         path = task.folder / name
         if name not in (RESULT, *DOWNLOADS) or task.state != DONE or not path.is_file():
             raise BadRequest("this fit has no such file.", 404)
+        self._uploads.folder(task.set_name)  # a set whose result is read is not idle
         kind = _TYPES[name.rpartition(".")[2]]
         shown = None if name == RESULT else name
         return FileResponse(path, media_type=kind, filename=shown)

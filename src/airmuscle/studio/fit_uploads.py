@@ -1,7 +1,7 @@
 """Uploads of the tab Fit: sets of measurement files in a temporary folder, within limits of number and size.
 
-A set has a random identifier, which only the page that uploaded it knows. A file appears under its name when it is
-complete. The folder of a server that was killed is removed by the next one.
+A set has a random identifier, which only the page that uploaded it knows; it is made when its first file was accepted.
+A file appears under its name when it is complete. The folder of a server that was killed is removed by the next one.
 """
 
 from __future__ import annotations
@@ -30,8 +30,9 @@ MAX_FILES = 60
 """Maximum number of files of a set (chosen)."""
 MAX_SETS = 40
 """Maximum number of sets that the server keeps (chosen)."""
-MAX_IDLE = 3600.0
-"""Time [s] without a request after which a set may be removed for the sake of another one (chosen)."""
+MAX_IDLE = 600.0
+"""Time [s] without a request after which a set may be removed for the sake of another one (chosen); one without files
+may be removed at once."""
 MAX_NAME = 120
 """Maximum length of the name of a file (chosen)."""
 FILES = "files"
@@ -68,17 +69,18 @@ class UploadStore:
             if len(self._used) >= MAX_SETS:
                 self._remove_idle(is_needed)
             identifier = secrets.token_urlsafe(16)
-            (self._folder(identifier) / FILES).mkdir(parents=True, mode=0o700)
+            self._files(identifier).mkdir(parents=True, mode=0o700)
             self._used[identifier] = time.monotonic()
         return identifier
 
     def _remove_idle(self, is_needed: Callable[[str], bool]) -> None:
         latest = time.monotonic() - MAX_IDLE
-        idle = [name for name, used in self._used.items() if used < latest and not is_needed(name)]
+        filled = {name: any(self._files(name).iterdir()) for name in self._used}
+        idle = [n for n, used in self._used.items() if (used < latest or not filled[n]) and not is_needed(n)]
         if not idle:
             raise BadRequest(f"the server keeps {MAX_SETS} sets of files, and all are in use; try again later.", 503)
-        oldest = min(idle, key=lambda name: self._used[name])
-        shutil.rmtree(self._folder(oldest), ignore_errors=True)
+        oldest = min(idle, key=lambda name: (filled[name], self._used[name]))
+        shutil.rmtree(self._top() / oldest, ignore_errors=True)
         del self._used[oldest]
 
     def folder(self, identifier: str) -> Path:
@@ -87,34 +89,32 @@ class UploadStore:
             if not _IDENTIFIER.fullmatch(identifier) or identifier not in self._used:
                 raise BadRequest("these files are no longer on the server; drop them again.", 404)
             self._used[identifier] = time.monotonic()
-            return self._folder(identifier)
+            return self._top() / identifier
 
     def names(self, identifier: str) -> list[str]:
         """The names of the files of a set, in order."""
         return sorted(path.name for path in (self.folder(identifier) / FILES).iterdir())
 
-    async def add(self, identifier: str, name: str, parts: AsyncIterator[bytes]) -> None:
-        """Add a file, or replace the one of this name. Raises BadRequest beyond the limits."""
-        folder = self.folder(identifier)
-        others = [path for path in (folder / FILES).iterdir() if path.name != name]
+    async def add(
+        self, identifier: str, name: str, parts: AsyncIterator[bytes], is_needed: Callable[[str], bool]
+    ) -> str:
+        """Add a file, or replace the one of this name; the identifier of the set, of a new one if none is given.
+
+        Raises BadRequest beyond the limits; then there is no new set.
+        """
+        folder = self.folder(identifier) if identifier else None
+        others = [path for path in (folder / FILES).iterdir() if path.name != name] if folder else []
         if len(others) >= MAX_FILES:
             raise BadRequest(f"at most {MAX_FILES} files are fitted together; remove some.", 413)
-        size, allowed = 0, MAX_SET - sum(path.stat().st_size for path in others)
-        unfinished = folder / f"{secrets.token_hex(8)}.part"
+        allowed = MAX_SET - sum(path.stat().st_size for path in others)
+        unfinished = self._top() / f"{secrets.token_hex(8)}.part"
         try:
-            with unfinished.open("wb") as file:
-                async for part in parts:
-                    size += len(part)
-                    if size > MAX_FILE:
-                        raise BadRequest(f"{name} is larger than {MAX_FILE // 10**6} MB; export fewer rows.", 413)
-                    if size > allowed:
-                        raise BadRequest(f"all files are larger than {MAX_SET // 10**6} MB; remove some.", 413)
-                    file.write(part)
-            if not size:
-                raise BadRequest(f"{name} is empty.")
-            unfinished.replace(folder / FILES / name)
+            await _write_parts(unfinished, name, parts, allowed)
+            identifier = identifier or self.new_set(is_needed)
+            unfinished.replace(self.folder(identifier) / FILES / name)
         finally:
             unfinished.unlink(missing_ok=True)
+        return identifier
 
     def remove(self, identifier: str, name: str) -> None:
         """Remove a file of a set."""
@@ -127,10 +127,27 @@ class UploadStore:
         if self._root is not None:
             shutil.rmtree(self._root, ignore_errors=True)
 
-    def _folder(self, identifier: str) -> Path:
+    def _files(self, identifier: str) -> Path:
+        return self._top() / identifier / FILES
+
+    def _top(self) -> Path:
         if self._root is None:
             self._root = _new_root(self._parent)
-        return self._root / identifier
+        return self._root
+
+
+async def _write_parts(path: Path, name: str, parts: AsyncIterator[bytes], allowed: int) -> None:
+    size = 0
+    with path.open("wb") as file:
+        async for part in parts:
+            size += len(part)
+            if size > MAX_FILE:
+                raise BadRequest(f"{name} is larger than {MAX_FILE // 10**6} MB; export fewer rows.", 413)
+            if size > allowed:
+                raise BadRequest(f"all files are larger than {MAX_SET // 10**6} MB; remove some.", 413)
+            file.write(part)
+    if not size:
+        raise BadRequest(f"{name} is empty.")
 
 
 def _new_root(parent: Path | None) -> Path:

@@ -3,7 +3,9 @@
 The page has access to the programs that it computes and to nothing else: scripts and styles come from this server
 only, none are written in the page itself, and nothing is sent elsewhere. A request that changes something, or that
 costs computation, needs the header X-Airmuscle, which a page of another origin cannot send, and an Origin of this
-server. The Host of every request is compared, so that another name that leads to this machine is of no use.
+server. The token of the printed address is required of everyone, because the other users of this machine reach a
+loopback address as well. The Host of every request is compared, so that another name that leads to this machine is of
+no use.
 """
 
 from __future__ import annotations
@@ -35,7 +37,11 @@ HEADERS = (
     (b"cache-control", b"no-store"),
 )
 COOKIE = "airmuscle_token"
+LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
+"""Names of this machine in the header Host."""
 READING = ("GET", "HEAD")
+COMPUTING = ("/api/law", "/api/plant", "/api/joint")
+"""Beginnings of the paths that are read, but cost computation."""
 MAX_TARGET = 2048
 """Maximum length of the path of a request (chosen)."""
 
@@ -45,33 +51,33 @@ def is_loopback(host: str) -> bool:
     try:
         return ipaddress.ip_address(host.strip("[]")).is_loopback
     except ValueError:
-        return host == "localhost"
+        return host.lower().removesuffix(".") == "localhost"
 
 
 @dataclasses.dataclass(frozen=True)
 class Access:
-    """Who may send requests: the names of the server, and the token that is required of other machines.
+    """Who may send requests: the names of the server, and the token that is required.
 
     hosts   allowed values of the header Host without a port; any if empty
     token   text that a request must know; none is required if empty
     """
 
-    hosts: tuple[str, ...] = ("127.0.0.1", "localhost", "[::1]")
+    hosts: tuple[str, ...] = LOOPBACK
     token: str = ""
 
     def refusal(self, scope: Scope) -> tuple[int, str] | None:
         """Status and reason if a request is not allowed."""
         headers = _headers(scope)
         host = headers.get("host", "")
-        if self.hosts and _without_port(host) not in self.hosts:
+        if self.hosts and _without_port(host).lower().removesuffix(".") not in self.hosts:
             return 421, "This server does not answer for this host."
         if len(scope.get("raw_path") or scope["path"]) > MAX_TARGET:
             return 414, "The path is too long."
         if self.token and not self._knows_token(scope, headers):
             return 401, "A token is required; open the address that the command printed."
-        if scope["method"] in READING:
+        if scope["method"] in READING and not scope["path"].startswith(COMPUTING):
             return None
-        if scope["method"] != "POST":
+        if scope["method"] not in (*READING, "POST"):
             return 405, "This method is not allowed."
         if headers.get("x-airmuscle") != "1" or headers.get("sec-fetch-site", "same-origin") != "same-origin":
             return 403, "This request does not come from the page of this server."
@@ -81,7 +87,7 @@ class Access:
         return None
 
     def _knows_token(self, scope: Scope, headers: Mapping[str, str]) -> bool:
-        given = [cookie_value(headers.get("cookie", "")), *given_token(scope)]
+        given = [cookie_value(headers.get("cookie", ""), cookie_name(scope)), *given_token(scope)]
         return any(secrets.compare_digest(text.encode(), self.token.encode()) for text in given)
 
 
@@ -94,14 +100,19 @@ def given_token(scope: Scope) -> list[str]:
         return []
 
 
-def cookie_value(text: str) -> str:
+def cookie_name(scope: Scope) -> str:
+    """The name of the cookie: browsers keep one for all ports of a host, and each server has its own token."""
+    return f"{COOKIE}_{(scope.get('server') or ('', 0))[1]}"
+
+
+def cookie_value(text: str, name: str) -> str:
     """The token in a header Cookie; empty if there is none."""
     cookie: SimpleCookie = SimpleCookie()
     try:
         cookie.load(text)
     except CookieError:
         return ""
-    return cookie[COOKIE].value if COOKIE in cookie else ""
+    return cookie[name].value if name in cookie else ""
 
 
 def urlsplit_netloc(origin: str) -> str:

@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
+import ipaddress
 import secrets
+import signal
 import socket
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from ..core.errors import InputError
-from .app import WORKERS, create_app
+from .app import LONG_WORKERS, WORKERS, create_app
+from .connections import limited_protocol
 from .fit_routes import FitService
-from .security import Access, is_loopback
+from .security import LOOPBACK, Access, is_loopback
+from .tasks import warm_up
 from .worker import WorkerPool
 
 PACKAGES = ("starlette", "uvicorn")
-MAX_CONNECTIONS = 64
-"""Maximum number of requests at a time (chosen)."""
+_OUTSIDE = "192.0.2.1"
+"""An address of another network, RFC 5737: its route names the address of this machine; nothing is sent to it."""
 
 
 def check_packages() -> None:
@@ -30,8 +36,19 @@ def check_packages() -> None:
 
 
 def access_of(host: str) -> Access:
-    """The rules of access: this machine without a token, other machines with one."""
-    return Access() if is_loopback(host) else Access((), secrets.token_urlsafe(32))
+    """The rules of access: a token for all, and the names of this machine alone if the server is reached only there.
+
+    Other users of this machine reach a loopback address as well, so it has a token too.
+    """
+    name = f"[{host}]" if ":" in host and not host.startswith("[") else host
+    return Access((*LOOPBACK, name.lower()) if is_loopback(host) else (), secrets.token_urlsafe(32))
+
+
+def warning_of(host: str) -> str:
+    """The remark that belongs to an address that other machines reach; empty for this machine alone."""
+    if is_loopback(host):
+        return ""
+    return "the connection is not encrypted; use it only in a network that you trust."
 
 
 def bound_socket(host: str, port: int) -> socket.socket:
@@ -54,8 +71,39 @@ def bound_socket(host: str, port: int) -> socket.socket:
 def address_of(listening: socket.socket, host: str, access: Access) -> str:
     """The address of the page; with the token if there is one."""
     port = listening.getsockname()[1]
+    host = reachable_host(host)
     name = f"[{host}]" if ":" in host and not host.startswith("[") else host
     return f"http://{name}:{port}/" + (f"?token={access.token}" if access.token else "")
+
+
+def reachable_host(host: str) -> str:
+    """The host; for the unspecified address, on which no page is opened, the address of this machine in its network."""
+    try:
+        address = ipaddress.ip_address(host.strip("[]"))
+    except ValueError:
+        return host
+    if not address.is_unspecified:
+        return host
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as route:
+        try:
+            route.connect((_OUTSIDE, 9))
+            return str(route.getsockname()[0])
+        except OSError:  # a machine without a network
+            return "127.0.0.1"
+
+
+@contextlib.contextmanager
+def ending_signals(end: Callable[[], None]) -> Iterator[None]:
+    """Within the block SIGTERM and SIGHUP, the end of a session, call `end`; the process is not ended at once."""
+    names = [name for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    if threading.current_thread() is not threading.main_thread():
+        names = []
+    before = {name: signal.signal(getattr(signal, name), lambda number, frame: end()) for name in names}
+    try:
+        yield
+    finally:
+        for name, handler in before.items():
+            signal.signal(getattr(signal, name), handler)
 
 
 def serve(host: str, port: int, opened: tuple[dict[str, Any], ...], started: Callable[[str], None]) -> None:
@@ -66,17 +114,26 @@ def serve(host: str, port: int, opened: tuple[dict[str, Any], ...], started: Cal
     check_packages()
     import uvicorn
 
-    access, listening, pool = access_of(host), bound_socket(host, port), WorkerPool(WORKERS)
+    access, listening = access_of(host), bound_socket(host, port)
+    pool, long_pool = WorkerPool(WORKERS, warm_up), WorkerPool(LONG_WORKERS, warm_up)
     settings: dict[str, Any] = {
-        "log_level": "warning", "access_log": False, "limit_concurrency": MAX_CONNECTIONS, "timeout_keep_alive": 5,
+        "log_level": "warning", "access_log": False, "http": limited_protocol(), "timeout_keep_alive": 5,
         "server_header": False, "lifespan": "off", "ws": "none",
     }  # fmt: skip
-    fits = FitService(pool)
-    server = uvicorn.Server(uvicorn.Config(create_app(access, pool, opened, fits), **settings))
-    try:
-        started(address_of(listening, host, access))
-        server.run(sockets=[listening])
-    finally:
-        fits.stop()
-        pool.stop()
-        listening.close()
+    fits = FitService(long_pool)
+    server = uvicorn.Server(uvicorn.Config(create_app(access, pool, opened, fits, long_pool), **settings))
+
+    def end() -> None:
+        server.should_exit = server.force_exit = True
+
+    with ending_signals(end):
+        try:
+            pool.prepare()
+            listening.listen()  # a browser that is faster than the server waits instead of being refused
+            started(address_of(listening, host, access))
+            server.run(sockets=[listening])
+        finally:
+            fits.stop()
+            pool.stop()
+            long_pool.stop()
+            listening.close()

@@ -41,6 +41,12 @@ def sheet_of_offered_plant(name: str) -> dict[str, Any]:
     return sheet_of_plant(read_toml(path), Location(path.name, "", SCENARIOS), name)
 
 
+def warm_up() -> None:
+    """Import what the sheets need, so that the first one is as fast as the next ones."""
+    sheet_of_law("tondu-lopez")
+    sheet_of_offered_plant("lift")
+
+
 def sheet_of_scenario_text(text: str) -> dict[str, Any]:
     """The sheet of a scenario of a user."""
     tables = read_text_tables(text)

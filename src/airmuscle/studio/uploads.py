@@ -6,12 +6,12 @@ the machine of the server.
 
 from __future__ import annotations
 
-import re
 import tomllib
 from collections.abc import Mapping
 from typing import Any
 
 from ..core.errors import FileError, ParameterError
+from ..core.units import is_known_unit
 from ..library.files import is_path
 
 MAX_TEXT = 64 * 1024
@@ -20,7 +20,6 @@ FILE_KEYS = ("file", "mapping")
 """Keys whose value is a path."""
 TEXT_KEYS = ("title", "provenance", "note", "warning", "source", "sources", "reference")
 """Keys of texts that are shown and not read as names."""
-_QUANTITY = re.compile(r"\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s+[^\s.]")
 
 
 def read_text_tables(text: str) -> dict[str, Any]:
@@ -47,8 +46,17 @@ def check_self_contained(value: Any, path: str = "") -> None:
     elif isinstance(value, list):
         for i, item in enumerate(value):
             check_self_contained(item, f"{path}[{i}]")
-    elif isinstance(value, str) and is_path(value) and not (_QUANTITY.match(value) and ".." not in value):
+    elif isinstance(value, str) and is_path(value) and not _is_quantity(value):
         raise ParameterError(_refusal(path))
+
+
+def _is_quantity(text: str) -> bool:
+    number, _, unit = text.strip().partition(" ")
+    try:
+        float(number)
+    except ValueError:
+        return False
+    return is_known_unit(unit.strip())
 
 
 def _refusal(path: str) -> str:

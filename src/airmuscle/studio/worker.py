@@ -41,6 +41,7 @@ class Worker:
     def __init__(self) -> None:
         self._process: Any = None
         self._pipe: Connection | None = None
+        self._starting = threading.Lock()
 
     def call(
         self, task: Callable[..., Any], arguments: tuple[Any, ...], limit: float, report: Report | None = None
@@ -52,6 +53,8 @@ class Worker:
         if self._process is None or not self._process.is_alive():
             self._start()
         assert self._pipe is not None
+        if report is not None:
+            report(0.0, "starting")  # a task that was cancelled while the process was started ends here
         end = time.monotonic() + limit
         try:
             self._pipe.send((task, arguments, report is not None))
@@ -77,17 +80,23 @@ class Worker:
         self.stop()
         context = multiprocessing.get_context("spawn")
         self._pipe, other = context.Pipe()
-        self._process = context.Process(target=serve_tasks, args=(other,), name="airmuscle studio", daemon=True)
-        self._process.start()
+        process = context.Process(target=serve_tasks, args=(other,), name="airmuscle studio", daemon=True)
+        with self._starting:
+            process.start()
+            self._process = process
         other.close()
-        if not self._pipe.poll(_START):
+        try:
+            started = self._pipe.poll(_START) and self._pipe.recv() == "ready"
+        except (EOFError, OSError):
+            started = False
+        if not started:
             self.stop()
             raise LimitError("no process could be started for the computation.")
-        self._pipe.recv()
 
     def kill(self) -> None:
         """End the process from another thread; the call that waits for it raises LimitError."""
-        process = self._process
+        with self._starting:
+            process = self._process
         if process is not None:
             process.kill()
             process.join(_END)
@@ -150,14 +159,32 @@ def _limit_memory() -> None:
 
 
 class WorkerPool:
-    """Some workers, which are started when they are needed."""
+    """Some workers, which are started when they are needed; with `warm`, one more than are occupied is kept ready.
 
-    def __init__(self, count: int) -> None:
+    `warm` is a task without arguments that a new worker runs once, so that its imports delay nobody.
+    """
+
+    def __init__(self, count: int, warm: Callable[[], Any] | None = None) -> None:
         self._all = [Worker() for _ in range(count)]
-        self._free: queue.Queue[Worker] = queue.Queue()
-        self._lock = threading.Lock()
-        for worker in self._all:
+        self._free: queue.LifoQueue[Worker] = queue.LifoQueue()
+        self._warm = warm
+        self._unused = list(self._all) if warm else []
+        for worker in [] if warm else self._all:
             self._free.put(worker)
+
+    def prepare(self) -> None:
+        """Start one more worker in a thread of its own, if there is one that was never started."""
+        with contextlib.suppress(IndexError):
+            arguments = (self._unused.pop(),)
+            threading.Thread(target=self._start, args=arguments, name="airmuscle studio spare", daemon=True).start()
+
+    def _start(self, worker: Worker) -> None:
+        try:
+            if self._warm is not None:
+                worker.call(self._warm, (), _START)
+        except LimitError:
+            worker.stop()  # it starts again with its next task
+        self._free.put(worker)
 
     def call(self, task: Callable[..., Any], *arguments: Any, limit: float) -> Any:
         """The result of a task in a free worker. Raises what it raises, LimitError after `limit` [s]."""
@@ -167,10 +194,14 @@ class WorkerPool:
 
     @contextlib.contextmanager
     def _borrowed(self, limit: float) -> Iterator[Worker]:
+        if self._free.empty():
+            self.prepare()
         try:
             worker = self._free.get(timeout=limit)
         except queue.Empty:
             raise LimitError("all workers of the studio are occupied; try again later.") from None
+        if self._free.empty():
+            self.prepare()
         try:
             yield worker
         finally:
@@ -178,5 +209,6 @@ class WorkerPool:
 
     def stop(self) -> None:
         """End all processes."""
+        self._unused.clear()
         for worker in self._all:
             worker.stop()

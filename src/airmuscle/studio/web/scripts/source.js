@@ -12,11 +12,13 @@
     let answer;
     try { answer = await fetch(address, options); } catch { throw new Error("The server does not answer. Start airmuscle studio again."); }
     if (answer.ok) return answer;
+    if (answer.status === 401) throw new Error("This page belongs to a server that has ended. Open the address that airmuscle studio printed.");
     const content = await answer.json().catch(() => ({ error: answer.statusText }));
     throw new Error(content.error || answer.statusText);
   }
 
-  const post = (address, body) => request(address, { method: "POST", headers: { "X-Airmuscle": "1", "Content-Type": "text/plain; charset=utf-8" }, body });
+  const OWN = { "X-Airmuscle": "1" };  // what a page of another origin cannot send
+  const post = (address, body) => request(address, { method: "POST", headers: { ...OWN, "Content-Type": "text/plain; charset=utf-8" }, body });
 
   /* The program of a sheet enters the table of programs as a script of this server. */
   function loadProgram(sheet) {
@@ -39,7 +41,7 @@
     },
 
     async named(kind, name) {
-      if (!embedded) return loadProgram(await (await request(`api/${kind}/${encodeURIComponent(name)}`)).json());
+      if (!embedded) return loadProgram(await (await request(`api/${kind}/${encodeURIComponent(name)}`, { headers: OWN })).json());
       const sheet = embedded.sheets.find((s) => s.name === name && kindOf(s) === kind);
       if (!sheet) throw new Error(`This page does not contain ${name}.`);
       return sheet;
