@@ -350,4 +350,5 @@ def test_the_text_lists_the_first_laws_and_the_recommended_one():
     assert f"and {len(long.ranking) - 10} more" in lines[more] or f"and {len(long.ranking) - 11} more" in lines[more]
     (excluded,) = (line for line in lines if line.startswith("excluded, as the error is too large"))
     named = [each.name for each in comparison.excluded if each.error is not None]
-    assert named and all(name in excluded for name in named)
+    assert named
+    assert all(name in excluded for name in named)

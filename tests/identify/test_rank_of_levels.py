@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -66,10 +68,21 @@ def test_single_points_are_not_searched_for_runs(monkeypatch):
     random = np.random.default_rng(2)
     columns = {"pressure": random.uniform(0, 6e5, 200), "contraction": random.uniform(0, 0.25, 200)}
     points = Recording({**columns, "force": np.ones(200)}, "points")
-    plain = fit_points._columns_at_levels(points)
+    plain, _ = fit_points._columns_at_levels(points)
     assert all((plain[name] == columns[name]).all() for name in columns)
     monkeypatch.setattr(fit_points, "_may_be_constant", lambda *_: True)
-    assert all((fit_points._columns_at_levels(points)[name] == columns[name]).all() for name in columns)
+    assert all((fit_points._columns_at_levels(points)[0][name] == columns[name]).all() for name in columns)
     monkeypatch.undo()
     monkeypatch.setattr(fit_points, "find_runs", lambda _: pytest.fail("a search for runs"))
     fit_points._columns_at_levels(points)
+
+
+def test_repeated_isobars_have_no_further_levels():
+    """Three runs at each of three pressures, a few hundred pascals apart, determine degree 2 and no more."""
+    runs = [
+        dataclasses.replace(isobar(np.zeros(ROWS), level + shift), origin=f"{level:g} {shift:g}")
+        for level in (2e5, 3.5e5, 5e5) for shift in (-400.0, 0.0, 700.0)
+    ]  # fmt: skip
+    with pytest.raises(IdentificationError, match="cannot separate"):
+        fit(ContractileSurface.blank(5, max_force=1e5), runs)
+    assert fit(ContractileSurface.blank(2, max_force=1e5), runs).rank == 6

@@ -16,6 +16,7 @@ from ..core.reference import cite
 from ..muscle.characteristic.base import Characteristic, ForceLaw
 from ..recording import Recording
 from ..recording.segment import ISOBARIC, ISOMETRIC, find_runs
+from ..recording.segment.runs import RELATIVE_BAND
 from .censoring import Censoring, default_censoring, force_limits
 from .cross_validation import specimen_name
 from .data_checks import DataChecks
@@ -96,11 +97,15 @@ class FitPoints:
     def at_levels(self) -> Recording:
         """The complete rows of `data`, with every quantity that is constant in a run replaced by its level.
 
-        Its noise and its ripple vary in these rows, but do not show how the muscle depends on it.
+        Its noise and its ripple vary in these rows, and its level in repeated runs, but do not show how the muscle
+        depends on it.
         """
         columns = [_columns_at_levels(run) for run in self.recordings]
-        joined = {name: np.concatenate([each[name] for each in columns]) for name in ("pressure", "contraction")}
-        levels = {name: values[~self.missing] for name, values in joined.items()}
+        levels: dict[str, Array] = {}
+        for name in ("pressure", "contraction"):
+            values, held = (np.concatenate([each[name] for each in part]) for part in zip(*columns, strict=True))
+            values[held] = _merged_levels(values[held])
+            levels[name] = values[~self.missing]
         return self.data.with_columns(**levels)
 
     @functools.cached_property
@@ -156,21 +161,31 @@ def _join_recordings(runs: Sequence[Recording]) -> tuple[Recording, npt.NDArray[
     return Recording(columns, origin, constants, references=tuple(cite(runs))), missing
 
 
-def _columns_at_levels(recording: Recording) -> dict[str, Array]:
-    """Pressure and contraction of the rows; that which is constant in a run is replaced by its level."""
+def _columns_at_levels(recording: Recording) -> tuple[dict[str, Array], dict[str, npt.NDArray[np.bool_]]]:
+    """Pressure and contraction of the rows; that which is constant in a run is replaced by its level, in these rows."""
     columns = {name: np.array(recording[name], dtype=float) for name in ("pressure", "contraction")}
+    held = {name: np.zeros(len(recording), dtype=bool) for name in columns}
     finite = np.isfinite(recording["pressure"] + recording["contraction"] + recording["force"]).all()
     if not finite:
-        return columns
+        return columns, held
     bands = {"pressure": LEVEL_BAND * float(np.max(np.abs(columns["pressure"]), initial=0.0)), "contraction": 0.01}
     if not any(_may_be_constant(columns[name], band) for name, band in bands.items()):
-        return columns
+        return columns, held
     names = {ISOBARIC: "pressure", ISOMETRIC: "contraction"}
     for run in find_runs(recording):
         name, rows = names.get(run.kind), run.interval.rows
         if name is not None and len(run.interval) >= MIN_ROWS_OF_RUN and _range(columns[name][rows]) <= bands[name]:
-            columns[name][rows] = np.median(columns[name][rows])
-    return columns
+            columns[name][rows], held[name][rows] = np.median(columns[name][rows]), True
+    return columns, held
+
+
+def _merged_levels(levels: Array) -> Array:
+    """The levels (N,) of runs, those within the band of a constant quantity replaced by the lowest of them."""
+    distinct, member = np.unique(levels, return_inverse=True)
+    band, merged = RELATIVE_BAND * float(np.max(np.abs(distinct), initial=0.0)), distinct.copy()
+    for i in range(1, merged.size):
+        merged[i] = merged[i - 1] if distinct[i] - merged[i - 1] <= band else distinct[i]
+    return np.asarray(merged[member])
 
 
 def _may_be_constant(values: Array, band: float) -> bool:
