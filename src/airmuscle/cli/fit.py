@@ -20,6 +20,7 @@ from .fit_compare import compare_models
 from .fit_geometry import parse_braid, with_braid
 from .fit_options import FitOptions, FitRequest, robust_loss
 from .fit_output import fit_to_dict, print_results, with_option_names, write_results
+from .option_hints import in_options
 from .options import Folder, Json
 from .reading_options import NO_OPTIONS, ReadingOptions, with_reading_options
 from .terminal import print_json
@@ -185,7 +186,7 @@ def _fit_one(files: list[Path], recordings: list[Recording], characteristic: str
     errors = specimen_errors(result, recordings, (*request.fixed, *initial.fixed))
     entry = extras.constrained_entry(fitted_entry(result, start, files, recordings=recordings, errors=errors))
     write_results(result, entry, recordings, request.out, extras.chapters())
-    notes = [*odd_specimen_notes(errors), *missing_geometry(entry)]
+    notes = [*(in_options(note, "fit") for note in odd_specimen_notes(errors)), *missing_geometry(entry)]
     if request.json:
         data = fit_to_dict(result)
         print_json(data | {"notes": [*data["notes"], *notes]} | extras.to_dict())

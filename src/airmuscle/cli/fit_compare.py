@@ -49,7 +49,7 @@ def compare_models(
     initial, notes = _initial_entry(best.candidate, geometry, recordings, request)
     errors = ranked_specimen_errors(best, selection.comparisons, recordings)
     entry = fitted_entry(best.fit, initial, files, left_out_ratio(best), recordings, errors)
-    notes += [*odd_specimen_notes(errors), *missing_geometry(entry)]
+    notes += [*(in_options(note, "fit") for note in odd_specimen_notes(errors)), *missing_geometry(entry)]
     chapters = compare_chapters(selection.comparisons, best, selection.reason)
     write_results(best.fit, entry, recordings, request.out, [*chapters, *extras.chapters()])
     if request.json:

@@ -94,6 +94,7 @@ INSTRUCTIONS: Mapping[str, Mapping[str, Instruction]] = {
         "by": _leave_out,
         "leave_out": _leave_out,
         "identify.hysteresis.fit_hysteresis": lambda hint: "run `airmuscle hysteresis`",
+        "identify.estimate_length_error": lambda hint: "use --length-error SPECIMEN",
     },
     "hysteresis": {
         **_FILES,

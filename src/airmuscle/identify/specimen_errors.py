@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..core.errors import AirmuscleError
+from ..core.hints import Hint, HintedText
 from ..muscle.characteristic.base import Characteristic
 from ..recording import Recording
 from .candidate_scores import FoldScore, RankedModel
@@ -68,7 +69,7 @@ class SpecimenErrors:
         )
 
 
-def odd_specimen_notes(errors: SpecimenErrors | None) -> list[str]:
+def odd_specimen_notes(errors: SpecimenErrors | None) -> list[HintedText]:
     """The remark on a specimen that does not follow the others; empty without one."""
     found = None if errors is None else errors.odd
     if errors is None or found is None:
@@ -80,9 +81,12 @@ def odd_specimen_notes(errors: SpecimenErrors | None) -> list[str]:
         if own in (min(errors.lengths), max(errors.lengths)):
             extrapolated = " Its length is outside those of the others, so that the law is extrapolated to it."
     return [
-        f"Specimen {name} does not follow the others: left out, its rms error is {error:.3g} N, that of the others "
-        f"{others:.3g} N (median).{extrapolated} Compare its length, its product and its fittings with those of the "
-        "others; '--length-error' tests whether its length is recorded wrongly."
+        HintedText(
+            f"Specimen {name} does not follow the others: left out, its rms error is {error:.3g} N, that of the others "
+            f"{others:.3g} N (median).{extrapolated} Compare its length, its product and its fittings with those of "
+            "the others.",
+            Hint("To test whether its length is recorded wrongly", function="identify.estimate_length_error"),
+        )
     ]
 
 

@@ -23,7 +23,7 @@ from ..core.output_folder import atomic_folder
 from ..identify.hysteresis import LoopFit, find_loops, fit_jointly, fit_loop, loops_not_joined, preferred_fit
 from ..identify.hysteresis.selection import select_friction
 from ..identify.law_selection import LawSelection, select_law
-from ..identify.specimen_errors import ranked_specimen_errors
+from ..identify.specimen_errors import odd_specimen_notes, ranked_specimen_errors
 from ..library.entry import Entry
 from ..library.fitted_entry import fitted_entry, left_out_ratio, missing_geometry
 from ..library.initial_law import find_initial_law
@@ -79,7 +79,8 @@ def run_fit(folder: str, out: str, settings: FitSettings, report: Report) -> Non
         sheet["hysteresis"] = _friction(recordings, staging, report) if settings.hysteresis else None
         report(SHARES[2], "report")
         write_fit(staging, best.fit, entry, recordings, chapters)
-        sheet["notes"] = [GEOMETRY] if missing_geometry(entry) else []
+        odd = [in_page_words(note) for note in odd_specimen_notes(errors)]
+        sheet["notes"] = [*odd, *([GEOMETRY] if missing_geometry(entry) else [])]
         sheet["files"] = _pack(staging)
         (staging / RESULT).write_text(as_json(sheet), encoding="utf-8")
 

@@ -13,6 +13,7 @@ from ...recording import Recording
 from ..data_checks import DataChecks
 from ..model_selection import Comparison, compare
 from ..result import Fit
+from ..specimen_errors import odd_specimen_notes, ranked_specimen_errors
 from .creep_stage import creep_force
 from .error_band import ErrorBand, calibrate, calibrate_held
 from .friction_stage import friction_along
@@ -35,7 +36,7 @@ class StaticStage(ShortRepr):
     bands: tuple[ErrorBand, ...]
     """One for each purpose that the records can judge."""
     data_notes: tuple[str, ...] = ()
-    """Contradictions and suspicious values of the records."""
+    """Contradictions and suspicious values of the records, and the specimen that does not follow the others."""
     held_band: ErrorBand | None = None
     """For further isometric runs, if the records contain some."""
 
@@ -94,7 +95,9 @@ def fit_static_stage(
     except AirmuscleError as error:
         return LeftOutStage(NAME, str(error.message), "measure at more levels of pressure and contraction")
     progress(1.0)
-    return StaticStage(comparison, points, bands, DataChecks.of([record.recording for record in used]).notes, held)
+    odd = odd_specimen_notes(ranked_specimen_errors(comparison.recommended, [comparison], points))
+    notes = (*DataChecks.of([record.recording for record in used]).notes, *odd)
+    return StaticStage(comparison, points, bands, notes, held)
 
 
 def _parts_at_levels(
