@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import base64
 import hashlib
+import json
 import re
 import time
 import tomllib
@@ -27,6 +28,7 @@ from airmuscle.studio.page import self_contained_page
 from airmuscle.studio.plant_sheet import sheet_of_tables
 from airmuscle.studio.security import Access, is_loopback
 from airmuscle.studio.server import access_of, bound_socket, reachable_host, warning_of
+from airmuscle.studio.single_file import first_state, open_sheets
 from airmuscle.studio.uploads import MAX_TEXT, read_text_tables
 from airmuscle.studio.worker import LimitError, WorkerPool
 
@@ -287,6 +289,20 @@ def test_a_loopback_address_is_recognised_and_has_a_token_as_well():
     assert [is_loopback(h) for h in ("127.0.0.1", "127.8.8.8", "localhost", "::1", "[::1]", "LOCALHOST.")] == [True] * 6
     assert [is_loopback(h) for h in ("0.0.0.0", "192.168.1.2", "::", "example.org", "")] == [False] * 5
     assert min(len(access_of(host).token) for host in ("127.0.0.1", "0.0.0.0")) > 30
+
+
+def test_a_muscle_that_the_command_names_is_opened_by_its_name(tmp_path):
+    """Only a file has a text of its own."""
+    (tmp_path / "own.toml").write_text(MUSCLE, encoding="utf-8")
+    by_name, by_path = open_sheets(["dmsp-20-300", str(tmp_path / "own.toml")])
+    assert by_name.get("own_text", "") == ""
+    muscles = first_state([by_name, by_path])["muscle"]["muscles"]
+    assert muscles[0] == {"name": "dmsp-20-300", "values": {}}
+    assert set(muscles[1]) == {"text", "values"}
+    opened = json.loads(request(create_app(pool=InThisProcess(), opened=(by_name,)), "GET", "/api/library").text)[
+        "opened"
+    ]
+    assert [sheet["name"] for sheet in opened] == ["dmsp-20-300"]
 
 
 def test_another_address_of_this_machine_answers_for_its_own_name():

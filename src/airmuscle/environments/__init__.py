@@ -1,6 +1,6 @@
 """Learning environments: plants with a task as Gymnasium environments, single and as vectors of thousands.
 
-Each name is imported when it is first used, because Gymnasium calls `register_environments` at every start.
+Each name is imported when it is first used, so that `register_environments` costs little.
 """
 
 from .. import _attach_stub

@@ -15,8 +15,8 @@ EPISODE_PERIODS = 500
 def register_environments() -> None:
     """Register airmuscle/Joint-v0, airmuscle/Lift-v0 and airmuscle/Arm-v0 with Gymnasium, once.
 
-    `gymnasium.make("airmuscle/Joint-v0")` and `gymnasium.make_vec(..., num_envs=N)` then return them. An installed
-    package is registered by Gymnasium itself. Raises InputError if Gymnasium is not installed.
+    `gymnasium.make("airmuscle/Joint-v0")` and `gymnasium.make_vec(..., num_envs=N)` then return them. Gymnasium 1.0
+    and later call this for no package by themselves. Raises InputError if Gymnasium is not installed.
     """
     if importlib.util.find_spec("gymnasium") is None:
         raise InputError("learning environments need the package gymnasium. Install it: pip install airmuscle[sim]")

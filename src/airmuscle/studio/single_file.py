@@ -26,15 +26,20 @@ def open_sheets(names: Sequence[str]) -> tuple[dict[str, Any], ...]:
 
 def first_state(sheets: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """The state of a page that begins with these sheets."""
-    muscles = [{"text": sheet["own_text"], "values": {}} for sheet in sheets if "plant" not in sheet]
+    laws = [sheet for sheet in sheets if "plant" not in sheet]
+    muscles = [_named(sheet) | {"values": {}} for sheet in laws]
     plants = [sheet for sheet in sheets if "plant" in sheet]
-    first = plants[0] if plants else {}
-    plant = {"text": first["own_text"]} if first.get("own_text") else {"name": first.get("name", "")}
+    plant = _named(plants[0]) if plants else {"name": ""}
     return {
         "tab": "muscle" if muscles else "plant",
         "muscle": {"muscles": muscles[:MAX_MUSCLES], "active": 0},
         "plant": plant,
     }
+
+
+def _named(sheet: dict[str, Any]) -> dict[str, Any]:
+    """What the state of a page contains of a sheet: the text of a file, or a name of the library."""
+    return {"text": sheet["own_text"]} if sheet.get("own_text") else {"name": sheet["name"]}
 
 
 def export_page(names: Sequence[str], path: str | Path) -> Path:

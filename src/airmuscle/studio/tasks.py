@@ -64,7 +64,7 @@ def sheet_of_any(name: str) -> dict[str, Any]:
     if "plant" in tables:
         return sheet_of_tables(tables, Location(str(path), "", path.parent), path.stem, {}, path.read_text("utf-8-sig"))
     sheet = law_sheet(load_law(name))
-    return {**sheet, "own_text": sheet["toml"]["unchanged"]}
+    return {**sheet, "own_text": sheet["toml"]["unchanged"]} if is_path(name) else sheet
 
 
 def sheet_of_law(name: str) -> dict[str, Any]:

@@ -57,9 +57,14 @@
     /* Fill the list of the library, then open what the state names. */
     async start(library, state) {
       this.select.replaceChildren(...library.laws.map((law) => element("option", { value: law.name }, `${law.name} – ${law.title}`)));
-      const wanted = state && Array.isArray(state.muscles) && state.muscles.length ? state.muscles.slice(0, MOST) : [{ name: library.laws.some((l) => l.name === FIRST) ? FIRST : library.laws[0]?.name }];
+      const opened = library.opened.filter((s) => !s.plant);
+      const kept = state && Array.isArray(state.muscles) ? state.muscles.slice(0, MOST) : [];
+      const wanted = kept.length || opened.length ? kept : [{ name: library.laws.some((l) => l.name === FIRST) ? FIRST : library.laws[0]?.name }];
       for (const item of wanted) if (item.name || item.text) await this.open(item);
-      for (const sheet of library.opened.filter((s) => !s.plant)) this.add(await source.loadProgram(sheet), { text: sheet.own_text });
+      for (const sheet of opened) {
+        const known = this.laws.some((law) => law.sheet.id === sheet.id);
+        if (!known) this.add(await source.loadProgram(sheet), { text: sheet.own_text, quiet: true });
+      }
       if (!this.laws.length) { this.host.replaceChildren(element("p.message", {}, "This page contains no muscle.")); return; }
       this.restore(state ?? {});
       this.refresh();
