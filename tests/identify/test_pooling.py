@@ -26,7 +26,6 @@ from airmuscle.identify import (
     select_for_both,
     standard_candidates,
 )
-from airmuscle.identify.candidates import blank_surface
 from airmuscle.identify.specimen_effects import Sums, predict_effects
 from airmuscle.library import Entry, load, save
 from airmuscle.muscle.characteristic import ContractileSurface, LogarithmicLength, PooledLengthLaw
@@ -37,9 +36,9 @@ LENGTHS = (0.1, 0.15, 0.2, 0.3, 0.4, 0.25)
 HELD = (0.0, 0.05, 0.1, 0.15)
 NAMES = tuple(f"muscle {i + 1}" for i in range(len(LENGTHS)))
 SCATTER, NOISE = 12.0, 2.0
-POPULATION = LogarithmicLength(blank_surface(3), blank_surface(1), 0.2, 0.2)
-CHANGED = LogarithmicLength(blank_surface(3), blank_surface(3), 0.2, 0.2)
-POOLED = PooledLengthLaw(POPULATION, (blank_surface(2),))
+POPULATION = LogarithmicLength(ContractileSurface.blank(3), ContractileSurface.blank(1), 0.2, 0.2)
+CHANGED = LogarithmicLength(ContractileSurface.blank(3), ContractileSurface.blank(3), 0.2, 0.2)
+POOLED = PooledLengthLaw(POPULATION, (ContractileSurface.blank(2),))
 CANDIDATES = [
     Candidate("complete pooling", POPULATION),
     Candidate("rich", CHANGED),

@@ -26,14 +26,13 @@ from airmuscle.identify import (
     fit,
     standard_candidates,
 )
-from airmuscle.identify.candidates import blank_surface
 from airmuscle.identify.fit_points import FitPoints
 from airmuscle.identify.model_evidence import batch_sample_size
 from airmuscle.identify.recommendation import eligible_models, excess_error, recommend
 from airmuscle.identify.slack_rows import Slackness, SlackPull, slack_pull
 from airmuscle.identify.solver import solve
 from airmuscle.identify.specimen_errors import SpecimenErrors, odd_specimen_notes
-from airmuscle.muscle.characteristic import LogarithmicLength, PooledLengthLaw
+from airmuscle.muscle.characteristic import ContractileSurface, LogarithmicLength, PooledLengthLaw
 from airmuscle.muscle.geometry import Braid
 from airmuscle.recording import Recording
 
@@ -87,7 +86,7 @@ def test_the_law_of_a_specimen_does_not_pull_at_pressures_below_its_slack_rows(p
 
 def test_the_effects_decay_where_the_population_does_not_pull():
     population = LogarithmicLength(
-        _surface(-100.0), blank_surface(1).with_validity_range((1e5, 6e5), (0.0, 0.2)), 0.2, 0.2
+        _surface(-100.0), ContractileSurface.blank(1).with_validity_range((1e5, 6e5), (0.0, 0.2)), 0.2, 0.2
     )
     law = PooledLengthLaw(population, (_surface(400.0),), ("a",), (0.2,), "a", effect_decay=1 / 20)
     assert law.force(3e5, 0.1) == 0.0
@@ -97,7 +96,7 @@ def test_the_effects_decay_where_the_population_does_not_pull():
 
 
 def _surface(force: float):
-    surface = blank_surface(1).with_validity_range((1e5, 6e5), (0.0, 0.2))
+    surface = ContractileSurface.blank(1).with_validity_range((1e5, 6e5), (0.0, 0.2))
     return dataclasses.replace(surface, coefficients=(force, 0.0, 0.0), min_force=-1e6, max_force=1e6)
 
 
@@ -109,7 +108,7 @@ def test_the_greatest_error_of_a_pooled_fit_includes_slack_rows(pooled):
 
 
 def test_a_law_of_any_length_pulls_less_where_a_length_that_was_not_measured_is_slack(measured):
-    law = LogarithmicLength(blank_surface(3), blank_surface(1), 0.2, 0.2)
+    law = LogarithmicLength(ContractileSurface.blank(3), ContractileSurface.blank(1), 0.2, 0.2)
     others = [run for run in measured if run.constants["resting_length"] != 0.083]
     problem = FitPoints.from_recordings(others).problem(law)
     values = solve(problem, LeastSquares()).values
@@ -121,10 +120,10 @@ def test_a_law_of_any_length_pulls_less_where_a_length_that_was_not_measured_is_
 
 def test_a_law_that_pulls_at_slack_rows_of_a_specimen_left_out_loses(measured):
     """The constant law meets no slack row; its score must contain them."""
-    comparison = compare(measured, [Candidate("plane", blank_surface(1))], leave_out=SpecimenSplit())
+    comparison = compare(measured, [Candidate("plane", ContractileSurface.blank(1))], leave_out=SpecimenSplit())
     (score,) = [s for s in comparison.ranking[0].fold_scores if s.fold == "83 mm"]
     others = [run for run in measured if run.constants["resting_length"] != 0.083]
-    law = fit(blank_surface(1), others).model
+    law = fit(ContractileSurface.blank(1), others).model
     own = [run for run in measured if run.constants["resting_length"] == 0.083]
     force, modelled = (np.concatenate(each) for each in (
         [run["force"] for run in own], [law.force(run["pressure"], run["contraction"]) for run in own]))  # fmt: skip
@@ -133,7 +132,7 @@ def test_a_law_that_pulls_at_slack_rows_of_a_specimen_left_out_loses(measured):
 
 
 def test_a_law_that_pulls_where_a_muscle_is_slack_is_not_recommended(measured):
-    candidates = [Candidate("rich", blank_surface(3)), Candidate("plain", blank_surface(2))]
+    candidates = [Candidate("rich", ContractileSurface.blank(3)), Candidate("plain", ContractileSurface.blank(2))]
     ranking = compare(measured[:8], candidates, leave_out=RunSplit()).ranking
     pulls = dataclasses.replace(
         ranking[0],
@@ -178,7 +177,11 @@ def test_all_rows_slack_is_a_clear_error(measured):
     slack = [run.with_columns(force=np.full(len(run), -1.0)) for run in measured]
     with pytest.raises(IdentificationError, match="no measured value"):
         fit(
-            PooledLengthLaw(LogarithmicLength(blank_surface(2), blank_surface(1), 0.2, 0.2), (blank_surface(2),)), slack
+            PooledLengthLaw(
+                LogarithmicLength(ContractileSurface.blank(2), ContractileSurface.blank(1), 0.2, 0.2),
+                (ContractileSurface.blank(2),),
+            ),
+            slack,
         )
 
 
@@ -217,8 +220,8 @@ def isobars(curve: float = 40.0, rows: int = 200) -> list[Recording]:
 def test_with_three_levels_a_law_is_not_recommended_that_the_measured_points_contradict():
     """One standard error of three folds admits straight isobars through curved points, 12 N against 7 N."""
     candidates = [
-        Candidate("straight", blank_surface(1)),
-        Candidate("curved", blank_surface(2), ("coefficients[4]", "coefficients[5]")),
+        Candidate("straight", ContractileSurface.blank(1)),
+        Candidate("curved", ContractileSurface.blank(2), ("coefficients[4]", "coefficients[5]")),
     ]
     found = compare(isobars(), candidates, leave_out=LevelSplit("pressure"))
     straight, curved = found["straight"], found["curved"]

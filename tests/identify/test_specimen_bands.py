@@ -12,7 +12,7 @@ import pytest
 
 import airmuscle as am
 from airmuscle.identify import fit, standard_candidates
-from airmuscle.identify.prediction.left_out import degrees_of_freedom, leverages, t_quantile
+from airmuscle.identify.left_out import degrees_of_freedom, leverages, t_quantile
 from airmuscle.identify.specimen_errors import SpecimenErrors, specimen_errors, specimens_of
 from airmuscle.library import Entry, save
 from airmuscle.library.entry_prediction import predict_with_entry

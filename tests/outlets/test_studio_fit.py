@@ -22,7 +22,7 @@ pytest.importorskip("starlette", reason="needs starlette")
 import airmuscle as am
 from airmuscle.identify import LevelSplit, compare, model_selection, standard_candidates
 from airmuscle.recording import read
-from airmuscle.studio import fit_queue, fit_task, fit_uploads
+from airmuscle.studio import fit_queue, fit_uploads
 from airmuscle.studio.app import create_app
 from airmuscle.studio.fit_queue import FIT_WORKERS, MAX_WAITING, FitQueue
 from airmuscle.studio.fit_routes import MAX_SETTINGS, FitService
@@ -349,7 +349,7 @@ def test_the_specimen_that_does_not_follow_the_others_is_named(tmp_path):
     text = "Specimen c does not follow the others."
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(model_selection, "standard_candidates", lambda runs: standard_candidates(runs)[1:3])
-        patch.setattr(fit_task, "odd_specimen_notes", lambda errors: [text])
+        patch.setattr("airmuscle.studio.fit_task.odd_specimen_notes", lambda errors: [text])
         app = make_app(tmp_path)
         task = fit_of(app, {"columns": COLUMNS, "resting_length": "300 mm"})
     notes = request(app, "GET", f"/api/fit/task/{task}/result.json").json()["notes"]

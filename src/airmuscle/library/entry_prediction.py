@@ -11,9 +11,9 @@ from ..core.hints import Hint
 from ..identify.campaign.rows import is_held
 from ..identify.compared_points import law_of_length
 from ..identify.cross_validation import specimen_name
+from ..identify.left_out import widening
 from ..identify.prediction import RecordPrediction, predict_static
 from ..identify.prediction.fitted_range import length_notes
-from ..identify.prediction.left_out import widening
 from ..identify.problem import fitted_quantity_of
 from ..muscle.characteristic.base import ForceLaw
 from ..muscle.muscle import LENGTH_TOLERANCE

@@ -12,7 +12,7 @@ from ..core.errors import printable
 from ..core.reference import cite
 from ..identify import Fit
 from ..identify.candidate_scores import RankedModel
-from ..identify.prediction.result import LEVEL
+from ..identify.left_out import LEVEL
 from ..identify.specimen_errors import SpecimenErrors, resting_lengths_of, specimens_of
 from ..muscle.geometry import Geometry
 from ..recording import Recording

@@ -25,10 +25,9 @@ from ..core.arrays import Array
 from ..core.errors import ParameterError
 from ..identify.dynamic import DynamicFit
 from ..identify.dynamic.cross_prediction import OF_RECORD
+from ..identify.left_out import LEVEL, degrees_of_freedom, root_mean_square, t_quantile
 from ..identify.prediction import PlantUncertainty
 from ..identify.prediction.dynamic import NORMAL_QUANTILE
-from ..identify.prediction.left_out import degrees_of_freedom, root_mean_square, t_quantile
-from ..identify.prediction.result import LEVEL
 from ..library.location import Location, check_keys, read_finite_number
 from ..library.uncertainty import KEYS, read_uncertainty
 from ..plant.plant import Plant

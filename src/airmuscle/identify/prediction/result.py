@@ -11,9 +11,6 @@ from ...core.arrays import Array
 from ...core.short_repr import ShortRepr
 from ...recording import Recording
 
-LEVEL = 0.95
-"""Share of the rows that the band is stated for."""
-
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class QuantityPrediction(ShortRepr):

@@ -18,9 +18,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...core.arrays import Array
-from .result import LEVEL
+from ..core.arrays import Array
 
+LEVEL = 0.95
+"""Share of the rows that a band is stated for."""
 MIN_MEMBERS = 3
 """Minimum number of specimens from which a band for others is stated (chosen): of two, each predicts the other."""
 
