@@ -34,7 +34,8 @@ from airmuscle.control import (
     WithDrivers,
 )
 from airmuscle.errors import AirmuscleError, ColumnError, ParameterError, UnitError, UnknownNameError
-from airmuscle.report.simulation_chapter import describe_input, run_chapter
+from airmuscle.report import run_chapter
+from airmuscle.report.simulation_chapter import describe_input
 from airmuscle.scenario import load_scenario, scenario_schema
 from airmuscle.study import load_study
 

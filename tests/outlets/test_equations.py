@@ -30,11 +30,10 @@ from airmuscle.muscle.characteristic import (
     LogarithmicLength,
     PressureLaw,
 )
-from airmuscle.report import write_report
+from airmuscle.report import fit_chapter, write_report
 from airmuscle.report.equation import LawEquation, law_equation
 from airmuscle.report.equation.source_code import EXAMPLE, source_codes
 from airmuscle.report.equation_section import equation_section
-from airmuscle.report.static_fit_chapter import fit_chapter
 
 Values = Mapping[str, npt.NDArray[np.float64]]
 RANGES = {"pressure": (5e4, 5e5), "contraction": (0.01, 0.12), "force": (10.0, 400.0)}

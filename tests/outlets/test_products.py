@@ -14,8 +14,7 @@ from airmuscle import simulate
 from airmuscle.cli.app import app
 from airmuscle.control import Schedule
 from airmuscle.errors import ParameterError, UnknownNameError
-from airmuscle.library import list_laws, list_products, load, load_law
-from airmuscle.library.files import entries_of_product
+from airmuscle.library import entries_of_product, list_laws, list_products, load, load_law
 from airmuscle.library.scaling import scale_entry
 from airmuscle.library.stated_band import StatedBand
 from airmuscle.library.uncertainty import ParameterUncertainty, without_parts

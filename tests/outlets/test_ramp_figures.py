@@ -23,11 +23,11 @@ from airmuscle.library.fitted_entry import list_files
 from airmuscle.muscle.characteristic import ContractileSurface
 from airmuscle.muscle.isobars import compute_isobars
 from airmuscle.recording import Recording
+from airmuscle.report import fit_chapter
 from airmuscle.report.band_plot import band_plot
 from airmuscle.report.isobar_plot import isobar_plot
 from airmuscle.report.levels import is_pressure_ramp, levels_of
 from airmuscle.report.ramp_plot import ramp_plot
-from airmuscle.report.static_fit_chapter import fit_chapter
 
 pytestmark = pytest.mark.drawn
 LENGTHS, CONTRACTIONS = (0.083, 0.182, 0.382), (0.0, 0.04, 0.08, 0.12)

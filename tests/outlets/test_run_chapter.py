@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from airmuscle.control import PWM, Periodic, SampledSignal, Schedule, WithDrivers
-from airmuscle.report.simulation_chapter import MAX_DRIVER_SEGMENTS, describe_input, run_chapter
+from airmuscle.report import run_chapter
+from airmuscle.report.simulation_chapter import MAX_DRIVER_SEGMENTS, describe_input
 from airmuscle.scenario import load_scenario
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "fill_discharge.toml"

@@ -2,6 +2,7 @@ from .build import load_valve as load_valve
 from .catalogue import load as load
 from .catalogue import load_data as load_data
 from .entry import Entry as Entry
+from .files import entries_of_product as entries_of_product
 from .files import list_data as list_data
 from .files import list_laws as list_laws
 from .files import list_library as list_library
