@@ -34,7 +34,6 @@ from airmuscle.identify import (
     standard_candidates,
 )
 from airmuscle.identify.candidate_scores import FoldScore
-from airmuscle.identify.candidates import blank_surface
 from airmuscle.identify.cross_validation import ALWAYS_FITTED, default_split
 from airmuscle.identify.force_evaluation import evaluate_force
 from airmuscle.identify.recommendation import excess_error, recommend
@@ -70,9 +69,9 @@ def bench() -> list[Recording]:
 
 CANDIDATES = (
     Candidate("braid", START),
-    Candidate("surface of degree 2", blank_surface(2)),
-    Candidate("surface of degree 5", blank_surface(5)),
-    Candidate("surface of degree 6", blank_surface(6)),
+    Candidate("surface of degree 2", ContractileSurface.blank(2)),
+    Candidate("surface of degree 5", ContractileSurface.blank(5)),
+    Candidate("surface of degree 6", ContractileSurface.blank(6)),
 )
 
 
@@ -233,8 +232,8 @@ def test_what_is_left_out_decides_what_the_law_is_for():
             columns = {"pressure": pressure, "contraction": held, "force": force}
             runs.append(Recording(columns, f"run {len(runs)}", {"resting_length": length, "specimen": f"{length} m"}))
     candidates = [
-        Candidate("plain", blank_surface(1)),
-        Candidate("rich", InverseLength(blank_surface(5), blank_surface(3), 0.4, 0.4)),
+        Candidate("plain", ContractileSurface.blank(1)),
+        Candidate("rich", InverseLength(ContractileSurface.blank(5), ContractileSurface.blank(3), 0.4, 0.4)),
     ]
     within, beyond = (compare(runs, candidates, leave_out=how) for how in (BlockSplit(), SpecimenSplit()))
     assert (within.recommended.candidate.name, beyond.recommended.candidate.name) == ("rich", "plain")
