@@ -20,9 +20,7 @@ import pytest
 pytest.importorskip("starlette", reason="needs starlette")
 pytest.importorskip("uvicorn", reason="needs uvicorn")
 
-from airmuscle.studio import connections
-from airmuscle.studio.connections import ANSWER_LIMIT, BODY_LIMIT, HEAD_LIMIT, close_one_of, limit_of
-from airmuscle.studio.worker import LimitError, Worker, WorkerPool
+from airmuscle.studio import connections, worker
 
 
 @contextmanager
@@ -76,12 +74,12 @@ def made_connection(cycle, since):
 def test_each_phase_of_a_request_has_its_limit(monkeypatch):
     body, answer = (SimpleNamespace(response_complete=False, more_body=more) for more in (True, False))
     done = SimpleNamespace(response_complete=True, more_body=True)
-    assert [limit_of(cycle) for cycle in (None, body, answer, done)] == [
-        HEAD_LIMIT, BODY_LIMIT, ANSWER_LIMIT, HEAD_LIMIT,
+    assert [connections.limit_of(cycle) for cycle in (None, body, answer, done)] == [
+        connections.HEAD_LIMIT, connections.BODY_LIMIT, connections.ANSWER_LIMIT, connections.HEAD_LIMIT,
     ]  # fmt: skip
     monkeypatch.setattr(connections, "MAX_CONNECTIONS", 2)
     kept = [made_connection(cycle, since) for since, cycle in enumerate((body, None, None))]
-    close_one_of(kept)
+    connections.close_one_of(kept)
     assert [each.transport.is_closing() for each in kept] == [False, True, False]
 
 
@@ -113,12 +111,12 @@ def test_a_silent_connection_is_closed_at_its_limit(monkeypatch):
 
 def occupy(pool):
     """A task that lasts until the pool ends."""
-    with suppress(LimitError, AttributeError):
+    with suppress(worker.LimitError, AttributeError):
         pool.call(time.sleep, 60, limit=60.0)
 
 
 def test_a_short_task_is_answered_while_long_ones_run():
-    pool = WorkerPool(4, os.getpid)
+    pool = worker.WorkerPool(4, os.getpid)
     try:
         pool.prepare()
         assert pool.call(sum, [1, 2], limit=60.0) == 3
@@ -137,25 +135,25 @@ def test_a_short_task_is_answered_while_long_ones_run():
 
 def test_a_worker_may_be_ended_at_any_instant_of_its_start():
     for delay in (0.0, 0.005, 0.05):
-        worker, cancelled = Worker(), threading.Event()
+        process, cancelled = worker.Worker(), threading.Event()
 
-        def report(fraction, text, worker=worker, cancelled=cancelled):
+        def report(fraction, text, process=process, cancelled=cancelled):
             if cancelled.is_set():
-                worker.kill()
+                process.kill()
 
         ended = []
 
-        def run(worker=worker, report=report, ended=ended):
+        def run(process=process, report=report, ended=ended):
             try:
-                worker.call(time.sleep, (60.0,), 60.0, report)
-            except (LimitError, TypeError) as error:
+                process.call(time.sleep, (60.0,), 60.0, report)
+            except (worker.LimitError, TypeError) as error:
                 ended.append(error)
 
         thread = threading.Thread(target=run)
         thread.start()
         time.sleep(delay)
         cancelled.set()
-        worker.kill()
+        process.kill()
         thread.join(30.0)
         assert not thread.is_alive()
-        worker.stop()
+        process.stop()

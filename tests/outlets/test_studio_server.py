@@ -23,12 +23,12 @@ from airmuscle.errors import InputError, ParameterError
 from airmuscle.library import to_toml
 from airmuscle.library.location import Location
 from airmuscle.studio import app as studio_app
+from airmuscle.studio import single_file
 from airmuscle.studio.app import MAX_PAGE, create_app
 from airmuscle.studio.page import self_contained_page
 from airmuscle.studio.plant_sheet import sheet_of_tables
 from airmuscle.studio.security import Access, is_loopback
 from airmuscle.studio.server import access_of, bound_socket, reachable_host, warning_of
-from airmuscle.studio.single_file import first_state, open_sheets
 from airmuscle.studio.uploads import MAX_TEXT, read_text_tables
 from airmuscle.studio.worker import LimitError, WorkerPool
 
@@ -294,9 +294,9 @@ def test_a_loopback_address_is_recognised_and_has_a_token_as_well():
 def test_a_muscle_that_the_command_names_is_opened_by_its_name(tmp_path):
     """Only a file has a text of its own."""
     (tmp_path / "own.toml").write_text(MUSCLE, encoding="utf-8")
-    by_name, by_path = open_sheets(["dmsp-20-300", str(tmp_path / "own.toml")])
+    by_name, by_path = single_file.open_sheets(["dmsp-20-300", str(tmp_path / "own.toml")])
     assert by_name.get("own_text", "") == ""
-    muscles = first_state([by_name, by_path])["muscle"]["muscles"]
+    muscles = single_file.first_state([by_name, by_path])["muscle"]["muscles"]
     assert muscles[0] == {"name": "dmsp-20-300", "values": {}}
     assert set(muscles[1]) == {"text", "values"}
     opened = json.loads(request(create_app(pool=InThisProcess(), opened=(by_name,)), "GET", "/api/library").text)[
