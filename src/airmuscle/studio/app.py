@@ -32,8 +32,8 @@ from .tasks import (
 from .uploads import MAX_TEXT
 from .worker import LimitError, WorkerPool
 
-WORKERS = 4
-"""Number of worker processes for sheets, of which one more than are occupied is kept ready (chosen)."""
+WORKERS = 5
+"""Number of worker processes for sheets, some of which are kept ready (chosen)."""
 LONG_WORKERS = 3
 """The same for what may take long: measurement files, sizings and joints (chosen)."""
 TIME_LIMIT = 20.0

@@ -18,7 +18,7 @@ from .connections import limited_protocol
 from .fit_routes import FitService
 from .security import LOOPBACK, Access, is_loopback
 from .tasks import warm_up
-from .worker import WorkerPool
+from .worker import SPARE, WorkerPool
 
 PACKAGES = ("starlette", "uvicorn")
 _OUTSIDE = "192.0.2.1"
@@ -128,7 +128,7 @@ def serve(host: str, port: int, opened: tuple[dict[str, Any], ...], started: Cal
 
     with ending_signals(end):
         try:
-            pool.prepare()
+            pool.prepare(1 + SPARE)
             listening.listen()  # a browser that is faster than the server waits instead of being refused
             started(address_of(listening, host, access))
             server.run(sockets=[listening])

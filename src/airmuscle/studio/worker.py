@@ -27,6 +27,7 @@ Report = Callable[[float, str], None]
 """Receives the progress of a task: the completed fraction and what is being done."""
 _END = 5.0
 """Limit [s] of the end of a process that was killed (chosen)."""
+_ENDED = "the computation ended without a result, for lack of memory; give a smaller model."
 _START = 60.0
 """Limit [s] of the start of a process with its imports (chosen)."""
 
@@ -52,26 +53,26 @@ class Worker:
         """
         if self._process is None or not self._process.is_alive():
             self._start()
-        assert self._pipe is not None
+        pipe = self._pipe
+        if pipe is None:  # the pool was stopped meanwhile
+            raise LimitError(_ENDED)
         if report is not None:
             report(0.0, "starting")  # a task that was cancelled while the process was started ends here
         end = time.monotonic() + limit
         try:
-            self._pipe.send((task, arguments, report is not None))
+            pipe.send((task, arguments, report is not None))
             progress, content = True, (None, None)
             while progress:
-                if not self._pipe.poll(max(0.0, end - time.monotonic())):
+                if not pipe.poll(max(0.0, end - time.monotonic())):
                     self.stop()
                     raise LimitError(f"the computation takes more than {limit:g} s; give a smaller model or file.")
-                progress, content = self._pipe.recv()
+                progress, content = pipe.recv()
                 if progress and report is not None:
                     report(*content)
             result, error = content
         except (EOFError, OSError):
             self.stop()
-            raise LimitError(
-                "the computation ended without a result, for lack of memory; give a smaller model."
-            ) from None
+            raise LimitError(_ENDED) from None
         if error is not None:
             raise error
         return result
@@ -79,14 +80,14 @@ class Worker:
     def _start(self) -> None:
         self.stop()
         context = multiprocessing.get_context("spawn")
-        self._pipe, other = context.Pipe()
+        pipe, other = context.Pipe()
         process = context.Process(target=serve_tasks, args=(other,), name="airmuscle studio", daemon=True)
         with self._starting:
             process.start()
-            self._process = process
+            self._process, self._pipe = process, pipe
         other.close()
         try:
-            started = self._pipe.poll(_START) and self._pipe.recv() == "ready"
+            started = pipe.poll(_START) and pipe.recv() == "ready"
         except (EOFError, OSError):
             started = False
         if not started:
@@ -102,14 +103,15 @@ class Worker:
             process.join(_END)
 
     def stop(self) -> None:
-        """End the process."""
-        if self._process is not None:
-            self._process.kill()
-            self._process.join()
-            self._process = None
-        if self._pipe is not None:
-            self._pipe.close()
-            self._pipe = None
+        """End the process; several threads may do so, of which one closes its pipe."""
+        with self._starting:
+            process, self._process = self._process, None
+            pipe, self._pipe = self._pipe, None
+        if process is not None:
+            process.kill()
+            process.join()
+        if pipe is not None:
+            pipe.close()
 
 
 def serve_tasks(pipe: Connection) -> None:
@@ -158,8 +160,12 @@ def _limit_memory() -> None:
     resource.setrlimit(resource.RLIMIT_DATA, (limit, hard))
 
 
+SPARE = 2
+"""Number of idle workers that a pool keeps ready (chosen): two long tasks may begin at once beside a short one."""
+
+
 class WorkerPool:
-    """Some workers, which are started when they are needed; with `warm`, one more than are occupied is kept ready.
+    """Some workers, which are started when they are needed; with `warm`, SPARE more than are occupied are kept ready.
 
     `warm` is a task without arguments that a new worker runs once, so that its imports delay nobody.
     """
@@ -172,11 +178,12 @@ class WorkerPool:
         for worker in [] if warm else self._all:
             self._free.put(worker)
 
-    def prepare(self) -> None:
-        """Start one more worker in a thread of its own, if there is one that was never started."""
+    def prepare(self, count: int = 1) -> None:
+        """Start further workers, each in a thread of its own, as far as there are some that were never started."""
         with contextlib.suppress(IndexError):
-            arguments = (self._unused.pop(),)
-            threading.Thread(target=self._start, args=arguments, name="airmuscle studio spare", daemon=True).start()
+            for _ in range(count):
+                arguments = (self._unused.pop(),)
+                threading.Thread(target=self._start, args=arguments, name="airmuscle studio spare", daemon=True).start()
 
     def _start(self, worker: Worker) -> None:
         try:
@@ -200,7 +207,7 @@ class WorkerPool:
             worker = self._free.get(timeout=limit)
         except queue.Empty:
             raise LimitError("all workers of the studio are occupied; try again later.") from None
-        if self._free.empty():
+        if self._free.qsize() < SPARE:
             self.prepare()
         try:
             yield worker
