@@ -57,7 +57,8 @@ class JavaScriptKernels(KernelPrinter):
     def assign(self, target: ast.expr, value: ast.expr, node: ast.stmt) -> list[str]:
         left = self.expression(target)
         if isinstance(node, ast.AugAssign):
-            return [f"{left}++;" if ast.unparse(node.value) == "1" else f"{left} = {self.expression(value)};"]
+            counts = isinstance(node.op, ast.Add) and ast.unparse(node.value) == "1"
+            return [f"{left}++;" if counts else f"{left} = {self.expression(value)};"]
         return [f"{self._declared(target, node)}{left} = {self.expression(value)};"]
 
     def _declared(self, target: ast.expr, node: ast.stmt) -> str:
