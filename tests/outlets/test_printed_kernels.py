@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 
 import numpy as np
+import plants
 import printed
 import pytest
 
@@ -17,7 +18,10 @@ from airmuscle.compile.kernel_text import (
     typed,
 )
 from airmuscle.compile.kernels.driven_inputs import DriverKind, apply_drivers
+from airmuscle.control import Schedule
 from airmuscle.errors import TraceError
+from airmuscle.export import C99, JavaScript, Octave, write_program
+from airmuscle.simulation import Problem, RungeKutta4, solve
 
 CASES, CAPACITY, PIECES = 2000, 64, 5
 SIGNAL, TABLE = ("", "CAPACITY"), ("1", "4")
@@ -208,3 +212,63 @@ def test_the_order_of_operations_is_kept(expression, language):
     for own in ("(int)", "Math.trunc", "fix"):
         text = text.replace(own, "int")
     assert expression.replace(".0", "") in text
+
+
+MIDPOINT = """
+from .calls import invoke, pointer
+from .segments import set_inputs
+
+def single_step(rhs, c, y, base, w, t, start, end, h, f0, u, x, yn):
+    last = t + 1.000001 * h >= end
+    taken = end - t if last else h
+    reached = end if last else t + taken
+    set_inputs(base, t - start, w, u)
+    invoke(rhs, (pointer(y), pointer(u), pointer(c), pointer(f0)))
+    for i in range(y.shape[0]):
+        x[i] = y[i] + 0.5 * taken * f0[i]
+    set_inputs(base, t + 0.5 * taken - start, w, u)
+    invoke(rhs, (pointer(x), pointer(u), pointer(c), pointer(f0)))
+    for i in range(y.shape[0]):
+        yn[i] = y[i] + taken * f0[i]
+    return 0, reached, taken, h, 0
+
+def state_between(y, yn, t, h, time, between):
+    for i in range(y.shape[0]):
+        between[i] = y[i] + (time - t) / h * (yn[i] - y[i])
+"""
+
+
+class Midpoint(RungeKutta4):
+    """A method that the library does not have."""
+
+    printed_step = "midpoint"
+
+    def tableau(self):
+        return ((0.5,),), (0.0, 1.0)
+
+
+def run_c(folder):
+    return printed.finished([printed.built(folder)], folder)
+
+
+def run_javascript(folder):
+    return printed.finished([printed.require("node"), "plant.run.mjs"], folder)
+
+
+@pytest.mark.parametrize(
+    ("target", "run"), [(C99(), run_c), (JavaScript(), run_javascript), (Octave(), printed.run_octave)], ids=str
+)
+def test_a_new_integrator_in_the_kernels_is_in_every_outlet(target, run, tmp_path, monkeypatch):
+    def read(module):
+        return read_text(MIDPOINT, "midpoint.py") if module == "midpoint" else read_kernels(module)
+
+    monkeypatch.setattr("airmuscle.compile.kernel_text.printer.read_kernels", read)
+    plant = plants.EXAMPLES["heat"]
+    signal = Schedule(dict.fromkeys(plant.inputs, ((0.0, 0.3), (0.05, 0.1))))
+    problem = Problem(plant, signal, 0.1, plant.state_at(pressure=1e5), integrator=Midpoint(1e-3))
+    write_program(problem, tmp_path, target, name="plant")
+    steps, csv = run(tmp_path)
+    assert "100 steps, 0 rejected" in steps
+    last = [float(number) for number in csv.splitlines()[-1].split(",")]
+    expected = solve(problem).final_state.values()
+    np.testing.assert_allclose(last[1 : 1 + len(expected)], list(expected), rtol=1e-11)

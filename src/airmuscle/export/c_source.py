@@ -8,22 +8,23 @@ import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from ..compile.functions import ArraySizes, Extension
-from ..compile.kernels import rodas4_coefficients
+from ..compile.kernel_text import CKernels
 from ..compile.text.c import CLanguage
 from ..recording.recording import column_heading
-from ..simulation.integrators import ExplicitRungeKutta, Integrator, Rodas4
+from ..simulation.integrators import Integrator
 from .c_text import c_array, c_number, c_string, c_strings
 from .identifiers import make_identifiers
 from .printed_system import ExportedSystem
 from .provenance import block_comment
-from .run_data import RunData, tableau_arrays
+from .run_data import RunData
+from .solver_text import BETWEEN, SHAPES, STEP, TABLEAU, SolverText
 from .templates import filled
 
 PUBLIC = frozenset({"prepare", "rhs", "outputs", "partials", "indicators"})
 """Printed functions that other files may call."""
-COEFFICIENTS = {name: value for name, value in vars(rodas4_coefficients).items() if name.isupper()}
-"""Coefficients of Rodas4 by name."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -43,12 +44,14 @@ class CSource:
     def files(self) -> dict[str, str]:
         """Contents of the header and of the source, by file name."""
         language = CLanguage("double", f"{self.name}_", PUBLIC)
-        functions, sizes = self.system.printed(
-            language, implicit=isinstance(self.integrator, Rodas4), extend=self.extend
-        )
+        solver = self._solver()
+        constants = solver.constants
+        functions, sizes = self.system.printed(language, implicit=solver.implicit, extend=self.extend)
         common = {"provenance": block_comment(self.provenance), "file": self.name}
-        header = {**common, **self._sizes(sizes), **self._steps(), "enumerations": self._enumerations()}
-        source = {**common, "constants": self._constants(), "functions": functions, "solver": self._solver(sizes)}
+        steps = {key.lower(): c_number(constants[key]) for key in ("FIRST_STEP", "CLOSE")}
+        header = {**common, **self._sizes(sizes), **steps, "enumerations": self._enumerations()}
+        text = self._solver_constants(sizes, constants) + filled("solver.c", solver.places, self.name)
+        source = {**common, "constants": self._constants(), "functions": functions, "solver": text}
         return {
             f"{self.name}.h": filled("model.h", header, self.name),
             f"{self.name}.c": filled("model.c", source, self.name),
@@ -91,12 +94,6 @@ class CSource:
             "held": str(sizes.held), "outputs": str(sizes.outputs),
         }  # fmt: skip
 
-    def _steps(self) -> dict[str, str]:
-        if isinstance(self.integrator, ExplicitRungeKutta):
-            step = c_number(self.integrator.step)
-            return {"first_step": step, "close": f"(1e-9 * {step})"}
-        return {"first_step": "0.0", "close": "0.0"}
-
     def _enumerations(self) -> str:
         kinds: Mapping[str, Sequence[str]] = {
             "STATE": self.system.state_names, "INPUT": self.system.input_names, "OUTPUT": self.system.output_names,
@@ -128,27 +125,23 @@ class CSource:
         text += c_array(f"const double {m}_input_minimum[{upper}_INPUTS + 1]", known.input_minimum, 1)
         return text + c_array(f"const double {m}_input_maximum[{upper}_INPUTS + 1]", known.input_maximum, 1)
 
-    def _solver(self, sizes: ArraySizes) -> str:
-        head = filled("solver_head.c", {}, self.name)
-        if isinstance(self.integrator, Rodas4):
-            values = {f"{self.upper}_RTOL": self.integrator.rtol, **COEFFICIENTS}
-            defined = "".join(f"#define {name} {_in_brackets(value)}\n" for name, value in values.items())
-            defined += f"#define {self.upper}_JACOBIAN {sizes.jacobian}\n#define {self.upper}_FACTORS {sizes.factors}\n"
-            return defined + head + filled("rodas4.c", {}, self.name)
-        assert isinstance(self.integrator, ExplicitRungeKutta)
-        rows, weights, nodes = tableau_arrays(self.integrator)
-        count = len(weights)
-        arrays = (
-            f"#define {self.upper}_RTOL 0.0\n#define {self.upper}_STAGES {count}\n"
-            + c_array(f"static const double ROWS[{count}][{count}]", rows)
-            + c_array(f"static const double WEIGHTS[{count}]", weights)
-            + c_array(f"static const double NODES[{count}]", nodes)
-        )
-        return arrays + head + filled("explicit.c", {}, self.name)
+    def _solver(self) -> SolverText:
+        shapes = {name: tuple(f"{self.upper}_{size}" for size in sizes) for name, sizes in SHAPES.items()}
+        fields = {name: f"s->{name}" for name in {*STEP.values(), *BETWEEN.values()}}
+        fields |= {"c": "c", "nominal": f"{self.name}_nominal"} | {key: key.upper() for key in TABLEAU}
+        sizes = {size: f"{self.upper}_{size}{'' if size in {'STATES', 'STAGES'} else ' + 1'}"
+                 for each in SHAPES.values() for size in each}  # fmt: skip
+        return SolverText(CKernels(shapes, f"{self.name}_"), self.integrator, fields, sizes)
 
-
-def _in_brackets(value: float) -> str:
-    return c_number(value) if value >= 0 else f"({c_number(value)})"
+    def _solver_constants(self, sizes: ArraySizes, constants: Mapping[str, Any]) -> str:
+        tableau = {key: value for key, value in constants.items() if isinstance(value, np.ndarray)}
+        numbers = {"RTOL": c_number(constants["RTOL"]), "JACOBIAN": sizes.jacobian, "FACTORS": sizes.factors}
+        if tableau:
+            numbers["STAGES"] = len(tableau["NODES"])
+        text = "".join(f"#define {self.upper}_{key} {value}\n" for key, value in numbers.items())
+        for key, value in tableau.items():
+            text += c_array(f"static double {key}{f'[{len(value)}]' * value.ndim}", value)
+        return text
 
 
 def csv_header(columns: Sequence[str]) -> str:

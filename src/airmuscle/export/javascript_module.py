@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -11,12 +12,12 @@ import numpy as np
 
 from ..compile.kernel_text import JavaScriptKernels
 from ..compile.text.javascript import JavaScriptLanguage
-from ..simulation.integrators import ExplicitRungeKutta, Rodas4
-from .c_source import COEFFICIENTS, csv_header
+from .c_source import csv_header
 from .exported_loop import ExportedLoop
 from .printed_system import ExportedSystem
 from .provenance import block_comment
-from .run_data import RunData, tableau_arrays
+from .run_data import RunData
+from .solver_text import BETWEEN, STEP, TABLEAU, SolverText
 from .templates import filled
 
 ULP = """/** The distance from a number to the next. */
@@ -50,22 +51,22 @@ class JavaScriptModule:
 
     def files(self, columns: Sequence[str]) -> dict[str, str]:
         """Contents of the module, and of a program that writes these columns, after time, as CSV, by file name."""
-        implicit = isinstance(self.run.integrator, Rodas4)
-        functions, sizes = self.system.printed(JavaScriptLanguage(), implicit=implicit)
+        solver = self._solver()
+        functions, sizes = self.system.printed(JavaScriptLanguage(), implicit=solver.implicit)
         functions = functions.replace("export function outputs(", "export function outputsOf(", 1)
         constants = {
             "SIZES": {"held": sizes.held, "jacobian": sizes.jacobian, "factors": sizes.factors},
-            **self._method(),
+            **solver.constants,
         }
         text = "".join(f"export const {name} = {to_json(value)};\n" for name, value in self._names().items())
         text += "".join(f"const {name} = {to_json(value)};\n" for name, value in constants.items())
         comment = block_comment(self.provenance)
-        solver = filled("rodas4.mjs" if implicit else "explicit.mjs", {}, self.name)
         if self.loop is not None:
             text += f"export const loop = {to_json(self._loop_data(self.loop))};\n"
             functions += f"\n{self.loop.controller.sample_in(JavaScriptLanguage('control_'))}"
         places = {
-            "provenance": comment, "constants": text, "functions": functions, "solver": solver,
+            "provenance": comment, "constants": text, "functions": functions,
+            "solver": filled("solver.mjs", solver.places, self.name),
             "arguments": filled("arguments.mjs", {}, self.name), "simulate": self._simulation(),
         }  # fmt: skip
         run = {
@@ -164,14 +165,13 @@ class JavaScriptModule:
             "drivers": {"kinds": table.kinds, "settings": table.settings, "states": loop.driver_states},
         }
 
-    def _method(self) -> dict[str, Any]:
-        integrator = self.run.integrator
-        if isinstance(integrator, ExplicitRungeKutta):
-            rows, weights, nodes = tableau_arrays(integrator)
-            close = 1e-9 * integrator.step
-            return {"FIRST_STEP": integrator.step, "CLOSE": close, "ROWS": rows, "WEIGHTS": weights, "NODES": nodes}
-        assert isinstance(integrator, Rodas4)
-        return {"FIRST_STEP": 0.0, "CLOSE": 0.0, "RTOL": integrator.rtol, **COEFFICIENTS}
+    def _solver(self) -> SolverText:
+        names = {*STEP.values(), *BETWEEN.values()}
+        fields = {name: f"this.{re.sub('_(.)', lambda mark: mark[1].upper(), name)}" for name in names}
+        fields |= {"nominal": "nominal"} | {key: key.upper() for key in TABLEAU}
+        sizes = {"STATES": "states.length", "INPUTS": "inputs.length", "STAGES": "WEIGHTS.length",
+                 "JACOBIAN": "SIZES.jacobian", "FACTORS": "SIZES.factors"}  # fmt: skip
+        return SolverText(JavaScriptKernels(), self.run.integrator, fields, sizes, "work.")
 
 
 def _union(names: Iterable[str]) -> str:

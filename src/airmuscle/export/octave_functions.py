@@ -11,12 +11,12 @@ import numpy as np
 from ..compile.kernel_text import MatlabKernels
 from ..compile.text.matlab import DEFINITION, MatlabBody, MatlabLanguage
 from ..core.errors import printable
-from ..simulation.integrators import ExplicitRungeKutta, Rodas4
-from .c_source import COEFFICIENTS, csv_header
+from .c_source import csv_header
 from .exported_loop import ExportedLoop
 from .printed_system import ExportedSystem
 from .provenance import line_comment
-from .run_data import RunData, tableau_arrays
+from .run_data import RunData
+from .solver_text import BETWEEN, SHAPES, STEP, SolverText
 from .templates import filled
 
 _BODY = MatlabBody()
@@ -46,16 +46,19 @@ class OctaveFunctions:
 
     def files(self, columns: Sequence[str]) -> dict[str, str]:
         """Contents of the function, and of a function that writes these columns, after time, as CSV, by file name."""
-        implicit = isinstance(self.run.integrator, Rodas4)
-        functions, _ = self.system.printed(MatlabLanguage(), implicit=implicit)
-        steps, constants = self._steps(), self._constants()
+        solver = self._solver()
+        functions, _ = self.system.printed(MatlabLanguage(), implicit=solver.implicit)
+        method = solver.constants
+        steps = {key.lower(): m_number(method.pop(key)) for key in ("FIRST_STEP", "CLOSE")}
+        held = {key.lower(): m_array(value) if np.ndim(value) else m_number(value) for key, value in method.items()}
+        constants = self._constants()
         if self.loop is not None:
             functions += f"\n{self.loop.controller.sample_in(MatlabLanguage('control_'))}"
             constants += self._loop_constants(self.loop)
-        solver = filled("rodas4.m" if implicit else "explicit.m", steps, self.name)
         places = {
             "provenance": line_comment(self.provenance), "file": self.name, "functions": f"{DEFINITION}\n{functions}",
-            "constants": constants, "solver": solver, **steps,
+            "constants": constants, "solver": filled("solver.m", {**solver.places, **steps}, self.name), **steps,
+            "solver_constants": "".join(f"  s.{key} = {value};\n" for key, value in held.items()),
             "simulate": self._simulation(steps), "loop_help": LOOP_HELP if self.loop else "",
             "columns": m_strings(["time", *columns]), "header": m_string(csv_header(columns).strip("\n")),
         }  # fmt: skip
@@ -76,15 +79,10 @@ class OctaveFunctions:
         }
         return filled("loop.m", {**places, **steps}, self.name)
 
-    def _steps(self) -> dict[str, str]:
-        integrator = self.run.integrator
-        if isinstance(integrator, ExplicitRungeKutta):
-            rows, weights, nodes = map(m_array, tableau_arrays(integrator))
-            step, close = m_number(integrator.step), m_number(1e-9 * integrator.step)
-            return {"rows": rows, "weights": weights, "nodes": nodes, "first_step": step, "close": close}
-        assert isinstance(integrator, Rodas4)
-        values = {name: m_number(value) for name, value in COEFFICIENTS.items()}
-        return {"rtol": m_number(integrator.rtol), "first_step": "0", "close": "0", **values}
+    def _solver(self) -> SolverText:
+        fields = {name: f"s.{name}" for name in {*STEP.values(), *BETWEEN.values()}} | {"end": "s.finish"}
+        sizes = {"STATES": "s.n", "INPUTS": "numel(s.u)", "STAGES": "numel(s.weights)", "JACOBIAN": "0", "FACTORS": "0"}
+        return SolverText(MatlabKernels(SHAPES), self.run.integrator, fields, sizes)
 
     def _constants(self) -> str:
         system, run, known = self.system, self.run, self.system.compiled.description

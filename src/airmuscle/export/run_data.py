@@ -11,7 +11,7 @@ from ..control.piecewise_linear import PiecewiseLinear
 from ..core.arrays import Array
 from ..core.errors import ParameterError
 from ..simulation import Problem
-from ..simulation.integrators import ExplicitRungeKutta, Integrator, Rodas4
+from ..simulation.integrators import ExplicitRungeKutta, Integrator
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ def loop_data(problem: Problem, others: PiecewiseLinear, times: Array) -> RunDat
 
 def check_integrator(integrator: Integrator) -> Integrator:
     """The integrator. Raises ParameterError for one that has no printed form."""
-    if not isinstance(integrator, Rodas4 | ExplicitRungeKutta):
+    if not integrator.printed_step:
         raise ParameterError(
             f"the integrator {type(integrator).__name__} has no printed form; choose Rodas4, RungeKutta4 or "
             "DormandPrince8."

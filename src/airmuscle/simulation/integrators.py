@@ -45,7 +45,12 @@ PRINCE_DORMAND1981 = Reference(
 
 
 class Integrator(abc.ABC):
-    """A numerical method for ordinary differential equations."""
+    """A numerical method for ordinary differential equations.
+
+    printed_step  module of the kernels with the step that exported programs print; empty: there is none
+    """
+
+    printed_step: ClassVar[str] = ""
 
     @abc.abstractmethod
     def binding(self, compiled: CompiledSystem) -> Binding:
@@ -72,6 +77,7 @@ class Rodas4(Integrator):
     """
 
     references: ClassVar[tuple[Reference, ...]] = (HAIRER_WANNER1996,)
+    printed_step: ClassVar[str] = "rodas4_step"
 
     rtol: float = parameter("1", "rtol", "relative tolerance of a step", bounds=(1e-13, 0.1), default=1e-6)
 
@@ -85,6 +91,7 @@ class Rodas4(Integrator):
 class ExplicitRungeKutta(Integrator):
     """An explicit Runge-Kutta method of fixed step size, stable only for small steps; a subclass has its tableau."""
 
+    printed_step: ClassVar[str] = "fixed_step"
     step: float
 
     @abc.abstractmethod
@@ -93,7 +100,7 @@ class ExplicitRungeKutta(Integrator):
 
     def binding(self, compiled: CompiledSystem) -> Binding:
         address, precomputed = compiled.program.step(self.tableau(), compiled.parameters)
-        work = compiled.sizes.states + 2 * compiled.sizes.inputs
+        work = compiled.sizes.states + compiled.sizes.inputs
         return Binding(fixed_step, (address, precomputed), (self.step,), work)
 
 

@@ -4,34 +4,34 @@ from __future__ import annotations
 
 import ast
 import math
-import textwrap
 from collections.abc import Mapping, Sequence
 
-from .printer import KernelPrinter
-from .scopes import declarations
-from .types import ElementType
+from .braces import BraceKernels
+from .types import ElementType, TypedKernel
 
 _KEYWORDS = """auto break case char const continue default do double else enum extern float for goto if inline int long
 register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while new delete
 class this template typename private public protected operator namespace using try catch throw virtual friend"""
 _NAMES = {"abs": "fabs", "np.ceil": "ceil", "np.floor": "floor", "np.sqrt": "sqrt", "np.exp": "exp", "np.log": "log"}
-_WIDTH = 118
 
 
-class CKernels(KernelPrinter):
+class CKernels(BraceKernels):
     """Kernels in C; the first result is that of the function, the others are written to pointers.
 
     shapes  sizes of the arrays of several dimensions, by the names of the arguments: ("", "CAPACITY")
+    prefix  beginning of the names of the functions of the system
     """
 
     reserved = frozenset(_KEYWORDS.split())
     spelling: dict[type, str] = {}  # noqa: RUF012
 
-    def __init__(self, shapes: Mapping[str, Sequence[str]]) -> None:
-        self.shapes = shapes
+    counter = "int"
 
-    def begin(self) -> None:
-        self._places = declarations(self.source, self.kernel)
+    def __init__(self, shapes: Mapping[str, Sequence[str]], prefix: str = "") -> None:
+        self.shapes, self.prefix = shapes, prefix
+
+    def declaration(self, name: str, constant: bool) -> str:
+        return f"{'const ' if constant else ''}{_type(self.kernel.kinds[name].scalar)} "
 
     def constant(self, name: str, value: float) -> str:
         return f"static const {'int' if isinstance(value, int) else 'double'} {name} = {value!r};"
@@ -44,13 +44,10 @@ class CKernels(KernelPrinter):
 
     def head(self) -> list[str]:
         kernel, returned = self.kernel, self.kernel.returns
-        given = [self._argument(name) for name in self.source.arguments]
+        given = [self._argument(name) for name in kernel.arguments]
         given += [f"{_type(kind)} *{self._out(i)}" for i, kind in enumerate(returned) if i]
         text = f"static {_type(returned[0]) if returned else 'void'} {kernel.source.name}({', '.join(given)})"
-        text = ", ".join(part.replace(" ", "\0") for part in text.split(", "))  # a line ends after an argument
-        lines = [line.replace("\0", " ") for line in textwrap.wrap(text, _WIDTH, subsequent_indent="    ")]
-        early = [f"  {_type(kernel.kinds[name].scalar)} {self.name(name)};" for name in self._places.early]
-        return [*lines, "{", *early]
+        return [text, "{", *(f"  {self.declaration(name, False)}{self.name(name)};" for name in self.early)]
 
     def _argument(self, name: str) -> str:
         kind = self.kernel.kinds[name]
@@ -72,9 +69,6 @@ class CKernels(KernelPrinter):
 
     def flag(self, value: bool) -> str:
         return "1" if value else "0"
-
-    def element(self, array: ast.Name, at: Sequence[ast.expr]) -> str:
-        return self.name(array.id) + "".join(f"[{self.expression(index)}]" for index in at)
 
     def size(self, array: str, dimension: int) -> str:
         try:
@@ -102,22 +96,6 @@ class CKernels(KernelPrinter):
         a, b = (self.expression(each, 5) for each in arguments)
         return f"({a} {'<' if name == 'min' else '>'} {b} ? {a} : {b})"
 
-    def conditional(self, node: ast.IfExp) -> str:
-        return f"{self.expression(node.test, 1)} ? {self.expression(node.body, 1)} : {self.expression(node.orelse)}"
-
-    def assign(self, target: ast.expr, value: ast.expr, node: ast.stmt) -> list[str]:
-        left = self.expression(target)
-        if isinstance(node, ast.AugAssign):
-            counts = isinstance(node.op, ast.Add) and ast.unparse(node.value) == "1"
-            return [f"{left}++;" if counts else f"{left} = {self.expression(value)};"]
-        return [f"{self._declared(target, node)}{left} = {self.expression(value)};"]
-
-    def _declared(self, target: ast.expr, node: ast.stmt) -> str:
-        if not isinstance(target, ast.Name) or self._places.at.get(target.id) is not node:
-            return ""
-        fixed = "const " if target.id in self._places.constant else ""
-        return f"{fixed}{_type(self.kernel.kinds[target.id].scalar)} "
-
     def call_lines(self, call: ast.Call, targets: Sequence[ast.expr], node: ast.stmt) -> list[str]:
         called = self.kernel.calls.get(ast.unparse(call.func))
         if called is None:
@@ -125,23 +103,23 @@ class CKernels(KernelPrinter):
         for target, kind in zip(targets, called.returns, strict=False):
             if self.kernel.of(target) != kind:
                 raise self.source.unprintable(call, "a result of another type than its variable")
-        before = [f"{self._declared(t, node).replace('const ', '')}{self.expression(t)};"
-                  for t in targets[1:] if self._declared(t, node)]  # fmt: skip
-        given = ", ".join(
-            [*map(self.expression, call.args), *(f"&{self.expression(target)}" for target in targets[1:])]
-        )
-        left = f"{self._declared(targets[0], node)}{self.expression(targets[0])} = " if targets else ""
-        return [*before, f"{left}{called.source.name}({given});"]
+        before = [f"{self.declared(t, node, constant=False)}{self.expression(t)};"
+                  for t in targets[1:] if self.declared(t, node)]  # fmt: skip
+        given = [*map(self.expression, called.given(call).values()), *(f"&{self.expression(t)}" for t in targets[1:])]
+        left = f"{self.declared(targets[0], node)}{self.expression(targets[0])} = " if targets else ""
+        return [*before, f"{left}{called.source.name}({', '.join(given)});"]
+
+    def called_with(self, kernel: TypedKernel, given: Mapping[str, str], results: Sequence[str]) -> str:
+        values = [given.get(name, name) for name in kernel.arguments] + [f"&{name}" for name in results[1:]]
+        return f"{f'{results[0]} = ' if results else ''}{kernel.source.name}({', '.join(values)});"
+
+    def workspace(self, arrays: Mapping[str, Sequence[str]]) -> str:
+        texts = [name + "".join(f"[{size}]" for size in sizes) for name, sizes in arrays.items()]
+        return self.lines(f"double {', '.join(texts)};") if texts else ""
 
     def finish(self, values: Sequence[ast.expr], last: bool) -> list[str]:
         lines = [f"*{self._out(i)} = {self.expression(value)};" for i, value in enumerate(values) if i]
         return [*lines, f"return {self.expression(values[0])};"] if values else ["return;"]
-
-    def loop(self, variable: str, first: str, limit: ast.expr) -> str:
-        return f"for (int {variable} = {first}; {variable} < {self.expression(limit, 5)}; {variable}++) {{"
-
-    def branch(self, word: str, test: str) -> str:
-        return f"{word} ({'1' if test == 'true' else test}) {{"
 
 
 def _type(scalar: ElementType) -> str:

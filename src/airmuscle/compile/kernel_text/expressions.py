@@ -18,7 +18,7 @@ OPERATORS: dict[type, tuple[str, int]] = {
 """Operators with their precedence."""
 CONDITIONAL, NEGATION, ATOM = 0, 7, 9
 """Precedence of a conditional value, of signs, and of names, numbers and calls."""
-FUNCTIONS = {"min", "max", "abs", "np.ceil", "np.floor", "np.sqrt", "np.exp", "np.log"}
+FUNCTIONS = {"min", "max", "abs", "sqrt", "np.ceil", "np.floor", "np.sqrt", "np.exp", "np.log"}
 
 
 class ExpressionPrinter(abc.ABC):
@@ -109,11 +109,16 @@ class ExpressionPrinter(abc.ABC):
         text, precedence = OPERATORS[type(operator)]
         return self.spelling.get(type(operator), text), precedence
 
+    def operator(self, text: str, left: ast.expr, right: ast.expr) -> str:
+        """An arithmetic operator between these operands."""
+        return text
+
     def _operation(self, node: ast.BinOp | ast.BoolOp | ast.Compare) -> tuple[str, int]:
         if isinstance(node, ast.BinOp):
             if isinstance(node.op, ast.Pow):
                 return self.call("pow", [node.left, node.right]), ATOM
             text, level = self._operator(node.op, node)
+            text = self.operator(text, node.left, node.right)
             return f"{self.expression(node.left, level)} {text} {self.expression(node.right, level + 1)}", level
         if isinstance(node, ast.BoolOp):
             text, level = self._operator(node.op, node)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import ast
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from .printer import KernelPrinter, used_constants
-from .types import TypedKernel
+from .types import TypedKernel, indices
 
 _KEYWORDS = """break case catch classdef continue do else elseif end end_try_catch end_unwind_protect endfor endfunction
 endif endswitch endwhile for function global if otherwise parfor persistent return spmd switch try until unwind_protect
@@ -15,14 +15,21 @@ while"""
 
 
 class MatlabKernels(KernelPrinter):
-    """Kernels in MATLAB; indices begin with 1, and an array of three dimensions is a row (cell array) of tables."""
+    """Kernels in MATLAB; indices begin with 1, and an array of three dimensions is a row (cell array) of tables.
+
+    shapes  sizes of arrays, by the names of the arguments: a loop over all elements of arrays of one size, which are
+            columns, is printed as operations on whole arrays
+    """
 
     reserved = frozenset(_KEYWORDS.split())
     spelling: dict[type, str] = {ast.NotEq: "~=", ast.Not: "~"}  # noqa: RUF012
-    close, otherwise = "end", "else"
+    close, otherwise, continuation = "end", "else", " ..."
+
+    def __init__(self, shapes: Mapping[str, Sequence[str]] | None = None) -> None:
+        self.shapes = shapes or {}
 
     def begin(self) -> None:
-        pass  # MATLAB declares no variables
+        self._counter, self._columns = "", set[str]()  # of a loop that is printed as operations on whole arrays
 
     def constants(self, kernels: dict[str, TypedKernel]) -> list[str]:
         return []  # a constant is a variable of the functions that use it
@@ -39,24 +46,23 @@ class MatlabKernels(KernelPrinter):
     def head(self) -> list[str]:
         results = self._results(self.kernel)
         names = results[0] if len(results) == 1 else f"[{', '.join(results)}]"
-        given = ", ".join(map(self.name, self.source.arguments))
+        given = ", ".join(map(self.name, self.kernel.arguments))
         constants = [f"  {self.constant(name, value)}" for name, value in used_constants(self.kernel).items()]
         return [f"function {f'{names} = ' if results else ''}{self.source.name}({given})", *constants]
 
     def _results(self, kernel: TypedKernel) -> list[str]:
         """Names of the results of a function, and of the arrays that it changes."""
         names = kernel.returned_names or [f"result_{i}" for i in range(len(kernel.returns))]
-        return [self.name(name) for name in (*names, *self._changed(kernel))]
-
-    @staticmethod
-    def _changed(kernel: TypedKernel) -> list[str]:
-        return [name for name in kernel.source.arguments if name in kernel.written]
+        return [self.name(name) for name in (*names, *kernel.changed)]
 
     def number(self, value: float) -> str:
         return "Inf" if math.isinf(value) else repr(value).removesuffix(".0")
 
     def element(self, array: ast.Name, at: Sequence[ast.expr]) -> str:
-        places, rank = [self._place(index) for index in at], self.kernel.kinds[array.id].rank
+        rank = self.kernel.kinds[array.id].rank
+        if self._counter and ast.unparse(at[-1]) == self._counter:
+            return self.name(array.id) if rank == 1 else f"{self.name(array.id)}({self._place(at[0])}, :)'"
+        places = [self._place(index) for index in at]
         if rank == 3:
             rest = f"({', '.join([*places[1:], ':'][:2])})" if len(places) > 1 else ""
             return f"{self.name(array.id)}{{{places[0]}}}{rest}"
@@ -89,20 +95,86 @@ class MatlabKernels(KernelPrinter):
         raise self.source.unprintable(node, "a conditional value that does not stand alone in an assignment")
 
     def assign(self, target: ast.expr, value: ast.expr, node: ast.stmt) -> list[str]:
+        if self._counter:
+            return [self._assigned_columns(target, value, node)]
         if not isinstance(value, ast.IfExp):
             return [f"{self.expression(target)} = {self.expression(value)};"]
         branches = [["  " + line for line in self.assign(target, v, node)] for v in (value.body, value.orelse)]
         return [f"if {self.expression(value.test)}", *branches[0], "else", *branches[1], "end"]
 
+    def _assigned_columns(self, target: ast.expr, value: ast.expr, node: ast.stmt) -> str:
+        """An assignment to all elements of a column, or the sum of its elements."""
+        left = self.expression(target)
+        if isinstance(target, ast.Name) and isinstance(node, ast.AugAssign):
+            return f"{left} = {left} + sum({self.expression(node.value)});"
+        if isinstance(target, ast.Name):
+            self._columns.add(target.id)
+        elif not self._is_column(value):
+            left += "(:)"
+        return f"{left} = {self.expression(value)};"
+
     def call_lines(self, call: ast.Call, targets: Sequence[ast.expr], node: ast.stmt) -> list[str]:
         called = self.kernel.calls.get(ast.unparse(call.func))
         if called is None:
             raise self.source.unprintable(call, f"the function {ast.unparse(call.func)}")
-        given = dict(zip(called.source.arguments, call.args, strict=True))
-        results = [self.expression(each) for each in (*targets, *(given[name] for name in self._changed(called)))]
-        text = f"{called.source.name}({self.joined(call.args)});"
-        left = results[0] if len(results) == 1 else f"[{', '.join(results)}]"
-        return [f"{left} = {text}" if results else text]
+        given = called.given(call)
+        text = f"{called.source.name}({self.joined(list(given.values()))});"
+        return [self._results_of([*targets, *(given[name] for name in called.changed)]) + text]
+
+    def _results_of(self, targets: Sequence[ast.expr]) -> str:
+        """The left side of an assignment of results."""
+        return self._left(list(map(self.expression, targets)))
+
+    @staticmethod
+    def _left(names: Sequence[str]) -> str:
+        return (names[0] if len(names) == 1 else f"[{', '.join(names)}]") + " = " if names else ""
+
+    def invoke(self, name: str, given: Sequence[ast.expr], results: int) -> str:
+        return f"{self._results_of(given[-results:])}{name}({self.joined(given[:-results])});"
+
+    # Operations on whole arrays
+
+    def compound(self, node: ast.If | ast.While | ast.For) -> list[str]:
+        if not isinstance(node, ast.For) or not self._is_elementwise(node):
+            return super().compound(node)
+        self._counter = ast.unparse(node.target)
+        lines = [line for each in node.body for line in self.statement(each)]
+        self._counter, self._columns = "", set()
+        return lines
+
+    def _is_elementwise(self, node: ast.For) -> bool:
+        """Whether a loop computes every element of columns of one size from the same elements of others."""
+        counter, sizes = ast.unparse(node.target), set()
+        for statement in node.body:
+            if not isinstance(statement, ast.Assign | ast.AugAssign):
+                return False
+            for part in ast.walk(statement):
+                if isinstance(part, ast.IfExp | ast.BoolOp | ast.Compare):
+                    return False
+                if isinstance(part, ast.Subscript) and isinstance(part.value, ast.Name):
+                    *_, last = map(ast.unparse, indices(part))
+                    if last == counter:
+                        sizes.add(self.shapes.get(part.value.id, ("",))[-1])
+                    elif counter in {n.id for n in ast.walk(part) if isinstance(n, ast.Name)}:
+                        return False
+        return len(sizes) == 1 and "" not in sizes
+
+    def _is_column(self, node: ast.expr) -> bool:
+        names = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
+        return bool(self._counter) and bool(names & {self._counter, *self._columns})
+
+    def operator(self, text: str, left: ast.expr, right: ast.expr) -> str:
+        columns = self._is_column(left), self._is_column(right)
+        return f".{text}" if (text == "*" and all(columns)) or (text == "/" and columns[1]) else text
+
+    def called_with(self, kernel: TypedKernel, given: Mapping[str, str], results: Sequence[str]) -> str:
+        values = ", ".join(given.get(name, name) for name in kernel.arguments)
+        changed = [given.get(name, name) for name in kernel.changed]
+        return f"{self._left([*results, *changed])}{kernel.source.name}({values});"
+
+    def workspace(self, arrays: Mapping[str, Sequence[str]]) -> str:
+        texts = [f"{name} = zeros({', '.join([*sizes, '1'][:2])});" for name, sizes in arrays.items()]
+        return "\n".join(" ".join(texts[i : i + 5]) for i in range(0, len(texts), 5))
 
     def finish(self, values: Sequence[ast.expr], last: bool) -> list[str]:
         names = [] if self.kernel.returned_names else self._results(self.kernel)

@@ -5,11 +5,14 @@ from __future__ import annotations
 import abc
 import ast
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from .expressions import ExpressionPrinter
 from .source import KernelSource, read_kernels
-from .types import TypedKernel, pairs, stored_names, typed
+from .types import TypedKernel, invoked, pairs, stored_names, typed
+
+WIDTH = 108
+"""Characters in a line, less the indentation of inner blocks."""
 
 
 class KernelPrinter(ExpressionPrinter):
@@ -19,16 +22,24 @@ class KernelPrinter(ExpressionPrinter):
     """
 
     close = "}"
+    prefix = ""
+    """Beginning of the names of the functions of the system that kernels call."""
+    continuation = ""
+    """What ends a line that goes on in the next."""
 
     def text(self, module: str, names: Sequence[str]) -> str:
         """The functions of a module of `compile/kernels/` with these names, and the constants that they use.
 
         Raises TraceError, with file and line, for a construct that has no printed form.
         """
+        return self.printed(self.typed(module, names))
+
+    def typed(self, module: str, names: Sequence[str]) -> dict[str, TypedKernel]:
+        """These functions with their types, each after those that it calls."""
         self.kernels: dict[str, TypedKernel] = {}
         for name in names:
             self._add(read_kernels(module), name)
-        return self.printed(self.kernels)
+        return self.kernels
 
     def printed(self, kernels: dict[str, TypedKernel]) -> str:
         """Text of typed functions, each after those that it calls, and the constants that they use."""
@@ -40,24 +51,48 @@ class KernelPrinter(ExpressionPrinter):
             return
         source = sources[name]
         for node in ast.walk(source.node):
-            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in source.imported:
-                module = source.imported[node.func.id]
-                self._add(read_kernels(module) if f"{module}.py" != source.file else sources, node.func.id)
+            called = node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
+            if (module := source.imported.get(called, "calls")) != "calls":
+                self._add(read_kernels(module) if f"{module}.py" != source.file else sources, called)
         self.kernels[name] = typed(source, self.kernels)
 
     def constants(self, kernels: dict[str, TypedKernel]) -> list[str]:
         """Lines that define the finite constants of the functions."""
         used = {name: value for kernel in kernels.values() for name, value in used_constants(kernel).items()}
+        known = [name for kernel in kernels.values() for name in kernel.source.constants]
+        used = {name: used[name] for name in dict.fromkeys(known) if name in used}
         return [*(self.constant(name, value) for name, value in used.items()), ""] if used else []
 
     def function(self, kernel: TypedKernel) -> str:
         """The text of one function."""
         self.kernel, self.source = kernel, kernel.source
         self.begin()
-        lines = [*self.comment(self.source.description), *self.head()]
+        first, *rest = self.head()
+        lines = [*self.comment(self.source.description), *self._wrapped(first), *rest]
         return "\n".join([*lines, *indented(self.block(self.source.body)), self.close, ""])
 
+    def _wrapped(self, line: str) -> list[str]:
+        """A line, divided after arguments where it is too long."""
+        at = line.rfind(", ", 0, WIDTH) + 1 if len(line) > WIDTH else 0
+        return [line[:at] + self.continuation, *self._wrapped("    " + line[at + 1 :])] if at > 5 else [line]
+
+    def bound_call(self, kernel: TypedKernel, given: Mapping[str, str], results: Sequence[str]) -> str:
+        """A call from a template: its arguments are texts, or variables of the same name; `results` are variables."""
+        return self.lines(self.called_with(kernel, given, results))
+
+    def lines(self, line: str) -> str:
+        """A line of a template, divided where it is too long."""
+        return "\n".join(self._wrapped(line))
+
     # What a language writes
+
+    @abc.abstractmethod
+    def called_with(self, kernel: TypedKernel, given: Mapping[str, str], results: Sequence[str]) -> str:
+        """The statement of `bound_call`."""
+
+    @abc.abstractmethod
+    def workspace(self, arrays: Mapping[str, Sequence[str]]) -> str:
+        """The declarations of arrays of these sizes."""
 
     @abc.abstractmethod
     def constant(self, name: str, value: float) -> str:
@@ -84,6 +119,10 @@ class KernelPrinter(ExpressionPrinter):
         """The lines of a call of a printed function as a statement, with the targets of its results."""
 
     @abc.abstractmethod
+    def invoke(self, name: str, given: Sequence[ast.expr], results: int) -> str:
+        """The line of a call of a function of the system, of whose arguments the last ones are `results`."""
+
+    @abc.abstractmethod
     def finish(self, values: Sequence[ast.expr], last: bool) -> list[str]:
         """The lines that return values; `last`: at the end of the function."""
 
@@ -107,9 +146,11 @@ class KernelPrinter(ExpressionPrinter):
         """The lines of statements."""
         lines: list[str] = []
         for node in nodes:
-            lines += self.statement(node)
-            remark = None if hasattr(node, "body") else self.source.comments.get(node.end_lineno or 0)
-            if remark:
+            if hasattr(node, "body"):
+                lines += self.statement(node)
+                continue
+            lines += [part for line in self.statement(node) for part in self._wrapped(line)]
+            if remark := self.source.comments.get(node.end_lineno or 0):
                 lines[-1] += f"  {self.remark(remark)}"
         return lines
 
@@ -125,6 +166,8 @@ class KernelPrinter(ExpressionPrinter):
             case ast.AugAssign(target=target, op=operator, value=value):
                 loaded = ast.parse(ast.unparse(target), mode="eval").body
                 return self.assign(target, ast.copy_location(ast.BinOp(loaded, operator, value), node), node)
+            case ast.Expr(value=ast.Call() as call) if system := invoked(call):
+                return [self.invoke(*system)]
             case ast.Expr(value=ast.Call() as call):
                 return self.call_lines(call, [], node)
             case ast.Return(value=value):
@@ -132,7 +175,7 @@ class KernelPrinter(ExpressionPrinter):
                 values = [] if value is None else value.elts if isinstance(value, ast.Tuple) else [value]
                 return self.finish(values, last)
             case ast.If() | ast.While(orelse=[]) | ast.For(orelse=[]):
-                return self._compound(node)
+                return self.compound(node)
             case ast.Break():
                 return [self.word("break")]
             case ast.Continue():
@@ -157,7 +200,8 @@ class KernelPrinter(ExpressionPrinter):
         called = isinstance(value, ast.Call) and isinstance(value.func, ast.Name) and value.func.id in self.kernel.calls
         return self.call_lines(value, [target], node) if called else self.assign(target, value, node)  # type: ignore[arg-type]
 
-    def _compound(self, node: ast.If | ast.While | ast.For) -> list[str]:
+    def compound(self, node: ast.If | ast.While | ast.For) -> list[str]:
+        """The lines of a branch or a loop."""
         if isinstance(node, ast.For):
             lines = [self._for(node)]
         else:
@@ -189,9 +233,8 @@ class KernelPrinter(ExpressionPrinter):
 
 def used_constants(kernel: TypedKernel) -> dict[str, float]:
     """The finite constants that a function uses."""
-    names = [n.id for n in ast.walk(kernel.source.node) if isinstance(n, ast.Name) and n.id not in kernel.kinds]
-    found = {name: kernel.source.constants.get(name, math.inf) for name in names}
-    return {name: value for name, value in found.items() if math.isfinite(value)}
+    names = {n.id for n in ast.walk(kernel.source.node) if isinstance(n, ast.Name)} - {*kernel.kinds}
+    return {name: value for name, value in kernel.source.constants.items() if name in names and math.isfinite(value)}
 
 
 def indented(lines: Sequence[str]) -> list[str]:

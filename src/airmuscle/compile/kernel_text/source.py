@@ -14,6 +14,7 @@ from importlib import resources
 import numpy as np
 
 from ...core.errors import TraceError
+from ...core.status import Status
 from .. import kernel_layout
 
 _PACKAGE = __package__.rpartition(".")[0] + ".kernels"
@@ -90,7 +91,7 @@ def read_text(text: str, file: str) -> dict[str, KernelSource]:
 
 def _constants(nodes: list[ast.stmt]) -> dict[str, float]:
     """The values of the constants of a module."""
-    known = {"np": np, **vars(kernel_layout)}
+    known = {"np": np, "Status": Status, **vars(kernel_layout)}
     values = {}
     for node in nodes:
         if isinstance(node, ast.Assign) and all(

@@ -34,6 +34,7 @@ class TypedKernel:
     written  arguments whose elements it changes
     calls    the printed functions that it calls, by name
     of       the type of an expression
+    called   arguments that are functions of a system, such as its rates: they are called by name
     """
 
     source: KernelSource
@@ -42,6 +43,22 @@ class TypedKernel:
     written: frozenset[str]
     calls: Mapping[str, TypedKernel]
     of: Callable[[ast.expr], ElementType]
+    called: frozenset[str] = frozenset()
+
+    @property
+    def arguments(self) -> list[str]:
+        """Names of the arguments of the printed function."""
+        return [name for name in self.source.arguments if name not in self.called]
+
+    def given(self, call: ast.Call) -> dict[str, ast.expr]:
+        """What a call gives for these arguments."""
+        values = dict(zip(self.source.arguments, call.args, strict=True))
+        return {name: values[name] for name in self.arguments}
+
+    @property
+    def changed(self) -> list[str]:
+        """Names of the arguments whose elements it changes."""
+        return [name for name in self.source.arguments if name in self.written]
 
     @property
     def returned_names(self) -> list[str] | None:
@@ -51,10 +68,21 @@ class TypedKernel:
         return names if len(set(found)) <= 1 and all(name.isidentifier() for name in names) else None
 
 
-REAL_FUNCTIONS = {f"np.{name}": name for name in ("ceil", "floor", "sqrt", "exp", "log")}
-"""Functions of one number that return a number."""
 SAME_TYPE = ("min", "max", "abs")
 """Functions whose result has the type of their arguments."""
+
+
+def invoked(call: ast.expr) -> tuple[str, list[ast.expr], int] | None:
+    """The function of a system that `invoke` calls, its arguments, and how many of them, the last ones, it writes."""
+    match call:
+        case ast.Call(func=ast.Name(id="invoke"), args=[ast.Name(id=name), ast.Tuple(elts=given)]):
+            arrays = [each.args[0] if _is_pointer(each) else each for each in given]  # type: ignore[attr-defined]
+            return name, arrays, 2 if name == "jac" else 1
+    return None
+
+
+def _is_pointer(node: ast.expr) -> bool:
+    return isinstance(node, ast.Call) and ast.unparse(node.func) == "pointer"
 
 
 def typed(source: KernelSource, calls: Mapping[str, TypedKernel]) -> TypedKernel:
@@ -89,6 +117,7 @@ class _Inference:
     def __init__(self, source: KernelSource, calls: Mapping[str, TypedKernel]) -> None:
         self.source, self.calls = source, calls
         self.ranks, self.integers, self.written = dict.fromkeys(source.arguments, 0), set[str](), set[str]()
+        self.flags, self.called = set[str](), set[str]()
         names = {n.id for n in ast.walk(source.node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
         self.locals = dict.fromkeys(names - {*source.arguments}, ElementType.FLAG)
 
@@ -106,9 +135,10 @@ class _Inference:
                 self._assign(node)
         kinds = {name: VariableType(scalar) for name, scalar in self.locals.items()}
         for name in self.source.arguments:
-            given = ElementType.INTEGER if name in self.integers else ElementType.NUMBER
+            given = self._name(name) if name not in self.locals else ElementType.FLAG
             kinds[name] = VariableType(max(given, self.locals.get(name, given)), self.ranks[name])
-        return TypedKernel(self.source, kinds, self._returns(), frozenset(self.written), self.calls, self.of)
+        return TypedKernel(self.source, kinds, self._returns(), frozenset(self.written), self.calls, self.of,
+                           frozenset(self.called))  # fmt: skip
 
     def _returns(self) -> tuple[ElementType, ...]:
         found = [
@@ -139,7 +169,18 @@ class _Inference:
         elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in self.calls:
             called = self.calls[node.func.id]
             for name, given in zip(called.source.arguments, node.args, strict=True):
-                self._given(given, called.kinds[name], name in called.written)
+                if name in called.called:
+                    self.called.add(ast.unparse(given))
+                else:
+                    self._given(given, called.kinds[name], name in called.written)
+        elif isinstance(node, ast.Call) and (system := invoked(node)):
+            name, arrays, results = system
+            self.called.add(name)
+            for i, array in enumerate(arrays):
+                if isinstance(array, ast.Name | ast.Subscript):
+                    self._given(array, VariableType(ElementType.NUMBER, 1), i >= len(arrays) - results)
+        elif isinstance(node, ast.If | ast.While) and isinstance(node.test, ast.Name):
+            self.flags.add(node.test.id)
 
     def _given(self, node: ast.expr, kind: VariableType, written: bool) -> None:
         inner = node.value if isinstance(node, ast.Subscript) else node
@@ -149,6 +190,8 @@ class _Inference:
                 self.written.add(inner.id)
         if kind.scalar == ElementType.INTEGER:
             self._index(node)
+        elif kind.scalar == ElementType.FLAG and isinstance(node, ast.Name):
+            self.flags.add(node.id)
 
     def _rank(self, name: str, rank: int) -> None:
         if name in self.ranks:
@@ -213,7 +256,7 @@ class _Inference:
             return self.locals[name]
         if isinstance(self.source.constants.get(name), int) or name in self.integers:
             return ElementType.INTEGER
-        return ElementType.NUMBER
+        return ElementType.FLAG if name in self.flags else ElementType.NUMBER
 
 
 def stored_names(nodes: list[ast.stmt]) -> Iterator[str]:

@@ -11,17 +11,10 @@ from .parts import CONTRACTED_PART
 
 
 @CONTRACTED_PART
-def set_slopes(slopes: Any, segment: Any, w: Any) -> None:
-    """The slopes `w` of the inputs in a segment."""
-    for i in range(w.shape[0]):
-        w[i] = slopes[segment, i]
-
-
-@CONTRACTED_PART
-def set_inputs(values: Any, segment: Any, elapsed: Any, w: Any, u: Any) -> None:
-    """The inputs `u` so long after the start of a segment."""
+def set_inputs(base: Any, elapsed: Any, w: Any, u: Any) -> None:
+    """The inputs `u` so long after the start of a segment, where they were `base`; they move at `w`."""
     for i in range(u.shape[0]):
-        u[i] = values[segment, i] + elapsed * w[i]
+        u[i] = base[i] + elapsed * w[i]
 
 
 @CONTRACTED_PART

@@ -42,10 +42,10 @@ extern const double model_input_maximum[MODEL_INPUTS + 1];
 /* A run: time, state, the step to be tried next, inputs u + (time - start) w until `end`, and the step before. */
 typedef struct {
   double t, start, end, h, rtol, t_before, h_taken;
-  double x[MODEL_STATES], x_before[MODEL_STATES], dense[2][MODEL_STATES];
+  double x[MODEL_STATES], x_before[MODEL_STATES], d2[MODEL_STATES], d3[MODEL_STATES];
   double u[MODEL_INPUTS + 1], w[MODEL_INPUTS + 1];
-  long steps, rejected, done;
-  int moving;
+  long steps, rejected;
+  int moving, done;
 } model_solver;
 
 /* c[MODEL_PRECOMPUTED + 1]: all that the functions need of the parameters p[MODEL_PARAMETERS + 1]; call it first. */

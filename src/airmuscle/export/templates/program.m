@@ -25,11 +25,13 @@ function s = begin_run(model, run)
   s.n = numel(model.states);
   s.nominal = model.nominal;
   s.t = run.start;
-  s.before = run.start;
+  s.t_before = run.start;
   s.x = run.initial(:);
-  s.xbefore = s.x;
-  s.taken = 0;
-  s.steps = 0;
+  s.x_before = s.x;
+  s.h_taken = 0;
+  s.d2 = zeros(s.n, 1);
+  s.d3 = zeros(s.n, 1);
+@solver_constants@  s.steps = 0;
   s.rejected = 0;
 end
 
@@ -38,6 +40,7 @@ function s = begin_segment(s, finish, u, w)
   s.finish = finish;
   s.u = u;
   s.w = w;
+  s.moving = any(w);
   s.done = 0;
   s.h = @first_step@;
 end
