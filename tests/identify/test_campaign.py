@@ -85,6 +85,38 @@ def test_a_fill_and_its_discharge_are_two_steps_with_their_instants():
     assert down.change == pytest.approx(-6.2e5, rel=0.01)
 
 
+def staircase(*changes, hold=3.0, rows=400):
+    """The pressure of a held muscle through (target [bar], end [bar]): each approach ends where its valve is closed."""
+    pressures, now = [], 0.0
+    for target, end in changes:
+        since = np.arange(rows) * hold / rows - 0.3
+        change = target + (now - target) * np.exp(-np.maximum(since, 0.0) / 0.2)
+        pressures.append(np.maximum(change, end) if end < now else np.minimum(change, end))
+        now = float(pressures[-1][-1])
+    pressure = 1e5 * np.concatenate(pressures) + RANDOM.normal(0.0, 300.0, rows * len(changes))
+    return {"time": np.arange(pressure.size) * hold / rows, "pressure": pressure, "contraction": 0.05 + 0.0 * pressure}
+
+
+def test_a_partial_discharge_is_left_out_and_the_complete_steps_beside_it_are_used():
+    columns = staircase((5.0, 5.0), (0.0, 3.0), (0.0, 0.0))
+    *fills, rest = classify_records([recording(columns, "partial")])
+    assert [record.kind for record in fills] == [RecordKind.FILL] * 2
+    assert [record.steps[0].change for record in fills] == pytest.approx([5e5, -3e5], rel=0.02)
+    assert rest.kind is RecordKind.UNUSED
+    assert rest.reason.startswith(
+        "1 of 3 pressure steps at a held length end between the lowest and the highest pressure,"
+    )
+
+
+def test_a_staircase_of_small_steps_without_force_says_what_it_is():
+    columns = staircase(*((bar, bar) for bar in (1.0, 2.0, 3.0, 4.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.0)))
+    records = classify_records([recording(columns, "stairs")])
+    assert "8 of 10 pressure steps" in records[-1].reason
+    assert not [record for record in records if "no measured force" in record.reason]
+    with_force = {**columns, "force": 1e-3 * columns["pressure"]}
+    assert [record.kind for record in classify_records([recording(with_force, "stairs")])] == [RecordKind.ISOMETRIC]
+
+
 def test_a_file_with_several_isobaric_runs_gives_one_record_for_each():
     parts, offset = [MUSCLE.isobaric(bar, RANDOM) for bar in (2.0, 4.0, 6.0)], 0.0
     for part in parts:

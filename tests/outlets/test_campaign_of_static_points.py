@@ -1,5 +1,6 @@
 """`airmuscle campaign` on a force map without time: its pressures are the levels of the band, and the braid that is given
-is that of the muscle that is written, although there is no fill.
+is that of the muscle that is written, although there is no fill. Fills alone give their scenarios, and the reason why there
+is no muscle.
 """
 
 from __future__ import annotations
@@ -8,11 +9,13 @@ import json
 
 import numpy as np
 import pytest
+from made_campaign import TrueMuscle
 from typer.testing import CliRunner
 
-from airmuscle import load, load_data, write_csv
+from airmuscle import Recording, load, load_data, write_csv
 from airmuscle.cli.app import app
 from airmuscle.muscle.geometry import Braid
+from airmuscle.scenario import load_scenario
 
 
 @pytest.fixture(scope="module")
@@ -46,3 +49,23 @@ def test_the_map_is_one_static_record_with_a_band_of_its_levels(written):
     assert [record["kind"] for record in data["records"]] == ["static"]
     static = next(stage for stage in data["stages"] if stage["stage"] == "static characteristic")
     assert static["bands"][0]["groups"] >= 2
+
+
+def test_fills_alone_give_their_scenarios_with_the_braid_and_say_why_there_is_no_muscle(tmp_path):
+    columns = TrueMuscle(0.3).fill(0.08, np.random.default_rng(1))
+    del columns["force"]
+    write_csv(Recording(columns, "fill", {"resting_length": 0.3}), tmp_path / "fill.csv")
+    braid = ("--braid", "radius=10 mm, angle=24.4 deg", "--resting-length", "300 mm")
+    words = ["campaign", str(tmp_path / "fill.csv"), *braid, "--out", str(tmp_path / "out")]
+    done = CliRunner().invoke(app, words)
+    said = " ".join(done.stdout.split())
+    assert (
+        "muscle: not written, because it needs a static law: no record is a slow run with force and length; record"
+        in said
+    )
+    assert not (tmp_path / "out" / "muscle.toml").exists()
+    path = tmp_path / "out" / "scenarios" / "fill.toml"
+    assert "because no force was measured" in path.read_text(encoding="utf-8").splitlines()[0]
+    assert load_scenario(path).simulate()["pressure"].max() == pytest.approx(6.2e5, rel=0.03)
+    alone = CliRunner().invoke(app, [*words[:2], *braid[2:], "--out", str(tmp_path / "none")])
+    assert "scenarios: not written: the muscle has no enclosed volume" in " ".join(alone.stdout.split())

@@ -212,3 +212,28 @@ def test_an_uncertainty_of_a_plant_with_a_number_that_is_none_is_refused(plants,
     )
     with pytest.raises(ParameterError, match=message):
         load_scenario(tmp_path / "s.toml")
+
+
+def test_a_band_that_does_not_hold_is_said_with_the_likely_reason(muscle, tmp_path):
+    def said(record: Recording) -> str:
+        (note,) = [note for note in predicted(muscle, record, tmp_path)["notes"] if "does not hold" in note]
+        return note
+
+    shifted = said(sweep().with_columns(force=sweep()["force"] - 60.0))
+    assert "is 60" in shifted or "is 59" in shifted
+    assert "too high on average; nothing recorded explains it; usual are another specimen" in shifted
+    far = sweep(top=0.26)
+    beyond = far.with_columns(force=far["force"] + np.where(far["contraction"] > 0.201, 40.0, 0.0))
+    assert "too low on average; likely because of rows outside the range of the fit (inside it 9" in said(beyond)
+    fast = sweep(duration=12.0)
+    assert "likely because of a faster motion" in said(fast.with_columns(force=fast["force"] + 30.0))
+
+
+def test_a_band_of_another_muscle_that_does_not_hold_names_the_difference():
+    law, other = am.load(LAW).characteristic, sweep().with_columns(force=sweep()["force"] + 40.0)
+    prediction = predict_static(law, other, half_width=8.0, differences=("another specimen",))
+    assert "likely because of another specimen" in prediction.notes[-1]
+
+
+def test_a_band_that_holds_is_not_doubted(muscle, tmp_path):
+    assert not [note for note in predicted(muscle, sweep(seed=9), tmp_path)["notes"] if "does not hold" in note]

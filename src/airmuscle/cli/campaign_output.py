@@ -53,6 +53,12 @@ def print_campaign(
     written = sum(bool(scenario.text) for scenario in scenarios)
     if (out / "muscle.toml").exists():
         echo(f"muscle: {out / 'muscle.toml'}")
+    elif isinstance(campaign.static, LeftOutStage):
+        stage = campaign.static
+        echo(f"muscle: not written, because it needs a static law: {stage.reason}; {stage.remedy}")
+    if scenarios and not written:
+        reasons = dict.fromkeys(scenario.reason for scenario in scenarios)
+        echo(f"scenarios: not written: {'; '.join(reasons)}")
     if written:
         echo(f"scenarios: {out / 'scenarios'} ({written} of {len(scenarios)} records)")
     echo(f"report: {out / 'report.html'}")

@@ -45,7 +45,7 @@ def predict_with_entry(entry: Entry, recording: Recording) -> RecordPrediction:
     stated = recording.constants.get("resting_length")
     length = None if stated is None else float(stated)
     law = law_of_length(entry.characteristic, length, specimen_name(recording))
-    notes = []
+    notes, differences = [], []
     if length is None and entry.geometry is not None:
         recording, remarks = _with_resting_length(recording, float(entry.geometry.resting_length))
         notes += remarks
@@ -56,15 +56,18 @@ def predict_with_entry(entry: Entry, recording: Recording) -> RecordPrediction:
         notes.append(f"left out of the static prediction: {', '.join(left_out)}")
     own = None if entry.geometry is None else float(entry.geometry.resting_length)
     if None not in (own, length) and abs((own or 0.0) - (length or 0.0)) > LENGTH_TOLERANCE:
+        differences.append("another resting length")
         notes.append(f"the law was scaled from {1e3 * (own or 0.0):.4g} mm to {1e3 * (length or 0.0):.4g} mm")
     half, source, remarks = _band(entry, fitted_quantity_of(law).name, recording)
     limits = entry.error_band
     rates = {} if limits is None else {"contraction": limits.max_contraction_rate, "pressure": limits.max_pressure_rate}
-    result = predict_static(
+    if any(note.startswith("specimen ") for note in remarks):
+        differences.append("another specimen")
+    return predict_static(
         law, recording, friction=entry.friction, creep=entry.creep, half_width=half,
         validity_range=entry.validity_range, rates=rates, band=source,
+        notes=(*notes, *remarks), differences=differences,
     )  # fmt: skip
-    return dataclasses.replace(result, notes=(*result.notes, *notes, *remarks))
 
 
 def _with_resting_length(recording: Recording, length: float) -> tuple[Recording, list[str]]:

@@ -35,6 +35,9 @@ REGULATOR = ProportionalRegulator(Supply(1e6), Valve(2e-7, 0.3), Valve(2e-7, 0.3
 MARGIN = 2e5
 """Pressure of the supply above the highest recorded pressure [Pa] (chosen)."""
 
+IDEAL = "Its tension is that of the volume by virtual work, because no force was measured."
+"""Note of the scenario of a fill without a static law: the pressure at a held length does not depend on the tension."""
+
 
 class RecordScenario(NamedTuple):
     """The scenario of a record: its file name, its text, and the reason where there is none."""
@@ -58,12 +61,14 @@ def campaign_scenarios(campaign: Campaign) -> tuple[RecordScenario, ...]:
 
 
 def _scenario(campaign: Campaign, record: CampaignRecord, name: str) -> RecordScenario:
-    muscle = campaign.muscle(record.resting_length)
+    muscle, geometry = campaign.muscle(record.resting_length), campaign.geometry(record.resting_length)
+    if muscle is None and record.kind is RecordKind.FILL and geometry is not None:
+        muscle = Muscle.ideal(geometry)
     reason = ""
     if record.kind is RecordKind.UNUSED:
         reason = record.reason
     elif muscle is None:
-        reason = "the muscle has no enclosed volume"
+        reason = "the muscle has no static law" if geometry is not None else "the muscle has no enclosed volume"
     elif "time" not in record.recording:
         reason = "the record has no time"
     if reason or muscle is None:
@@ -87,11 +92,12 @@ def _fill(campaign: Campaign, record: CampaignRecord, muscle: Muscle) -> tuple[s
     if not isinstance(stage, FillStage) or record not in stage.records:
         return "", "the fills of this muscle were not fitted"
     plant, known, start = _fitted_record(stage, record, muscle)
+    ideal = "" if campaign.law() is not None else f" {IDEAL}"
     points = {name: [list(point) for point in rows] for name, rows in stage.commands(record).items()}
     run = {"duration": float(record.recording["time"][-1]) - start, "initial_state": {"pressure": known["pressure"]}}
     table = fit_uncertainty(stage.fit, [{"pressure": error} for error in stage.cross_rms])
     fitted = {"uncertainty": _known_in(table, plant)}
-    return scenario_toml(record.origin, plant, points, run, _note(record, start), fitted), ""
+    return scenario_toml(record.origin, plant, points, run, f"{_note(record, start)}{ideal}", fitted), ""
 
 
 def _release(campaign: Campaign, record: CampaignRecord, muscle: Muscle) -> tuple[str, str]:

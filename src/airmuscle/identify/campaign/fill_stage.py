@@ -90,9 +90,8 @@ class FillStage(ShortRepr):
         return (
             f"The rms residual of {worst.origin}, {rms / 1e3:.3g} kPa, is {rms / noise:.3g} times the noise of the "
             "pressure sensor: the model does not follow the records, and conductances, heat transfer and volume are "
-            "not to be used. Changes of the pressure by less than half of the range, such as a partial discharge, are "
-            "not detected as steps: cut such rows off, or write each change to a file of its own. Check also that "
-            "the supply pressure was constant and that no tube or leak lies between valve and muscle."
+            "not to be used. Check that the supply pressure was constant, that each change of the pressure goes "
+            "through an open valve until it has settled, and that no tube or leak lies between valve and muscle."
         )
 
     @property

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import enum
-from collections.abc import Sequence
+import itertools
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -19,13 +20,15 @@ from ...recording.segment import (
     ISOTONIC,
     Inspection,
     Run,
+    Sensor,
     estimate_sensors,
     inspect,
     inspect_all,
     quasi_static_rows,
 )
+from ...recording.segment.interval import true_intervals
 from ...recording.segment.runs import CONTRACTION_BAND, RELATIVE_BAND
-from .transient import PressureStep, find_motion, find_pressure_steps
+from .transient import MIN_STEP, PressureStep, find_motion, find_pressure_steps
 
 RowMask = npt.NDArray[np.bool_]
 MIN_HOLD, MIN_HOLD_RATIO = 10.0, 10.0
@@ -36,6 +39,9 @@ MIN_ROWS = 8
 """Minimum number of rows of a record (chosen)."""
 MIN_SLOW = 0.5
 """Minimum fraction of slow rows of a record that is used for static fits (chosen)."""
+LEVEL_SHARE = 0.05
+"""Distance of the end of a step from the highest or the lowest pressure, as a fraction of their difference, within
+which it leads to the supply or to ambient pressure (chosen)."""
 MAX_CHANGE = 0.04
 """Maximum change of pressure and length in a slow row within 0.1 s, as a fraction of their range (chosen). It exceeds
 that of a quasi-static row, because the friction along the motion is taken into account."""
@@ -103,7 +109,7 @@ def classify_records(recordings: Sequence[Recording]) -> tuple[CampaignRecord, .
     for inspection in inspect_all(recordings):
         record = _classify(inspection)
         parts = _long_runs(record) if record.kind.is_static else []
-        records += [_classify(inspect(part, sensors)) for part in parts] or [record]
+        records += [_classify(inspect(part, sensors)) for part in parts] or _cut_at_levels(record, sensors)
     return tuple(records)
 
 
@@ -129,6 +135,37 @@ def _long_runs(record: CampaignRecord) -> list[Recording]:
         )
         for run in runs
     ]
+
+
+def _cut_at_levels(record: CampaignRecord, sensors: Mapping[str, Sensor]) -> list[CampaignRecord]:
+    """The steps between the pressure levels of a held muscle as records of their own, if there are more levels than a
+    fill explains: those to the supply and to ambient pressure, and one record of the rows that are not used."""
+    recording, levels = record.recording, list[tuple[float, int, int]]()
+    usable = "time" in recording and "pressure" in recording and "contraction" in recording
+    if record.kind.is_static or not usable or not np.isfinite(recording["pressure"]).all() or _is_moved(recording):
+        return [record]
+    for interval in true_intervals(quasi_static_rows(recording, sensors)):
+        value = float(np.median(recording["pressure"][interval.rows]))
+        if levels and abs(value - levels[-1][0]) <= MIN_STEP:
+            levels[-1] = (*levels[-1][:2], interval.stop)
+        elif len(interval) >= MIN_ROWS:
+            levels.append((value, interval.start, interval.stop))
+    if len(levels) < 3 or len(levels) <= len(record.steps) + 1:
+        return [record]
+    low, high = min(levels)[0], max(levels)[0]
+    margin, parts = LEVEL_SHARE * (high - low), []
+    for (_, begin, end), (value, _, stop) in itertools.pairwise(levels):
+        start = max(begin, end - max(MIN_ROWS, (end - begin) // 4))  # without the end of the step before
+        if min(abs(value - low), abs(value - high)) <= margin:
+            origin = f"{recording.origin}, rows {start + 1} to {stop}"
+            part = _classify(inspect(dataclasses.replace(recording.rows(slice(start, stop)), origin=origin), sensors))
+            parts += [part] if part.kind is RecordKind.FILL else []
+    reason = (
+        f"{len(levels) - 1 - len(parts)} of {len(levels) - 1} pressure steps at a held length end between the lowest "
+        "and the highest pressure, or are no fill through an open valve; with a measured force they would be static "
+        "points"
+    )
+    return [*parts, dataclasses.replace(record, kind=RecordKind.UNUSED, reason=reason, steps=())]
 
 
 def _classify(inspection: Inspection) -> CampaignRecord:

@@ -19,7 +19,7 @@ from ..dynamic.fit import fit_dynamic
 from ..dynamic.record_model import ModelOutputs, RecordModel
 from ..dynamic.reliability import RECORD_CONSEQUENCE
 from ..dynamic.result import DynamicFit
-from .fitted_range import NOISY_MARGIN, range_notes, rate_notes, rows_outside
+from .fitted_range import NOISY_MARGIN, band_notes, range_notes, rate_notes, rows_outside
 from .result import QuantityPrediction, RecordPrediction
 
 NORMAL_QUANTILE = 1.959963984540054
@@ -28,6 +28,10 @@ UNKNOWN = "not known from one record"
 """Words in place of the band of a plant that was fitted to one record, which does not show how records differ."""
 ASSUMED_DEVIATION = 0.01
 """Standard deviation of a quantity without a stated one, relative to its range in the record (chosen)."""
+USUAL = (
+    "another valve opening, supply or muscle, a wrong start time, and another initial pressure (--own, --start-margin)"
+)
+"""Usual causes of a band that does not hold, where nothing recorded shows one."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -100,6 +104,7 @@ def predict_dynamic(
     Raises IdentificationError where the simulation fails, ParameterError for unknown names.
     """
     notes = describe_other_ambient(plant, experiment)
+    other_air = ["other ambient air"] if notes else []
     plant = experiment.plant or plant
     deviations = {name: sensor or _deviation(name, experiment, uncertainty) for name, sensor in observed.items()}
     if own:
@@ -118,9 +123,13 @@ def predict_dynamic(
         band = "" if uncertainty is None else uncertainty.source(name)
         quantities.append(QuantityPrediction(name, measured, predicted, half, compared, band))
     ranges, rates = ({}, {}) if uncertainty is None else (uncertainty.ranges, uncertainty.rates)
-    notes += [*range_notes(recording, ranges, NOISY_MARGIN), *rate_notes(recording, rates)]
+    faster = rate_notes(recording, rates)
+    notes += [*range_notes(recording, ranges, NOISY_MARGIN), *faster]
     notes += [f"the band of {q.name} is {q.band}" for q in quantities if q.half_width is None and q.band]
-    return RecordPrediction(recording, tuple(quantities), tuple(notes), rows_outside(recording, ranges, NOISY_MARGIN))
+    outside = rows_outside(recording, ranges, NOISY_MARGIN)
+    prediction = RecordPrediction(recording, tuple(quantities), tuple(notes), outside)
+    said = band_notes(prediction, [*other_air, *(["faster changes"] if faster else [])], USUAL)
+    return dataclasses.replace(prediction, notes=(*notes, *said))
 
 
 def _describe_estimates(fit: DynamicFit) -> list[str]:

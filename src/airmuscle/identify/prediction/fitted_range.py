@@ -12,6 +12,7 @@ from ...muscle.characteristic.validity_range import ValidityRange
 from ...recording import Recording
 from ...recording.display_units import displayed
 from ...recording.segment import rate_of_change
+from .result import QuantityPrediction, RecordPrediction
 
 LIMIT_MARGIN = 1e-3
 """Noise of the sensors at the limits of the range of a law, relative to the range (chosen)."""
@@ -24,6 +25,10 @@ LENGTH_MARGIN = 1e-3
 Ends = Mapping[str, tuple[float, float]]
 """Lower and upper end of quantities [SI], by name."""
 NOT_THERE = "the stated band does not apply there"
+MIN_SHARE = 0.8
+"""Share of the rows within a 95 % band below which the band does not hold for a record (chosen)."""
+MIN_ROWS = 5
+"""Minimum number of compared rows for that statement (chosen)."""
 
 
 def ends_of(limits: ValidityRange | None) -> Ends:
@@ -72,6 +77,38 @@ def length_notes(length: float | None, fitted: Sequence[float]) -> list[str]:
         return []
     span = displayed("length", low) if low == high else f"{displayed('length', low)} to {displayed('length', high)}"
     return [f"the resting length, {displayed('length', length)}, is outside that of the fit, {span}; {NOT_THERE}"]
+
+
+def band_notes(prediction: RecordPrediction, differences: Sequence[str], usual: str) -> list[str]:
+    """For each quantity with far fewer than 95 % of its rows within the band: that it does not hold, and why not.
+
+    `differences` name what of the record lies outside the fit; where there are none, `usual` names the usual causes.
+    """
+    notes = []
+    for each in prediction.quantities:
+        if each.share is None or each.share >= MIN_SHARE or each.compared.sum() < MIN_ROWS:
+            continue
+        mean = float(np.mean(each.errors[each.compared]))
+        known = [*differences]
+        if prediction.outside is not None and (each.compared & prediction.outside).any():
+            known.insert(0, "rows outside the range of the fit" + _share_inside(each, prediction.outside))
+        reason = (
+            f"likely because of {', '.join(known)}" if known else f"nothing recorded explains it; usual are {usual}"
+        )
+        notes.append(
+            f"the 95 % band of the {each.name} does not hold for this record: {100 * each.share:.3g} % of the rows are "
+            f"within it, and the predicted {each.name} is {displayed(each.name, abs(mean))} too "
+            f"{'high' if mean > 0 else 'low'} on average; {reason}"
+        )
+    return notes
+
+
+def _share_inside(quantity: QuantityPrediction, outside: npt.NDArray[np.bool_]) -> str:
+    rows = quantity.compared & ~outside
+    if quantity.half_width is None or not rows.any():
+        return ""
+    share = np.mean(np.abs(quantity.errors[rows]) <= quantity.half_width[rows])
+    return f" (inside it {100 * share:.3g} % are within the band)"
 
 
 def _beyond(values: Array, low: float, high: float, margin: float) -> npt.NDArray[np.bool_]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import dataclasses
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -18,11 +19,13 @@ from ...recording import Recording
 from ..campaign.predicted_force import predicted_force
 from ..compared_points import FORCE_MARGIN
 from ..problem import FORCE, evaluate, fitted_quantity_of
-from .fitted_range import ends_of, range_notes, rate_notes, rows_outside
+from .fitted_range import band_notes, ends_of, range_notes, rate_notes, rows_outside
 from .result import QuantityPrediction, RecordPrediction
 
 COLUMNS = ("pressure", "contraction", "force")
 """Columns that a static law relates."""
+USUAL = "another specimen, a resting length or a zero of a sensor that differs, a muscle that has changed, and outliers"
+"""Usual causes of a band that does not hold, where nothing recorded shows one."""
 
 
 def predict_static(
@@ -35,6 +38,8 @@ def predict_static(
     validity_range: ValidityRange | None = None,
     rates: Mapping[str, float | None] | None = None,
     band: str = "",
+    notes: Sequence[str] = (),
+    differences: Sequence[str] = (),
 ) -> RecordPrediction:
     """Predict the quantity that a law gives at the rows of a recording with pressure, contraction and force.
 
@@ -46,6 +51,9 @@ def predict_static(
     rates           maximum rates of contraction [1/s] and pressure [Pa/s] of these measurements, by quantity; a record
                     that is faster is named in a note
     band            where the band comes from, or why there is none
+    notes           further notes on the record
+    differences     what differs from the muscle of the fit, such as "another specimen": named as likely reason where
+                    far fewer than 95 % of the rows are within the band
 
     Rows without tension are compared where the predicted force exceeds the half width, or 0 without one. Raises
     ColumnError for a recording without these columns or without tension.
@@ -60,23 +68,26 @@ def predict_static(
             "tension is positive."
         )
     moving = [part for part in (friction, creep) if part not in (None, NoFriction(), CreepElements())]
-    notes = _notes(recording, bool(moving) and quantity == FORCE, validity_range, rates or {})
+    remarks, faster = _notes(recording, bool(moving) and quantity == FORCE, validity_range, rates or {})
     pulling = np.zeros(len(recording), dtype=bool)
     if isinstance(law, ForceLaw):
         limit = FORCE_MARGIN * float(np.nanmax(recording["force"]))
         predicted = predicted_force(law, recording, friction or NoFriction(), creep or CreepElements(), limit)
         predicted = np.maximum(predicted, 0.0)
         pulling = complete & ~tension & (predicted > (half_width or 0.0))
-        notes += _slack_notes(predicted, pulling, int((complete & ~tension).sum()))
+        remarks += _slack_notes(predicted, pulling, int((complete & ~tension).sum()))
     else:
         predicted = evaluate(law, quantity.method, quantity.arguments, recording)
     known = np.isfinite(predicted)
     if (tension & ~known).any():
-        notes.append(f"the law gives no {quantity.name} at {int((tension & ~known).sum())} rows with tension")
+        remarks.append(f"the law gives no {quantity.name} at {int((tension & ~known).sum())} rows with tension")
     widths = None if half_width is None else np.full(len(recording), float(half_width))
     compared = (tension | pulling) & known
     result = QuantityPrediction(quantity.name, recording[quantity.name], predicted, widths, compared, band)
-    return RecordPrediction(recording, (result,), tuple(notes), rows_outside(recording, ends_of(validity_range)))
+    outside = rows_outside(recording, ends_of(validity_range))
+    prediction = RecordPrediction(recording, (result,), (*remarks, *notes), outside)
+    said = band_notes(prediction, [*differences, *(["a faster motion"] if faster else [])], USUAL)
+    return dataclasses.replace(prediction, notes=(*prediction.notes, *said))
 
 
 def _check_columns(recording: Recording) -> None:
@@ -94,11 +105,12 @@ def _check_columns(recording: Recording) -> None:
 
 def _notes(
     recording: Recording, moving: bool, limits: ValidityRange | None, rates: Mapping[str, float | None]
-) -> list[str]:
-    notes = []
+) -> tuple[list[str], bool]:
+    """The notes on what limits the prediction, and whether the record is faster than those of the fit."""
+    notes, faster = [], rate_notes(recording, rates)
     if moving and recording.constants.get("resting_length") is None:
         notes.append("friction and creep of the muscle are left out, because the record states no resting length")
-    return [*notes, *range_notes(recording, ends_of(limits)), *rate_notes(recording, rates)]
+    return [*notes, *range_notes(recording, ends_of(limits)), *faster], bool(faster)
 
 
 def _slack_notes(predicted: Array, pulling: npt.NDArray[np.bool_], count: int) -> list[str]:
