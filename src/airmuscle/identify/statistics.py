@@ -22,6 +22,7 @@ from .solver import LeastSquaresSolution
 
 _MAX_NAMES = 3
 """Maximum number of parameters that the cause of a rank deficiency lists (chosen)."""
+DEGREE_REMEDY = "For the greatest degree that the levels determine"
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -157,7 +158,9 @@ def _degree_remedy(problem: FitProblem, degree: int) -> tuple[str, Hint | None]:
         "powers up to n need n + 1 levels. "
     )
     possible = 0 < degree < problem.law.degree
-    return text, Hint("For the greatest degree that the levels determine", "degree", degree) if possible else None
+    return text, Hint(
+        DEGREE_REMEDY, "degree", degree, "muscle.characteristic.ContractileSurface.blank"
+    ) if possible else None
 
 
 def count_levels(values: Array) -> int:

@@ -19,7 +19,7 @@ from ..dynamic.fit import fit_dynamic
 from ..dynamic.record_model import ModelOutputs, RecordModel
 from ..dynamic.reliability import RECORD_CONSEQUENCE
 from ..dynamic.result import DynamicFit
-from .fitted_range import NOISY_MARGIN, band_notes, range_notes, rate_notes, rows_outside
+from .fitted_range import NOISY_MARGIN, range_notes, rate_notes, rows_outside, with_band_notes
 from .result import QuantityPrediction, RecordPrediction
 
 NORMAL_QUANTILE = 1.959963984540054
@@ -128,8 +128,7 @@ def predict_dynamic(
     notes += [f"the band of {q.name} is {q.band}" for q in quantities if q.half_width is None and q.band]
     outside = rows_outside(recording, ranges, NOISY_MARGIN)
     prediction = RecordPrediction(recording, tuple(quantities), tuple(notes), outside)
-    said = band_notes(prediction, [*other_air, *(["faster changes"] if faster else [])], USUAL)
-    return dataclasses.replace(prediction, notes=(*notes, *said))
+    return with_band_notes(prediction, [*other_air, *(["faster changes"] if faster else [])], USUAL)
 
 
 def _describe_estimates(fit: DynamicFit) -> list[str]:

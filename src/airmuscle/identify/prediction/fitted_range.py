@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -79,8 +80,8 @@ def length_notes(length: float | None, fitted: Sequence[float]) -> list[str]:
     return [f"the resting length, {displayed('length', length)}, is outside that of the fit, {span}; {NOT_THERE}"]
 
 
-def band_notes(prediction: RecordPrediction, differences: Sequence[str], usual: str) -> list[str]:
-    """For each quantity with far fewer than 95 % of its rows within the band: that it does not hold, and why not.
+def with_band_notes(prediction: RecordPrediction, differences: Sequence[str], usual: str) -> RecordPrediction:
+    """The prediction with a note for each quantity whose band does not hold: by how much, and the likely reason.
 
     `differences` name what of the record lies outside the fit; where there are none, `usual` names the usual causes.
     """
@@ -100,7 +101,7 @@ def band_notes(prediction: RecordPrediction, differences: Sequence[str], usual: 
             f"within it, and the predicted {each.name} is {displayed(each.name, abs(mean))} too "
             f"{'high' if mean > 0 else 'low'} on average; {reason}"
         )
-    return notes
+    return dataclasses.replace(prediction, notes=(*prediction.notes, *notes))
 
 
 def _share_inside(quantity: QuantityPrediction, outside: npt.NDArray[np.bool_]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -19,7 +18,7 @@ from ...recording import Recording
 from ..campaign.predicted_force import predicted_force
 from ..compared_points import FORCE_MARGIN
 from ..problem import FORCE, evaluate, fitted_quantity_of
-from .fitted_range import band_notes, ends_of, range_notes, rate_notes, rows_outside
+from .fitted_range import ends_of, range_notes, rate_notes, rows_outside, with_band_notes
 from .result import QuantityPrediction, RecordPrediction
 
 COLUMNS = ("pressure", "contraction", "force")
@@ -58,22 +57,15 @@ def predict_static(
     Rows without tension are compared where the predicted force exceeds the half width, or 0 without one. Raises
     ColumnError for a recording without these columns or without tension.
     """
-    _check_columns(recording)
+    complete, tension = _rows_with_tension(recording)
     quantity = fitted_quantity_of(law)
-    complete = np.isfinite(sum(recording[name] for name in COLUMNS))
-    tension = (recording["force"] > 0.0) & complete
-    if not tension.any():
-        raise ColumnError(
-            f"{recording.origin}: no row has a positive force, so that no prediction can be compared; a force of "
-            "tension is positive."
-        )
     moving = [part for part in (friction, creep) if part not in (None, NoFriction(), CreepElements())]
     remarks, faster = _notes(recording, bool(moving) and quantity == FORCE, validity_range, rates or {})
     pulling = np.zeros(len(recording), dtype=bool)
     if isinstance(law, ForceLaw):
         limit = FORCE_MARGIN * float(np.nanmax(recording["force"]))
-        predicted = predicted_force(law, recording, friction or NoFriction(), creep or CreepElements(), limit)
-        predicted = np.maximum(predicted, 0.0)
+        force = predicted_force(law, recording, friction or NoFriction(), creep or CreepElements(), limit)
+        predicted = np.maximum(force, 0.0)
         pulling = complete & ~tension & (predicted > (half_width or 0.0))
         remarks += _slack_notes(predicted, pulling, int((complete & ~tension).sum()))
     else:
@@ -82,35 +74,42 @@ def predict_static(
     if (tension & ~known).any():
         remarks.append(f"the law gives no {quantity.name} at {int((tension & ~known).sum())} rows with tension")
     widths = None if half_width is None else np.full(len(recording), float(half_width))
-    compared = (tension | pulling) & known
-    result = QuantityPrediction(quantity.name, recording[quantity.name], predicted, widths, compared, band)
-    outside = rows_outside(recording, ends_of(validity_range))
-    prediction = RecordPrediction(recording, (result,), (*remarks, *notes), outside)
-    said = band_notes(prediction, [*differences, *(["a faster motion"] if faster else [])], USUAL)
-    return dataclasses.replace(prediction, notes=(*prediction.notes, *said))
+    measured = recording[quantity.name]
+    result = QuantityPrediction(quantity.name, measured, predicted, widths, (tension | pulling) & known, band)
+    limits = ends_of(validity_range)
+    prediction = RecordPrediction(recording, (result,), (*remarks, *notes), rows_outside(recording, limits))
+    return with_band_notes(prediction, [*differences, *faster], USUAL)
 
 
-def _check_columns(recording: Recording) -> None:
+def _rows_with_tension(recording: Recording) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+    """Masks (N,) of the complete rows, and of those with tension. Raises ColumnError without columns or tension."""
     missing = [name for name in COLUMNS if name not in recording]
-    if not missing:
-        return
-    hint = None
-    if missing == ["contraction"]:
-        hint = Hint("To compute it from the length", "resting_length", "300 mm")
-    raise ColumnError(
-        f"{recording.origin}: the prediction of a static law is compared with pressure, contraction and force; missing "
-        f"is {', '.join(missing)}.", hint=hint,
-    )  # fmt: skip
+    if missing:
+        hint = None
+        if missing == ["contraction"]:
+            hint = Hint("To compute it from the length", "resting_length", "300 mm")
+        raise ColumnError(
+            f"{recording.origin}: the prediction of a static law is compared with pressure, contraction and force; "
+            f"missing is {', '.join(missing)}.", hint=hint,
+        )  # fmt: skip
+    complete = np.isfinite(sum(recording[name] for name in COLUMNS))
+    tension = (recording["force"] > 0.0) & complete
+    if not tension.any():
+        raise ColumnError(
+            f"{recording.origin}: no row has a positive force, so that no prediction can be compared; a force of "
+            "tension is positive."
+        )
+    return complete, tension
 
 
 def _notes(
     recording: Recording, moving: bool, limits: ValidityRange | None, rates: Mapping[str, float | None]
-) -> tuple[list[str], bool]:
-    """The notes on what limits the prediction, and whether the record is faster than those of the fit."""
+) -> tuple[list[str], list[str]]:
+    """The notes on what limits the prediction, and those of them that name a faster record as a difference."""
     notes, faster = [], rate_notes(recording, rates)
     if moving and recording.constants.get("resting_length") is None:
         notes.append("friction and creep of the muscle are left out, because the record states no resting length")
-    return [*notes, *range_notes(recording, ends_of(limits)), *faster], bool(faster)
+    return [*notes, *range_notes(recording, ends_of(limits)), *faster], ["a faster motion"] if faster else []
 
 
 def _slack_notes(predicted: Array, pulling: npt.NDArray[np.bool_], count: int) -> list[str]:
