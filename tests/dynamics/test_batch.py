@@ -311,14 +311,8 @@ def test_a_plant_without_an_equilibrium_is_reported():
 
 
 def test_plants_that_differ_in_their_circuit_alone_share_the_search_for_rest(monkeypatch):
-    from airmuscle.simulation.batch import initial_states
-
-    asked, search = [], initial_states.find_equilibrium_of_each
-    monkeypatch.setattr(
-        initial_states,
-        "find_equilibrium_of_each",
-        lambda ready, table, *more: asked.append(len(table)) or search(ready, table, *more),
-    )
+    asked, search = [], Plant.default_states
+    monkeypatch.setattr(Plant, "default_states", lambda plant, rows: asked.append(len(rows)) or search(plant, rows))
     varied = around({"circuit.fill.conductance": 5e-9}, 6)
     simulate_batch(plain(), varied, ZERO_INPUT, duration=0.1, integrator=FAST)
     assert asked == [1]

@@ -192,7 +192,7 @@ def test_more_plants_than_go_side_by_side_are_taken_in_blocks(monkeypatch):
     table = varied(plant, 7)
     together = found(plant, table, 2e5)
     module = sys.modules["airmuscle.simulation.equilibrium.equilibrium"]
-    monkeypatch.setattr(module, "block_size", lambda states: 3)
+    monkeypatch.setattr(module, "TABLE_SIZE", 3 * module.GRID_POINTS * len(plant.states))
     np.testing.assert_array_equal(found(plant, table, 2e5), together)
     assert np.isfinite(together).all()
 

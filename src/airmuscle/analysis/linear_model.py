@@ -15,6 +15,7 @@ from ..compile.program import CompiledSystem, compile_system
 from ..core.arrays import Array
 from ..core.errors import AirmuscleError, ParameterError, suggestion
 from ..core.system import System
+from ..plant.plant import Plant
 from ..plant.state import check_system, state_vector
 from ..plant.units import column_units
 from ..simulation.equilibrium import complete_inputs
@@ -197,7 +198,7 @@ def linearise(plant: System, state: Mapping[str, float], inputs: Mapping[str, fl
         np.vstack([np.zeros((len(names), len(values))), at.outputs_by_input[further]]),
         tuple(names), tuple(values), (*names, *(compiled.output_names[i] for i in further)),
         column_units(plant, compiled.output_names), dict(zip(names, x, strict=True)), values, at.rates,
-        stiffness(plant, state) if plant.equilibrium_plant is plant else None,
+        stiffness(plant, state) if isinstance(plant, Plant) else None,
         {**dict(zip(compiled.output_names, at.outputs.tolist(), strict=True)), **dict(zip(names, x, strict=True))},
         plant,
     )  # fmt: skip

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Mapping, Sequence
-from typing import Any
 
+from .arrays import Array
 from .diagnostics import ColumnLimit, Columns, Diagnostic
 from .ops import Value
 from .variables import Input, StateVariable
@@ -73,14 +73,18 @@ class System(abc.ABC):
         """Constants of a recording of this system, such as the resting length [m]."""
         return {}
 
-    @property
-    def equilibrium_plant(self) -> Any:
-        """The Plant whose static equilibrium is the default initial state; None where a run must be given one."""
+    def default_state(self) -> Mapping[str, float] | None:
+        """The default initial state, a value for each state; None where a run must be given one."""
         return None
 
-    def extend_state(self, state: Mapping[str, float]) -> dict[str, float]:
-        """The system's state from that of its `equilibrium_plant`."""
-        return dict(state)
+    def default_states(self, parameters: Array) -> Array | None:
+        """The default initial states (N, n) of systems of this structure with parameters (N, P); NaN where there is
+        none, None where a run must be given one."""
+        return None
+
+    def affects_default_state(self, path: str) -> bool:
+        """Whether the parameter with this path affects the default initial state."""
+        return True
 
     def check_state(self, state: Mapping[str, float]) -> None:  # noqa: B027 - every state is possible by default
         """Raise ParameterError or GeometryLimitError for a state that is impossible; names and signs were checked."""

@@ -195,7 +195,7 @@ def _indices(name: str, values: Sequence[int]) -> str:
 def _limits(system: object, columns: Sequence[str]) -> list[tuple[int, float, float, str]]:
     """The ranges of columns: number of the column, lowest and highest value, text."""
     limits: list[tuple[int, float, float, str]] = []
-    plant = getattr(system, "equilibrium_plant", None)
+    plant = getattr(system, "plant", system)
     if isinstance(plant, Plant):
         for limit in column_limits(plant.muscles, plant.prefixes):
             if limit.column in columns:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 from ..core import autodiff
 from ..core.ops import Value
-from ..core.variables import Input
+from ..core.variables import Input, StateVariable
 
 INFINITY = float("inf")
 
@@ -34,6 +34,14 @@ class Coordinate:
         """Name of the acceleration: the name of the speed with "acceleration" instead of "speed"."""
         name = self.speed.replace("speed", "acceleration")
         return name if name != self.speed else f"{self.name}.acceleration"
+
+    @property
+    def states(self) -> tuple[StateVariable, StateVariable]:
+        """The coordinate and its speed, as states of a plant."""
+        return (
+            StateVariable(self.name, self.unit, self.nominal, f"{self.name} of the load"),
+            StateVariable(self.speed, f"{self.unit}/s", self.nominal_speed, f"{self.speed} of the load"),
+        )
 
 
 class Mechanism(abc.ABC):

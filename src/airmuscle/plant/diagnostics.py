@@ -32,14 +32,16 @@ _MEANINGS = {
 """The range that a column has left, and what that means."""
 
 
-def describe_friction(muscles: Sequence[Muscle]) -> str:
-    """Text on the friction of the muscles; also stated if there is none, which is the default."""
+def friction(muscles: Sequence[Muscle]) -> Diagnostic:
+    """The friction of the muscles; also stated if there is none, which is the default."""
     if all(isinstance(m.friction, NoFriction) for m in muscles):
-        return "friction: off"
-    if len(muscles) == 1:
-        return f"friction: {muscles[0].friction}"
-    parts = [f"{m.name} {'none' if isinstance(m.friction, NoFriction) else m.friction}" for m in muscles]
-    return f"friction: {', '.join(parts)}"
+        text = "off"
+    elif len(muscles) == 1:
+        text = str(muscles[0].friction)
+    else:
+        parts = [f"{m.name} {'none' if isinstance(m.friction, NoFriction) else m.friction}" for m in muscles]
+        text = ", ".join(parts)
+    return Diagnostic(DiagnosticCode.MODEL, "friction", f"friction: {text}")
 
 
 def column_limits(muscles: Sequence[Muscle], prefixes: Sequence[str]) -> tuple[ColumnLimit, ...]:

@@ -94,10 +94,9 @@ class WithEnergyMeters(System):
         """The plant's constants."""
         return self.plant.constants
 
-    @property
-    def equilibrium_plant(self) -> Plant:
-        """The plant, whose equilibrium with all meters at zero is the default initial state."""
-        return self.plant
+    def default_state(self) -> dict[str, float]:
+        """The default initial state of the plant with every meter at zero."""
+        return self.extend_state(self.plant.default_state())
 
     def extend_state(self, state: Mapping[str, float]) -> dict[str, float]:
         """A state of the plant with every meter at zero."""

@@ -12,7 +12,6 @@ from ..core.declaration import model
 from ..core.diagnostics import ColumnLimit, Columns, Diagnostic, DiagnosticCode
 from ..core.errors import GeometryLimitError
 from ..core.ops import Value
-from ..core.system import System
 from ..core.variables import Input, StateVariable, add_prefix, select_prefix, with_prefix
 from ..mechanism import Mechanism
 from ..muscle import Muscle
@@ -20,6 +19,8 @@ from ..pneumatics import Circuit, CircuitFlows
 from ..pneumatics.gas import Air, Ambient, Gas
 from ..pneumatics.ports import key_by_muscle, key_by_port
 from ..pneumatics.wall_heat_transfer import DEFAULT_GAS
+from ..simulation.equilibrium.equilibrium import equilibria_at_ambient_pressure, equilibrium_at_ambient_pressure
+from ..simulation.equilibrium.static_plant import StaticPlant
 from . import diagnostics
 from .display import PlantDisplay
 from .evaluation import PlantEvaluation
@@ -33,7 +34,7 @@ _ROUNDING = 1e-3
 
 
 @model
-class Plant(PlantDisplay, System):
+class Plant(PlantDisplay, StaticPlant):
     """Ordinary differential equations of muscles, valves and load. Air mass [kg] is the state, pressure an output.
 
     `muscle` is one or a tuple. `circuit` is a tuple with one for each muscle, or a single one that feeds them all.
@@ -90,10 +91,7 @@ class Plant(PlantDisplay, System):
         for prefix, muscle in zip(self.prefixes, self.muscles, strict=True):
             air += states_of_muscle(prefix, muscle, air_states(muscle, self.gas, self.ambient))
             inner += states_of_muscle(prefix, muscle, muscle.states)
-        moving = []
-        for c in self.mechanism.coordinates:
-            moving.append(StateVariable(c.name, c.unit, c.nominal, f"{c.name} of the load"))
-            moving.append(StateVariable(c.speed, f"{c.unit}/s", c.nominal_speed, f"{c.speed} of the load"))
+        moving = [state for coordinate in self.mechanism.coordinates for state in coordinate.states]
         own = [(prefix, s) for prefix, circuit in self._circuits() for s in circuit.states(self.ambient)]
         circuits = [replace(s, name=name) for prefix, s in own for name in self._outside(prefix, {s.name: s})]
         return (*air, *moving, *inner, *circuits)
@@ -129,10 +127,12 @@ class Plant(PlantDisplay, System):
         lengths = {"resting_length": self.resting_lengths[0]} if len(self.muscles) == 1 else {}
         return {"ambient": self.ambient.pressure, **lengths}
 
-    @property
-    def equilibrium_plant(self) -> Plant:
-        """The plant itself."""
-        return self
+    default_state = equilibrium_at_ambient_pressure
+    default_states = equilibria_at_ambient_pressure
+
+    def affects_default_state(self, path: str) -> bool:
+        """Whether a parameter affects the equilibrium; those of a circuit without states do not."""
+        return not path.startswith("circuit") or any(circuit.states(self.ambient) for circuit in self.circuits)
 
     def _circuits(self) -> Iterator[tuple[str, Circuit]]:
         return zip(self.circuit_prefixes, self.circuits, strict=True)
@@ -155,10 +155,9 @@ class Plant(PlantDisplay, System):
         place = {**inputs, **state}
         contractions = self.mechanism.contractions(place, self.resting_lengths)
         speeds = self.mechanism.contraction_speeds(place, place, self.resting_lengths)
-        each = zip(self.muscles, self.prefixes, contractions, speeds, strict=True)
         return tuple(
-            muscle_state(muscle, select_prefix(prefix, state), contraction, speed, self.gas, self.ambient)
-            for muscle, prefix, contraction, speed in each
+            muscle_state(m, select_prefix(prefix, state), contraction, speed, self.gas, self.ambient)
+            for m, prefix, contraction, speed in zip(self.muscles, self.prefixes, contractions, speeds, strict=True)
         )
 
     def circuit_flows(
@@ -241,8 +240,7 @@ class Plant(PlantDisplay, System):
     def settle_muscles(
         self, pressures: Sequence[Value], state: Mapping[str, Value]
     ) -> tuple[dict[str, Value], list[Value]]:
-        """`state` with the muscles' own states, in steady state at these gauge pressures [Pa] unless given, and the
-        volume [m3] of each muscle. Nothing is checked; values and parameters may be arrays that broadcast."""
+        """As StaticPlant; nothing is checked, and values and parameters may be arrays that broadcast."""
         contractions = self.mechanism.contractions(state, self.resting_lengths)
         return settle_muscles(self.muscles, self.prefixes, contractions, pressures, state)
 
@@ -266,8 +264,8 @@ class Plant(PlantDisplay, System):
 
     def describe(self) -> tuple[Diagnostic, ...]:
         """The gas and the friction."""
-        friction = Diagnostic(DiagnosticCode.MODEL, "friction", diagnostics.describe_friction(self.muscles))
-        return Diagnostic(DiagnosticCode.MODEL, "gas", f"gas: {str(self.gas).removesuffix('()')}"), friction
+        gas = Diagnostic(DiagnosticCode.MODEL, "gas", f"gas: {str(self.gas).removesuffix('()')}")
+        return gas, diagnostics.friction(self.muscles)
 
     def diagnose(self, columns: Columns) -> list[Diagnostic]:
         """Extrapolation of characteristics, limits of geometries, components beyond the validity of their model."""
@@ -281,7 +279,7 @@ class Plant(PlantDisplay, System):
     def _checks(self) -> diagnostics.Checks:
         """What `diagnose` compares a run with."""
         rated = diagnostics.rated_temperature(self.muscles, self.ambient.temperature)
-        circuits = tuple((prefix, circuit) for prefix, circuit in self._circuits() if circuit.has_validity_range)
+        circuits = tuple(each for each in self._circuits() if each[1].has_validity_range)
         return diagnostics.Checks(rated, diagnostics.with_tolerance(self.column_limits), circuits)
 
     @functools.cached_property

@@ -17,7 +17,6 @@ from ..identify.campaign import (
     StaticStage,
 )
 from ..identify.hysteresis import loops_not_joined
-from ..library.entry import Entry
 from .campaign_plots import characteristic_plot, creep_plot, fill_plot, prediction_plot, residual_plot
 from .campaign_stages import USES, count_records, stage_result
 from .chapter import Chapter, Plot, Table
@@ -25,7 +24,7 @@ from .compare_chapter import compare_chapter
 from .dynamic_chapter import dynamic_chapters
 from .hysteresis_chapter import hysteresis_chapters
 from .joint_friction_chapter import joint_friction_chapter
-from .static_fit_chapter import fit_chapter
+from .static_fit_chapter import MuscleDescription, fit_chapter
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,7 +48,7 @@ class ValidationRow:
 
 def campaign_chapters(
     campaign: Campaign,
-    entry: Entry | None,
+    entry: MuscleDescription | None,
     *,
     unread: Sequence[UnreadFile] = (),
     scenarios: Sequence[tuple[str, str]] = (),

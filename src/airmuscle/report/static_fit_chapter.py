@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Protocol
 
 from ..core.errors import AirmuscleError
 from ..core.reference import cite
 from ..identify import Fit
 from ..identify.surface.shape import shape_violations_of_fit
-from ..library.entry import Entry
 from ..muscle.characteristic.energy_defect import maxwell_defect
+from ..muscle.characteristic.validity_range import ValidityRange
+from ..muscle.geometry import Geometry
 from ..muscle.isobars import compute_isobars
 from .band_plot import band_plot
 from .chapter import Chapter, Plot, Table
@@ -22,7 +24,20 @@ from .shape_chapter import violation_table
 MAX_CURVES = 8
 
 
-def fit_chapter(fit: Fit, entry: Entry, notes: Sequence[str] = ()) -> Chapter:
+class MuscleDescription(Protocol):
+    """What a chapter states of a fitted muscle beside its law; a library Entry has it."""
+
+    @property
+    def title(self) -> str: ...
+    @property
+    def note(self) -> str: ...
+    @property
+    def geometry(self) -> Geometry | None: ...
+    @property
+    def validity_range(self) -> ValidityRange | None: ...
+
+
+def fit_chapter(fit: Fit, entry: MuscleDescription, notes: Sequence[str] = ()) -> Chapter:
     """Return the chapter of a fit: equation, goodness of fit, parameters, isobars with measured points, residuals."""
     remarks = "\n\n".join((*fit.notes, *notes))
     equations, symbols = equation_section(fit)
@@ -53,7 +68,7 @@ def _goodness_of_fit(fit: Fit) -> Table:
     return Table("figures", "Goodness of fit", {"quantity": list(names), "value": list(texts)})
 
 
-def _energy_consistency(fit: Fit, entry: Entry) -> list[Table]:
+def _energy_consistency(fit: Fit, entry: MuscleDescription) -> list[Table]:
     """Return a table of the Maxwell defect of the law with the volume of the muscle, if it has one."""
     if entry.geometry is None or entry.validity_range is None:
         return []
@@ -103,7 +118,7 @@ def _rows(fit: Fit) -> Table:
     )
 
 
-def _isobars(fit: Fit, entry: Entry) -> Plot:
+def _isobars(fit: Fit, entry: MuscleDescription) -> Plot:
     """Return the isobars of the fitted law at measured pressures, with the measured points.
 
     The pressures are round if the pressure was swept.

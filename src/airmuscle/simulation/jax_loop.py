@@ -14,7 +14,7 @@ from ..control.control_loop import COMMAND, ControlLoop
 from ..control.controller import Measurement
 from ..core import ops, tree
 from ..core.errors import AirmuscleError, ParameterError
-from ..plant.plant import Plant
+from ..core.system import System
 from .problem import Problem
 from .sampled_loop import SampledLoop, prepare_loop
 
@@ -22,7 +22,7 @@ LoopFunction = Callable[[Any, Any], dict[str, Any]]
 
 
 def loop_in_jax(
-    plant: Plant, loop: ControlLoop, *, duration: float, step: float, initial_state: Mapping[str, float]
+    plant: System, loop: ControlLoop, *, duration: float, step: float, initial_state: Mapping[str, float]
 ) -> LoopFunction:
     """A control loop as a pure JAX function, for `jit`, `vmap`, `grad` and `jacfwd` in a user's own program.
 
@@ -66,7 +66,7 @@ def loop_in_jax(
 class _Sample:
     """A sample and the steps after it: the body of the loop over the samples. Plant and law have traced parameters."""
 
-    plant: Plant
+    plant: System
     law: ControlLaw
     prepared: SampledLoop
     numpy: Any
@@ -107,7 +107,7 @@ def _run(sample: _Sample, start: dict[str, Any], rows: tuple[Any, ...]) -> dict[
     return {"time": jnp.asarray(sample.prepared.instants), **columns, **named}
 
 
-def runge_kutta4(plant: Plant, state: Mapping[str, Any], inputs: Mapping[str, Any], h: Any) -> dict[str, Any]:
+def runge_kutta4(plant: System, state: Mapping[str, Any], inputs: Mapping[str, Any], h: Any) -> dict[str, Any]:
     """The states of a plant after a step of h [s] of the classical method with held inputs."""
 
     def moved(rates: Mapping[str, Any], length: Any) -> dict[str, Any]:

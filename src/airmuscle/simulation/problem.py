@@ -24,7 +24,6 @@ from ..core.reference import Reference, cite
 from ..core.short_repr import ShortRepr
 from ..core.system import System
 from ..plant.state import check_system, state_vector
-from .equilibrium import find_equilibrium
 from .integrators import Integrator, default_integrator
 from .output_times import output_times
 
@@ -179,12 +178,12 @@ def default_state(compiled: CompiledSystem) -> Array:
     """
     known, system = compiled.description, compiled.system
     if known.default_state is None:
-        plant = system.equilibrium_plant
-        if plant is None:
+        state = system.default_state()
+        if state is None:
             raise ParameterError(
                 f"simulate: give the initial_state of {type(system).__name__}, a value for each state."
             )
-        known.default_state = state_vector(system, system.extend_state(find_equilibrium(plant, pressure=0.0)))
+        known.default_state = state_vector(system, state)
     return known.default_state
 
 

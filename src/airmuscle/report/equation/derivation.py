@@ -6,10 +6,10 @@ import dataclasses
 import re
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
+from typing import Any
 
 from ...core.short_repr import ShortRepr
 from ...core.tree import Leaf, leaves
-from ...muscle.characteristic.base import Characteristic
 from .expression import ADD, COMPARISONS, NEGATIVE, PRODUCT, QUOTIENT, WHERE, Expressions, Node, in_order
 from .intervals import Bounds, within
 from .polynomial import assemble, coefficients_by_monomial, depends_on, expand, summands
@@ -81,7 +81,7 @@ class _Traced:
 
 
 def law_equation(
-    law: Characteristic, quantity: str, arguments: Sequence[str], ranges: Mapping[str, Bounds]
+    law: Any, quantity: str, arguments: Sequence[str], ranges: Mapping[str, Bounds]
 ) -> tuple[LawEquation, ...]:
     """The equations of a law for one quantity in terms of two others, for arguments within their ranges [SI].
 
@@ -105,9 +105,7 @@ def law_equation(
     return (scaled,) if physical is None else (scaled, physical)
 
 
-def _trace(
-    law: Characteristic, quantity: str, arguments: Sequence[str], ranges: Mapping[str, Bounds]
-) -> _Traced | None:
+def _trace(law: Any, quantity: str, arguments: Sequence[str], ranges: Mapping[str, Bounds]) -> _Traced | None:
     new = Expressions()
     points = tuple(new.symbol(ARGUMENTS[name].name) for name in arguments)
     own = {new.symbol(f"parameter {leaf.path}"): leaf for leaf in leaves(law)}

@@ -7,13 +7,13 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import numpy.typing as npt
 
-from ...compile.program import compile_system
 from ...core.arrays import Array
 from ...core.errors import AirmuscleError, ParameterError, PhysicsError, suggestion
 from ...core.system import System
-from ...plant.plant import Plant
-from ..equilibrium import block_size, complete_inputs, find_equilibrium, find_equilibrium_of_each
 from .variations import Column, Variations
+
+STATES_AT_ONCE = 500
+"""Systems whose default states are computed between two reports of progress (chosen)."""
 
 
 def count_of_states(given: Mapping[str, npt.ArrayLike] | None) -> int | None:
@@ -71,29 +71,25 @@ def check_states(variations: Variations, states: Array) -> None:
 
 
 def default_states(variations: Variations, advanced: Callable[[int], None]) -> tuple[Array, dict[int, str]]:
-    """The equilibrium at ambient pressure of every plant (N, n), and why there is none where there is none.
+    """The default state of every system (N, n), and why there is none where there is none.
 
-    A circuit without states does not affect it, so plants that differ in nothing else share it. `advanced` is called
-    with the number of plants that are done.
+    Systems that differ only in parameters without an effect on it share it. `advanced` is called with the number of
+    systems that are done.
     """
     system = variations.system
-    plant = system.equilibrium_plant
-    if plant is not system or not isinstance(plant, Plant):
-        raise ParameterError(
-            f"simulate_batch: give the initial_states of {type(system).__name__}, a value for each state."
-        )
-    complete_inputs(plant, None)  # raises where an input cannot be 0
-    rows, shared = _distinct(plant, variations)
-    compiled, pressures = compile_system(plant), (0.0,) * len(plant.muscles)
-    inputs, names = np.zeros(len(plant.inputs)), [s.name for s in plant.states]
+    rows, shared = _distinct(system, variations)
+    names = [s.name for s in system.states]
     states, reasons = np.full((rows.size, len(names)), np.nan), dict[int, str]()
-    each = block_size(len(names))
-    for begin in range(0, rows.size, each):
-        part = rows[begin : begin + each]
-        table = find_equilibrium_of_each(compiled, variations.table(part), pressures, inputs)
-        states[begin : begin + each] = table
+    for begin in range(0, rows.size, STATES_AT_ONCE):
+        part = rows[begin : begin + STATES_AT_ONCE]
+        table = system.default_states(variations.table(part))
+        if table is None:
+            raise ParameterError(
+                f"simulate_batch: give the initial_states of {type(system).__name__}, a value for each state."
+            )
+        states[begin : begin + part.size] = table
         for i in np.flatnonzero(~np.isfinite(table).all(axis=1)):
-            state = _equilibrium(variations.one(int(part[i])), names)
+            state = _default_state(variations.one(int(part[i])), names)
             if isinstance(state, str):
                 reasons[begin + int(i)] = state
             else:
@@ -103,10 +99,9 @@ def default_states(variations: Variations, advanced: Callable[[int], None]) -> t
     return states[shared], {row: reasons[i] for row, i in enumerate(shared.tolist()) if i in reasons}
 
 
-def _distinct(plant: Plant, variations: Variations) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
-    """The first of all plants that share an equilibrium, and for each plant (N,) the index of the shared one."""
-    stateless = not any(circuit.states(plant.ambient) for circuit in plant.circuits)
-    relevant = [i for i, path in enumerate(variations.paths) if not (stateless and path.startswith("circuit"))]
+def _distinct(system: System, variations: Variations) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """The first of all systems that share a default state, and for each (N,) the index of the shared one."""
+    relevant = [i for i, path in enumerate(variations.paths) if system.affects_default_state(path)]
     known: dict[bytes, int] = {}
     table = np.ascontiguousarray(variations.values[:, relevant])
     shared = [known.setdefault(row.tobytes(), len(known)) for row in table]
@@ -114,9 +109,9 @@ def _distinct(plant: Plant, variations: Variations) -> tuple[npt.NDArray[np.intp
     return first, np.array(shared, dtype=np.intp)
 
 
-def _equilibrium(plant: System, names: list[str]) -> Array | str:
+def _default_state(system: System, names: list[str]) -> Array | str:
     try:
-        state = find_equilibrium(plant.equilibrium_plant, pressure=0.0)
+        state = system.default_state() or {}
     except PhysicsError as error:
         return f"it has no equilibrium to start from: {error}"
     return np.array([state[name] for name in names])

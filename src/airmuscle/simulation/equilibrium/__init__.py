@@ -1,11 +1,10 @@
 """Static equilibria of a plant for given pressures in its muscles, or given masses of air."""
 
-from .equilibrium import Equilibrium, block_size, find_equilibria, find_equilibrium, find_equilibrium_of_each
+from .equilibrium import Equilibrium, find_equilibria, find_equilibrium, find_equilibrium_of_each
 from .request import complete_inputs
 
 __all__ = [
     "Equilibrium",
-    "block_size",
     "complete_inputs",
     "find_equilibria",
     "find_equilibrium",

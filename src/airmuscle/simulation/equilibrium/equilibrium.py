@@ -11,12 +11,12 @@ import numpy.typing as npt
 from ...compile.program import CompiledSystem, compile_system
 from ...core.arrays import Array
 from ...core.errors import AirmuscleError, EquilibriumError
-from ...plant.plant import Plant
 from .explanation import no_equilibrium
 from .multi_dof import equilibria_of_several_coordinates
 from .request import MuscleValues, air_of_each, complete_inputs
 from .single_dof import GRID_POINTS, equilibria_of_one_coordinate, grid
 from .stability import are_stable
+from .static_plant import StaticPlant
 from .statics import Rows, Statics
 
 TABLE_SIZE = 500_000
@@ -32,7 +32,7 @@ class Equilibrium:
 
 
 def find_equilibria(
-    plant: Plant,
+    plant: StaticPlant,
     *,
     pressure: MuscleValues = None,
     air_mass: MuscleValues = None,
@@ -74,7 +74,7 @@ def _is_degenerate(one: Statics) -> bool:
 
 
 def find_equilibrium(
-    plant: Plant,
+    plant: StaticPlant,
     *,
     pressure: MuscleValues = None,
     air_mass: MuscleValues = None,
@@ -92,6 +92,18 @@ def find_equilibrium(
     return dict(zip(one.names, state.tolist(), strict=True))
 
 
+def equilibrium_at_ambient_pressure(plant: StaticPlant) -> dict[str, float]:
+    """The state of `find_equilibrium` at gauge pressure 0 and inputs 0."""
+    return find_equilibrium(plant, pressure=0.0)
+
+
+def equilibria_at_ambient_pressure(plant: StaticPlant, parameters: Array) -> Array:
+    """The states (N, n) of `find_equilibrium` at gauge pressure 0 and inputs 0, for plants of this structure with
+    parameters (N, P); NaN if none exists. Raises ParameterError where an input cannot be 0."""
+    inputs = np.array(list(complete_inputs(plant, None).values()), dtype=float)
+    return find_equilibrium_of_each(compile_system(plant), parameters, (0.0,) * len(plant.muscles), inputs)
+
+
 def find_equilibrium_of_each(
     compiled: CompiledSystem, parameters: Array, pressures: tuple[float, ...], inputs: Array
 ) -> Array:
@@ -100,16 +112,11 @@ def find_equilibrium_of_each(
     The gauge pressures [Pa] of the muscles and the inputs (m,) are the same for all; `compiled` is any of the plants.
     """
     size = len(compiled.description.state_names)
-    table, block = np.full((len(parameters), size), np.nan), block_size(size)
+    table, block = np.full((len(parameters), size), np.nan), max(1, TABLE_SIZE // (GRID_POINTS * size))
     for begin in range(0, len(parameters), block):
         part = slice(begin, begin + block)
         table[part] = _each_nearest(compiled, parameters[part], pressures, inputs)
     return table
-
-
-def block_size(states: int) -> int:
-    """Number of plants with this number of states that are evaluated together."""
-    return max(1, TABLE_SIZE // (GRID_POINTS * states))
 
 
 def _each_nearest(compiled: CompiledSystem, parameters: Array, pressures: tuple[float, ...], inputs: Array) -> Array:
@@ -122,7 +129,7 @@ def _each_nearest(compiled: CompiledSystem, parameters: Array, pressures: tuple[
 
 
 def _statics(
-    plant: Plant, pressure: MuscleValues, air_mass: MuscleValues, inputs: Mapping[str, float] | None
+    plant: StaticPlant, pressure: MuscleValues, air_mass: MuscleValues, inputs: Mapping[str, float] | None
 ) -> Statics:
     """The checked arguments as a table of one plant."""
     air = air_of_each(plant, pressure, air_mass)

@@ -12,13 +12,13 @@ from ...core.annotation import one_line
 from ...core.errors import ParameterError
 from ...core.system import System
 from ...core.units import quantity
-from ...plant.plant import Plant
+from .static_plant import StaticPlant
 
 MuscleValues: TypeAlias = float | str | Sequence[float | str] | None
 """One number for all muscles, or one for each; None where the other quantity is given."""
 
 
-def air_of_each(plant: Plant, pressure: MuscleValues, air_mass: MuscleValues) -> tuple[float, ...]:
+def air_of_each(plant: StaticPlant, pressure: MuscleValues, air_mass: MuscleValues) -> tuple[float, ...]:
     """The given pressures [Pa] or air masses [kg], one for each muscle. Raises ParameterError or UnitError."""
     if (pressure is None) == (air_mass is None):
         raise ParameterError("find_equilibrium: give either the pressure [Pa] or the air_mass [kg] of the muscles.")

@@ -10,8 +10,8 @@ import numpy as np
 
 from ...core.arrays import Array
 from ...muscle import Muscle
-from ...plant.plant import Plant
 from ...pneumatics.gas import absolute_pressure, gauge_pressure
+from .static_plant import StaticPlant
 
 MAX_PRESSURE = 1e8
 """Maximum absolute pressure [Pa] of the search."""
@@ -19,7 +19,7 @@ _TOLERANCE = 1e-13
 """Relative error of the air mass at which the search ends."""
 
 
-def shut_air_pressure(plant: Plant, muscle: Muscle, air_mass: float, contraction: Array) -> Array:
+def shut_air_pressure(plant: StaticPlant, muscle: Muscle, air_mass: float, contraction: Array) -> Array:
     """Gauge pressure [Pa] of a mass of air [kg] in a muscle at rest, wall and series spring in steady state.
 
     Contractions are arrays that broadcast with the parameters of the plant; NaN if the pressure would exceed

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from ...compile.program import CompiledSystem, Program
 from ...core.arrays import Array
-from ...plant.plant import Plant
+from .static_plant import StaticPlant
 
 MARGIN = 1e-9
 """Real part of an eigenvalue, relative to the largest eigenvalue, up to which it counts as zero (chosen)."""
@@ -27,7 +27,7 @@ def are_stable(
     it would hold any position. A state without finite derivatives is not stable.
     """
     plant, names = compiled.system, [s.name for s in compiled.system.states]
-    assert isinstance(plant, Plant)
+    assert isinstance(plant, StaticPlant)
     air, moving = _kinds(plant)
     free = [i for i, n in enumerate(names) if n in moving]
     if not free:
@@ -46,7 +46,7 @@ def are_stable(
     return stable
 
 
-def _kinds(plant: Plant) -> tuple[set[str], set[str]]:
+def _kinds(plant: StaticPlant) -> tuple[set[str], set[str]]:
     """The states of the air in the muscles, and the states of the motion."""
     air, friction = set[str](), set[str]()
     for prefix, muscle in zip(plant.prefixes, plant.muscles, strict=True):
@@ -71,7 +71,7 @@ def _slopes(
 def _function(compiled: CompiledSystem, free: list[int]) -> Any:
     """(x, u, p) -> (df/dx of the states of the motion, V, dV/dx), differentiated once for each structure."""
     program, plant = compiled.program, compiled.system
-    assert isinstance(plant, Plant)
+    assert isinstance(plant, StaticPlant)
     if program not in _functions:
         import casadi
 

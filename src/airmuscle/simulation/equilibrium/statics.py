@@ -16,9 +16,9 @@ from ...core.arrays import Array
 from ...core.errors import AirmuscleError
 from ...core.ops import Value
 from ...muscle import Muscle
-from ...plant.plant import Plant
 from ...pneumatics.gas import absolute_pressure
 from .shut_air import shut_air_pressure
+from .static_plant import StaticPlant
 
 Rows = npt.NDArray[np.intp]
 LOWEST_CONTRACTION = -0.5
@@ -45,7 +45,7 @@ class Statics:
     air: tuple[float, ...]
     shut: bool
     inputs: Array
-    plants: Plant
+    plants: StaticPlant
 
     @classmethod
     def of_plants(
@@ -54,7 +54,7 @@ class Statics:
         """The plants with these parameters (N, P)."""
         precomputed = np.array([compiled.program.precompute(row) for row in np.ascontiguousarray(parameters)])
         plant = compiled.system
-        assert isinstance(plant, Plant)
+        assert isinstance(plant, StaticPlant)
         return cls(compiled, parameters, precomputed, air, shut, inputs, _with_arrays(plant, parameters))
 
     def of(self, rows: Rows) -> Statics:
@@ -64,10 +64,10 @@ class Statics:
         return dataclasses.replace(self, parameters=parameters, precomputed=self.precomputed[rows], plants=plants)
 
     @functools.cached_property
-    def separate(self) -> list[Plant]:
+    def separate(self) -> list[StaticPlant]:
         """The plants, each with scalar parameters."""
         plant = self.compiled.system
-        assert isinstance(plant, Plant)
+        assert isinstance(plant, StaticPlant)
         return [tree.unflatten(plant, row.tolist()) for row in self.parameters]
 
     @property
@@ -189,7 +189,7 @@ class Statics:
         return dict(zip(self.names, self.states(place)[0, 0].tolist(), strict=True))
 
 
-def _with_arrays(plant: Plant, parameters: Array) -> Plant:
+def _with_arrays(plant: StaticPlant, parameters: Array) -> StaticPlant:
     """The plant with an array (N, 1) for every parameter, also if N = 1: powers of scalars and arrays differ in the
     last digit, and the equilibrium of a plant must not depend on the number of plants."""
     return tree.unflatten(plant, [column[:, None].copy() for column in parameters.T])
