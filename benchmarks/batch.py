@@ -20,10 +20,10 @@ from ode8 import compilers
 
 import airmuscle as am
 from airmuscle.core import tree
-from airmuscle.simulation.batch import Double, Precision, Single
-from airmuscle.simulation.batch.initial_states import default_states
-from airmuscle.simulation.batch.thread_pool import available_cores
-from airmuscle.simulation.batch.variations import variations_of
+from airmuscle.engine import Double, Precision, Single
+from airmuscle.engine.run.batch.initial_states import default_states
+from airmuscle.engine.run.batch.thread_pool import available_cores
+from airmuscle.engine.run.batch.variations import variations_of
 
 STEP, PLANTS, DURATION = 1e-3, 10_000, 5.0
 SHORT = 0.1
@@ -68,7 +68,7 @@ def c_parameters(plant: Any, count: int) -> Array:
     """The parameters (46, N) of the C code, in its order."""
     muscle, circuit, load, ambient = plant.muscles[0], plant.circuits[0], plant.mechanism, plant.ambient
     law, (k, c) = muscle.contractile, _stretch(muscle.geometry)
-    scale = am.pneumatics.REFERENCE_DENSITY * np.sqrt(am.pneumatics.REFERENCE_TEMPERATURE / ambient.temperature)
+    scale = am.physics.REFERENCE_DENSITY * np.sqrt(am.physics.REFERENCE_TEMPERATURE / ambient.temperature)
     validity_range = (law.min_contraction, law.max_contraction), (law.min_pressure, law.max_pressure)
     valves = [
         x
@@ -77,7 +77,7 @@ def c_parameters(plant: Any, count: int) -> Array:
     ]
     rows = [1 / load.mass, load.gravity, 1 / muscle.geometry.resting_length, k, c * c]
     rows += [
-        am.pneumatics.GAS_CONSTANT * ambient.temperature,
+        am.physics.GAS_CONSTANT * ambient.temperature,
         ambient.pressure,
         circuit.supply.pressure + ambient.pressure,
         *valves,

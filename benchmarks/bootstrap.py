@@ -21,8 +21,8 @@ TEXT = (
 
 def refit_library(runs: list[am.Recording]) -> np.ndarray:
     """Coefficients of every refit with the library, including the initial fit."""
-    initial = am.fit(am.characteristic.ContractileSurface.blank(), runs, censoring=am.identify.UNCENSORED)
-    return am.identify.bootstrap(initial, runs, refits=REFITS, by=am.identify.RunSplit(), seed=0).values
+    initial = am.fit(am.characteristic.ContractileSurface.blank(), runs, censoring=am.bench.UNCENSORED)
+    return am.bench.bootstrap(initial, runs, refits=REFITS, by=am.bench.RunSplit(), seed=0).values
 
 
 def refit_scipy(columns: np.ndarray, force: np.ndarray) -> np.ndarray:

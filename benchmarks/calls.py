@@ -12,7 +12,7 @@ from measure import Section, Target, format_time, print_section, time_variants
 from rodas4 import hand_written_rates, kernel, lsoda
 
 import airmuscle as am
-from airmuscle.compile.program import compile_system
+from airmuscle.engine.compile.program import compile_system
 
 HEADER = ("call", "median", "minimum", "kernel", "call / kernel")
 STEP = 1e-5
@@ -35,7 +35,7 @@ TEXT = (
 
 
 @dataclasses.dataclass(frozen=True)
-class Called(am.control.Controller):
+class Called(am.engine.Controller):
     """A controller that calls a control law from Python."""
 
     inner: am.PID
@@ -73,14 +73,14 @@ CALLED_REASON = "most of it is the controller in Python: `PID.step` takes 5 to 1
 
 
 @dataclasses.dataclass(frozen=True)
-class Applied(am.control.InputSignal):
+class Applied(am.engine.InputSignal):
     """The inputs of a recording of held and pulsed inputs, with an instant at each row."""
 
     recording: am.Recording
 
-    def segments(self, inputs: Sequence[str], start: float, duration: float) -> am.control.PiecewiseLinear:
+    def segments(self, inputs: Sequence[str], start: float, duration: float) -> am.engine.PiecewiseLinear:
         values = np.stack([self.recording[name][:-1] for name in inputs], axis=1)
-        return am.control.PiecewiseLinear(self.recording["time"][1:].copy(), values, np.zeros(values.shape))
+        return am.engine.PiecewiseLinear(self.recording["time"][1:].copy(), values, np.zeros(values.shape))
 
 
 def with_default_state(run: Run) -> Callable[[], Any]:
@@ -180,8 +180,8 @@ def steps(rounds: int) -> tuple[list[tuple[str, ...]], list[Target]]:
 
 def control_samples(rounds: int) -> tuple[list[tuple[str, ...]], list[Target]]:
     """One sample of a loop with a PID, compiled and called from Python: inputs held, and two pulsed inputs."""
-    pid = am.PID("pressure", am.control.SplitRange("fill", "discharge"), gain=1.5e-5, integral_time=0.4)
-    pulses = {"fill": am.control.PWM(50.0), "discharge": am.control.PWM(50.0)}
+    pid = am.PID("pressure", am.engine.SplitRange("fill", "discharge"), gain=1.5e-5, integral_time=0.4)
+    pulses = {"fill": am.engine.PWM(50.0), "discharge": am.engine.PWM(50.0)}
     rows, targets = [], []
     for name, drivers, limits in (("held", {}, (5, 15)), ("two pulsed inputs", pulses, (10, 40))):
         law = am.ControlLoop(pid, SAMPLE_TIME, SETPOINT, drivers=drivers)

@@ -14,11 +14,11 @@ from measure import Section, Target, format_time, print_section, time_variants
 from rodas4 import kernel
 
 import airmuscle as am
-from airmuscle.compile.program import CompiledSystem, compile_system
 from airmuscle.core import ops
 from airmuscle.core.declaration import model, parameter
 from airmuscle.core.ops import Value
 from airmuscle.core.variables import Input, StateVariable
+from airmuscle.engine.compile.program import CompiledSystem, compile_system
 
 RTOL = 1e-6
 SIDE_NAMES = ("left", "right")
@@ -48,8 +48,8 @@ class Antagonists(am.Mechanism):
     offset: float = parameter("1", "eps_0", "contraction of both muscles at angle zero")
 
     @property
-    def coordinates(self) -> tuple[am.mechanism.Coordinate, ...]:
-        return (am.mechanism.Coordinate("angle", "speed", "rad", 0.1, 1.0),)
+    def coordinates(self) -> tuple[am.physics.Coordinate, ...]:
+        return (am.physics.Coordinate("angle", "speed", "rad", 0.1, 1.0),)
 
     def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         left, right = resting_lengths
@@ -79,19 +79,19 @@ class LaggedValve(am.Circuit):
 
     def supplied_flow(
         self,
-        inlet: am.pneumatics.Air,
-        airs: tuple[am.pneumatics.Air, ...],
+        inlet: am.physics.Air,
+        airs: tuple[am.physics.Air, ...],
         state: Mapping[str, Value],
         inputs: Mapping[str, Value],
         ambient: am.Ambient,
-    ) -> am.pneumatics.CircuitFlows:
+    ) -> am.physics.CircuitFlows:
         spool = state["spool"]
-        incoming = am.pneumatics.orifice_flow(self.valve, inlet, airs[0], ops.maximum(spool, 0.0))
-        outgoing = am.pneumatics.orifice_flow(
-            self.valve, airs[0], am.pneumatics.ambient_air(ambient), ops.maximum(-spool, 0.0)
+        incoming = am.physics.orifice_flow(self.valve, inlet, airs[0], ops.maximum(spool, 0.0))
+        outgoing = am.physics.orifice_flow(
+            self.valve, airs[0], am.physics.ambient_air(ambient), ops.maximum(-spool, 0.0)
         )
         moving = (inputs["fill"] - inputs["discharge"] - spool) / self.lag
-        return am.pneumatics.CircuitFlows((incoming - outgoing,), incoming, outgoing, {"spool": moving})
+        return am.physics.CircuitFlows((incoming - outgoing,), incoming, outgoing, {"spool": moving})
 
 
 @model
@@ -101,7 +101,7 @@ class JointWithUpstreamHeat(JointWithHeat):
     def _flows(self, side: str, state: Mapping[str, Any], pressure: Any, fill: Any, discharge: Any) -> tuple[Any, Any]:
         incoming, _ = super()._flows(side, state, pressure, fill, discharge)
         wall = self.ambient.temperature
-        in_tube = state[f"{side}.tube_mass"] * am.pneumatics.GAS_CONSTANT * wall / self.tube_volume
+        in_tube = state[f"{side}.tube_mass"] * am.physics.GAS_CONSTANT * wall / self.tube_volume
         inside = state[f"{side}.energy"] / (state[f"{side}.air_mass"] * HEAT_CAPACITY)
         temperature = ops.where(in_tube >= pressure, wall, inside)
         return incoming, self.tube.mass_flow(in_tube, pressure, 1.0, temperature)
@@ -111,21 +111,21 @@ def component_plant(system: Joint) -> am.Plant:
     """A joint of `joints.py`, made of components."""
     muscles = tuple(dataclasses.replace(system.muscle, name=name) for name in SIDE_NAMES)
     mechanism = Antagonists(system.inertia, system.radius, system.friction, system.load, system.offset)
-    tube = am.pneumatics.Tube(system.tube, system.tube_volume)
+    tube = am.physics.Tube(system.tube, system.tube_volume)
     if isinstance(system, JointWithHeat):
-        line = am.pneumatics.WithTubes(LaggedValve(system.supply, system.valve, system.spool_lag), tube)
+        line = am.physics.WithTubes(LaggedValve(system.supply, system.valve, system.spool_lag), tube)
         return am.Plant(
-            muscles, (line, line), mechanism, am.pneumatics.EnergyBalance(system.heat_transfer), system.ambient
+            muscles, (line, line), mechanism, am.physics.EnergyBalance(system.heat_transfer), system.ambient
         )
-    line = am.pneumatics.WithTubes(am.FillDischarge(system.supply, system.valve, system.valve), tube)
+    line = am.physics.WithTubes(am.FillDischarge(system.supply, system.valve, system.valve), tube)
     return am.Plant(muscles, (line, line), mechanism, am.Isothermal(), system.ambient)
 
 
 def with_proportional_valves(system: JointWithHeat) -> am.Plant:
     """The joint with heat transfer and a 5/3 proportional valve for each muscle: twelve states."""
-    plant, spool = component_plant(system), am.pneumatics.SecondOrderLag(1.0 / (2.0 * ops.pi * system.spool_lag))
-    valve = am.pneumatics.ProportionalValve(system.supply, system.valve, system.valve, spool)
-    return dataclasses.replace(plant, circuit=(am.pneumatics.WithTubes(valve, plant.circuits[0].tube),) * 2)
+    plant, spool = component_plant(system), am.physics.SecondOrderLag(1.0 / (2.0 * ops.pi * system.spool_lag))
+    valve = am.physics.ProportionalValve(system.supply, system.valve, system.valve, spool)
+    return dataclasses.replace(plant, circuit=(am.physics.WithTubes(valve, plant.circuits[0].tube),) * 2)
 
 
 def written_name(name: str) -> str:

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from control_page import FORWARD, ON_OFF, page
 
-from airmuscle.study.control_benchmark import (
+from airmuscle.design import (
     BenchmarkJoint,
     compare_controllers,
     find_tasks,

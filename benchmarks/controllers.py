@@ -36,7 +36,7 @@ def predictive(joint: Any, state: Any) -> am.control.LinearModelPredictive:
     for side in SIDES:
         noise |= {f"{side}.air_mass": 1e-6, f"{side}.air_mass.disturbance": 1e-5, f"{side}.lagged_setpoint_rate": 1e3}
     permitted = {"angle": 0.02, "angular_speed": 1.0, **{f"{side}.setpoint": 1e5 for side in SIDES}}
-    return am.analysis.design_predictive(
+    return am.control.design_predictive(
         model, SAMPLE_TIME, measured=MEASURED, controlled=("angle",),
         disturbed=("left.air_mass", "right.air_mass", "angular_speed"), permitted=permitted, process_noise=noise,
         measurement_noise={"left.pressure": 300.0, "right.pressure": 300.0, "angle": 1e-4},
@@ -60,7 +60,7 @@ def predictive_times(law: am.control.LinearModelPredictive) -> dict[str, np.ndar
     for _ in range(SAMPLES):
         pressures, angles = rng.uniform(1.5e5, 3.5e5, 2).tolist(), rng.uniform(-0.3, 0.3, 2).tolist()
         columns = dict(zip(MEASURED, (*pressures, angles[0]), strict=True))
-        measurement = am.control.Measurement(columns, {"angle": angles[1]}, ranges)
+        measurement = am.engine.Measurement(columns, {"angle": angles[1]}, ranges)
         begun = time.perf_counter()
         _, memory = law.step(memory, measurement, SAMPLE_TIME)
         whole.append(time.perf_counter() - begun)
@@ -99,14 +99,14 @@ def section(rounds: int = 20) -> Section:
     state = am.find_equilibrium(joint, pressure=PRESSURE)
     times = predictive_times(predictive(joint, state))
     for name, kind in (
-        ("extended", am.analysis.ExtendedKalmanFilter),
-        ("unscented", am.analysis.UnscentedKalmanFilter),
+        ("extended", am.control.ExtendedKalmanFilter),
+        ("unscented", am.control.UnscentedKalmanFilter),
     ):
         times[f"{name} Kalman filter, a sample"] = filter_times(kind, joint, state)
     inverse = am.control.StaticInverse(joint.muscles[0], max_pressure=6e5)
     contraction, force = np.linspace(0.02, 0.18, POINTS), np.linspace(300.0, 100.0, POINTS)
     times[f"static inverse, {POINTS} points"] = repeated(lambda: inverse.pressure(contraction, force), 5 * rounds)
-    statics = am.analysis.joint_statics(joint)
+    statics = am.physics.joint_statics(joint)
     angles = np.linspace(-0.2, 0.2, POINTS)
     low, high = (np.asarray(each) for each in statics.stiffness_limits(angles))
     wanted = low + np.linspace(0.3, 0.7, POINTS) * (high - low)

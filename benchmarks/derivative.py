@@ -13,8 +13,8 @@ from measure import Section, Target, format_time, print_section, time_variants
 from new_plant import MUSCLES, many_muscles
 
 import airmuscle as am
-from airmuscle.compile.kernels.calls import invoke, pointer
-from airmuscle.compile.program import CompiledSystem, compile_system
+from airmuscle.engine.compile.kernels.calls import invoke, pointer
+from airmuscle.engine.compile.program import CompiledSystem, compile_system
 
 HEADER = ("plant", "median", "minimum", "per muscle")
 CALLS = 10_000

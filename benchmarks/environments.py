@@ -16,8 +16,8 @@ from measure import Section, Target, format_time, print_section, time_variants
 
 import airmuscle as am
 from airmuscle.core.errors import AirmuscleWarning
-from airmuscle.simulation.batch import Double, Single
-from airmuscle.simulation.batch.thread_pool import available_cores
+from airmuscle.engine import Double, Single
+from airmuscle.engine.run.batch.thread_pool import available_cores
 
 COUNT, SUBSTEPS, PERIOD = 4096, 10, 0.01
 STEPS = 20
@@ -109,7 +109,7 @@ def variants(count: int) -> tuple[dict[str, Callable[[], Any]], dict[str, int]]:
     runs: dict[str, Callable[[], Any]] = {"Stepper.step, 10 ms": stepper_steps(SUBSTEPS)}
     sizes = {"Stepper.step, 10 ms": STEPS}
     if is_installed("gymnasium"):
-        am.environments.register_environments()
+        am.outlets.register_environments()
         for name, precision in (
             ("double", Double()),
             ("single precision", Single()),

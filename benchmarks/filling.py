@@ -68,7 +68,7 @@ def hanging(muscles: int = 1) -> am.Plant:
             surface(),
             BRAID,
             am.LinearSpring(4000.0 + 50.0 * i),
-            am.muscle.PressureDamper(100.0, 5e-4),
+            am.physics.PressureDamper(100.0, 5e-4),
             name=f"muscle{i}",
         )
         for i in range(muscles)
@@ -107,7 +107,7 @@ class Run:
         return np.array([s.nominal for s in self.system.states])
 
     @property
-    def segments(self) -> am.control.PiecewiseLinear:
+    def segments(self) -> am.engine.PiecewiseLinear:
         return self.command.segments(self.system.inputs, 0.0, DURATION)
 
     @property

@@ -11,7 +11,7 @@ from measure import Section, format_time, print_section, time_variants
 from new_plant import compile_anew
 
 import airmuscle as am
-from airmuscle.compile.program import compile_system
+from airmuscle.engine.compile.program import compile_system
 
 TOLERANCES = tuple(10.0**-k for k in range(3, 11))
 MUSCLES = (1, 2, 4, 6, 12, 24)
@@ -40,7 +40,7 @@ class Case:
     plant: str
     value: str
     run: Run
-    segments: am.control.PiecewiseLinear
+    segments: am.engine.PiecewiseLinear
     duration: float
     rtol: float = 1e-6
 
@@ -92,11 +92,11 @@ def by_muscles(rounds: int) -> list[Row]:
     return measure_cases(cases, rounds, {name: time.minimum for name, time in compiling.items()})
 
 
-def pwm_command(plant: am.Plant, frequency: float) -> am.control.WithDrivers:
+def pwm_command(plant: am.Plant, frequency: float) -> am.engine.WithDrivers:
     """Duty ratios 0.3 of filling and 0.1 of discharge for every muscle; interchanged in the second half of the run."""
     large, small = ((0.0, 0.3), (PULSED / 2, 0.1)), ((0.0, 0.1), (PULSED / 2, 0.3))
     duties = {f"{p}{name}": duty for p in plant.prefixes for name, duty in (("fill", large), ("discharge", small))}
-    return am.control.WithDrivers(am.Schedule(duties), {name: am.control.PWM(frequency) for name in duties})
+    return am.engine.WithDrivers(am.Schedule(duties), {name: am.engine.PWM(frequency) for name in duties})
 
 
 def by_frequency(rounds: int) -> list[Row]:
@@ -105,7 +105,7 @@ def by_frequency(rounds: int) -> list[Row]:
     for muscles, label in ((1, "1 muscle"), (6, "6 muscles")):
         run = lifting_run(muscles)
 
-        def driven(frequency: float, run: Run = run) -> am.control.PiecewiseLinear:
+        def driven(frequency: float, run: Run = run) -> am.engine.PiecewiseLinear:
             return pwm_command(run.system, frequency).segments(run.system.inputs, 0.0, PULSED)
 
         cases = [Case("PWM frequency", label, f"{f:g} Hz", run, driven(f), PULSED) for f in FREQUENCIES]

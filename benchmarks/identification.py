@@ -12,9 +12,9 @@ from scalar_rates import hill
 from sensitivities import DURATION, FREE, SENSORS, case
 
 import airmuscle as am
+from airmuscle.bench import fit_dynamic
+from airmuscle.bench.identify.dynamic.fit import initial_guesses
 from airmuscle.core import tree
-from airmuscle.identify.dynamic import fit_dynamic
-from airmuscle.identify.dynamic.fit import initial_guesses
 
 STARTS = 100
 HEADER = ("variant", "time for 100 starts", "evaluations per start", "starts at the best optimum")
@@ -55,7 +55,7 @@ def find_rest(plant: am.Plant, rates: Any) -> Array:
     def state(position: float) -> Array:
         s = 1.0 - position / geometry.resting_length
         volume = k * s * (1.0 - c * c * s * s)
-        return np.array([air.pressure * volume / (am.pneumatics.GAS_CONSTANT * air.temperature), position, 0.0])
+        return np.array([air.pressure * volume / (am.physics.GAS_CONSTANT * air.temperature), position, 0.0])
 
     return state(brentq(lambda position: rates(0.0, state(position))[2], -0.1, 0.1, xtol=1e-12))
 
@@ -78,7 +78,7 @@ def simulate_scipy(plant: am.Plant, settings: ScipySettings) -> Array:
     rows = np.concatenate(parts)
     k, c = stretch_factor(plant.muscles[0].geometry)
     s = 1.0 - rows[:, 1] / plant.muscles[0].geometry.resting_length
-    inside = rows[:, 0] * am.pneumatics.GAS_CONSTANT * plant.ambient.temperature / (k * s * (1.0 - c * c * s * s))
+    inside = rows[:, 0] * am.physics.GAS_CONSTANT * plant.ambient.temperature / (k * s * (1.0 - c * c * s * s))
     return np.column_stack([inside - plant.ambient.pressure, rows[:, 1]])
 
 

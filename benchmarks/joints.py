@@ -15,7 +15,7 @@ from airmuscle.core.declaration import model, parameter
 from airmuscle.core.system import System
 from airmuscle.core.variables import StateVariable
 
-HEAT_CAPACITY = am.pneumatics.GAS_CONSTANT / 0.4
+HEAT_CAPACITY = am.physics.GAS_CONSTANT / 0.4
 """Specific heat of air at constant volume [J/(kg K)], for a heat capacity ratio of 1.4."""
 SIDES = (("left", 1.0), ("right", -1.0))
 
@@ -77,13 +77,10 @@ class Joint(System):
         contraction, speed = self._motion(sign, state)
         temperature = self.ambient.temperature
         pressure = (
-            state[f"{side}.air_mass"]
-            * am.pneumatics.GAS_CONSTANT
-            * temperature
-            / self.muscle.geometry.volume(contraction)
+            state[f"{side}.air_mass"] * am.physics.GAS_CONSTANT * temperature / self.muscle.geometry.volume(contraction)
         )
         incoming, through = self._flows(side, state, pressure, inputs[f"{side}.fill"], inputs[f"{side}.discharge"])
-        tension = self.muscle.tension(am.pneumatics.gauge_pressure(pressure, self.ambient), contraction, speed)
+        tension = self.muscle.tension(am.physics.gauge_pressure(pressure, self.ambient), contraction, speed)
         return tension, {f"{side}.air_mass": through, f"{side}.tube_mass": incoming - through}
 
     def _motion(self, sign: float, state: Mapping[str, Any]) -> tuple[Any, Any]:
@@ -92,8 +89,8 @@ class Joint(System):
 
     def _flows(self, side: str, state: Mapping[str, Any], pressure: Any, fill: Any, discharge: Any) -> tuple[Any, Any]:
         temperature = self.ambient.temperature
-        in_tube = state[f"{side}.tube_mass"] * am.pneumatics.GAS_CONSTANT * temperature / self.tube_volume
-        source = am.pneumatics.absolute_pressure(self.supply.pressure, self.ambient)
+        in_tube = state[f"{side}.tube_mass"] * am.physics.GAS_CONSTANT * temperature / self.tube_volume
+        source = am.physics.absolute_pressure(self.supply.pressure, self.ambient)
         incoming = self.valve.mass_flow(source, in_tube, fill, temperature)
         outgoing = self.valve.mass_flow(in_tube, self.ambient.pressure, discharge, temperature)
         return incoming - outgoing, self.tube.mass_flow(in_tube, pressure, 1.0, temperature)
@@ -120,15 +117,13 @@ class JointWithHeat(Joint):
         growth = self.muscle.geometry.volume_derivative(contraction) * speed / self.muscle.geometry.resting_length
         mass, energy, spool = (state[f"{side}.{name}"] for name in ("air_mass", "energy", "spool"))
         temperature = energy / (mass * HEAT_CAPACITY)
-        pressure = mass * am.pneumatics.GAS_CONSTANT * temperature / volume
+        pressure = mass * am.physics.GAS_CONSTANT * temperature / volume
         opened = ops.maximum(spool, 0.0), ops.maximum(-spool, 0.0)
         incoming, through = self._flows(side, state, pressure, *opened)
         wall = self.ambient.temperature
-        energy_flow = (
-            (HEAT_CAPACITY + am.pneumatics.GAS_CONSTANT) * through * ops.where(through >= 0, wall, temperature)
-        )
+        energy_flow = (HEAT_CAPACITY + am.physics.GAS_CONSTANT) * through * ops.where(through >= 0, wall, temperature)
         heat = self.heat_transfer * (wall - temperature)
-        tension = self.muscle.tension(am.pneumatics.gauge_pressure(pressure, self.ambient), contraction, speed)
+        tension = self.muscle.tension(am.physics.gauge_pressure(pressure, self.ambient), contraction, speed)
         return tension, {
             f"{side}.air_mass": through,
             f"{side}.tube_mass": incoming - through,
@@ -145,8 +140,8 @@ def joint(heat: bool = False) -> Joint:
 
 def joint_start(system: Joint, pressure: float = 2e5) -> dict[str, float]:
     """The state at angle and speed zero, with muscles and tubes at a gauge pressure [Pa] and ambient temperature."""
-    per_volume = am.pneumatics.absolute_pressure(pressure, system.ambient) / (
-        am.pneumatics.GAS_CONSTANT * system.ambient.temperature
+    per_volume = am.physics.absolute_pressure(pressure, system.ambient) / (
+        am.physics.GAS_CONSTANT * system.ambient.temperature
     )
     mass = float(per_volume * system.muscle.geometry.volume(system.offset))
     start = {"angle": 0.0, "speed": 0.0}

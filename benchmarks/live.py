@@ -29,10 +29,8 @@ def log_lines() -> list[str]:
 
 def measure() -> dict[str, np.ndarray]:
     """Times [s] of each step, shape (ROWS,)."""
-    fit = am.identify.RecursiveFit(
-        am.identify.BenchLimits(am.characteristic.ValidityRange(0.0, 6e5, 0.0, 0.25), 1500.0)
-    )
-    reader = am.recording.RowReader("log")
+    fit = am.bench.RecursiveFit(am.bench.BenchLimits(am.characteristic.ValidityRange(0.0, 6e5, 0.0, 0.25), 1500.0))
+    reader = am.bench.RowReader("log")
     times: dict[str, list[float]] = {"row read": [], "surface updated": [], "next point": []}
     for line in log_lines():
         start = time.perf_counter()

@@ -10,8 +10,8 @@ from joints import chosen_muscle
 from measure import Section, Target, format_time, print_section
 
 import airmuscle as am
-from airmuscle.simulation.batch import BatchSolution
-from airmuscle.simulation.batch.thread_pool import available_cores
+from airmuscle.engine import BatchSolution
+from airmuscle.engine.run.batch.thread_pool import available_cores
 
 COUNT, DURATION, SAMPLE_TIME = 10_000, 5.0, 5e-3
 SIMULATED = 400
@@ -48,7 +48,7 @@ class LoopVariant:
     gains: tuple[float, float]
     columns: tuple[str, ...]
 
-    def simulate(self, count: int, duration: float, integrator: am.simulation.Integrator) -> BatchSolution:
+    def simulate(self, count: int, duration: float, integrator: am.engine.Integrator) -> BatchSolution:
         """So many loops with gains between both values."""
         gains = np.geomspace(*self.gains, count)
         return am.simulate_batch(
@@ -61,7 +61,7 @@ def lifted_load() -> LoopVariant:
     """A cascade of position and pressure control."""
     valve = am.Valve(2.6e-9, 0.4)
     plant = am.Plant(chosen_muscle(), am.FillDischarge(am.Supply(5.5e5), valve, valve), am.HangingMass(2.0))
-    inner = am.PID("pressure", am.control.SplitRange("fill", "discharge"), gain=5e-5)
+    inner = am.PID("pressure", am.engine.SplitRange("fill", "discharge"), gain=5e-5)
     law = am.control.Cascade(am.PID("position", "pressure", 4e6, 0.3, initial_output=1e5), inner, (0.0,), (5e5,))
     loop = am.ControlLoop(law, SAMPLE_TIME, am.Schedule({"position": ((0, 0.01), (1, 0.02), (3, 0.01))}))
     columns = ("position", "setpoint.position", "command.fill", "command.discharge", "air_mass")
@@ -73,12 +73,12 @@ def joint() -> LoopVariant:
     """Control of angle and stiffness, with a pressure controller for each muscle."""
     valve, names = am.Valve(1e-8, 0.4), ("left", "right")
     muscles = tuple(dataclasses.replace(chosen_muscle(), name=name) for name in names)
-    mechanism = am.mechanism.AntagonisticJoint(radius=0.02, inertia=0.02, damping=0.05, weight_torque=0.5, offset=0.08)
+    mechanism = am.physics.AntagonisticJoint(radius=0.02, inertia=0.02, damping=0.05, weight_torque=0.5, offset=0.08)
     circuit = am.FillDischarge(am.Supply(5.5e5), valve, valve)
     plant = am.Plant(muscles, (circuit, circuit), mechanism)
     inverse = am.control.AntagonisticInverse(muscles, mechanism, 0.2e5, 5e5)
     inner = am.control.Decentralised(
-        tuple(am.PID(f"{n}.pressure", am.control.SplitRange(f"{n}.fill", f"{n}.discharge"), gain=2e-5) for n in names)
+        tuple(am.PID(f"{n}.pressure", am.engine.SplitRange(f"{n}.fill", f"{n}.discharge"), gain=2e-5) for n in names)
     )
     outer = am.control.AngleAndStiffness(inverse, ("left.pressure", "right.pressure"), gain=5.0, integral_time=0.5)
     law = am.control.Cascade(outer, inner, (0.2e5,) * 2, (5e5,) * 2)
@@ -121,7 +121,7 @@ def _errors(case: LoopVariant, batch: BatchSolution, reference: BatchSolution) -
 
 
 def _times(
-    case: LoopVariant, count: int, duration: float, integrator: am.simulation.Integrator, rounds: int
+    case: LoopVariant, count: int, duration: float, integrator: am.engine.Integrator, rounds: int
 ) -> tuple[float, float]:  # fmt: skip
     """Minimum CPU time and minimum wall time of a loop [s]."""
     cpu, wall = [], []

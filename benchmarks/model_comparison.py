@@ -17,8 +17,8 @@ from rig_files import write_files
 from startup import program
 
 import airmuscle as am
-from airmuscle.identify.candidates import blank_surface
-from airmuscle.identify.hysteresis import find_loops, fit_loop
+from airmuscle.bench import find_loops, fit_loop
+from airmuscle.bench.identify.candidates import blank_surface
 
 LENGTHS = (0.15, 0.2, 0.3)
 """Resting lengths [m] of the muscles (chosen)."""
@@ -138,9 +138,9 @@ def describe(result: Any) -> str:
     """The outcome of a task in a few words."""
     if isinstance(result, str):
         return f"recommended: {result}"
-    if isinstance(result, am.identify.Comparison):
+    if isinstance(result, am.bench.Comparison):
         return f"recommended: {result.recommended.candidate.name}; {len(result.excluded)} excluded"
-    if isinstance(result, am.identify.Bootstrap):
+    if isinstance(result, am.bench.Bootstrap):
         return f"{result.failed_refits} of {len(result.values)} refits not determined"
     return ", ".join(type(each.recommended.friction).__name__ for each in result if each.recommended is not None)
 
@@ -151,18 +151,18 @@ def section(rounds: int = 3) -> Section:
     runs = [make_sweep(length, held, 500, 300 + i) for i, (length, held) in enumerate(POINTS)]
     surface, braid = am.fit(blank_surface(5), runs), am.fit(muscle(0.3), runs)
     tasks: dict[str, tuple[Callable[[], Any], float]] = {
-        "comparison of 24 files, by specimen": (lambda: am.identify.compare(family), 10.0),
-        "comparison of 24 files, by run": (lambda: am.identify.compare(family, leave_out=am.identify.RunSplit()), 10.0),
-        f"the same by specimen, {TWO}": (lambda: am.identify.compare(family, workers=2), 10.0),
+        "comparison of 24 files, by specimen": (lambda: am.bench.compare(family), 10.0),
+        "comparison of 24 files, by run": (lambda: am.bench.compare(family, leave_out=am.bench.RunSplit()), 10.0),
+        f"the same by specimen, {TWO}": (lambda: am.bench.compare(family, workers=2), 10.0),
         f"the same by run, {TWO}": (
-            lambda: am.identify.compare(family, leave_out=am.identify.RunSplit(), workers=2),
+            lambda: am.bench.compare(family, leave_out=am.bench.RunSplit(), workers=2),
             10.0,
         ),
-        "comparison of six sweeps": (lambda: am.identify.compare(sweeps), 10.0),
+        "comparison of six sweeps": (lambda: am.bench.compare(sweeps), 10.0),
         "friction of three loops": (lambda: [fit_loop(loop) for loop in loops], 10.0),
-        "bootstrap, surface": (lambda: am.identify.bootstrap(surface, runs, by=am.identify.RunSplit()), 3.0),
+        "bootstrap, surface": (lambda: am.bench.bootstrap(surface, runs, by=am.bench.RunSplit()), 3.0),
         "bootstrap, braid, 100 refits": (
-            lambda: am.identify.bootstrap(braid, runs, refits=100, by=am.identify.RunSplit()),
+            lambda: am.bench.bootstrap(braid, runs, refits=100, by=am.bench.RunSplit()),
             3.0,
         ),
     }

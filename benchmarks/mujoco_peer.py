@@ -17,7 +17,7 @@ from ode8 import FLAGS, SOURCE, STEP, compile_source, compilers, constants
 from rodas4 import kernel
 
 import airmuscle as am
-from airmuscle.compile.program import compile_system
+from airmuscle.engine.compile.program import compile_system
 
 CALLBACKS = pathlib.Path(__file__).with_name("mujoco_callbacks.c")
 HEADER = ("muscles", "variant", "median", "minimum", "ratio to ode8", "maximum error [m]")
@@ -106,7 +106,7 @@ def measure(muscles: int, rounds: int) -> tuple[tuple[tuple[str, ...], ...], tup
     segments, times, state = run.segments, run.times, run.vector
     library_name, mujoco_name = "DormandPrince8(1e-4), kernel", "MuJoCo RK4(1e-4), C callbacks"
 
-    def kernel_call(method: am.simulation.Integrator) -> Callable[[], Array]:
+    def kernel_call(method: am.engine.Integrator) -> Callable[[], Array]:
         bound = method.bind(ready)
         return lambda: bound.run(segments, 0.0, state, times).rows
 

@@ -17,9 +17,9 @@ from filling import hanging, runs
 from measure import Section, Target, format_time, print_section, time_variants
 
 import airmuscle as am
-from airmuscle.compile.program import Program, compile_system
 from airmuscle.core import autodiff
 from airmuscle.core.system import System
+from airmuscle.engine.compile.program import Program, compile_system
 
 HEADER = ("task", "median", "minimum")
 TEXT = (
@@ -71,19 +71,19 @@ def many_muscles() -> am.Plant:
     )
 
 
-def with_meters() -> am.plant.WithEnergyMeters:
+def with_meters() -> am.physics.WithEnergyMeters:
     """Four muscles with friction, creep and a lagging wall, heat and tubes of two volumes, and all energy meters."""
-    plant, tube = hanging(4), am.pneumatics.Tube(am.pneumatics.TubeOrifice(1.0, 3e-3), 1e-5, 2)
+    plant, tube = hanging(4), am.physics.Tube(am.physics.TubeOrifice(1.0, 3e-3), 1e-5, 2)
     parts = (
         am.friction.LuGre(5e4, 15.0, 5.0, 0.01, 50.0, 20.0),
-        am.muscle.CreepElements((2e4, 1e4), (0.1, 2.0)),
-        am.muscle.ViscoelasticWall(2e-11, 0.05),
+        am.physics.CreepElements((2e4, 1e4), (0.1, 2.0)),
+        am.physics.ViscoelasticWall(2e-11, 0.05),
     )
     friction, creep, wall = parts
     muscles = tuple(dataclasses.replace(m, friction=friction, creep=creep, wall=wall) for m in plant.muscles)
-    circuits = tuple(am.pneumatics.WithTubes(circuit, tube) for circuit in plant.circuits)
-    return am.plant.WithEnergyMeters(
-        dataclasses.replace(plant, muscle=muscles, circuit=circuits, gas=am.pneumatics.EnergyBalance(0.5))
+    circuits = tuple(am.physics.WithTubes(circuit, tube) for circuit in plant.circuits)
+    return am.physics.WithEnergyMeters(
+        dataclasses.replace(plant, muscle=muscles, circuit=circuits, gas=am.physics.EnergyBalance(0.5))
     )
 
 

@@ -16,7 +16,7 @@ from measure import Section, Target, Times, format_time, print_section, time_var
 from rodas4 import kernel
 
 import airmuscle as am
-from airmuscle.compile.program import compile_system
+from airmuscle.engine.compile.program import compile_system
 
 STEP = 1e-4
 SOURCE = pathlib.Path(__file__).with_name("fill_discharge.c")
@@ -52,12 +52,12 @@ def constants(plant: am.Plant) -> Array:
 def _constants(muscle: am.Muscle, circuit: am.FillDischarge, ambient: am.Ambient) -> list[float]:
     law, valve = muscle.contractile, circuit.fill
     k, c = stretch_factor(muscle.geometry)
-    scale = am.pneumatics.REFERENCE_DENSITY * np.sqrt(am.pneumatics.REFERENCE_TEMPERATURE / ambient.temperature)
+    scale = am.physics.REFERENCE_DENSITY * np.sqrt(am.physics.REFERENCE_TEMPERATURE / ambient.temperature)
     validity_range = (law.min_contraction, law.max_contraction), (law.min_pressure, law.max_pressure)
     scaling = [x for low, high in validity_range for x in (low, 2 / (high - low))]
     return [
-        *(1 / muscle.geometry.resting_length, k, c * c, am.pneumatics.GAS_CONSTANT * ambient.temperature),
-        *(ambient.pressure, am.pneumatics.absolute_pressure(circuit.supply.pressure, ambient)),
+        *(1 / muscle.geometry.resting_length, k, c * c, am.physics.GAS_CONSTANT * ambient.temperature),
+        *(ambient.pressure, am.physics.absolute_pressure(circuit.supply.pressure, ambient)),
         *(scale * v.conductance for v in (circuit.fill, circuit.discharge)),
         *(valve.critical_ratio, 1 / (1 - valve.critical_ratio), float(valve.laminar_slope())),
         *(*scaling, law.min_force, law.max_force),
@@ -66,7 +66,7 @@ def _constants(muscle: am.Muscle, circuit: am.FillDischarge, ambient: am.Ambient
 
 
 def make_c_run(
-    run: Run, library: ctypes.CDLL, segments: am.control.PiecewiseLinear | None = None
+    run: Run, library: ctypes.CDLL, segments: am.engine.PiecewiseLinear | None = None
 ) -> Callable[[], Array]:
     """A function that computes the run, or given segments of it, with a compiled C library."""
     segments = segments or run.segments

@@ -20,10 +20,10 @@ from filling import DURATION, Run, runs
 from measure import Section, Target, format_time, print_section, time_variants
 
 import airmuscle as am
-from airmuscle.compile.program import compile_system
 from airmuscle.core.errors import ParameterError
-from airmuscle.export.mujoco_plugin import check_mujoco
-from airmuscle.export.platforms import find_cross_compiler
+from airmuscle.engine.compile.program import compile_system
+from airmuscle.outlets.export.mujoco_plugin import check_mujoco
+from airmuscle.outlets.export.platforms import find_cross_compiler
 
 STEPS = 1000
 TEXT = (
@@ -135,7 +135,7 @@ def processor_time(call: Callable[[], object], count: int = 20) -> float:
 
 def do_step(case: Run, folder: Path) -> float:
     """Processor time of a DoStep of 1 ms [s]."""
-    path = am.export.write_fmu(problem_of(case), folder / "a.fmu", fmi=2, name="plant", binary=False).path
+    path = am.outlets.write_fmu(problem_of(case), folder / "a.fmu", fmi=2, name="plant", binary=False).path
     with zipfile.ZipFile(path) as archive:
         archive.extractall(folder / "fmu")
     text = (folder / "fmu" / "modelDescription.xml").read_text()
@@ -189,7 +189,7 @@ def rows_of(case: Run, folder: Path, rounds: int) -> tuple[list[tuple[str, ...]]
     name, problem = f"{len(case.system.states)} states", problem_of(case)
     bound = am.Rodas4(1e-6).bind(compile_system(case.system))
     end, state = np.array([DURATION]), case.vector
-    am.export.write_program(problem, folder / "c", am.export.C99(), name="plant")
+    am.outlets.write_program(problem, folder / "c", am.outlets.C99(), name="plant")
     (folder / "c" / "driver.c").write_text(RUNS)
     times = time_variants(
         {"kernel": lambda: bound.run(case.segments, 0.0, state, end), "C": in_c(folder / "c")}, 5 * rounds
@@ -199,7 +199,7 @@ def rows_of(case: Run, folder: Path, rounds: int) -> tuple[list[tuple[str, ...]]
     size = code_size(folder / "c", "plant.c")
     rows.append((f"{name}: C", format_time(times["C"].minimum), f"{ratio:.2f}", size))
     if shutil.which("node"):
-        am.export.write_program(problem, folder / "js", am.export.JavaScript(), name="plant")
+        am.outlets.write_program(problem, folder / "js", am.outlets.JavaScript(), name="plant")
         others = {"JavaScript": in_node(folder / "js", LAST_ROW + SCRIPT), "WebAssembly": in_webassembly(folder / "c")}
         rows += [(f"{name}: {k}", format_time(v), f"{v / kernel:.2f}", "") for k, v in others.items() if v is not None]
     step = do_step(case, folder)
@@ -213,7 +213,7 @@ def rows_of(case: Run, folder: Path, rounds: int) -> tuple[list[tuple[str, ...]]
 def in_mujoco(case: Run, folder: Path) -> float:
     """Processor time of a step in MuJoCo that a muscle adds [s]."""
     mujoco = check_mujoco()
-    muscle = am.export.write_mujoco_plugin(case.system, folder / "plugin", name="plant")
+    muscle = am.outlets.write_mujoco_plugin(case.system, folder / "plugin", name="plant")
     times = []
     for with_muscle in (True, False):
         spec = mujoco.MjSpec()

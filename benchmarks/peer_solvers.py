@@ -18,8 +18,8 @@ import numpy as np
 from filling import SPACING, Array, Run
 from rodas4 import hand_written_rates
 
-from airmuscle.compile.kernels.calls import invoke, pointer
-from airmuscle.compile.program import CompiledSystem
+from airmuscle.engine.compile.kernels.calls import invoke, pointer
+from airmuscle.engine.compile.program import CompiledSystem
 
 Solver = Callable[[float], Callable[[], Array]]
 MAX_STEPS = 1_000_000

@@ -23,7 +23,7 @@ from peer_solvers import (
 from rodas4 import MAX_ERROR, kernel, loosest_tolerance
 
 import airmuscle as am
-from airmuscle.compile.program import CompiledSystem, compile_system
+from airmuscle.engine.compile.program import CompiledSystem, compile_system
 
 HEADER = ("states", "variant", "rtol", "median", "minimum", "ratio to Rodas4", "maximum error [m]")
 TEXT = (

@@ -21,10 +21,10 @@ import numpy as np
 import pandas as pd
 
 import airmuscle as am
+from airmuscle.bench.identify.candidate_scores import count_parameters
+from airmuscle.bench.identify.candidates import blank_surface
+from airmuscle.bench.identify.compared_points import evaluated_rows, force_residuals, residuals_of_rows
 from airmuscle.core.errors import IdentificationError
-from airmuscle.identify.candidate_scores import count_parameters
-from airmuscle.identify.candidates import blank_surface
-from airmuscle.identify.compared_points import evaluated_rows, force_residuals, residuals_of_rows
 
 NAME = re.compile(r"_cut(\d+)cm_held([\d.]+)cm_test(\d+)\.csv$")
 MIN_FORCE = 2.0
@@ -97,7 +97,7 @@ def slack_force(model: am.characteristic.ForceLaw, runs: Sequence[am.Recording])
 
 
 def validation_errors(
-    candidate: am.identify.Candidate, train: list[am.Recording], test: list[am.Recording], specimens: list[str]
+    candidate: am.bench.Candidate, train: list[am.Recording], test: list[am.Recording], specimens: list[str]
 ) -> list[float]:
     """Error on repeat 9, greatest force at its slack rows, then the error on each specimen left out of the fit; NaN if
     the others do not determine the law."""
@@ -133,10 +133,10 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     train, test = repeats(parser.parse_args().folder)
     specimens = sorted({str(run.constants["specimen"]) for run in train})
-    for split in (am.identify.BlockSplit(), am.identify.SpecimenSplit()):
-        print(am.identify.compare(train, leave_out=split, workers=2).reason, flush=True)
+    for split in (am.bench.BlockSplit(), am.bench.SpecimenSplit()):
+        print(am.bench.compare(train, leave_out=split, workers=2).reason, flush=True)
     for name, runs in (("repeat 8", train), ("repeats 8 and 9", train + test)):
-        print(f"\n{name}: {am.identify.select_for_both(runs, workers=2)}", flush=True)
+        print(f"\n{name}: {am.bench.select_for_both(runs, workers=2)}", flush=True)
     floor = repeatability(pulling(train), pulling(test))
     print(f"\nrms error of the force [N]; fitted to repeat 8 ({sum(map(len, train))} rows), validated on repeat 9")
     columns = "".join(f"{'no ' + name:>9}" for name in specimens)
@@ -148,8 +148,8 @@ def main() -> None:
     print(format_row("one surface of degree 5 per length", 63, [rms(np.concatenate(each)), np.nan], floor))
     print(format_row("  each length", 21, [rms(e) for e in each], floor))
     candidates = [
-        am.identify.Candidate("one surface of degree 5 for all lengths", blank_surface(5)),
-        *am.identify.standard_candidates(train),
+        am.bench.Candidate("one surface of degree 5 for all lengths", blank_surface(5)),
+        *am.bench.standard_candidates(train),
     ]
     for candidate in candidates:
         if hasattr(candidate.law, "with_resting_length") or candidate is candidates[0]:

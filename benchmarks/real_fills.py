@@ -13,7 +13,7 @@ import time
 import numpy as np
 
 import airmuscle as am
-from airmuscle.identify.dynamic import (
+from airmuscle.bench import (
     DynamicFit,
     Experiment,
     InitialConditions,
@@ -54,7 +54,7 @@ class Model:
     @property
     def valves(self) -> str:
         """Common prefix of the valve paths."""
-        return "circuit.circuit." if isinstance(self.plant.circuit, am.pneumatics.WithTubes) else "circuit."
+        return "circuit.circuit." if isinstance(self.plant.circuit, am.physics.WithTubes) else "circuit."
 
     def nuisances(self, wall: bool) -> tuple[str | StartTime | InitialValue, ...]:
         """Nuisance parameters of each record; with the initial wall volume if `wall`."""
@@ -67,20 +67,18 @@ class Model:
         return {path: pair for end, pair in BOUNDS.items() for path in named if path.endswith(end)}
 
 
-def make_plant(gas: am.pneumatics.Gas, growth: float, lag: float, line: bool) -> am.Plant:
+def make_plant(gas: am.physics.Gas, growth: float, lag: float, line: bool) -> am.Plant:
     """An unloaded muscle of unknown length behind a valve, with a supply tube if `line`."""
     muscle = dataclasses.replace(
-        am.Muscle.ideal(am.geometry.Vessel(REST_VOLUME)), wall=am.muscle.SwellingWall(growth, 150e3, 5e4, lag)
+        am.Muscle.ideal(am.geometry.Vessel(REST_VOLUME)), wall=am.physics.SwellingWall(growth, 150e3, 5e4, lag)
     )
     valves = am.FillDischarge(am.Supply(625e3), am.Valve(5e-10, 0.4), am.Valve(0.0, 0.3))
-    circuit = (
-        am.pneumatics.WithTubes(valves, am.pneumatics.Tube(am.Valve(1.3e-9, 0.3), 2e-5, gas=gas)) if line else valves
-    )
+    circuit = am.physics.WithTubes(valves, am.physics.Tube(am.Valve(1.3e-9, 0.3), 2e-5, gas=gas)) if line else valves
     return am.Plant(muscle, circuit, am.Isometric(0.0), gas)
 
 
 def make_model(
-    name: str, gas: am.pneumatics.Gas, *, growing: bool = False, lagging: bool = False, line: bool = False
+    name: str, gas: am.physics.Gas, *, growing: bool = False, lagging: bool = False, line: bool = False
 ) -> Model:
     """A model variant with the given features."""
     valves = "circuit.circuit." if line else "circuit."
@@ -105,7 +103,7 @@ MODELS = (
 )
 
 GASES = (
-    am.Isothermal(), am.Polytropic(1.2), *(am.pneumatics.WallHeatTransfer(h) for h in (12.5, 25.0, 50.0)),
+    am.Isothermal(), am.Polytropic(1.2), *(am.physics.WallHeatTransfer(h) for h in (12.5, 25.0, 50.0)),
 )  # fmt: skip
 """Gas models that are compared with the same unknowns, the default with half and twice its coefficient, too."""
 

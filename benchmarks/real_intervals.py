@@ -41,7 +41,7 @@ def main() -> None:
         for degree in DEGREES:
             surface = am.characteristic.ContractileSurface.blank(degree, max_force=UNREACHED)
             fits = [am.fit(surface, runs) for runs in pair]
-            bands = [am.identify.confidence_band(each, points) for each in fits]
+            bands = [am.bench.confidence_band(each, points) for each in fits]
             half = np.hypot(*((band.high - band.low) / 2 for band in bands))
             pulls = bands[0].value > LEAST_FORCE
             difference = (bands[0].value - bands[1].value)[pulls]

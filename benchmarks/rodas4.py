@@ -13,8 +13,8 @@ from scalar_rates import Rates, hill, six_states, ten_states
 from several_rates import hanging_rates
 
 import airmuscle as am
-from airmuscle.compile.kernels.calls import invoke, pointer
-from airmuscle.compile.program import CompiledSystem, compile_system
+from airmuscle.engine.compile.kernels.calls import invoke, pointer
+from airmuscle.engine.compile.program import CompiledSystem, compile_system
 
 RTOL = 1e-6
 HAND_WRITTEN: dict[int, Callable[[Any], Callable[[Sequence[float]], Rates]]] = {

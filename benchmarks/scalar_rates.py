@@ -21,9 +21,7 @@ Scalar = Callable[[float, float], float]
 
 def valve_flow(valve: am.Valve, temperature: float) -> Scalar:
     """Mass flow [kg/s] from one absolute pressure to another [Pa], fully open."""
-    scale = (
-        valve.conductance * am.pneumatics.REFERENCE_DENSITY * sqrt(am.pneumatics.REFERENCE_TEMPERATURE / temperature)
-    )
+    scale = valve.conductance * am.physics.REFERENCE_DENSITY * sqrt(am.physics.REFERENCE_TEMPERATURE / temperature)
     b, laminar = valve.critical_ratio, float(valve.laminar_slope())
     inverse = 1.0 / (1.0 - b)
 
@@ -71,9 +69,9 @@ def hill(plant: am.Plant) -> Callable[[Sequence[float]], Rates]:
     law, length = muscle.contractile, muscle.geometry.resting_length
     k, c = stretch_factor(muscle.geometry)
     rt, outside, source = (
-        am.pneumatics.GAS_CONSTANT * ambient.temperature,
+        am.physics.GAS_CONSTANT * ambient.temperature,
         ambient.pressure,
-        am.pneumatics.absolute_pressure(circuit.supply.pressure, ambient),
+        am.physics.absolute_pressure(circuit.supply.pressure, ambient),
     )
     fill_flow, discharge_flow = (valve_flow(v, ambient.temperature) for v in (circuit.fill, circuit.discharge))
     stiffness, damping, growth = muscle.spring.stiffness, muscle.damper.damping, muscle.damper.damping_slope
@@ -140,10 +138,10 @@ def six_states(system: Joint) -> Callable[[Sequence[float]], Rates]:
     """A function from valve openings to the rates of the joint with six states."""
     ambient, length = system.ambient, system.muscle.geometry.resting_length
     k, c = stretch_factor(system.muscle.geometry)
-    rt, outside, cc = am.pneumatics.GAS_CONSTANT * ambient.temperature, ambient.pressure, c * c
+    rt, outside, cc = am.physics.GAS_CONSTANT * ambient.temperature, ambient.pressure, c * c
     in_tube, source, radius = (
         rt / system.tube_volume,
-        am.pneumatics.absolute_pressure(system.supply.pressure, ambient),
+        am.physics.absolute_pressure(system.supply.pressure, ambient),
         system.radius,
     )
     lever, offset, inverse_inertia = radius / length, system.offset, 1.0 / system.inertia
@@ -184,14 +182,14 @@ def ten_states(system: JointWithHeat) -> Callable[[Sequence[float]], Rates]:
     k, c = stretch_factor(system.muscle.geometry)
     wall, outside, cc = ambient.temperature, ambient.pressure, c * c
     in_tube, source = (
-        am.pneumatics.GAS_CONSTANT * wall / system.tube_volume,
-        am.pneumatics.absolute_pressure(system.supply.pressure, ambient),
+        am.physics.GAS_CONSTANT * wall / system.tube_volume,
+        am.physics.absolute_pressure(system.supply.pressure, ambient),
     )
     radius, offset, inverse_inertia = system.radius, system.offset, 1.0 / system.inertia
     lever, friction, load, force = radius / length, system.friction, system.load, _force(system)
     valve, tube = (valve_flow(v, wall) for v in (system.valve, system.tube))
-    transfer, inverse_lag, cp = system.heat_transfer, 1.0 / system.spool_lag, HEAT_CAPACITY + am.pneumatics.GAS_CONSTANT
-    inverse_cv, ratio, per_length = 1.0 / HEAT_CAPACITY, am.pneumatics.GAS_CONSTANT / HEAT_CAPACITY, 1.0 / length
+    transfer, inverse_lag, cp = system.heat_transfer, 1.0 / system.spool_lag, HEAT_CAPACITY + am.physics.GAS_CONSTANT
+    inverse_cv, ratio, per_length = 1.0 / HEAT_CAPACITY, am.physics.GAS_CONSTANT / HEAT_CAPACITY, 1.0 / length
 
     def side(
         contraction: float, speed: float, air: float, tube_air: float, energy: float, spool: float, goal: float

@@ -13,14 +13,14 @@ from filling import Array, hanging
 from measure import Section, Target, format_time, print_section, time_variants
 
 import airmuscle as am
-from airmuscle.compile.functions import trace_system
-from airmuscle.compile.ir.instructions import Code, Operand, Operation, instructions
-from airmuscle.compile.program import compile_system
+from airmuscle.bench import Experiment, InitialConditions
+from airmuscle.bench.identify.dynamic.experiment import make_unknowns
+from airmuscle.bench.identify.dynamic.problem import DynamicFitProblem
+from airmuscle.bench.identify.dynamic.record_model import RecordModel
 from airmuscle.core import tree
-from airmuscle.identify.dynamic import Experiment, InitialConditions
-from airmuscle.identify.dynamic.experiment import make_unknowns
-from airmuscle.identify.dynamic.problem import DynamicFitProblem
-from airmuscle.identify.dynamic.record_model import RecordModel
+from airmuscle.engine.compile.functions import trace_system
+from airmuscle.engine.compile.ir.instructions import Code, Operand, Operation, instructions
+from airmuscle.engine.compile.program import compile_system
 
 FREE = (
     "circuit.fill.conductance",
@@ -36,7 +36,7 @@ SENSORS = {"pressure": 1e3, "position": 1e-4}
 """Standard deviations of the noise [Pa, m]; chosen."""
 DURATION, SPACING, STEP = 5.0, 0.01, 1e-3
 COMMAND = am.Schedule({"fill": ((0.5, 1.0), (2.5, 0.0)), "discharge": ((3.0, 1.0), (4.5, 0.0))})
-METHODS: dict[str, am.simulation.Integrator] = {"RungeKutta4(1e-3)": am.RungeKutta4(STEP), "Rodas4(1e-6)": am.Rodas4()}
+METHODS: dict[str, am.engine.Integrator] = {"RungeKutta4(1e-3)": am.RungeKutta4(STEP), "Rodas4(1e-6)": am.Rodas4()}
 LIBRARY = "RungeKutta4(1e-3), residual and Jacobian"
 FORMS = ("a tuple", "an array")
 HEADER = ("method", "variant", "median", "minimum", "ratio to a simulation", "maximum difference of the Jacobian")
@@ -62,13 +62,13 @@ class Case(NamedTuple):
     plant: am.Plant
     experiment: Experiment
 
-    def problem(self, method: am.simulation.Integrator) -> DynamicFitProblem:
+    def problem(self, method: am.engine.Integrator) -> DynamicFitProblem:
         parameters = make_unknowns(self.plant, [self.experiment], FREE, (), {})
         record = RecordModel(self.plant, self.experiment, 0, parameters, SENSORS, method)
         return DynamicFitProblem((record,), parameters, np.array(list(SENSORS.values())))
 
     @property
-    def segments(self) -> am.control.PiecewiseLinear:
+    def segments(self) -> am.engine.PiecewiseLinear:
         return COMMAND.segments(self.plant.inputs, 0.0, DURATION)
 
 
@@ -84,7 +84,7 @@ def case() -> Case:
     )
 
 
-def simulation(method: am.simulation.Integrator) -> Callable[[], am.Recording]:
+def simulation(method: am.engine.Integrator) -> Callable[[], am.Recording]:
     """A function that calls `simulate` from a given initial state."""
     plant, start = case().plant, dict(case().experiment.initial_conditions.guess)
 
@@ -96,7 +96,7 @@ def simulation(method: am.simulation.Integrator) -> Callable[[], am.Recording]:
     return run
 
 
-def kernel(method: am.simulation.Integrator) -> Callable[[], Array]:
+def kernel(method: am.engine.Integrator) -> Callable[[], Array]:
     """A function that runs the kernel alone for the same rows."""
     bound, segments = method.bind(compile_system(case().plant)), case().segments
     times = case().experiment.recording["time"].copy()
@@ -104,7 +104,7 @@ def kernel(method: am.simulation.Integrator) -> Callable[[], Array]:
     return lambda: bound.run(segments, 0.0, start, times).rows
 
 
-def jacobian(method: am.simulation.Integrator) -> Callable[[], tuple[Array, Array]]:
+def jacobian(method: am.engine.Integrator) -> Callable[[], tuple[Array, Array]]:
     """A function that computes the residual (R,) and the Jacobian (R, 8) with respect to the scaled parameters."""
     problem = case().problem(method)
     at = np.array([u.value for u in problem.unknowns]) / problem.scales

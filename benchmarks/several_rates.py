@@ -17,8 +17,8 @@ def one_muscle(muscle: am.Muscle, circuit: am.FillDischarge, ambient: am.Ambient
     """A function from air mass, position, speed and valve openings to tension [N] and mass flow [kg/s]."""
     law, per_length = muscle.contractile, 1.0 / muscle.geometry.resting_length
     k, c = stretch_factor(muscle.geometry)
-    rt, outside, cc = am.pneumatics.GAS_CONSTANT * ambient.temperature, ambient.pressure, c * c
-    source = am.pneumatics.absolute_pressure(circuit.supply.pressure, ambient)
+    rt, outside, cc = am.physics.GAS_CONSTANT * ambient.temperature, ambient.pressure, c * c
+    source = am.physics.absolute_pressure(circuit.supply.pressure, ambient)
     fill_flow, discharge_flow = (valve_flow(v, ambient.temperature) for v in (circuit.fill, circuit.discharge))
     stiffness, damping, growth = muscle.spring.stiffness, muscle.damper.damping, muscle.damper.damping_slope
     low_x, scale_x = law.min_contraction, 2.0 / (law.max_contraction - law.min_contraction)

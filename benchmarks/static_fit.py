@@ -35,7 +35,7 @@ def design_matrix(data: am.Recording) -> Array:
 
 def fit_library(data: am.Recording) -> Array:
     """The coefficients fitted by the library, without censoring."""
-    model = am.fit(am.characteristic.ContractileSurface.blank(), data, censoring=am.identify.UNCENSORED).model
+    model = am.fit(am.characteristic.ContractileSurface.blank(), data, censoring=am.bench.UNCENSORED).model
     assert isinstance(model, am.characteristic.ContractileSurface)
     return np.array(model.coefficients)
 

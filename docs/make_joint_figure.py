@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import airmuscle as am
-from airmuscle.analysis import joint_statics, plot_reachable_region
 from airmuscle.core.plotting import save
+from airmuscle.physics import joint_statics, plot_reachable_region
 
 PICTURE = Path(__file__).with_name("images") / "joint.png"
 

@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 
 import airmuscle as am
-from airmuscle.analysis import ExtendedKalmanFilter, NonlinearModelPredictive, design_predictive, linearise
-from airmuscle.control import ControlLoop
+from airmuscle.control import ExtendedKalmanFilter, NonlinearModelPredictive, design_predictive
 from airmuscle.core.plotting import BLACK, DASHES, LINES, legend_below, new_figure, save
+from airmuscle.engine import ControlLoop
+from airmuscle.physics import linearise
 
 PICTURE = Path(__file__).with_name("images") / "nonlinear_predictive.png"
 H, STEP, LIMIT, DISCHARGE = 0.01, 20e-3, 0.06, 0.3

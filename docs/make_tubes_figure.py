@@ -7,17 +7,24 @@ from typing import Any
 
 import numpy as np
 
-from airmuscle.control.inputs import Schedule
 from airmuscle.core.plotting import DASHES, LINES, MARKERS, new_figure, save
-from airmuscle.mechanism import Isometric
-from airmuscle.muscle import Muscle
-from airmuscle.muscle.characteristic import VirtualWork
-from airmuscle.muscle.geometry import Braid
-from airmuscle.plant.plant import Plant
-from airmuscle.pneumatics import DistributedTube, FillDischarge, Supply, Tube, Valve, WithTubes
-from airmuscle.pneumatics.gas import Air, Isothermal
-from airmuscle.simulation import simulate
-from airmuscle.simulation.integrators import Rodas4
+from airmuscle.engine import simulate
+from airmuscle.engine.loop.inputs import Schedule
+from airmuscle.engine.run.integrators import Rodas4
+from airmuscle.physics import (
+    Braid,
+    DistributedTube,
+    FillDischarge,
+    Isometric,
+    Muscle,
+    Supply,
+    Tube,
+    Valve,
+    VirtualWork,
+    WithTubes,
+)
+from airmuscle.physics.plant.plant import Plant
+from airmuscle.physics.pneumatics.gas import Air, Isothermal
 
 PICTURE = Path(__file__).parent / "images" / "tubes.png"
 DIAMETER, PRESSURE = 4e-3, 6e5

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.optimize import brentq
 
 from airmuscle.core.plotting import DASHES, LINES, new_figure, save
-from airmuscle.pneumatics import CheckValve, Orifice, SubsonicIndexValve, Valve, in_series
-from airmuscle.pneumatics.gas import REFERENCE_DENSITY, REFERENCE_TEMPERATURE
+from airmuscle.physics import CheckValve, Orifice, SubsonicIndexValve, Valve, in_series
+from airmuscle.physics.pneumatics.gas import REFERENCE_DENSITY, REFERENCE_TEMPERATURE
 
 PICTURE = Path(__file__).with_name("images") / "valves.png"
 UPSTREAM = 700e3

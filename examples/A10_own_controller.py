@@ -9,9 +9,8 @@ that is not its model. The small budget makes the example fast; `airmuscle compa
 
 from typing import ClassVar
 
-from airmuscle.control import ControlLaw
 from airmuscle.core import model, ops, parameter, plotting
-from airmuscle.study.control_benchmark import (
+from airmuscle.design import (
     Contender,
     compare_controllers,
     find_tasks,
@@ -19,6 +18,7 @@ from airmuscle.study.control_benchmark import (
     run_plot,
     standard_contenders,
 )
+from airmuscle.engine import ControlLaw
 
 
 @model

@@ -19,7 +19,7 @@ except ImportError as error:
     sys.exit()
 
 from airmuscle.core import plotting
-from airmuscle.environments import register_environments
+from airmuscle.outlets import register_environments
 
 register_environments()
 PERIODS, PERIOD = 500, 0.01

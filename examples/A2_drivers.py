@@ -6,8 +6,8 @@ python examples/A2_drivers.py        writes drivers.png to the working directory
 import numpy as np
 
 import airmuscle as am
-from airmuscle.control import PWM, SolenoidDriver, WithDrivers
 from airmuscle.core import plotting
+from airmuscle.engine import PWM, SolenoidDriver, WithDrivers
 from airmuscle.units import ms
 
 VALVE = SolenoidDriver(opening_delay=5 * ms, closing_delay=2 * ms, opening_ramp=10 * ms, closing_ramp=4 * ms)  # chosen

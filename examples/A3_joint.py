@@ -8,10 +8,16 @@ Dimensions, valve and brake are chosen.
 from dataclasses import replace
 
 import airmuscle as am
-from airmuscle.analysis import linearise, stiffness
-from airmuscle.control import SolenoidDriver, WithDrivers
-from airmuscle.mechanism import AntagonisticJoint
-from airmuscle.pneumatics import ProportionalValve, SecondOrderLag, Tube, WithTubes
+from airmuscle.engine import SolenoidDriver, WithDrivers
+from airmuscle.physics import (
+    AntagonisticJoint,
+    ProportionalValve,
+    SecondOrderLag,
+    Tube,
+    WithTubes,
+    linearise,
+    stiffness,
+)
 from airmuscle.units import bar, degree, kPa, mm, ms
 
 muscle = replace(am.load("dmsp-20-300").muscle, damper=am.LinearDamper(200.0))

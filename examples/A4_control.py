@@ -9,10 +9,10 @@ are chosen.
 from dataclasses import replace
 
 import airmuscle as am
-from airmuscle.control import PID, ControlLoop, OnOffController, SolenoidDriver, SplitRange
+from airmuscle.control import PID, OnOffController
 from airmuscle.core import plotting
-from airmuscle.pneumatics import ProportionalValve, SecondOrderLag
-from airmuscle.simulation import Problem, solve
+from airmuscle.engine import ControlLoop, Problem, SolenoidDriver, SplitRange, solve
+from airmuscle.physics import ProportionalValve, SecondOrderLag
 from airmuscle.units import bar, mm, ms
 
 muscle = replace(am.load("dmsp-20-300").muscle, damper=am.LinearDamper(300.0))

@@ -8,7 +8,7 @@ The joint is a plant of the library; its dimensions are chosen, and so are the w
 import numpy as np
 
 import airmuscle as am
-from airmuscle.analysis import joint_statics
+from airmuscle.physics import joint_statics
 from airmuscle.units import bar, degree
 
 plant = am.load("joint-dmsp-20-regulators").plant

@@ -16,24 +16,19 @@ from airmuscle.control import (
     AngleAndStiffness,
     AntagonisticInverse,
     Cascade,
-    ColumnSensor,
-    ControlLoop,
     DeadZoneController,
     Decentralised,
     IterativeLearning,
     SetpointCommand,
-    SigmaDelta,
     SlidingMode,
-    SplitRange,
     StaticFeedForward,
     StaticInverse,
     SuperTwisting,
     WithFeedForward,
-    WithSensors,
 )
 from airmuscle.core import plotting
-from airmuscle.mechanism import AntagonisticJoint
-from airmuscle.muscle.friction import Dahl
+from airmuscle.engine import ColumnSensor, ControlLoop, SigmaDelta, SplitRange, WithSensors
+from airmuscle.physics import AntagonisticJoint, Dahl
 from airmuscle.units import bar, mm, ms
 
 muscle = replace(am.load("dmsp-20-300").muscle, damper=am.LinearDamper(300.0))

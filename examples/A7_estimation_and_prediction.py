@@ -10,10 +10,10 @@ from dataclasses import replace
 import numpy as np
 
 import airmuscle as am
-from airmuscle.analysis import ExtendedKalmanFilter, FiniteControlSet
-from airmuscle.control import ControlLoop, HysteresisOperator, SetpointCommand
+from airmuscle.control import ExtendedKalmanFilter, FiniteControlSet, HysteresisOperator, SetpointCommand
 from airmuscle.core import plotting
-from airmuscle.muscle.friction import Dahl, MaxwellSlip, PressureScaledFriction
+from airmuscle.engine import ControlLoop
+from airmuscle.physics import Dahl, MaxwellSlip, PressureScaledFriction
 from airmuscle.units import bar, mm, ms
 
 figure, axes = plotting.new_figure(2, 2, height=6.2)

@@ -10,10 +10,11 @@ from dataclasses import replace
 import numpy as np
 
 import airmuscle as am
-from airmuscle.control import PID, ControlLoop
+from airmuscle.control import PID
 from airmuscle.core import plotting
-from airmuscle.pneumatics import ProportionalValve, SecondOrderLag
-from airmuscle.study import Perturbations, perturbed_family, tune
+from airmuscle.design import Perturbations, perturbed_family, tune
+from airmuscle.engine import ControlLoop
+from airmuscle.physics import ProportionalValve, SecondOrderLag
 from airmuscle.units import bar, mm, ms
 
 muscle = replace(am.load("dmsp-20-300").muscle, damper=am.LinearDamper(300.0))

@@ -6,14 +6,8 @@ Load, stroke, supply, safety factor and cycle time are chosen.
 """
 
 import airmuscle as am
-from airmuscle.mechanism import HangingMass
-from airmuscle.sizing import (
-    LiftRequirement,
-    SizingConditions,
-    discharge_valve,
-    fill_valve,
-    size_muscles,
-)
+from airmuscle.design import LiftRequirement, SizingConditions, discharge_valve, fill_valve, size_muscles
+from airmuscle.physics import HangingMass
 from airmuscle.units import bar, mm
 
 lift = LiftRequirement(stroke=40 * mm, mass=20.0)

@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 
 import airmuscle as am
-from airmuscle.export import write_mujoco_plugin
+from airmuscle.outlets import write_mujoco_plugin
 
 MODEL = Path(__file__).with_name("mujoco_arm.xml")
 COMMANDS = {"shoulder_flexor": 0.4, "elbow_flexor": 0.3, "biarticular_flexor": 0.2}

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import ClassVar
 
-from airmuscle.control import ControlLaw
 from airmuscle.core import model, parameter
-from airmuscle.study.control_benchmark import Contender, ControlTask, SineMotion, proportional_joint
+from airmuscle.design import Contender, ControlTask, SineMotion, proportional_joint
+from airmuscle.engine import ControlLaw
 
 JOINT = proportional_joint()
 SHORT = ControlTask("short sine", SineMotion(math.radians(10.0), 2.0), 1.0, begin=0.5)

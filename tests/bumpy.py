@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from airmuscle.core import model, parameter
-from airmuscle.mechanism import Coordinate, Mechanism
+from airmuscle.physics import Coordinate, Mechanism
 
 
 @model

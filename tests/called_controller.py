@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from airmuscle.control import Controller
+from airmuscle.engine import Controller
 
 
 @dataclasses.dataclass(frozen=True)

@@ -15,17 +15,14 @@ import typing
 import numpy as np
 from plants import EXAMPLES
 
-from airmuscle.control import SampledSignal, Schedule
-from airmuscle.control.control_loop import CombinedSignal
 from airmuscle.core import parameters
 from airmuscle.core.annotation import conforms, type_hints
+from airmuscle.engine import SampledSignal, Schedule
+from airmuscle.engine.loop.control_loop import CombinedSignal
 from airmuscle.errors import AirmuscleError
-from airmuscle.library.models import model_names
-from airmuscle.mechanism import ExternalLoad, Mechanism
-from airmuscle.mechanism.external_load import SHORTENING, SHORTENING_SPEED
-from airmuscle.muscle import Muscle
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import AirSource, Ambient, Circuit, Gas, SharedSupply
+from airmuscle.files.library.models import model_names
+from airmuscle.physics import AirSource, Ambient, Circuit, ExternalLoad, Gas, Mechanism, Muscle, Plant, SharedSupply
+from airmuscle.physics.mechanism.external_load import SHORTENING, SHORTENING_SPEED
 
 ATTEMPTS = 40
 """Compositions of one component that its constructor may refuse."""

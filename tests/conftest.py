@@ -25,9 +25,9 @@ from unittest import mock
 import pytest
 from hypothesis import settings
 
-from airmuscle.compile.cache import kernel, object_code
-from airmuscle.compile.cache.store import load, save
 from airmuscle.core import plotting, processes
+from airmuscle.engine.compile.cache import kernel, object_code
+from airmuscle.engine.compile.cache.store import load, save
 
 try:
     import fcntl

@@ -7,11 +7,9 @@ import dataclasses
 import numpy as np
 from plants import chosen_muscle
 
-from airmuscle.control import PID, AntagonisticInverse, Decentralised, SplitRange
-from airmuscle.mechanism import AntagonisticJoint, HangingMass
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Polytropic, Supply, Valve
-from airmuscle.simulation import Solution
+from airmuscle.control import PID, AntagonisticInverse, Decentralised
+from airmuscle.engine import Solution, SplitRange
+from airmuscle.physics import AntagonisticJoint, FillDischarge, HangingMass, Plant, Polytropic, Supply, Valve
 
 VALVE = Valve(2.6e-9, 0.4)
 LARGE = Valve(1e-8, 0.4)

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from typer.testing import CliRunner
 
-from airmuscle.cli.app import app
-from airmuscle.scenario import load_scenario
+from airmuscle.files import load_scenario
+from airmuscle.outlets.cli.app import app
 
 VALVES = '["circuit.fill.conductance", "circuit.discharge.conductance"]'
 

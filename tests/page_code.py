@@ -19,8 +19,8 @@ from typing import Any, NamedTuple
 
 from typer.testing import CliRunner
 
-from airmuscle.cli.app import app
 from airmuscle.errors import AirmuscleWarning
+from airmuscle.outlets.cli.app import app
 
 DOCS = Path(__file__).parents[1] / "docs"
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)

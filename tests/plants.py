@@ -6,76 +6,78 @@ from dataclasses import replace
 
 from joints import chosen_muscle
 
-from airmuscle import pneumatics
-from airmuscle.library import catalogue
-from airmuscle.mechanism import (
+from airmuscle import friction, geometry, physics
+from airmuscle.files.library import catalogue
+from airmuscle.physics import (
     AntagonisticJoint,
     ArmLink,
+    Catenary,
+    CircleVirtualWork,
+    Clamped,
     ConstantRadius,
+    ContractileSurface,
     CrankProfile,
+    CreepElements,
+    CubicSeriesSpring,
+    CubicSpring,
+    DirectionalDamper,
+    EffectiveLength,
+    EndStop,
+    EnergyBalance,
     ExternalLoad,
+    FillDischarge,
     HangingMass,
     HuntCrossley,
+    InverseLength,
     Isometric,
+    Isothermal,
     Isotonic,
     JointWithEndStops,
     JointWithExternalTorque,
     JointWithFriction,
     Lever,
-    MuscleRoute,
-    MusclesInSeries,
-    PlanarArm,
-    PolynomialProfile,
-    PrescribedMotion,
-    Pulley,
-    SpringLoad,
-    WithEndStops,
-    WithLatch,
-    WithOffsets,
-)
-from airmuscle.muscle import (
-    CreepElements,
-    CubicSeriesSpring,
-    CubicSpring,
-    DirectionalDamper,
-    EndStop,
     LinearDamper,
     LinearSpring,
+    LogarithmicLength,
     Muscle,
+    MuscleRoute,
+    MusclesInSeries,
+    Parabola,
+    PlanarArm,
+    Plant,
+    PolynomialProfile,
+    Polytropic,
+    PooledLengthLaw,
+    PrescribedMotion,
     PressureDamper,
+    Pulley,
     Reynolds2003Damper,
     Reynolds2003Spring,
+    RubberLine,
     SeriesSpring,
     Serres2009Damper,
     Serres2009Spring,
+    SpringLoad,
+    Supply,
     SwellingWall,
-    ViscoelasticWall,
-    friction,
-    geometry,
-)
-from airmuscle.muscle.characteristic import (
-    CircleVirtualWork,
-    Clamped,
-    ContractileSurface,
-    EffectiveLength,
-    InverseLength,
-    LogarithmicLength,
-    PooledLengthLaw,
-    RubberLine,
+    TrueArcParabola,
     ValidityRange,
+    Valve,
+    Vessel,
     VirtualWork,
+    ViscoelasticWall,
+    WithEndStops,
+    WithLatch,
+    WithOffsets,
     as_force_law,
 )
-from airmuscle.muscle.geometry import Catenary, Parabola, TrueArcParabola, Vessel
-from airmuscle.muscle.geometry.chebyshev import as_polynomial
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import EnergyBalance, FillDischarge, Isothermal, Polytropic, Supply, Valve
+from airmuscle.physics.muscle.geometry.chebyshev import as_polynomial
 
 VALVE, OTHER = Valve(1e-8, 0.4), Valve(3e-9, 0.2)
 TWO_VALVES = FillDischarge(Supply(5e5), VALVE, OTHER)
 BRAID = geometry.Braid(0.01, 0.4363, 0.2)
 FIBRES = geometry.StraightFibre(0.2, 0.02)
-SPOOL = pneumatics.SecondOrderLag(20.0, 0.7)
+SPOOL = physics.SecondOrderLag(20.0, 0.7)
 STOP = EndStop(0.1, HuntCrossley(1e9))
 SLIPS = ((4e4, 2e4), (2e-4, 8e-4))
 SURFACE = ContractileSurface((300.0, -200.0, 40.0, 10.0, 5.0, 3.0), 0.0, 6e5, 0.0, 0.25, 0.0, 1200.0, 2)
@@ -148,26 +150,26 @@ EXAMPLES = {
     "Prandtl-Ishlinskii": of(friction=friction.PrandtlIshlinskii(*SLIPS, (8.0, -8.0), (0.5, -0.5))),
     # circuits
     "polytropic": fed(TWO_VALVES, gas=Polytropic(1.3)),
-    "real gas": fed(TWO_VALVES, gas=pneumatics.VirialGas()),
+    "real gas": fed(TWO_VALVES, gas=physics.VirialGas()),
     "heat": fed(TWO_VALVES),
-    "closed": fed(pneumatics.ClosedChamber()),
+    "closed": fed(physics.ClosedChamber()),
     "held and let go": Plant(chosen_muscle(), TWO_VALVES, WithLatch(HangingMass(10.0))),
     "held for good": Plant(chosen_muscle(), TWO_VALVES, Isometric(0.05), EnergyBalance(0.5)),
     "check valve and cracking pressure": fed(
         FillDischarge(
-            Supply(5e5), pneumatics.CheckValve(pneumatics.SubsonicIndexValve(1e-8, 0.3, 0.6, 3e4)), pneumatics.SubsonicIndexValve(1e-8, 0.5, 0.4)
+            Supply(5e5), physics.CheckValve(physics.SubsonicIndexValve(1e-8, 0.3, 0.6, 3e4)), physics.SubsonicIndexValve(1e-8, 0.5, 0.4)
         )
     ),
-    "three positions through a tube": fed(pneumatics.WithTubes(pneumatics.ThreePositionValve(Supply(5e5), VALVE, OTHER),
-                                                       pneumatics.Tube(pneumatics.TubeOrifice(1.0, 3e-3), 1e-5, 2))),
-    "tube with inertia": fed(pneumatics.WithTubes(TWO_VALVES, pneumatics.DistributedTube(1.0, 2e-3, 2, EnergyBalance(0.1)))),
-    "overlap": fed(pneumatics.ProportionalValve(Supply(5e5), VALVE, OTHER, SPOOL, 0.2, 2), 2),
-    "underlap": fed(pneumatics.ProportionalValve(Supply(5e5), VALVE, OTHER, SPOOL, -0.2)),
-    "regulator, leak": fed(pneumatics.WithLeak(pneumatics.ProportionalRegulator(Supply(5e5), VALVE, VALVE, SPOOL), OTHER)),
+    "three positions through a tube": fed(physics.WithTubes(physics.ThreePositionValve(Supply(5e5), VALVE, OTHER),
+                                                       physics.Tube(physics.TubeOrifice(1.0, 3e-3), 1e-5, 2))),
+    "tube with inertia": fed(physics.WithTubes(TWO_VALVES, physics.DistributedTube(1.0, 2e-3, 2, EnergyBalance(0.1)))),
+    "overlap": fed(physics.ProportionalValve(Supply(5e5), VALVE, OTHER, SPOOL, 0.2, 2), 2),
+    "underlap": fed(physics.ProportionalValve(Supply(5e5), VALVE, OTHER, SPOOL, -0.2)),
+    "regulator, leak": fed(physics.WithLeak(physics.ProportionalRegulator(Supply(5e5), VALVE, VALVE, SPOOL), OTHER)),
     "manifold on tank and regulator": fed(
-        pneumatics.Manifold(
-            pneumatics.RegulatedSupply(pneumatics.Tank(Supply(7e5), OTHER, 1e-3, EnergyBalance(0.1)), VALVE, 4e5),
-            (FillDischarge(pneumatics.SharedSupply(), VALVE, OTHER), pneumatics.ThreePositionValve(pneumatics.SharedSupply(), VALVE, OTHER)),
+        physics.Manifold(
+            physics.RegulatedSupply(physics.Tank(Supply(7e5), OTHER, 1e-3, EnergyBalance(0.1)), VALVE, 4e5),
+            (FillDischarge(physics.SharedSupply(), VALVE, OTHER), physics.ThreePositionValve(physics.SharedSupply(), VALVE, OTHER)),
             ("one", "two"),
         ),
         2,

@@ -132,15 +132,15 @@ class Recipe:
 
     @property
     def steps(self) -> tuple[str, ...]:
-        library = ("library",) if self.folder == "muscle/characteristic" else ()
+        library = ("library",) if self.folder == "physics/muscle/characteristic" else ()
         return ("file", "export", *library, "example" if self.example else "exemption", "nomenclature")
 
 
 RECIPES = {
-    "law": Recipe("muscle/characteristic", LAW, "of({name}(1e-3))"),
-    "valve": Recipe("pneumatics", VALVE, "fed(FillDischarge(Supply(5e5), {name}(1e-8), OTHER))"),
-    "friction": Recipe("muscle/friction", FRICTION, "of(friction={name}(5e4, 4e-4))"),
-    "controller": Recipe("control", CONTROLLER, None),
+    "law": Recipe("physics/muscle/characteristic", LAW, "of({name}(1e-3))"),
+    "valve": Recipe("physics/pneumatics", VALVE, "fed(FillDischarge(Supply(5e5), {name}(1e-8), OTHER))"),
+    "friction": Recipe("physics/muscle/friction", FRICTION, "of(friction={name}(5e4, 4e-4))"),
+    "controller": Recipe("control/laws", CONTROLLER, None),
 }
 
 
@@ -157,7 +157,7 @@ def add(root: Path, kind: str, name: str, without: str = "") -> None:
     edits = {
         "file": (package / f"{module}.py", (HEAD + recipe.text).format(name=name, root=recipe.root)),
         "export": (package / "__init__.py", f'\n{line}\n__all__ += ["{name}"]\n'),
-        "library": (source / "library" / f"{module}.toml", LAW_FILE.format(name=name)),
+        "library": (source / "files" / "library" / f"{module}.toml", LAW_FILE.format(name=name)),
         "example": (
             root / "tests" / "plants.py",
             f"\nfrom airmuscle.{recipe.package}{line[5:]}\nEXAMPLES['{module}'] = {recipe.example}\n".format(name=name),

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import printed
 
-import airmuscle.studio
+import airmuscle.outlets.studio
 
-WEB = Path(airmuscle.studio.__file__).with_name("web")
+WEB = Path(airmuscle.outlets.studio.__file__).with_name("web")
 HOST = "127.0.0.1:8765"
 BEGINNING = ("numbers", "roots", "law")
 """Scripts of a law that need no browser."""

@@ -9,7 +9,7 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from airmuscle.studio import export_page
+from airmuscle.outlets import export_page
 
 from . import gallery, pictures
 from .contents import ROOT, broken_links, documents

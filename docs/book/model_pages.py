@@ -13,11 +13,11 @@ from typing import Any
 from airmuscle.core.annotation import describe, type_hints
 from airmuscle.core.declaration import Parameter, parameters
 from airmuscle.core.reference import Reference
-from airmuscle.library import files
-from airmuscle.library.catalogue import load
-from airmuscle.library.entry import Entry
-from airmuscle.library.models import PACKAGES, model_class, model_names
-from airmuscle.muscle.characteristic import Characteristic, ContractionLaw, ForceLaw, PressureLaw
+from airmuscle.files.library import files
+from airmuscle.files.library.catalogue import load
+from airmuscle.files.library.entry import Entry
+from airmuscle.files.library.models import PACKAGES, model_class, model_names
+from airmuscle.physics import Characteristic, ContractionLaw, ForceLaw, PressureLaw
 
 from .docstrings import docstring, parts, symbol, to_markdown
 from .formulas_in_text import escape, markdown

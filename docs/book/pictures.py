@@ -12,25 +12,20 @@ from typing import Any
 
 import numpy as np
 
-from airmuscle import mechanism, pneumatics
+from airmuscle import characteristic, friction, geometry, physics
+from airmuscle.bench.identify.hysteresis.plot import plot_loops
 from airmuscle.core import plotting
 from airmuscle.core.errors import AirmuscleError
-from airmuscle.identify.hysteresis.plot import plot_loops
-from airmuscle.mechanism import PulleyProfile
-from airmuscle.muscle import characteristic, friction, geometry
-from airmuscle.muscle.characteristic import Characteristic, ValidityRange
-from airmuscle.muscle.friction import Friction
-from airmuscle.muscle.geometry import Geometry
-from airmuscle.muscle.isobars import compute_isobars
-from airmuscle.pneumatics import Orifice
-from airmuscle.report.isobar_plot import isobar_plot
+from airmuscle.physics import Characteristic, Friction, Geometry, Orifice, PulleyProfile, ValidityRange
+from airmuscle.physics.muscle.isobar_plot import isobar_plot
+from airmuscle.physics.muscle.isobars import compute_isobars
 
 from .model_pages import components, entries_of, rooms
 
 BRAID = geometry.Braid(radius=0.010, braid_angle=0.426, resting_length=0.300)
 IDEAL = characteristic.VirtualWork(BRAID)
 RANGE = ValidityRange(0.0, 6e5, 0.0, 0.25)
-VALVE = pneumatics.Valve(conductance=2.6167e-9, critical_ratio=0.433)
+VALVE = physics.Valve(conductance=2.6167e-9, critical_ratio=0.433)
 SAMPLES: dict[str, Any] = {
     "VirtualWork": IDEAL,
     "Clamped": characteristic.Clamped(IDEAL, 0.0, 800.0),
@@ -42,12 +37,12 @@ SAMPLES: dict[str, Any] = {
     "PrandtlIshlinskii": friction.PrandtlIshlinskii((2e4, 1e4), (3e-4, 1.2e-3), (-8.0, 8.0), (-0.3, 0.4)),
     "Braid": BRAID,
     "Valve": VALVE,
-    "SubsonicIndexValve": pneumatics.SubsonicIndexValve(2.6167e-9, 0.3, 0.6, cracking_pressure=2e4),
-    "CheckValve": pneumatics.CheckValve(VALVE),
-    "TubeOrifice": pneumatics.TubeOrifice(length=1.0, diameter=4e-3),
-    "ConstantRadius": mechanism.ConstantRadius(),
-    "PolynomialProfile": mechanism.PolynomialProfile((0.4, -0.2)),
-    "CrankProfile": mechanism.CrankProfile(0.3),
+    "SubsonicIndexValve": physics.SubsonicIndexValve(2.6167e-9, 0.3, 0.6, cracking_pressure=2e4),
+    "CheckValve": physics.CheckValve(VALVE),
+    "TubeOrifice": physics.TubeOrifice(length=1.0, diameter=4e-3),
+    "ConstantRadius": physics.ConstantRadius(),
+    "PolynomialProfile": physics.PolynomialProfile((0.4, -0.2)),
+    "CrankProfile": physics.CrankProfile(0.3),
 }
 """Objects with chosen parameters, for models without a library entry."""
 

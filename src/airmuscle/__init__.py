@@ -2,7 +2,7 @@
 
 Nouns are frozen models, verbs are functions. Everything inside is SI, pressure is gauge, contraction is
 (L0 - L)/L0, pulling is positive. The laws are in `airmuscle.characteristic`, short for
-`airmuscle.muscle.characteristic`, the units in `airmuscle.units`, the exceptions in `airmuscle.errors`.
+`airmuscle.physics.muscle.characteristic`, the units in `airmuscle.units`, the exceptions in `airmuscle.errors`.
 
 Each name is imported from its package when it is first used, so that `import airmuscle` takes no time; the names and
 their packages are those of `__init__.pyi`, which type checkers read, too.

@@ -22,10 +22,9 @@ import startup
 import static_fit
 from filling import runs
 
-from airmuscle.compile.program import compile_system
-from airmuscle.control import Schedule
 from airmuscle.core import tree
-from airmuscle.simulation import DormandPrince8, Rodas4
+from airmuscle.engine import DormandPrince8, Rodas4, Schedule
+from airmuscle.engine.compile.program import compile_system
 
 
 @pytest.mark.parametrize("states", [3, 6, 8, 10])

@@ -6,9 +6,9 @@ import importlib
 import inspect
 import pkgutil
 
-from airmuscle.library import files
-from airmuscle.library.models import PACKAGES, model_class, model_names
-from airmuscle.muscle.characteristic import Characteristic
+from airmuscle.files.library import files
+from airmuscle.files.library.models import PACKAGES, model_class, model_names
+from airmuscle.physics import Characteristic
 
 PARTS = {"PlaneCurve", "PlaneCurves"}
 """Coefficients of BorzikovaDirect, which builds them itself."""
@@ -39,7 +39,7 @@ def test_every_law_of_a_paper_has_a_library_file():
     texts = "".join(path.read_text(encoding="utf-8") for path in files.LAWS.glob("*.toml"))
     laws = [law for name in model_names() if issubclass(law := model_class(name, "test"), Characteristic)]
     missing = [
-        f"write a file in airmuscle/library that names {law.__name__}"
+        f"write a file in airmuscle/files/library that names {law.__name__}"
         for law in laws
         if law.references and law.__name__ not in GENERAL_LAWS and f'"{law.__name__}"' not in texts
     ]

@@ -20,10 +20,9 @@ import pytest
 import rodas4
 from filling import lifting_run, runs
 
-from airmuscle.compile.program import compile_system
-from airmuscle.control import Schedule
-from airmuscle.plant import Plant
-from airmuscle.simulation import DormandPrince8, Rodas4, RungeKutta4
+from airmuscle.engine import DormandPrince8, Rodas4, RungeKutta4, Schedule
+from airmuscle.engine.compile.program import compile_system
+from airmuscle.physics import Plant
 
 
 def reference(run):

@@ -15,12 +15,10 @@ import pytest
 from plants import EXAMPLES
 
 import airmuscle as am
-from airmuscle import analysis, export, identify, simulation, sizing
-from airmuscle.environments.default_tasks import joint_task
-from airmuscle.environments.plant_env import PlantEnv
-from airmuscle.environments.plant_vector_env import PlantVectorEnv
-from airmuscle.recording import segment
-from airmuscle.study import control_benchmark
+from airmuscle import bench, control, design, engine, outlets, physics
+from airmuscle.outlets.environments.default_tasks import joint_task
+from airmuscle.outlets.environments.plant_env import PlantEnv
+from airmuscle.outlets.environments.plant_vector_env import PlantVectorEnv
 from airmuscle.units import bar
 
 COPIES: dict[str, Callable[[Any], Any]] = {
@@ -33,8 +31,8 @@ RAMP = am.Schedule({"fill": ((0.1, 1.0), (0.3, 0.0))})
 LOOP = am.ControlLoop(control_plants.PRESSURE, 0.01, am.Schedule({"pressure": ((0.0, 2 * bar),)}))
 BENCH = am.load_data("dmsp-20-300")
 PRODUCT = am.load("dmsp-20-300")
-SUPPLY = sizing.SizingConditions(supply=6 * bar)
-LIMITS = identify.BenchLimits(am.characteristic.ValidityRange(0.0, 6e5, 0.0, 0.25), 1500.0)
+SUPPLY = design.SizingConditions(supply=6 * bar)
+LIMITS = bench.BenchLimits(am.characteristic.ValidityRange(0.0, 6e5, 0.0, 0.25), 1500.0)
 
 
 def open_loop() -> am.Problem:
@@ -53,7 +51,7 @@ def stepped() -> am.Stepper:
 
 
 def estimator() -> Any:
-    return analysis.ExtendedKalmanFilter(LIFT, ("pressure",), 0.01, {}, {"pressure": 500.0})
+    return control.ExtendedKalmanFilter(LIFT, ("pressure",), 0.01, {}, {"pressure": 500.0})
 
 
 def environment() -> PlantEnv:
@@ -83,27 +81,27 @@ RESULTS: dict[str, Callable[[], Any]] = {
     "a stepper": stepped,
     "equilibria": lambda: am.find_equilibrium(LIFT, pressure=2 * bar),
     "a linear model": linear_model,
-    "joint statics": lambda: analysis.joint_statics(control_plants.JOINT),
+    "joint statics": lambda: physics.joint_statics(control_plants.JOINT),
     "a Kalman filter": estimator,
     "a batch": lambda: am.simulate_batch(LIFT, {"mechanism.mass": [1.0, 2.0]}, RAMP, duration=0.2),
-    "sensitivities": lambda: simulation.WithSensitivities(LIFT, (("mechanism.mass",),), (2.0,)),
+    "sensitivities": lambda: engine.WithSensitivities(LIFT, (("mechanism.mass",),), (2.0,)),
     "a recording": lambda: BENCH,
     "a fit": lambda: am.fit(am.characteristic.ContractileSurface.blank(3, max_force=1e5), BENCH),
-    "a comparison of laws": lambda: identify.compare(BENCH),
-    "a recursive fit": lambda: identify.RecursiveFit(LIMITS, degree=2),
-    "muscles for a lift": lambda: sizing.size_muscles(
-        sizing.LiftRequirement(stroke=0.04, mass=10.0), SUPPLY, [PRODUCT]
+    "a comparison of laws": lambda: bench.compare(BENCH),
+    "a recursive fit": lambda: bench.RecursiveFit(LIMITS, degree=2),
+    "muscles for a lift": lambda: design.size_muscles(
+        design.LiftRequirement(stroke=0.04, mass=10.0), SUPPLY, [PRODUCT]
     ),
     "an environment": environment,
     "a vector environment": vector,
     "contenders and tasks of the benchmark": lambda: (
-        *control_benchmark.standard_contenders(control_benchmark.on_off_joint()),
-        *control_benchmark.STANDARD_TASKS,
+        *design.standard_contenders(design.on_off_joint()),
+        *design.STANDARD_TASKS,
     ),
-    "a loop with sensitivities": lambda: simulation.differentiate_loop(LIFT, LOOP, ("controller.gain",), (2e-5,)),
-    "targets of an export": lambda: (export.C99(), export.JavaScript(), export.Octave()),
-    "an inspection": lambda: segment.inspect(BENCH),
-    "an unscented Kalman filter": lambda: analysis.UnscentedKalmanFilter(
+    "a loop with sensitivities": lambda: engine.differentiate_loop(LIFT, LOOP, ("controller.gain",), (2e-5,)),
+    "targets of an export": lambda: (outlets.C99(), outlets.JavaScript(), outlets.Octave()),
+    "an inspection": lambda: bench.inspect(BENCH),
+    "an unscented Kalman filter": lambda: control.UnscentedKalmanFilter(
         LIFT, ("pressure",), 0.01, {}, {"pressure": 500.0}
     ),
     "an entry of the library": lambda: am.load("dmsp-20-300"),

@@ -23,8 +23,8 @@ CONTRACTS = (
 )
 CHECK = """
 import airmuscle as am
-from airmuscle.library.build import build
-from airmuscle.library.location import Location
+from airmuscle.files.library.build import build
+from airmuscle.files.library.location import Location
 from pathlib import Path
 from plants import OTHER, of, fed
 
@@ -47,7 +47,7 @@ for plant, signal in ((of(law), command), (fed(circuit), command), (of(friction=
 STEPS = [(kind, step) for kind, recipe in RECIPES.items() for step in recipe.steps]
 MESSAGES = {
     "export": r"export {name} in airmuscle/{folder}/__init__\.py",
-    "library": r"write a file in airmuscle/library that names {name}",
+    "library": r"write a file in airmuscle/files/library that names {name}",
     "example": r"{name}: airmuscle\.{package}\.{module} is in no plant of tests/plants\.py",
     "exemption": r"{name}: airmuscle\.{package}\.{module} is in no plant of tests/plants\.py, nor in NOT_IN_A_PLANT",
     "nomenclature": r"run docs/make_nomenclature\.py: {name} is missing",
@@ -126,7 +126,7 @@ def test_each_step_is_in_the_rules(kind: str, step: str):
     places = {
         "file": f"`{RECIPES[kind].folder}/`",
         "export": "`__init__.py` of the package",
-        "library": "`src/airmuscle/library/`",
+        "library": "`src/airmuscle/files/library/`",
         "example": "`tests/plants.py`",
         "exemption": "`NOT_IN_A_PLANT`",
         "nomenclature": "`docs/make_nomenclature.py`",

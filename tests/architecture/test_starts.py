@@ -20,16 +20,19 @@ plant = am.Plant(am.load("dmsp-20-300").muscle, am.FillDischarge(am.Supply(6e5),
 am.simulate(plant, am.Schedule({"fill": ((0.5, 1),)}), duration=2.0, integrator=METHOD)
 """
 STARTS = {
-    "import airmuscle": ("import airmuscle", {*HEAVY, "casadi", "llvmlite", "numpy.ma", "airmuscle.identify"}),
+    "import airmuscle": ("import airmuscle", {*HEAVY, "casadi", "llvmlite", "numpy.ma", "airmuscle.bench.identify"}),
     "simulate": (
         SIMULATION.replace("METHOD", "am.Rodas4()"),
-        {*HEAVY, "numpy.ma", "airmuscle.identify", "airmuscle.compile.kernels.rodas4"},
+        {*HEAVY, "numpy.ma", "airmuscle.bench.identify", "airmuscle.engine.compile.kernels.rodas4"},
     ),
-    "simulate, fixed steps": (SIMULATION.replace("METHOD", "am.RungeKutta4(1e-3)"), {*HEAVY, "airmuscle.identify"}),
+    "simulate, fixed steps": (
+        SIMULATION.replace("METHOD", "am.RungeKutta4(1e-3)"),
+        {*HEAVY, "airmuscle.bench.identify"},
+    ),
     "airmuscle solve": (
-        "from airmuscle.cli.app import app\n"
+        "from airmuscle.outlets.cli.app import app\n"
         "app(['solve', 'chou-hannaford', '--pressure', '3 bar', '--force', '100 N'], standalone_mode=False)",
-        (HEAVY | {"llvmlite", "airmuscle.identify"}) - {"typer", "rich"},
+        (HEAVY | {"llvmlite", "airmuscle.bench.identify"}) - {"typer", "rich"},
     ),
 }
 
@@ -51,9 +54,9 @@ def test_a_process_does_not_import_modules_that_it_does_not_need(start):
 
 
 def test_names_that_are_imported_on_use_are_available():
-    assert am.fit is sys.modules["airmuscle.identify"].fit
-    assert am.Fit is sys.modules["airmuscle.identify"].Fit
-    assert am.identify is sys.modules["airmuscle.identify"]
+    assert am.fit is sys.modules["airmuscle.bench.identify"].fit
+    assert am.Fit is sys.modules["airmuscle.bench.identify"].Fit
+    assert am.bench is sys.modules["airmuscle.bench"]
     assert {"fit", "Fit"} <= set(dir(am))
     with pytest.raises(AttributeError, match="module 'airmuscle' has no attribute 'fitt'"):
         am.fitt  # noqa: B018

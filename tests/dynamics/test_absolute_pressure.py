@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 import airmuscle as am
-from airmuscle.control.law_design import designed_loop
 from airmuscle.core import tree
 from airmuscle.core.absolute_pressure import AbsolutePressure, ambient_pressure
+from airmuscle.design import load_study
+from airmuscle.engine.loop.law_design import designed_loop
 from airmuscle.errors import ParameterError
-from airmuscle.pneumatics import Ambient
-from airmuscle.scenario import load_scenario
-from airmuscle.study import load_study
+from airmuscle.files import load_scenario
+from airmuscle.physics import Ambient
 from airmuscle.units import quantity
 
 AMBIENT = 8e4
@@ -75,7 +75,7 @@ def test_a_plant_of_another_ambient_pressure_has_the_same_absolute_supply():
 
 
 def test_supplies_at_any_depth_of_a_circuit_are_converted():
-    inner = am.pneumatics.Tank(am.Supply("9 bara"), am.Valve(1e-9, 0.3), 1e-3)
+    inner = am.physics.Tank(am.Supply("9 bara"), am.Valve(1e-9, 0.3), 1e-3)
     made = replace(plant(), circuit=am.FillDischarge(inner, VALVE, VALVE))
     assert made.circuit.supply.supply.pressure == pytest.approx(9e5 - AMBIENT)  # type: ignore[union-attr]
 
@@ -83,7 +83,7 @@ def test_supplies_at_any_depth_of_a_circuit_are_converted():
 def test_a_state_and_an_equilibrium_at_an_absolute_pressure_have_it():
     made = plant()
     assert initial_pressure(made, made.state_at(pressure="3 bara")) == pytest.approx(3e5)
-    assert initial_pressure(made, am.simulation.find_equilibrium(made, pressure="3 bara")) == pytest.approx(3e5)
+    assert initial_pressure(made, am.physics.find_equilibrium(made, pressure="3 bara")) == pytest.approx(3e5)
     stated = quantity("3 bara", "Pa")
     assert initial_pressure(made, made.state_at(pressure=stated)) == pytest.approx(3e5)
 

@@ -11,20 +11,25 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.analysis import linearise, stiffness
-from airmuscle.control import Schedule
-from airmuscle.mechanism import (
+from airmuscle.engine import Rodas4, Schedule, simulate
+from airmuscle.physics import (
     ArmLink,
     CrankProfile,
+    FillDischarge,
     HuntCrossley,
     JointWithEndStops,
     JointWithFriction,
     MuscleRoute,
     PlanarArm,
+    Plant,
+    Polytropic,
+    Supply,
+    Valve,
+    WithEnergyMeters,
+    find_equilibrium,
+    linearise,
+    stiffness,
 )
-from airmuscle.plant import Plant, WithEnergyMeters
-from airmuscle.pneumatics import FillDischarge, Polytropic, Supply, Valve
-from airmuscle.simulation import Rodas4, find_equilibrium, simulate
 
 NAMES = ("s_flex", "s_ext", "e_flex", "e_ext", "bi_flex", "bi_ext")
 ARM = PlanarArm(

@@ -14,24 +14,27 @@ import numpy as np
 import pytest
 from joints import chosen_muscle, joint, joint_start
 
-from airmuscle.control import ZERO_INPUT, SampledSignal, Schedule
 from airmuscle.core import StateVariable, System, model, ops, parameter, tree
-from airmuscle.errors import ColumnError, FileError, GeometryLimitError, ParameterError
-from airmuscle.mechanism import HangingMass
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Isothermal, Polytropic, Supply, Valve
-from airmuscle.reproduce.hosovsky_plant import UnpublishedParameters, hanging_load
-from airmuscle.reproduce.hosovsky_plant import plant as third_paper
-from airmuscle.simulation import (
+from airmuscle.engine import (
+    ZERO_INPUT,
+    BatchSolution,
     DormandPrince8,
     ExplicitRungeKutta,
     Rodas4,
     RungeKutta4,
+    SampledSignal,
+    Schedule,
+    Single,
     WithSensitivities,
     sensitivity,
     simulate,
+    simulate_batch,
 )
-from airmuscle.simulation.batch import BatchSolution, Single, simulate_batch, thread_pool, variations
+from airmuscle.engine.run.batch import thread_pool, variations
+from airmuscle.errors import ColumnError, FileError, GeometryLimitError, ParameterError
+from airmuscle.papers.hosovsky_plant import UnpublishedParameters, hanging_load
+from airmuscle.papers.hosovsky_plant import plant as third_paper
+from airmuscle.physics import FillDischarge, HangingMass, Isothermal, Plant, Polytropic, Supply, Valve
 
 PULSE = Schedule({"fill": ((0.0303, 1), (0.2, 0)), "discharge": ((0.31, 1), (0.42, 0))})
 JOINT_PULSE = Schedule({"left.fill": ((0.02, 1), (0.07, 0)), "right.discharge": ((0.0217, 1), (0.07, 0))})
@@ -519,7 +522,7 @@ def test_a_column_of_a_strange_name_has_a_file(tmp_path):
 
 
 def test_an_error_on_the_way_leaves_nothing_behind(tmp_path, monkeypatch):
-    from airmuscle.simulation.batch.job import BatchJob
+    from airmuscle.engine.run.batch.job import BatchJob
 
     def fails(self, index):
         raise ZeroDivisionError("of the test")

@@ -13,22 +13,24 @@ from called_controller import Called
 from control_plants import LIFT, SPLIT
 
 from airmuscle import Status
-from airmuscle.control import (
-    PID,
+from airmuscle.control import PID, OnOffController
+from airmuscle.engine import (
     PWM,
     ControlLoop,
     Driver,
-    OnOffController,
     Periodic,
+    Problem,
+    Rodas4,
+    RungeKutta4,
     Schedule,
+    Single,
     SolenoidDriver,
+    simulate_batch,
+    solve,
 )
+from airmuscle.engine.run.bound_integrator import BoundIntegrator
 from airmuscle.errors import ParameterError
-from airmuscle.mechanism import HangingMass
-from airmuscle.plant import Plant
-from airmuscle.simulation import Problem, Rodas4, RungeKutta4, solve
-from airmuscle.simulation.batch import Single, simulate_batch
-from airmuscle.simulation.bound_integrator import BoundIntegrator
+from airmuscle.physics import HangingMass, Plant
 
 PI = PID("pressure", SPLIT, gain=8e-6, integral_time=0.3)
 STEPS = Schedule({"pressure": ((0, 1e5), (0.25, 3e5))})

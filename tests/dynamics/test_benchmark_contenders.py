@@ -13,18 +13,13 @@ import pytest
 from benchmark_contender import JOINT, MINE, SHORT
 from called_controller import Called
 
-from airmuscle.control import Measurement
+from airmuscle.design import Contender, StuckValve, compare_controllers, standard_contenders
+from airmuscle.design.control_benchmark.called_contender import Readings
+from airmuscle.design.control_benchmark.commissioning import identify_gains, tracking_error
+from airmuscle.design.control_benchmark.contenders import complete
+from airmuscle.design.tuning.case import with_gains
+from airmuscle.engine import Measurement
 from airmuscle.errors import ParameterError
-from airmuscle.study.control_benchmark import (
-    Contender,
-    StuckValve,
-    compare_controllers,
-    standard_contenders,
-)
-from airmuscle.study.control_benchmark.called_contender import Readings
-from airmuscle.study.control_benchmark.commissioning import identify_gains, tracking_error
-from airmuscle.study.control_benchmark.contenders import complete
-from airmuscle.study.tuning.case import with_gains
 
 
 def test_a_controller_that_is_called_meets_the_same_sensors_and_the_same_actuation():

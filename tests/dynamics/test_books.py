@@ -9,17 +9,28 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.control import Schedule
 from airmuscle.core import autodiff
+from airmuscle.engine import DormandPrince8, Rodas4, Schedule, simulate
 from airmuscle.errors import EquilibriumError, ParameterError
-from airmuscle.library import load
-from airmuscle.mechanism import HangingMass, Isometric, WithLatch
-from airmuscle.muscle import LinearDamper
-from airmuscle.plant import Plant, WithEnergyMeters
-from airmuscle.plant.diagnostics import percent_of_rows
-from airmuscle.pneumatics import Ambient, ClosedChamber, FillDischarge, Isothermal, Polytropic, Supply, Valve
-from airmuscle.simulation import DormandPrince8, Rodas4, simulate
-from airmuscle.simulation.equilibrium import find_equilibria, find_equilibrium
+from airmuscle.files import load
+from airmuscle.physics import (
+    Ambient,
+    ClosedChamber,
+    FillDischarge,
+    HangingMass,
+    Isometric,
+    Isothermal,
+    LinearDamper,
+    Plant,
+    Polytropic,
+    Supply,
+    Valve,
+    WithEnergyMeters,
+    WithLatch,
+    find_equilibria,
+    find_equilibrium,
+)
+from airmuscle.physics.plant.diagnostics import percent_of_rows
 
 VALVE = Valve(2.6167e-9, 0.433)
 CIRCUIT = FillDischarge(Supply(548675.0), VALVE, VALVE)

@@ -12,20 +12,30 @@ from hypothesis import given
 from hypothesis import strategies as st
 from joints import chosen_muscle
 
-from airmuscle.compile.cache.kernel import record
-from airmuscle.compile.program import compile_system
-from airmuscle.control import PID, PWM, ControlLoop, Driver, InputSignal, PiecewiseLinear, SampledSignal, Schedule
-from airmuscle.control.driver import PwmState
-from airmuscle.control.piecewise_linear import merge_columns
+from airmuscle.control import PID
 from airmuscle.core import Input, StateVariable, System, arrays
+from airmuscle.engine import (
+    PWM,
+    ControlLoop,
+    Driver,
+    InputSignal,
+    PiecewiseLinear,
+    Problem,
+    SampledSignal,
+    Schedule,
+    advance,
+    simulate,
+    solve,
+)
+from airmuscle.engine.compile.cache.kernel import record
+from airmuscle.engine.compile.program import compile_system
+from airmuscle.engine.loop.driver import PwmState
+from airmuscle.engine.loop.piecewise_linear import merge_columns
+from airmuscle.engine.run import output_times as rows_of_a_run
+from airmuscle.engine.run.output_times import merge_few_output_times, merge_output_times
+from airmuscle.engine.run.rows import RowRecorder
 from airmuscle.errors import AirmuscleWarning, GeometryLimitError, ParameterError
-from airmuscle.mechanism import HangingMass
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Polytropic, Supply, Valve
-from airmuscle.simulation import Problem, advance, simulate, solve
-from airmuscle.simulation import output_times as rows_of_a_run
-from airmuscle.simulation.output_times import merge_few_output_times, merge_output_times
-from airmuscle.simulation.rows import RowRecorder
+from airmuscle.physics import FillDischarge, HangingMass, Plant, Polytropic, Supply, Valve
 
 TICKS = st.integers(0, 400).map(lambda i: i / 64)
 

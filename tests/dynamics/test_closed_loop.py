@@ -18,37 +18,44 @@ from plants import chosen_muscle
 from scipy.linalg import expm
 
 from airmuscle import Status
-from airmuscle.analysis import linearise
-from airmuscle.compile.program import Description
-from airmuscle.control import (
-    PID,
+from airmuscle.control import PID, OnOffController
+from airmuscle.core import StateVariable, System, cite, model, parameter
+from airmuscle.engine import (
     PWM,
     Controller,
     ControlLoop,
-    OnOffController,
+    DormandPrince8,
     Periodic,
+    Problem,
+    Rodas4,
+    RungeKutta4,
     SampledSignal,
     Schedule,
     SolenoidDriver,
     SplitRange,
+    simulate,
+    simulate_batch,
+    solve,
 )
-from airmuscle.core import StateVariable, System, cite, model, parameter
+from airmuscle.engine.compile.program import Description
+from airmuscle.engine.run import closed_loop
+from airmuscle.engine.run.bound_integrator import BoundIntegrator
 from airmuscle.errors import ParameterError, SimulationError
-from airmuscle.mechanism import HangingMass, Isometric, WithLatch
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import (
+from airmuscle.physics import (
     FillDischarge,
+    HangingMass,
+    Isometric,
     Isothermal,
+    Plant,
     Polytropic,
     ProportionalRegulator,
     ProportionalValve,
     SecondOrderLag,
     Supply,
     Valve,
+    WithLatch,
+    linearise,
 )
-from airmuscle.simulation import DormandPrince8, Problem, Rodas4, RungeKutta4, closed_loop, simulate, solve
-from airmuscle.simulation.batch import simulate_batch
-from airmuscle.simulation.bound_integrator import BoundIntegrator
 
 VALVE = Valve(2.6e-9, 0.4)
 TICK = 2.0**-6
@@ -606,7 +613,7 @@ def test_a_memory_belongs_to_its_instant(start_time):
 
 
 def test_an_experiment_takes_the_commands_of_a_loop():
-    from airmuscle.identify.dynamic import Experiment, InitialConditions
+    from airmuscle.bench import Experiment, InitialConditions
 
     loop, plant = ControlLoop(VALVES, 0.1, PRESSURE), lifting()
     run = simulate(plant, loop, duration=0.2)

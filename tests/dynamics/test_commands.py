@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airmuscle import Recording, read_csv
-from airmuscle.control import Periodic, PiecewiseLinear, SampledSignal, Schedule
+from airmuscle.engine import Periodic, PiecewiseLinear, SampledSignal, Schedule
 from airmuscle.errors import ColumnError, ParameterError
 
 

@@ -14,32 +14,35 @@ from called_controller import Called
 from control_plants import CIRCUIT, INVERSE, JOINT, LIFT, PRESSURE, PRESSURES, SPLIT
 
 import airmuscle as am
-from airmuscle.analysis import design_lqg, linearise
 from airmuscle.control import (
     PID,
     AngleAndStiffness,
     Cascade,
-    ColumnSensor,
-    ControlLoop,
     DeadZoneController,
     GainSchedule,
-    SampledSignal,
-    Schedule,
     SetpointCommand,
-    SigmaDelta,
     SlidingMode,
     StaticFeedForward,
     StaticInverse,
     SuperTwisting,
     WithFeedForward,
-    WithSensors,
+    design_lqg,
 )
 from airmuscle.core.diagnostics import DiagnosticCode
+from airmuscle.engine import (
+    ColumnSensor,
+    ControlLoop,
+    Problem,
+    RungeKutta4,
+    SampledSignal,
+    Schedule,
+    SigmaDelta,
+    WithSensors,
+    simulate_batch,
+    solve,
+)
 from airmuscle.errors import ParameterError
-from airmuscle.mechanism import HangingMass
-from airmuscle.pneumatics import FillDischarge, Supply, Valve
-from airmuscle.simulation import Problem, RungeKutta4, solve
-from airmuscle.simulation.batch import simulate_batch
+from airmuscle.physics import FillDischarge, HangingMass, Supply, Valve, linearise
 
 WEIGHT = 2.0 * 9.80665
 FORWARD = StaticFeedForward(

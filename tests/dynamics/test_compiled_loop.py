@@ -19,21 +19,25 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airmuscle import Status
-from airmuscle.control import (
-    PID,
+from airmuscle.control import PID, OnOffController
+from airmuscle.core import model, ops, parameter
+from airmuscle.core.diagnostics import DiagnosticCode
+from airmuscle.engine import (
     PWM,
     ControlLaw,
     ControlLoop,
-    OnOffController,
+    DormandPrince8,
+    Problem,
+    Rodas4,
+    RungeKutta4,
     SampledSignal,
     Schedule,
     SolenoidDriver,
+    solve,
 )
-from airmuscle.core import model, ops, parameter
-from airmuscle.core.diagnostics import DiagnosticCode
+from airmuscle.engine.run import closed_loop, compiled_loop
 from airmuscle.errors import ParameterError, TraceError
-from airmuscle.mechanism import Isometric
-from airmuscle.simulation import DormandPrince8, Problem, Rodas4, RungeKutta4, closed_loop, compiled_loop, solve
+from airmuscle.physics import Isometric
 
 ON_OFF = OnOffController("pressure", SPLIT, hysteresis=1e4)
 STEPS = Schedule({"pressure": ((0, 1e5), (0.5, 3e5), (1.005, 2e5))})
@@ -150,7 +154,7 @@ def test_pauses_and_short_buffers_change_nothing(drivers, monkeypatch):
     whole = solve(problem)
     monkeypatch.setattr(compiled_loop, "INTERRUPT_CHECK_STEPS", 3)
     monkeypatch.setattr(compiled_loop, "FIRST_SEGMENTS", 1)
-    monkeypatch.setattr("airmuscle.simulation.bound_integrator.INTERRUPT_CHECK_STEPS", 1)
+    monkeypatch.setattr("airmuscle.engine.run.bound_integrator.INTERRUPT_CHECK_STEPS", 1)
     assert_identical(solve(dataclasses.replace(problem)), whole)
 
 

@@ -14,14 +14,10 @@ import numpy as np
 import pytest
 from plants import EXAMPLES, of
 
-from airmuscle.compile.program import compile_system
 from airmuscle.core import model, ops
-from airmuscle.library.models import model_class, model_names
-from airmuscle.mechanism import HuntCrossley
-from airmuscle.muscle import (
-    Damper,
-    EndStop,
-)
+from airmuscle.engine.compile.program import compile_system
+from airmuscle.files.library.models import model_class, model_names
+from airmuscle.physics import Damper, EndStop, HuntCrossley
 
 JUMP = 1e-6
 """What counts as a jump, as a share of a usual rate."""

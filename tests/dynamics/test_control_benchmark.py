@@ -15,10 +15,7 @@ from benchmark_contender import JOINT, MINE, SHORT, AngleLaw
 
 import airmuscle as am
 from airmuscle.core import model
-from airmuscle.errors import ParameterError
-from airmuscle.muscle.friction import LuGre, NoFriction
-from airmuscle.recording import Recording
-from airmuscle.study.control_benchmark import (
+from airmuscle.design import (
     STANDARD_TASKS,
     Contender,
     ControlTask,
@@ -34,10 +31,13 @@ from airmuscle.study.control_benchmark import (
     on_off_joint,
     standard_contenders,
 )
-from airmuscle.study.control_benchmark.contenders import complete
-from airmuscle.study.control_benchmark.joints import check_truth_differs, kinds_of
-from airmuscle.study.control_benchmark.task_signals import task_signals
-from airmuscle.study.control_benchmark.tracking_metrics import RATED_STROKES, track
+from airmuscle.design.control_benchmark.contenders import complete
+from airmuscle.design.control_benchmark.joints import check_truth_differs, kinds_of
+from airmuscle.design.control_benchmark.task_signals import task_signals
+from airmuscle.design.control_benchmark.tracking_metrics import RATED_STROKES, track
+from airmuscle.errors import ParameterError
+from airmuscle.physics import LuGre, NoFriction
+from airmuscle.recording import Recording
 
 DEGREE = math.pi / 180
 STEP = ControlTask("short step", StepMotion(10 * DEGREE, 0.1), 0.8, begin=0.1, event=0.1)

@@ -11,23 +11,26 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.control import ZERO_INPUT, SampledSignal, Schedule
-from airmuscle.mechanism import HangingMass
-from airmuscle.muscle import CreepElements, CubicSpring, LinearDamper, Muscle, ViscoelasticWall
-from airmuscle.muscle.characteristic import VirtualWork
-from airmuscle.muscle.geometry import Braid
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import (
+from airmuscle.engine import ZERO_INPUT, DormandPrince8, Rodas4, RungeKutta4, SampledSignal, Schedule, simulate
+from airmuscle.physics import (
+    Braid,
     ClosedChamber,
+    CreepElements,
+    CubicSpring,
     DistributedTube,
     EnergyBalance,
     FillDischarge,
+    HangingMass,
+    LinearDamper,
+    Muscle,
+    Plant,
     Polytropic,
     Supply,
     Valve,
+    VirtualWork,
+    ViscoelasticWall,
     WithTubes,
 )
-from airmuscle.simulation import DormandPrince8, Rodas4, RungeKutta4, simulate
 
 BRAID = Braid(0.01, 0.4363, 0.2)
 HEAT = EnergyBalance(0.5)

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 
 import airmuscle as am
-from airmuscle.environments.default_tasks import arm_task, joint_task, lift_task
-from airmuscle.library import list_plants
-from airmuscle.pneumatics import Ambient, EnergyBalance, WallHeatTransfer
-from airmuscle.pneumatics.wall_heat_transfer import DEFAULT_GAS
-from airmuscle.sizing import LiftRequirement, SizingConditions, size_muscles
+from airmuscle.design import LiftRequirement, SizingConditions, size_muscles
+from airmuscle.files import list_plants
+from airmuscle.outlets.environments.default_tasks import arm_task, joint_task, lift_task
+from airmuscle.physics import Ambient, EnergyBalance, WallHeatTransfer
+from airmuscle.physics.pneumatics.wall_heat_transfer import DEFAULT_GAS
 
 VALVE = am.Valve(1e-8, 0.3)
 AMBIENT = Ambient()
 
 
-def vessel(volume: float, gas: am.pneumatics.Gas | None = None) -> am.Plant:
+def vessel(volume: float, gas: am.physics.Gas | None = None) -> am.Plant:
     """A held muscle of constant volume on a supply of 6 bar."""
     muscle = am.Muscle.ideal(am.geometry.Vessel(volume))
     plant = am.Plant(muscle, am.FillDischarge(am.Supply(6e5), VALVE, VALVE), am.Isometric(0.0))

@@ -14,12 +14,8 @@ import pickle
 import numpy as np
 import pytest
 
-from airmuscle.control import ControlLoop, Measurement, Schedule
 from airmuscle.core import leaves
-from airmuscle.errors import ParameterError
-from airmuscle.simulation import find_equilibrium, simulate
-from airmuscle.simulation.compiled_law import LawSample
-from airmuscle.study.control_benchmark import (
+from airmuscle.design import (
     ControlTask,
     SineMotion,
     StepMotion,
@@ -27,11 +23,15 @@ from airmuscle.study.control_benchmark import (
     proportional_joint,
     standard_contenders,
 )
-from airmuscle.study.control_benchmark.benchmark import run_task, tune_contender
-from airmuscle.study.control_benchmark.contenders import complete
-from airmuscle.study.control_benchmark.designed_controllers import joint_design_model
-from airmuscle.study.control_benchmark.motion_dynamics import angular_acceleration
-from airmuscle.study.control_benchmark.plots import line_style, marker_style
+from airmuscle.design.control_benchmark.benchmark import run_task, tune_contender
+from airmuscle.design.control_benchmark.contenders import complete
+from airmuscle.design.control_benchmark.designed_controllers import joint_design_model
+from airmuscle.design.control_benchmark.motion_dynamics import angular_acceleration
+from airmuscle.design.control_benchmark.plots import line_style, marker_style
+from airmuscle.engine import ControlLoop, Measurement, Schedule, simulate
+from airmuscle.engine.run.compiled_law import LawSample
+from airmuscle.errors import ParameterError
+from airmuscle.physics import find_equilibrium
 
 pytest.importorskip("daqp", reason="the package daqp is not installed")
 JOINT = proportional_joint()

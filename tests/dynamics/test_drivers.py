@@ -28,9 +28,9 @@ from airmuscle import (
     load,
     simulate,
 )
-from airmuscle.control import PWM, PiecewiseLinear, SampledSignal, Schedule, SolenoidDriver, WithDrivers
+from airmuscle.engine import PWM, PiecewiseLinear, SampledSignal, Schedule, SolenoidDriver, WithDrivers
+from airmuscle.engine.run.output_times import output_times
 from airmuscle.errors import ParameterError
-from airmuscle.simulation.output_times import output_times
 
 INPUTS = ("other", "fill")
 TICK = 2.0**-10

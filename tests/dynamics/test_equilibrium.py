@@ -12,41 +12,41 @@ from hypothesis import strategies as st
 from joints import chosen_muscle
 from widths import widened
 
-from airmuscle.compile.program import compile_system
-from airmuscle.control import ZERO_INPUT, Schedule
 from airmuscle.core import ops
+from airmuscle.engine import ZERO_INPUT, Schedule, simulate
+from airmuscle.engine.compile.program import compile_system
 from airmuscle.errors import EquilibriumError, GeometryLimitError, ParameterError, UnitError
-from airmuscle.mechanism import (
+from airmuscle.physics import (
     AntagonisticJoint,
+    ClosedChamber,
+    CreepElements,
+    Dahl,
+    EnergyBalance,
+    FillDischarge,
     HangingMass,
     HuntCrossley,
     Isometric,
+    Isothermal,
     JointWithEndStops,
     Lever,
     MusclesInSeries,
-    PrescribedMotion,
-    SpringLoad,
-    WithLatch,
-    WithOffsets,
-)
-from airmuscle.muscle import CreepElements, SeriesSpring, ViscoelasticWall
-from airmuscle.muscle.friction import Dahl
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import (
-    ClosedChamber,
-    EnergyBalance,
-    FillDischarge,
-    Isothermal,
+    Plant,
     Polytropic,
+    PrescribedMotion,
     ProportionalValve,
     SecondOrderLag,
+    SeriesSpring,
+    SpringLoad,
     Supply,
     Valve,
+    ViscoelasticWall,
+    WithLatch,
+    WithOffsets,
+    find_equilibria,
+    find_equilibrium,
 )
-from airmuscle.simulation import simulate
-from airmuscle.simulation.equilibrium import find_equilibria, find_equilibrium
-from airmuscle.simulation.equilibrium.single_dof import grid
-from airmuscle.simulation.equilibrium.statics import Statics
+from airmuscle.physics.equilibrium.single_dof import grid
+from airmuscle.physics.equilibrium.statics import Statics
 
 LEFT, RIGHT = (replace(chosen_muscle(), name=name) for name in ("left", "right"))
 VALVE = Valve(2.6e-8, 0.433)

@@ -11,40 +11,41 @@ from bumpy import Bumpy
 from joints import chosen_muscle
 from plants import BRAID, EXAMPLES, TWO_VALVES, of, pulled
 
-from airmuscle.compile.program import compile_system
-from airmuscle.control import ZERO_INPUT
 from airmuscle.core import ops, tree
+from airmuscle.engine import ZERO_INPUT, RungeKutta4, simulate_batch
+from airmuscle.engine.compile.program import compile_system
 from airmuscle.errors import AirmuscleError, EquilibriumError, ParameterError
-from airmuscle.mechanism import (
+from airmuscle.physics import (
+    Ambient,
     AntagonisticJoint,
+    Braid,
+    ClosedChamber,
+    FillDischarge,
     HangingMass,
     HuntCrossley,
     Isometric,
     JointWithEndStops,
     Lever,
+    LinearSpring,
+    MartensBoblan2017,
     MusclesInSeries,
-    SpringLoad,
-)
-from airmuscle.muscle import LinearSpring, SeriesSpring, ViscoelasticWall
-from airmuscle.muscle.characteristic import MartensBoblan2017, VirtualWork
-from airmuscle.muscle.geometry import Braid
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import (
-    Ambient,
-    ClosedChamber,
-    FillDischarge,
+    Plant,
     Polytropic,
     ProportionalRegulator,
+    SeriesSpring,
+    SpringLoad,
     Supply,
     Tube,
     Valve,
+    VirtualWork,
+    ViscoelasticWall,
     WithTubes,
+    find_equilibria,
+    find_equilibrium,
+    find_equilibrium_of_each,
 )
-from airmuscle.simulation import RungeKutta4
-from airmuscle.simulation.batch import simulate_batch
-from airmuscle.simulation.equilibrium import find_equilibria, find_equilibrium, find_equilibrium_of_each
-from airmuscle.simulation.equilibrium.single_dof import grid
-from airmuscle.simulation.equilibrium.statics import Statics
+from airmuscle.physics.equilibrium.single_dof import grid
+from airmuscle.physics.equilibrium.statics import Statics
 
 SPREAD = 0.05
 FAST = RungeKutta4(1e-3)
@@ -191,7 +192,7 @@ def test_more_plants_than_go_side_by_side_are_taken_in_blocks(monkeypatch):
     plant = JOINT
     table = varied(plant, 7)
     together = found(plant, table, 2e5)
-    module = sys.modules["airmuscle.simulation.equilibrium.equilibrium"]
+    module = sys.modules["airmuscle.physics.equilibrium.equilibrium"]
     monkeypatch.setattr(module, "TABLE_SIZE", 3 * module.GRID_POINTS * len(plant.states))
     np.testing.assert_array_equal(found(plant, table, 2e5), together)
     assert np.isfinite(together).all()

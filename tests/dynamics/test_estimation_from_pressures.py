@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import airmuscle as am
-from airmuscle.analysis import ExtendedKalmanFilter, UnscentedKalmanFilter
-from airmuscle.control import Schedule
-from airmuscle.muscle.friction import Dahl, PressureScaledFriction
+from airmuscle.control import ExtendedKalmanFilter, UnscentedKalmanFilter
+from airmuscle.engine import Schedule
+from airmuscle.physics import Dahl, PressureScaledFriction
 
 pytestmark = pytest.mark.slow
 H = 5e-3

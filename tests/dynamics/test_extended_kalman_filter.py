@@ -12,11 +12,11 @@ import pytest
 from control_plants import LIFT
 
 import airmuscle as am
-from airmuscle.analysis import ExtendedKalmanFilter, StateEstimate, consistency_band, normalised_error_squared
-from airmuscle.compile.jacobians import derivatives
-from airmuscle.compile.program import compile_system
+from airmuscle.control import ExtendedKalmanFilter, StateEstimate, consistency_band, normalised_error_squared
+from airmuscle.engine import RungeKutta4, Stepper, advance
+from airmuscle.engine.compile.jacobians import derivatives
+from airmuscle.engine.compile.program import compile_system
 from airmuscle.errors import ParameterError, SolveError
-from airmuscle.simulation import RungeKutta4, Stepper, advance
 
 H = 5e-3
 PLANT = LIFT

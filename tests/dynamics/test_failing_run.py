@@ -10,30 +10,45 @@ from joints import chosen_muscle
 from widths import widened
 
 from airmuscle import Status
-from airmuscle.analysis import linearise, stiffness
-from airmuscle.compile.program import compile_system
-from airmuscle.control import PiecewiseLinear, Schedule
 from airmuscle.core.diagnostics import Columns, DiagnosticCode
+from airmuscle.engine import (
+    PiecewiseLinear,
+    Problem,
+    Rodas4,
+    RungeKutta4,
+    Schedule,
+    advance,
+    simulate,
+    simulate_batch,
+    solve,
+)
+from airmuscle.engine.compile.program import compile_system
+from airmuscle.engine.run import bound_integrator
+from airmuscle.engine.state import state_vector
 from airmuscle.errors import AirmuscleError, SimulationError
-from airmuscle.mechanism import HangingMass, HuntCrossley, MusclesInSeries, WithEndStops, WithLatch
-from airmuscle.muscle import LinearDamper, SeriesSpring
-from airmuscle.plant import Plant
-from airmuscle.plant.state import state_vector
-from airmuscle.pneumatics import (
+from airmuscle.physics import (
     EnergyBalance,
     FillDischarge,
+    HangingMass,
+    HuntCrossley,
     Isothermal,
+    LinearDamper,
     Manifold,
+    MusclesInSeries,
+    Plant,
     Polytropic,
+    SeriesSpring,
     SharedSupply,
     Supply,
     Tube,
     Valve,
+    WithEndStops,
+    WithLatch,
     WithLeak,
     WithTubes,
+    linearise,
+    stiffness,
 )
-from airmuscle.simulation import Problem, Rodas4, RungeKutta4, advance, bound_integrator, simulate, solve
-from airmuscle.simulation.batch import simulate_batch
 
 HUGE = Valve(9e-6, 0.3)
 VALVE = Valve(2.6e-9, 0.4)

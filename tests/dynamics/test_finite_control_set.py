@@ -12,10 +12,9 @@ import pytest
 from control_plants import LIFT
 
 import airmuscle as am
-from airmuscle.analysis import ExtendedKalmanFilter, FiniteControlSet, StateEstimate
-from airmuscle.control import ControlLoop
+from airmuscle.control import ExtendedKalmanFilter, FiniteControlSet, StateEstimate
+from airmuscle.engine import ControlLoop, Problem, solve
 from airmuscle.errors import ParameterError
-from airmuscle.simulation import Problem, solve
 
 H = 0.01
 MODES = tuple({"fill": a, "discharge": b} for a, b in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))

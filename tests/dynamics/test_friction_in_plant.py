@@ -13,25 +13,30 @@ import pytest
 from joints import chosen_muscle
 from widths import widened
 
-from airmuscle.compile.functions import trace_system
-from airmuscle.control import Schedule
 from airmuscle.core import model, parameter
+from airmuscle.engine import DormandPrince8, Rodas4, Schedule, simulate
+from airmuscle.engine.compile.functions import trace_system
 from airmuscle.errors import ParameterError
-from airmuscle.mechanism import Coordinate, HangingMass, Mechanism
-from airmuscle.muscle.friction import (
+from airmuscle.physics import (
     BoucWen,
+    Coordinate,
     Dahl,
+    FillDischarge,
+    HangingMass,
     IdentifiedFriction,
     LuGre,
     MaxwellSlip,
+    Mechanism,
     NoFriction,
+    Plant,
+    Polytropic,
     PrandtlIshlinskii,
     PressureScaledFriction,
+    Supply,
+    Valve,
+    WithEnergyMeters,
+    find_equilibrium,
 )
-from airmuscle.plant import Plant, WithEnergyMeters
-from airmuscle.pneumatics import FillDischarge, Polytropic, Supply, Valve
-from airmuscle.simulation import DormandPrince8, Rodas4, simulate
-from airmuscle.simulation.equilibrium import find_equilibrium
 
 VALVE = Valve(3e-10, 0.433)
 CIRCUIT = FillDischarge(Supply(548675.0), VALVE, VALVE)

@@ -12,15 +12,31 @@ import numpy as np
 import pytest
 
 import airmuscle as am
-from airmuscle.analysis import joint_statics, plot_reachable_region, stiffness
 from airmuscle.errors import ColumnError, ParameterError, SolveError
-from airmuscle.mechanism import AntagonisticJoint, CrankProfile, HangingMass, HuntCrossley, JointWithEndStops, WithLatch
-from airmuscle.muscle import LinearSpring, SeriesSpring, SwellingWall
-from airmuscle.muscle.characteristic import Clamped, ContractileSurface, VirtualWork
-from airmuscle.muscle.characteristic.contractile_surface import exponents
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import EnergyBalance, Isothermal, Polytropic
-from airmuscle.simulation import find_equilibria, find_equilibrium
+from airmuscle.physics import (
+    AntagonisticJoint,
+    Clamped,
+    ContractileSurface,
+    CrankProfile,
+    EnergyBalance,
+    HangingMass,
+    HuntCrossley,
+    Isothermal,
+    JointWithEndStops,
+    LinearSpring,
+    Plant,
+    Polytropic,
+    SeriesSpring,
+    SwellingWall,
+    VirtualWork,
+    WithLatch,
+    find_equilibria,
+    find_equilibrium,
+    joint_statics,
+    plot_reachable_region,
+    stiffness,
+)
+from airmuscle.physics.muscle.characteristic.contractile_surface import exponents
 
 DMSP = am.load("dmsp-20-300").muscle
 BRAID = am.geometry.Braid(0.01, 0.4363, 0.3)

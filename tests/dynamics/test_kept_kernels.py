@@ -18,18 +18,17 @@ import pytest
 from filling import lifting_run
 from numba.core import ir
 
-from airmuscle.compile.cache import kernel as kernels
-from airmuscle.compile.cache import module
-from airmuscle.compile.cache import store as kept
-from airmuscle.compile.cache.inlining import shallow_scope_copies
-from airmuscle.compile.cache.kernel import BoundKernel, Kernel
-from airmuscle.compile.cache.object_code import build
-from airmuscle.compile.function import Function
-from airmuscle.compile.llvm.jit import object_code
-from airmuscle.compile.program import compile_system
-from airmuscle.control import Schedule
+from airmuscle.engine import DormandPrince8, Rodas4, Schedule, simulate
+from airmuscle.engine.compile.cache import kernel as kernels
+from airmuscle.engine.compile.cache import module
+from airmuscle.engine.compile.cache import store as kept
+from airmuscle.engine.compile.cache.inlining import shallow_scope_copies
+from airmuscle.engine.compile.cache.kernel import BoundKernel, Kernel
+from airmuscle.engine.compile.cache.object_code import build
+from airmuscle.engine.compile.function import Function
+from airmuscle.engine.compile.llvm.jit import object_code
+from airmuscle.engine.compile.program import compile_system
 from airmuscle.errors import AirmuscleWarning
-from airmuscle.simulation import DormandPrince8, Rodas4, simulate
 
 CASE = lifting_run(1)
 READY = compile_system(CASE.system)

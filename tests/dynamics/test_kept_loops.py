@@ -9,17 +9,10 @@ import numpy as np
 import pytest
 from control_plants import LIFT, SPLIT, assert_identical
 
-from airmuscle.control import (
-    PID,
-    PWM,
-    ControlLoop,
-    OnOffController,
-    SampledSignal,
-    Schedule,
-    SolenoidDriver,
-)
-from airmuscle.simulation import Problem, RungeKutta4, closed_loop, solve
-from airmuscle.simulation.kept_loops import MAX_FORMS, form_of
+from airmuscle.control import PID, OnOffController
+from airmuscle.engine import PWM, ControlLoop, Problem, RungeKutta4, SampledSignal, Schedule, SolenoidDriver, solve
+from airmuscle.engine.run import closed_loop
+from airmuscle.engine.run.kept_loops import MAX_FORMS, form_of
 
 STEPS = Schedule({"pressure": ((0, 1e5), (0.5, 3e5), (0.703, 2e5))})
 SOLENOID = SolenoidDriver(2e-3, 1.5e-3, 1e-3, 1.2e-3)

@@ -8,14 +8,11 @@ import pytest
 from joints import chosen_muscle, joint, joint_start
 from scipy.integrate import solve_ivp
 
-from airmuscle.compile.program import compile_system
-from airmuscle.control import ZERO_INPUT, SampledSignal, Schedule
 from airmuscle.core import StateVariable, System, model, ops, parameter
+from airmuscle.engine import ZERO_INPUT, DormandPrince8, Rodas4, RungeKutta4, SampledSignal, Schedule, advance, simulate
+from airmuscle.engine.compile.program import compile_system
 from airmuscle.errors import SimulationError
-from airmuscle.mechanism import HangingMass
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Polytropic, Supply, Valve
-from airmuscle.simulation import DormandPrince8, Rodas4, RungeKutta4, advance, simulate
+from airmuscle.physics import FillDischarge, HangingMass, Plant, Polytropic, Supply, Valve
 
 
 def hanging() -> Plant:

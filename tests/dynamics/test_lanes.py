@@ -10,13 +10,13 @@ import casadi
 import numpy as np
 import pytest
 
-from airmuscle.compile.functions import Printer
-from airmuscle.compile.ir.instructions import Operation
-from airmuscle.compile.llvm import emit, vector_math
-from airmuscle.compile.llvm.jit import jit_compile
-from airmuscle.compile.llvm.types import LlvmType
+from airmuscle.engine.compile.functions import Printer
+from airmuscle.engine.compile.ir.instructions import Operation
+from airmuscle.engine.compile.llvm import emit, vector_math
+from airmuscle.engine.compile.llvm.jit import jit_compile
+from airmuscle.engine.compile.llvm.types import LlvmType
+from airmuscle.engine.run.batch.lanes import aligned_arrays
 from airmuscle.errors import TraceError
-from airmuscle.simulation.batch.lanes import aligned_arrays
 
 NUMBERS = {"16 doubles": LlvmType(64, 16), "8 doubles": LlvmType(64, 8), "32 singles": LlvmType(32, 32)}
 WIDE = max(number.lanes for number in NUMBERS.values())

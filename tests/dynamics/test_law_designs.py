@@ -12,13 +12,12 @@ import pytest
 from control_plants import LIFT
 
 import airmuscle as am
-from airmuscle.control import PID, ControlLaw, ControlLoop, LawDesign, SplitRange, WithFeedForward, WithSetpointDelay
-from airmuscle.control.law_design import designed_loop, with_designed_laws
+from airmuscle.control import PID, WithFeedForward, WithSetpointDelay
 from airmuscle.core import model, parameter
+from airmuscle.design import LoopCase, tune
+from airmuscle.engine import ControlLaw, ControlLoop, LawDesign, RungeKutta4, SplitRange, simulate, simulate_batch
+from airmuscle.engine.loop.law_design import designed_loop, with_designed_laws
 from airmuscle.errors import ParameterError
-from airmuscle.simulation import RungeKutta4, simulate
-from airmuscle.simulation.batch import simulate_batch
-from airmuscle.study import LoopCase, tune
 
 H, BAR = 0.01, 1e5
 VALVES = SplitRange("fill", "discharge")

@@ -13,28 +13,33 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.control import ZERO_INPUT, Schedule
-from airmuscle.mechanism import AntagonisticJoint, HangingMass, HuntCrossley, Isometric, SpringLoad, WithEndStops
-from airmuscle.muscle.friction import Dahl
-from airmuscle.plant import Plant, total_air
-from airmuscle.pneumatics import (
+from airmuscle.engine import ZERO_INPUT, Rodas4, Schedule, simulate
+from airmuscle.physics import (
+    AntagonisticJoint,
     ClosedChamber,
+    Dahl,
     EnergyBalance,
     FillDischarge,
+    HangingMass,
+    HuntCrossley,
+    Isometric,
     Isothermal,
+    Plant,
     Polytropic,
     ProportionalRegulator,
     ProportionalValve,
     SecondOrderLag,
+    SpringLoad,
     Supply,
     Tank,
     Tube,
     Valve,
+    WithEndStops,
     WithLeak,
     WithTubes,
+    find_equilibrium,
+    total_air,
 )
-from airmuscle.simulation import Rodas4, simulate
-from airmuscle.simulation.equilibrium import find_equilibrium
 
 GASES = [Isothermal(), Polytropic(1.2), EnergyBalance(0.2), EnergyBalance(0.0)]
 MUSCLE = chosen_muscle()

@@ -8,30 +8,31 @@ import numpy as np
 import pytest
 from joints import chosen_muscle, joint, joint_start
 
-from airmuscle.analysis import linearise
-from airmuscle.compile.program import compile_system
-from airmuscle.control import Schedule
+from airmuscle.engine import Problem, Rodas4, Schedule, simulate, solve
+from airmuscle.engine.compile.program import compile_system
 from airmuscle.errors import AirmuscleError, ParameterError
-from airmuscle.mechanism import AntagonisticJoint, HangingMass, SpringLoad
-from airmuscle.muscle import SeriesSpring
-from airmuscle.muscle.friction import LuGre
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import (
+from airmuscle.physics import (
+    AntagonisticJoint,
     ClosedChamber,
     EnergyBalance,
     FillDischarge,
+    HangingMass,
     Isothermal,
+    LuGre,
+    Plant,
     Polytropic,
     ProportionalRegulator,
     ProportionalValve,
     SecondOrderLag,
+    SeriesSpring,
+    SpringLoad,
     Supply,
     Tube,
     Valve,
     WithTubes,
+    find_equilibrium,
+    linearise,
 )
-from airmuscle.simulation import Problem, Rodas4, simulate, solve
-from airmuscle.simulation.equilibrium import find_equilibrium
 
 VALVE = Valve(2.6e-9, 0.433)
 LEFT, RIGHT = (replace(chosen_muscle(), name=name) for name in ("left", "right"))

@@ -9,17 +9,23 @@ from called_controller import Called
 from control_plants import LIFT, PRESSURE
 
 import airmuscle as am
-from airmuscle.control import PID, PWM, Cascade, ColumnSensor, ControlLoop, SampledSignal, Schedule, WithSensors
+from airmuscle.control import PID, Cascade
 from airmuscle.core import tree
-from airmuscle.errors import AirmuscleError, ParameterError
-from airmuscle.simulation import (
+from airmuscle.engine import (
+    PWM,
+    ColumnSensor,
+    ControlLoop,
     RungeKutta4,
+    SampledSignal,
+    Schedule,
+    WithSensors,
     differentiate_loop,
     loop_in_jax,
     sensitivity,
     simulate,
     tracking_sensitivity,
 )
+from airmuscle.errors import AirmuscleError, ParameterError
 
 jax = pytest.importorskip("jax", reason="the package jax is not installed (extra jax)")
 jax.config.update("jax_enable_x64", True)

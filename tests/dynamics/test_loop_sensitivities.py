@@ -17,33 +17,33 @@ from control_plants import JOINT, LIFT, PRESSURE, PRESSURES, SPLIT
 import airmuscle as am
 from airmuscle.control import (
     PID,
-    PWM,
     Cascade,
-    ColumnSensor,
-    ControlLoop,
     GainSchedule,
-    SampledSignal,
-    Schedule,
     SlidingMode,
     StaticFeedForward,
     StaticInverse,
     SuperTwisting,
     WithFeedForward,
-    WithSensors,
 )
 from airmuscle.core import Input, StateVariable, System, model, parameter, tree
-from airmuscle.errors import ParameterError
-from airmuscle.simulation import (
+from airmuscle.engine import (
+    PWM,
+    ColumnSensor,
+    ControlLoop,
     LawWithSensitivities,
     Rodas4,
     RungeKutta4,
+    SampledSignal,
+    Schedule,
     WithSensitivities,
+    WithSensors,
     differentiate_loop,
     sensitivity,
     simulate,
+    simulate_batch,
     tracking_sensitivity,
 )
-from airmuscle.simulation.batch import simulate_batch
+from airmuscle.errors import ParameterError
 
 OUTER = PID("position", "pressure", 4e6, 0.3, 0.02, initial_output=1e5)
 FORWARD = StaticFeedForward(

@@ -11,44 +11,42 @@ from hypothesis import strategies as st
 from joints import HEAT_CAPACITY, chosen_muscle, joint, joint_start
 from widths import widened
 
-from airmuscle.compile.program import compile_system
-from airmuscle.control import ZERO_INPUT, SampledSignal, Schedule, spline_trajectory
+from airmuscle.engine import ZERO_INPUT, Rodas4, SampledSignal, Schedule, simulate, spline_trajectory
+from airmuscle.engine.compile.program import compile_system
 from airmuscle.errors import ParameterError
-from airmuscle.mechanism import (
-    AntagonisticJoint,
-    HangingMass,
-    HuntCrossley,
-    Isotonic,
-    JointWithEndStops,
-    Lever,
-    MusclesInSeries,
-    PrescribedMotion,
-    Pulley,
-    SpringLoad,
-    WithEndStops,
-    WithOffsets,
-)
-from airmuscle.plant import Plant, WithEnergyMeters
-from airmuscle.pneumatics import (
+from airmuscle.physics import (
     GAS_CONSTANT,
+    AntagonisticJoint,
     ClosedChamber,
     DistributedTube,
     EnergyBalance,
     FillDischarge,
+    HangingMass,
+    HuntCrossley,
     Isothermal,
+    Isotonic,
+    JointWithEndStops,
+    Lever,
     Manifold,
+    MusclesInSeries,
+    Plant,
     Polytropic,
+    PrescribedMotion,
     ProportionalValve,
+    Pulley,
     SecondOrderLag,
     SharedSupply,
+    SpringLoad,
     Supply,
     ThreePositionValve,
     Tube,
     Valve,
+    WithEndStops,
+    WithEnergyMeters,
+    WithOffsets,
     WithTubes,
+    find_equilibrium,
 )
-from airmuscle.simulation import Rodas4, simulate
-from airmuscle.simulation.equilibrium import find_equilibrium
 
 LEFT, RIGHT = (replace(chosen_muscle(), name=name) for name in ("left", "right"))
 VALVE = Valve(2.6e-8, 0.433)

@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 
 import airmuscle as am
-from airmuscle.analysis import design_predictive, linearise
-from airmuscle.analysis.riccati import regulator
-from airmuscle.control import ControlLoop, Measurement
+from airmuscle.control import design_predictive
+from airmuscle.control.estimation.riccati import regulator
+from airmuscle.engine import ControlLoop, Measurement
 from airmuscle.errors import AirmuscleError, ParameterError
+from airmuscle.physics import linearise
 
 pytest.importorskip("daqp", reason="the package daqp is not installed")
 H = 0.01
@@ -216,7 +217,7 @@ def test_a_pickled_controller_gives_the_same_command():
 
 
 def test_a_continued_run_is_the_undivided_run():
-    from airmuscle.simulation import Problem, solve
+    from airmuscle.engine import Problem, solve
 
     judged = law(limits={"left.pressure": (0.5e5, 3.1e5)})
     loop = ControlLoop(judged, H, am.Schedule({"angle": ((0.0, 0.0), (0.2, 0.25))}))

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import airmuscle as am
-from airmuscle.analysis import ExtendedKalmanFilter, NonlinearModelPredictive, design_predictive, linearise
-from airmuscle.control import ControlLoop, Measurement
+from airmuscle.control import ExtendedKalmanFilter, NonlinearModelPredictive, design_predictive
+from airmuscle.engine import ControlLoop, Measurement
 from airmuscle.errors import ParameterError
-from airmuscle.simulation import find_equilibrium
+from airmuscle.physics import find_equilibrium, linearise
 
 pytest.importorskip("daqp", reason="the package daqp is not installed")
 H = 0.01

@@ -9,12 +9,10 @@ import numpy as np
 import plants
 import pytest
 
-from airmuscle.control import SampledSignal, Schedule
-from airmuscle.control.control_loop import CombinedSignal
+from airmuscle.engine import Problem, Rodas4, SampledSignal, Schedule, solve
+from airmuscle.engine.loop.control_loop import CombinedSignal
 from airmuscle.errors import ParameterError
-from airmuscle.mechanism import ExternalLoad
-from airmuscle.plant import WithEnergyMeters, open_plant
-from airmuscle.simulation import Problem, Rodas4, solve
+from airmuscle.physics import ExternalLoad, WithEnergyMeters, open_plant
 
 ONE = ("dmsp-20-300", "LuGre", "heat", "three positions through a tube", "stop, lagging wall")
 TIMES, SHORTENINGS = (0.0, 0.2, 0.3, 0.6, 0.8), (0.003, 0.006, 0.004, 0.01, 0.01)

@@ -14,8 +14,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airmuscle.compile.program import compile_system
 from airmuscle.core import StateVariable, System, autodiff, model, ops, parameter
+from airmuscle.engine.compile.program import compile_system
 from airmuscle.errors import ParameterError, TraceError
 
 FORMULAS = {

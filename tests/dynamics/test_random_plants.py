@@ -17,11 +17,22 @@ from composer import STOCK, Composer, models_in
 
 from airmuscle import Status
 from airmuscle.core.diagnostics import DiagnosticCode
+from airmuscle.engine import Problem, Rodas4, solve
 from airmuscle.errors import AirmuscleError, ParameterError
-from airmuscle.mechanism import HangingMass, WithLatch
-from airmuscle.plant import Plant, WithEnergyMeters
-from airmuscle.pneumatics import Ambient, EnergyBalance, FillDischarge, Isothermal, RegulatedSupply, Supply, Tank, Valve
-from airmuscle.simulation import Problem, Rodas4, solve
+from airmuscle.physics import (
+    Ambient,
+    EnergyBalance,
+    FillDischarge,
+    HangingMass,
+    Isothermal,
+    Plant,
+    RegulatedSupply,
+    Supply,
+    Tank,
+    Valve,
+    WithEnergyMeters,
+    WithLatch,
+)
 
 # Laws and geometries of different lengths are combined.
 pytestmark = pytest.mark.filterwarnings("ignore:.*is the law of a muscle of")

@@ -11,11 +11,11 @@ import pytest
 from plants import EXAMPLES
 from widths import widened
 
-from airmuscle.compile.functions_simd import ROWS
-from airmuscle.compile.program import compile_system
-from airmuscle.control import PiecewiseLinear
-from airmuscle.mechanism import HangingMass
-from airmuscle.simulation.rows import RowRecorder
+from airmuscle.engine import PiecewiseLinear
+from airmuscle.engine.compile.functions_simd import ROWS
+from airmuscle.engine.compile.program import compile_system
+from airmuscle.engine.run.rows import RowRecorder
+from airmuscle.physics import HangingMass
 
 BY_DEFAULT = {
     "surface", "stand-in", "circle", "tondu-lopez", "sarosi", "Catenary", "stop, lagging wall", "Maxwell slip", "heat",

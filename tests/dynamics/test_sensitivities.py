@@ -12,11 +12,10 @@ import numpy as np
 import pytest
 from filling import hanging, runs
 
-from airmuscle.compile.program import compile_system
-from airmuscle.control import SampledSignal, Schedule
 from airmuscle.core import StateVariable, System, model, ops, parameter, tree
+from airmuscle.engine import Rodas4, RungeKutta4, SampledSignal, Schedule, WithSensitivities, sensitivity
+from airmuscle.engine.compile.program import compile_system
 from airmuscle.errors import ParameterError
-from airmuscle.simulation import Rodas4, RungeKutta4, WithSensitivities, sensitivity
 
 PATHS = (
     "circuit.fill.conductance",

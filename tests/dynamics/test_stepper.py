@@ -13,11 +13,10 @@ import numpy as np
 import pytest
 from control_plants import JOINT, LIFT
 
-from airmuscle.control import Schedule
+from airmuscle.engine import Rodas4, RungeKutta4, Schedule, Stepper, simulate
 from airmuscle.errors import ParameterError, SimulationError
-from airmuscle.library import catalogue
-from airmuscle.plant import WithEnergyMeters
-from airmuscle.simulation import Rodas4, RungeKutta4, Stepper, simulate
+from airmuscle.files.library import catalogue
+from airmuscle.physics import WithEnergyMeters
 
 START = JOINT.state_at(pressure=2e5)
 FILL, SHUT = [0.5, 0.0, 0.0, 0.5], [0.0] * 4

@@ -13,17 +13,29 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from joints import chosen_muscle
 
-from airmuscle.analysis import stiffness
-from airmuscle.control import spline_trajectory
-from airmuscle.mechanism import AntagonisticJoint, HangingMass, Isometric, Lever, MusclesInSeries, PrescribedMotion
-from airmuscle.muscle import LinearSpring, Muscle, SeriesSpring
-from airmuscle.muscle.characteristic import VirtualWork
-from airmuscle.muscle.geometry import Braid
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import ClosedChamber, EnergyBalance, Isothermal, Polytropic, absolute_pressure
-from airmuscle.pneumatics.gas import HEAT_CAPACITY_RATIO
-from airmuscle.simulation import Rodas4, simulate
-from airmuscle.simulation.equilibrium import find_equilibrium
+from airmuscle.engine import Rodas4, simulate, spline_trajectory
+from airmuscle.physics import (
+    AntagonisticJoint,
+    Braid,
+    ClosedChamber,
+    EnergyBalance,
+    HangingMass,
+    Isometric,
+    Isothermal,
+    Lever,
+    LinearSpring,
+    Muscle,
+    MusclesInSeries,
+    Plant,
+    Polytropic,
+    PrescribedMotion,
+    SeriesSpring,
+    VirtualWork,
+    absolute_pressure,
+    find_equilibrium,
+    stiffness,
+)
+from airmuscle.physics.pneumatics.gas import HEAT_CAPACITY_RATIO
 
 BRAID = Braid(0.01, 0.4363, 0.2)
 MUSCLE = Muscle(VirtualWork(BRAID), BRAID, LinearSpring(3000.0))

@@ -9,7 +9,7 @@ import pytest
 
 import airmuscle as am
 from airmuscle.errors import AirmuscleWarning, TraceError
-from airmuscle.plant import WithEnergyMeters
+from airmuscle.physics import WithEnergyMeters
 
 
 @pytest.fixture(scope="module")

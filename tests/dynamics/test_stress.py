@@ -11,23 +11,29 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.control import Schedule, SolenoidDriver, WithDrivers
-from airmuscle.mechanism import HangingMass, HuntCrossley
-from airmuscle.muscle import CreepElements, DirectionalDamper, EndStop, SeriesSpring, ViscoelasticWall
-from airmuscle.muscle.friction import LuGre, MaxwellSlip
-from airmuscle.plant import Plant, WithEnergyMeters
-from airmuscle.pneumatics import (
+from airmuscle.engine import Rodas4, Schedule, SolenoidDriver, WithDrivers, simulate
+from airmuscle.physics import (
+    CreepElements,
+    DirectionalDamper,
     DistributedTube,
+    EndStop,
     EnergyBalance,
     FillDischarge,
+    HangingMass,
+    HuntCrossley,
+    LuGre,
+    MaxwellSlip,
+    Plant,
     RegulatedSupply,
+    SeriesSpring,
     Supply,
     Tank,
     Tube,
     Valve,
+    ViscoelasticWall,
+    WithEnergyMeters,
     WithTubes,
 )
-from airmuscle.simulation import Rodas4, simulate
 
 SWITCHINGS = 10_000
 

@@ -9,12 +9,7 @@ import pytest
 from control_plants import LIFT
 
 import airmuscle as am
-from airmuscle.analysis import (
-    ExtendedKalmanFilter,
-    UnscentedKalmanFilter,
-    consistency_band,
-    normalised_error_squared,
-)
+from airmuscle.control import ExtendedKalmanFilter, UnscentedKalmanFilter, consistency_band, normalised_error_squared
 from airmuscle.core import StateVariable, System, model, parameter
 from airmuscle.errors import ParameterError
 

@@ -15,25 +15,24 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from airmuscle.control import Schedule
-from airmuscle.mechanism import Isometric
-from airmuscle.muscle import Muscle
-from airmuscle.muscle.characteristic import ChouHannaford1996
-from airmuscle.muscle.geometry import Braid
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import (
+from airmuscle.engine import Rodas4, Schedule, simulate
+from airmuscle.physics import (
     GAS_CONSTANT,
     REFERENCE_DENSITY,
     Ambient,
+    Braid,
     CheckValve,
+    ChouHannaford1996,
     FillDischarge,
+    Isometric,
     Isothermal,
+    Muscle,
     Orifice,
+    Plant,
     SubsonicIndexValve,
     Supply,
     Valve,
 )
-from airmuscle.simulation import Rodas4, simulate
 
 SOURCE, T0, CONDUCTANCE = 7e5, 293.15, 1e-9
 AMBIENT = Ambient(100e3, T0)

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from airmuscle import load
+from airmuscle.bench import Campaign, LeftOutStage, RowReader, classify_records, read
+from airmuscle.bench.identify.campaign.fill_stage import fit_fill_stage
 from airmuscle.errors import ColumnError, ParameterError, UnitError
-from airmuscle.identify.campaign import Campaign, LeftOutStage, classify_records
-from airmuscle.identify.campaign.fill_stage import fit_fill_stage
-from airmuscle.pneumatics import Ambient
-from airmuscle.recording import Recording, RowReader, read
-from airmuscle.scenario import load_dynamic_fit, load_plant_model, load_scenario
-from airmuscle.scenario.campaign import campaign_scenarios
+from airmuscle.files import load_dynamic_fit, load_plant_model, load_scenario
+from airmuscle.files.scenario.campaign import campaign_scenarios
+from airmuscle.physics import Ambient
+from airmuscle.recording import Recording
 
 PLANT = """
 title = "rig"

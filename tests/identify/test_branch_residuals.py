@@ -7,9 +7,9 @@ import re
 import numpy as np
 import pytest
 
-from airmuscle.identify import fit
-from airmuscle.identify.candidates import blank_surface
-from airmuscle.muscle.characteristic import Sarosi2012
+from airmuscle.bench import fit
+from airmuscle.bench.identify.candidates import blank_surface
+from airmuscle.physics import Sarosi2012
 from airmuscle.recording import Recording
 
 LAW = Sarosi2012(1.2e-4, 420.0, -57.0, -8.7e-3, 2.7e-3, -310.0)

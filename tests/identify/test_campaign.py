@@ -11,9 +11,7 @@ import numpy as np
 import pytest
 from made_campaign import THREE_LENGTHS, TrueMuscle, unseen_records, write_campaign, write_german
 
-from airmuscle.errors import IdentificationError
-from airmuscle.identify import standard_candidates
-from airmuscle.identify.campaign import (
+from airmuscle.bench import (
     CreepStage,
     FillStage,
     FrictionStage,
@@ -23,16 +21,19 @@ from airmuscle.identify.campaign import (
     StaticStage,
     classify_records,
     identify_campaign,
+    read,
+    standard_candidates,
 )
-from airmuscle.identify.campaign.creep_stage import creep_stretches, fit_creep_stage
-from airmuscle.identify.campaign.friction_stage import friction_along
-from airmuscle.identify.campaign.next_experiment import _levels
-from airmuscle.identify.campaign.rows import held_steady
-from airmuscle.identify.campaign.transient import count_pulses
-from airmuscle.identify.campaign.volume import VolumeChange, relate_volumes
-from airmuscle.identify.experiment_design import PlannedRun
-from airmuscle.muscle.friction import BoucWen
-from airmuscle.recording import Recording, read
+from airmuscle.bench.identify.campaign.creep_stage import creep_stretches, fit_creep_stage
+from airmuscle.bench.identify.campaign.friction_stage import friction_along
+from airmuscle.bench.identify.campaign.next_experiment import _levels
+from airmuscle.bench.identify.campaign.rows import held_steady
+from airmuscle.bench.identify.campaign.transient import count_pulses
+from airmuscle.bench.identify.campaign.volume import VolumeChange, relate_volumes
+from airmuscle.bench.identify.experiment_design import PlannedRun
+from airmuscle.errors import IdentificationError
+from airmuscle.physics import BoucWen
+from airmuscle.recording import Recording
 
 RANDOM = np.random.default_rng(3)
 MUSCLE = TrueMuscle(0.3)
@@ -391,7 +392,7 @@ def test_a_planned_run_is_described_by_its_levels():
 
 def test_the_specimen_that_does_not_follow_the_others_is_noted(monkeypatch):
     """Four muscles of one type; the third has 70 % of the force."""
-    kept = "airmuscle.identify.model_selection.standard_candidates"
+    kept = "airmuscle.bench.identify.model_selection.standard_candidates"
     monkeypatch.setattr(kept, lambda runs: standard_candidates(runs)[2:5])
     random, time, runs = np.random.default_rng(2), np.linspace(0.0, 60.0, 60), []
     contraction = 0.06 - 0.05 * np.cos(2 * np.pi * time / 60.0)

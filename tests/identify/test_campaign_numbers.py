@@ -7,30 +7,30 @@ import types
 import numpy as np
 import pytest
 
-from airmuscle.control import Schedule
+from airmuscle.bench import (
+    Experiment,
+    InitialConditions,
+    classify_records,
+    creep_elements,
+    estimate_sensors,
+    fit,
+    fit_creep,
+    fit_held_creep,
+)
+from airmuscle.bench.identify.campaign.error_band import _band, _inner, _left_out_residuals
+from airmuscle.bench.identify.campaign.release_stage import _mass
+from airmuscle.bench.identify.campaign.rig import check_one_rig
+from airmuscle.bench.identify.campaign.rows import with_force
+from airmuscle.bench.identify.campaign.transient import find_motion, find_pressure_steps
+from airmuscle.bench.identify.campaign.volume import volume_change
+from airmuscle.bench.identify.dynamic.candidate_records import _Context
+from airmuscle.bench.identify.dynamic.fit import _describe_model_error
+from airmuscle.bench.identify.dynamic.reliability import searches_at_lowest
+from airmuscle.bench.identify.dynamic.sensing import SensorLocation
+from airmuscle.engine import Schedule
 from airmuscle.errors import IdentificationError
-from airmuscle.identify import fit
-from airmuscle.identify.campaign import classify_records, fit_held_creep
-from airmuscle.identify.campaign.error_band import _band, _inner, _left_out_residuals
-from airmuscle.identify.campaign.release_stage import _mass
-from airmuscle.identify.campaign.rig import check_one_rig
-from airmuscle.identify.campaign.rows import with_force
-from airmuscle.identify.campaign.transient import find_motion, find_pressure_steps
-from airmuscle.identify.campaign.volume import volume_change
-from airmuscle.identify.dynamic import Experiment, InitialConditions
-from airmuscle.identify.dynamic.candidate_records import _Context
-from airmuscle.identify.dynamic.fit import _describe_model_error
-from airmuscle.identify.dynamic.reliability import searches_at_lowest
-from airmuscle.identify.dynamic.sensing import SensorLocation
-from airmuscle.identify.hysteresis import creep_elements, fit_creep
-from airmuscle.mechanism import Isometric
-from airmuscle.muscle import Muscle
-from airmuscle.muscle.characteristic import VirtualWork
-from airmuscle.muscle.geometry import Braid
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Polytropic, Supply, Valve
+from airmuscle.physics import Braid, FillDischarge, Isometric, Muscle, Plant, Polytropic, Supply, Valve, VirtualWork
 from airmuscle.recording import Recording
-from airmuscle.recording.segment import estimate_sensors
 
 LENGTH = 0.3
 BRAID = Braid(0.01, 0.43, LENGTH)

@@ -9,15 +9,10 @@ import math
 import numpy as np
 import pytest
 
-from airmuscle.control import SampledSignal, Schedule
+from airmuscle.bench import CommandInstants, Experiment, InitialConditions, StartTime, fit_dynamic
+from airmuscle.engine import Rodas4, SampledSignal, Schedule, simulate
 from airmuscle.errors import ParameterError
-from airmuscle.identify.dynamic import CommandInstants, Experiment, InitialConditions, StartTime, fit_dynamic
-from airmuscle.mechanism import Isometric
-from airmuscle.muscle import Muscle
-from airmuscle.muscle.geometry import Braid
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import EnergyBalance, FillDischarge, Supply, Valve
-from airmuscle.simulation import Rodas4, simulate
+from airmuscle.physics import Braid, EnergyBalance, FillDischarge, Isometric, Muscle, Plant, Supply, Valve
 
 MUSCLE = Muscle.ideal(Braid(0.01, math.radians(25), 0.3))
 VALVES = FillDischarge(Supply(6e5), Valve(3e-9, 0.35), Valve(3.6e-9, 0.2))

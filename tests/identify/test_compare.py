@@ -20,10 +20,7 @@ from typer.testing import CliRunner
 
 import airmuscle as am
 from airmuscle import load_data
-from airmuscle.cli.app import app
-from airmuscle.cli.fit_options import parse_split
-from airmuscle.errors import IdentificationError, ParameterError
-from airmuscle.identify import (
+from airmuscle.bench import (
     BlockSplit,
     Candidate,
     LevelSplit,
@@ -32,21 +29,18 @@ from airmuscle.identify import (
     compare,
     select_for_both,
     standard_candidates,
+    write_csv,
 )
-from airmuscle.identify.candidate_scores import FoldScore
-from airmuscle.identify.cross_validation import ALWAYS_FITTED, default_split
-from airmuscle.identify.force_evaluation import evaluate_force
-from airmuscle.identify.recommendation import excess_error, recommend
-from airmuscle.muscle.characteristic import (
-    ContractileSurface,
-    Hunt2017,
-    InverseLength,
-    LogarithmicLength,
-    TonduLopez2000,
-)
-from airmuscle.muscle.geometry import Braid
-from airmuscle.recording import Recording, write_csv
-from airmuscle.report.compare_chapter import compare_chapter, compare_chapters
+from airmuscle.bench.identify.candidate_scores import FoldScore
+from airmuscle.bench.identify.compare_chapter import compare_chapter, compare_chapters
+from airmuscle.bench.identify.cross_validation import ALWAYS_FITTED, default_split
+from airmuscle.bench.identify.force_evaluation import evaluate_force
+from airmuscle.bench.identify.recommendation import excess_error, recommend
+from airmuscle.errors import IdentificationError, ParameterError
+from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli.fit_options import parse_split
+from airmuscle.physics import Braid, ContractileSurface, Hunt2017, InverseLength, LogarithmicLength, TonduLopez2000
+from airmuscle.recording import Recording
 
 TRUTH = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.2)
 START = TonduLopez2000(Braid(0.012, 0.4, 0.3), 1.0)

@@ -7,11 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from airmuscle.bench import Creep, creep_elements, find_holds, fit_creep
+from airmuscle.bench.identify.campaign.creep_stage import HeldRows
+from airmuscle.bench.identify.hysteresis.creep import CreepFit
 from airmuscle.errors import IdentificationError, ParameterError
-from airmuscle.identify.campaign.creep_stage import HeldRows
-from airmuscle.identify.hysteresis import Creep, creep_elements, find_holds, fit_creep
-from airmuscle.identify.hysteresis.creep import CreepFit
-from airmuscle.muscle import CreepElements
+from airmuscle.physics import CreepElements
 from airmuscle.recording import Recording
 
 K, L0 = 20e3, 0.2

@@ -32,16 +32,14 @@ from laboratories import (
 )
 from typer.testing import CliRunner
 
-from airmuscle.cli.app import app
+from airmuscle.bench import Candidate, Fit, StaticStage, classify_records, compare, fit, read
+from airmuscle.bench.identify.campaign.static_stage import fit_static_stage
+from airmuscle.bench.identify.candidates import blank_surface
+from airmuscle.bench.identify.data_checks import DataChecks
 from airmuscle.errors import AirmuscleWarning, ColumnError
-from airmuscle.identify import Candidate, Fit, compare, fit
-from airmuscle.identify.campaign import StaticStage, classify_records
-from airmuscle.identify.campaign.static_stage import fit_static_stage
-from airmuscle.identify.candidates import blank_surface
-from airmuscle.identify.data_checks import DataChecks
-from airmuscle.muscle import CreepElements
-from airmuscle.muscle.friction import NoFriction
-from airmuscle.recording import Recording, read
+from airmuscle.outlets.cli.app import app
+from airmuscle.physics import CreepElements, NoFriction
+from airmuscle.recording import Recording
 
 OTHER = dataclasses.replace(MUSCLE, radius=0.0128)
 FRICTIONLESS = dataclasses.replace(MUSCLE, friction=0.0)

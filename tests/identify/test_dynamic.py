@@ -12,10 +12,7 @@ import pytest
 from filling import hanging
 
 from airmuscle import Status
-from airmuscle.control import Schedule
-from airmuscle.core import tree
-from airmuscle.errors import IdentificationError, ParameterError
-from airmuscle.identify.dynamic import (
+from airmuscle.bench import (
     Experiment,
     InitialConditions,
     InitialValue,
@@ -24,16 +21,29 @@ from airmuscle.identify.dynamic import (
     fit_dynamic,
     locate_pressure_sensor,
 )
-from airmuscle.identify.dynamic.profile import DynamicProfile
-from airmuscle.mechanism import HangingMass, Isometric
-from airmuscle.muscle import Muscle, SwellingWall
-from airmuscle.muscle.friction import Dahl
-from airmuscle.muscle.geometry import Vessel
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import EnergyBalance, FillDischarge, Polytropic, Supply, Tube, Valve, WithLeak, WithTubes
-from airmuscle.simulation import simulate
-from airmuscle.simulation.bound_integrator import BoundIntegrator
-from airmuscle.simulation.equilibrium import find_equilibrium
+from airmuscle.bench.identify.dynamic.profile import DynamicProfile
+from airmuscle.core import tree
+from airmuscle.engine import Schedule, simulate
+from airmuscle.engine.run.bound_integrator import BoundIntegrator
+from airmuscle.errors import IdentificationError, ParameterError
+from airmuscle.physics import (
+    Dahl,
+    EnergyBalance,
+    FillDischarge,
+    HangingMass,
+    Isometric,
+    Muscle,
+    Plant,
+    Polytropic,
+    Supply,
+    SwellingWall,
+    Tube,
+    Valve,
+    Vessel,
+    WithLeak,
+    WithTubes,
+    find_equilibrium,
+)
 
 FILL = Schedule({"fill": ((0.1, 1.0), (1.0, 0.0)), "discharge": ((1.3, 1.0),)})
 SENSORS = {"pressure": 500.0, "position": 5e-5}
@@ -491,10 +501,10 @@ def test_a_start_left_after_a_first_look_goes_on_as_if_it_had_not_been(monkeypat
     plant, free = rigid_plant(), ("circuit.fill.conductance", "circuit.supply.pressure")
     question = {"free": free, "observed": {"pressure": 300.0}, "starts": 5}
     whole = fit_dynamic(plant, [rigid_fill(plant)], **question)
-    monkeypatch.setattr("airmuscle.identify.dynamic.fit.SCREENING_RUNS", 3)
-    monkeypatch.setattr("airmuscle.identify.dynamic.fit.SCREENING_RATIO", np.inf)
+    monkeypatch.setattr("airmuscle.bench.identify.dynamic.fit.SCREENING_RUNS", 3)
+    monkeypatch.setattr("airmuscle.bench.identify.dynamic.fit.SCREENING_RATIO", np.inf)
     np.testing.assert_array_equal(fit_dynamic(plant, [rigid_fill(plant)], **question).costs, whole.costs)
-    monkeypatch.setattr("airmuscle.identify.dynamic.fit.SCREENING_RATIO", 1.0)
+    monkeypatch.setattr("airmuscle.bench.identify.dynamic.fit.SCREENING_RATIO", 1.0)
     left = fit_dynamic(plant, [rigid_fill(plant)], **question)
     assert left.costs[-1] > 10 * whole.costs[-1]
     assert left.costs[0] == pytest.approx(whole.costs[0], rel=1e-6)
@@ -513,8 +523,8 @@ def test_a_run_of_far_more_steps_than_the_best_is_not_waited_for(monkeypatch):
     found = fit_dynamic(guess, [record], free=(path,), observed={"pressure": 300.0})
     assert found[path].value == pytest.approx(truth(plant, path), rel=0.01)
     assert allowed == [1_000_000, *[10_000] * (len(allowed) - 2), 1_000_000]  # the last is that of the result
-    monkeypatch.setattr("airmuscle.identify.dynamic.problem.MIN_STEP_BUDGET", 10)
-    monkeypatch.setattr("airmuscle.identify.dynamic.problem.STEP_BUDGET_FACTOR", 0.5)
+    monkeypatch.setattr("airmuscle.bench.identify.dynamic.problem.MIN_STEP_BUDGET", 10)
+    monkeypatch.setattr("airmuscle.bench.identify.dynamic.problem.STEP_BUDGET_FACTOR", 0.5)
     stays = fit_dynamic(guess, [record], free=(path,), observed={"pressure": 300.0})
     assert stays[path].value == truth(guess, path)
 

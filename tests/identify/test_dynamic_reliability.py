@@ -12,23 +12,18 @@ import re
 import numpy as np
 import pytest
 
-from airmuscle.control import Schedule
-from airmuscle.identify import Estimate
-from airmuscle.identify.dynamic import Experiment, InitialConditions, fit_dynamic
-from airmuscle.identify.dynamic.reliability import (
+from airmuscle.bench import Estimate, Experiment, InitialConditions, fit_dynamic
+from airmuscle.bench.identify.dynamic.dynamic_chapter import dynamic_chapters
+from airmuscle.bench.identify.dynamic.reliability import (
     describe_bounds,
     describe_flatness,
     describe_optima,
     distinct_optima,
     searches_at_lowest,
 )
-from airmuscle.library import load
-from airmuscle.mechanism import Isometric
-from airmuscle.muscle import Muscle
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Polytropic, Supply, Valve
-from airmuscle.report.dynamic_chapter import dynamic_chapters
-from airmuscle.simulation import simulate
+from airmuscle.engine import Schedule, simulate
+from airmuscle.files import load
+from airmuscle.physics import FillDischarge, Isometric, Muscle, Plant, Polytropic, Supply, Valve
 
 FILL = Schedule({"fill": ((0.0, 1.0),)})
 CONDUCTANCE, RATIO = "circuit.fill.conductance", "circuit.fill.critical_ratio"

@@ -10,22 +10,22 @@ import math
 import numpy as np
 import pytest
 
-from airmuscle.core import autodiff
-from airmuscle.errors import IdentificationError
-from airmuscle.identify.correlation_index import correlation_index
-from airmuscle.identify.surface.basis import Chebyshev, LoadRange, Monomials, conditioning
-from airmuscle.identify.surface.exponential import SurfaceProblem, fit_linearised, fit_nonlinear
-from airmuscle.identify.surface.monotone import (
+from airmuscle.bench.identify.correlation_index import correlation_index
+from airmuscle.bench.identify.surface.basis import Chebyshev, LoadRange, Monomials, conditioning
+from airmuscle.bench.identify.surface.exponential import SurfaceProblem, fit_linearised, fit_nonlinear
+from airmuscle.bench.identify.surface.monotone import (
     FALLS_WITH_PRESSURE,
     RISES_WITH_FORCE,
     find_monotonicity_violations,
     fit_monotone,
     slope_constraints,
 )
-from airmuscle.muscle.characteristic import BorzikovaExponential
-from airmuscle.muscle.characteristic.borzikova import SAM_30X290
+from airmuscle.core import autodiff
+from airmuscle.errors import IdentificationError
+from airmuscle.papers.borzikova_surfaces import sample
+from airmuscle.physics import BorzikovaExponential
+from airmuscle.physics.muscle.characteristic.borzikova import SAM_30X290
 from airmuscle.recording import Recording
-from airmuscle.reproduce.borzikova_surfaces import sample
 
 CURVES = sample(SAM_30X290)
 EXACT = SAM_30X290.interpolate()

@@ -12,20 +12,20 @@ import numpy as np
 import pytest
 from widths import widened
 
+from airmuscle.bench import Candidate, SpecimenSplit, compare, fit, standard_candidates
+from airmuscle.bench.identify.candidates import blank_surface
 from airmuscle.errors import IdentificationError, ParameterError
-from airmuscle.identify import Candidate, SpecimenSplit, compare, fit, standard_candidates
-from airmuscle.identify.candidates import blank_surface
-from airmuscle.library import Entry, to_toml
-from airmuscle.library.build import build
-from airmuscle.library.location import Location
-from airmuscle.muscle.characteristic import (
+from airmuscle.files import Entry, to_toml
+from airmuscle.files.library.build import build
+from airmuscle.files.library.location import Location
+from airmuscle.physics import (
+    Braid,
     ContractileSurface,
     EffectiveLength,
     InverseLength,
     LogarithmicLength,
     TonduLopez2000,
 )
-from airmuscle.muscle.geometry import Braid
 from airmuscle.recording import Recording
 
 LENGTHS = (0.08, 0.12, 0.2, 0.4)

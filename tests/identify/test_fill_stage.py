@@ -13,22 +13,31 @@ import pytest
 from widths import widened
 
 from airmuscle import load
-from airmuscle.control import Schedule
+from airmuscle.bench import Experiment, FillStage, InitialConditions, classify_records, fit_dynamic, stated_ambient
+from airmuscle.bench.identify.campaign.campaign_stages import stage_result
+from airmuscle.bench.identify.campaign.fill_stage import fit_fill_stage
+from airmuscle.bench.identify.campaign.release_stage import fit_release_stage
+from airmuscle.bench.identify.campaign.volume import volume_change
+from airmuscle.engine import Rodas4, Schedule, simulate
 from airmuscle.errors import ParameterError
-from airmuscle.identify.campaign import FillStage, classify_records
-from airmuscle.identify.campaign.fill_stage import fit_fill_stage
-from airmuscle.identify.campaign.release_stage import fit_release_stage
-from airmuscle.identify.campaign.volume import volume_change
-from airmuscle.identify.dynamic import Experiment, InitialConditions, fit_dynamic, stated_ambient
-from airmuscle.mechanism import HangingMass, Isometric, WithLatch
-from airmuscle.muscle import LinearDamper, Muscle
-from airmuscle.muscle.characteristic import VirtualWork
-from airmuscle.muscle.geometry import Braid
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import Ambient, ClosedChamber, EnergyBalance, FillDischarge, Polytropic, Supply, Valve
+from airmuscle.physics import (
+    Ambient,
+    Braid,
+    ClosedChamber,
+    EnergyBalance,
+    FillDischarge,
+    HangingMass,
+    Isometric,
+    LinearDamper,
+    Muscle,
+    Plant,
+    Polytropic,
+    Supply,
+    Valve,
+    VirtualWork,
+    WithLatch,
+)
 from airmuscle.recording import Recording
-from airmuscle.report.campaign_stages import stage_result
-from airmuscle.simulation import Rodas4, simulate
 
 BRAID = Braid(0.01, math.radians(25), 0.3)
 CONTRACTIONS = (0.0, 0.1, 0.2)

@@ -19,26 +19,39 @@ from scipy.optimize import curve_fit
 from widths import widened
 
 import airmuscle
+from airmuscle.bench import (
+    UNCENSORED,
+    Censoring,
+    Fit,
+    Huber,
+    LeastSquares,
+    Loss,
+    SoftL1,
+    confidence_band,
+    fit,
+    read_csv,
+)
 from airmuscle.core import model, ops, parameter
 from airmuscle.errors import IdentificationError, ParameterError
-from airmuscle.identify import UNCENSORED, Censoring, Fit, Huber, LeastSquares, Loss, SoftL1, confidence_band, fit
-from airmuscle.library import load, load_data
-from airmuscle.muscle.characteristic import (
+from airmuscle.files import load, load_data
+from airmuscle.physics import (
+    Braid,
     Clamped,
     ContractileSurface,
     ContractionLaw,
     MartensBoblan2017,
+    Parabola,
     PressureLaw,
     Saga2007,
     Sarosi2012,
+    StraightFibre,
     TonduLopez2000,
 )
-from airmuscle.muscle.characteristic.contractile_surface import exponents
-from airmuscle.muscle.characteristic.saga2007 import LINE_A
-from airmuscle.muscle.geometry import Braid, Parabola, StraightFibre
-from airmuscle.recording import Recording, read_csv
+from airmuscle.physics.muscle.characteristic.contractile_surface import exponents
+from airmuscle.physics.muscle.characteristic.saga2007 import LINE_A
+from airmuscle.recording import Recording
 
-DATA = Path(airmuscle.__file__).parent / "library" / "data"
+DATA = Path(airmuscle.__file__).parent / "files" / "library" / "data"
 WIDE = {"min_force": -1e6, "max_force": 1e6}
 MUSCLE = Sarosi2012(1.2e-4, 420.0, -57.0, -8.7e-3, 2.7e-3, -310.0)
 """Near to what the measured map of the DMSP-20-300 gives."""

@@ -12,21 +12,20 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from airmuscle.identify.campaign import classify_records
-from airmuscle.identify.campaign.friction_stage import fit_friction_stage
-from airmuscle.identify.hysteresis import (
+from airmuscle.bench import (
     ContractionPath,
     PolynomialCurve,
+    classify_records,
     find_loops,
     fit_hysteresis,
     fit_jointly,
     fit_loop,
     preferred_fit,
 )
-from airmuscle.identify.hysteresis.fit import make_loop_series
-from airmuscle.identify.hysteresis.limits import data_limits
-from airmuscle.muscle import CreepElements
-from airmuscle.muscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip
+from airmuscle.bench.identify.campaign.friction_stage import fit_friction_stage
+from airmuscle.bench.identify.hysteresis.fit import make_loop_series
+from airmuscle.bench.identify.hysteresis.limits import data_limits
+from airmuscle.physics import BoucWen, CreepElements, Dahl, LuGre, MaxwellSlip
 from airmuscle.recording import Recording
 
 LENGTH = 0.3

@@ -11,8 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from airmuscle.errors import IdentificationError, ParameterError
-from airmuscle.identify.hysteresis import (
+from airmuscle.bench import (
     ContractionPath,
     Creep,
     FixedCharacteristic,
@@ -21,15 +20,14 @@ from airmuscle.identify.hysteresis import (
     fit_creep,
     fit_hysteresis,
     initial_friction_laws,
+    motion_direction,
 )
-from airmuscle.identify.hysteresis.branches import branch_gap, repeat_difference
-from airmuscle.identify.hysteresis.plot import loop_path, plot_loops
-from airmuscle.identify.model_evidence import aicc, effective_sample_size, f_test_p_value
-from airmuscle.muscle.characteristic import VirtualWork
-from airmuscle.muscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip, PrandtlIshlinskii
-from airmuscle.muscle.geometry import Braid
+from airmuscle.bench.identify.hysteresis.branches import branch_gap, repeat_difference
+from airmuscle.bench.identify.hysteresis.plot import loop_path, plot_loops
+from airmuscle.bench.identify.model_evidence import aicc, effective_sample_size, f_test_p_value
+from airmuscle.errors import IdentificationError, ParameterError
+from airmuscle.physics import BoucWen, Braid, Dahl, LuGre, MaxwellSlip, PrandtlIshlinskii, VirtualWork
 from airmuscle.recording import Recording
-from airmuscle.recording.segment import motion_direction
 
 LENGTH = 0.2
 LIMITS = (3e-4, 1.2e-3, 5e-3)

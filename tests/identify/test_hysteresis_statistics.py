@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from airmuscle.errors import AirmuscleWarning, ColumnError, IdentificationError
-from airmuscle.identify.hysteresis import (
+from airmuscle.bench import (
     Creep,
     HysteresisFit,
     LoopFit,
@@ -23,13 +22,14 @@ from airmuscle.identify.hysteresis import (
     fit_jointly,
     identified_friction,
 )
-from airmuscle.identify.hysteresis.agreement import agreement_of_run, force_amplitude
-from airmuscle.identify.hysteresis.axis import Axis
-from airmuscle.identify.hysteresis.creep import _fit_elements
-from airmuscle.identify.hysteresis.holds import _drifts
-from airmuscle.identify.hysteresis.limits import DataLimits, data_limits, parameters_on_bounds
-from airmuscle.identify.volume_fit import VolumePoints, fit_volume, volume_points
-from airmuscle.muscle.friction import Dahl, IdentifiedFriction, MaxwellSlip
+from airmuscle.bench.identify.hysteresis.agreement import agreement_of_run, force_amplitude
+from airmuscle.bench.identify.hysteresis.axis import Axis
+from airmuscle.bench.identify.hysteresis.creep import _fit_elements
+from airmuscle.bench.identify.hysteresis.holds import _drifts
+from airmuscle.bench.identify.hysteresis.limits import DataLimits, data_limits, parameters_on_bounds
+from airmuscle.bench.identify.volume_fit import VolumePoints, fit_volume, volume_points
+from airmuscle.errors import AirmuscleWarning, ColumnError, IdentificationError
+from airmuscle.physics import Dahl, IdentifiedFriction, MaxwellSlip
 from airmuscle.recording import Recording
 
 LENGTH = 0.3

@@ -11,17 +11,10 @@ import itertools
 import numpy as np
 import pytest
 
-from airmuscle.identify.hysteresis import (
-    ContractionPath,
-    PolynomialCurve,
-    find_loops,
-    fit_jointly,
-    fit_loop,
-    identified_friction,
-)
-from airmuscle.identify.hysteresis.fit import make_loop_series
-from airmuscle.identify.hysteresis.search import search_parameters
-from airmuscle.muscle.friction import (
+from airmuscle.bench import ContractionPath, PolynomialCurve, find_loops, fit_jointly, fit_loop, identified_friction
+from airmuscle.bench.identify.hysteresis.fit import make_loop_series
+from airmuscle.bench.identify.hysteresis.search import search_parameters
+from airmuscle.physics import (
     BoucWen,
     Dahl,
     IdentifiedFriction,

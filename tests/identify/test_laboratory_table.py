@@ -35,10 +35,9 @@ from laboratories import (
     write,
 )
 
+from airmuscle.bench import Fit, fit, read
+from airmuscle.bench.identify.candidates import blank_surface
 from airmuscle.errors import AirmuscleError, AirmuscleWarning
-from airmuscle.identify import Fit, fit
-from airmuscle.identify.candidates import blank_surface
-from airmuscle.recording import read
 
 MAX_ERROR = 0.02
 INVISIBLE = "no data can show it"

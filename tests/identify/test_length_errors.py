@@ -12,20 +12,12 @@ import numpy as np
 import pytest
 
 import airmuscle as am
+from airmuscle.bench import Candidate, RunSplit, compare, estimate_length_error, find_length_errors, select_for_both
+from airmuscle.bench.identify import joint_selection
+from airmuscle.bench.identify.candidates import blank_surface
+from airmuscle.bench.identify.length_errors import corrected_length
 from airmuscle.errors import IdentificationError, ParameterError
-from airmuscle.identify import (
-    Candidate,
-    RunSplit,
-    compare,
-    estimate_length_error,
-    find_length_errors,
-    joint_selection,
-    select_for_both,
-)
-from airmuscle.identify.candidates import blank_surface
-from airmuscle.identify.length_errors import corrected_length
-from airmuscle.muscle.characteristic import EffectiveLength, LogarithmicLength, TonduLopez2000
-from airmuscle.muscle.geometry import Braid
+from airmuscle.physics import Braid, EffectiveLength, LogarithmicLength, TonduLopez2000
 from airmuscle.recording import Recording
 
 LAW = EffectiveLength(blank_surface(3), 0.3, 0.005)

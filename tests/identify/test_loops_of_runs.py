@@ -7,9 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
+from airmuscle.bench import find_loops, fit_loop
 from airmuscle.errors import AirmuscleWarning, IdentificationError
-from airmuscle.identify.hysteresis import find_loops, fit_loop
-from airmuscle.muscle.friction import MaxwellSlip
+from airmuscle.physics import MaxwellSlip
 from airmuscle.recording import Recording
 
 SLIP = MaxwellSlip((2e4, 1e4), (3e-4, 2e-3))

@@ -12,19 +12,14 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle.cli.app import app
-from airmuscle.control import Schedule
+from airmuscle.bench import Experiment, InitialConditions, StartTime, fit_dynamic, rank_records
+from airmuscle.bench.identify.dynamic.candidate_records import candidate_records
+from airmuscle.engine import Schedule, simulate
 from airmuscle.errors import IdentificationError, ParameterError
-from airmuscle.identify.dynamic import Experiment, InitialConditions, StartTime, fit_dynamic, rank_records
-from airmuscle.identify.dynamic.candidate_records import candidate_records
-from airmuscle.library import load
-from airmuscle.mechanism import Isometric
-from airmuscle.muscle import Muscle
-from airmuscle.muscle.geometry import Vessel
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import EnergyBalance, FillDischarge, Polytropic, Supply, Valve
+from airmuscle.files import load
+from airmuscle.outlets.cli.app import app
+from airmuscle.physics import EnergyBalance, FillDischarge, Isometric, Muscle, Plant, Polytropic, Supply, Valve, Vessel
 from airmuscle.recording import Recording
-from airmuscle.simulation import simulate
 
 NOISE = 500.0
 FILL = Schedule({"fill": ((0.0, 1.0),)})

@@ -11,19 +11,18 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle.cli.app import app
-from airmuscle.errors import IdentificationError, ParameterError
-from airmuscle.identify import BenchLimits, fit
-from airmuscle.identify.experiment_design import (
+from airmuscle.bench import BenchLimits, fit, read_csv
+from airmuscle.bench.identify.experiment_design import (
     _exchange,
     _log_determinant,
     _select_greedily,
     candidate_runs,
     optimal_design,
 )
-from airmuscle.muscle.characteristic import TonduLopez2000, ValidityRange
-from airmuscle.muscle.geometry import Braid
-from airmuscle.recording import Recording, read_csv
+from airmuscle.errors import IdentificationError, ParameterError
+from airmuscle.outlets.cli.app import app
+from airmuscle.physics import Braid, TonduLopez2000, ValidityRange
+from airmuscle.recording import Recording
 
 BENCH = BenchLimits(ValidityRange(50e3, 500e3, 0.0, 0.25), 400.0)
 

@@ -14,10 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 import airmuscle as am
-from airmuscle.cli.app import app
-from airmuscle.cli.fit_options import parse_split
-from airmuscle.errors import IdentificationError, ParameterError
-from airmuscle.identify import (
+from airmuscle.bench import (
     Candidate,
     RunSplit,
     SpecimenSplit,
@@ -26,11 +23,14 @@ from airmuscle.identify import (
     select_for_both,
     standard_candidates,
 )
-from airmuscle.identify.specimen_effects import Sums, predict_effects
-from airmuscle.library import Entry, load, save
-from airmuscle.muscle.characteristic import ContractileSurface, LogarithmicLength, PooledLengthLaw
+from airmuscle.bench.identify.equation_section import equation_section
+from airmuscle.bench.identify.specimen_effects import Sums, predict_effects
+from airmuscle.errors import IdentificationError, ParameterError
+from airmuscle.files import Entry, load, save
+from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli.fit_options import parse_split
+from airmuscle.physics import ContractileSurface, LogarithmicLength, PooledLengthLaw
 from airmuscle.recording import Recording
-from airmuscle.report.equation_section import equation_section
 
 LENGTHS = (0.1, 0.15, 0.2, 0.3, 0.4, 0.25)
 HELD = (0.0, 0.05, 0.1, 0.15)

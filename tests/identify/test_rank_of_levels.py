@@ -10,11 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import airmuscle as am
+from airmuscle.bench import fit
+from airmuscle.bench.identify import fit_points
+from airmuscle.bench.identify.statistics import count_levels
 from airmuscle.errors import IdentificationError
-from airmuscle.identify import fit, fit_points
-from airmuscle.identify.statistics import count_levels
-from airmuscle.library import load
-from airmuscle.muscle.characteristic import ContractileSurface
+from airmuscle.files import load
+from airmuscle.physics import ContractileSurface
 from airmuscle.recording import Recording
 
 ROWS = 600

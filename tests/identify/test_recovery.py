@@ -12,12 +12,12 @@ import warnings
 import numpy as np
 import pytest
 
+from airmuscle.bench import UNCENSORED, confidence_band, fit, weakly_determined
+from airmuscle.bench.identify.problem import fitted_quantity_of
 from airmuscle.core import tree
 from airmuscle.errors import AirmuscleWarning, IdentificationError
-from airmuscle.identify import UNCENSORED, confidence_band, fit, weakly_determined
-from airmuscle.identify.problem import fitted_quantity_of
-from airmuscle.library import catalogue, files
-from airmuscle.muscle.characteristic import Clamped, ContractionLaw, ForceLaw, Tabulated, ValidityRange
+from airmuscle.files.library import catalogue, files
+from airmuscle.physics import Clamped, ContractionLaw, ForceLaw, Tabulated, ValidityRange
 from airmuscle.recording import Recording
 
 HELD = {

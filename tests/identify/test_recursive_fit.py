@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from airmuscle.bench import UNCENSORED, BenchLimits, RecursiveFit, fit
+from airmuscle.bench.identify.recursive_fit import NextPoint
 from airmuscle.errors import IdentificationError, ParameterError
-from airmuscle.identify import UNCENSORED, BenchLimits, RecursiveFit, fit
-from airmuscle.identify.recursive_fit import NextPoint
-from airmuscle.muscle.characteristic import ContractileSurface, ValidityRange
+from airmuscle.physics import ContractileSurface, ValidityRange
 from airmuscle.recording import Recording
 
 LIMITS = BenchLimits(ValidityRange(0.0, 6e5, 0.0, 0.25), 1500.0)

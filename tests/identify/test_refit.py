@@ -13,18 +13,18 @@ import pytest
 from widths import widened
 
 import airmuscle as am
+from airmuscle.bench import Candidate, RunSplit, bootstrap, compare
+from airmuscle.bench.identify import bootstrapping
+from airmuscle.bench.identify.candidates import blank_surface
+from airmuscle.bench.identify.fit_points import FitPoints
+from airmuscle.bench.identify.gauss_newton import gauss_newton
+from airmuscle.bench.identify.group_refits import GroupRefits, KnownMinima
+from airmuscle.bench.identify.problem import fitted_quantity_of
+from airmuscle.bench.identify.solver import LeastSquaresSolution, solve, solve_iteratively
+from airmuscle.bench.identify.static_fit import refit
+from airmuscle.bench.identify.variable_projection import find_initial_values
 from airmuscle.core import autodiff, tree
-from airmuscle.identify import Candidate, RunSplit, bootstrap, bootstrapping, compare
-from airmuscle.identify.candidates import blank_surface
-from airmuscle.identify.fit_points import FitPoints
-from airmuscle.identify.gauss_newton import gauss_newton
-from airmuscle.identify.group_refits import GroupRefits, KnownMinima
-from airmuscle.identify.problem import fitted_quantity_of
-from airmuscle.identify.solver import LeastSquaresSolution, solve, solve_iteratively
-from airmuscle.identify.static_fit import refit
-from airmuscle.identify.variable_projection import find_initial_values
-from airmuscle.muscle.characteristic import ContractileSurface, EffectiveLength, Hunt2017, InverseLength, TonduLopez2000
-from airmuscle.muscle.geometry import Braid
+from airmuscle.physics import Braid, ContractileSurface, EffectiveLength, Hunt2017, InverseLength, TonduLopez2000
 from airmuscle.recording import Recording
 
 LAWS = {

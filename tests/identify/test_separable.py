@@ -14,15 +14,16 @@ import pytest
 
 import airmuscle
 from airmuscle import read_csv
+from airmuscle.bench import UNCENSORED, Candidate, Censoring, LevelSplit, compare, fit, standard_candidates
+from airmuscle.bench.identify.candidates import blank_surface
+from airmuscle.bench.identify.censored_least_squares import solve_censored_least_squares
+from airmuscle.bench.identify.cross_validation import label_folds
+from airmuscle.bench.identify.problem import make_problem
+from airmuscle.bench.identify.variable_projection import find_initial_values, is_linear_parameter
 from airmuscle.core import leaves
 from airmuscle.errors import IdentificationError
-from airmuscle.identify import UNCENSORED, Candidate, Censoring, LevelSplit, compare, fit, standard_candidates
-from airmuscle.identify.candidates import blank_surface
-from airmuscle.identify.censored_least_squares import solve_censored_least_squares
-from airmuscle.identify.cross_validation import label_folds
-from airmuscle.identify.problem import make_problem
-from airmuscle.identify.variable_projection import find_initial_values, is_linear_parameter
-from airmuscle.muscle.characteristic import (
+from airmuscle.physics import (
+    Braid,
     ContractileSurface,
     EffectiveLength,
     Hunt2017,
@@ -30,10 +31,9 @@ from airmuscle.muscle.characteristic import (
     Sarosi2012,
     TonduLopez2000,
 )
-from airmuscle.muscle.geometry import Braid
 from airmuscle.recording import Recording
 
-DATA = Path(airmuscle.__file__).parent / "library" / "data"
+DATA = Path(airmuscle.__file__).parent / "files" / "library" / "data"
 SAROSI = Sarosi2012(1.2e-4, 420.0, -40.0, -8.7e-3, 2.7e-3, -310.0)
 HUNT = Hunt2017(0.17)
 MAPS = ("dmsp-10-250", "dmsp-20-300", "festo-tool-dmsp-10", "festo-tool-dmsp-20", "festo-tool-dmsp-40")

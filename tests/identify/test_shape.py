@@ -9,12 +9,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from airmuscle.bench import convert, find_shape_violations, fit, fit_shape_constrained
+from airmuscle.bench.identify.candidates import blank_surface
+from airmuscle.bench.identify.surface.shape import FALLS_WITH_PRESSURE, RISES_WITH_CONTRACTION, shape_constraints
 from airmuscle.errors import IdentificationError, SolveError
-from airmuscle.identify import convert, find_shape_violations, fit, fit_shape_constrained
-from airmuscle.identify.candidates import blank_surface
-from airmuscle.identify.surface.shape import FALLS_WITH_PRESSURE, RISES_WITH_CONTRACTION, shape_constraints
-from airmuscle.muscle.characteristic import ContractileSurface, Sarosi2012, TonduLopez2000, ValidityRange
-from airmuscle.muscle.geometry import Braid
+from airmuscle.physics import Braid, ContractileSurface, Sarosi2012, TonduLopez2000, ValidityRange
 from airmuscle.recording import Recording
 
 MUSCLE = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.2)

@@ -14,9 +14,7 @@ import numpy as np
 import pytest
 
 import airmuscle as am
-from airmuscle.core import tree
-from airmuscle.errors import IdentificationError
-from airmuscle.identify import (
+from airmuscle.bench import (
     Candidate,
     LeastSquares,
     LevelSplit,
@@ -26,14 +24,15 @@ from airmuscle.identify import (
     fit,
     standard_candidates,
 )
-from airmuscle.identify.fit_points import FitPoints
-from airmuscle.identify.model_evidence import batch_sample_size
-from airmuscle.identify.recommendation import eligible_models, excess_error, recommend
-from airmuscle.identify.slack_rows import Slackness, SlackPull, slack_pull
-from airmuscle.identify.solver import solve
-from airmuscle.identify.specimen_errors import SpecimenErrors, odd_specimen_notes
-from airmuscle.muscle.characteristic import ContractileSurface, LogarithmicLength, PooledLengthLaw
-from airmuscle.muscle.geometry import Braid
+from airmuscle.bench.identify.fit_points import FitPoints
+from airmuscle.bench.identify.model_evidence import batch_sample_size
+from airmuscle.bench.identify.recommendation import eligible_models, excess_error, recommend
+from airmuscle.bench.identify.slack_rows import Slackness, SlackPull, slack_pull
+from airmuscle.bench.identify.solver import solve
+from airmuscle.bench.identify.specimen_errors import SpecimenErrors, odd_specimen_notes
+from airmuscle.core import tree
+from airmuscle.errors import IdentificationError
+from airmuscle.physics import Braid, ContractileSurface, LogarithmicLength, PooledLengthLaw
 from airmuscle.recording import Recording
 
 NAME = "pooled, ln L0, degree 3, change of degree 1, effects of degree 3"
@@ -65,7 +64,7 @@ def measured() -> list[Recording]:
 
 
 @pytest.fixture(scope="module")
-def pooled(measured: list[Recording]) -> am.identify.Fit:
+def pooled(measured: list[Recording]) -> am.bench.Fit:
     candidate = next(each for each in standard_candidates(measured) if each.name == NAME)
     return fit(candidate.law, measured)
 

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 import airmuscle as am
-from airmuscle.identify import fit, standard_candidates
-from airmuscle.identify.left_out import degrees_of_freedom, leverages, t_quantile
-from airmuscle.identify.specimen_errors import SpecimenErrors, specimen_errors, specimens_of
-from airmuscle.library import Entry, save
-from airmuscle.library.entry_prediction import predict_with_entry
-from airmuscle.library.fitted_entry import fitted_entry
-from airmuscle.muscle.characteristic import ContractileSurface
+from airmuscle.bench import fit, standard_candidates
+from airmuscle.bench.identify.left_out import degrees_of_freedom, leverages, t_quantile
+from airmuscle.bench.identify.specimen_errors import SpecimenErrors, specimen_errors, specimens_of
+from airmuscle.files import Entry, save
+from airmuscle.files.library.entry_prediction import predict_with_entry
+from airmuscle.files.library.fitted_entry import fitted_entry
+from airmuscle.physics import ContractileSurface
 from airmuscle.recording import Recording
 
 LENGTHS = {3: (0.1, 0.2, 0.4), 4: (0.1, 0.16, 0.25, 0.4), 6: (0.1, 0.13, 0.18, 0.24, 0.31, 0.4)}

@@ -15,22 +15,14 @@ import pytest
 from scipy.stats import t as student
 from typer.testing import CliRunner
 
-from airmuscle.cli.app import app
-from airmuscle.identify import (
-    Fit,
-    RunSplit,
-    bootstrap,
-    confidence_band,
-    fit,
-    profile,
-)
-from airmuscle.identify.bootstrapping import RELIABLE_GROUPS
-from airmuscle.identify.candidates import blank_surface
-from airmuscle.identify.parameter_covariance import NORMAL_QUANTILE, _degrees_of_freedom
-from airmuscle.muscle.characteristic import TonduLopez2000
-from airmuscle.muscle.geometry import Braid
-from airmuscle.recording import Recording, write_csv
-from airmuscle.report.uncertainty_chapter import Uncertainty, uncertainty_chapter
+from airmuscle.bench import Fit, RunSplit, bootstrap, confidence_band, fit, profile, write_csv
+from airmuscle.bench.identify.bootstrapping import RELIABLE_GROUPS
+from airmuscle.bench.identify.candidates import blank_surface
+from airmuscle.bench.identify.parameter_covariance import NORMAL_QUANTILE, _degrees_of_freedom
+from airmuscle.bench.identify.uncertainty_chapter import Uncertainty, uncertainty_chapter
+from airmuscle.outlets.cli.app import app
+from airmuscle.physics import Braid, TonduLopez2000
+from airmuscle.recording import Recording
 
 TRUTH = TonduLopez2000(Braid(0.01, np.deg2rad(23.0), 0.3), 1.18)
 VALUES = np.array([0.01, np.deg2rad(23.0), 1.18])

@@ -13,21 +13,11 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
+from airmuscle.bench import Huber, LevelSplit, RunSplit, bootstrap, confidence_band, fit, profile, weakly_determined
+from airmuscle.bench.identify.bootstrapping import _assign_groups, _refit_iteratively
+from airmuscle.bench.identify.candidates import blank_surface
 from airmuscle.errors import IdentificationError
-from airmuscle.identify import (
-    Huber,
-    LevelSplit,
-    RunSplit,
-    bootstrap,
-    confidence_band,
-    fit,
-    profile,
-    weakly_determined,
-)
-from airmuscle.identify.bootstrapping import _assign_groups, _refit_iteratively
-from airmuscle.identify.candidates import blank_surface
-from airmuscle.muscle.characteristic import ContractileSurface, Sarosi2012, TonduLopez2000
-from airmuscle.muscle.geometry import Braid
+from airmuscle.physics import Braid, ContractileSurface, Sarosi2012, TonduLopez2000
 from airmuscle.recording import Recording
 
 TRUTH = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.2)

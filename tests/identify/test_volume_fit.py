@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle.cli.app import app
+from airmuscle.bench.identify.volume_fit import VolumePoints, fit_volume, volume_points
 from airmuscle.errors import ColumnError, IdentificationError
-from airmuscle.identify.volume_fit import VolumePoints, fit_volume, volume_points
-from airmuscle.library import load
-from airmuscle.muscle.characteristic import ValidityRange, VirtualWork
-from airmuscle.muscle.characteristic.energy_defect import maxwell_defect
-from airmuscle.muscle.geometry import Braid, ChebyshevGeometry
+from airmuscle.files import load
+from airmuscle.outlets.cli.app import app
+from airmuscle.physics import Braid, ChebyshevGeometry, ValidityRange, VirtualWork
+from airmuscle.physics.muscle.characteristic.energy_defect import maxwell_defect
 from airmuscle.recording import Recording
 
 BRAID = Braid(0.01, 0.43, 0.2)

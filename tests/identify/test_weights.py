@@ -11,13 +11,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle.cli.app import app
-from airmuscle.identify import fit
-from airmuscle.identify.weights import sensor_deviations
-from airmuscle.muscle.characteristic import ContractileSurface, TonduLopez2000
-from airmuscle.muscle.geometry import Braid
-from airmuscle.recording import Recording, write_csv
-from airmuscle.recording.segment import estimate_sensors
+from airmuscle.bench import estimate_sensors, fit, write_csv
+from airmuscle.bench.identify.weights import sensor_deviations
+from airmuscle.outlets.cli.app import app
+from airmuscle.physics import Braid, ContractileSurface, TonduLopez2000
+from airmuscle.recording import Recording
 
 MUSCLE = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.2)
 SURFACE = ContractileSurface.blank(3, max_force=1e5)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from control_plants import INVERSE, MECHANISM
 
-from airmuscle.control import AngleAndStiffness, Measurement
+from airmuscle.control import AngleAndStiffness
+from airmuscle.engine import Measurement
 
 NAMES = ("left.pressure", "right.pressure")
 LAW = AngleAndStiffness(INVERSE, NAMES)

@@ -12,19 +12,16 @@ import pytest
 from airmuscle.control import (
     PID,
     CoContraction,
-    ColumnSensor,
     FrictionFeedForward,
-    Measurement,
     MotionFeedForward,
     ProportionalFeedback,
     SetpointLead,
-    SplitRange,
-    WithSensors,
     WithSetpointDelay,
     WithStuckValve,
 )
+from airmuscle.engine import ColumnSensor, Measurement, SplitRange, WithSensors
 from airmuscle.errors import ParameterError
-from airmuscle.mechanism import AntagonisticJoint, HangingMass, JointWithExternalTorque
+from airmuscle.physics import AntagonisticJoint, HangingMass, JointWithExternalTorque
 
 PRESSURES = ("left.pressure", "right.pressure")
 RANGES = dict.fromkeys(("left.fill", "left.discharge", "right.fill", "right.discharge"), (0.0, 1.0))

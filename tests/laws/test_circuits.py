@@ -13,11 +13,9 @@ import numpy as np
 import pytest
 from joints import chosen_muscle
 
-from airmuscle.control import ZERO_INPUT, Schedule
+from airmuscle.engine import ZERO_INPUT, Rodas4, Schedule, simulate
 from airmuscle.errors import ParameterError
-from airmuscle.mechanism import HangingMass, Isometric
-from airmuscle.plant import Plant, WithEnergyMeters
-from airmuscle.pneumatics import (
+from airmuscle.physics import (
     GAS_CONSTANT,
     Air,
     Ambient,
@@ -27,8 +25,11 @@ from airmuscle.pneumatics import (
     EnergyBalance,
     FillDischarge,
     Flow,
+    HangingMass,
+    Isometric,
     Isothermal,
     Manifold,
+    Plant,
     ProportionalRegulator,
     ProportionalValve,
     RegulatedSupply,
@@ -40,12 +41,12 @@ from airmuscle.pneumatics import (
     ThreePositionValve,
     Tube,
     Valve,
+    WithEnergyMeters,
     WithLeak,
     WithTubes,
     orifice_flow,
 )
-from airmuscle.pneumatics.gas import NO_FLOW
-from airmuscle.simulation import Rodas4, simulate
+from airmuscle.physics.pneumatics.gas import NO_FLOW
 
 AMBIENT = Ambient()
 VALVE, WIDE, NARROW = Valve(1e-8, 0.4), Valve(5e-8, 0.4), Valve(2e-9, 0.3)

@@ -11,10 +11,10 @@ import pytest
 from control_plants import CIRCUIT, MECHANISM, MUSCLES
 
 import airmuscle as am
-from airmuscle.analysis import stiffness
-from airmuscle.control import AntagonisticInverse, ComputedTorque, ControlLoop, Measurement
+from airmuscle.control import AntagonisticInverse, ComputedTorque
+from airmuscle.engine import ControlLoop, Measurement
 from airmuscle.errors import ParameterError
-from airmuscle.muscle import LinearDamper
+from airmuscle.physics import LinearDamper, stiffness
 
 DAMPED = tuple(replace(muscle, damper=LinearDamper(150.0)) for muscle in MUSCLES)
 PLANT = am.Plant(DAMPED, (CIRCUIT, CIRCUIT), MECHANISM)

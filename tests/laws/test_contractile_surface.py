@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airmuscle.errors import ParameterError
-from airmuscle.muscle.characteristic import ContractileSurface
-from airmuscle.muscle.characteristic.contractile_surface import exponents
+from airmuscle.physics import ContractileSurface
+from airmuscle.physics.muscle.characteristic.contractile_surface import exponents
 
 BOX = (50e3, 650e3), (0.0, 0.25)
 

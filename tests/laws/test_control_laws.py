@@ -14,21 +14,17 @@ from hypothesis import strategies as st
 from airmuscle.control import (
     PID,
     Cascade,
-    ColumnSensor,
     DeadZoneController,
     Decentralised,
     GainSchedule,
     IterativeLearning,
-    Measurement,
     SetpointCommand,
-    SigmaDelta,
     SlidingMode,
-    SplitRange,
     SuperTwisting,
     WithFeedForward,
-    WithSensors,
 )
-from airmuscle.control.random_numbers import drawn, drawn_normal, seeded
+from airmuscle.engine import ColumnSensor, Measurement, SigmaDelta, SplitRange, WithSensors
+from airmuscle.engine.loop.random_numbers import drawn, drawn_normal, seeded
 from airmuscle.errors import ParameterError
 
 H = 0.01

@@ -15,9 +15,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airmuscle.control import PID, Measurement, OnOffController, SplitRange
-from airmuscle.control.controller import relative_unit
+from airmuscle.control import PID, OnOffController
 from airmuscle.core import cite, leaves
+from airmuscle.engine import Measurement, SplitRange
+from airmuscle.engine.loop.controller import relative_unit
 from airmuscle.errors import ParameterError
 
 WIDE = {"fill": (-math.inf, math.inf)}

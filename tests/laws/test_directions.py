@@ -15,9 +15,10 @@ import pytest
 
 from airmuscle.core import autodiff
 from airmuscle.errors import AirmuscleWarning, ParameterError, SolveError
-from airmuscle.library import Entry, catalogue, files
-from airmuscle.muscle.characteristic import Characteristic, ContractionLaw, ForceLaw, PressureLaw, ValidityRange
-from airmuscle.muscle.characteristic.solve import find_first_root
+from airmuscle.files import Entry
+from airmuscle.files.library import catalogue, files
+from airmuscle.physics import Characteristic, ContractionLaw, ForceLaw, PressureLaw, ValidityRange
+from airmuscle.physics.muscle.characteristic.solve import find_first_root
 
 ARGUMENTS = {
     "force": ("pressure", "contraction"),

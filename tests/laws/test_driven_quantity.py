@@ -8,16 +8,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from airmuscle.bench import ISOBARIC, find_branches, find_outliers, find_plateaus, find_runs, inspect, plateau_points
 from airmuscle.recording import Recording
-from airmuscle.recording.segment import (
-    ISOBARIC,
-    find_branches,
-    find_outliers,
-    find_plateaus,
-    find_runs,
-    inspect,
-    plateau_points,
-)
 
 ROWS = 400
 SWEEP = np.concatenate([np.linspace(0.02, 0.2, ROWS), np.linspace(0.2, 0.02, ROWS)])

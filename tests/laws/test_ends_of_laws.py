@@ -16,39 +16,38 @@ import pytest
 
 from airmuscle.core import autodiff
 from airmuscle.errors import AirmuscleWarning, GeometryLimitError, ParameterError, PhysicsError
-from airmuscle.library import catalogue, list_laws
-from airmuscle.muscle import Muscle
-from airmuscle.muscle.characteristic import (
+from airmuscle.files import list_laws
+from airmuscle.files.library import catalogue
+from airmuscle.physics import (
+    Braid,
+    Catenary,
     Characteristic,
+    ChebyshevGeometry,
     ChouHannaford1996,
     CircleVirtualWork,
+    CircularArc,
     Clamped,
     ContractileSurface,
     EffectiveLength,
     ExactMeridian,
     Hunt2017,
     InverseLength,
+    Muscle,
+    Parabola,
+    PleatedTube,
     PooledLengthLaw,
     RubberLine,
+    StraightFibre,
     TonduLopez2000,
+    TrueArcParabola,
     ValidityRange,
+    Vessel,
     VirtualWork,
     as_force_law,
 )
-from airmuscle.muscle.characteristic.borzikova import SAM_30X290
-from airmuscle.muscle.characteristic.energy_defect import maxwell_defect, virtual_work_defect
-from airmuscle.muscle.geometry import (
-    Braid,
-    Catenary,
-    ChebyshevGeometry,
-    CircularArc,
-    Parabola,
-    PleatedTube,
-    StraightFibre,
-    TrueArcParabola,
-    Vessel,
-)
-from airmuscle.muscle.geometry.chebyshev import as_polynomial
+from airmuscle.physics.muscle.characteristic.borzikova import SAM_30X290
+from airmuscle.physics.muscle.characteristic.energy_defect import maxwell_defect, virtual_work_defect
+from airmuscle.physics.muscle.geometry.chebyshev import as_polynomial
 
 BRAID = Braid(0.01, 0.4363, 0.2)
 RUBBER = RubberLine(3e5, 1e5)

@@ -19,8 +19,8 @@ from scipy.integrate import solve_ivp
 
 from airmuscle.core import leaves
 from airmuscle.errors import ParameterError
-from airmuscle.muscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip, NoFriction, PrandtlIshlinskii
-from airmuscle.muscle.friction.path import stop_operators
+from airmuscle.physics import BoucWen, Dahl, LuGre, MaxwellSlip, NoFriction, PrandtlIshlinskii
+from airmuscle.physics.muscle.friction.path import stop_operators
 
 STIFFNESSES, LIMITS = (4e4, 2e4, 1e4), (1e-4, 4e-4, 1e-3)
 SLIP = MaxwellSlip(STIFFNESSES, LIMITS)

@@ -12,26 +12,25 @@ from hypothesis import strategies as st
 from joints import chosen_muscle
 from scipy.integrate import quad, solve_ivp
 
-from airmuscle.control import Schedule
 from airmuscle.core import autodiff
-from airmuscle.mechanism import Isometric
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import (
+from airmuscle.engine import Rodas4, Schedule, simulate
+from airmuscle.physics import (
     GAS_CONSTANT,
     Air,
     Ambient,
     EnergyBalance,
     FillDischarge,
     Flow,
+    Isometric,
     Isothermal,
+    Plant,
     Polytropic,
     Supply,
     Valve,
     VirialGas,
     virial_coefficient_of_air,
 )
-from airmuscle.pneumatics.gas import SPECIFIC_HEAT_CONSTANT_PRESSURE, SPECIFIC_HEAT_CONSTANT_VOLUME
-from airmuscle.simulation import Rodas4, simulate
+from airmuscle.physics.pneumatics.gas import SPECIFIC_HEAT_CONSTANT_PRESSURE, SPECIFIC_HEAT_CONSTANT_VOLUME
 
 AMBIENT = Ambient()
 WARM, SUPPLY = AMBIENT.temperature, 650e3

@@ -12,10 +12,10 @@ from called_controller import Called
 from plants import chosen_muscle
 
 import airmuscle as am
-from airmuscle.control import ControlLoop, HysteresisCompensation, HysteresisOperator, SetpointCommand
+from airmuscle.control import HysteresisCompensation, HysteresisOperator, SetpointCommand
+from airmuscle.engine import ControlLoop
 from airmuscle.errors import ParameterError
-from airmuscle.muscle.friction import MaxwellSlip
-from airmuscle.pneumatics import Valve
+from airmuscle.physics import MaxwellSlip, Valve
 
 OPERATORS = {
     "plays": HysteresisOperator((0.0, 0.1, 0.3, 0.7), (0.8, 0.3, 0.2, 0.4)),

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airmuscle.errors import ParameterError
-from airmuscle.mechanism import (
+from airmuscle.physics import (
     AntagonisticJoint,
     ArmLink,
     ConstantRadius,

@@ -16,15 +16,17 @@ from joints import chosen_muscle
 
 from airmuscle.core import autodiff
 from airmuscle.errors import ParameterError
-from airmuscle.mechanism import (
+from airmuscle.physics import (
     AntagonisticJoint,
     ArmLink,
+    ClosedChamber,
     ConstantRadius,
     CrankProfile,
     ExternalLoad,
     HangingMass,
     HuntCrossley,
     Isometric,
+    Isothermal,
     Isotonic,
     JointWithEndStops,
     JointWithExternalTorque,
@@ -34,6 +36,7 @@ from airmuscle.mechanism import (
     MuscleRoute,
     MusclesInSeries,
     PlanarArm,
+    Plant,
     PolynomialProfile,
     PrescribedMotion,
     Pulley,
@@ -42,8 +45,6 @@ from airmuscle.mechanism import (
     WithLatch,
     WithOffsets,
 )
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import ClosedChamber, Isothermal
 
 CONTACT = HuntCrossley(1e7, 0.4)
 JOINT = AntagonisticJoint(0.03, 0.05, 0.2, 2.0, 0.12)

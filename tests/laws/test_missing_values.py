@@ -10,8 +10,8 @@ import pytest
 
 from airmuscle.core import ops
 from airmuscle.errors import AirmuscleWarning, PhysicsError
-from airmuscle.library import list_laws, load
-from airmuscle.muscle.characteristic import Characteristic
+from airmuscle.files import list_laws, load
+from airmuscle.physics import Characteristic
 
 NAN = float("nan")
 

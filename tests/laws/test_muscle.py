@@ -10,16 +10,25 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airmuscle.errors import AirmuscleWarning
-from airmuscle.muscle import CubicSpring, LinearDamper, LinearSpring, Muscle, PressureDamper
-from airmuscle.muscle.characteristic import (
+from airmuscle.physics import (
+    GAS_CONSTANT,
+    Ambient,
+    Braid,
     ChouHannaford1996,
     Clamped,
     ContractileSurface,
+    CubicSpring,
     EffectiveLength,
+    Isothermal,
+    LinearDamper,
+    LinearSpring,
+    Muscle,
+    Polytropic,
+    PressureDamper,
     Reynolds2003,
+    absolute_pressure,
+    gauge_pressure,
 )
-from airmuscle.muscle.geometry import Braid
-from airmuscle.pneumatics import GAS_CONSTANT, Ambient, Isothermal, Polytropic, absolute_pressure, gauge_pressure
 
 BRAID = Braid(0.01, 0.44, 0.3)
 AMBIENT = Ambient()

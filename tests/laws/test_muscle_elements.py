@@ -15,29 +15,38 @@ from joints import chosen_muscle
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from airmuscle.control import ZERO_INPUT, Schedule
+from airmuscle.engine import ZERO_INPUT, Rodas4, Schedule, simulate
 from airmuscle.errors import ParameterError
-from airmuscle.mechanism import HangingMass, HuntCrossley, Isometric
-from airmuscle.muscle import (
+from airmuscle.physics import (
+    ClosedChamber,
     CreepElements,
     CubicSeriesSpring,
+    Dahl,
     DirectionalDamper,
     EndStop,
+    FillDischarge,
+    HangingMass,
+    HuntCrossley,
+    Isometric,
+    Isothermal,
     LinearDamper,
+    LuGre,
+    Plant,
+    Polytropic,
     PressureDamper,
+    Reynolds2003,
     Reynolds2003Damper,
     Reynolds2003Spring,
     SeriesSpring,
+    Serres2009,
     Serres2009Damper,
     Serres2009Spring,
+    Supply,
     SwellingWall,
+    Valve,
     ViscoelasticWall,
+    WithEnergyMeters,
 )
-from airmuscle.muscle.characteristic import Reynolds2003, Serres2009
-from airmuscle.muscle.friction import Dahl, LuGre
-from airmuscle.plant import Plant, WithEnergyMeters
-from airmuscle.pneumatics import ClosedChamber, FillDischarge, Isothermal, Polytropic, Supply, Valve
-from airmuscle.simulation import Rodas4, simulate
 
 pressures, speeds = st.floats(-1e5, 8e5), st.floats(-2, 2)
 DAMPERS = [

@@ -12,10 +12,9 @@ import math
 import numpy as np
 import pytest
 
-from airmuscle.muscle import Ratings, SwellingWall
-from airmuscle.muscle.geometry import Braid, TabulatedGeometry, Vessel
-from airmuscle.muscle.geometry.chebyshev import as_polynomial
-from airmuscle.muscle.series_equilibrium import find_largest_nonnegative
+from airmuscle.physics import Braid, Ratings, SwellingWall, TabulatedGeometry, Vessel
+from airmuscle.physics.muscle.geometry.chebyshev import as_polynomial
+from airmuscle.physics.muscle.series_equilibrium import find_largest_nonnegative
 
 BRAID = Braid(0.01, 0.4363, 0.2)
 POLYNOMIAL = as_polynomial(BRAID, 4, (-0.05, 0.3))

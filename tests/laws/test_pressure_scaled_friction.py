@@ -8,13 +8,13 @@ import pytest
 from joints import chosen_muscle
 
 from airmuscle.errors import ParameterError
-from airmuscle.muscle import Muscle
-from airmuscle.muscle.friction import (
+from airmuscle.physics import (
     BoucWen,
     Dahl,
     IdentifiedFriction,
     LuGre,
     MaxwellSlip,
+    Muscle,
     NoFriction,
     PrandtlIshlinskii,
     PressureScaledFriction,

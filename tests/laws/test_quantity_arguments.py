@@ -11,7 +11,7 @@ import pytest
 import airmuscle as am
 from airmuscle.core import model
 from airmuscle.errors import AirmuscleWarning, ParameterError, UnitError
-from airmuscle.muscle.characteristic import ForceLaw, PressureLaw
+from airmuscle.physics import ForceLaw, PressureLaw
 
 BRAID = am.geometry.Braid(0.01, 0.4363, 0.3)
 MUSCLE = am.Muscle(am.load("tondu-lopez").characteristic, BRAID, damper=am.LinearDamper(100.0))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from airmuscle.errors import ParameterError
-from airmuscle.muscle import Ratings
+from airmuscle.physics import Ratings
 
 DMSP_20 = Ratings(max_force=1500.0, min_pressure=0.0, max_pressure=6e5, max_contraction=0.25, max_prestretch=0.04)
 

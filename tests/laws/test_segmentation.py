@@ -15,9 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from airmuscle.errors import ColumnError
-from airmuscle.recording import Recording
-from airmuscle.recording.segment import (
+from airmuscle.bench import (
     AT_REST,
     FREE,
     ISOBARIC,
@@ -36,8 +34,10 @@ from airmuscle.recording.segment import (
     plateau_points,
     quasi_static_rows,
 )
-from airmuscle.recording.segment.branches import branch_column_agreement
-from airmuscle.recording.segment.sensor import estimate_noise, estimate_resolution
+from airmuscle.bench.segment.branches import branch_column_agreement
+from airmuscle.bench.segment.sensor import estimate_noise, estimate_resolution
+from airmuscle.errors import ColumnError
+from airmuscle.recording import Recording
 
 STEP = 0.05
 RANDOM = np.random.default_rng

@@ -9,8 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from airmuscle.recording import Recording
-from airmuscle.recording.segment import (
+from airmuscle.bench import (
     ISOBARIC,
     ISOMETRIC,
     Sensor,
@@ -22,7 +21,8 @@ from airmuscle.recording.segment import (
     inspect,
     quasi_static_rows,
 )
-from airmuscle.recording.segment.sensor import estimate_noise
+from airmuscle.bench.segment.sensor import estimate_noise
+from airmuscle.recording import Recording
 
 RANDOM = np.random.default_rng
 SENSOR = {"force": Sensor("force", 0.0, 1.0)}

@@ -10,10 +10,8 @@ import pytest
 from joints import chosen_muscle
 
 from airmuscle.core import autodiff, tree
-from airmuscle.mechanism import HuntCrossley
-from airmuscle.muscle import CubicSpring, EndStop, LinearSpring, SeriesSpring
-from airmuscle.muscle.characteristic import VirtualWork
-from airmuscle.muscle.series_equilibrium import find_largest_nonnegative
+from airmuscle.physics import CubicSpring, EndStop, HuntCrossley, LinearSpring, SeriesSpring, VirtualWork
+from airmuscle.physics.muscle.series_equilibrium import find_largest_nonnegative
 
 STOP = EndStop(0.1, HuntCrossley(1e9, 0.5))
 
@@ -79,7 +77,7 @@ def test_inside_it_settles_in_a_few_looks(monkeypatch):
         function = traced(*given, **named)
         return lambda *arguments: looks.append(1) or function(*arguments)
 
-    monkeypatch.setattr("airmuscle.muscle.muscle.autodiff.value_and_derivative", counted)
+    monkeypatch.setattr("airmuscle.physics.muscle.muscle.autodiff.value_and_derivative", counted)
     for muscle in INSIDE.values():
         for p in (0.0, 2e5):
             for contraction in (-0.02, 0.0, 0.05, 0.2):

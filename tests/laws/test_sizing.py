@@ -18,13 +18,7 @@ from scipy.interpolate import PchipInterpolator
 
 import airmuscle as am
 from airmuscle.core.constants import STANDARD_GRAVITY
-from airmuscle.errors import AirmuscleError, ParameterError, SolveError
-from airmuscle.library import Entry
-from airmuscle.muscle import Ratings
-from airmuscle.muscle.characteristic import EffectiveLength, MartensBoblan2017, PressureLaw, ValidityRange
-from airmuscle.pneumatics import GAS_CONSTANT, REFERENCE_DENSITY
-from airmuscle.report.sizing_chapter import choice_row
-from airmuscle.sizing import (
+from airmuscle.design import (
     JointRequirement,
     LiftRequirement,
     MuscleChoice,
@@ -38,8 +32,20 @@ from airmuscle.sizing import (
     scenario_text,
     size_muscles,
 )
-from airmuscle.sizing.static_muscle import static_muscle
-from airmuscle.sizing.valve_sizing import air_path
+from airmuscle.design.sizing.sizing_chapter import choice_row
+from airmuscle.design.sizing.static_muscle import static_muscle
+from airmuscle.design.sizing.valve_sizing import air_path
+from airmuscle.errors import AirmuscleError, ParameterError, SolveError
+from airmuscle.files import Entry
+from airmuscle.physics import (
+    GAS_CONSTANT,
+    REFERENCE_DENSITY,
+    EffectiveLength,
+    MartensBoblan2017,
+    PressureLaw,
+    Ratings,
+    ValidityRange,
+)
 
 pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
 
@@ -157,7 +163,7 @@ def test_the_extended_muscle_of_a_joint_accelerates_the_inertia():
 
 def some_mounting_suffices(entry: Entry, requirement: LiftRequirement, length: float, count: int = 1) -> bool:
     """Whether any contraction at the start meets the requirement with this length: independent of the search."""
-    muscle = static_muscle(am.library.scaling.scale_entry(entry, resting_length=length), SIX_BAR)
+    muscle = static_muscle(am.files.library.scaling.scale_entry(entry, resting_length=length), SIX_BAR)
     low, high = muscle.contraction_range
     starts = np.linspace(low, high, 4001)[:, None]
     displacement, load = requirement.path

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from airmuscle.control import Measurement, StateFeedback
+from airmuscle.control import StateFeedback
+from airmuscle.engine import Measurement
 
 H, RANDOM = 0.02, np.random.default_rng(4)
 A, B, C = (0.4 * RANDOM.normal(size=shape) for shape in ((3, 3), (3, 2), (2, 3)))

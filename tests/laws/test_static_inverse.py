@@ -17,10 +17,8 @@ import airmuscle as am
 from airmuscle.control import AngleAndStiffness, StaticFeedForward, StaticInverse
 from airmuscle.core import autodiff
 from airmuscle.errors import ParameterError
-from airmuscle.library.files import LAWS as LAW_FILES
-from airmuscle.mechanism import HuntCrossley
-from airmuscle.muscle import CubicSpring, EndStop, SeriesSpring
-from airmuscle.muscle.characteristic import ForceLaw, ValidityRange, as_force_law
+from airmuscle.files.library.files import LAWS as LAW_FILES
+from airmuscle.physics import CubicSpring, EndStop, ForceLaw, HuntCrossley, SeriesSpring, ValidityRange, as_force_law
 
 
 def force_laws():

@@ -8,13 +8,11 @@ import numpy as np
 import pytest
 
 from airmuscle import load_data
-from airmuscle.identify.campaign import RecordKind, StaticStage, classify_records
-from airmuscle.identify.campaign.static_stage import fit_static_stage
-from airmuscle.muscle import CreepElements
-from airmuscle.muscle.friction import NoFriction
+from airmuscle.bench import FREE, ISOBARIC, ISOMETRIC, RecordKind, StaticStage, classify_records, find_runs, inspect
+from airmuscle.bench.identify.campaign.static_stage import fit_static_stage
+from airmuscle.bench.segment.static_points import find_static_points
+from airmuscle.physics import CreepElements, NoFriction
 from airmuscle.recording import Recording
-from airmuscle.recording.segment import FREE, ISOBARIC, ISOMETRIC, find_runs, inspect
-from airmuscle.recording.segment.static_points import find_static_points
 
 MAP = load_data("dmsp-20-300")
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from airmuscle.errors import ParameterError
-from airmuscle.library import catalogue
-from airmuscle.muscle.characteristic import Hunt2017, Reynolds2003, Serres2009
+from airmuscle.files.library import catalogue
+from airmuscle.physics import Hunt2017, Reynolds2003, Serres2009
 
 
 def test_a_stiffness_model_requires_the_length_of_its_specimen():

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 from airmuscle.core import autodiff
 from airmuscle.errors import GeometryLimitError, ParameterError
-from airmuscle.muscle.geometry import (
+from airmuscle.physics import (
     Catenary,
     CircularArc,
     HalfShellFibreSum,
@@ -25,7 +25,7 @@ from airmuscle.muscle.geometry import (
     UniformFibreSum,
     UserDefinedFibreSum,
 )
-from airmuscle.muscle.geometry.stumpff import stumpff
+from airmuscle.physics.muscle.geometry.stumpff import stumpff
 
 L0, D0 = 0.072, 0.012
 CIRCLE, CATENARY, TRUE_ARC, PARABOLA = CircularArc(), Catenary(), TrueArcParabola(), Parabola()

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from airmuscle.errors import GeometryLimitError, ParameterError, SolveError
-from airmuscle.library import catalogue
-from airmuscle.muscle.characteristic import Tabulated
-from airmuscle.muscle.geometry import TabulatedGeometry
+from airmuscle.files.library import catalogue
+from airmuscle.physics import Tabulated, TabulatedGeometry
 
 TOOL = ("festo-tool-dmsp-10", "festo-tool-dmsp-20", "festo-tool-dmsp-40")
 SMALL = Tabulated((1e5, 1e5, 1e5, 2e5, 2e5), (0.0, 0.05, 0.1, 0.0, 0.2), (100.0, 40.0, 0.0, 200.0, 0.0))

@@ -19,17 +19,17 @@ from hypothesis import strategies as st
 from joints import chosen_muscle
 from scipy.optimize import brentq
 
-from airmuscle.control import Schedule
-from airmuscle.mechanism import Isometric
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import (
+from airmuscle.engine import Rodas4, Schedule, simulate
+from airmuscle.physics import (
     GAS_CONSTANT,
     Air,
     Ambient,
     DistributedTube,
     EnergyBalance,
     FillDischarge,
+    Isometric,
     Isothermal,
+    Plant,
     Polytropic,
     Supply,
     Tube,
@@ -37,8 +37,7 @@ from airmuscle.pneumatics import (
     Valve,
     WithTubes,
 )
-from airmuscle.pneumatics.gas import NO_FLOW, SPECIFIC_HEAT_CONSTANT_PRESSURE
-from airmuscle.simulation import Rodas4, simulate
+from airmuscle.physics.pneumatics.gas import NO_FLOW, SPECIFIC_HEAT_CONSTANT_PRESSURE
 
 AMBIENT = Ambient()
 WARM = AMBIENT.temperature

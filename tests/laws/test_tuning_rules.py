@@ -13,9 +13,8 @@ import pytest
 from control_plants import LIFT, PRESSURE
 
 import airmuscle as am
-from airmuscle.control import ControlLoop, OnOffController, Schedule, SplitRange
-from airmuscle.errors import ParameterError
-from airmuscle.study import (
+from airmuscle.control import OnOffController
+from airmuscle.design import (
     FirstOrderDeadTime,
     IntegratorDeadTime,
     LoopCase,
@@ -30,6 +29,8 @@ from airmuscle.study import (
     step_experiment,
     ultimate_point,
 )
+from airmuscle.engine import ControlLoop, Schedule, SplitRange
+from airmuscle.errors import ParameterError
 
 PLANT = FirstOrderDeadTime(gain=2.0, time_constant=10.0, dead_time=1.0)
 LEVEL = IntegratorDeadTime(rate=0.5, dead_time=2.0)

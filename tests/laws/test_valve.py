@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from airmuscle.core import autodiff
-from airmuscle.pneumatics import REFERENCE_DENSITY, Air, Ambient, FillDischarge, Supply, Valve
+from airmuscle.physics import REFERENCE_DENSITY, Air, Ambient, FillDischarge, Supply, Valve
 
 T0 = 293.15
 MATRIX = Valve(2.6167e-9, 0.433)

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from airmuscle.errors import ParameterError
-from airmuscle.pneumatics import SubsonicIndexValve, Valve, in_parallel, in_series
+from airmuscle.physics import SubsonicIndexValve, Valve, in_parallel, in_series
 
 P1, T0 = 7e5, 293.15
 valves = st.builds(Valve, st.floats(1e-9, 1e-7), st.floats(0.0, 0.6))

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airmuscle.errors import ParameterError
-from airmuscle.pneumatics import Ambient, Valve
-from airmuscle.pneumatics import conversion as c
+from airmuscle.physics import Ambient, Valve
+from airmuscle.physics import conversion as c
 
 LITRE_PER_MINUTE = 1e-3 / 60
 sizes = st.floats(1e-11, 9e-6)

@@ -13,14 +13,7 @@ from hypothesis import strategies as st
 
 from airmuscle.core import autodiff, cite, ops
 from airmuscle.errors import ParameterError
-from airmuscle.pneumatics import (
-    REFERENCE_DENSITY,
-    REFERENCE_TEMPERATURE,
-    CheckValve,
-    Orifice,
-    SubsonicIndexValve,
-    Valve,
-)
+from airmuscle.physics import REFERENCE_DENSITY, REFERENCE_TEMPERATURE, CheckValve, Orifice, SubsonicIndexValve, Valve
 
 T0 = REFERENCE_TEMPERATURE
 pressures = st.floats(2e4, 1.2e6)

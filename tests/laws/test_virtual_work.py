@@ -15,11 +15,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airmuscle.errors import SolveError, TraceError
-from airmuscle.library import catalogue
-from airmuscle.muscle.characteristic import ChouHannaford1996, TonduLopez2000, ValidityRange, VirtualWork
-from airmuscle.muscle.characteristic.energy_defect import maxwell_defect, virtual_work_defect
-from airmuscle.muscle.geometry import Braid, TabulatedGeometry
-from airmuscle.muscle.geometry.chebyshev import as_polynomial
+from airmuscle.files.library import catalogue
+from airmuscle.physics import Braid, ChouHannaford1996, TabulatedGeometry, TonduLopez2000, ValidityRange, VirtualWork
+from airmuscle.physics.muscle.characteristic.energy_defect import maxwell_defect, virtual_work_defect
+from airmuscle.physics.muscle.geometry.chebyshev import as_polynomial
 
 BRAID = Braid(0.01, np.radians(25.0), 0.3)
 BOX = ValidityRange(5e4, 6e5, 0.0, 0.28)

@@ -9,9 +9,9 @@ from control_plants import JOINT, LIFT
 
 import airmuscle as am
 from airmuscle.errors import ColumnError, FileError, ParameterError
-from airmuscle.library import catalogue
-from airmuscle.muscle.geometry import Braid
-from airmuscle.plant.drawing import muscle_outline
+from airmuscle.files.library import catalogue
+from airmuscle.physics import Braid
+from airmuscle.physics.plant.drawing import muscle_outline
 
 FILL = am.Schedule({"fill": ((0.0, 0.3),)})
 

@@ -12,12 +12,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle.cli.app import app
-from airmuscle.identify import UNCENSORED, fit
-from airmuscle.library import load
-from airmuscle.muscle.characteristic import ContractileSurface, TonduLopez2000
-from airmuscle.muscle.geometry import Braid
-from airmuscle.recording import Recording, read, write_csv
+from airmuscle.bench import UNCENSORED, fit, read, write_csv
+from airmuscle.files import load
+from airmuscle.outlets.cli.app import app
+from airmuscle.physics import Braid, ContractileSurface, TonduLopez2000
+from airmuscle.recording import Recording
 
 MUSCLE = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.2)
 SURFACE = ("--characteristic", "ContractileSurface", "--degree", "3", "--resting-length", "300 mm")

@@ -19,20 +19,17 @@ from typer.testing import CliRunner
 from widths import SAME_LAW, widened
 
 from airmuscle import advance, load, load_data, read_csv, simulate
-from airmuscle.cli.app import app
-from airmuscle.compile.cache.kernel import BoundKernel, fixed_step
-from airmuscle.control import SampledSignal, Schedule
 from airmuscle.core import model, parameter
 from airmuscle.core.output_folder import atomic_folder, check_writable
 from airmuscle.core.units import ABSOLUTE
+from airmuscle.engine import SampledSignal, Schedule
+from airmuscle.engine.compile.cache.kernel import BoundKernel, fixed_step
+from airmuscle.engine.run import bound_integrator
 from airmuscle.errors import FileError, ParameterError, SolveError, UnitError
-from airmuscle.library import list_laws
-from airmuscle.library.files import read_toml
-from airmuscle.mechanism import HangingMass
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Supply, Valve
-from airmuscle.simulation import bound_integrator
-from airmuscle.simulation.equilibrium import find_equilibrium
+from airmuscle.files import list_laws
+from airmuscle.files.library.files import read_toml
+from airmuscle.outlets.cli.app import app
+from airmuscle.physics import FillDischarge, HangingMass, Plant, Supply, Valve, find_equilibrium
 from airmuscle.units import conversion, quantity
 
 MUSCLE = "dmsp-20-300"

@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle.cli.app import app
+from airmuscle.bench import RowReader, follow_lines, read_csv
+from airmuscle.bench.readers.follow import MAX_UNREADABLE
 from airmuscle.errors import ColumnError, FileError
-from airmuscle.library import load
-from airmuscle.recording import RowReader, follow_lines, read_csv
-from airmuscle.recording.follow import MAX_UNREADABLE
+from airmuscle.files import load
+from airmuscle.outlets.cli.app import app
 
 RIG = ("--max-pressure", "6 bar", "--max-force", "1.5 kN")
 

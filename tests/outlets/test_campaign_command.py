@@ -15,12 +15,11 @@ import pytest
 from made_campaign import THREE_LENGTHS, TrueMuscle, unseen_records, write_campaign, write_german
 from typer.testing import CliRunner
 
-from airmuscle.cli.app import app
+from airmuscle.bench import read
 from airmuscle.errors import ParameterError
-from airmuscle.library import load
-from airmuscle.library.uncertainty import ParameterUncertainty
-from airmuscle.recording import read
-from airmuscle.scenario import load_scenario
+from airmuscle.files import load, load_scenario
+from airmuscle.files.library.uncertainty import ParameterUncertainty
+from airmuscle.outlets.cli.app import app
 
 pytestmark = pytest.mark.slow  # the whole campaign takes a minute
 
@@ -95,7 +94,7 @@ def test_an_interruption_keeps_the_finished_stages(tmp_path, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("airmuscle.identify.campaign.campaign.fit_static_stage", interrupted)
+    monkeypatch.setattr("airmuscle.bench.identify.campaign.campaign.fit_static_stage", interrupted)
     rig = write_campaign(tmp_path / "rig")
     for path in rig.glob("*isobar_[3456]*"):
         path.unlink()

@@ -15,9 +15,9 @@ import pytest
 from made_campaign import write_campaign
 from typer.testing import CliRunner
 
-from airmuscle.cli.app import app
-from airmuscle.cli.campaign_stages import KeptStages
-from airmuscle.identify.campaign import LeftOutStage
+from airmuscle.bench import LeftOutStage
+from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli.campaign_stages import KeptStages
 from airmuscle.recording import Recording
 
 STAGE = LeftOutStage("creep", "no record is a hold", "hold the length")
@@ -85,8 +85,8 @@ def test_a_killed_campaign_does_not_fit_its_finished_stages_again(tmp_path, monk
     def fitted_again(*_):
         raise AssertionError("a finished stage is fitted again")
 
-    monkeypatch.setattr("airmuscle.identify.campaign.campaign.fit_friction_stage", fitted_again)
-    monkeypatch.setattr("airmuscle.identify.campaign.campaign.fit_creep_stage", fitted_again)
+    monkeypatch.setattr("airmuscle.bench.identify.campaign.campaign.fit_friction_stage", fitted_again)
+    monkeypatch.setattr("airmuscle.bench.identify.campaign.campaign.fit_creep_stage", fitted_again)
     done = CliRunner().invoke(app, ["campaign", str(rig), "--out", str(out)])
     assert done.exit_code == 0, done.stderr
     assert "continued after: creep, hysteresis" in done.stderr

@@ -13,9 +13,9 @@ from made_campaign import TrueMuscle
 from typer.testing import CliRunner
 
 from airmuscle import Recording, load, load_data, write_csv
-from airmuscle.cli.app import app
-from airmuscle.muscle.geometry import Braid
-from airmuscle.scenario import load_scenario
+from airmuscle.files import load_scenario
+from airmuscle.outlets.cli.app import app
+from airmuscle.physics import Braid
 
 
 @pytest.fixture(scope="module")

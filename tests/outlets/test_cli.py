@@ -25,17 +25,17 @@ from typer.testing import CliRunner, Result
 from widths import SAME_LAW, widened
 
 import airmuscle as airmuscle_package
-from airmuscle.cli.app import COMMANDS, app
-from airmuscle.cli.cite import as_bibtex
-from airmuscle.cli.terminal import print_json, print_table
+from airmuscle.bench import read_csv
 from airmuscle.core import Reference
 from airmuscle.core.errors import printable
 from airmuscle.errors import UnknownNameError
-from airmuscle.library import list_laws, list_plants, list_products, list_valves, load
-from airmuscle.muscle.characteristic import ContractileSurface
-from airmuscle.recording import read_csv
+from airmuscle.files import list_laws, list_plants, list_products, list_valves, load
+from airmuscle.outlets.cli.app import COMMANDS, app
+from airmuscle.outlets.cli.cite import as_bibtex
+from airmuscle.outlets.cli.terminal import print_json, print_table
+from airmuscle.papers import run
+from airmuscle.physics import ContractileSurface
 from airmuscle.report import Chapter, Claim, Equal
-from airmuscle.reproduce import run
 
 MUSCLE = "dmsp-20-300"
 SCENARIO = f"""
@@ -93,7 +93,7 @@ def test_the_help_lists_the_commands_in_the_order_of_use():
 
 @pytest.mark.parametrize("row", COMMANDS, ids=NAMES)
 def test_every_command_has_its_summary_and_examples_in_its_help(row):
-    function = getattr(importlib.import_module(f"airmuscle.cli.{row.module}"), row.function)
+    function = getattr(importlib.import_module(f"airmuscle.outlets.cli.{row.module}"), row.function)
     assert function.__doc__.splitlines()[0] == row.summary
     result = airmuscle(row.name, "--help")
     assert result.exit_code == 0
@@ -105,12 +105,10 @@ def test_every_command_has_its_summary_and_examples_in_its_help(row):
 @pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["list"]])
 def test_a_command_module_is_imported_only_when_it_is_called(arguments: list[str]):
     modules = [row.module for row in COMMANDS if row.name not in arguments]
-    code = (
-        f"from airmuscle.cli.app import app; app({arguments!r}, standalone_mode=False); import sys; print(*sys.modules)"
-    )
+    code = f"from airmuscle.outlets.cli.app import app; app({arguments!r}, standalone_mode=False); import sys; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr
-    assert not {f"airmuscle.cli.{name}" for name in modules} & set(done.stdout.splitlines()[-1].split())
+    assert not {f"airmuscle.outlets.cli.{name}" for name in modules} & set(done.stdout.splitlines()[-1].split())
 
 
 def test_an_unknown_command_names_the_nearest_one():
@@ -569,7 +567,7 @@ def test_a_process_ends_with_the_documented_exit_codes():
 
 
 def test_list_starts_without_what_it_does_not_need():
-    code = "import sys; from airmuscle.cli.app import app; app(['list', '--json'], standalone_mode=False)"
+    code = "import sys; from airmuscle.outlets.cli.app import app; app(['list', '--json'], standalone_mode=False)"
     done = subprocess.run(
         [sys.executable, "-c", f"{code}; print(*sys.modules)"], capture_output=True, text=True, timeout=60
     )
@@ -629,7 +627,7 @@ main()
     ("module", "kind"),
     [
         pytest.param(module, kind, marks=[] if (i - k) % 4 == 0 else pytest.mark.slow)
-        for i, module in enumerate(("typer", "airmuscle.cli.app", "airmuscle.cli.solve", "rich.table"))
+        for i, module in enumerate(("typer", "airmuscle.outlets.cli.app", "airmuscle.outlets.cli.solve", "rich.table"))
         for k, kind in enumerate(("module", "extension", "exception discarded", "discarded by a destructor"))
     ],
 )
@@ -638,7 +636,9 @@ def test_an_interrupted_import_is_one_line_and_exit_code_130(module: str, kind: 
 
 
 @pytest.mark.skipif(os.name == "nt", reason="SIGINT cannot be sent to one process")
-@pytest.mark.parametrize("module", ["airmuscle.cli", "airmuscle.cli.entry_point", "airmuscle.cli.interruption"])
+@pytest.mark.parametrize(
+    "module", ["airmuscle.outlets.cli", "airmuscle.outlets.cli.entry_point", "airmuscle.outlets.cli.interruption"]
+)
 def test_an_interruption_before_the_handler_is_installed_is_no_traceback(module: str):
     assert_interrupted(module, "module")
 

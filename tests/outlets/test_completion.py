@@ -10,9 +10,9 @@ import pytest
 from typer.testing import CliRunner
 
 import airmuscle as am
-from airmuscle.cli.app import app
-from airmuscle.cli.completion import SHELLS, complete_data, complete_entry, complete_plant
 from airmuscle.errors import UnknownNameError
+from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli.completion import SHELLS, complete_data, complete_entry, complete_plant
 
 
 def completed(words: str, monkeypatch: pytest.MonkeyPatch) -> list[str]:

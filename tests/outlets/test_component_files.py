@@ -13,12 +13,12 @@ from plants import EXAMPLES
 from widths import widened
 
 from airmuscle.errors import ParameterError
-from airmuscle.library import write
-from airmuscle.library.files import read_toml
-from airmuscle.library.location import Location
-from airmuscle.library.models import model_class, model_names
-from airmuscle.library.plant_file import build_plant
-from airmuscle.scenario import load_scenario
+from airmuscle.files import load_scenario
+from airmuscle.files.library import write
+from airmuscle.files.library.files import read_toml
+from airmuscle.files.library.location import Location
+from airmuscle.files.library.models import model_class, model_names
+from airmuscle.files.library.plant_file import build_plant
 
 
 def text_of(plant):

@@ -16,24 +16,22 @@ import pytest
 from plants import EXAMPLES
 
 from airmuscle import (
-    analysis,
+    bench,
+    characteristic,
     control,
-    environments,
-    identify,
+    design,
+    engine,
+    friction,
+    geometry,
     load,
-    mechanism,
-    muscle,
-    pneumatics,
+    outlets,
+    physics,
     recording,
 )
 from airmuscle.control import PID
 from airmuscle.errors import AirmuscleError, AirmuscleWarning, ParameterError, UnitError
-from airmuscle.identify import dynamic, prediction
-from airmuscle.library import list_laws
-from airmuscle.mechanism import HangingMass
-from airmuscle.muscle import characteristic, friction, geometry
-from airmuscle.pneumatics import Supply, Tank, Valve
-from airmuscle.study import control_benchmark, tuning
+from airmuscle.files import list_laws
+from airmuscle.physics import HangingMass, Supply, Tank, Valve, muscle
 
 FACES = (characteristic, control, friction, geometry, mechanism, muscle, pneumatics)
 MODELS = sorted(
@@ -118,7 +116,7 @@ def test_structural_fields_are_checked():
     with pytest.raises(ParameterError, match="Tank: gas must be an instance of Gas; it is 'isothermal'"):
         Tank(Supply(6e5), valve, 1e-3, "isothermal")  # type: ignore[arg-type]
     with pytest.raises(ParameterError, match="SplitRange: positive must be a text; it is 3"):
-        control.SplitRange(3, "discharge")  # type: ignore[arg-type]
+        engine.SplitRange(3, "discharge")  # type: ignore[arg-type]
     with pytest.raises(ParameterError, match=r"HangingMass.mass .* is too large a number; allowed range"):
         HangingMass(10**400)
 
@@ -142,27 +140,27 @@ def test_a_supply_of_some_pascals_is_implausible():
 
 def settings() -> list[Any]:
     """One instance of each dataclass that is a setting of a fit, a reader, a tuning, a benchmark or a learning task."""
-    step, plant = control_benchmark.StepMotion(0.1, 0.0), EXAMPLES["surface"]
+    step, plant = design.StepMotion(0.1, 0.0), EXAMPLES["surface"]
     return [
-        identify.Huber(1.0), identify.SoftL1(1.0), identify.LeastSquares(), identify.BlockSplit(),
-        identify.LevelSplit("pressure"), identify.Censoring(), dynamic.StartTime(0.1),
-        dynamic.InitialValue("pressure", 1.0), prediction.PlantUncertainty({"muscle.damping": 1.0}),
-        identify.RecursiveFit(identify.BenchLimits(muscle.characteristic.ValidityRange(0.0, 6e5, 0.0, 0.25), 1e3)),
-        recording.BlockMeans(), recording.Decimation(), recording.RecordedTime(), recording.ColumnMapping(),
+        bench.Huber(1.0), bench.SoftL1(1.0), bench.LeastSquares(), bench.BlockSplit(),
+        bench.LevelSplit("pressure"), bench.Censoring(), bench.StartTime(0.1),
+        bench.InitialValue("pressure", 1.0), bench.PlantUncertainty({"muscle.damping": 1.0}),
+        bench.RecursiveFit(bench.BenchLimits(muscle.characteristic.ValidityRange(0.0, 6e5, 0.0, 0.25), 1e3)),
+        bench.BlockMeans(), bench.Decimation(), bench.RecordedTime(), bench.ColumnMapping(),
         recording.Recording({"time": [0.0, 1.0]}, "two rows"),
-        environments.ValueRange(("mass",), 0.0, 1.0), environments.FactorRange(("mass",), 0.5, 2.0),
-        environments.Observation("angle", "rad", -1.0, 1.0),
-        tuning.FirstOrderDeadTime(1.0, 1.0, 0.1), tuning.IntegratorDeadTime(1.0, 0.1), tuning.UltimatePoint(1.0, 1.0),
-        tuning.Perturbations(), tuning.RobustObjective(), tuning.RootMeanSquareError(), tuning.RuleSettings("SIMC", 1, 1),
-        tuning.IntegralAbsoluteError(), tuning.IntegralTimeAbsoluteError(),
-        control_benchmark.StuckValve("left.fill", 1.0, 0.5), control_benchmark.ControlTask("step", step, 1.0), step,
-        control_benchmark.RampMotion(0.1, 0.0, 1.0), control_benchmark.SineMotion(0.1, 1.0),
-        control_benchmark.MinimumJerkMotion(0.1, 0.0, 1.0), control_benchmark.SumOfMotions((step, step)),
-        analysis.ExtendedKalmanFilter(plant, ("pressure",), 0.01, {}, {"pressure": 500.0}),
-        analysis.UnscentedKalmanFilter(plant, ("pressure",), 0.01, {}, {"pressure": 500.0}),
-        control.WithDrivers(control.Schedule({"fill": ((0, 1),)}), {"fill": control.PWM(50.0)}),
-        control.Schedule({"fill": ((0, 1),)}),
-        control_benchmark.Contender("PID", PID("angle", "difference", 1.0)),
+        outlets.ValueRange(("mass",), 0.0, 1.0), outlets.FactorRange(("mass",), 0.5, 2.0),
+        outlets.Observation("angle", "rad", -1.0, 1.0),
+        design.FirstOrderDeadTime(1.0, 1.0, 0.1), design.IntegratorDeadTime(1.0, 0.1), design.UltimatePoint(1.0, 1.0),
+        design.Perturbations(), design.RobustObjective(), design.RootMeanSquareError(), design.RuleSettings("SIMC", 1, 1),
+        design.IntegralAbsoluteError(), design.IntegralTimeAbsoluteError(),
+        design.StuckValve("left.fill", 1.0, 0.5), design.ControlTask("step", step, 1.0), step,
+        design.RampMotion(0.1, 0.0, 1.0), design.SineMotion(0.1, 1.0),
+        design.MinimumJerkMotion(0.1, 0.0, 1.0), design.SumOfMotions((step, step)),
+        control.ExtendedKalmanFilter(plant, ("pressure",), 0.01, {}, {"pressure": 500.0}),
+        control.UnscentedKalmanFilter(plant, ("pressure",), 0.01, {}, {"pressure": 500.0}),
+        engine.WithDrivers(engine.Schedule({"fill": ((0, 1),)}), {"fill": engine.PWM(50.0)}),
+        engine.Schedule({"fill": ((0, 1),)}),
+        design.Contender("PID", PID("angle", "difference", 1.0)),
     ]  # fmt: skip
 
 
@@ -174,15 +172,15 @@ def test_junk_in_a_setting_is_accepted_or_refused_but_never_a_foreign_exception(
         said = refusal_of(lambda f=field: dataclasses.replace(setting, **{f.name: Unprintable()}))
         assert said is not None, field.name
         names = type(setting).__name__ in said and field.name in said
-        assert names or isinstance(setting, control.InputSignal), said
+        assert names or isinstance(setting, engine.InputSignal), said
 
 
 def test_the_mappings_of_a_row_reader_are_checked():
     for junk in (3, "time", [1], object()):
         with pytest.raises(ParameterError, match="RowReader: units must be a mapping or None"):
-            recording.RowReader("log.csv", units=junk)  # type: ignore[arg-type]
+            bench.RowReader("log.csv", units=junk)  # type: ignore[arg-type]
 
 
 def test_an_array_without_dimension_is_no_list_of_numbers():
     with pytest.raises(ParameterError, match=r"Lever.arms .* it must be several numbers"):
-        dataclasses.replace(INSTANCES[mechanism.Lever], arms=np.array("x"))
+        dataclasses.replace(INSTANCES[physics.Lever], arms=np.array("x"))

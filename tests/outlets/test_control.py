@@ -19,13 +19,12 @@ import pytest
 from scenario_files import writer_of
 from typer.testing import CliRunner
 
-from airmuscle.cli.app import app
-from airmuscle.control import (
-    PID,
+from airmuscle.control import PID, OnOffController
+from airmuscle.design import load_study
+from airmuscle.engine import (
     PWM,
     ZERO_INPUT,
     ControlLoop,
-    OnOffController,
     Periodic,
     SampledSignal,
     Schedule,
@@ -34,10 +33,9 @@ from airmuscle.control import (
     WithDrivers,
 )
 from airmuscle.errors import AirmuscleError, ColumnError, ParameterError, UnitError, UnknownNameError
-from airmuscle.report import run_chapter
-from airmuscle.report.simulation_chapter import describe_input
-from airmuscle.scenario import load_scenario, scenario_schema
-from airmuscle.study import load_study
+from airmuscle.files import load_scenario, run_chapter, scenario_schema
+from airmuscle.files.scenario.simulation_chapter import describe_input
+from airmuscle.outlets.cli.app import app
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "pressure_loop.toml"
@@ -261,8 +259,8 @@ def test_a_column_that_a_set_point_follows_is_there(tmp_path: Path):
 
 
 def test_a_record_has_no_controller(tmp_path: Path):
-    from airmuscle.library.location import Location
-    from airmuscle.scenario.inputs import build_input_signal
+    from airmuscle.files.library.location import Location
+    from airmuscle.files.scenario.inputs import build_input_signal
 
     with pytest.raises(
         ParameterError,

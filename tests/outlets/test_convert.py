@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle.cli.app import app
-from airmuscle.library import load
+from airmuscle.files import load
+from airmuscle.outlets.cli.app import app
 
 MUSCLE = "dmsp-20-300"
 

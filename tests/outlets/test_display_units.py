@@ -11,7 +11,6 @@ import pytest
 from typer.testing import CliRunner
 
 import airmuscle as am
-from airmuscle.cli.app import app
 from airmuscle.core import display as module
 from airmuscle.core.display import (
     CONFIG_FILE,
@@ -24,8 +23,9 @@ from airmuscle.core.display import (
     scaled_numbers,
 )
 from airmuscle.core.plotting import new_figure, rendered
+from airmuscle.design import process_pool
 from airmuscle.errors import FileError, UnitError
-from airmuscle.study import process_pool
+from airmuscle.outlets.cli.app import app
 from airmuscle.units import display
 
 

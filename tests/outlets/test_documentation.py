@@ -20,9 +20,9 @@ from book.formulas_in_text import markdown
 from book.sources import COPIED, index, site_text
 
 import airmuscle
-from airmuscle.cli.app import COMMANDS, app
 from airmuscle.core import parameters
-from airmuscle.library.models import model_class, model_names
+from airmuscle.files.library.models import model_class, model_names
+from airmuscle.outlets.cli.app import COMMANDS, app
 from airmuscle.report.formula import to_display_mathml
 
 FORMULA = re.compile(r"```\{math\}\n(.*?)\n```|\{math\}`([^`]+)`", re.DOTALL)

@@ -6,8 +6,8 @@ import os
 
 import pytest
 
-from airmuscle.cli import entry_point
 from airmuscle.core import processes
+from airmuscle.outlets.cli import entry_point
 
 
 @pytest.mark.parametrize(("given", "threads"), [(None, "1"), ("4", "4")])

@@ -14,7 +14,11 @@ import numpy as np
 import pytest
 from control_plants import JOINT, LIFT
 
-from airmuscle.environments import (
+from airmuscle.engine import Double, RungeKutta4, Single, Stepper
+from airmuscle.engine.run.batch.stepper import BatchStepper
+from airmuscle.errors import ParameterError
+from airmuscle.files.library.uncertainty import ParameterUncertainty
+from airmuscle.outlets import (
     FactorRange,
     FitUncertainty,
     JointTracking,
@@ -22,11 +26,6 @@ from airmuscle.environments import (
     ValueRange,
     register_environments,
 )
-from airmuscle.errors import ParameterError
-from airmuscle.library.uncertainty import ParameterUncertainty
-from airmuscle.simulation import RungeKutta4, Stepper
-from airmuscle.simulation.batch import Double, Single
-from airmuscle.simulation.batch.stepper import BatchStepper
 
 NAMES = ("Joint", "Lift", "Arm")
 gymnasium = pytest.importorskip("gymnasium", reason="gymnasium is not installed")
@@ -302,7 +301,7 @@ def test_a_batch_of_steppers_is_its_steppers():
 def test_the_package_is_imported_without_gymnasium_which_the_error_names():
     code = (
         "import sys; sys.modules['gymnasium'] = None\n"
-        "import airmuscle.environments as e, importlib.util\n"
+        "import airmuscle.outlets.environments as e, importlib.util\n"
         "importlib.util.find_spec = lambda name: None\n"
         "try: e.register_environments()\n"
         "except Exception as error: print(type(error).__name__, error)\n"

@@ -20,9 +20,10 @@ import numpy.typing as npt
 import pytest
 
 from airmuscle import load
-from airmuscle.identify import fit
-from airmuscle.library import load_data
-from airmuscle.muscle.characteristic import (
+from airmuscle.bench import fit, fit_chapter
+from airmuscle.bench.identify.equation_section import equation_section
+from airmuscle.files import load_data
+from airmuscle.physics import (
     Characteristic,
     ContractileSurface,
     ContractionLaw,
@@ -30,10 +31,9 @@ from airmuscle.muscle.characteristic import (
     LogarithmicLength,
     PressureLaw,
 )
-from airmuscle.report import fit_chapter, write_report
+from airmuscle.report import write_report
 from airmuscle.report.equation import LawEquation, law_equation
 from airmuscle.report.equation.source_code import EXAMPLE, source_codes
-from airmuscle.report.equation_section import equation_section
 
 Values = Mapping[str, npt.NDArray[np.float64]]
 RANGES = {"pressure": (5e4, 5e5), "contraction": (0.01, 0.12), "force": (10.0, 400.0)}

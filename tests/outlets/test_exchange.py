@@ -6,19 +6,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle.cli.app import app
+from airmuscle.bench import Decimation, from_pandas, read, read_csv, to_xarray, write, write_csv
+from airmuscle.bench.readers import large_csv
 from airmuscle.errors import ColumnError, FileError, ParameterError
-from airmuscle.recording import (
-    Decimation,
-    Recording,
-    from_pandas,
-    large_csv,
-    read,
-    read_csv,
-    to_xarray,
-    write,
-    write_csv,
-)
+from airmuscle.outlets.cli.app import app
+from airmuscle.recording import Recording
 
 pd = pytest.importorskip("pandas", reason="needs the package pandas")
 RUN = Recording(

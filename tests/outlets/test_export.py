@@ -20,17 +20,15 @@ import pytest
 from typer.testing import CliRunner
 from widths import widened
 
-from airmuscle.cli.app import app
-from airmuscle.control import SampledSignal, Schedule
 from airmuscle.core import autodiff
+from airmuscle.engine import DormandPrince8, Problem, Rodas4, RungeKutta4, SampledSignal, Schedule, solve
 from airmuscle.errors import AirmuscleWarning, FileError, ParameterError
-from airmuscle.export import C99, JavaScript, Octave, make_identifiers, write_fmu, write_law, write_program
-from airmuscle.export.building import build_and_run
-from airmuscle.export.identifiers import LONGEST, RESERVED
-from airmuscle.library import list_laws, load_law
-from airmuscle.mechanism import HangingMass
-from airmuscle.muscle.characteristic import Tabulated
-from airmuscle.simulation import DormandPrince8, Problem, Rodas4, RungeKutta4, solve
+from airmuscle.files import list_laws, load_law
+from airmuscle.outlets import C99, JavaScript, Octave, make_identifiers, write_fmu, write_law, write_program
+from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.export.building import build_and_run
+from airmuscle.outlets.export.identifiers import LONGEST, RESERVED
+from airmuscle.physics import HangingMass, Tabulated
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 RAMPS = ((0.0, 0.0), (0.1, 0.5), (0.3, 0.1), (0.5, 0.1), (0.7, 0.4))

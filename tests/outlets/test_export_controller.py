@@ -15,30 +15,34 @@ from control_plants import LIFT, PRESSURE, SPLIT
 from typer.testing import CliRunner
 from widths import widened
 
-from airmuscle.cli.app import app
 from airmuscle.control import (
     PID,
-    PWM,
     Cascade,
-    ColumnSensor,
-    ControlLoop,
     DeadZoneController,
     GainSchedule,
     OnOffController,
-    Schedule,
-    SigmaDelta,
     SlidingMode,
     SuperTwisting,
-    WithSensors,
     WithStuckValve,
 )
+from airmuscle.engine import (
+    PWM,
+    ColumnSensor,
+    ControlLoop,
+    Double,
+    Problem,
+    Schedule,
+    SigmaDelta,
+    Single,
+    WithSensors,
+    solve,
+)
+from airmuscle.engine.run.sampled_loop import prepare_loop
 from airmuscle.errors import FileError, ParameterError
-from airmuscle.export import write_controller
-from airmuscle.export.microcontroller import COMPILER, EMULATOR, PROCESSORS, run_in_emulator
-from airmuscle.export.printed_controller import print_controller
-from airmuscle.simulation import Problem, solve
-from airmuscle.simulation.batch import Double, Single
-from airmuscle.simulation.sampled_loop import prepare_loop
+from airmuscle.outlets import write_controller
+from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.export.microcontroller import COMPILER, EMULATOR, PROCESSORS, run_in_emulator
+from airmuscle.outlets.export.printed_controller import print_controller
 
 SENSED = (ColumnSensor("position", resolution=5e-5, delay=2, lag=3e-3), ColumnSensor("pressure", noise=500.0, delay=1))
 OUTER = PID("position", "pressure", gain=4e6, integral_time=0.4, derivative_time=0.01)

@@ -25,13 +25,14 @@ import printed
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle.cli.app import app
-from airmuscle.control import PID, ControlLoop, Schedule
+from airmuscle.control import PID
+from airmuscle.engine import ControlLoop, Problem, Rodas4, RungeKutta4, Schedule, solve
 from airmuscle.errors import FileError, ParameterError
-from airmuscle.export import compiler, write_fmu
-from airmuscle.export.fmi_units import BASE, base_powers
-from airmuscle.muscle.characteristic import ValidityRange
-from airmuscle.simulation import Problem, Rodas4, RungeKutta4, solve
+from airmuscle.outlets import write_fmu
+from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.export import compiler
+from airmuscle.outlets.export.fmi_units import BASE, base_powers
+from airmuscle.physics import ValidityRange
 
 JUMPS = ((0.0, 0.0), (0.1, 0.5), (0.3, 0.1), (0.4, 0.4))
 SOME = ("dmsp-20-300", "overlap")

@@ -14,23 +14,23 @@ from called_controller import Called
 from control_plants import JOINT, LIFT, PRESSURE, PRESSURES, SPLIT
 from typer.testing import CliRunner
 
-from airmuscle.cli.app import app
-from airmuscle.control import (
-    PID,
+from airmuscle.control import PID, Cascade, OnOffController
+from airmuscle.engine import (
     PWM,
-    Cascade,
     ColumnSensor,
     ControlLoop,
     Driver,
-    OnOffController,
+    Problem,
+    RungeKutta4,
     SampledSignal,
     Schedule,
     SolenoidDriver,
     WithSensors,
+    solve,
 )
 from airmuscle.errors import ParameterError
-from airmuscle.export import C99, JavaScript, Octave, write_program
-from airmuscle.simulation import Problem, RungeKutta4, solve
+from airmuscle.outlets import C99, JavaScript, Octave, write_program
+from airmuscle.outlets.cli.app import app
 
 STEP = Schedule({"pressure": ((0.0, 1e5), (0.1, 3e5))})
 RAMP = SampledSignal({"pressure": ((0.0, 1e5), (0.087, 2.1e5), (0.2, 1.4e5))})

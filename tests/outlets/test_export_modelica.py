@@ -17,12 +17,12 @@ import printed
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle.cli.app import app
-from airmuscle.compile.program import compile_system
-from airmuscle.control import PID, ControlLoop, Schedule
+from airmuscle.control import PID
+from airmuscle.engine import ControlLoop, Problem, Schedule
+from airmuscle.engine.compile.program import compile_system
 from airmuscle.errors import ParameterError
-from airmuscle.export import write_modelica
-from airmuscle.simulation import Problem
+from airmuscle.outlets import write_modelica
+from airmuscle.outlets.cli.app import app
 
 
 def package(name, folder, **options):

@@ -19,13 +19,12 @@ import pytest
 from typer.testing import CliRunner
 from widths import widened
 
-from airmuscle.cli.app import app
-from airmuscle.control import Schedule
+from airmuscle.engine import Problem, Rodas4, RungeKutta4, Schedule, solve
 from airmuscle.errors import ParameterError
-from airmuscle.export import compiler, mujoco_plugin, write_mujoco_plugin
-from airmuscle.mechanism import AntagonisticJoint
-from airmuscle.pneumatics import FillDischarge, Supply, Valve
-from airmuscle.simulation import Problem, Rodas4, RungeKutta4, find_equilibrium, solve
+from airmuscle.outlets import write_mujoco_plugin
+from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.export import compiler, mujoco_plugin
+from airmuscle.physics import AntagonisticJoint, FillDischarge, Supply, Valve, find_equilibrium
 
 VALVE = Valve(2.6167e-9, 0.433)
 PLANT = replace(plants.EXAMPLES["dmsp-20-300"], circuit=FillDischarge(Supply(5.5e5), VALVE, VALVE))

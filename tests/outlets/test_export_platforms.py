@@ -15,15 +15,15 @@ import printed
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle.cli.app import app
-from airmuscle.control import Schedule
 from airmuscle.core import leaves
+from airmuscle.engine import Problem, RungeKutta4, Schedule
 from airmuscle.errors import ParameterError
-from airmuscle.export import C99, platforms, write_fmu, write_law
-from airmuscle.export.compiler import run_command
-from airmuscle.export.platforms import PLATFORMS, find_cross_compiler, find_platform, this_platform
-from airmuscle.library import load_law
-from airmuscle.simulation import Problem, RungeKutta4
+from airmuscle.files import load_law
+from airmuscle.outlets import C99, write_fmu, write_law
+from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.export import platforms
+from airmuscle.outlets.export.compiler import run_command
+from airmuscle.outlets.export.platforms import PLATFORMS, find_cross_compiler, find_platform, this_platform
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "fill_discharge.toml"
 FORMATS = {

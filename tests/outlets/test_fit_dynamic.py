@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 from dynamic_study import VALVES, airmuscle, noisy_run, plant_table, run_table
 
+from airmuscle.bench import CrossPrediction, InitialValue, StartTime, describe_cross_predictions, read_csv, write_csv
 from airmuscle.core import leaves
-from airmuscle.identify.dynamic import CrossPrediction, InitialValue, StartTime, describe_cross_predictions
-from airmuscle.mechanism import HangingMass
-from airmuscle.recording import Recording, read_csv, write_csv
-from airmuscle.scenario import load_dynamic_fit, load_scenario
+from airmuscle.files import load_dynamic_fit, load_scenario
+from airmuscle.physics import HangingMass
+from airmuscle.recording import Recording
 
 INPUT = '[input]\nfill = [["0.1 s", 1], ["1 s", 0]]\ndischarge = [["1.3 s", 1]]\n'
 WEIGHT = 'model = "HangingMass"\nmass = "10 kg"'

@@ -13,13 +13,13 @@ import pytest
 from dynamic_study import airmuscle, noisy_run
 
 import airmuscle as am
+from airmuscle.bench import InitialConditions, write_csv
 from airmuscle.errors import EquilibriumError, ParameterError
-from airmuscle.identify.dynamic import InitialConditions
-from airmuscle.library.location import Location
-from airmuscle.mechanism import HangingMass
-from airmuscle.recording import Recording, write_csv
-from airmuscle.scenario import load_dynamic_fit, load_scenario
-from airmuscle.scenario.initial_state import build_initial_conditions
+from airmuscle.files import load_dynamic_fit, load_scenario
+from airmuscle.files.library.location import Location
+from airmuscle.files.scenario.initial_state import build_initial_conditions
+from airmuscle.physics import HangingMass
+from airmuscle.recording import Recording
 
 MUSCLE = """
 [[plant.muscle]]

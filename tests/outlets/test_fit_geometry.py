@@ -11,13 +11,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle.cli.app import app
+from airmuscle.bench.identify.candidates import blank_surface
 from airmuscle.errors import ParameterError, UnknownNameError
-from airmuscle.identify.candidates import blank_surface
-from airmuscle.library import load, save
-from airmuscle.library.length_scaling import scale_to_length
-from airmuscle.muscle.characteristic import EffectiveLength, MartensBoblan2017
-from airmuscle.muscle.geometry import Braid
+from airmuscle.files import load, save
+from airmuscle.files.library.length_scaling import scale_to_length
+from airmuscle.outlets.cli.app import app
+from airmuscle.physics import Braid, EffectiveLength, MartensBoblan2017
 
 MUSCLE = "dmsp-20-300"
 SURFACE = ("--characteristic", "ContractileSurface", "--degree", 3)

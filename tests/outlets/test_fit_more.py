@@ -13,8 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from airmuscle import load_data
-from airmuscle.cli.app import app
-from airmuscle.identify import (
+from airmuscle.bench import (
     LevelSplit,
     bootstrap,
     confidence_band,
@@ -23,13 +22,15 @@ from airmuscle.identify import (
     fit_shape_constrained,
     profile,
     weakly_determined,
+    write_csv,
 )
-from airmuscle.identify.candidates import blank_surface
-from airmuscle.library import load
-from airmuscle.muscle.characteristic import ContractileSurface, Sarosi2012, ValidityRange
-from airmuscle.recording import Recording, write_csv
-from airmuscle.report.band_plot import band_plot
-from airmuscle.report.levels import levels_of
+from airmuscle.bench.identify.band_plot import band_plot
+from airmuscle.bench.identify.candidates import blank_surface
+from airmuscle.bench.identify.levels import levels_of
+from airmuscle.files import load
+from airmuscle.outlets.cli.app import app
+from airmuscle.physics import ContractileSurface, Sarosi2012, ValidityRange
+from airmuscle.recording import Recording
 
 MUSCLE = "dmsp-20-300"
 SURFACE = ("--characteristic", "ContractileSurface", "--degree", "2")

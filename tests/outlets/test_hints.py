@@ -22,17 +22,31 @@ import pytest
 from typer.testing import CliRunner
 
 import airmuscle as am
-from airmuscle.cli.app import COMMANDS, app
-from airmuscle.cli.option_hints import INSTRUCTIONS, in_options
+from airmuscle.bench import (
+    DropMissing,
+    Huber,
+    LevelSplit,
+    NoTime,
+    RunSplit,
+    bootstrap,
+    compare,
+    find_loops,
+    fit,
+    fit_loop,
+    read,
+    read_csv,
+    standard_candidates,
+    write_csv,
+)
+from airmuscle.bench.identify.candidates import blank_surface
 from airmuscle.core.diagnostics import Diagnostic, DiagnosticCode
 from airmuscle.core.hints import Hint, HintedText
 from airmuscle.errors import ColumnError, SimulationError
-from airmuscle.identify import Huber, LevelSplit, RunSplit, bootstrap, compare, fit, standard_candidates
-from airmuscle.identify.candidates import blank_surface
-from airmuscle.identify.hysteresis import find_loops, fit_loop
-from airmuscle.library.location import located_errors
-from airmuscle.muscle.characteristic import Sarosi2012
-from airmuscle.recording import DropMissing, NoTime, Recording, read, read_csv, write_csv
+from airmuscle.files.library.location import located_errors
+from airmuscle.outlets.cli.app import COMMANDS, app
+from airmuscle.outlets.cli.option_hints import INSTRUCTIONS, in_options
+from airmuscle.physics import Sarosi2012
+from airmuscle.recording import Recording
 
 SOURCE = Path(am.__file__).parent
 SAROSI = Sarosi2012(1.2e-4, 420.0, -57.0, -8.7e-3, 2.7e-3, -310.0)

@@ -15,20 +15,25 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle.cli.app import app
-from airmuscle.identify.campaign import fit_held_creep
-from airmuscle.identify.campaign.creep_stage import creep_force
-from airmuscle.identify.hysteresis import PressurePath, find_holds, find_loops, fit_loop
-from airmuscle.identify.hysteresis.plot import plot_loops
-from airmuscle.library import load, save
-from airmuscle.library.location import Location
-from airmuscle.library.plant_file import build_muscle
-from airmuscle.muscle import CreepElements
-from airmuscle.muscle.friction import MaxwellSlip
-from airmuscle.recording import Recording, read, write_csv
-from airmuscle.recording.segment import motion_direction
-from airmuscle.report.hysteresis_chapter import hysteresis_chapters
-from airmuscle.scenario import load_scenario
+from airmuscle.bench import (
+    PressurePath,
+    find_holds,
+    find_loops,
+    fit_held_creep,
+    fit_loop,
+    motion_direction,
+    read,
+    write_csv,
+)
+from airmuscle.bench.identify.campaign.creep_stage import creep_force
+from airmuscle.bench.identify.hysteresis.hysteresis_chapter import hysteresis_chapters
+from airmuscle.bench.identify.hysteresis.plot import plot_loops
+from airmuscle.files import load, load_scenario, save
+from airmuscle.files.library.location import Location
+from airmuscle.files.library.plant_file import build_muscle
+from airmuscle.outlets.cli.app import app
+from airmuscle.physics import CreepElements, MaxwellSlip
+from airmuscle.recording import Recording
 
 SLIP = MaxwellSlip((2e4, 1e4, 3e3), (3e-4, 1.2e-3, 5e-3))
 TURNS = (0.02, 0.14, 0.08, 0.12, 0.05, 0.14, 0.02)

@@ -11,15 +11,13 @@ import numpy as np
 import pytest
 
 from airmuscle import read
-from airmuscle.control import Schedule
-from airmuscle.identify.dynamic import Experiment, InitialConditions
-from airmuscle.library import load
-from airmuscle.muscle.friction import MaxwellSlip
-from airmuscle.pneumatics import WallHeatTransfer
-from airmuscle.recording import Recording, write_csv
-from airmuscle.reproduce.hosovsky_plant import UnpublishedParameters, hanging_load
-from airmuscle.reproduce.hosovsky_plant import plant as third_paper
-from airmuscle.simulation import simulate
+from airmuscle.bench import Experiment, InitialConditions, write_csv
+from airmuscle.engine import Schedule, simulate
+from airmuscle.files import load
+from airmuscle.papers.hosovsky_plant import UnpublishedParameters, hanging_load
+from airmuscle.papers.hosovsky_plant import plant as third_paper
+from airmuscle.physics import MaxwellSlip, WallHeatTransfer
+from airmuscle.recording import Recording
 
 DOCS = Path(__file__).parents[2] / "docs"
 LAW = load("dmsp-20-300").characteristic

@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle.cli.app import app
+from airmuscle.bench import ColumnMapping, NoTime, UniformTime, find_runs, inspect, read
+from airmuscle.bench.readers.file_name import FileNamePattern
 from airmuscle.errors import AirmuscleError, ColumnError
-from airmuscle.recording import ColumnMapping, NoTime, Recording, UniformTime, read
-from airmuscle.recording.file_name import FileNamePattern
-from airmuscle.recording.segment import find_runs, inspect
+from airmuscle.outlets.cli.app import app
+from airmuscle.recording import Recording
 
 RATE, ROWS = 530.0, 1061
 

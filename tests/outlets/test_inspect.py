@@ -14,9 +14,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from airmuscle.cli.app import app
-from airmuscle.recording import read
-from airmuscle.recording.segment import inspect
+from airmuscle.bench import inspect, read
+from airmuscle.outlets.cli.app import app
 
 ROWS = 400
 

@@ -15,24 +15,28 @@ from joints import chosen_muscle
 
 from airmuscle.core import tree
 from airmuscle.errors import AirmuscleWarning, ParameterError, TraceError
-from airmuscle.library import list_laws, load
-from airmuscle.mechanism import HangingMass, HuntCrossley
-from airmuscle.muscle import CreepElements, EndStop, SeriesSpring, ViscoelasticWall
-from airmuscle.muscle.friction import MaxwellSlip
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import (
+from airmuscle.files import list_laws, load
+from airmuscle.physics import (
+    CreepElements,
+    EndStop,
     EnergyBalance,
     FillDischarge,
+    HangingMass,
+    HuntCrossley,
     Isothermal,
+    MaxwellSlip,
+    Plant,
     Polytropic,
+    SeriesSpring,
     Supply,
     Tank,
     Tube,
     Valve,
+    ViscoelasticWall,
     WithLeak,
     WithTubes,
+    find_equilibrium,
 )
-from airmuscle.simulation.equilibrium import find_equilibrium
 
 jax = pytest.importorskip("jax")
 jax.config.update("jax_enable_x64", True)

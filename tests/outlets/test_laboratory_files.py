@@ -17,23 +17,27 @@ from dynamic_study import plant_table
 from typer.testing import CliRunner
 
 import airmuscle as am
-from airmuscle.cli.app import COMMANDS, app
-from airmuscle.core.constants import STANDARD_GRAVITY
-from airmuscle.errors import ColumnError, FileError, IdentificationError, ParameterError
-from airmuscle.identify import Huber, LeastSquares, LevelSplit, compare, fit
-from airmuscle.muscle.characteristic import ContractileSurface
-from airmuscle.recording import (
+from airmuscle.bench import (
     ColumnMapping,
     DropMissing,
+    Huber,
     InterpolateMissing,
-    Recording,
+    LeastSquares,
+    LevelSplit,
     RefuseMissing,
     RowReader,
+    compare,
+    fit,
     read,
 )
-from airmuscle.recording.mapping import mapping_of_tables
+from airmuscle.bench.readers.mapping import mapping_of_tables
+from airmuscle.core.constants import STANDARD_GRAVITY
+from airmuscle.errors import ColumnError, FileError, IdentificationError, ParameterError
+from airmuscle.files import load_dynamic_fit
+from airmuscle.outlets.cli.app import COMMANDS, app
+from airmuscle.physics import ContractileSurface
+from airmuscle.recording import Recording
 from airmuscle.recording.row_notes import row_notes
-from airmuscle.scenario import load_dynamic_fit
 
 PREAMBLE = ("Prüfstand 3 (Zwick Z010)", "Prüfer;Müller", "Datum;12.03.2026;14:05", "Kanal;1;2;3", "Verstärkung;1;10;1")
 HEADINGS = "Zeit;Druck (rel.);Kraft;Weg;Bemerkung"
@@ -118,7 +122,7 @@ def test_the_number_of_lines_above_the_headings_may_be_stated(tmp_path, write):
 
 
 def test_the_heading_row_of_a_large_file_is_found_in_the_same_way(tmp_path, monkeypatch):
-    monkeypatch.setattr("airmuscle.recording.large_csv.LARGE_FILE_BYTES", 10)
+    monkeypatch.setattr("airmuscle.bench.readers.large_csv.LARGE_FILE_BYTES", 10)
     assert len(only(text(tmp_path, [*PREAMBLE, HEADINGS, UNITS, *ROWS]))) == 4
     assert len(only(text(tmp_path, NUMBERED), columns=MAPPED)) == 4
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle.environments import register_environments
 from airmuscle.errors import ParameterError
+from airmuscle.outlets import register_environments
 
 gymnasium = pytest.importorskip("gymnasium", reason="gymnasium is not installed")
 register_environments()

@@ -12,18 +12,33 @@ from pathlib import Path
 
 import pytest
 
+from airmuscle.bench import fit
 from airmuscle.core import cite
 from airmuscle.errors import AirmuscleError, AirmuscleWarning, FileError, ParameterError, UnitError, UnknownNameError
-from airmuscle.identify import fit
-from airmuscle.library import Entry, catalogue, files, write
-from airmuscle.library.location import Location
-from airmuscle.library.models import model_class, model_names
-from airmuscle.library.plant_file import build_muscle
-from airmuscle.mechanism import HuntCrossley
-from airmuscle.muscle import CreepElements, EndStop, LinearDamper, LinearSpring, PressureDamper, SwellingWall
-from airmuscle.muscle.characteristic import ChouHannaford1996, Clamped, ContractileSurface
-from airmuscle.muscle.friction import BoucWen, Dahl, LuGre, MaxwellSlip, NoFriction, PrandtlIshlinskii
-from airmuscle.muscle.geometry import Braid
+from airmuscle.files import Entry
+from airmuscle.files.library import catalogue, files, write
+from airmuscle.files.library.location import Location
+from airmuscle.files.library.models import model_class, model_names
+from airmuscle.files.library.plant_file import build_muscle
+from airmuscle.physics import (
+    BoucWen,
+    Braid,
+    ChouHannaford1996,
+    Clamped,
+    ContractileSurface,
+    CreepElements,
+    Dahl,
+    EndStop,
+    HuntCrossley,
+    LinearDamper,
+    LinearSpring,
+    LuGre,
+    MaxwellSlip,
+    NoFriction,
+    PrandtlIshlinskii,
+    PressureDamper,
+    SwellingWall,
+)
 
 GOOD = """
 title = "A muscle of our own"

@@ -12,11 +12,10 @@ import pytest
 from typer.testing import CliRunner
 
 import airmuscle as am
-from airmuscle.cli.app import app
 from airmuscle.errors import ParameterError, UnknownNameError
-from airmuscle.library import PlantEntry, list_plants, load_law
-from airmuscle.library.files import PLANTS
-from airmuscle.scenario import load_scenario
+from airmuscle.files import PlantEntry, list_plants, load_law, load_scenario
+from airmuscle.files.library.files import PLANTS
+from airmuscle.outlets.cli.app import app
 
 pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
 each = pytest.mark.parametrize("name", list_plants())

@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from airmuscle.bench import read
+from airmuscle.bench.readers import mat_objects
+from airmuscle.bench.readers.mat_objects import MatlabObject, find_objects
+from airmuscle.bench.readers.raw_mat import read_mat_tables_here
 from airmuscle.errors import FileError
-from airmuscle.recording import mat_objects, read
-from airmuscle.recording.mat_objects import MatlabObject, find_objects
-from airmuscle.recording.raw_mat import read_mat_tables_here
 
 scipy_io = pytest.importorskip("scipy.io")
 pytest.importorskip("pymatreader")

@@ -9,13 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle import mechanism
-from airmuscle.library import list_plants
-from airmuscle.library.build import build
-from airmuscle.library.location import Location
-from airmuscle.library.models import model_names
-from airmuscle.mechanism import AntagonisticJoint, JointWithEndStops, Mechanism
-from airmuscle.simulation import sensitivity
+from airmuscle.engine import sensitivity
+from airmuscle.files import list_plants
+from airmuscle.files.library.build import build
+from airmuscle.files.library.location import Location
+from airmuscle.files.library.models import model_names
+from airmuscle.physics import AntagonisticJoint, JointWithEndStops, Mechanism, mechanism
 
 DOCS = Path(__file__).parents[2] / "docs"
 

@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from airmuscle.bench import read
 from airmuscle.errors import ColumnError, FileError, InputError
-from airmuscle.recording import Recording, read
+from airmuscle.recording import Recording
 
 TIME = np.linspace(0.0, 2.0, 41)
 COLUMNS = {

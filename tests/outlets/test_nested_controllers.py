@@ -16,11 +16,7 @@ from airmuscle.control import (
     AntagonisticInverse,
     Cascade,
     CoContraction,
-    ColumnSensor,
     ComputedTorque,
-    ControlLaw,
-    Controller,
-    ControlLoop,
     DeadZoneController,
     Decentralised,
     FrictionFeedForward,
@@ -29,31 +25,36 @@ from airmuscle.control import (
     HysteresisOperator,
     MotionFeedForward,
     OnOffController,
-    Periodic,
     ProportionalFeedback,
-    SampledSignal,
-    Schedule,
     SetpointCommand,
     SetpointLead,
-    SigmaDelta,
     SlidingMode,
-    SolenoidDriver,
-    SplitRange,
     StateFeedback,
     StaticFeedForward,
     StaticInverse,
     SuperTwisting,
     WithFeedForward,
-    WithSensors,
     WithSetpointDelay,
     WithStuckValve,
 )
+from airmuscle.design import load_scenario_loop, proportional_joint, scenario_contender
+from airmuscle.engine import (
+    ColumnSensor,
+    ControlLaw,
+    Controller,
+    ControlLoop,
+    Periodic,
+    Problem,
+    SampledSignal,
+    Schedule,
+    SigmaDelta,
+    SolenoidDriver,
+    SplitRange,
+    WithSensors,
+)
 from airmuscle.errors import AirmuscleError, ParameterError, UnitError, UnknownNameError
-from airmuscle.library.models import model_class, model_names
-from airmuscle.scenario import Scenario, load_scenario, save_scenario, scenario_text
-from airmuscle.simulation import Problem
-from airmuscle.study.control_benchmark import proportional_joint, scenario_contender
-from airmuscle.study.tuning import load_scenario_loop
+from airmuscle.files import Scenario, load_scenario, save_scenario, scenario_text
+from airmuscle.files.library.models import model_class, model_names
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "joint_cascade.toml"
 TEXT = EXAMPLE.read_text(encoding="utf-8")

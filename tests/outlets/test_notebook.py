@@ -19,8 +19,8 @@ from airmuscle.core.notebook import MAX_NOTES, MAX_ROWS, Card, NotebookDisplay, 
 from airmuscle.core.plotting import new_figure
 from airmuscle.core.short_repr import MAX_LINES, ShortRepr
 from airmuscle.errors import ParameterError
-from airmuscle.muscle.characteristic import ContractileSurface
-from airmuscle.muscle.display import parameter_rows
+from airmuscle.physics import ContractileSurface
+from airmuscle.physics.muscle.display import parameter_rows
 from airmuscle.recording.panels import panels_of
 
 MAX_BYTES = 200_000

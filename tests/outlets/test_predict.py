@@ -14,16 +14,23 @@ import pytest
 from dynamic_study import VALVES, airmuscle, noisy_run, plant_table, run_table
 
 import airmuscle as am
+from airmuscle.bench import (
+    Experiment,
+    InitialConditions,
+    PlantUncertainty,
+    StartTime,
+    predict_dynamic,
+    predict_static,
+    write_csv,
+)
 from airmuscle.core import leaves, with_parameters
+from airmuscle.engine import Rodas4
 from airmuscle.errors import ColumnError, ParameterError
-from airmuscle.identify.dynamic import Experiment, InitialConditions, StartTime
-from airmuscle.identify.prediction import PlantUncertainty, predict_dynamic, predict_static
-from airmuscle.library.entry_prediction import predict_with_entry
-from airmuscle.library.stated_band import StatedBand
-from airmuscle.muscle.friction import Dahl
-from airmuscle.recording import Recording, write_csv
-from airmuscle.scenario import load_scenario
-from airmuscle.simulation import Rodas4
+from airmuscle.files import load_scenario
+from airmuscle.files.library.entry_prediction import predict_with_entry
+from airmuscle.files.library.stated_band import StatedBand
+from airmuscle.physics import Dahl
+from airmuscle.recording import Recording
 
 NOISE = 4.0
 """Standard deviation of the measured force [N]."""
@@ -214,7 +221,7 @@ def test_a_parameter_that_differs_in_the_record_is_seen_and_can_be_estimated_fro
 
 def test_the_band_of_a_plant_grows_with_the_sensitivity_to_its_parameters(study):
     scenario = load_scenario(study / "fit" / "scenario-1.toml")
-    run = am.recording.read(study / "again.csv")[0]
+    run = am.bench.read(study / "again.csv")[0]
     experiment = Experiment(run, scenario.problem.input, InitialConditions.at_rest(scenario.plant, 2e4), 0.03)
     exact = Rodas4(rtol=1e-9)
     wide = PlantUncertainty({"pressure": 500.0}, ("gas.exponent",), np.array([[0.05**2]]))
@@ -235,7 +242,7 @@ def test_the_band_of_a_plant_grows_with_the_sensitivity_to_its_parameters(study)
 
 def test_the_start_time_of_a_prediction_is_estimated_where_it_is_unknown(study):
     scenario = load_scenario(study / "fit" / "scenario-1.toml")
-    run = am.recording.read(study / "again.csv")[0]
+    run = am.bench.read(study / "again.csv")[0]
     experiment = Experiment(run, scenario.problem.input, InitialConditions.at_rest(scenario.plant, 2e4), 0.0)
     late = predict_dynamic(scenario.plant, experiment, {"pressure": 500.0})
     found = predict_dynamic(scenario.plant, experiment, {"pressure": 500.0}, own=(StartTime(0.05),))

@@ -14,13 +14,12 @@ import pytest
 from dynamic_study import VALVES, airmuscle, noisy_run, plant_table, run_table
 
 import airmuscle as am
+from airmuscle.bench import predict_static, rate_of_change, write_csv
 from airmuscle.errors import ParameterError
-from airmuscle.identify.prediction import predict_static
-from airmuscle.library.location import Location
-from airmuscle.library.stated_band import read_stated_band
-from airmuscle.recording import Recording, write_csv
-from airmuscle.recording.segment import rate_of_change
-from airmuscle.scenario import load_scenario
+from airmuscle.files import load_scenario
+from airmuscle.files.library.location import Location
+from airmuscle.files.library.stated_band import read_stated_band
+from airmuscle.recording import Recording
 
 LAW = "chou-hannaford"
 HELD = 'model = "Isometric"\ncontraction = 0.05'

@@ -9,7 +9,8 @@ import plants
 import printed
 import pytest
 
-from airmuscle.compile.kernel_text import (
+from airmuscle.engine import Problem, RungeKutta4, Schedule, solve
+from airmuscle.engine.compile.kernel_text import (
     CKernels,
     JavaScriptKernels,
     MatlabKernels,
@@ -17,11 +18,9 @@ from airmuscle.compile.kernel_text import (
     read_text,
     typed,
 )
-from airmuscle.compile.kernels.driven_inputs import DriverKind, apply_drivers
-from airmuscle.control import Schedule
+from airmuscle.engine.compile.kernels.driven_inputs import DriverKind, apply_drivers
 from airmuscle.errors import TraceError
-from airmuscle.export import C99, JavaScript, Octave, write_program
-from airmuscle.simulation import Problem, RungeKutta4, solve
+from airmuscle.outlets import C99, JavaScript, Octave, write_program
 
 CASES, CAPACITY, PIECES = 2000, 64, 5
 SIGNAL, TABLE = ("", "CAPACITY"), ("1", "4")
@@ -262,7 +261,7 @@ def test_a_new_integrator_in_the_kernels_is_in_every_outlet(target, run, tmp_pat
     def read(module):
         return read_text(MIDPOINT, "midpoint.py") if module == "midpoint" else read_kernels(module)
 
-    monkeypatch.setattr("airmuscle.compile.kernel_text.printer.read_kernels", read)
+    monkeypatch.setattr("airmuscle.engine.compile.kernel_text.printer.read_kernels", read)
     plant = plants.EXAMPLES["heat"]
     signal = Schedule(dict.fromkeys(plant.inputs, ((0.0, 0.3), (0.05, 0.1))))
     problem = Problem(plant, signal, 0.1, plant.state_at(pressure=1e5), integrator=Midpoint(1e-3))

@@ -15,15 +15,15 @@ import plants
 import printed
 import pytest
 
-from airmuscle.compile import functions
-from airmuscle.compile.ir.instructions import Operation
-from airmuscle.compile.ir.interpreter import InterpretedBody
-from airmuscle.compile.jacobians import derivatives
-from airmuscle.compile.llvm.jit import jit_compile
-from airmuscle.compile.program import compile_system
-from airmuscle.compile.text.c import CLanguage
-from airmuscle.compile.text.javascript import JavaScriptLanguage
-from airmuscle.compile.text.matlab import DEFINITION, MatlabLanguage
+from airmuscle.engine.compile import functions
+from airmuscle.engine.compile.ir.instructions import Operation
+from airmuscle.engine.compile.ir.interpreter import InterpretedBody
+from airmuscle.engine.compile.jacobians import derivatives
+from airmuscle.engine.compile.llvm.jit import jit_compile
+from airmuscle.engine.compile.program import compile_system
+from airmuscle.engine.compile.text.c import CLanguage
+from airmuscle.engine.compile.text.javascript import JavaScriptLanguage
+from airmuscle.engine.compile.text.matlab import DEFINITION, MatlabLanguage
 from airmuscle.errors import TraceError
 
 SOME = ("dmsp-20-300", "overlap", "shaped joint with friction", "manifold on tank and regulator")

@@ -11,14 +11,14 @@ from plants import EXAMPLES
 from typer.testing import CliRunner
 
 from airmuscle import simulate
-from airmuscle.cli.app import app
-from airmuscle.control import Schedule
+from airmuscle.engine import Schedule
 from airmuscle.errors import ParameterError, UnknownNameError
-from airmuscle.library import entries_of_product, list_laws, list_products, load, load_law
-from airmuscle.library.scaling import scale_entry
-from airmuscle.library.stated_band import StatedBand
-from airmuscle.library.uncertainty import ParameterUncertainty, without_parts
-from airmuscle.muscle import CreepElements, LinearSpring, Ratings
+from airmuscle.files import entries_of_product, list_laws, list_products, load, load_law
+from airmuscle.files.library.scaling import scale_entry
+from airmuscle.files.library.stated_band import StatedBand
+from airmuscle.files.library.uncertainty import ParameterUncertainty, without_parts
+from airmuscle.outlets.cli.app import app
+from airmuscle.physics import CreepElements, LinearSpring, Ratings
 
 DMSP_20 = "dmsp-20-300"
 

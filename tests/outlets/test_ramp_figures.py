@@ -15,19 +15,18 @@ import pytest
 from typer.testing import CliRunner
 
 from airmuscle import load
-from airmuscle.cli.app import app
+from airmuscle.bench import Fit, fit, fit_chapter
+from airmuscle.bench.identify.band_plot import band_plot
+from airmuscle.bench.identify.levels import is_pressure_ramp, levels_of
+from airmuscle.bench.identify.ramp_plot import ramp_plot
 from airmuscle.core.plotting import MAX_VECTOR_MARKERS, new_figure, rendered, save
-from airmuscle.identify import Fit, fit
-from airmuscle.library import Entry
-from airmuscle.library.fitted_entry import list_files
-from airmuscle.muscle.characteristic import ContractileSurface
-from airmuscle.muscle.isobars import compute_isobars
+from airmuscle.files import Entry
+from airmuscle.files.library.fitted_entry import list_files
+from airmuscle.outlets.cli.app import app
+from airmuscle.physics import ContractileSurface
+from airmuscle.physics.muscle.isobar_plot import isobar_plot
+from airmuscle.physics.muscle.isobars import compute_isobars
 from airmuscle.recording import Recording
-from airmuscle.report import fit_chapter
-from airmuscle.report.band_plot import band_plot
-from airmuscle.report.isobar_plot import isobar_plot
-from airmuscle.report.levels import is_pressure_ramp, levels_of
-from airmuscle.report.ramp_plot import ramp_plot
 
 pytestmark = pytest.mark.drawn
 LENGTHS, CONTRACTIONS = (0.083, 0.182, 0.382), (0.0, 0.04, 0.08, 0.12)

@@ -11,10 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from airmuscle.bench import BlockMeans, Decimation, read
+from airmuscle.bench.readers import pieces, raw_columnar, raw_mat, raw_mdf
+from airmuscle.bench.readers.large_mat import read_large_mat
+from airmuscle.bench.readers.optional_dependency import is_installed
 from airmuscle.errors import AirmuscleError, ColumnError
-from airmuscle.recording import BlockMeans, Decimation, pieces, raw_columnar, raw_mat, raw_mdf, read
-from airmuscle.recording.large_mat import read_large_mat
-from airmuscle.recording.optional_dependency import is_installed
 
 h5py = pytest.importorskip("h5py", reason="h5py is not installed")
 ROWS = 10_007
@@ -170,8 +171,8 @@ def test_a_damaged_large_file_is_an_error_and_no_crash(tmp_path, write):
 
 MEASURE = """
 import sys, resource, pathlib
-from airmuscle.recording import Decimation
-from airmuscle.recording.raw_mat import read_mat_tables_here
+from airmuscle.bench import Decimation
+from airmuscle.bench.readers.raw_mat import read_mat_tables_here
 path = pathlib.Path(sys.argv[1])
 read_mat_tables_here(pathlib.Path(sys.argv[2]), None, (), Decimation(1000))
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

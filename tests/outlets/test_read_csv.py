@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from airmuscle.bench import read_csv
 from airmuscle.errors import ColumnError, FileError, InputError, UnitError
-from airmuscle.recording import Recording, read_csv
+from airmuscle.recording import Recording
 
 PLAIN = "time [s],pressure [kPa],length [mm],force [N]\n0,100,300,0.5\n0.1,200.5,290,120\n0.2,300,280,240.25\n"
 EXPECTED = {

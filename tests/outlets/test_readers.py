@@ -17,11 +17,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from airmuscle.bench import BlockMeans, ColumnMapping, Decimation, read
+from airmuscle.bench.readers import large_csv, separate_process
+from airmuscle.bench.readers.clock import seconds_from_clock
+from airmuscle.bench.readers.mapping import read_mapping
+from airmuscle.bench.readers.separate_process import call_in_separate_process
 from airmuscle.errors import AirmuscleWarning, ColumnError, FileError, InputError, ParameterError, UnitError
-from airmuscle.recording import BlockMeans, ColumnMapping, Decimation, Recording, large_csv, read, separate_process
-from airmuscle.recording.clock import seconds_from_clock
-from airmuscle.recording.mapping import read_mapping
-from airmuscle.recording.separate_process import call_in_separate_process
+from airmuscle.recording import Recording
 
 TIME = np.arange(40) * 0.05
 PRESSURE = 100.0 + 5.0 * np.arange(40.0)  # kPa

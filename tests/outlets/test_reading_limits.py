@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from airmuscle.bench import UniformTime, read, read_csv
+from airmuscle.bench.readers.header import parse_unit_row
+from airmuscle.bench.readers.reader import check_bench
 from airmuscle.errors import AirmuscleWarning, ColumnError, UnitError
-from airmuscle.recording import Recording, UniformTime, read, read_csv
-from airmuscle.recording.header import parse_unit_row
-from airmuscle.recording.reader import check_bench
+from airmuscle.recording import Recording
 
 UP = np.linspace(0.0, 1.0, 60)
 

@@ -26,13 +26,13 @@ import pytest
 from airmuscle.core import Reference, plotting
 from airmuscle.core.output_folder import atomic_folder, check_writable
 from airmuscle.errors import FileError, SolveError, UnknownNameError
+from airmuscle.papers import run
 from airmuscle.report import AtLeast, AtMost, Chapter, Claim, Equal, Kind, Plot, Table, write_report
 from airmuscle.report.chapter import statements
 from airmuscle.report.formatting import MARKS, MEANINGS, count_verdicts, format_number, format_published
 from airmuscle.report.formula import to_mathtext, to_plain
 from airmuscle.report.html import MAX_SVG_BYTES, render_cell, render_header
 from airmuscle.report.write import as_json
-from airmuscle.reproduce import run
 from airmuscle.units import display
 
 pytestmark = pytest.mark.drawn
@@ -465,7 +465,7 @@ def test_an_interruption_does_not_wait_for_the_processes(tmp_path: Path, monkeyp
 
 def test_the_table_of_papers_names_modules_of_this_package():
     assert list(run.PAPERS) == ["saga2007", "borzikova", "hosovsky"]
-    assert all(module.startswith("airmuscle.reproduce.") for module in run.PAPERS.values())
+    assert all(module.startswith("airmuscle.papers.") for module in run.PAPERS.values())
 
 
 def test_a_chosen_bound_is_never_given_out_as_published():

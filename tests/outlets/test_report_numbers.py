@@ -10,33 +10,52 @@ import numpy as np
 import pytest
 
 import airmuscle as am
-from airmuscle.control import Schedule
-from airmuscle.identify import Bootstrap, fit
-from airmuscle.identify.dynamic import Experiment, InitialConditions, fit_dynamic
-from airmuscle.identify.hysteresis import LoopFit, find_loops, fit_hysteresis, fit_jointly
-from airmuscle.identify.prediction import QuantityPrediction, RecordPrediction
-from airmuscle.identify.volume_fit import VolumePoints, fit_volume
-from airmuscle.mechanism import Isometric
-from airmuscle.muscle import Muscle
-from airmuscle.muscle.characteristic import VirtualWork
-from airmuscle.muscle.friction import MaxwellSlip
-from airmuscle.muscle.geometry import Braid
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Polytropic, Supply, Valve
+from airmuscle.bench import (
+    Bootstrap,
+    Experiment,
+    InitialConditions,
+    LoopFit,
+    QuantityPrediction,
+    RecordPrediction,
+    find_loops,
+    fit,
+    fit_dynamic,
+    fit_hysteresis,
+    fit_jointly,
+)
+from airmuscle.bench.identify.campaign.campaign_chapters import (
+    ValidationRow,
+    _band_table,
+    _plan_table,
+    _validation_table,
+)
+from airmuscle.bench.identify.compare_chapter import _ranking
+from airmuscle.bench.identify.dynamic.dynamic_chapter import _estimate_table, _estimates, _optima_table, _record
+from airmuscle.bench.identify.hysteresis.hysteresis_chapter import _law_table, describe_row_counts
+from airmuscle.bench.identify.hysteresis.joint_friction_chapter import _run_table
+from airmuscle.bench.identify.prediction.prediction_chapter import _overview, with_unit
+from airmuscle.bench.identify.prediction.prediction_chapter import _record as predicted_record
+from airmuscle.bench.identify.static_fit_chapter import _rows
+from airmuscle.bench.identify.uncertainty_chapter import Uncertainty, _table
+from airmuscle.bench.identify.volume_chapter import _compared, _volumes
+from airmuscle.bench.identify.volume_fit import VolumePoints, fit_volume
+from airmuscle.design import LiftRequirement, SizingConditions, choose
+from airmuscle.design.sizing.scenario import scenario_valves
+from airmuscle.design.sizing.sizing_chapter import _valve_settings, choice_row
+from airmuscle.engine import Schedule
+from airmuscle.physics import (
+    Braid,
+    FillDischarge,
+    Isometric,
+    MaxwellSlip,
+    Muscle,
+    Plant,
+    Polytropic,
+    Supply,
+    Valve,
+    VirtualWork,
+)
 from airmuscle.recording import Recording
-from airmuscle.report.campaign_chapters import ValidationRow, _band_table, _plan_table, _validation_table
-from airmuscle.report.compare_chapter import _ranking
-from airmuscle.report.dynamic_chapter import _estimate_table, _estimates, _optima_table, _record
-from airmuscle.report.hysteresis_chapter import _law_table, describe_row_counts
-from airmuscle.report.joint_friction_chapter import _run_table
-from airmuscle.report.prediction_chapter import _overview, with_unit
-from airmuscle.report.prediction_chapter import _record as predicted_record
-from airmuscle.report.sizing_chapter import _valve_settings, choice_row
-from airmuscle.report.static_fit_chapter import _rows
-from airmuscle.report.uncertainty_chapter import Uncertainty, _table
-from airmuscle.report.volume_chapter import _compared, _volumes
-from airmuscle.sizing import LiftRequirement, SizingConditions, choose
-from airmuscle.sizing.scenario import scenario_valves
 
 LENGTH = 0.3
 BRAID = Braid(0.01, 0.43, LENGTH)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle.cli.app import app
+from airmuscle.bench import read
 from airmuscle.errors import FileError
-from airmuscle.recording import read
+from airmuscle.outlets.cli.app import app
 
 
 @pytest.fixture

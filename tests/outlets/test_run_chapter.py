@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle.control import PWM, Periodic, SampledSignal, Schedule, WithDrivers
-from airmuscle.report import run_chapter
-from airmuscle.report.simulation_chapter import MAX_DRIVER_SEGMENTS, describe_input
-from airmuscle.scenario import load_scenario
+from airmuscle.engine import PWM, Periodic, SampledSignal, Schedule, WithDrivers
+from airmuscle.files import load_scenario, run_chapter
+from airmuscle.files.scenario.simulation_chapter import MAX_DRIVER_SEGMENTS, describe_input
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "fill_discharge.toml"
 

@@ -7,9 +7,7 @@ from pathlib import Path
 import pytest
 
 import airmuscle as am
-from airmuscle.muscle.characteristic import ContractileSurface, TonduLopez2000
-from airmuscle.muscle.friction import Dahl
-from airmuscle.muscle.geometry import Braid
+from airmuscle.physics import Braid, ContractileSurface, Dahl, TonduLopez2000
 
 ENTRY = am.load("dmsp-20-300")
 MUSCLES = {

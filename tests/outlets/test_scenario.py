@@ -15,7 +15,17 @@ import pytest
 from scenario_files import writer_of
 
 import airmuscle as am
-from airmuscle.control import PWM, Periodic, SampledSignal, Schedule, SolenoidDriver, WithDrivers
+from airmuscle.engine import (
+    PWM,
+    DormandPrince8,
+    Periodic,
+    Rodas4,
+    RungeKutta4,
+    SampledSignal,
+    Schedule,
+    SolenoidDriver,
+    WithDrivers,
+)
 from airmuscle.errors import (
     AirmuscleError,
     ColumnError,
@@ -26,14 +36,19 @@ from airmuscle.errors import (
     UnitError,
     UnknownNameError,
 )
-from airmuscle.library import Entry, load, load_valve, save
-from airmuscle.mechanism import HangingMass, Isometric, WithLatch
-from airmuscle.muscle import LinearDamper
-from airmuscle.muscle.geometry import Braid
-from airmuscle.pneumatics import ClosedChamber, Isothermal, Polytropic, WallHeatTransfer
-from airmuscle.report.simulation_chapter import _input_plot
-from airmuscle.scenario import load_scenario
-from airmuscle.simulation import DormandPrince8, Rodas4, RungeKutta4
+from airmuscle.files import Entry, load, load_scenario, load_valve, save
+from airmuscle.files.scenario.simulation_chapter import _input_plot
+from airmuscle.physics import (
+    Braid,
+    ClosedChamber,
+    HangingMass,
+    Isometric,
+    Isothermal,
+    LinearDamper,
+    Polytropic,
+    WallHeatTransfer,
+    WithLatch,
+)
 
 PAGE = (Path(__file__).parents[2] / "docs" / "scenario.md").read_text(encoding="utf-8")
 WHOLE, FITTED, FROM_LIBRARY, PAIR, DRIVEN, LINE = re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)
@@ -667,8 +682,8 @@ def test_too_many_rows_are_refused_before_they_fill_the_memory(tmp_path: Path):
 
 
 def test_a_scenario_is_loaded_run_and_reported_from_the_faces(tmp_path):
-    scenario = am.scenario.load_scenario(Path(__file__).parents[2] / "examples" / "fill_discharge.toml")
-    page = am.report.write_report([am.report.run_chapter(scenario, scenario.simulate())], tmp_path / "run")
+    scenario = am.files.load_scenario(Path(__file__).parents[2] / "examples" / "fill_discharge.toml")
+    page = am.report.write_report([am.files.run_chapter(scenario, scenario.simulate())], tmp_path / "run")
     assert scenario.title in page.read_text(encoding="utf-8")
-    again = am.scenario.load_scenario(am.scenario.save_scenario(scenario, tmp_path / "again.toml"))
+    again = am.files.load_scenario(am.files.save_scenario(scenario, tmp_path / "again.toml"))
     assert again.problem.system == scenario.problem.system

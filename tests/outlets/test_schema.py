@@ -15,18 +15,17 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle.cli.app import app
 from airmuscle.core import parameters
 from airmuscle.errors import AirmuscleError
-from airmuscle.library import list_laws, list_plants, load, to_toml
-from airmuscle.library.entry_file import build_entry
-from airmuscle.library.files import PLANTS
-from airmuscle.library.models import model_class
-from airmuscle.scenario import load_scenario, muscle_schema, scenario_schema
-from airmuscle.scenario.scenario import TABLES
+from airmuscle.files import list_laws, list_plants, load, load_scenario, muscle_schema, scenario_schema, to_toml
+from airmuscle.files.library.entry_file import build_entry
+from airmuscle.files.library.files import PLANTS
+from airmuscle.files.library.models import model_class
+from airmuscle.files.scenario.scenario import TABLES
+from airmuscle.outlets.cli.app import app
 
 ROOT = Path(__file__).parents[2]
-LIBRARY = sorted((ROOT / "src" / "airmuscle" / "library").glob("*.toml"))
+LIBRARY = sorted((ROOT / "src" / "airmuscle" / "files" / "library").glob("*.toml"))
 EXAMPLES = [p for p in sorted((ROOT / "examples").glob("*.toml")) if "[vary]" not in p.read_text(encoding="utf-8")]
 """Scenarios; a study of many runs has a grammar of its own."""
 SCENARIO, MUSCLE = scenario_schema(), muscle_schema()

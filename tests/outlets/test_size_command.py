@@ -12,10 +12,10 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import airmuscle as am
-from airmuscle.cli.app import app
-from airmuscle.scenario import load_scenario
-from airmuscle.sizing import JointRequirement, LiftRequirement, SizingConditions, choose, scenario_text
-from airmuscle.sizing.scenario import MOVING, RESTING
+from airmuscle.design import JointRequirement, LiftRequirement, SizingConditions, choose, scenario_text
+from airmuscle.design.sizing.scenario import MOVING, RESTING
+from airmuscle.files import load_scenario
+from airmuscle.outlets.cli.app import app
 
 LIFT = ("size", "--load", "20 kg", "--stroke", "40 mm", "--supply", "6 bar")
 ONE = ("--muscle", "dmsp-20-300", "--max-count", "1")

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import airmuscle as am
-from airmuscle.library import to_toml
-from airmuscle.library.location import Location
-from airmuscle.scenario.scenario import build_scenario
+from airmuscle.files import to_toml
+from airmuscle.files.library.location import Location
+from airmuscle.files.scenario.scenario import build_scenario
 
 pytest.importorskip("starlette", reason="needs starlette")
 pytest.importorskip("playwright.sync_api", reason="needs the package playwright")

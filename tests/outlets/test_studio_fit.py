@@ -20,17 +20,17 @@ from studio_tasks import WorkerHere, fail, write_slowly
 pytest.importorskip("starlette", reason="needs starlette")
 
 import airmuscle as am
-from airmuscle.identify import LevelSplit, compare, model_selection, standard_candidates
-from airmuscle.recording import read
-from airmuscle.studio import fit_queue, fit_uploads
-from airmuscle.studio.app import create_app
-from airmuscle.studio.fit_queue import FIT_WORKERS, MAX_WAITING, FitQueue
-from airmuscle.studio.fit_routes import MAX_SETTINGS, FitService
-from airmuscle.studio.fit_task import run_fit
-from airmuscle.studio.fit_uploads import UploadStore, check_file_name
-from airmuscle.studio.page import self_contained_page
-from airmuscle.studio.requests import BadRequest
-from airmuscle.studio.worker import Worker
+from airmuscle.bench import LevelSplit, compare, read, standard_candidates
+from airmuscle.bench.identify import model_selection
+from airmuscle.outlets.studio import fit_queue, fit_uploads
+from airmuscle.outlets.studio.app import create_app
+from airmuscle.outlets.studio.fit_queue import FIT_WORKERS, MAX_WAITING, FitQueue
+from airmuscle.outlets.studio.fit_routes import MAX_SETTINGS, FitService
+from airmuscle.outlets.studio.fit_task import run_fit
+from airmuscle.outlets.studio.fit_uploads import UploadStore, check_file_name
+from airmuscle.outlets.studio.page import self_contained_page
+from airmuscle.outlets.studio.requests import BadRequest
+from airmuscle.outlets.studio.worker import Worker
 
 LAW = am.load("dmsp-20-300").characteristic
 COLUMNS = {"Zeit": {"quantity": "time", "unit": "s"}, "Druck": {"quantity": "pressure", "unit": "bar"}}
@@ -349,7 +349,7 @@ def test_the_specimen_that_does_not_follow_the_others_is_named(tmp_path):
     text = "Specimen c does not follow the others."
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(model_selection, "standard_candidates", lambda runs: standard_candidates(runs)[1:3])
-        patch.setattr("airmuscle.studio.fit_task.odd_specimen_notes", lambda errors: [text])
+        patch.setattr("airmuscle.outlets.studio.fit_task.odd_specimen_notes", lambda errors: [text])
         app = make_app(tmp_path)
         task = fit_of(app, {"columns": COLUMNS, "resting_length": "300 mm"})
     notes = request(app, "GET", f"/api/fit/task/{task}/result.json").json()["notes"]
@@ -516,7 +516,7 @@ def test_an_error_of_a_task_keeps_its_field(tmp_path):
 def test_a_worker_ends_with_its_server(tmp_path):
     """Also during a task, so that a killed server leaves no process and no result."""
     script = (
-        "import sys, pathlib; from airmuscle.studio.fit_queue import FitQueue; from studio_tasks import write_slowly\n"
+        "import sys, pathlib; from airmuscle.outlets.studio.fit_queue import FitQueue; from studio_tasks import write_slowly\n"
         "if __name__ == '__main__':\n"
         "    queue = FitQueue(write_slowly, count=1); task = queue.submit('set', pathlib.Path(sys.argv[1]), 600.0)\n"
         "    while queue.status(task)['fraction'] != 0.5: pass\n"
@@ -589,7 +589,7 @@ def test_the_page_has_the_reading_settings_of_the_command_line(app, tmp_path):
     (tmp_path / "a.csv").write_bytes(content)
     (expected,) = read(
         tmp_path / "a.csv", resting_length="300 mm", displacement_zero="12 mm", skip_rows=1,
-        missing=am.recording.DropMissing((-999.0, "OL")),
+        missing=am.bench.DropMissing((-999.0, "OL")),
     )  # fmt: skip
     assert recording["rows"] == len(expected) == 78
     assert recording["points"]["contraction"] == pytest.approx(expected["contraction"], abs=1e-8)
@@ -623,7 +623,7 @@ def test_outliers_are_left_out_as_by_the_command_line(app, tmp_path):
     ]
     (tmp_path / "a.csv").write_bytes(content)
     stated = {"resting_length": "300 mm", "displacement_zero": "12 mm", "skip_rows": 1}
-    missing = am.recording.DropMissing((-999.0, "OL"))
+    missing = am.bench.DropMissing((-999.0, "OL"))
     (complete,) = read(tmp_path / "a.csv", **stated, missing=missing)
     (expected,) = read(tmp_path / "a.csv", **stated, missing=missing, drop_outliers=True)
     left_out = np.flatnonzero(~np.isin(complete["time"], expected["time"]))

@@ -8,15 +8,14 @@ import numpy as np
 import pytest
 from studio_pages import run_script, scripts
 
-from airmuscle.analysis import linearise
-from airmuscle.control import ControlLoop, SampledSignal, Schedule
 from airmuscle.core import with_parameters
-from airmuscle.library.plant_file import plant_tables
-from airmuscle.scenario.scenario import build_scenario
-from airmuscle.simulation import Problem, solve
-from airmuscle.studio.joint_laws import joint_controllers, statics_within_valves
-from airmuscle.studio.joint_sheet import joint_tables, sheet_of_joint
-from airmuscle.study.control_benchmark import STANDARD_TASKS
+from airmuscle.design import STANDARD_TASKS
+from airmuscle.engine import ControlLoop, Problem, SampledSignal, Schedule, solve
+from airmuscle.files.library.plant_file import plant_tables
+from airmuscle.files.scenario.scenario import build_scenario
+from airmuscle.outlets.studio.joint_laws import joint_controllers, statics_within_valves
+from airmuscle.outlets.studio.joint_sheet import joint_tables, sheet_of_joint
+from airmuscle.physics import linearise
 
 pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
 SCRIPTS = ("plant-start", "plant-run", "joint-loop", "joint-statics", "joint-linear")

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle.analysis import joint_statics
-from airmuscle.library.location import Location
-from airmuscle.library.plant_file import plant_tables
-from airmuscle.scenario.scenario import build_scenario
-from airmuscle.sizing import LiftRequirement, SizingConditions, size_muscles
-from airmuscle.studio import export_page
+from airmuscle.design import LiftRequirement, SizingConditions, size_muscles
+from airmuscle.files.library.location import Location
+from airmuscle.files.library.plant_file import plant_tables
+from airmuscle.files.scenario.scenario import build_scenario
+from airmuscle.outlets import export_page
+from airmuscle.physics import joint_statics
 
 pytest.importorskip("starlette", reason="needs starlette")
 pytest.importorskip("playwright.sync_api", reason="needs the package playwright")

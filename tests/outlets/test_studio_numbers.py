@@ -15,18 +15,18 @@ from studio_pages import BEGINNING, WEB, run_script, scripts
 from typer.testing import CliRunner
 
 import airmuscle as am
-from airmuscle.cli.app import app
 from airmuscle.core import flatten, leaves, with_parameters
 from airmuscle.errors import FileError, ParameterError, PhysicsError, TraceError
-from airmuscle.library import list_laws, list_plants, to_toml
-from airmuscle.library.build import build
-from airmuscle.library.location import Location
-from airmuscle.muscle.geometry import Braid, PleatedTube, StraightFibre
-from airmuscle.scenario.scenario import build_scenario
-from airmuscle.studio import export_page
-from airmuscle.studio.law_sheet import law_sheet
-from airmuscle.studio.tasks import plant_names, sheet_of_any, sheet_of_scenario_text
-from airmuscle.studio.toml_template import fill_template
+from airmuscle.files import list_laws, list_plants, to_toml
+from airmuscle.files.library.build import build
+from airmuscle.files.library.location import Location
+from airmuscle.files.scenario.scenario import build_scenario
+from airmuscle.outlets import export_page
+from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.studio.law_sheet import law_sheet
+from airmuscle.outlets.studio.tasks import plant_names, sheet_of_any, sheet_of_scenario_text
+from airmuscle.outlets.studio.toml_template import fill_template
+from airmuscle.physics import Braid, PleatedTube, StraightFibre
 
 WITHOUT_CLOSED_FORM = ("festo-tool-dmsp-10", "festo-tool-dmsp-20", "festo-tool-dmsp-40", "saga2007-exact")
 pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
@@ -200,9 +200,9 @@ def test_a_run_of_the_page_is_that_of_the_library(name, tmp_path):
 
 
 def scenario_of(name):
-    from airmuscle.library.files import read_toml
-    from airmuscle.library.plant_file import plant_tables
-    from airmuscle.studio.tasks import SCENARIOS
+    from airmuscle.files.library.files import read_toml
+    from airmuscle.files.library.plant_file import plant_tables
+    from airmuscle.outlets.studio.tasks import SCENARIOS
 
     if name in list_plants():
         tables, location = plant_tables(name)

@@ -20,7 +20,7 @@ import pytest
 pytest.importorskip("starlette", reason="needs starlette")
 pytest.importorskip("uvicorn", reason="needs uvicorn")
 
-from airmuscle.studio import connections, worker
+from airmuscle.outlets.studio import connections, worker
 
 
 @contextmanager

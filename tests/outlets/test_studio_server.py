@@ -20,17 +20,17 @@ pytest.importorskip("starlette", reason="needs starlette")
 
 from airmuscle import load
 from airmuscle.errors import InputError, ParameterError
-from airmuscle.library import to_toml
-from airmuscle.library.location import Location
-from airmuscle.studio import app as studio_app
-from airmuscle.studio import single_file
-from airmuscle.studio.app import MAX_PAGE, create_app
-from airmuscle.studio.page import self_contained_page
-from airmuscle.studio.plant_sheet import sheet_of_tables
-from airmuscle.studio.security import Access, is_loopback
-from airmuscle.studio.server import access_of, bound_socket, reachable_host, warning_of
-from airmuscle.studio.uploads import MAX_TEXT, read_text_tables
-from airmuscle.studio.worker import LimitError, WorkerPool
+from airmuscle.files import to_toml
+from airmuscle.files.library.location import Location
+from airmuscle.outlets.studio import app as studio_app
+from airmuscle.outlets.studio import single_file
+from airmuscle.outlets.studio.app import MAX_PAGE, create_app
+from airmuscle.outlets.studio.page import self_contained_page
+from airmuscle.outlets.studio.plant_sheet import sheet_of_tables
+from airmuscle.outlets.studio.security import Access, is_loopback
+from airmuscle.outlets.studio.server import access_of, bound_socket, reachable_host, warning_of
+from airmuscle.outlets.studio.uploads import MAX_TEXT, read_text_tables
+from airmuscle.outlets.studio.worker import LimitError, WorkerPool
 
 MUSCLE = to_toml(load("tondu-lopez"))
 

@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from airmuscle.bench import read
 from airmuscle.errors import AirmuscleWarning, ColumnError
-from airmuscle.muscle.characteristic import TonduLopez2000
-from airmuscle.muscle.geometry import Braid
-from airmuscle.recording import read
+from airmuscle.physics import Braid, TonduLopez2000
 
 MUSCLE = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.2)
 HEAD = "time [s],pressure [kPa],contraction [%],force [N]"

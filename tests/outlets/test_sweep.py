@@ -26,18 +26,19 @@ import pytest
 from scenario_files import CIRCUIT, MUSCLE_FILE
 from typer.testing import CliRunner
 
-from airmuscle.cli.app import app
-from airmuscle.cli.interruption import check_interrupted, deferred_sigint
 from airmuscle.core import fingerprint
+from airmuscle.design import dask_cluster, load_study, process_pool, run_study
+from airmuscle.design.study import chunk
+from airmuscle.design.study.chapter import study_chapter, write_study
+from airmuscle.design.study.design import DESIGNS
+from airmuscle.design.study.distributions import VARIATIONS
+from airmuscle.design.study.metrics import METRICS
+from airmuscle.engine import simulate, solve
 from airmuscle.errors import AirmuscleError, ColumnError, FileError, InputError, SimulationError
+from airmuscle.files import load_scenario
+from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli.interruption import check_interrupted, deferred_sigint
 from airmuscle.report.write import save_table
-from airmuscle.scenario import load_scenario
-from airmuscle.simulation import simulate, solve
-from airmuscle.study import chunk, dask_cluster, load_study, process_pool, run_study
-from airmuscle.study.chapter import study_chapter, write_study
-from airmuscle.study.design import DESIGNS
-from airmuscle.study.distributions import VARIATIONS
-from airmuscle.study.metrics import METRICS
 
 ROOT = Path(__file__).parents[2]
 SCENARIO = f"""
@@ -494,7 +495,7 @@ def test_an_unexpected_exception_fails_only_its_own_run(folder: Path, monkeypatc
             raise ZeroDivisionError("by nothing")
         return solve(*given, **named)
 
-    monkeypatch.setattr("airmuscle.study.scenario_runs.solve", failing)
+    monkeypatch.setattr("airmuscle.design.study.scenario_runs.solve", failing)
     result = run(folder)
     assert [r for r in result.failure_reasons if r] == ["ZeroDivisionError: by nothing"]
 
@@ -715,7 +716,7 @@ def test_invalid_executors_and_folders_are_rejected(folder: Path):
 
 def test_a_cluster_that_does_not_respond_is_rejected(monkeypatch: pytest.MonkeyPatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("airmuscle.study.executors.CONNECT_TIMEOUT", 0.5)
+    monkeypatch.setattr("airmuscle.design.study.executors.CONNECT_TIMEOUT", 0.5)
     for address in ("tcp://127.0.0.1:1", "nonsense://here"):
         with (
             pytest.raises(InputError, match=f"no response from a Dask scheduler at '{address}'"),

@@ -14,10 +14,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from airmuscle.errors import ParameterError
-from airmuscle.library.location import Location
-from airmuscle.study.design import Grid, LatinHypercube, MonteCarlo, Saltelli, Sobol
-from airmuscle.study.distributions import (
+from airmuscle.design.study.design import Grid, LatinHypercube, MonteCarlo, Saltelli, Sobol
+from airmuscle.design.study.distributions import (
     LevelSet,
     LogNormal,
     Normal,
@@ -28,7 +26,9 @@ from airmuscle.study.distributions import (
     Variation,
     read_variation,
 )
-from airmuscle.study.fields import read_difference
+from airmuscle.design.study.fields import read_difference
+from airmuscle.errors import ParameterError
+from airmuscle.files.library.location import Location
 
 numbers = st.floats(-1e6, 1e6)
 widths = st.floats(1e-3, 1e6)

@@ -14,8 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from airmuscle.errors import ParameterError
-from airmuscle.study.metrics import (
+from airmuscle.design.study.metrics import (
     Final,
     Maximum,
     Mean,
@@ -27,7 +26,8 @@ from airmuscle.study.metrics import (
     TimeSeries,
     TimeToReach,
 )
-from airmuscle.study.result import _statistics
+from airmuscle.design.study.result import _statistics
+from airmuscle.errors import ParameterError
 
 TIME = np.linspace(0.0, 2.0, 21)
 RAMP = 3.0 * TIME - 1.0

@@ -15,11 +15,11 @@ import pytest
 from scenario_files import CIRCUIT, MUSCLE_FILE
 from typer.testing import CliRunner
 
-from airmuscle.cli import tune as command
-from airmuscle.cli.app import app
+from airmuscle.design import Perturbations, load_scenario_loop, tune
 from airmuscle.errors import AirmuscleError, FileError, ParameterError
-from airmuscle.scenario import load_scenario
-from airmuscle.study import Perturbations, load_scenario_loop, tune
+from airmuscle.files import load_scenario
+from airmuscle.outlets.cli import tune as command
+from airmuscle.outlets.cli.app import app
 
 MUSCLE = f"""{MUSCLE_FILE}
 [damper]

@@ -16,14 +16,9 @@ from control_plants import JOINT, LIFT, MUSCLES, PRESSURE, SPLIT
 from plants import chosen_muscle
 
 import airmuscle as am
-from airmuscle.control import PID, ColumnSensor, ControlLaw, ControlLoop, Schedule, WithSensors
+from airmuscle.control import PID
 from airmuscle.core import model, ops, parameter
-from airmuscle.errors import ColumnError, ParameterError, SimulationError
-from airmuscle.library.uncertainty import ParameterUncertainty
-from airmuscle.mechanism import HangingMass, Isometric
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import ProportionalRegulator, SecondOrderLag, Supply, Valve
-from airmuscle.study import (
+from airmuscle.design import (
     CaseMetrics,
     IntegralAbsoluteError,
     IntegralTimeAbsoluteError,
@@ -34,6 +29,10 @@ from airmuscle.study import (
     perturbed_family,
     tune,
 )
+from airmuscle.engine import ColumnSensor, ControlLaw, ControlLoop, Schedule, WithSensors
+from airmuscle.errors import ColumnError, ParameterError, SimulationError
+from airmuscle.files.library.uncertainty import ParameterUncertainty
+from airmuscle.physics import HangingMass, Isometric, Plant, ProportionalRegulator, SecondOrderLag, Supply, Valve
 
 STEPS = Schedule({"pressure": ((0, 1e5), (0.1, 2e5))})
 LOOP = ControlLoop(PRESSURE, 0.01, STEPS)

@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle.cli.app import app
+from airmuscle.bench import inspect, read
 from airmuscle.errors import FileError
-from airmuscle.recording import read
-from airmuscle.recording.segment import inspect
+from airmuscle.outlets.cli.app import app
 
 HEAD = "time [s],pressure [kPa],force [N]\n"
 ROWS = "".join(f"{i},{100 + i},{50 + i}\n" for i in range(9))

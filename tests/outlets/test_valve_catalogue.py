@@ -13,10 +13,9 @@ import pytest
 from typer.testing import CliRunner
 
 import airmuscle as am
-from airmuscle.cli.app import app
 from airmuscle.core import cite
 from airmuscle.errors import AirmuscleWarning, FileError, ParameterError, UnitError, UnknownNameError
-from airmuscle.library import (
+from airmuscle.files import (
     Entry,
     PlantEntry,
     ValveEntry,
@@ -27,13 +26,14 @@ from airmuscle.library import (
     list_valves,
     load,
     load_law,
+    load_scenario,
     load_valve,
 )
-from airmuscle.library.build import build
-from airmuscle.library.location import Location
-from airmuscle.pneumatics import CheckValve, Valve, in_series
-from airmuscle.reproduce.hosovsky_plant import MATRIX
-from airmuscle.scenario import load_scenario
+from airmuscle.files.library.build import build
+from airmuscle.files.library.location import Location
+from airmuscle.outlets.cli.app import app
+from airmuscle.papers.hosovsky_plant import MATRIX
+from airmuscle.physics import CheckValve, Valve, in_series
 
 pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
 every_valve = pytest.mark.parametrize("name", list_valves())

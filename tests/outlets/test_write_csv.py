@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from airmuscle.bench import read_csv, write_csv
 from airmuscle.errors import FileError
-from airmuscle.recording import QUANTITIES, Recording, read_csv, write_csv
+from airmuscle.recording import QUANTITIES, Recording
 
 
 def run(rows: int = 50) -> Recording:

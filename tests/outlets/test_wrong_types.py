@@ -13,15 +13,23 @@ import numpy as np
 import pytest
 
 from airmuscle import cite, fit, load, load_data, read, read_csv, save, write_csv
-from airmuscle.control import PWM, Periodic, SampledSignal, Schedule, WithDrivers, spline_trajectory
+from airmuscle.engine import PWM, Periodic, SampledSignal, Schedule, WithDrivers, advance, simulate, spline_trajectory
+from airmuscle.engine.run import integrators
 from airmuscle.errors import AirmuscleError, ColumnError, FileError, ParameterError, UnknownNameError
-from airmuscle.mechanism import HangingMass, WithOffsets
-from airmuscle.muscle import LinearDamper, Muscle
-from airmuscle.muscle.characteristic import ContractileSurface
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import FillDischarge, Supply, Valve, in_parallel, in_series
+from airmuscle.physics import (
+    ContractileSurface,
+    FillDischarge,
+    HangingMass,
+    LinearDamper,
+    Muscle,
+    Plant,
+    Supply,
+    Valve,
+    WithOffsets,
+    in_parallel,
+    in_series,
+)
 from airmuscle.recording import Recording
-from airmuscle.simulation import advance, integrators, simulate
 
 EDGE = Valve(2.6e-9, 0.433)
 CIRCUIT = FillDischarge(Supply(6e5), EDGE, EDGE)

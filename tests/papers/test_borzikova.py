@@ -9,13 +9,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from airmuscle.identify.surface.basis import LoadRange
-from airmuscle.muscle.characteristic.borzikova import SAM_30X290
-from airmuscle.report import Kind
-from airmuscle.report.chapter import DIFFERS, HOLDS, NOT_TESTABLE
-from airmuscle.reproduce import borzikova
-from airmuscle.reproduce import borzikova_muscle_claims as muscle_claims
-from airmuscle.reproduce.borzikova_surfaces import (
+from airmuscle.bench.identify.surface.basis import LoadRange
+from airmuscle.papers import borzikova
+from airmuscle.papers import borzikova_muscle_claims as muscle_claims
+from airmuscle.papers.borzikova_surfaces import (
     AS_EXPONENT,
     CORRECTED,
     CORRECTED_A02,
@@ -29,6 +26,9 @@ from airmuscle.reproduce.borzikova_surfaces import (
     surfaces,
     with_a02,
 )
+from airmuscle.physics.muscle.characteristic.borzikova import SAM_30X290
+from airmuscle.report import Kind
+from airmuscle.report.chapter import DIFFERS, HOLDS, NOT_TESTABLE
 
 CURVES = SAM_30X290
 
@@ -197,7 +197,7 @@ def test_the_saturation_is_not_reached_within_the_pressure_range():
 
 
 def test_the_library_holds_the_monotone_fit_of_the_chapter(laws):
-    from airmuscle.library import load
+    from airmuscle.files import load
 
     kept = load("borzikova-monotone").characteristic
     data = sample(CURVES)

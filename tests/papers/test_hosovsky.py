@@ -7,31 +7,14 @@ import dataclasses
 import numpy as np
 import pytest
 
-from airmuscle.control import ZERO_INPUT, SampledSignal
-from airmuscle.identify import fit
-from airmuscle.mechanism import HangingMass, Isometric
-from airmuscle.muscle import CubicSeriesSpring, CubicSpring, LinearDamper, LinearSpring, Muscle, ViscoelasticWall
-from airmuscle.muscle.characteristic import ContractileSurface
-from airmuscle.plant import Plant
-from airmuscle.pneumatics import (
-    ClosedChamber,
-    EnergyBalance,
-    Isothermal,
-    Polytropic,
-    SubsonicIndexValve,
-    Tube,
-    Valve,
-    VirialGas,
-)
-from airmuscle.recording import Recording
-from airmuscle.report import Kind
-from airmuscle.report.chapter import DIFFERS, HOLDS, NOT_TESTABLE, statements
-from airmuscle.reproduce import hosovsky, hosovsky_claims, hosovsky_effect_ranges
-from airmuscle.reproduce import hosovsky_effects as causing
-from airmuscle.reproduce import hosovsky_fill as filling
-from airmuscle.reproduce import hosovsky_joint as joining
-from airmuscle.reproduce import hosovsky_release as releasing
-from airmuscle.reproduce.hosovsky_plant import (
+from airmuscle.bench import fit
+from airmuscle.engine import ZERO_INPUT, DormandPrince8, RungeKutta4, SampledSignal, simulate
+from airmuscle.papers import hosovsky, hosovsky_claims, hosovsky_effect_ranges
+from airmuscle.papers import hosovsky_effects as causing
+from airmuscle.papers import hosovsky_fill as filling
+from airmuscle.papers import hosovsky_joint as joining
+from airmuscle.papers import hosovsky_release as releasing
+from airmuscle.papers.hosovsky_plant import (
     MATRIX,
     MATRIX_BY_VOLUME,
     UnpublishedParameters,
@@ -41,9 +24,31 @@ from airmuscle.reproduce.hosovsky_plant import (
     surface,
     surface_fit,
 )
-from airmuscle.reproduce.hosovsky_schedule import FILLING
-from airmuscle.simulation import DormandPrince8, RungeKutta4, simulate
-from airmuscle.simulation.equilibrium import find_equilibrium
+from airmuscle.papers.hosovsky_schedule import FILLING
+from airmuscle.physics import (
+    ClosedChamber,
+    ContractileSurface,
+    CubicSeriesSpring,
+    CubicSpring,
+    EnergyBalance,
+    HangingMass,
+    Isometric,
+    Isothermal,
+    LinearDamper,
+    LinearSpring,
+    Muscle,
+    Plant,
+    Polytropic,
+    SubsonicIndexValve,
+    Tube,
+    Valve,
+    VirialGas,
+    ViscoelasticWall,
+    find_equilibrium,
+)
+from airmuscle.recording import Recording
+from airmuscle.report import Kind
+from airmuscle.report.chapter import DIFFERS, HOLDS, NOT_TESTABLE, statements
 
 NUMBERS = UnpublishedParameters()
 

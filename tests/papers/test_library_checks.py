@@ -8,7 +8,8 @@ import warnings
 import pytest
 
 from airmuscle.errors import AirmuscleWarning
-from airmuscle.library import Entry, catalogue, files, verify
+from airmuscle.files import Entry, verify
+from airmuscle.files.library import catalogue, files
 
 
 def quietly_loaded(name: str) -> Entry:

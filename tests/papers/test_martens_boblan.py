@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from airmuscle.core import ops
-from airmuscle.library import catalogue
-from airmuscle.muscle.characteristic import MartensBoblan2017
+from airmuscle.files.library import catalogue
+from airmuscle.physics import MartensBoblan2017
 from airmuscle.units import degree
 
 ROWS = {"dmsp-20-300": 126, "dmsp-10-250": 85}

@@ -16,25 +16,13 @@ from scipy.optimize import brentq
 
 from airmuscle.core import autodiff, flatten, structure
 from airmuscle.errors import GeometryLimitError, ParameterError, SolveError
-from airmuscle.library import load
-from airmuscle.muscle.characteristic import AxialIntegral, RubberLine, Saga2007
-from airmuscle.muscle.characteristic.saga2007 import LINE_A, LINE_B
-from airmuscle.muscle.geometry import (
-    CircularArc,
-    Parabola,
-    PrintedFibreSum,
-    StraightFibre,
-    UniformFibreSum,
-    UserDefinedFibreSum,
-)
-from airmuscle.report import Kind
-from airmuscle.report.chapter import DEPENDS, DIFFERS, HOLDS, NOT_PRINTED, NOT_TESTABLE, statements
-from airmuscle.reproduce import saga2007_claims as claims
-from airmuscle.reproduce import saga2007_further_claims as further
-from airmuscle.reproduce import saga2007_joint as joining
-from airmuscle.reproduce import saga2007_pairs as pairs
-from airmuscle.reproduce.saga2007 import chapter
-from airmuscle.reproduce.saga2007_muscle import (
+from airmuscle.files import load
+from airmuscle.papers import saga2007_claims as claims
+from airmuscle.papers import saga2007_further_claims as further
+from airmuscle.papers import saga2007_joint as joining
+from airmuscle.papers import saga2007_pairs as pairs
+from airmuscle.papers.saga2007 import chapter
+from airmuscle.papers.saga2007_muscle import (
     DEFAULT,
     circular_meridian,
     exact_mechanics,
@@ -42,8 +30,22 @@ from airmuscle.reproduce.saga2007_muscle import (
     interpretation,
     with_rings,
 )
-from airmuscle.reproduce.saga2007_previous import Ferraresi2001, previous_model_claims
-from airmuscle.reproduce.saga2007_tables import virtual_work
+from airmuscle.papers.saga2007_previous import Ferraresi2001, previous_model_claims
+from airmuscle.papers.saga2007_tables import virtual_work
+from airmuscle.physics import (
+    AxialIntegral,
+    CircularArc,
+    Parabola,
+    PrintedFibreSum,
+    RubberLine,
+    Saga2007,
+    StraightFibre,
+    UniformFibreSum,
+    UserDefinedFibreSum,
+)
+from airmuscle.physics.muscle.characteristic.saga2007 import LINE_A, LINE_B
+from airmuscle.report import Kind
+from airmuscle.report.chapter import DEPENDS, DIFFERS, HOLDS, NOT_PRINTED, NOT_TESTABLE, statements
 
 LINES = {"A": LINE_A, "B": LINE_B}
 AT = np.array([0.001, 0.01, 0.05, 0.10, 0.20, 0.35])

@@ -9,6 +9,4 @@ from .chapter import Plot as Plot
 from .chapter import PublishedValue as PublishedValue
 from .chapter import Statement as Statement
 from .chapter import Table as Table
-from .simulation_chapter import run_chapter as run_chapter
-from .static_fit_chapter import fit_chapter as fit_chapter
 from .write import write_report as write_report

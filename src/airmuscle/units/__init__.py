@@ -6,7 +6,7 @@ All internal values are SI. A pressure is gauge unless its unit states absolute,
 """
 
 from ..core.display import display
-from ..core.units import (
+from ..core.units import (  # fmt: skip
     AMBIENT_PRESSURE,
     J,
     K,
@@ -34,7 +34,7 @@ from ..core.units import (
     quantity,
     rad,
     s,
-)  # fmt: skip
+)
 
 __all__ = [
     "AMBIENT_PRESSURE",

@@ -1,0 +1,5 @@
+"""Bench: readers of measurement files, inspection, identification of muscles and plants, prediction."""
+
+from .. import _attach_stub
+
+__getattr__, __dir__, __all__ = _attach_stub(__name__, __file__)

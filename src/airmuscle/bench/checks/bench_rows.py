@@ -1,0 +1,149 @@
+"""Rows of the recordings of a bench for its checks: joined columns, robust limits, lines of force over pressure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core.arrays import Array
+from ...recording.recording import Recording
+from ..segment.remembered import remembered
+from ..segment.sensor import estimate_sensors
+
+MIN_FORCE = 0.05
+"""Minimum force of a row that surely pulls, as a fraction of the maximum force (chosen)."""
+NO_PRESSURE = 0.01
+"""Pressure that counts as none, as a fraction of the highest (chosen)."""
+MAX_ELONGATION = 0.005
+"""Elongation and contraction that count as the resting length (chosen); a stretched muscle pulls without pressure."""
+MIN_ROWS = 6
+"""Minimum number of rows of a level (chosen)."""
+LEVELS = 8
+"""Number of intervals of the contraction, with equal numbers of rows, in which force is taken as linear in pressure."""
+
+
+def recordings_with(recordings: Sequence[Recording], *names: str) -> list[Recording]:
+    """The recordings that have all named columns."""
+    return [recording for recording in recordings if all(name in recording for name in names)]
+
+
+def limits(values: Array) -> tuple[float, float]:
+    """The 1 % and the 99 % quantile, so that a glitch is not judged."""
+    low, high = np.nanquantile(values, [0.01, 0.99])
+    return float(low), float(high)
+
+
+def file_list(origins: Sequence[str], most: int = 3) -> str:
+    """Names of files as text, the first ones and the number of the others."""
+    names = list(dict.fromkeys(origins))
+    rest = len(names) - most
+    return ", ".join(names) if rest <= 1 else f"{', '.join(names[:most])} and {rest} more"
+
+
+class BenchRows(NamedTuple):
+    """Pressure [Pa], contraction [1] and force [N] of all complete rows of a bench; shape (N,) each."""
+
+    pressure: Array
+    contraction: Array
+    force: Array
+
+    @classmethod
+    def of(cls, recordings: Sequence[Recording]) -> BenchRows:
+        """The rows of the recordings that have all three quantities."""
+        return _rows_of(recordings)
+
+    def at(self, rows: npt.NDArray[np.bool_]) -> BenchRows:
+        """The rows of a mask (N,)."""
+        return BenchRows(*(column[rows] for column in self))
+
+    @property
+    def greatest(self) -> float:
+        """The maximum force [N] without glitches; 0 without rows."""
+        return limits(self.force)[1] if self.force.size else 0.0
+
+    @property
+    def shortened(self) -> BenchRows:
+        """The rows at the resting length and shorter."""
+        return self.at(self.contraction > -MAX_ELONGATION)
+
+    @property
+    def pulling(self) -> BenchRows:
+        """The rows whose force is above `MIN_FORCE`."""
+        return self.at(self.force > MIN_FORCE * self.greatest)
+
+    @property
+    def slack_forces(self) -> Array:
+        """The forces [N] at zero pressure and shortened length, where a muscle is slack."""
+        without = np.abs(self.pressure) < NO_PRESSURE * np.max(self.pressure, initial=0.0)
+        return self.force[without & (self.contraction > MAX_ELONGATION)]
+
+
+@remembered
+def _rows_of(recordings: Sequence[Recording]) -> BenchRows:
+    given = recordings_with(recordings, *BenchRows._fields)
+    columns = [np.concatenate([[], *(run[name] for run in given)]) for name in BenchRows._fields]
+    complete = np.isfinite(np.sum(columns, axis=0)) & _not_saturated(given)
+    return BenchRows(*(column[complete] for column in columns))
+
+
+def _not_saturated(recordings: Sequence[Recording]) -> npt.NDArray[np.bool_]:
+    """Mask (N,) of the rows at which the force sensor is not at its upper limit."""
+    if not recordings:
+        return np.zeros(0, dtype=bool)
+    sensor = estimate_sensors([Recording({"force": each["force"]}, each.origin) for each in recordings])["force"]
+    limit = sensor.upper_limit - 0.25 * sensor.resolution
+    return np.concatenate([each["force"] < limit for each in recordings])
+
+
+class PressureLine(NamedTuple):
+    """The straight line of the force over the pressure at one contraction, of the rows that pull."""
+
+    contraction: float
+    intercept: float
+    """Force at zero pressure [N], extrapolated."""
+    slope: float
+    """Slope [N/Pa]."""
+    error: float
+    """Standard error of the intercept [N], of independent rows."""
+
+    @property
+    def zero_force_pressure(self) -> float:
+        """The pressure [Pa] at which the line gives no force."""
+        return -self.intercept / self.slope
+
+
+def pressure_lines(rows: BenchRows) -> list[PressureLine]:
+    """The lines of force over pressure at levels of the contraction; those with too few rows or pressures are omitted.
+
+    Within a level the force is taken as bilinear in pressure and contraction, at the middle of the level.
+    """
+    pull = rows.shortened.pulling
+    if pull.force.size < MIN_ROWS:
+        return []
+    edges = np.unique(np.quantile(pull.contraction, np.linspace(0.0, 1.0, LEVELS + 1)))
+    level = np.clip(np.searchsorted(edges, pull.contraction, side="right"), 1, max(edges.size - 1, 1))
+    lines = (_line(pull.at(level == i)) for i in range(1, max(edges.size, 2)))
+    return [line for line in lines if line is not None]
+
+
+def _line(rows: BenchRows) -> PressureLine | None:
+    """The line of one level; None unless the pressure varies by half of its maximum."""
+    if rows.force.size < MIN_ROWS or np.ptp(rows.pressure) < 0.5 * np.max(rows.pressure):
+        return None
+    offset, middle = rows.contraction - float(np.median(rows.contraction)), float(np.median(rows.contraction))
+    columns = [np.ones(offset.size), rows.pressure]
+    if np.ptp(offset) > 1e-3:
+        columns += [offset, rows.pressure * offset]
+    matrix = np.column_stack(columns)
+    scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)
+    values, _, rank, _ = np.linalg.lstsq(matrix / scale, rows.force, rcond=None)
+    if rank < matrix.shape[1] or not values[1] > 0:
+        return None
+    residual = rows.force - matrix @ (values / scale)
+    variance = float(residual @ residual) / max(offset.size - rank, 1)
+    inverse = np.linalg.inv((matrix / scale).T @ (matrix / scale))
+    error = float(np.sqrt(variance * inverse[0, 0])) / float(scale[0])
+    return PressureLine(middle, float(values[0] / scale[0]), float(values[1] / scale[1]), error)

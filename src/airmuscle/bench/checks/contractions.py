@@ -1,0 +1,105 @@
+"""Checks of the contraction: reversed sign, elongation, a ratio read as percent, and the limit of all muscles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ...core.errors import ColumnError
+from ...recording.recording import Recording
+from ..segment.sensor import estimate_noise
+from .bench_rows import BenchRows, file_list, limits, recordings_with
+from .forces import REVERSED
+
+MAX_STRETCH = 0.05
+"""Maximum elongation by the resting length (chosen)."""
+SMALL_CONTRACTION = 0.01
+"""Contraction in percent below which the numbers may be ratios (chosen)."""
+NOISE_RANGE = 10.0
+"""Range of a held contraction, in standard deviations of its noise (chosen)."""
+MAX_CONTRACTION = 0.55
+"""Greatest contraction at which a pneumatic muscle pulls: pleated muscles without membrane stretch reach 54 % at most
+(Daerden, Conception and realization of pleated pneumatic artificial muscles (1999)); braided ones at most
+1 - 1/(sqrt(3) cos(angle)), 42 % (Chou and Hannaford 1996)."""
+PULLING = 0.05
+"""Force of a row that pulls, as a fraction of the maximum force (chosen)."""
+PRESSURE_LEVELS = 6
+"""Number of intervals of pressure in which the slope of the force over the contraction is judged (chosen)."""
+MIN_LEVEL_ROWS, MIN_RISING = 6, 0.8
+"""Minimum number of rows of an interval, and minimum share of intervals in which the force rises (chosen)."""
+MIN_RANGE = 0.02
+"""Minimum range of the contraction in an interval (chosen)."""
+
+
+def check_contraction_signs(recordings: Sequence[Recording]) -> Iterator[str]:
+    """A contraction of reversed sign, or that of percent as ratios."""
+    given = recordings_with(recordings, "contraction")
+    widest = max((limits(each["contraction"])[1] for each in given), default=0.0)
+    for each in given:
+        low, high = limits(each["contraction"])
+        if low < -MAX_STRETCH and -low > REVERSED * max(high, 0.0):
+            yield (
+                f"{each.origin}: the contraction is down to {100 * low:.3g} %, an elongation that muscles do not bear. "
+                "The contraction (L0 - L)/L0 of a shortened muscle is positive: check the resting length, or, if the "
+                "column is a strain (L - L0)/L0, multiply it by -1."
+            )
+            return
+        held = high - low <= NOISE_RANGE * estimate_noise(each["contraction"])
+        small = high - low > 2e-4 and high <= SMALL_CONTRACTION and low > -1e-3
+        if each.units.get("contraction") == "%" and small and not held and widest <= SMALL_CONTRACTION:
+            yield (
+                f"{each.origin}: the contraction changes from {100 * low:.3g} to {100 * high:.3g} % only. If these "
+                "numbers are ratios and not percent, state the unit '1'."
+            )
+            return
+
+
+def check_contraction_limit(recordings: Sequence[Recording]) -> Iterator[str]:
+    """A muscle that pulls beyond `MAX_CONTRACTION`. Raises ColumnError where it pulls nowhere else."""
+    given = recordings_with(recordings, *BenchRows._fields)
+    rows = BenchRows.of(given)
+    beyond = rows.contraction[(rows.contraction > MAX_CONTRACTION) & (rows.force > PULLING * rows.greatest)]
+    if not beyond.size or not rows.greatest > 0:
+        return
+    low, high = limits(beyond)
+    text = (
+        f"{_files_beyond(given)}: the muscle pulls at a contraction of {100 * low:.3g} to {100 * high:.3g} %, but no "
+        f"pneumatic muscle pulls beyond {100 * MAX_CONTRACTION:.3g} %. Check the units of the length and of the "
+        "resting length (a length in cm under a heading in mm?)."
+    )
+    inside = rows.contraction[rows.force > PULLING * rows.greatest]
+    if limits(inside)[0] > MAX_CONTRACTION:
+        raise ColumnError(text)
+    yield text
+
+
+def _files_beyond(recordings: Sequence[Recording]) -> str:
+    return file_list([each.origin for each in recordings if limits(each["contraction"])[1] > MAX_CONTRACTION])
+
+
+def check_elongation(recordings: Sequence[Recording]) -> Iterator[str]:
+    """A force that rises with the contraction at nearly every pressure: the column counts the elongation."""
+    rows = BenchRows.of(recordings).shortened
+    if rows.force.size < MIN_LEVEL_ROWS or not rows.greatest > 0:
+        return
+    edges = np.quantile(rows.pressure, np.linspace(0.0, 1.0, PRESSURE_LEVELS + 1))[1:-1]
+    level = np.digitize(rows.pressure, edges)
+    slopes = [_slope(rows.at(level == i)) for i in range(PRESSURE_LEVELS)]
+    known = np.array([slope for slope in slopes if slope is not None])
+    if known.size and np.mean(known > 0) >= MIN_RISING:
+        yield (
+            f"{file_list([each.origin for each in recordings])}: the force rises with the contraction at nearly every "
+            "pressure, but that of a muscle falls. The column probably counts the elongation, or the displacement from "
+            "the shortest length: the contraction (L0 - L)/L0 is 0 at the resting length and grows as the muscle "
+            "shortens."
+        )
+
+
+def _slope(rows: BenchRows) -> float | None:
+    """The slope of the force over the contraction at equal pressure [N]; None where too little varies."""
+    if rows.force.size < MIN_LEVEL_ROWS or np.ptp(rows.contraction) < MIN_RANGE:
+        return None
+    scaled = (rows.pressure - np.mean(rows.pressure)) / max(float(np.ptp(rows.pressure)), 1.0)
+    matrix = np.column_stack([np.ones(scaled.size), rows.contraction, scaled])
+    return float(np.linalg.lstsq(matrix, rows.force, rcond=None)[0][1])

@@ -1,0 +1,120 @@
+"""Plot of the confidence and prediction bands of a fit."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...core import plotting
+from ...core.arrays import Array
+from ...core.display import level_text
+from ...core.errors import IdentificationError
+from ...recording import Recording
+from ...report.chapter import Plot
+from . import Band, Fit, confidence_band
+from .levels import is_pressure_ramp, levels_of
+
+LEVEL = 0.95
+MAX_CURVES = 5
+"""Maximum number of curves: more bands would overlap."""
+POINTS = 121
+_DISPLAY_UNITS = {"pressure": (1e-3, "kPa"), "contraction": (100.0, "%"), "force": (1.0, "N")}
+
+
+class CurveAxes(NamedTuple):
+    """The quantity that is constant on a curve, and the one that varies along it."""
+
+    constant: str
+    varying: str
+
+
+_CURVE_AXES = {
+    "force": CurveAxes("pressure", "contraction"),
+    "contraction": CurveAxes("pressure", "force"),
+    "pressure": CurveAxes("contraction", "force"),
+}
+
+_CAPTION = (
+    "Left: 95 % confidence bands (dark) and prediction bands of one further measurement (light) at measured levels. "
+    "Right: half width of the confidence bands (thick) and the prediction bands (thin), for non-negative forces. The "
+    "variance of the parameters is estimated "
+)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class BandCurve:
+    """A fitted curve at one level of the held quantity, with both 95 % bands; SI, shape (N,) each."""
+
+    level: float
+    points: Array
+    """Values of the quantity along the curve."""
+    confidence: Band
+    prediction: Band
+
+
+def band_curves(fit: Fit) -> tuple[CurveAxes, tuple[BandCurve, ...]] | None:
+    """Return the fitted curves at measured levels with their bands; None if no band can be computed."""
+    curve, curves = _curve_axes(fit), []
+    for level in levels_of(fit.recording[curve.constant], MAX_CURVES):
+        points = _curve_points(fit, curve, float(level))
+        try:
+            bands = [confidence_band(fit, points, level=LEVEL, prediction=further) for further in (False, True)]
+        except IdentificationError:
+            return None
+        curves.append(BandCurve(float(level), points[curve.varying], *bands))
+    return curve, tuple(curves)
+
+
+def band_plot(fit: Fit, name: str = "bands") -> Plot | None:
+    """Return the fitted curves with 95 % bands and the half width of the bands; None if no band can be computed."""
+    computed, quantity = band_curves(fit), fit.fitted_quantity.name
+    if computed is None:
+        return None
+    curve, curves = computed
+    figure, (left, right) = plotting.new_figure(1, 2, width=7.4, height=3.7)
+    (factor, unit), (x_factor, x_unit) = _DISPLAY_UNITS[quantity], _DISPLAY_UNITS[curve.varying]
+    for i, each in enumerate(curves):
+        confidence, prediction = each.confidence, each.prediction
+        colour = plotting.LINES[i % len(plotting.LINES)]
+        x = x_factor * np.where(confidence.value < 0 if quantity == "force" else False, np.nan, each.points)
+        label = level_text(curve.constant, each.level, max(abs(other.level) for other in curves))
+        style = {"color": colour, "linestyle": plotting.DASHES[i % 5]}
+        left.plot(x, factor * confidence.value, label=label, **style)
+        left.fill_between(x, factor * prediction.low, factor * prediction.high, color=colour, alpha=0.15, linewidth=0)
+        left.fill_between(x, factor * confidence.low, factor * confidence.high, color=colour, alpha=0.35, linewidth=0)
+        right.plot(x, factor * (confidence.high - confidence.value), **style)
+        right.plot(x, factor * (prediction.high - prediction.value), color=colour, linewidth=0.7, alpha=0.7)
+    _draw_measured(left, fit, curve, factor, x_factor)
+    left.set(xlabel=f"{curve.varying} [{x_unit}]", ylabel=f"{quantity} [{unit}]")
+    right.set(xlabel=f"{curve.varying} [{x_unit}]", ylabel=f"half width of the band [{unit}]", ylim=(0.0, None))
+    plotting.legend_below(figure, left, columns=MAX_CURVES + 1)
+    return Plot(name, f"{_CAPTION}{fit.error_basis}.", figure)
+
+
+def _curve_axes(fit: Fit) -> CurveAxes:
+    """Return the quantities of the curves; over the pressure if it was swept at held contractions."""
+    data, quantity = fit.recording, fit.fitted_quantity.name
+    ramp = quantity == "force" and is_pressure_ramp(data["pressure"], data["contraction"])
+    return CurveAxes("contraction", "pressure") if ramp else _CURVE_AXES[quantity]
+
+
+def _curve_points(fit: Fit, curve: CurveAxes, level: float) -> Recording:
+    """Return points over the range of the data at one level, for the median resting length."""
+    low, high = fit.data_ranges[curve.varying]
+    columns = {curve.varying: np.linspace(low, high, POINTS), curve.constant: np.full(POINTS, level)}
+    lengths = fit.recording.columns.get("resting_length")
+    constants = {} if lengths is None else {"resting_length": float(np.median(lengths))}
+    return Recording(columns, fit.recording.origin, constants)
+
+
+def _draw_measured(axes: Any, fit: Fit, curve: CurveAxes, factor: float, x_factor: float) -> None:
+    measured = fit.recording.rows(fit.censoring == 0)
+    style = {"marker": ".", "linestyle": "none", "markersize": 2, "color": plotting.BLACK, "alpha": 0.35}
+    axes.plot(
+        x_factor * measured[curve.varying], factor * measured[fit.fitted_quantity.name], label="measured", **style
+    )
+    values = factor * measured[fit.fitted_quantity.name]
+    margin = 0.08 * float(np.ptp(values)) or 1.0
+    axes.set_ylim(float(values.min()) - margin, float(values.max()) + margin)

@@ -1,0 +1,259 @@
+"""Campaign: the identification of one muscle from all records of a rig, stage by stage."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+
+from ....core.arrays import Array
+from ....core.errors import IdentificationError
+from ....core.short_repr import ShortRepr
+from ....physics.muscle import CreepElements, LinearDamper, Muscle
+from ....physics.muscle.characteristic.base import ForceLaw
+from ....physics.muscle.friction import Friction, NoFriction
+from ....physics.muscle.geometry import Geometry
+from ....recording import Recording
+from ..compared_points import FORCE_MARGIN, law_of_length
+from .creep_stage import CreepStage, fit_creep_stage
+from .fill_stage import FillStage, fit_fill_stage
+from .friction_stage import FrictionStage, fit_friction_stage
+from .next_experiment import NextExperiment, plan_next
+from .predicted_force import predicted_force
+from .record import CampaignRecord, RecordKind, classify_records
+from .release_stage import ReleaseStage, fit_release_stage
+from .rig import check_one_rig
+from .rows import named
+from .stage import LeftOutStage
+from .static_stage import StaticStage, fit_static_stage
+from .volume import scaled_to_length, volume_change
+
+STAGES = ("records", "creep", "hysteresis", "static characteristic", "fills and volume", "release", "plan")
+"""The stages in their order; each is fitted with the results of those before it."""
+T = TypeVar("T")
+StageResult = CreepStage | FrictionStage | StaticStage | FillStage | ReleaseStage | LeftOutStage
+_WEIGHTS = (0.05, 0.05, 0.35, 0.3, 0.15, 0.08, 0.02)
+"""Shares of the stages in the computing time (chosen)."""
+
+
+class Prediction(NamedTuple):
+    """Predicted force and the limits of its 95 % band at the rows of a record [N]; shape (N,) each."""
+
+    force: Array
+    low: Array
+    high: Array
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Campaign(ShortRepr):
+    """The records of a rig with their use, the result of each stage, and the next experiments."""
+
+    records: tuple[CampaignRecord, ...]
+    creep: CreepStage | LeftOutStage
+    hysteresis: FrictionStage | LeftOutStage
+    static: StaticStage | LeftOutStage
+    fills: FillStage | LeftOutStage
+    release: ReleaseStage | LeftOutStage
+    next_experiments: tuple[NextExperiment, ...]
+    given_geometry: Geometry | None = None
+    """The geometry that was given; it is that of the muscle also without fills."""
+
+    @property
+    def stages(self) -> tuple[tuple[str, StageResult], ...]:
+        """The name and the result of each stage."""
+        results = (self.creep, self.hysteresis, self.static, self.fills, self.release)
+        return tuple(zip(STAGES[1:-1], results, strict=True))
+
+    @property
+    def friction(self) -> Friction:
+        """The friction of the muscle."""
+        return self.hysteresis.friction if isinstance(self.hysteresis, FrictionStage) else NoFriction()
+
+    @property
+    def creep_elements(self) -> CreepElements:
+        """The creep elements of the muscle."""
+        return self.creep.elements if isinstance(self.creep, CreepStage) else CreepElements()
+
+    @property
+    def resting_length(self) -> float | None:
+        """Resting length of the muscle that is written [m]: that of the fills, else the longest of the static runs."""
+        return _main_length(self.records)
+
+    def law(self, resting_length: float | None = None) -> ForceLaw | None:
+        """The static law of a muscle of a resting length [m], by default the one that is written."""
+        if not isinstance(self.static, StaticStage):
+            return None
+        law = law_of_length(self.static.fit.model, resting_length or self.resting_length)
+        return law if isinstance(law, ForceLaw) else None
+
+    def geometry(self, resting_length: float | None = None) -> Geometry | None:
+        """The given geometry or that of the fills, for a resting length [m] with a volume in proportion; None without
+        one."""
+        own = self.fills.geometry if isinstance(self.fills, FillStage) else self.given_geometry
+        if own is None:
+            return None
+        length = resting_length or self.resting_length
+        if length is None or abs(length - own.resting_length) < 1e-6:
+            return own
+        return _geometry_of_length(self, length, own)
+
+    def muscle(self, resting_length: float | None = None) -> Muscle | None:
+        """The muscle of a resting length [m] with all identified parts; None without a static law or a volume."""
+        law, geometry = self.law(resting_length), self.geometry(resting_length)
+        if law is None or geometry is None:
+            return None
+        assert isinstance(self.static, StaticStage)
+        damper = self.release.damper if isinstance(self.release, ReleaseStage) else LinearDamper(0.0)
+        return Muscle(
+            law, geometry, damper=damper, friction=self.friction, creep=self.creep_elements,
+            validity_range=self.static.fit.validity_range,
+        )  # fmt: skip
+
+    def predict(self, recording: Recording) -> Prediction:
+        """The force along the pressure and the motion of a recording, with its 95 % band.
+
+        The band is that of further runs for a resting length of the records, and that of other lengths otherwise.
+        Raises IdentificationError without a static law, ColumnError without pressure and contraction.
+        """
+        if not isinstance(self.static, StaticStage):
+            raise IdentificationError(f"the campaign has no static characteristic: {self.static.reason}.")
+        length = recording.constants.get("resting_length")
+        law = law_of_length(self.static.fit.model, None if length is None else float(length))
+        limit = FORCE_MARGIN * max(float(np.nanmax(run["force"])) for run in self.static.points)
+        force = predicted_force(law, recording, self.friction, self.creep_elements, limit)
+        known = {r.resting_length for r in self.records if r.kind.is_static}
+        measured = length is None or any(abs(float(length) - k) < 1e-6 for k in known if k)
+        half = self.static.half_width(recording, measured)
+        return Prediction(np.maximum(force, 0.0), force - half, force + half)
+
+
+def _geometry_of_length(campaign: Campaign, length: float, own: Geometry) -> Geometry | None:
+    """The volume change of the law of this length, with the volume at rest in proportion to the length."""
+    law = campaign.law(length)
+    assert isinstance(campaign.static, StaticStage)
+    ranges = campaign.static.fit.data_ranges
+    change = None if law is None else volume_change(law, length, ranges["pressure"], ranges["contraction"])
+    if change is None:
+        return None
+    return change.geometry(scaled_to_length(float(own.volume(0.0)), own.resting_length, length))
+
+
+def _main_length(records: Sequence[CampaignRecord]) -> float | None:
+    for kinds in ((RecordKind.FILL,), (RecordKind.RELEASE,), tuple(RecordKind)):
+        lengths = [r.resting_length for r in records if r.kind in kinds and r.resting_length is not None]
+        if lengths:
+            return max(lengths, key=lambda length: (lengths.count(length), length))
+    return None
+
+
+def identify_campaign(
+    recordings: Sequence[Recording],
+    *,
+    geometry: Geometry | None = None,
+    progress: Callable[[str, float], None] | None = None,
+    finished: Callable[[str, object], None] | None = None,
+    known: Mapping[str, Any] | None = None,
+) -> Campaign:
+    """Identify one muscle from all recordings of a rig.
+
+    The records are sorted by kind. Creep is fitted to holds; friction to loops freed of creep; the static
+    characteristic to the slow rows freed of both; valve and volume to fills and discharges; the damping to releases. A
+    stage that the records do not allow is left out with its reason.
+
+    geometry  the geometry of the muscle; by default the volume follows from the static law and fills at several lengths
+    progress  called with the name of the stage and the completed fraction of the campaign
+    finished  called with the name and the result of each stage as it ends
+    known     results of finished stages by name, from an interrupted call with the same recordings and geometry
+
+    Raises IdentificationError where no record can be used.
+    """
+    steps = _Steps(progress, finished, known or {})
+    records = classify_records(named(recordings))
+    _check_usable(records)
+    check_one_rig(records)
+    steps.end("records", records)
+    creep = steps.fit("creep", lambda _: fit_creep_stage(_of_kind(records, RecordKind.CREEP)))
+    elements = creep.elements if isinstance(creep, CreepStage) else CreepElements()
+    hysteresis = steps.fit("hysteresis", lambda show: fit_friction_stage(records, elements, show))
+    friction = hysteresis.friction if isinstance(hysteresis, FrictionStage) else NoFriction()
+    static = steps.fit("static characteristic", lambda show: fit_static_stage(records, friction, elements, show))
+    fills = steps.fit("fills and volume", lambda show: _fit_fills(records, static, geometry, show))
+    partial = Campaign(records, creep, hysteresis, static, fills, LeftOutStage("release", "", ""), (), geometry)
+    releases = _of_kind(records, RecordKind.RELEASE)
+    muscle = partial.muscle(releases[0].resting_length) if releases else None
+    release = steps.fit("release", lambda _: fit_release_stage(releases, muscle))
+    complete = dataclasses.replace(partial, release=release)
+    planned = plan_next([stage for _, stage in complete.stages], static, records)
+    steps.end("plan", planned)
+    return dataclasses.replace(complete, next_experiments=planned)
+
+
+def _fit_fills(
+    records: Sequence[CampaignRecord],
+    static: StaticStage | LeftOutStage,
+    geometry: Geometry | None,
+    progress: Callable[[float], None],
+) -> FillStage | LeftOutStage:
+    fills = _of_kind(records, RecordKind.FILL)
+    lengths = sorted({r.resting_length for r in fills if r.resting_length is not None})
+    if len(lengths) > 1:
+        main = _main_length(records)
+        fills = [r for r in fills if r.resting_length == main]
+    change = None
+    if isinstance(static, StaticStage) and lengths:
+        law, ranges = law_of_length(static.fit.model, _main_length(records)), static.fit.data_ranges
+        if isinstance(law, ForceLaw):
+            change = volume_change(law, _main_length(records) or 0.0, ranges["pressure"], ranges["contraction"])
+    return fit_fill_stage(fills, geometry, change, progress)
+
+
+def _of_kind(records: Sequence[CampaignRecord], kind: RecordKind) -> list[CampaignRecord]:
+    return [record for record in records if record.kind is kind]
+
+
+def _check_usable(records: Sequence[CampaignRecord]) -> None:
+    if records and any(record.kind is not RecordKind.UNUSED for record in records):
+        return
+    reasons = "; ".join(f"{record.origin}: {record.reason}" for record in records) or "there is no recording"
+    raise IdentificationError(
+        f"no record of the campaign can be used ({reasons}). Give records with pressure, length and force, and the "
+        "resting length."
+    )
+
+
+class _Steps:
+    """Progress over the stages."""
+
+    def __init__(
+        self,
+        progress: Callable[[str, float], None] | None,
+        finished: Callable[[str, object], None] | None,
+        known: Mapping[str, Any],
+    ) -> None:
+        self._progress, self._finished, self._known = progress, finished, known
+        self._total = sum(_WEIGHTS)
+
+    def within(self, stage: str) -> Callable[[float], None]:
+        """The progress within a stage, called with its completed fraction."""
+        number = STAGES.index(stage)
+        before, own = sum(_WEIGHTS[:number]), _WEIGHTS[number]
+
+        def show(fraction: float) -> None:
+            if self._progress is not None:
+                self._progress(stage, (before + own * fraction) / self._total)
+
+        return show
+
+    def fit(self, stage: str, task: Callable[[Callable[[float], None]], T]) -> T:
+        """The result of a stage: the known one, or that of the task, which is called with the progress."""
+        result: T = self._known[stage] if stage in self._known else task(self.within(stage))
+        return self.end(stage, result)
+
+    def end(self, stage: str, result: T) -> T:
+        """Report the end of a stage with its result."""
+        self.within(stage)(1.0)
+        if self._finished is not None:
+            self._finished(stage, result)
+        return result

@@ -1,0 +1,200 @@
+"""Plots of a campaign: characteristic, loops with their bands, residuals of the stages, fills and creep."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ....core.errors import AirmuscleError
+from ....core.plotting import BLACK, BLUE, DASHES, LINES, RED, legend_below, new_figure
+from ....report.chapter import Plot
+from . import Campaign, CampaignRecord, CreepStage, FillStage, RecordKind, StaticStage
+
+MAX_LOOPS, MAX_PANELS = 6, 6
+"""Maximum number of loops in a figure, and of panels of fills (chosen)."""
+CURVE_POINTS = 161
+LEVEL_TOLERANCE = 0.03
+"""Maximum relative difference of two pressures that have one curve (chosen)."""
+POINT_TOLERANCE = 0.005
+"""Maximum difference of the pressure of a point from that of its curve, relative to the maximum (chosen)."""
+
+
+def characteristic_plot(campaign: Campaign) -> Plot | None:
+    """Return the isobars of the muscle with the 95 % band and the measured points, freed of friction and creep."""
+    stage, law = campaign.static, campaign.law()
+    if not isinstance(stage, StaticStage) or law is None:
+        return None
+    length = campaign.resting_length
+    figure, axes = new_figure(width=6.6, height=4.0)
+    runs = [run for run in stage.points if length is None or run.constants.get("resting_length") in (length, None)]
+    pressures = _isobaric_levels(campaign, length) or np.linspace(*stage.fit.data_ranges["pressure"], 6)[1:].tolist()
+    low, high = stage.fit.data_ranges["contraction"]
+    eps = np.linspace(low, high, CURVE_POINTS)
+    for i, pressure in enumerate(pressures):
+        colour, force = LINES[i % len(LINES)], np.asarray(law.force(np.full(eps.size, pressure), eps), dtype=float)
+        force = np.where(force > 0.0, force, np.nan)
+        label = f"{pressure / 1e3:.3g} kPa"
+        axes.plot(100 * eps, force, color=colour, linestyle=DASHES[i % 5], label=label, zorder=3)
+        half = stage.band.half_width
+        axes.fill_between(100 * eps, np.maximum(force - half, 0), force + half, color=colour, alpha=0.18, linewidth=0)
+        for run in runs:
+            rows = np.abs(run["pressure"] - pressure) <= POINT_TOLERANCE * max(pressures)
+            style = {"color": colour, "linestyle": "none", "marker": ".", "markersize": 2.5, "alpha": 0.7}
+            axes.plot(100 * run["contraction"][rows], run["force"][rows], **style)
+    axes.set(xlabel="contraction [%]", ylabel="force [N]", ylim=(0.0, None))
+    axes.legend(title="gauge pressure", loc="upper right", fontsize=8, title_fontsize=8)
+    text = "" if length is None else f" of the muscle of {1e3 * length:.4g} mm"
+    caption = (
+        f"Static characteristic{text}: fitted law with its 95 % band, and measured points freed of friction and creep."
+    )
+    return Plot("campaign-characteristic", caption, figure)
+
+
+def _isobaric_levels(campaign: Campaign, length: float | None) -> list[float]:
+    levels = [
+        record.level[1]
+        for record in campaign.records
+        if record.kind is RecordKind.ISOBARIC and record.level and record.resting_length in (length, None)
+    ]
+    distinct: list[float] = []
+    for level in sorted(levels):
+        if not distinct or level - distinct[-1] > LEVEL_TOLERANCE * max(levels):
+            distinct.append(level)
+    return distinct[:: max(1, -(-len(distinct) // 7))]
+
+
+def prediction_plot(campaign: Campaign) -> Plot | None:
+    """Return measured loops, the force predicted with friction and creep, and its 95 % band."""
+    shown = _spread([record for record in campaign.records if record.kind is RecordKind.ISOBARIC], MAX_LOOPS)
+    shown = shown or _spread([record for record in campaign.records if record.kind.is_static], MAX_LOOPS)
+    if not shown or not isinstance(campaign.static, StaticStage):
+        return None
+    columns = min(3, len(shown))
+    rows = -(-len(shown) // columns)
+    figure, panels = new_figure(rows, columns, width=7.4, height=2.3 * rows + 0.4, squeeze=False)
+    for axes, record in zip(panels.ravel(), shown, strict=False):
+        _draw_loop(axes, campaign, record)
+    for axes in panels.ravel()[len(shown) :]:
+        axes.set_visible(False)
+    for axes in panels[:, 0]:
+        axes.set_ylabel("force [N]")
+    legend_below(figure, panels[0, 0], columns=3)
+    caption = (
+        "Slow records with the predicted force: static law minus friction and creep along the recorded motion. "
+        "Shaded: 95 % band."
+    )
+    return Plot("campaign-loops", caption, figure)
+
+
+def _draw_loop(axes: Any, campaign: Campaign, record: CampaignRecord) -> None:
+    recording = record.recording
+    prediction = campaign.predict(recording)
+    swept = "pressure" if record.kind is RecordKind.ISOMETRIC else "contraction"
+    factor = 1e-3 if swept == "pressure" else 100.0
+    x = factor * recording[swept]
+    dots = {"linestyle": "none", "marker": ".", "markersize": 2, "color": BLUE, "alpha": 0.6}
+    axes.plot(x, recording["force"], label="measured", **dots)
+    rising = np.argsort(x, kind="stable")
+    axes.fill_between(
+        x[rising], _envelope(prediction.low[rising], np.minimum), _envelope(prediction.high[rising], np.maximum),
+        color=RED, alpha=0.15, linewidth=0, label="95 % band",
+    )  # fmt: skip
+    axes.plot(x, prediction.force, color=RED, linewidth=0.9, label="predicted")
+    axes.set_xlabel("pressure [kPa]" if swept == "pressure" else "contraction [%]")
+    length = "" if record.resting_length is None else f", {1e3 * record.resting_length:.4g} mm"
+    level = record.level
+    axes.set_title("" if level is None else f"{_level_text(*level)}{length}", fontsize=8)
+
+
+def _envelope(values: np.ndarray, extreme: Any, width: int = 9) -> np.ndarray:
+    """Return the running extreme of a band, which has two branches."""
+    padded = np.pad(values, width // 2, mode="edge")
+    result = padded[: values.size]
+    for shift in range(1, width):
+        result = extreme(result, padded[shift : shift + values.size])
+    return np.asarray(result)
+
+
+def _level_text(column: str, value: float) -> str:
+    factor, unit = {"pressure": (1e-3, "kPa"), "force": (1.0, "N"), "contraction": (100.0, "%")}.get(
+        column, (1e3, "mm")
+    )
+    scaled = factor * value
+    return f"{0.0 if abs(scaled) < 5e-3 else scaled:.3g} {unit}"
+
+
+def residual_plot(campaign: Campaign) -> Plot | None:
+    """Return the residuals of all slow records over pressure, contraction and time in the record."""
+    if not isinstance(campaign.static, StaticStage):
+        return None
+    figure, panels = new_figure(1, 3, width=7.4, height=2.7, sharey=True)
+    half = campaign.static.band.half_width
+    for record in campaign.records:
+        if not record.kind.is_static:
+            continue
+        try:
+            prediction = campaign.predict(record.recording)
+        except AirmuscleError:
+            continue
+        recording = record.recording
+        rows = recording["force"] > 0.0
+        error = (prediction.force - recording["force"])[rows]
+        share = np.linspace(0.0, 100.0, len(recording))[rows]
+        columns = (1e-3 * recording["pressure"][rows], 100.0 * recording["contraction"][rows], share)
+        for axes, x in zip(panels, columns, strict=True):
+            axes.plot(x, error, linestyle="none", marker=".", markersize=1.0, color=BLUE, alpha=0.35, rasterized=True)
+    for axes, text in zip(panels, ("pressure [kPa]", "contraction [%]", "rows of the record [%]"), strict=True):
+        axes.axhline(0.0, color=BLACK, linewidth=0.8)
+        for limit in (-half, half):
+            axes.axhline(limit, color=RED, linewidth=0.8, linestyle="--")
+        axes.set_xlabel(text)
+    panels[0].set_ylabel("predicted - measured force [N]")
+    caption = "Residuals of all slow records. Dashed: limits of the 95 % band for further runs."
+    return Plot("campaign-residuals", caption, figure)
+
+
+def fill_plot(stage: FillStage) -> Plot:
+    """Return the pressures of all fills with the joint fit, and the residuals below."""
+    shown = list(range(len(stage.records)))[:MAX_PANELS]
+    figure, panels = new_figure(
+        2, len(shown), width=min(7.6, 2.6 + 1.9 * len(shown)), height=3.9, squeeze=False, sharex="col", sharey="row",
+        height_ratios=(2, 1),
+    )  # fmt: skip
+    for column, i in enumerate(shown):
+        upper, lower = panels[:, column]
+        recording, modelled = stage.experiments[i].recording, stage.fit.modelled(i)
+        time = recording["time"]
+        dots = {"linestyle": "none", "marker": ".", "markersize": 2.5, "color": BLUE}
+        upper.plot(time, 1e-3 * recording["pressure"], label="measured", **dots)
+        upper.plot(time, 1e-3 * modelled["pressure"], color=RED, linewidth=1.0, label="joint fit")
+        lower.plot(time, 1e-3 * (modelled["pressure"] - recording["pressure"]), **dots)
+        lower.axhline(0.0, color=BLACK, linewidth=0.8)
+        upper.set_title(f"contraction {_level_text('contraction', float(stage.contractions[i]))}", fontsize=8)
+        lower.set_xlabel("time [s]")
+    panels[0, 0].set_ylabel("pressure [kPa]")
+    panels[1, 0].set_ylabel("residual [kPa]")
+    legend_below(figure, panels[0, 0])
+    return Plot("campaign-fills", "Fills and discharges with the joint fit of valves and volume.", figure)
+
+
+def creep_plot(stage: CreepStage) -> Plot:
+    """Return the change of the force in the holds with the Maxwell elements."""
+    figure, axes = new_figure(width=6.3, height=3.0)
+    rows = zip(stage.holds, stage.times, stage.measured, stage.modelled, strict=True)
+    for i, ((origin, _), time, measured, modelled) in enumerate(rows):
+        colour, start = LINES[i % len(LINES)], modelled[0]
+        axes.plot(time, measured - start, linestyle="none", marker=".", markersize=2, color=colour, alpha=0.5)
+        axes.plot(time, modelled - start, color=colour, linestyle=DASHES[i % 5], label=origin)
+    axes.set(xlabel="time after the motion [s]", ylabel="change of the force [N]")
+    legend_below(figure, axes)
+    return Plot("campaign-creep", "Force after the motion of each hold, with the common Maxwell elements.", figure)
+
+
+def _spread(records: Sequence[CampaignRecord], count: int) -> list[CampaignRecord]:
+    """Return at most `count` records, at evenly spaced places in the order of resting length and level."""
+    ordered = sorted(records, key=lambda r: (r.resting_length or 0.0, r.level[1] if r.level else 0.0))
+    if not ordered:
+        return []
+    return [ordered[i] for i in np.unique(np.linspace(0, len(ordered) - 1, min(count, len(ordered))).astype(int))]

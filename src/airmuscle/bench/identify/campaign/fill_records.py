@@ -1,0 +1,115 @@
+"""Fills and discharges of a campaign as experiments: plant of a held muscle, valve commands, initial pressure."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from ....engine.loop.inputs import Schedule
+from ....physics.mechanism import Isometric
+from ....physics.muscle import Muscle
+from ....physics.muscle.geometry import Vessel
+from ....physics.plant.plant import Plant
+from ....physics.pneumatics import FillDischarge, Supply, Valve
+from ....physics.pneumatics.gas import EnergyBalance
+from ..dynamic import DynamicFit, Experiment, InitialConditions, stated_ambient
+from .record import CampaignRecord
+from .rows import thin
+
+FIT_ROWS = 250
+"""Maximum number of rows of a fill (chosen)."""
+ASSUMED_CONDUCTANCE = 1e-8
+"""Conductance [m3/(s Pa)] for which the relative volumes are fitted (chosen)."""
+MIN_DEVIATION = 100.0
+"""Least standard deviation of the pressure sensor [Pa] (chosen)."""
+HEAT_TRANSFER_BOUNDS = (1e-3, 1e3)
+"""Bounds of the heat transfer [W/K] (chosen)."""
+
+
+def held_contraction(record: CampaignRecord) -> float:
+    """The contraction at which the muscle is held."""
+    return float(np.median(record.recording["contraction"]))
+
+
+def pressure_deviation(records: Sequence[CampaignRecord]) -> float:
+    """Standard deviation of the pressure sensor [Pa]."""
+    return max(float(np.median([r.inspection.sensors["pressure"].std for r in records])), MIN_DEVIATION)
+
+
+def instant_margin(records: Sequence[CampaignRecord]) -> float:
+    """Maximum error of the detected start of a step [s]: a quarter of the shortest step, at least two rows."""
+    sample = max(float(np.median(np.diff(r.recording["time"]))) for r in records)
+    return max(0.25 * min(step.duration for r in records for step in r.steps), 2.0 * sample)
+
+
+def vessel_plant(record: CampaignRecord) -> Plant:
+    """The plant of a held muscle, with initial values from the steps of the record and the ambient air it states."""
+    rising = [step for step in record.steps if step.change > 0]
+    top = max(step.final_pressure for step in record.steps) if rising else float(record.recording["pressure"][0])
+    duration = float(np.mean([step.duration for step in record.steps]))
+    volume = ASSUMED_CONDUCTANCE * 1e5 * duration / 1.2
+    muscle = Muscle.ideal(Vessel(min(max(volume, 2e-7), 5e-2), record.resting_length or 0.2))
+    valve = Valve(ASSUMED_CONDUCTANCE, 0.35)
+    circuit = FillDischarge(Supply(top + 5e3), valve, valve)
+    return Plant(
+        muscle, circuit, Isometric(held_contraction(record)), EnergyBalance(1.0), stated_ambient(record.recording)
+    )
+
+
+def rescaled(plant: object, scale: float) -> Plant:
+    """The plant with its conductances and heat transfer multiplied by the scale."""
+    assert isinstance(plant, Plant)
+    circuit, gas = plant.circuit, plant.gas
+    assert isinstance(circuit, FillDischarge)
+    assert isinstance(gas, EnergyBalance)
+    fill, discharge = (
+        dataclasses.replace(valve, conductance=valve.conductance * scale)
+        for valve in (circuit.fill, circuit.discharge)
+        if isinstance(valve, Valve)
+    )
+    return dataclasses.replace(
+        plant,
+        circuit=dataclasses.replace(circuit, fill=fill, discharge=discharge),
+        gas=dataclasses.replace(gas, heat_transfer=float(np.clip(gas.heat_transfer * scale, *HEAT_TRANSFER_BOUNDS))),
+    )
+
+
+def at_record(plant: Plant, record: CampaignRecord, volume: float) -> Plant:
+    """The plant with this volume [m3], at the held length and in the ambient air of a record."""
+    vessel = Vessel(volume, plant.muscles[0].geometry.resting_length)
+    return dataclasses.replace(
+        plant, muscle=Muscle.ideal(vessel), mechanism=Isometric(held_contraction(record)),
+        ambient=stated_ambient(record.recording),
+    )  # fmt: skip
+
+
+def valve_commands(record: CampaignRecord) -> dict[str, tuple[tuple[float, float], ...]]:
+    """The detected instants [s] and values of the commands of both valves, counted from the start of the first step."""
+    start = record.steps[0].start
+    points: dict[str, list[tuple[float, float]]] = {"fill": [], "discharge": []}
+    for step in record.steps:
+        opened, closed = ("fill", "discharge") if step.change > 0 else ("discharge", "fill")
+        instant = max(step.start - start, 0.0)
+        if points[closed]:
+            points[closed].append((instant, 0.0))
+        points[opened].append((instant, 1.0))
+    return {name: tuple(values) for name, values in points.items() if values}
+
+
+def detected_experiment(record: CampaignRecord, plant: Plant) -> Experiment:
+    """The record with the detected instants of its steps."""
+    recording = thin(record.recording, FIT_ROWS)
+    began = record.steps[0].start
+    before = record.recording["time"] < began
+    pressure = record.recording["pressure"]
+    initial = float(np.median(pressure[before])) if before.sum() >= 3 else float(pressure[0])
+    conditions = InitialConditions.at_rest(plant, initial)
+    return Experiment(recording, Schedule(valve_commands(record)), conditions, began, plant)
+
+
+def with_instants(experiment: Experiment, fit: DynamicFit, number: int) -> Experiment:
+    """The experiment with the instants that a fit has found for it as its record of this number."""
+    model = fit.problem.record_models[number]
+    return dataclasses.replace(experiment, command=model.command(fit.values), start_time=model.start_time(fit.values))

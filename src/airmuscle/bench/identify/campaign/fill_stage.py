@@ -1,0 +1,261 @@
+"""Valve and enclosed volume of a campaign: a joint fit of all fills and discharges of the rig."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from ....core.arrays import Array
+from ....core.errors import AirmuscleError
+from ....core.short_repr import ShortRepr
+from ....engine.loop.inputs import Schedule
+from ....physics.muscle.geometry import Geometry
+from ....physics.plant.plant import Plant
+from ....physics.pneumatics import FillDischarge
+from ..dynamic import CommandInstants, DynamicFit, Experiment, StartTime, fit_dynamic
+from ..dynamic.ambient import describe_ambient
+from .fill_records import (
+    HEAT_TRANSFER_BOUNDS,
+    at_record,
+    detected_experiment,
+    held_contraction,
+    instant_margin,
+    pressure_deviation,
+    rescaled,
+    vessel_plant,
+    with_instants,
+)
+from .record import CampaignRecord
+from .stage import LeftOutStage
+from .valve_unknowns import CONDUCTANCE, DISCHARGE, ValveUnknowns, poor_ratios
+from .volume import VolumeChange, VolumeEstimate, relate_volumes
+
+NAME = "fills and volume"
+HEAT_TRANSFER = "gas.heat_transfer"
+VOLUME = "muscle.geometry.enclosed_volume"
+REMEDY = (
+    "record a fill from ambient pressure and a discharge through the valve at a held length, at three lengths with the "
+    "same valve and supply, at 100 rows per second or more, until the pressure has settled"
+)
+MAX_NOISE_RATIO = 4.0
+"""Ratio of the residual to the noise of the pressure sensor above which the model does not follow a record (chosen)."""
+MIN_MISFIT = 0.01
+"""Minimum residual that is reported, as a fraction of the greatest change of the pressure (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class FillStage(ShortRepr):
+    """The joint fit of all fills with common valves and one volume curve, and the prediction of each from the others.
+
+    `estimate` is None where the geometry was given.
+    """
+
+    fit: DynamicFit
+    records: tuple[CampaignRecord, ...]
+    experiments: tuple[Experiment, ...]
+    geometry: Geometry
+    estimate: VolumeEstimate | None
+    contractions: Array
+    cross_rms: tuple[float, ...]
+    """Rms error of the pressure of each fill, predicted by the parameters of the others [Pa]; empty for one fill."""
+    supposed: tuple[str, ...] = ()
+    """What the records do not determine or state, and what is taken for it, as sentences."""
+
+    @property
+    def circuit(self) -> FillDischarge:
+        """The circuit with the fitted valves and supply."""
+        plant = self.fit.plant()
+        assert isinstance(plant, Plant)
+        assert isinstance(plant.circuit, FillDischarge)
+        return plant.circuit
+
+    def commands(self, record: CampaignRecord) -> Mapping[str, Sequence[tuple[float, float]]]:
+        """The instants [s] and values of the commands of both valves in a record, with the estimated instants."""
+        command = self.fit.problem.record_models[self.records.index(record)].command(self.fit.values)
+        assert isinstance(command, Schedule)
+        return command.changes
+
+    @property
+    def misfit(self) -> str:
+        """The remark that the model does not follow the pressure of the records, with its cause; empty if it does."""
+        noise = pressure_deviation(self.records)
+        change = max(abs(step.change) for record in self.records for step in record.steps)
+        worst, rms = max(
+            ((record, self.fit.rms("pressure", i)) for i, record in enumerate(self.records)), key=lambda each: each[1]
+        )
+        if rms <= max(MAX_NOISE_RATIO * noise, MIN_MISFIT * change):
+            return ""
+        return (
+            f"The rms residual of {worst.origin}, {rms / 1e3:.3g} kPa, is {rms / noise:.3g} times the noise of the "
+            "pressure sensor: the model does not follow the records, and conductances, heat transfer and volume are "
+            "not to be used. Check that the supply pressure was constant, that each change of the pressure goes "
+            "through an open valve until it has settled, and that no tube or leak lies between valve and muscle."
+        )
+
+    @property
+    def verdict(self) -> str:
+        """Cross-prediction, volume and residuals, as sentences."""
+        rms = [self.fit.rms("pressure", i) / 1e3 for i in range(len(self.records))]
+        text = ""
+        if self.cross_rms:
+            text = (
+                f"Each fill predicted by the parameters of the others: rms error {min(self.cross_rms) / 1e3:.3g} to "
+                f"{max(self.cross_rms) / 1e3:.3g} kPa. "
+            )
+        text += f"Joint fit of {len(rms)} records: rms residual {min(rms):.3g} to {max(rms):.3g} kPa."
+        if self.estimate is not None:
+            text += (
+                f" Volume at zero contraction {1e6 * self.estimate.volume_at_rest:.4g} cm3 (standard error "
+                f"{1e6 * self.estimate.volume_stderr:.2g} cm3), from the change of the volume with contraction by "
+                "virtual work and the fills at several lengths."
+            )
+        else:
+            text += " The volume is that of the given geometry."
+        return " ".join(each for each in (text, self.misfit, *self.supposed) if each)
+
+
+def fit_fill_stage(
+    records: Sequence[CampaignRecord],
+    geometry: Geometry | None,
+    change: VolumeChange | None,
+    progress: Callable[[float], None],
+) -> FillStage | LeftOutStage:
+    """Fit conductances, critical ratios, heat transfer and supply pressure to all fills together.
+
+    Each record has the ambient air that it states, and its own instants of the valve commands. A valve that no record
+    shows is supposed to be equal to the other one, and so is a critical ratio that the records do not determine.
+
+    geometry  the given geometry of the muscle; then the conductance follows from it
+    change    the change of the volume with contraction; then fills at several lengths determine the volume at rest
+    """
+    if not records:
+        return LeftOutStage(NAME, "no record is a fill or a discharge at a held length", REMEDY)
+    try:
+        rising = [record for record in records if any(step.change > 0 for step in record.steps)]
+        relative = _RelativeFit.of(rising or records)
+        progress(0.5)
+        estimate = None
+        if geometry is None:
+            estimate = None if change is None else relative.relate(change)
+            if estimate is None or change is None:
+                return LeftOutStage(NAME, _no_volume(relative.contractions, change), REMEDY)
+            geometry, scale = change.geometry(estimate.volume_at_rest), estimate.scale
+        else:
+            scale = relative.scale_to(geometry)
+        return _fit_jointly(records, relative.experiments(records, geometry, scale), geometry, estimate, progress)
+    except AirmuscleError as error:
+        return LeftOutStage(NAME, str(error.message), REMEDY)
+
+
+def _no_volume(contractions: Array, change: VolumeChange | None) -> str:
+    if change is None:
+        return "the fills determine the ratio of conductance and volume only, and no static law gives the volume"
+    return (
+        f"the fills at contractions of {100 * contractions.min():.3g} to {100 * contractions.max():.3g} % determine "
+        "the ratio of conductance and volume only; give the braid of the muscle"
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class _RelativeFit:
+    """A fit of own volumes of the records for an assumed conductance of the valve of their first direction.
+
+    The records with a fill have it, because without one the ratio of the other conductance and the volumes remains.
+    """
+
+    fit: DynamicFit
+    records: tuple[CampaignRecord, ...]
+
+    @classmethod
+    def of(cls, records: Sequence[CampaignRecord]) -> _RelativeFit:
+        experiments = [detected_experiment(record, vessel_plant(record)) for record in records]
+        valves = ValveUnknowns.of(records)
+        free = [*valves.shared, *([f"{DISCHARGE}.{CONDUCTANCE}"] if valves.both else [])]
+        return cls(_fit(records, experiments, free, (VOLUME,)), tuple(records))
+
+    @property
+    def contractions(self) -> Array:
+        return np.array([held_contraction(record) for record in self.records])
+
+    def _volumes(self) -> tuple[Array, Array]:
+        """The relative volumes and their standard errors, shape (K,) each."""
+        own = [estimate for estimate in self.fit.estimates if estimate.name.startswith(VOLUME)]
+        return np.array([e.value for e in own]), np.array([e.stderr for e in own])
+
+    def relate(self, change: VolumeChange) -> VolumeEstimate | None:
+        return relate_volumes(*self._volumes(), self.contractions, change)
+
+    def scale_to(self, geometry: Geometry) -> float:
+        """The factor of the relative volumes that makes them those of a geometry."""
+        known = np.array([float(geometry.volume(c)) for c in self.contractions])
+        values, _ = self._volumes()
+        return float(known @ values / (values @ values))
+
+    def experiments(self, records: Sequence[CampaignRecord], geometry: Geometry, scale: float) -> list[Experiment]:
+        """All records with the volumes of a geometry, from the valves and instants of this fit."""
+        found = rescaled(self.fit.plant(), scale)
+        experiments = []
+        for record in records:
+            plant = at_record(found, record, float(geometry.volume(held_contraction(record))))
+            experiment = detected_experiment(record, plant)
+            known = record in self.records
+            experiments.append(with_instants(experiment, self.fit, self.records.index(record)) if known else experiment)
+        return experiments
+
+
+def _fit(
+    records: Sequence[CampaignRecord], experiments: Sequence[Experiment], free: Sequence[str | tuple[str, ...]],
+    own: tuple[str, ...] = (),
+) -> DynamicFit:  # fmt: skip
+    """A fit with the heat transfer, and own instants of the valve commands, because the detected ones are inexact."""
+    first, margin = experiments[0].plant, instant_margin(records)
+    assert first is not None
+    return fit_dynamic(
+        first, experiments, free=(HEAT_TRANSFER, *free), observed={"pressure": pressure_deviation(records)},
+        per_record=(*own, StartTime(margin), CommandInstants(margin)), bounds={HEAT_TRANSFER: HEAT_TRANSFER_BOUNDS},
+    )  # fmt: skip
+
+
+def _fit_jointly(
+    records: Sequence[CampaignRecord],
+    experiments: Sequence[Experiment],
+    geometry: Geometry,
+    estimate: VolumeEstimate | None,
+    progress: Callable[[float], None],
+) -> FillStage:
+    """The fit with the volumes of one curve, and the prediction of each record from the others."""
+    everything = range(len(records))
+    valves = ValveUnknowns.of(records)
+    fit = _fit_common(records, experiments, everything)
+    if valves.both and (reason := poor_ratios(fit)):
+        valves = dataclasses.replace(valves, common_ratio=reason)
+        fit = _fit_common(records, experiments, everything, reason)
+    cross = []
+    for i in everything if len(records) > 1 else ():
+        part = _fit_common(records, experiments, [k for k in everything if k != i], valves.common_ratio)
+        cross.append(_prediction_rms(fit, part, i))
+        progress(0.5 + 0.5 * (i + 1) / len(records))
+    contractions = np.array([held_contraction(record) for record in records])
+    supposed = (*valves.supposed, *describe_ambient([record.recording for record in records]))
+    return FillStage(fit, tuple(records), tuple(experiments), geometry, estimate, contractions, tuple(cross), supposed)
+
+
+def _fit_common(
+    records: Sequence[CampaignRecord], experiments: Sequence[Experiment], chosen: Sequence[int], common_ratio: str = ""
+) -> DynamicFit:
+    valves = ValveUnknowns.of([records[i] for i in chosen], common_ratio)
+    return _fit(records, [experiments[i] for i in chosen], [*valves.shared, *valves.paths(CONDUCTANCE)])
+
+
+def _prediction_rms(fit: DynamicFit, part: DynamicFit, record: int) -> float:
+    """Rms error [Pa] of a record for the common parameters of another fit, with its own start time."""
+    values = fit.values.copy()
+    names = [estimate.name for estimate in fit.estimates]
+    for estimate in part.estimates:
+        if "record" not in estimate.name:
+            values[names.index(estimate.name)] = estimate.value
+    model = fit.problem.record_models[record]
+    differences = model.evaluate(values).values[:, 0] - model.experiment.recording["pressure"]
+    return float(np.sqrt(np.mean(differences**2)))

@@ -1,0 +1,147 @@
+"""Friction of all loops of a campaign together, with its dependence on the pressure."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ....core.arrays import Array
+from ....core.errors import AirmuscleError
+from ....core.short_repr import ShortRepr
+from ....physics.muscle import CreepElements
+from ....physics.muscle.friction import Friction, NoFriction
+from ....recording import Recording
+from ...segment.sensor import estimate_noise
+from ..hysteresis import (
+    HysteresisLoop,
+    JointFit,
+    LoopFit,
+    find_loops,
+    fit_jointly,
+    fit_loop,
+    identified_friction,
+    preferred_fit,
+)
+from .creep_stage import creep_force
+from .record import CampaignRecord, RecordKind
+from .rows import PREDICTED_ROWS, displacement, held_steady, path_rows, with_force
+from .stage import LeftOutStage
+
+NAME = "hysteresis"
+CURVE_DEGREE = 5
+"""Degree of the polynomial static curve of each loop (chosen)."""
+MAX_LOOPS = 6
+"""Maximum number of loops that are fitted; of more, those at evenly spaced pressures (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class FrictionStage(ShortRepr):
+    """The friction of all loops, and the fits of the single loops and of all laws."""
+
+    friction: Friction
+    """With the range of its data; no friction where the loops justify none."""
+    loops: tuple[LoopFit, ...]
+    joint: tuple[JointFit, ...]
+    left_out: int = 0
+    """Number of loops that were not fitted, because there are more than `MAX_LOOPS`."""
+
+    @property
+    def selected(self) -> JointFit | None:
+        """The joint fit whose friction is used; None without one."""
+        return preferred_fit(self.joint)
+
+    @property
+    def verdict(self) -> str:
+        """The friction and whether the loops justify it, as sentences."""
+        if self.selected is not None:
+            return self.selected.verdict
+        if self.joint:
+            return f"{self.joint[0].verdict} The muscle is written without friction."
+        best = self.loops[0].recommended
+        if best is None:
+            return "The loops justify no friction; the muscle is written without friction."
+        return f"{best.verdict} A single loop does not show the dependence of the friction on the pressure."
+
+
+def fit_friction_stage(
+    records: Sequence[CampaignRecord], creep: CreepElements, progress: Callable[[float], None]
+) -> FrictionStage | LeftOutStage:
+    """Fit every friction law to the loops at constant pressure of all specimens together.
+
+    The force of the creep elements is added before, so that it is not taken for friction. Each loop has its own static
+    curve, a polynomial in the contraction.
+    """
+    loops, failed = _find_loops(records, creep)
+    if not loops:
+        reason = failed[0] if failed else "no record at constant pressure has a rising and a falling branch"
+        return LeftOutStage(
+            NAME, reason, "shorten and lengthen the muscle slowly at constant pressure, at three pressures or more"
+        )
+    kept = _spread(loops)
+    fits = []
+    for i, loop in enumerate(kept):
+        fits.append(fit_loop(loop))
+        progress(0.5 * (i + 1) / len(kept))
+    count = [0]
+
+    def advance(_: str) -> None:
+        count[0] += 1
+        progress(0.5 + 0.5 * min(count[0] / 5.0, 1.0))
+
+    joint = fit_jointly(fits, progress=advance)
+    best = preferred_fit(joint)
+    return FrictionStage(_friction(best, fits), tuple(fits), joint, len(loops) - len(kept))
+
+
+def _friction(best: JointFit | None, fits: Sequence[LoopFit]) -> Friction:
+    if best is not None:
+        return identified_friction(best.friction, best.series)
+    only = fits[0].recommended if len(fits) == 1 else None
+    return NoFriction() if only is None else identified_friction(only.friction, (only.series,))
+
+
+def _find_loops(records: Sequence[CampaignRecord], creep: CreepElements) -> tuple[list[HysteresisLoop], list[str]]:
+    """The loops of each specimen; loops of different specimens are not repeats of each other."""
+    loops, failed = list[HysteresisLoop](), list[str]()
+    by_length: dict[float | None, list[Recording]] = {}
+    for record in records:
+        if record.kind is RecordKind.ISOBARIC and record.resting_length is not None:
+            recording = with_force(record.recording, creep_force(creep, record.recording))
+            by_length.setdefault(record.resting_length, []).append(recording.rows(path_rows(recording)))
+    for recordings in by_length.values():
+        usable = []
+        for recording in recordings:
+            try:
+                find_loops([recording], degree=CURVE_DEGREE, all_rows=True)
+            except AirmuscleError as error:
+                failed.append(error.message)
+            else:
+                usable.append(recording)
+        loops += find_loops(usable, degree=CURVE_DEGREE, all_rows=True) if usable else ()
+    return loops, failed
+
+
+def _spread(loops: Sequence[HysteresisLoop]) -> list[HysteresisLoop]:
+    """At most `MAX_LOOPS` loops, at evenly spaced places in the order of their pressure."""
+    ordered = sorted(loops, key=lambda loop: loop.run.constant_value or 0.0)
+    places = np.unique(np.linspace(0, len(ordered) - 1, min(MAX_LOOPS, len(ordered))).round().astype(int))
+    return [ordered[i] for i in places]
+
+
+def friction_along(friction: Friction, recording: Recording) -> Array:
+    """Friction force against contraction [N] along the motion of a recording, relaxed at its start; shape (N,).
+
+    It is computed at rows whose steps are beyond the noise of the displacement, and interpolated between them. The
+    motion is that outside a dead band of the noise, so that a held length keeps its friction.
+    """
+    if isinstance(friction, NoFriction):
+        return np.zeros(len(recording))
+    rows = path_rows(recording, PREDICTED_ROWS)
+    time = recording.columns.get("time")
+    path = displacement(recording)
+    path = held_steady(path[rows], estimate_noise(path))
+    force = np.asarray(friction.force_along(path, None if time is None else time[rows]))
+    factor = np.asarray(friction.pressure_factor(recording["pressure"][rows]))
+    return np.asarray(np.interp(np.arange(len(recording)), rows, factor * force))

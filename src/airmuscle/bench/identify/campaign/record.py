@@ -1,0 +1,258 @@
+"""Records of a campaign and their kinds: static points, slow runs, fills, creep and release."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import itertools
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from ....core.arrays import Array
+from ....core.short_repr import ShortRepr
+from ....recording import Recording
+from ...segment import (
+    AT_REST,
+    ISOBARIC,
+    ISOMETRIC,
+    ISOTONIC,
+    Inspection,
+    Run,
+    Sensor,
+    estimate_sensors,
+    inspect,
+    inspect_all,
+    quasi_static_rows,
+)
+from ...segment.interval import true_intervals
+from ...segment.runs import CONTRACTION_BAND, RELATIVE_BAND
+from .transient import MIN_STEP, PressureStep, find_motion, find_pressure_steps
+
+RowMask = npt.NDArray[np.bool_]
+MIN_HOLD, MIN_HOLD_RATIO = 10.0, 10.0
+"""Minimum duration of a hold [s], and its minimum ratio to the duration of the motion before it (chosen)."""
+MIN_RUN_ROWS = 100
+"""Minimum number of rows of a run that is a record of its own (chosen)."""
+MIN_ROWS = 8
+"""Minimum number of rows of a record (chosen)."""
+MIN_SLOW = 0.5
+"""Minimum fraction of slow rows of a record that is used for static fits (chosen)."""
+LEVEL_SHARE = 0.05
+"""Distance of the end of a step from the highest or the lowest pressure, as a fraction of their difference, within
+which it leads to the supply or to ambient pressure (chosen)."""
+MAX_CHANGE = 0.04
+"""Maximum change of pressure and length in a slow row within 0.1 s, as a fraction of their range (chosen). It exceeds
+that of a quasi-static row, because the friction along the motion is taken into account."""
+
+
+class RecordKind(enum.Enum):
+    """Kind of a record of a campaign."""
+
+    ISOBARIC = "isobaric"
+    ISOMETRIC = "isometric"
+    ISOTONIC = "isotonic"
+    STATIC = "static"
+    FILL = "fill"
+    RELEASE = "release"
+    CREEP = "creep"
+    UNUSED = "unused"
+
+    @property
+    def is_static(self) -> bool:
+        """Whether the rows are used for the static characteristic."""
+        return self in (RecordKind.ISOBARIC, RecordKind.ISOMETRIC, RecordKind.ISOTONIC, RecordKind.STATIC)
+
+
+_KINDS = {ISOBARIC: RecordKind.ISOBARIC, ISOMETRIC: RecordKind.ISOMETRIC, ISOTONIC: RecordKind.ISOTONIC}
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class CampaignRecord(ShortRepr):
+    """A recording of a campaign, its kind, and the reason of this kind as a phrase."""
+
+    recording: Recording
+    kind: RecordKind
+    reason: str
+    inspection: Inspection
+    steps: tuple[PressureStep, ...] = ()
+    """The steps of the pressure of a fill."""
+
+    @property
+    def origin(self) -> str:
+        """Name of the file."""
+        return self.recording.origin
+
+    @property
+    def resting_length(self) -> float | None:
+        """Resting length [m], None if it is not stated."""
+        length = self.recording.constants.get("resting_length")
+        return float(length) if isinstance(length, float | int) else None
+
+    @property
+    def level(self) -> tuple[str, float] | None:
+        """The constant quantity and its value [SI]; None if no quantity is constant."""
+        run = _longest(self.inspection.runs)
+        if run is None or run.constant_column is None or run.constant_value is None:
+            return None
+        return run.constant_column, run.constant_value
+
+
+def classify_records(recordings: Sequence[Recording]) -> tuple[CampaignRecord, ...]:
+    """The records of a campaign with their kinds; the sensors are estimated from all recordings of the rig together.
+
+    A recording with several long runs at levels of one quantity gives one record for each of them.
+    """
+    sensors = estimate_sensors(recordings) if recordings else {}
+    records = []
+    for inspection in inspect_all(recordings):
+        record = _classify(inspection)
+        parts = _long_runs(record) if record.kind.is_static else []
+        records += [_classify(inspect(part, sensors)) for part in parts] or _cut_at_levels(record, sensors)
+    return tuple(records)
+
+
+def static_levels(record: CampaignRecord) -> list[CampaignRecord]:
+    """The rows of each pressure of a record of static points; any other record as it is."""
+    points = record.inspection.static_points
+    if points is None:
+        return [record]
+    parts = [record.recording.rows(points.pressure_level == k) for k in range(int(points.pressure_level.max()) + 1)]
+    return [dataclasses.replace(record, recording=part, inspection=inspect(part)) for part in parts]
+
+
+def _long_runs(record: CampaignRecord) -> list[Recording]:
+    """The rows of each long run of a record with time; empty unless there are several."""
+    recording = record.recording
+    runs = [run for run in record.inspection.runs if len(run.interval) >= MIN_RUN_ROWS and run.constant_column]
+    if "time" not in recording or len(runs) < 2:
+        return []
+    return [
+        dataclasses.replace(
+            recording.rows(run.interval.rows),
+            origin=f"{recording.origin}, rows {run.interval.start + 1} to {run.interval.stop}",
+        )
+        for run in runs
+    ]
+
+
+def _cut_at_levels(record: CampaignRecord, sensors: Mapping[str, Sensor]) -> list[CampaignRecord]:
+    """The steps between the pressure levels of a held muscle as records of their own, if there are more levels than a
+    fill explains: those to the supply and to ambient pressure, and one record of the rows that are not used."""
+    recording, levels = record.recording, list[tuple[float, int, int]]()
+    usable = "time" in recording and "pressure" in recording and "contraction" in recording
+    if record.kind.is_static or not usable or not np.isfinite(recording["pressure"]).all() or _is_moved(recording):
+        return [record]
+    for interval in true_intervals(quasi_static_rows(recording, sensors)):
+        value = float(np.median(recording["pressure"][interval.rows]))
+        if levels and abs(value - levels[-1][0]) <= MIN_STEP:
+            levels[-1] = (*levels[-1][:2], interval.stop)
+        elif len(interval) >= MIN_ROWS:
+            levels.append((value, interval.start, interval.stop))
+    if len(levels) < 3 or len(levels) <= len(record.steps) + 1:
+        return [record]
+    low, high = min(levels)[0], max(levels)[0]
+    margin, parts = LEVEL_SHARE * (high - low), []
+    for (_, begin, end), (value, _, stop) in itertools.pairwise(levels):
+        start = max(begin, end - max(MIN_ROWS, (end - begin) // 4))  # without the end of the step before
+        if min(abs(value - low), abs(value - high)) <= margin:
+            origin = f"{recording.origin}, rows {start + 1} to {stop}"
+            part = _classify(inspect(dataclasses.replace(recording.rows(slice(start, stop)), origin=origin), sensors))
+            parts += [part] if part.kind is RecordKind.FILL else []
+    reason = (
+        f"{len(levels) - 1 - len(parts)} of {len(levels) - 1} pressure steps at a held length end between the lowest "
+        "and the highest pressure, or are no fill through an open valve; with a measured force they would be static "
+        "points"
+    )
+    return [*parts, dataclasses.replace(record, kind=RecordKind.UNUSED, reason=reason, steps=())]
+
+
+def _classify(inspection: Inspection) -> CampaignRecord:
+    recording = inspection.recording
+    unusable = _unusable(recording)
+    if unusable:
+        return CampaignRecord(recording, RecordKind.UNUSED, unusable, inspection)
+    if inspection.static_points is not None and "force" in recording:
+        return CampaignRecord(recording, RecordKind.STATIC, inspection.static_points.description, inspection)
+    if "time" in recording:
+        steps = find_pressure_steps(recording, inspection.sensors)
+        if steps and not _is_moved(recording):
+            step = steps[0]
+            reason = f"pressure step of {step.change / 1e3:.4g} kPa within {step.duration:.3g} s at a held length"
+            return CampaignRecord(recording, RecordKind.FILL, reason, inspection, steps)
+        motion = find_motion(recording)
+        has_length = isinstance(recording.constants.get("resting_length"), float | int)
+        if motion is not None and motion.is_single and _is_constant(recording["pressure"]):
+            rest = float(recording["time"][-1]) - motion.end
+            if has_length and rest >= max(MIN_HOLD, MIN_HOLD_RATIO * motion.duration):
+                reason = f"motion within {motion.duration:.3g} s, then held for {rest:.4g} s at constant pressure"
+                return CampaignRecord(recording, RecordKind.CREEP, reason, inspection)
+        if has_length and motion is not None and motion.is_single and motion.is_fast:
+            reason = f"motion of {1e3 * abs(motion.travel):.3g} mm within {motion.duration:.3g} s"
+            return CampaignRecord(recording, RecordKind.RELEASE, reason, inspection)
+    return _classify_static(inspection)
+
+
+def _classify_static(inspection: Inspection) -> CampaignRecord:
+    recording, run = inspection.recording, _longest(inspection.runs)
+    if run is None or run.kind is AT_REST or "force" not in recording:
+        reason = "no measured force" if "force" not in recording else "no quantity varies"
+        return CampaignRecord(recording, RecordKind.UNUSED, reason, inspection)
+    slow = float(slow_rows(recording, inspection).mean())
+    if slow < MIN_SLOW:
+        reason = (
+            f"only {100 * slow:.3g} % of the rows are slow, and the record is neither a fill at a held length nor a "
+            "release"
+        )
+        return CampaignRecord(recording, RecordKind.UNUSED, reason, inspection)
+    kind = _KINDS.get(run.kind, RecordKind.STATIC)
+    count = "" if len(inspection.runs) == 1 else f"{len(inspection.runs)} runs, the longest "
+    reason = f"{count}{_describe(run)}" if kind is not RecordKind.STATIC else "slow, with no constant quantity"
+    return CampaignRecord(recording, kind, reason, inspection)
+
+
+def slow_rows(recording: Recording, inspection: Inspection) -> RowMask:
+    """Mask of the rows in which pressure and length change by less than `MAX_CHANGE`, shape (N,)."""
+    return quasi_static_rows(recording, inspection.sensors, max_change=MAX_CHANGE)
+
+
+def _unusable(recording: Recording) -> str:
+    """The reason why a recording cannot be used; empty if it can be."""
+    if "pressure" not in recording:
+        return "no pressure column"
+    if "contraction" not in recording and "force" not in recording:
+        return (
+            "only the pressure is recorded; a fill also needs the held length and the resting length, in the file or "
+            "as constants length and resting_length"
+        )
+    if "contraction" not in recording:
+        return "the contraction is not known: a length column and the resting length are needed"
+    if len(recording) < MIN_ROWS:
+        return f"{len(recording)} rows; at least {MIN_ROWS} are needed"
+    if not np.isfinite(recording["pressure"]).all():
+        return "values of the pressure are missing"
+    return ""
+
+
+def _describe(run: Run) -> str:
+    units = {"pressure": (1e-3, "kPa"), "contraction": (100.0, "%"), "length": (1e3, "mm"), "force": (1.0, "N")}
+    if run.constant_column is None or run.constant_value is None:
+        return run.kind.name
+    factor, unit = units.get(run.constant_column, (1e3, "mm"))
+    value = run.constant_value * factor
+    return f"{run.kind.name} at {0.0 if abs(value) < 5e-3 else value:.3g} {unit}"
+
+
+def _longest(runs: Sequence[Run]) -> Run | None:
+    return max(runs, key=lambda run: len(run.interval), default=None)
+
+
+def _is_moved(recording: Recording) -> bool:
+    low, high = np.quantile(recording["contraction"], [0.01, 0.99])
+    return bool(high - low > CONTRACTION_BAND)
+
+
+def _is_constant(values: Array) -> bool:
+    low, high = np.quantile(values, [0.01, 0.99])
+    return bool(high - low <= RELATIVE_BAND * max(float(np.max(np.abs(values))), 1.0))

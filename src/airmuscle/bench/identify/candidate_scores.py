@@ -1,0 +1,191 @@
+"""Scores of one candidate law: its fit to all rows, and its errors on the rows left out by one or several splits."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...core.arrays import Array
+from ...core.errors import AirmuscleError
+from ...physics.muscle.characteristic.base import Characteristic
+from ...recording import Recording
+from .candidates import Candidate
+from .compared_points import ComparedPoints, cause_of, residuals_of_rows
+from .cross_validation import GroupSplit, label_folds
+from .fit_points import FitPoints
+from .loss import LeastSquares, Loss
+from .model_evidence import aicc, effective_sample_size
+from .problem import FORCE, fitted_quantity_of
+from .result import Fit
+from .slack_rows import SlackPull
+from .static_fit import fit_to_points
+
+MAX_EXCESS = 2.0
+"""Ratio to the lowest cross-validated error of other laws above which a law is not cross-validated further (chosen).
+The error on rows left out is never lower than that on the rows of the fit, nor the sum of squares over all folds lower
+than that over some."""
+
+
+@dataclasses.dataclass(frozen=True)
+class FoldScore:
+    """The out-of-sample error of a law on one fold."""
+
+    fold: str
+    rmse: float
+    """Root mean square error in force [N] of the measured rows; the squared forces of the law at slack rows are
+    added."""
+    rows: int
+    """Number of rows with a positive force; of a fold without any, the number of its slack rows."""
+
+    @classmethod
+    def of(cls, fold: str, residuals: Array, measured: int) -> FoldScore:
+        """The score for residuals (N,), `measured` of them at a positive force."""
+        rows = measured or residuals.size
+        return cls(fold, float(np.sqrt(residuals @ residuals / rows)), rows)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class RankedModel:
+    """A candidate whose parameters the data determine, with its scores."""
+
+    candidate: Candidate
+    fit: Fit
+    in_sample_rmse: float
+    """Root mean square error in force [N] on the rows of the fit, as in `FoldScore`."""
+    cross_validated_rmse: float
+    """Root mean square error in force [N] on the rows left out, over all folds."""
+    aicc: float
+    """Akaike's information criterion of the in-sample errors in force, corrected for small samples."""
+    fold_scores: tuple[FoldScore, ...]
+    slack: SlackPull
+    """The force of the law at the slack rows of the fit."""
+    effective_rows: float
+    """Number of independent rows that are equivalent to those of the fit, by the autocorrelation of the residuals."""
+    notes: tuple[str, ...] = ()
+    """Remarks on the use of the law at the measured points."""
+    limit: float = np.inf
+    """Limit of the residuals in all errors [N], that of a robust loss; infinite for least squares."""
+    limited_rows: int = 0
+    """Number of rows of the fit whose residual is limited."""
+
+    @property
+    def parameter_count(self) -> int:
+        """Number of fitted parameters; specimen effects count with their effective number, rounded."""
+        return count_parameters(self.fit)
+
+
+def count_parameters(fit: Fit) -> int:
+    """Number of estimates, and the rounded effective number of the specimen effects."""
+    return len(fit.estimates) + (0 if fit.effects is None else round(fit.effects.degrees_of_freedom))
+
+
+@dataclasses.dataclass(frozen=True)
+class ExcludedModel:
+    """A candidate whose parameters the data do not determine, or that gives no force at measured points, with the
+    reason."""
+
+    name: str
+    reason: str
+    """The complete reason, with what to do."""
+    cause: str
+    """The cause in one phrase."""
+    error: float | None = None
+    """Error in force [N] at which the cross-validation of a law that cannot be recommended was ended."""
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.cause}."
+
+
+Score = RankedModel | ExcludedModel
+
+
+def points_of_splits(runs: Sequence[Recording], splits: Sequence[GroupSplit]) -> tuple[ComparedPoints, ...]:
+    """The compared points of each split, which share the rows. Raises IdentificationError for fewer than two groups."""
+    points = FitPoints.from_recordings(runs)
+    return tuple(ComparedPoints.from_recordings(runs, *label_folds(runs, split), points) for split in splits)
+
+
+def score_candidate(
+    candidate: Candidate, splits: Sequence[ComparedPoints], loss: Loss, limits: Sequence[float] = ()
+) -> tuple[Score, ...]:
+    """The scores of a candidate for each split; above `limits` [N] it is not cross-validated further."""
+    try:
+        own_loss = in_fitted_quantity(loss, candidate.law, splits[0].points)
+        fit = fit_to_points(candidate.law, splits[0].points, loss=own_loss, fixed=candidate.fixed)
+        notes = _slack_notes(fit.model, splits[0])
+        residuals = residuals_of_rows(fit.model, splits[0].rows, splits[0].max_force)
+    except AirmuscleError as error:
+        return (ExcludedModel(candidate.name, error.message, cause_of(error)),) * len(splits)
+    bounds = limits or [np.inf] * len(splits)
+    limit = loss.limit(residuals[splits[0].measured])
+    return tuple(
+        _cross_validate(candidate, points, own_loss, fit, residuals, notes, bound, limit)
+        for points, bound in zip(splits, bounds, strict=True)
+    )
+
+
+def _cross_validate(
+    candidate: Candidate, points: ComparedPoints, loss: Loss, fit: Fit, residuals: Array, notes: tuple[str, ...],
+    bound: float, limit: float,
+) -> Score:  # fmt: skip
+    """The scores for one split; residuals in force [N] are limited to `limit`, which is infinite for least squares."""
+    in_sample, left_out = np.clip(residuals, -limit, limit), list[FoldScore]()
+    rmse = points.rms(in_sample)
+    if rmse > bound:
+        return _excess_error(candidate.name, rmse, bound, "on the rows of the fit")
+    count = sum(points.rows_of_folds)
+    try:
+        for name, each, measured in points.left_out_residuals(candidate, fit, loss):
+            left_out += [FoldScore.of(name, np.clip(each, -limit, limit), measured)] if each.size else []
+            least = float(np.sqrt(sum(score.rmse**2 * score.rows for score in left_out) / count))
+            if least > bound:
+                return _excess_error(candidate.name, least, bound, f"without {name} and the groups before it alone")
+    except AirmuscleError as error:
+        return ExcludedModel(candidate.name, error.message, cause_of(error))
+    rows = np.array([each.rows for each in left_out])
+    return RankedModel(
+        candidate, fit, rmse,
+        cross_validated_rmse=float(np.sqrt(np.average([each.rmse**2 for each in left_out], weights=rows))),
+        aicc=aicc(rmse**2, int(np.count_nonzero(points.measured)), count_parameters(fit)),
+        fold_scores=tuple(left_out),
+        slack=points.slack_pull(residuals, rmse),
+        effective_rows=effective_sample_size(in_sample[points.measured]),
+        notes=notes,
+        limit=limit,
+        limited_rows=int(np.count_nonzero(np.abs(residuals) > limit)),
+    )  # fmt: skip
+
+
+def _excess_error(name: str, rmse: float, limit: float, where: str) -> ExcludedModel:
+    error = f"error {where}, {rmse:.4g} N, is above {limit:.4g} N, so that it cannot be recommended"
+    cause = f"its cross-validation takes long and was not completed: its {error}"
+    omitted = "its cross-validation takes long and was not completed. To complete it, give the law as a candidate."
+    reason = f"Its {error}; {omitted}"
+    return ExcludedModel(name, reason, cause, rmse)
+
+
+def _slack_notes(model: Characteristic, points: ComparedPoints) -> tuple[str, ...]:
+    """A remark where the law is slack at points with a positive force.
+
+    Raises IdentificationError where it gives no force although it is not slack.
+    """
+    slack, count = points.slack_count(model)
+    if not slack:
+        return ()
+    return (
+        f"it is slack at {slack} of {count} points with a positive force and is ranked with zero force there; its "
+        "method force raises SolveError at these points.",
+    )
+
+
+def in_fitted_quantity(loss: Loss, law: Characteristic, points: FitPoints) -> Loss:
+    """A robust loss whose scale is a force [N] for a law fitted in another quantity: in proportion to the medians of
+    the magnitudes of both quantities (chosen)."""
+    quantity = fitted_quantity_of(law)
+    if isinstance(loss, LeastSquares) or quantity == FORCE:
+        return loss
+    sizes = [float(np.nanmedian(np.abs(points.joined[name]))) for name in (quantity.name, "force")]
+    scale = loss.scale * sizes[0] / sizes[1] if min(sizes) > 0 else loss.scale
+    return dataclasses.replace(loss, scale=scale)  # type: ignore[type-var]  # each loss is a dataclass

@@ -1,0 +1,168 @@
+"""Cross-validation splits by run, level, specimen or block.
+
+Rows are left out in groups, never at random: neighbouring rows of one run are correlated, so that a law fitted to some
+of them also fits the others, which says nothing about its error on a new run.
+"""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+from collections.abc import Sequence
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core.display import level_text
+from ...core.errors import IdentificationError, ParameterError
+from ...core.field_types import check_field_types
+from ...core.hints import Hint, HintedText
+from ...recording import Recording
+
+Labels = npt.NDArray[np.str_]
+MAX_LEVELS = 12
+"""Maximum number of levels; beyond it neighbouring levels are merged (chosen: every level costs a fit of each law)."""
+ALWAYS_FITTED = ""
+"""Label of the rows that are in every training set."""
+
+
+class GroupSplit(abc.ABC):
+    """A division of the rows of recordings into groups; each group is left out in turn (one fold)."""
+
+    group_name: ClassVar[str]
+    """Noun for one group, used in reports."""
+    purpose: ClassVar[str]
+    """The use for which a low error on such groups recommends a law, as a phrase for reports."""
+
+    @abc.abstractmethod
+    def labels(self, recordings: Sequence[Recording]) -> list[Labels]:
+        """The group of each row, one array for each recording; ALWAYS_FITTED for rows that are never left out."""
+
+
+@dataclasses.dataclass(frozen=True)
+class RunSplit(GroupSplit):
+    """Each recording is a group."""
+
+    group_name: ClassVar[str] = "run"
+    purpose: ClassVar[str] = "further runs of the same kind"
+
+    def labels(self, recordings: Sequence[Recording]) -> list[Labels]:
+        names = [run.origin for run in recordings]
+        unique = [name if names.count(name) == 1 else f"{name} ({i + 1})" for i, name in enumerate(names)]
+        return [np.full(len(run), name) for run, name in zip(recordings, unique, strict=True)]
+
+
+@dataclasses.dataclass(frozen=True)
+class SpecimenSplit(GroupSplit):
+    """Each muscle is a group, identified by the constant `specimen`, or else by its resting length."""
+
+    group_name: ClassVar[str] = "specimen"
+    purpose: ClassVar[str] = "other muscles of the same type"
+
+    def labels(self, recordings: Sequence[Recording]) -> list[Labels]:
+        return [np.full(len(run), specimen_name(run)) for run in recordings]
+
+
+def specimen_name(run: Recording) -> str:
+    """The constant `specimen`, or else the resting length in mm, or the origin of the recording."""
+    if "specimen" in run.constants:
+        return str(run.constants["specimen"])
+    length = run.constants.get("resting_length")
+    return run.origin if length is None else f"{float(length) * 1e3:.6g} mm"
+
+
+@dataclasses.dataclass(frozen=True)
+class LevelSplit(GroupSplit):
+    """Each level of a quantity is a group; values closer than `min_gap` times their range belong to one level."""
+
+    quantity: str
+    min_gap: float = 0.02
+    group_name: ClassVar[str] = "level"
+    purpose: ClassVar[str] = "levels between the measured ones and one step beyond"
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
+
+    def labels(self, recordings: Sequence[Recording]) -> list[Labels]:
+        values = np.concatenate([run[self.quantity] for run in recordings])
+        ordered = np.sort(values[np.isfinite(values)])
+        span = float(np.ptp(ordered)) if ordered.size else 0.0
+        ends = np.flatnonzero(np.diff(ordered) > self.min_gap * span) + 1
+        groups = np.split(ordered, ends if span > 0 else [])
+        centres = np.array([float(np.median(group)) for group in groups])
+        while centres.size > MAX_LEVELS:
+            nearest = int(np.argmin(np.diff(centres)))
+            centres = np.delete(centres, nearest)
+        edges = (centres[1:] + centres[:-1]) / 2
+        names = np.array([f"{self.quantity} {level_text(self.quantity, float(each), span)}" for each in centres])
+        return [names[np.searchsorted(edges, run[self.quantity])] for run in recordings]
+
+
+@dataclasses.dataclass(frozen=True)
+class BlockSplit(GroupSplit):
+    """Blocks of a quantity within every run, so that every run and every muscle is part of each training set.
+
+    The range of a run is divided into `2 folds` intervals. Every `folds`-th interval belongs to one group, shifted by
+    one interval from run to run. The first and the last interval are in every training set, so that a law is evaluated
+    by interpolation only. The rows of an interval are correlated and are therefore left out together (Roberts et al.,
+    Ecography 40:913 (2017)).
+    """
+
+    quantity: str = "pressure"
+    folds: int = 5
+    group_name: ClassVar[str] = "block"
+    purpose: ClassVar[str] = "the measured muscles and contractions, within the measured range"
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
+        if self.folds < 2:
+            raise ParameterError(f"BlockSplit.folds is {self.folds}; it must be 2 or more.")
+
+    def labels(self, recordings: Sequence[Recording]) -> list[Labels]:
+        names = np.array([f"block {k + 1}" for k in range(self.folds)])
+        labels = []
+        for i, run in enumerate(recordings):
+            interval = self._interval_index(run[self.quantity])
+            inside = (interval > 0) & (interval < 2 * self.folds - 1)
+            labels.append(np.where(inside, names[(i + interval) % self.folds], ALWAYS_FITTED))
+        return labels
+
+    def _interval_index(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.intp]:
+        low, high = float(np.nanmin(values)), float(np.nanmax(values))
+        fractions = (np.nan_to_num(values, nan=low) - low) / (high - low if high > low else 1.0)
+        return np.minimum((2 * self.folds * fractions).astype(np.intp), 2 * self.folds - 1)
+
+
+def label_folds(recordings: Sequence[Recording], leave_out: GroupSplit) -> tuple[list[Labels], list[str]]:
+    """The label of each row, and the names of the folds in order.
+
+    Raises IdentificationError where there are fewer than two groups.
+    """
+    labels = leave_out.labels(recordings)
+    names = list(dict.fromkeys(str(name) for array in labels for name in dict.fromkeys(array.tolist())))
+    names = [name for name in names if name != ALWAYS_FITTED]
+    if len(names) < 2:
+        raise IdentificationError(
+            HintedText(
+                f"{recordings[0].origin if recordings else 'no recording'}: cross-validation needs two groups or more, "
+                f"but all rows belong to one {leave_out.group_name}. Give more runs.",
+                *(Hint(f"To leave out levels of {n}", "leave_out", LevelSplit(n)) for n in ("contraction", "pressure")),
+            )
+        )
+    return labels, names
+
+
+def default_split(recordings: Sequence[Recording], least: int = 3) -> GroupSplit:
+    """The first split with `least` groups or more: specimens, runs, levels of contraction, levels of pressure.
+
+    Raises IdentificationError where there is none.
+    """
+    splits: tuple[GroupSplit, ...] = (SpecimenSplit(), RunSplit(), LevelSplit("contraction"), LevelSplit("pressure"))
+    for split in splits:
+        if len({name for array in split.labels(recordings) for name in array.tolist()}) >= least:
+            return split
+    raise IdentificationError(
+        f"{least} groups or more are needed, but there are fewer than {least} specimens, runs, levels of contraction "
+        "and levels of pressure. Measure at more levels."
+    )

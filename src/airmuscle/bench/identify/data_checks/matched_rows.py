@@ -1,0 +1,230 @@
+"""Pairs of runs of one specimen that measured the same pressures and contractions in the same direction of motion.
+
+The force of each row is taken relative to a polynomial of degree 3 in pressure and contraction, fitted to all rows of
+the specimen, so that the distance of two matched rows does not count. Rows of different directions are not matched:
+their difference is hysteresis.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from ....core.arrays import Array
+from ....recording import Recording
+from ....recording.columns import quantity_of
+from ...segment import branch_directions, find_branches, find_runs
+from ..cross_validation import specimen_name
+
+PRESSURE_REACH, CONTRACTION_REACH = 0.015, 0.004
+"""Maximum distance of matched rows: in pressure, as a fraction of the highest, and in contraction (chosen)."""
+MIN_MATCHES = 5
+"""Minimum number of matched rows of two runs (chosen)."""
+MAX_ROWS = 4000
+"""Maximum number of rows of a specimen that are matched (chosen)."""
+MAX_BLOCKS = 80
+"""Maximum number of runs of a specimen that are matched (chosen)."""
+NEIGHBOURS = 4
+"""Number of nearest rows of one block that are compared, with the row itself (chosen)."""
+SPREAD_NEIGHBOURS = 9
+"""The same of rows of which no two have one place: also those at the next pressures (chosen)."""
+MIN_BRANCH_ROWS = 5
+"""Minimum number of rows of a branch (chosen)."""
+MIN_SPREAD_ROWS = 30
+"""Minimum number of rows without time of which no two have one place, and neighbours are compared (chosen)."""
+MIN_FORCE = 0.02
+"""Minimum force of a matched row, as a fraction of the maximum (chosen); slack rows agree in any case."""
+MAX_VALUES = 8
+"""Maximum number of values of a column that may tell specimens apart (chosen)."""
+DEGREE = 3
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Block:
+    """Rows of one run in one direction: recording, row numbers in it, direction, and values of its unknown columns."""
+
+    recording: Recording
+    rows: npt.NDArray[np.intp]
+    direction: int
+    labels: tuple[tuple[str, float], ...]
+    residuals: Array
+    """Force minus that of the polynomial [N]."""
+    slopes: Array
+    """Derivative of the polynomial by the pressure [N/Pa]."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class MatchedRuns:
+    """Two blocks with the indices of matched rows, and the force of the first minus that of the second [N]."""
+
+    first: Block
+    second: Block
+    pairs: npt.NDArray[np.intp]
+    """Indices of the matched rows in both blocks, shape (M, 2)."""
+    differences: Array
+    are_near: bool = True
+    """Whether the matched rows are at equal pressure and contraction; otherwise they are neighbouring static points,
+    and the polynomial accounts for their distance."""
+
+    @property
+    def is_unordered(self) -> bool:
+        """Whether the rows are of one block without time, so that the direction of the motion is not known."""
+        return self.first is self.second
+
+    @property
+    def typical(self) -> float:
+        """The median difference of the force [N]; of rows of one block, whose signs are random, the upper quartile."""
+        if self.is_unordered:
+            return float(np.quantile(np.abs(self.differences), 0.75))
+        return float(np.median(self.differences))
+
+    @property
+    def pressure_shift(self) -> float:
+        """The error of the pressure of the first block [Pa] that would explain the difference."""
+        slopes = self.first.slopes[self.pairs[:, 0]]
+        return -float(np.median(self.differences / np.maximum(slopes, 1e-12)))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Matches:
+    """All matched runs of a bench, and its maximum force [N]."""
+
+    runs: tuple[MatchedRuns, ...]
+    greatest: float
+
+
+def match_rows(recordings: Sequence[Recording]) -> Matches:
+    """The matched runs of recordings with pressure, contraction and force, by specimen."""
+    given = [run for run in recordings if len(run) and all(n in run for n in ("pressure", "contraction", "force"))]
+    greatest = max((float(np.nanquantile(run["force"], 0.99)) for run in given), default=0.0)
+    if not greatest > 0:
+        return Matches((), 0.0)
+    names = [specimen_name(run) for run in given]
+    matched: list[MatchedRuns] = []
+    for name in dict.fromkeys(names):
+        members = [run for run, own in zip(given, names, strict=True) if own == name]
+        matched += _matched_runs(_blocks(members, greatest), members)
+    return Matches(tuple(matched), greatest)
+
+
+def label_columns(recording: Recording) -> list[str]:
+    """The unknown columns of a recording with few different values, which may tell specimens apart."""
+    return [
+        name
+        for name, values in recording.columns.items()
+        if quantity_of(name) is None and 2 <= np.unique(values).size <= MAX_VALUES
+    ]
+
+
+def _blocks(recordings: Sequence[Recording], greatest: float) -> list[Block]:
+    rows = sum(map(len, recordings))
+    blocks = [block for run in recordings for block in _blocks_of(run, MIN_FORCE * greatest, -(-rows // MAX_ROWS))]
+    return _with_residuals([block for block in blocks if len(block.rows) >= MIN_MATCHES][:MAX_BLOCKS])
+
+
+def _blocks_of(recording: Recording, least: float, step: int) -> Iterator[Block]:
+    """The blocks of a recording: rows of one run, direction and combination of labels; every n-th row."""
+    columns = np.stack([recording[name] for name in ("pressure", "contraction", "force")])
+    complete = np.isfinite(columns).all(axis=0)
+    pulls = complete & (columns[2] > least)
+    if not complete.all():
+        recording, pulls = recording.rows(complete), pulls[complete]
+    branches = tuple(b for b in find_branches(recording) if len(b.interval) >= MIN_BRANCH_ROWS)
+    keys = [branch_directions(recording, branches), np.full(len(recording), -1.0)]
+    for i, run in enumerate(find_runs(recording)):
+        keys[1][run.interval.rows] = i
+    names = label_columns(recording)
+    keys += [recording.columns[name] for name in names]
+    values, member = np.unique(np.stack(keys), axis=1, return_inverse=True)
+    for i, key in enumerate(values.T):
+        rows = np.flatnonzero((member.ravel() == i) & pulls)[::step]
+        labels = tuple(zip(names, key[2:].tolist(), strict=True))
+        yield Block(recording, rows, int(key[0]), labels, np.zeros(0), np.zeros(0))
+
+
+def _with_residuals(blocks: list[Block]) -> list[Block]:
+    """The blocks with residuals and slopes of the polynomial of all their rows."""
+    if not blocks:
+        return []
+    p, c, force = (_joined(blocks, name) for name in ("pressure", "contraction", "force"))
+    scale = max(float(np.max(np.abs(p))), 1.0)
+    (low, high) = float(np.min(c)), float(np.max(c))
+    x, y = p / scale, (c - low) / max(high - low, 1e-6)
+    powers = [(i, j) for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i)]
+    values = np.linalg.lstsq(np.stack([x**i * y**j for i, j in powers], axis=1), force, rcond=1e-10)[0]
+    residuals = force - sum(v * x**i * y**j for v, (i, j) in zip(values, powers, strict=True))
+    slopes = sum(v * i * x ** max(i - 1, 0) * y**j for v, (i, j) in zip(values, powers, strict=True)) / scale
+    ends = np.cumsum([len(block.rows) for block in blocks])[:-1]
+    parts = zip(blocks, np.split(residuals, ends), np.split(slopes, ends), strict=True)
+    return [dataclasses.replace(block, residuals=r, slopes=s) for block, r, s in parts]
+
+
+def _joined(blocks: Sequence[Block], name: str) -> Array:
+    return np.concatenate([block.recording[name][block.rows] for block in blocks])
+
+
+def _matched_runs(blocks: Sequence[Block], recordings: Sequence[Recording]) -> list[MatchedRuns]:
+    """Every pair of blocks of one direction with enough matched rows."""
+    highest = max(float(np.max(np.abs(run["pressure"]))) for run in recordings)
+    reach = np.array([PRESSURE_REACH * max(highest, 1.0), CONTRACTION_REACH])
+    points = [np.column_stack([b.recording[n][b.rows] for n in ("pressure", "contraction")]) / reach for b in blocks]
+    limits = [(x.min(axis=0) - 1.0, x.max(axis=0) + 1.0) for x in points]
+    matched = [each for block, own in zip(blocks, points, strict=True) for each in _unordered(block, own)]
+    for i, j in itertools.combinations(range(len(blocks)), 2):
+        apart = (limits[i][0] > limits[j][1]).any() or (limits[j][0] > limits[i][1]).any()
+        if not apart and blocks[i].direction == blocks[j].direction:
+            pairs = _nearest(points[i], points[j])
+            if len(pairs) >= MIN_MATCHES:
+                both = blocks[i].residuals[pairs[:, 0]] - blocks[j].residuals[pairs[:, 1]]
+                matched.append(MatchedRuns(blocks[i], blocks[j], pairs, both))
+    return matched or list(_spread(blocks))
+
+
+def _unordered(block: Block, points: Array) -> Iterator[MatchedRuns]:
+    """The pairs of neighbouring rows of a block without time."""
+    if "time" not in block.recording and len(points) >= NEIGHBOURS:
+        pairs = _neighbours(points, NEIGHBOURS, 1.0)
+        if len(pairs) >= MIN_MATCHES:
+            yield _paired(block, pairs, are_near=True)
+
+
+def _spread(blocks: Sequence[Block]) -> Iterator[MatchedRuns]:
+    """The pairs of neighbouring rows of recordings without time, whatever their runs and their distance."""
+    parts: dict[int, list[Block]] = {}
+    for block in blocks:
+        if "time" not in block.recording:
+            parts.setdefault(id(block.recording), []).append(block)
+    for own in parts.values():
+        joined = [np.concatenate([getattr(block, n) for block in own]) for n in ("rows", "residuals", "slopes")]
+        if len(joined[0]) >= MIN_SPREAD_ROWS:
+            block = Block(own[0].recording, joined[0], 0, (), *joined[1:])
+            points = np.column_stack([block.recording[n][block.rows] for n in ("pressure", "contraction")])
+            spread = points / np.maximum(np.ptp(points, axis=0), 1e-9)
+            yield _paired(block, _neighbours(spread, SPREAD_NEIGHBOURS, np.inf), are_near=False)
+
+
+def _paired(block: Block, pairs: npt.NDArray[np.intp], are_near: bool) -> MatchedRuns:
+    return MatchedRuns(block, block, pairs, block.residuals[pairs[:, 0]] - block.residuals[pairs[:, 1]], are_near)
+
+
+def _neighbours(points: Array, count: int, reach: float) -> npt.NDArray[np.intp]:
+    """Each point (N, 2) with its nearest ones within the reach, without itself; shape (M, 2)."""
+    from scipy.spatial import cKDTree
+
+    distance, index = cKDTree(points).query(points, count, distance_upper_bound=reach)
+    first, place = np.nonzero(np.isfinite(distance))
+    pairs: npt.NDArray[np.intp] = np.column_stack([first, index[first, place]])
+    return np.asarray(pairs[pairs[:, 0] != pairs[:, 1]])
+
+
+def _nearest(first: Array, second: Array) -> npt.NDArray[np.intp]:
+    """Each point of the first set (N, 2) with the nearest of the second at a distance of 1 at most; shape (M, 2)."""
+    from scipy.spatial import cKDTree
+
+    distance, index = cKDTree(second).query(first, distance_upper_bound=1.0)
+    near = np.flatnonzero(np.isfinite(distance))
+    return np.column_stack([near, index[near]])

@@ -1,0 +1,177 @@
+"""Candidate records of a next experiment: fills and discharges of the same rig that differ from those of a fit."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+
+import numpy as np
+
+from ....core import tree
+from ....core.arrays import Array
+from ....engine.loop.inputs import Schedule
+from ....physics.mechanism import Isometric
+from ....physics.muscle import Muscle
+from ....physics.muscle.geometry import Vessel
+from ....physics.plant.plant import Plant
+from ....physics.pneumatics import FillDischarge, Valve
+from ....physics.pneumatics.gas import EnergyBalance
+from ....physics.pneumatics.wall_heat_transfer import WallHeatTransfer
+from ....recording import Recording
+from .experiment import Experiment
+from .initial_conditions import InitialConditions
+from .result import DynamicFit
+
+SUPPLY_FACTORS = (0.6, 1.4)
+"""Absolute supply pressures of candidates, relative to that of the fit (chosen)."""
+CONTRACTION_STEP = 0.08
+"""Difference of the contraction of candidates at another held length (chosen)."""
+THROTTLE = 0.2
+"""Conductance of the fill valve with a throttle, relative to that of the valve (chosen)."""
+LONGER = 4.0
+"""Duration of a longer record, relative to that of the fit (chosen)."""
+PULSE_SHARE = 0.5
+"""Share of the pressure rise at which a valve is closed again (chosen)."""
+VALVE_PARAMETERS = ("conductance", "critical_ratio")
+"""Parameters of a valve that its flow depends on, by the last part of their paths."""
+MAX_CONTRACTION = 0.2
+"""Maximum held contraction of a candidate (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class CandidateRecord:
+    """A record that could be measured: what it is, its simulated experiment, and what it does not share with the fit.
+
+    `changed` are parameters that are unknowns of its own: those whose values differ from the fit by an unknown amount,
+    such as the conductance of a throttled valve, and those that the records of the fit do not use.
+    """
+
+    description: str
+    experiment: Experiment
+    changed: tuple[str, ...] = ()
+    replaced: str = ""
+    """Beginning of the paths of a part of the plant that this record replaces by a known one."""
+
+
+def candidate_records(fit: DynamicFit) -> tuple[CandidateRecord, ...]:
+    """The records to compare for a fit of a plant with one muscle; the first is a repeat of its first record.
+
+    Fills from other supply pressures, a discharge, a fill whose valve is closed halfway, a fill through a throttle,
+    other held lengths, a longer record, and a fill of a rigid tank of known volume, as far as circuit and mechanism
+    allow. Each has as many rows as the first record.
+    """
+    plant, model = fit.plant(0), fit.problem.record_models[0]
+    assert isinstance(plant, Plant)
+    experiment, start = model.experiment, model.start_time(fit.values)
+    begun = dataclasses.replace(experiment, plant=plant, start_time=0.0)
+    times = model.times - start
+    candidates = [CandidateRecord("a repeat of the record", _with_times(begun, times, model.names))]
+    pressure = float(experiment.initial_conditions.known.get("pressure", 0.0))
+    identified = frozenset(path for unknown in fit.unknowns for path in unknown.paths)
+    context = _Context(plant, begun, times, model.names, pressure, identified)
+    candidates += [*context.longer(), *context.supplies(), *context.lengths()]
+    if isinstance(plant.circuit, FillDischarge) and len(plant.muscles) == 1:
+        candidates += [*context.valve_records(plant.circuit), *context.tank(plant.circuit)]
+    return tuple(candidates)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class _Context:
+    """The first record of a fit, from which the candidates are changed."""
+
+    plant: Plant
+    experiment: Experiment
+    times: Array
+    names: tuple[str, ...]
+    pressure: float
+    identified: frozenset[str]
+
+    def longer(self) -> Iterator[CandidateRecord]:
+        text = f"the same record, {LONGER:g} times as long"
+        yield CandidateRecord(text, _with_times(self.experiment, LONGER * self.times, self.names))
+
+    def supplies(self) -> Iterator[CandidateRecord]:
+        """The same record from other supply pressures, which are measured."""
+        ambient = float(self.plant.ambient.pressure)
+        for leaf in tree.leaves(self.plant):
+            if not leaf.path.endswith("supply.pressure"):
+                continue
+            for factor in SUPPLY_FACTORS:
+                changed = factor * (leaf.value + ambient) - ambient
+                values = [changed if each.path == leaf.path else each.value for each in tree.leaves(self.plant)]
+                text = f"the same record from a supply of {changed / 1e3:.3g} kPa, which is measured"
+                yield CandidateRecord(text, self._of(tree.with_parameters(self.plant, values)))
+
+    def lengths(self) -> Iterator[CandidateRecord]:
+        mechanism = self.plant.mechanism
+        if not isinstance(mechanism, Isometric):
+            return
+        for contraction in {0.0, min(mechanism.contraction + CONTRACTION_STEP, MAX_CONTRACTION)}:
+            if abs(contraction - mechanism.contraction) > 0.25 * CONTRACTION_STEP:
+                changed = dataclasses.replace(self.plant, mechanism=Isometric(contraction))
+                yield CandidateRecord(
+                    f"the same record at a contraction of {100 * contraction:.3g} %", self._of(changed)
+                )
+
+    def valve_records(self, circuit: FillDischarge) -> Iterator[CandidateRecord]:
+        """A discharge, a fill that stops halfway, and a fill through a throttle."""
+        end, high = float(self.times[-1]), float(tree.flatten(circuit.supply)[0])
+        discharge = self._of(self.plant, Schedule({"discharge": ((0.0, 1.0),)}), high)
+        yield CandidateRecord(
+            "a discharge from the supply pressure", discharge, self._unidentified("circuit.discharge")
+        )
+        half = self._time_of_half_rise(high)
+        closed = Schedule({"fill": ((0.0, 1.0), (half, 0.0))})
+        yield CandidateRecord(
+            f"a fill whose valve is closed after {half:.2g} s, and the pressure until {end:.2g} s",
+            self._of(self.plant, closed, 0.0),
+        )
+        if isinstance(circuit.fill, Valve):
+            throttled = dataclasses.replace(circuit.fill, conductance=THROTTLE * circuit.fill.conductance)
+            plant = dataclasses.replace(self.plant, circuit=dataclasses.replace(circuit, fill=throttled))
+            fill = Schedule({"fill": ((0.0, 1.0),)})
+            slow = dataclasses.replace(self, times=self.times / THROTTLE)
+            yield CandidateRecord(
+                "a slow fill through a throttle", slow._of(plant, fill, 0.0), ("circuit.fill.conductance",)
+            )
+
+    def _unidentified(self, part: str) -> tuple[str, ...]:
+        """The parameters of a part of the plant that the fit has not identified, except its resolution of the flow."""
+        paths = (leaf.path for leaf in tree.leaves(self.plant) if leaf.path.startswith(f"{part}."))
+        return tuple(path for path in paths if path.endswith(VALVE_PARAMETERS) and path not in self.identified)
+
+    def tank(self, circuit: FillDischarge) -> Iterator[CandidateRecord]:
+        """A fill of a rigid tank whose volume is known, at the valve of the muscle; its wall is another one."""
+        volume = float(self.plant.muscles[0].geometry.volume(0.0))
+        length = float(self.plant.muscles[0].geometry.resting_length)
+        vessel = Muscle.ideal(Vessel(float(np.clip(volume, 2e-7, 5e-2)), length))
+        plant = dataclasses.replace(self.plant, muscle=vessel, circuit=circuit, mechanism=Isometric(0.0))
+        coefficients = {EnergyBalance: ("gas.heat_transfer",), WallHeatTransfer: ("gas.coefficient",)}
+        changed = coefficients.get(type(plant.gas), ())
+        text = f"a fill of a rigid tank of known volume, about {1e6 * volume:.3g} cm3, through the same valve"
+        yield CandidateRecord(text, self._of(plant, Schedule({"fill": ((0.0, 1.0),)}), 0.0), changed, "muscle.")
+
+    def _time_of_half_rise(self, supply: float) -> float:
+        """Duration [s] of a choked fill to half of the supply pressure."""
+        circuit, plant = self.plant.circuit, self.plant
+        assert isinstance(circuit, FillDischarge)
+        volume = float(plant.muscles[0].geometry.volume(0.0))
+        valve = circuit.fill
+        conductance = valve.conductance if isinstance(valve, Valve) else 1e-8
+        ambient = float(plant.ambient.pressure)
+        rate = conductance * (supply + ambient) * 1e5 / volume  # [Pa/s] at the reference pressure of ISO 8778
+        return float(np.clip(PULSE_SHARE * supply / rate, 0.02 * self.times[-1], 0.5 * self.times[-1]))
+
+    def _of(self, plant: Plant, command: Schedule | None = None, pressure: float | None = None) -> Experiment:
+        conditions = self.experiment.initial_conditions
+        if pressure is not None or plant.mechanism is not self.plant.mechanism:
+            conditions = InitialConditions.at_rest(plant, self.pressure if pressure is None else pressure)
+        experiment = dataclasses.replace(
+            self.experiment, plant=plant, command=command or self.experiment.command, initial_conditions=conditions
+        )
+        return _with_times(experiment, self.times, self.names)
+
+
+def _with_times(experiment: Experiment, times: Array, names: tuple[str, ...]) -> Experiment:
+    columns = {"time": times, **{name: np.zeros(times.size) for name in names}}
+    return dataclasses.replace(experiment, recording=Recording(columns, "candidate"))

@@ -1,0 +1,240 @@
+"""Records, inputs, initial conditions and unknowns of a dynamic fit."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ....core import tree
+from ....core.errors import ParameterError, suggestion
+from ....core.field_types import check_field_types
+from ....core.hints import Hint
+from ....core.short_repr import ShortRepr
+from ....engine.compile import System
+from ....engine.loop.inputs import InputSignal, Schedule, check_input_signal
+from ....recording import Recording
+from ....recording.recording import column_heading
+from .initial_conditions import InitialConditions
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Experiment(ShortRepr):
+    """One record: the recording, the command that was applied, and the initial conditions.
+
+    `command` counts from the start of the run, which is at `start_time` [s] on the clock of the recording; rows before
+    it are at the initial state. `plant` replaces the plant of the fit, for example with another load.
+    """
+
+    recording: Recording
+    command: InputSignal
+    initial_conditions: InitialConditions
+    start_time: float = 0.0
+    plant: System | None = None
+
+    def __post_init__(self) -> None:
+        check_input_signal(self.command)
+
+
+@dataclasses.dataclass(frozen=True)
+class StartTime:
+    """The start time of a run on the clock of its recording, as an unknown."""
+
+    margin: float
+    """Maximum deviation from the start time of the experiment [s]."""
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
+
+    def __str__(self) -> str:
+        return "start time"
+
+
+@dataclasses.dataclass(frozen=True)
+class InitialValue:
+    """A known value of the initial conditions, as an unknown: `InitialValue("pressure", 2e3)`."""
+
+    name: str
+    margin: float
+    """Maximum deviation from the value of the experiment [SI]."""
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
+
+    def __str__(self) -> str:
+        return f"initial {self.name}"
+
+
+@dataclasses.dataclass(frozen=True)
+class CommandInstants:
+    """The instants at which the command of a run changes after its first one, each of them as an unknown.
+
+    They count from the start of the run, whose error is that of `StartTime`. The command must be a Schedule.
+    """
+
+    margin: float
+    """Maximum deviation from an instant of the command of the experiment [s]."""
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
+
+
+@dataclasses.dataclass(frozen=True)
+class CommandInstant:
+    """One instant of a command as an unknown: the instant in the command of the experiment [s], and its margin [s]."""
+
+    instant: float
+    margin: float
+
+    def __str__(self) -> str:
+        return "command instant"
+
+
+ParameterPaths = str | tuple[str, ...]
+"""Path of a parameter, or paths of several parameters with one common value."""
+Nuisance = StartTime | InitialValue | CommandInstant
+"""An unknown of one record that is no parameter of the plant."""
+RecordUnknown = ParameterPaths | StartTime | InitialValue | CommandInstants
+"""An unknown with its own value in every record."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Unknown:
+    """One unknown number: parameters with a common value, a start time or an initial value.
+
+    `record` is the index of the record it belongs to, None for all records. Value and bounds are SI.
+    """
+
+    name: str
+    target: tuple[str, ...] | Nuisance
+    record: int | None
+    value: float
+    low: float
+    high: float
+    unit: str
+    symbol: str
+    meaning: str
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """Paths of the parameters with this value; none for an instant or an initial value."""
+        return self.target if isinstance(self.target, tuple) else ()
+
+    @property
+    def scale(self) -> float:
+        """Magnitude by which the unknown is scaled in the search."""
+        if isinstance(self.target, Nuisance):
+            return self.target.margin
+        span = self.high - self.low
+        return abs(self.value) or (span if np.isfinite(span) else 1.0)
+
+    @property
+    def origin(self) -> float:
+        """Value from which the unknown is counted in the search: of an instant that of the experiment, whatever the
+        zero of the clock; otherwise 0."""
+        return self.value if isinstance(self.target, StartTime | CommandInstant) else 0.0
+
+    @property
+    def search_range(self) -> tuple[float, float]:
+        """Range of the initial guesses of a multi-start: a factor of three both ways, within the bounds."""
+        if isinstance(self.target, Nuisance):
+            return self.low, self.high
+        ends = (self.value / 3, self.value * 3) if self.value else (-self.scale, self.scale)
+        return max(self.low, min(ends)), min(self.high, max(ends))
+
+
+def make_unknowns(
+    plant: System,
+    experiments: Sequence[Experiment],
+    free: Sequence[ParameterPaths],
+    per_record: Sequence[RecordUnknown],
+    bounds: Mapping[str, tuple[float, float]],
+) -> tuple[Unknown, ...]:
+    """The unknowns common to all records, then those of each record. Raises ParameterError for unknown names."""
+    unknowns = [_plant_unknown(plant, paths, None, bounds) for paths in free]
+    for i, experiment in enumerate(experiments):
+        for target in per_record:
+            if isinstance(target, CommandInstants):
+                unknowns += _instant_unknowns(experiment, target.margin, i)
+            elif isinstance(target, StartTime | InitialValue):
+                unknowns.append(_record_unknown(experiment, target, i))
+            else:
+                unknowns.append(_plant_unknown(experiment.plant or plant, target, i, bounds))
+    names = [u.name for u in unknowns]
+    if not unknowns:
+        example = Hint("To name one, for example", "free", ("circuit.fill.conductance",))
+        raise ParameterError("no parameter is free; at least one is required.", hint=example)
+    for name in bounds:
+        if name not in {u.name.partition(" of record")[0] for u in unknowns}:
+            raise ParameterError(f"bounds are given for '{name}', which is not free; free are {', '.join(names)}.")
+    return tuple(unknowns)
+
+
+def _plant_unknown(
+    plant: System, target: ParameterPaths, record: int | None, bounds: Mapping[str, tuple[float, float]]
+) -> Unknown:
+    paths = (target,) if isinstance(target, str) else target
+    leaves = {leaf.path: leaf for leaf in tree.leaves(plant)}
+    for path in paths:
+        if path not in leaves:
+            known = [p for p in leaves if "[" not in p]
+            raise ParameterError(
+                f"{type(plant).__name__} has no parameter '{path}'; its parameters are {', '.join(known)}."
+                f"{suggestion(path, leaves)}"
+            )
+    leaf = leaves[paths[0]]
+    low, high = bounds.get(paths[0], leaf.declared.bounds)
+    name = paths[0] + ("" if record is None else f" of record {record + 1}")
+    if not low <= leaf.value <= high:
+        raise ParameterError(
+            f"the initial value of {name} is {leaf.value:g}, outside its bounds {low:g} to {high:g}. Change the value "
+            "or the bounds."
+        )
+    declared = leaf.declared
+    return Unknown(name, paths, record, leaf.value, low, high, declared.unit, declared.symbol, declared.meaning)
+
+
+def _record_unknown(experiment: Experiment, target: StartTime | InitialValue, record: int) -> Unknown:
+    if isinstance(target, StartTime):
+        value, unit, symbol = experiment.start_time, "s", "t_0"
+    else:
+        known = experiment.initial_conditions.known
+        if target.name not in known:
+            raise ParameterError(
+                f"the initial conditions of record {record + 1} have no known value '{target.name}'; known are "
+                f"{', '.join(known)}."
+            )
+        value, symbol = known[target.name], f"{target.name}_0"
+        unit = column_heading(target.name).partition("[")[2].rstrip("]") or "SI"
+    name, margin = f"{target} of record {record + 1}", target.margin
+    return Unknown(name, target, record, value, value - margin, value + margin, unit, symbol, str(target))
+
+
+def _instant_unknowns(experiment: Experiment, margin: float, record: int) -> list[Unknown]:
+    """The instants of a command after its first one. Raises ParameterError for a command that is no Schedule."""
+    if not isinstance(experiment.command, Schedule):
+        raise ParameterError(
+            f"the command of record {record + 1} is a {type(experiment.command).__name__}, which has no "
+            "instants; give a Schedule, or leave CommandInstants out."
+        )
+    instants = sorted({instant for points in experiment.command.changes.values() for instant, _ in points})
+    return [
+        Unknown(
+            f"command instant {number} of record {record + 1}", CommandInstant(instant, margin), record, instant,
+            instant - margin, instant + margin, "s", f"t_{number}", "command instant",
+        )
+        for number, instant in enumerate(instants[1:], 2)
+    ]  # fmt: skip
+
+
+def with_command_instants(command: InputSignal, instants: Mapping[float, float]) -> InputSignal:
+    """The command with its instants [s] replaced by others, all inputs that change at an instant together."""
+    if not instants:
+        return command
+    assert isinstance(command, Schedule)
+    changes = {
+        name: tuple((instants.get(instant, instant), value) for instant, value in points)
+        for name, points in command.changes.items()
+    }
+    return Schedule(changes)

@@ -1,0 +1,164 @@
+"""Initial state of a record from known values and equilibrium conditions, with its derivatives by the parameters."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ....core import autodiff, tree
+from ....core.arrays import Array
+from ....core.errors import IdentificationError, ParameterError, suggestion
+from ....core.status import Status
+from ....core.system import System
+from ....engine.compile.cache.kernel import newton
+from ....engine.compile.function import Function
+from ....physics.equilibrium import find_equilibrium
+from ....physics.plant.plant import Plant
+from ....physics.plant.validation import check_pressures
+
+PRESSURE_STEP = 100.0
+"""Increase of gauge pressure [Pa] by which states that depend on the pressure are detected."""
+MusclePressures = float | str | Sequence[float | str]
+"""Gauge pressure [Pa] of all muscles, or one for each; also as texts with a unit."""
+_compiled_conditions: dict[Any, Function] = {}
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class InitialConditions:
+    """Conditions that determine an initial state, one for each state; the inputs are zero.
+
+    known       values of states or outputs [SI]
+    guess       initial guess of every state for Newton's method [SI]
+    stationary  states whose time derivative is zero
+    equal       pairs of outputs that are equal
+    """
+
+    known: Mapping[str, float]
+    guess: Mapping[str, float]
+    stationary: tuple[str, ...] = ()
+    equal: tuple[tuple[str, str], ...] = ()
+
+    @classmethod
+    def at_rest(cls, plant: Plant, pressure: MusclePressures) -> InitialConditions:
+        """Equilibrium at gauge pressures [Pa], one for all muscles or one for each; walls and tubes in steady state.
+
+        Raises ParameterError for another number of pressures than muscles, EquilibriumError where there is none.
+        """
+        speeds = [c.speed for c in plant.mechanism.coordinates]
+        coordinates = [c.name for c in plant.mechanism.coordinates]
+        pressures = check_pressures(pressure, len(plant.muscles), plant.ambient)
+        state = find_equilibrium(plant, pressure=tuple(pressures))
+        known, stationary, equal = _steady_conditions(plant, state, pressures, (*speeds, *coordinates))
+        known |= dict.fromkeys(speeds, 0.0)
+        return cls({**_by_output(plant, pressures), **known}, state, (*stationary, *speeds), equal)
+
+    @classmethod
+    def at_coordinates(cls, plant: Plant, pressure: MusclePressures, **coordinates: float) -> InitialConditions:
+        """A plant at gauge pressures [Pa], one for all muscles or one for each, and given coordinates [SI].
+
+        Speeds are zero unless given. Walls and tubes are in steady state at these pressures, also where they are
+        unknowns. Raises ParameterError for another number of pressures than muscles, or an unknown name.
+        """
+        pressures = check_pressures(pressure, len(plant.muscles), plant.ambient)
+        state = plant.state_at(pressure=pressures, **coordinates)
+        known, stationary, equal = _steady_conditions(plant, state, pressures)
+        return cls({**_by_output(plant, pressures), **known}, state, stationary, equal)
+
+    def check_plant(self, system: System, values: Mapping[str, Any]) -> None:
+        """Raise ParameterError for a name that the system lacks, or where the number of conditions is wrong."""
+        names = [s.name for s in system.states]
+        for name in (*self.known, *self.stationary, *(n for pair in self.equal for n in pair)):
+            if name not in (names if name in self.stationary else values):
+                raise ParameterError(
+                    f"the initial conditions name '{name}'; the system has {', '.join(values)}."
+                    f"{suggestion(name, values)}"
+                )
+        if len(self.known) + len(self.stationary) + len(self.equal) != len(names) or set(self.guess) != set(names):
+            raise ParameterError(
+                f"the initial conditions must give as many conditions as there are states ({', '.join(names)}), and a "
+                f"guess of each state; known are {', '.join(self.known) or 'none'}, stationary are "
+                f"{', '.join(self.stationary) or 'none'}."
+            )
+
+
+def _by_output(plant: Plant, pressures: Sequence[float]) -> dict[str, float]:
+    """The gauge pressures [Pa] of the muscles by the names of their outputs."""
+    return {f"{prefix}pressure": value for prefix, value in zip(plant.prefixes, pressures, strict=True)}
+
+
+def _steady_conditions(
+    plant: Plant, state: Mapping[str, float], pressures: Sequence[float], excluded: Sequence[str] = ()
+) -> tuple[dict[str, float], tuple[str, ...], tuple[tuple[str, str], ...]]:
+    """The conditions for the states other than the air masses: known values, stationary states and equal outputs.
+
+    A state that depends on no pressure is known. Of the others, a tube has the pressure of its muscle, and the
+    remaining ones are stationary.
+    """
+    motion = {c.name: state[c.name] for c in plant.mechanism.coordinates}
+    motion |= {c.speed: state[c.speed] for c in plant.mechanism.coordinates}
+    increased = [[p + PRESSURE_STEP * (i == k) for i, p in enumerate(pressures)] for k in range(len(pressures))]
+    others = [plant.state_at(pressure=each, **motion) for each in increased]
+    outputs = plant.outputs(state, dict.fromkeys(plant.inputs, 0.0))
+    known, stationary, equal = {}, [], []
+    for name, value in state.items():
+        if name in excluded or name in [f"{prefix}air_mass" for prefix in plant.prefixes]:
+            continue
+        if all(other[name] == value for other in others):
+            known[name] = value
+        elif (tube_pressure := f"{name.removesuffix('air_mass')}pressure") in outputs:
+            prefix = next(prefix for prefix in plant.prefixes if name.startswith(prefix))
+            equal.append((tube_pressure, f"{prefix}pressure"))
+        else:
+            stationary.append(name)
+    return known, tuple(stationary), tuple(equal)
+
+
+def compile_conditions(system: System, initial: InitialConditions) -> Function:
+    """The compiled function (state, leaves) -> (known values and rates, their derivatives by state and by leaf)."""
+    import casadi
+
+    key = (tree.structure(system), tuple(initial.known), initial.stationary, initial.equal)
+    if key not in _compiled_conditions:
+        model, p = autodiff.symbolic(system)
+        x = casadi.SX.sym("x", len(system.states))
+        state = {s.name: x[i] for i, s in enumerate(system.states)}
+        inputs = dict.fromkeys(system.inputs, 0.0)
+        values = {**model.outputs(state, inputs), **state}
+        initial.check_plant(system, values)
+        rates = model.rates(state, inputs)
+        g = casadi.vertcat(
+            *(casadi.SX(values[n]) for n in initial.known),
+            *(casadi.SX(rates[n]) for n in initial.stationary),
+            *(casadi.SX(values[a] - values[b]) for a, b in initial.equal),
+        )
+        outputs = {"values": g, "by_state": casadi.jacobian(g, x), "by_leaf": casadi.jacobian(g, p)}
+        _compiled_conditions[key] = Function({"x": x, "leaves": p}, outputs)
+    return _compiled_conditions[key]
+
+
+def solve_initial_state(
+    function: Function, initial: InitialConditions, leaves: Array, known: Array, guess: Array, nominal: Array
+) -> tuple[Array, Array, Array]:
+    """The initial state (n,) and its derivatives by the known values (n, k) and by the leaves (n, p).
+
+    `function` is that of `compile_conditions`, `nominal` (n,) holds the magnitudes of the states. The derivatives
+    follow from the implicit function theorem. Raises IdentificationError where no state satisfies the conditions.
+    """
+    n, x = guess.size, guess.copy()
+    target = np.concatenate([known, np.zeros(len(initial.stationary) + len(initial.equal))])
+    values, by_state, by_leaf = np.empty(n), np.empty((n, n)), np.empty((n, leaves.size))
+    workspace = np.zeros((n, n)), np.zeros(n)
+    status = Status(newton(function.address, leaves, target, nominal, x, values, by_state, by_leaf, *workspace))
+    if status != Status.DONE:
+        conditions = [f"{name} = {value:.4g}" for name, value in zip(initial.known, known.tolist(), strict=True)]
+        conditions += [f"{name} stationary" for name in initial.stationary]
+        conditions += [f"{a} = {b}" for a, b in initial.equal]
+        raise IdentificationError(
+            f"no state satisfies the initial conditions ({', '.join(conditions)}; SI): {status.message}. Change "
+            "the conditions or the guess."
+        )
+    inverse = nominal[:, None] * np.linalg.inv(by_state * nominal)
+    return x, inverse[:, : known.size], -inverse @ by_leaf

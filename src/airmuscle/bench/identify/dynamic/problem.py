@@ -1,0 +1,116 @@
+"""DynamicFitProblem: residuals of all records as a function of the unknowns, and their minimisation."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Sequence
+
+import numpy as np
+
+from ....core.arrays import Array
+from ....core.errors import AirmuscleError
+from .experiment import Unknown
+from .levenberg_marquardt import LevenbergMarquardt, minimise
+from .record_model import MAX_STEPS, RecordModel, stack_residuals
+
+MAX_RUNS = 200
+"""Maximum number of simulations of all records in one search."""
+MIN_STEP_BUDGET, STEP_BUDGET_FACTOR = 10_000, 20
+"""A simulation is aborted after this many steps, or after this many times the steps of the best simulation of its
+search if that is more; chosen."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class DynamicFitProblem:
+    """Residuals as a function of the scaled unknowns (P,), counted from their origins in units of their magnitudes."""
+
+    record_models: tuple[RecordModel, ...]
+    unknowns: tuple[Unknown, ...]
+    sensor_deviations: Array
+    """Standard deviation of the sensor of every observed quantity [SI]."""
+
+    @functools.cached_property
+    def scales(self) -> Array:
+        """Magnitude of every unknown [SI], shape (P,)."""
+        return np.array([u.scale for u in self.unknowns])
+
+    @functools.cached_property
+    def origins(self) -> Array:
+        """Values from which the unknowns are counted [SI], shape (P,)."""
+        return np.array([u.origin for u in self.unknowns])
+
+    @functools.cached_property
+    def margins(self) -> Array:
+        """Margins of start times and initial values [SI], whose zero is arbitrary; NaN of parameters, shape (P,)."""
+        return np.array([np.nan if u.paths else u.scale for u in self.unknowns])
+
+    def scaled(self, values: Array) -> Array:
+        """The scaled unknowns for values [SI], shape (..., P)."""
+        return np.asarray((values - self.origins) / self.scales)
+
+    def values(self, scaled: Array) -> Array:
+        """The values [SI] of scaled unknowns, shape (..., P)."""
+        return np.asarray(self.origins + scaled * self.scales)
+
+    @functools.cached_property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lower and upper bounds of the scaled unknowns, shape (P,) each."""
+        low, high = np.array([u.low for u in self.unknowns]), np.array([u.high for u in self.unknowns])
+        return self.scaled(low), self.scaled(high)
+
+    def residuals(self, scaled: Array) -> tuple[Array, Array]:
+        """Residuals (R,) in standard deviations of the sensors, and their Jacobian (R, P) by the scaled unknowns."""
+        residuals, jacobian, _ = self.run(scaled)
+        return residuals, jacobian
+
+    def run(self, scaled: Array, max_steps: int = MAX_STEPS) -> tuple[Array, Array, int]:
+        """Residuals and Jacobian as in `residuals`, and the steps of the longest simulation.
+
+        Raises SimulationError or IdentificationError where a simulation fails or exceeds `max_steps`.
+        """
+        return stack_residuals(self.record_models, self.values(scaled), self.sensor_deviations, self.scales, max_steps)
+
+    def solve(self, scaled: Array, fixed: Sequence[int] = (), max_runs: int = MAX_RUNS) -> tuple[Array, float]:
+        """Least squares from an initial guess (P,) with some unknowns fixed, given by index.
+
+        Returns the scaled unknowns and the sum of squares, which is infinite where the initial guess cannot be
+        simulated.
+        """
+        free, solution = [k for k in range(scaled.size) if k not in fixed], scaled.copy()
+        state = minimise(*self._restrict(scaled, free), max_runs)
+        solution[free] = state.x
+        return solution, state.cost
+
+    def search(self, scaled: Array) -> LevenbergMarquardt:
+        """The search from an initial guess (P,), which can be interrupted and continued."""
+        return LevenbergMarquardt(*self._restrict(scaled, range(scaled.size)))
+
+    def _restrict(self, scaled: Array, free: Sequence[int]) -> tuple[_GuardedResiduals, Array, Array, Array]:
+        """Residuals as a function of the free unknowns, their initial guess and their bounds."""
+        (low, high), indices = self.bounds, list(free)
+        return _GuardedResiduals(self, scaled, indices), scaled[indices], low[indices], high[indices]
+
+
+class _GuardedResiduals:
+    """Residuals of a problem as a function of its free unknowns, None where they cannot be computed.
+
+    This includes simulations with far more steps than the best one so far, which occur far from physical parameters.
+    """
+
+    def __init__(self, problem: DynamicFitProblem, scaled: Array, free: Sequence[int]) -> None:
+        self._problem, self._scaled, self._free = problem, scaled, free
+        self._min_cost, self._max_steps = np.inf, MAX_STEPS
+
+    def __call__(self, x: Array) -> tuple[Array, Array] | None:
+        problem, scaled = self._problem, self._scaled.copy()
+        scaled[self._free] = x
+        try:
+            residuals, jacobian, steps = problem.run(scaled, self._max_steps)
+        except AirmuscleError:
+            return None
+        cost = float(residuals @ residuals)
+        if cost < self._min_cost:
+            self._min_cost = cost
+            self._max_steps = int(min(MAX_STEPS, max(MIN_STEP_BUDGET, STEP_BUDGET_FACTOR * steps)))
+        return residuals, jacobian if len(self._free) == scaled.size else jacobian[:, self._free]

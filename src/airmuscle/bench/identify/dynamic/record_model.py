@@ -1,0 +1,273 @@
+"""RecordModel: modelled outputs of one record, with their derivatives by every unknown."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ....core import tree
+from ....core.arrays import Array
+from ....core.errors import IdentificationError, ParameterError
+from ....core.status import Status
+from ....core.system import System
+from ....engine.compile.cache.kernel import evaluate
+from ....engine.compile.program import CompiledSystem, compile_system
+from ....engine.loop.inputs import InputSignal
+from ....engine.run.bound_integrator import BoundIntegrator
+from ....engine.run.integrators import Integrator
+from ....engine.run.with_sensitivities import WithSensitivities
+from .experiment import CommandInstant, Experiment, InitialValue, StartTime, Unknown, with_command_instants
+from .initial_conditions import compile_conditions, solve_initial_state
+from .time_grid import TimeGrid, make_time_grid
+
+MAX_STEPS = 1_000_000
+"""Maximum number of steps of one simulation."""
+
+
+class RecordModel:
+    """The model of one record, compiled once with its sensitivities.
+
+    names                the observed quantities, Q of them
+    times                of the rows on the clock of the recording [s], shape (N,)
+    measured             their measured values [SI], shape (N, Q)
+    valid                mask of the finite measured values, shape (N, Q)
+    unknown_indices      indices of the unknowns of the fit that affect this record
+    sensitivity_indices  those of them that are integrated as sensitivities; a start time is not
+    """
+
+    def __init__(
+        self, plant: System, experiment: Experiment, number: int, unknowns: Sequence[Unknown],
+        observed: Mapping[str, float], method: Integrator,
+    ) -> None:  # fmt: skip
+        self._arguments = plant, experiment, number, unknowns, dict(observed), method
+        self.plant, self.experiment, self.method = experiment.plant or plant, experiment, method
+        self.unknowns = unknowns
+        self.unknown_indices = [k for k, u in enumerate(unknowns) if u.record in (None, number)]
+        self.sensitivity_indices = [k for k in self.unknown_indices if not isinstance(unknowns[k].target, StartTime)]
+        self.names = tuple(observed)
+        self.times = _check_times(experiment)
+        self.measured = np.column_stack([experiment.recording[name] for name in self.names])
+        self.valid = np.isfinite(self.measured)
+        self.all_valid = bool(self.valid.all())
+        groups = tuple(unknowns[k].paths for k in self.sensitivity_indices) or ((),)
+        scales = tuple(unknowns[k].scale for k in self.sensitivity_indices) or (1.0,)
+        self._system = compile_system(_add_sensitivities(self.plant, groups, scales, self.names, experiment))
+        self._nominal = self._system.nominal
+        leaf_index = {leaf.path: i for i, leaf in enumerate(tree.leaves(self.plant))}
+        changed = [(leaf_index[path], k) for k in self.unknown_indices for path in unknowns[k].paths]
+        self._changed = np.array([i for i, _ in changed], dtype=int), np.array([k for _, k in changed], dtype=int)
+        self._leaves = tree.flatten(self.plant)
+        self._conditions = compile_conditions(self.plant, experiment.initial_conditions)
+        self._known = np.array(list(experiment.initial_conditions.known.values()), dtype=float)
+        self._initial_values = [
+            (j, i) for j, k in enumerate(self.sensitivity_indices) for i in _known_index(unknowns[k], experiment)
+        ]
+        targets = [(j, unknowns[k].target) for j, k in enumerate(self.sensitivity_indices)]
+        self._instant_columns = [(j, target) for j, target in targets if isinstance(target, CommandInstant)]
+        self._leaf_by_column = np.zeros((self._leaves.size, len(self.sensitivity_indices)))
+        for j, k in enumerate(self.sensitivity_indices):
+            self._leaf_by_column[[leaf_index[path] for path in unknowns[k].paths], j] = 1.0
+        self._state_nominal = np.array([s.nominal for s in self.plant.states])
+        self._guess = np.array([experiment.initial_conditions.guess[s.name] for s in self.plant.states])
+        self._last_grid: TimeGrid | None = None
+        self._idle: list[BoundIntegrator] = []
+        """Bound integrators that no simulation uses at present."""
+
+    def __reduce__(self) -> tuple[type[RecordModel], tuple[Any, ...]]:
+        """Compiled functions are not stored; a loaded model compiles them again."""
+        return RecordModel, self._arguments
+
+    def leaves(self, values: Array) -> Array:
+        """The leaves of the plant with the unknowns at `values` (P,) [SI]."""
+        leaves = self._leaves.copy()
+        indices, unknowns = self._changed
+        leaves[indices] = values[unknowns]
+        return leaves
+
+    def initial_state(self, values: Array) -> tuple[Array, Array]:
+        """The initial state (n,) and its derivatives by every sensitivity column (n, K)."""
+        known = self._known.copy()
+        for j, i in self._initial_values:
+            known[i] = values[self.sensitivity_indices[j]]
+        state, by_known, by_leaf = solve_initial_state(
+            self._conditions,
+            self.experiment.initial_conditions,
+            self.leaves(values),
+            known,
+            self._guess,
+            self._state_nominal,
+        )
+        derivatives = by_leaf @ self._leaf_by_column
+        for j, i in self._initial_values:
+            derivatives[:, j] = by_known[:, i]
+        return state, derivatives
+
+    def start_time(self, values: Array) -> float:
+        """The start of the run on the clock of the recording [s]."""
+        times = [values[k] for k in self.unknown_indices if isinstance(self.unknowns[k].target, StartTime)]
+        return float(times[0]) if times else self.experiment.start_time
+
+    def command(self, values: Array) -> InputSignal:
+        """The command of the run with its estimated instants."""
+        return with_command_instants(self.experiment.command, self._instants(values))
+
+    def _instants(self, values: Array) -> dict[float, float]:
+        """The estimated instants [s] by those of the command of the experiment."""
+        return {target.instant: float(values[self.sensitivity_indices[j]]) for j, target in self._instant_columns}
+
+    def evaluate(self, values: Array, max_steps: int = MAX_STEPS) -> ModelOutputs:
+        """The modelled outputs at the rows of the record for unknowns at `values` (P,) [SI].
+
+        Raises IdentificationError where the simulation fails or no initial state exists.
+        """
+        outputs, before_start, steps = self._outputs(values, max_steps)
+        count, columns = len(self.names), self._system.sizes.outputs // len(self.names) - 2
+        by_column = outputs[:, count:-count].reshape(-1, count, columns)
+        if len(self.sensitivity_indices) == len(self.unknowns):
+            return ModelOutputs(outputs[:, :count], by_column, steps)
+        jacobian = np.zeros((*self.measured.shape, len(self.unknowns)))
+        jacobian[:, :, self.sensitivity_indices] = by_column[:, :, : len(self.sensitivity_indices)]
+        for k in self.unknown_indices:
+            if isinstance(self.unknowns[k].target, StartTime):
+                jacobian[:, :, k] = np.where(before_start[:, None], 0.0, -outputs[:, -count:])
+        return ModelOutputs(outputs[:, :count], jacobian, steps)
+
+    def _outputs(self, values: Array, max_steps: int) -> tuple[Array, npt.NDArray[np.bool_], int]:
+        """Outputs of the compiled system at the rows, the mask of the rows before the start, and the steps."""
+        state, derivatives = self.initial_state(values)
+        grid = self._time_grid(values)
+        leaves = self._system.parameters.copy()
+        leaves[: self._leaves.size] = self.leaves(values)
+        system = self._system.at(leaves, self._nominal)
+        full_state = np.zeros(self._nominal.size)
+        full_state[: state.size] = state
+        if self.sensitivity_indices:
+            full_state[state.size :] = derivatives.ravel()
+        bound = self._bound_integrator(system)
+        rows, steps = self._integrate(bound, system, full_state, grid, max_steps)
+        results = np.empty((grid.times.size, system.sizes.outputs))
+        evaluate(system.address["outputs"], system.precomputed, rows, grid.inputs, results)
+        self._idle.append(bound)  # only now: another thread that takes it overwrites the precomputed values
+        return results, grid.before_start, steps
+
+    def _integrate(
+        self, bound: BoundIntegrator, system: CompiledSystem, state: Array, grid: TimeGrid, max_steps: int
+    ) -> tuple[Array, int]:
+        """The states with their sensitivities at the rows, and the steps, interval by interval.
+
+        The sensitivity to an instant of the command begins there with the difference of the rates before and after it.
+        """
+        rows, steps, held = list[Array](), 0, grid.intervals[0].segments.values[0]
+        for interval in grid.intervals:
+            if interval.column is not None:
+                own = self._guess.size
+                before, after = (system.rates(state.tolist(), u)[:own] for u in (held, interval.segments.values[0]))
+                state[own:].reshape(own, -1)[:, interval.column] += before - after
+            solution = bound.run(interval.segments, interval.begin, state, interval.times, max_steps - steps)
+            if solution.status == Status.INTERRUPTED:
+                raise KeyboardInterrupt
+            if solution.status != Status.DONE:
+                raise IdentificationError(
+                    f"{self.experiment.recording.origin}: the simulation ended early, at {solution.time:.4g} s."
+                )
+            rows.append(solution.rows)
+            state, held, steps = solution.state, interval.segments.values[-1], steps + solution.steps
+        return rows[0] if len(rows) == 1 else np.concatenate(rows), steps
+
+    def _bound_integrator(self, system: CompiledSystem) -> BoundIntegrator:
+        """The integrator at a system, an idle one if there is any: binding takes a twentieth of a simulation."""
+        try:
+            bound = self._idle.pop()
+        except IndexError:  # none, or another thread was quicker
+            return self.method.bind(system)
+        bound.rebind(self.method.binding(system))
+        return bound
+
+    def _time_grid(self, values: Array) -> TimeGrid:
+        """The rows relative to the start of the run; the last result is kept, as the instants rarely change."""
+        grid, start_time, instants = self._last_grid, self.start_time(values), self._instants(values)
+        if grid is None or (grid.start_time, grid.instants) != (start_time, instants):
+            command = with_command_instants(self.experiment.command, instants)
+            columns = {target.instant: j for j, target in self._instant_columns}
+            grid = make_time_grid(self.times, start_time, command, self.plant.inputs, instants, columns)
+            self._last_grid = grid
+        return grid
+
+
+class ModelOutputs(NamedTuple):
+    """Modelled outputs (N, Q), their derivatives by all unknowns (N, Q, P), and the steps of the simulation."""
+
+    values: Array
+    jacobian: Array
+    steps: int
+
+
+def _known_index(unknown: Unknown, experiment: Experiment) -> list[int]:
+    """The index of an unknown among the known initial values; empty if it is none of them."""
+    known, target = list(experiment.initial_conditions.known), unknown.target
+    return [known.index(target.name)] if isinstance(target, InitialValue) else []
+
+
+def _check_times(experiment: Experiment) -> Array:
+    """The times of a record [s]. Raises IdentificationError where they decrease or there are none."""
+    times, origin = experiment.recording["time"], experiment.recording.origin
+    bad = np.flatnonzero(~(np.diff(times) >= 0))
+    if bad.size:
+        raise IdentificationError(
+            f"{origin}: time must not decrease, but row {bad[0] + 2} is at {times[bad[0] + 1]:g} s. Correct the record "
+            "or use a part of it."
+        )
+    if not times.size:
+        raise IdentificationError(f"{origin}: the record has no rows. Give another one, or use a longer part of it.")
+    return times
+
+
+def _add_sensitivities(
+    plant: System, groups: tuple[tuple[str, ...], ...], scales: tuple[float, ...], names: tuple[str, ...],
+    experiment: Experiment,
+) -> WithSensitivities:  # fmt: skip
+    """The plant with sensitivity states; errors name the recording."""
+    try:
+        return WithSensitivities(plant, groups, scales, names)
+    except ParameterError as error:
+        raise error.located(experiment.recording.origin) from None
+
+
+def stack_residuals(
+    models: Sequence[RecordModel], values: Array, deviations: Array, scales: Array, max_steps: int = MAX_STEPS
+) -> tuple[Array, Array, int]:
+    """Residuals (model - measured) in standard deviations (R,), missing values omitted, for unknowns at `values` (P,).
+
+    Also the Jacobian (R, P) by the scaled unknowns, and the steps of the longest simulation.
+    """
+    residuals, jacobians, longest = [], [], 0
+    factors = scales / deviations[:, None]
+    for model in models:
+        modelled, jacobian, steps = model.evaluate(values, max_steps)
+        residual = (modelled - model.measured) / deviations
+        jacobian = jacobian * factors
+        longest = max(longest, steps)
+        residuals.append(residual.ravel() if model.all_valid else residual[model.valid])
+        jacobians.append(jacobian.reshape(-1, scales.size) if model.all_valid else jacobian[model.valid])
+    if len(models) == 1:
+        return residuals[0], jacobians[0], longest
+    return np.concatenate(residuals), np.concatenate(jacobians), longest
+
+
+def separate_residuals(models: Sequence[RecordModel], residuals: Array) -> list[Array]:
+    """The stacked residuals (R,) of each quantity of each record in order of time, missing values omitted."""
+    series, begin = [], 0
+    for model in models:
+        rows = residuals[begin : begin + int(model.valid.sum())]
+        quantity = np.nonzero(model.valid)[1]
+        series += [rows[quantity == q] for q in range(len(model.names))]
+        begin += rows.size
+    return series
+
+
+def count_readings(models: Sequence[RecordModel]) -> int:
+    """The number of finite measured values."""
+    return sum(int(model.valid.sum()) for model in models)

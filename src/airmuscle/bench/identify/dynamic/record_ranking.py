@@ -1,0 +1,228 @@
+"""Ranking of candidate records by how well they separate two parameters of a dynamic fit."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from ....core import tree
+from ....core.arrays import Array
+from ....core.errors import AirmuscleError, IdentificationError, ParameterError, suggestion
+from ....core.short_repr import ShortRepr
+from .candidate_records import CandidateRecord, candidate_records
+from .experiment import StartTime, Unknown, make_unknowns
+from .record_model import RecordModel
+from .result import DynamicFit
+
+VALVE = ("conductance", "critical_ratio", "subsonic_index")
+"""Parameters of a valve, by the last part of their paths."""
+WALL = ("heat_transfer", "exponent", "enclosed_volume", "rest_volume", "growth_volume", "radius", "resting_length")
+"""Parameters of the wall of a muscle and of its volume, by the last part of their paths."""
+PRIOR = 10.0
+"""Standard deviation of the normal prior of each unknown, relative to its value, which keeps undetermined ones finite
+(chosen)."""
+START_MARGIN = 0.05
+"""Standard deviation of the prior of the start time of a candidate [s] (chosen)."""
+MIN_GAIN = 1.5
+"""Least factor by which a record reduces the greater standard error of a pair to count as one that separates it
+(chosen); a repeat reduces it by 1.41."""
+
+
+@dataclasses.dataclass(frozen=True)
+class PairPrecision:
+    """Relative standard errors of two parameters and their correlation."""
+
+    standard_errors: tuple[float, float]
+    correlation: float
+
+    @property
+    def worst(self) -> float:
+        """The greater of the two relative standard errors."""
+        return max(self.standard_errors)
+
+
+@dataclasses.dataclass(frozen=True)
+class RankedRecord:
+    """A candidate record, and the precision of the pair with it in addition to the records of the fit."""
+
+    description: str
+    precision: PairPrecision
+    gain: float
+    """Factor by which the greater relative standard error of the pair decreases."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class RecordRanking(ShortRepr):
+    """Candidate records in the order of their gain for a pair of parameters; the first separates it best."""
+
+    pair: tuple[str, str]
+    now: PairPrecision
+    ranking: tuple[RankedRecord, ...]
+    failed: tuple[str, ...] = ()
+    """Candidates that could not be simulated, with the reason."""
+
+    @property
+    def verdict(self) -> str:
+        """What the records determine now, and which record would separate the pair, as sentences."""
+        first, second = self.pair
+        now = (
+            f"{first} and {second} have a correlation of {self.now.correlation:.2f} and relative standard errors of "
+            f"{_percent(self.now.standard_errors[0])} and {_percent(self.now.standard_errors[1])}."
+        )
+        best = self.ranking[0]
+        if best.gain < MIN_GAIN:
+            return f"{now} None of the {len(self.ranking)} compared records would separate them."
+        after = best.precision
+        return (
+            f"{now} To separate them, measure {best.description}: with it, the correlation is expected to be "
+            f"{after.correlation:.2f} and the relative standard errors {_percent(after.standard_errors[0])} and "
+            f"{_percent(after.standard_errors[1])}."
+        )
+
+
+def rank_records(fit: DynamicFit, pair: tuple[str, str] | None = None) -> RecordRanking:
+    """Rank candidate records by the expected precision of a pair of parameters of a fit.
+
+    The Fisher information of a candidate, from its sensitivities at the estimates, is added to that of the records of
+    the fit. Each candidate has the rows and the residual standard deviation of the fit, and an unknown start time. What
+    the fit keeps fixed counts as known, except a valve that only the candidate opens.
+
+    pair  names of two estimates; by default the most correlated pair of a valve parameter (conductance, critical ratio)
+          and a parameter of the wall or the gas (heat transfer, exponent, volume)
+
+    Raises ParameterError for names that the fit lacks, IdentificationError without a pair.
+    """
+    common = [i for i, u in enumerate(fit.unknowns) if u.record is None and not fit.estimates[i].on_bound]
+    names = [fit.unknowns[i].name for i in common]
+    information = _fit_information(fit, common)
+    chosen = _check_pair(pair, names, fit) if pair else _most_correlated(information, names)
+    now = _precision(information, names, chosen)
+    ranked, failed = list[RankedRecord](), list[str]()
+    for candidate in candidate_records(fit):
+        try:
+            own = _candidate_information(fit, candidate, common)
+        except AirmuscleError as error:
+            failed.append(f"{candidate.description}: {error.message}")
+            continue
+        after = _precision(information + own, names, chosen)
+        ranked.append(RankedRecord(candidate.description, after, now.worst / after.worst))
+    if not ranked:
+        raise IdentificationError(f"no candidate record can be simulated: {'; '.join(failed)}")
+    return RecordRanking(chosen, now, tuple(sorted(ranked, key=lambda each: -each.gain)), tuple(failed))
+
+
+def _percent(value: float) -> str:
+    return f"{100.0 * value:.2g} %"
+
+
+def _relative(fit: DynamicFit, index: int) -> float:
+    """The magnitude by which an unknown is made relative: the estimate of a parameter, or its scale if that is zero;
+    the margin of a start time or an initial value, whose zero is arbitrary."""
+    unknown = fit.unknowns[index]
+    return (abs(fit.estimates[index].value) if unknown.paths else 0.0) or unknown.scale
+
+
+def _fit_information(fit: DynamicFit, common: Sequence[int]) -> Array:
+    """The Fisher information of the relative common unknowns from the records of the fit, with the prior."""
+    _, jacobian = fit.problem.residuals(fit.problem.scaled(fit.values))
+    factors = np.array([_relative(fit, i) for i in range(len(fit.unknowns))]) / fit.problem.scales
+    matrix = jacobian * factors / max(fit.residual_std, 1e-12)
+    others = [i for i, e in enumerate(fit.estimates) if i not in common and not e.on_bound]
+    return _without(matrix[:, list(common)], matrix[:, others]) + np.eye(len(common)) / PRIOR**2
+
+
+def _without(matrix: Array, nuisance: Array, prior: Array | None = None) -> Array:
+    """The information of the columns of a matrix, with the columns of nuisance unknowns estimated as well.
+
+    `prior` are their standard deviations in the unit of the columns; `PRIOR` by default.
+    """
+    own = matrix.T @ matrix
+    if not nuisance.shape[1]:
+        return np.asarray(own)
+    deviations = np.full(nuisance.shape[1], PRIOR) if prior is None else prior
+    cross = matrix.T @ nuisance
+    weight = nuisance.T @ nuisance + np.diag(1.0 / deviations**2)
+    return np.asarray(own - cross @ np.linalg.solve(weight, cross.T))
+
+
+def _candidate_information(fit: DynamicFit, candidate: CandidateRecord, common: Sequence[int]) -> Array:
+    """The information of a candidate on the relative common unknowns; those that it lacks have none."""
+    plant, part = candidate.experiment.plant, candidate.replaced
+    assert plant is not None
+    known = {leaf.path for leaf in tree.leaves(plant) if not (part and leaf.path.startswith(part))}
+    own = [i for i, u in enumerate(fit.unknowns) if u.paths and u.record == 0]
+    kept = [i for i in (*common, *own) if fit.unknowns[i].paths and set(fit.unknowns[i].paths) <= known]
+    unknowns = [dataclasses.replace(fit.unknowns[i], record=None) for i in kept]
+    named = {path for unknown in unknowns for path in unknown.paths}
+    further = [path for path in candidate.changed if path not in named]
+    unknowns += make_unknowns(plant, [candidate.experiment], further, (), {}) if further else ()
+    matrix = _candidate_sensitivities(fit, candidate, unknowns)
+    shared = [k for k, i in enumerate(kept) if i in common and not set(unknowns[k].paths) & set(candidate.changed)]
+    nuisance = [k for k in range(len(unknowns) + 1) if k not in shared]
+    prior = np.where(np.array(nuisance) == len(unknowns), START_MARGIN, PRIOR)
+    information = np.zeros((len(common), len(common)))
+    rows = [common.index(kept[k]) for k in shared]
+    information[np.ix_(rows, rows)] = _without(matrix[:, shared], matrix[:, nuisance], prior)
+    return information
+
+
+def _candidate_sensitivities(fit: DynamicFit, candidate: CandidateRecord, unknowns: Sequence[Unknown]) -> Array:
+    """The scaled outputs of a candidate by its relative unknowns, and by its start time [1/s] in the last column."""
+    plant, problem = candidate.experiment.plant, fit.problem
+    assert plant is not None
+    start = Unknown("start time", StartTime(START_MARGIN), 0, 0.0, -START_MARGIN, START_MARGIN, "s", "t_0", "")
+    names, method = problem.record_models[0].names, problem.record_models[0].method
+    observed = dict(zip(names, problem.sensor_deviations.tolist(), strict=True))
+    model = RecordModel(plant, candidate.experiment, 0, [*unknowns, start], observed, method)
+    values = _values(plant, unknowns)
+    outputs = model.evaluate(np.array([*values, 0.0]))
+    scales = np.array([*(abs(value) or u.scale for value, u in zip(values, unknowns, strict=True)), 1.0])
+    deviations = problem.sensor_deviations * max(fit.residual_std, 1e-12)
+    matrix = (outputs.jacobian * scales / deviations[:, None]).reshape(-1, scales.size)
+    if not np.isfinite(matrix).all():
+        raise IdentificationError("its sensitivities are not finite.")
+    return np.asarray(matrix)
+
+
+def _values(plant: object, unknowns: Sequence[Unknown]) -> list[float]:
+    values = {leaf.path: leaf.value for leaf in tree.leaves(plant)}
+    return [float(values[unknown.paths[0]]) for unknown in unknowns]
+
+
+def _precision(information: Array, names: Sequence[str], pair: tuple[str, str]) -> PairPrecision:
+    covariance = np.linalg.inv(information)
+    i, k = (names.index(name) for name in pair)
+    first, second = np.sqrt(covariance[i, i]), np.sqrt(covariance[k, k])
+    return PairPrecision((float(first), float(second)), float(covariance[i, k] / (first * second)))
+
+
+def _kind(name: str) -> str:
+    return name.rpartition(".")[2].partition("[")[0]
+
+
+def _most_correlated(information: Array, names: Sequence[str]) -> tuple[str, str]:
+    """The most correlated pair of a valve and a wall parameter, else of any two. Raises IdentificationError."""
+    if len(names) < 2:
+        raise IdentificationError(
+            f"the fit has {len(names)} common unknowns that are not on a bound; two are needed. Free another one."
+        )
+    covariance = np.linalg.inv(information)
+    deviations = np.sqrt(np.diag(covariance))
+    strength = np.abs(covariance / np.outer(deviations, deviations))
+    valve, wall = ([i for i, name in enumerate(names) if _kind(name) in kinds] for kinds in (VALVE, WALL))
+    pairs = [(i, k) for i in valve for k in wall] or [(i, k) for i in range(len(names)) for k in range(i)]
+    i, k = max(pairs, key=lambda pair: strength[pair])
+    return names[i], names[k]
+
+
+def _check_pair(pair: tuple[str, str], names: Sequence[str], fit: DynamicFit) -> tuple[str, str]:
+    for name in pair:
+        if name not in names:
+            bound = any(e.name == name and e.on_bound for e in fit.estimates)
+            reason = "is on a bound" if bound else "is no common unknown of the fit"
+            raise ParameterError(f"'{name}' {reason}; allowed are {', '.join(names)}.{suggestion(name, names)}")
+    if pair[0] == pair[1]:
+        raise ParameterError(f"'{pair[0]}' is named twice; a pair has two different parameters.")
+    return pair

@@ -1,0 +1,209 @@
+"""Reliability of a dynamic fit beyond its standard errors: other optima of the searches, and the effect of bounds.
+
+Standard errors describe the curvature at one optimum. They contain neither another optimum that fits almost as well nor
+the effect of an unknown on its bound, whose sensitivity follows from the normal equations of the others:
+dx/db = -(J^T J)^-1 J^T j, with j the column of the unknown on the bound.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from ....core.arrays import Array
+from ..result import Estimate
+
+SAME_COST = 1e-3
+"""Relative difference of the sums of squares of one optimum (chosen)."""
+SAME_VALUE = 0.02
+"""Relative difference of the unknowns of one optimum (chosen)."""
+SIMILAR_RMS = 0.05
+"""Relative increase of the rms residual up to which another optimum is named (chosen)."""
+MIN_STANDARD_ERRORS = 3.0
+"""Difference of an unknown, in standard errors, that these do not contain (chosen)."""
+SMALL_RMS, WIDE_RANGE = 0.01, 0.1
+"""Relative increase of the rms residual that is negligible where there is model error, and relative change of an
+unknown that is named (both chosen)."""
+BOUND_SHIFT = 0.1
+"""Shift of a bound, relative to its value, whose effect on the other unknowns is stated (chosen)."""
+MIN_SEARCHES = 3
+"""Number of searches from which a single one at the optimum is named (chosen)."""
+MAX_NAMES = 3
+"""Maximum number of unknowns in a sentence."""
+
+CONSEQUENCES: tuple[tuple[tuple[str, ...], str], ...] = (
+    (("critical_ratio",),
+     "The flow law does not describe the records near equal pressures, or they do not reach that range; the "
+     "conductance takes up the difference, and the predicted time to the final pressure is biased. Record the fill "
+     "until the pressure is steady, or fix the ratio at the value of the data sheet."),
+    (("volume", "rest_volume", "growth_volume"),
+     "Only the ratio of conductance to volume is determined, so the conductance has the relative error of this bound "
+     "and must not be used with another volume. Measure the volume separately, for example by the water that fills "
+     "it."),
+)  # fmt: skip
+"""Consequence of an unknown on its bound, by the last part of its path."""
+RECORD_CONSEQUENCE = "The true value may lie beyond it: give a wider margin, or state the value in the record."
+"""Consequence of a start time or an initial value on its bound."""
+_OTHER_CONSEQUENCE = "Extend the bound if it is not physical, or fix the parameter at a measured value."
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Optimum:
+    """A point where searches ended: the estimates [SI], shape (P,), the sum of squares and the number of searches."""
+
+    values: Array
+    cost: float
+    searches: int
+
+
+def distinct_optima(values: Array, costs: Array, scales: Array, margins: Array | None = None) -> tuple[Optimum, ...]:
+    """The optima of searches that ended at `values` (S, P) with `costs` (S,), lowest first.
+
+    Two searches ended at one optimum if their sums of squares and all unknowns, relative to their values or at least a
+    thousandth of `scales` (P,), agree; start times and initial values relative to their `margins` (P,), which are NaN
+    for parameters. Searches without a result are left out.
+    """
+    margins = np.full(scales.size, np.nan) if margins is None else margins
+    optima: list[Optimum] = []
+    for point, cost in zip(values, costs, strict=True):
+        if not np.isfinite(cost):
+            continue
+        for i, optimum in enumerate(optima):
+            reference = np.maximum(np.abs(optimum.values), 1e-3 * scales)
+            near = np.abs(point - optimum.values) <= SAME_VALUE * np.where(np.isnan(margins), reference, margins)
+            if cost <= (1 + SAME_COST) * optimum.cost + 1e-9 and near.all():
+                optima[i] = dataclasses.replace(optimum, searches=optimum.searches + 1)
+                break
+        else:
+            optima.append(Optimum(point, float(cost), 1))
+    return tuple(optima)
+
+
+def searches_at_lowest(costs: Array) -> int:
+    """The number of searches with the lowest sum of squares, from all of them (S,), lowest first."""
+    return int(np.count_nonzero(costs <= (1 + SAME_COST) * costs[0] + 1e-9))
+
+
+def describe_optima(
+    optima: Sequence[Optimum], estimates: Sequence[Estimate], costs: Array, margins: Array | None = None
+) -> list[str]:
+    """Sentences on other optima that fit almost as well, or on an optimum that a single search reached.
+
+    margins  of the estimates that have one, as in `distinct_optima`
+    """
+    best, notes = optima[0], list[str]()
+    for other in optima[1:]:
+        increase = float(np.sqrt(other.cost / max(best.cost, 1e-300))) - 1.0
+        differences = _differences(other, estimates, _magnitudes(estimates, margins))
+        if increase > SIMILAR_RMS or not differences:
+            continue
+        notes.append(
+            f"the problem has several optima: {_count(other.searches)} of {costs.size} ended where the rms residual is "
+            f"only {100 * increase:.1f} % greater, with {', '.join(differences)}; the standard errors describe one "
+            "optimum and do not contain this difference"
+        )
+        break
+    if searches_at_lowest(costs) == 1 and costs.size >= MIN_SEARCHES:
+        notes.append(
+            f"only one of {costs.size} searches reached this optimum, so a lower one may exist and the standard errors "
+            "are not reliable; repeat the fit with more starts, or with narrower bounds"
+        )
+    return notes
+
+
+def _count(number: int) -> str:
+    return "one search" if number == 1 else f"{number} searches"
+
+
+def _magnitudes(estimates: Sequence[Estimate], margins: Array | None) -> Array:
+    """The magnitudes to which changes of the estimates are relative [SI], shape (P,): their values or margins."""
+    values = np.array([max(abs(estimate.value), 1e-300) for estimate in estimates])
+    return values if margins is None else np.where(np.isnan(margins), values, margins)
+
+
+def _differences(other: Optimum, estimates: Sequence[Estimate], magnitudes: Array) -> list[str]:
+    """The unknowns that differ by more than their standard errors contain, the largest relative difference first."""
+    differences = []
+    for estimate, value, magnitude in zip(estimates, other.values, magnitudes, strict=True):
+        change = abs(value - estimate.value)
+        contained = MIN_STANDARD_ERRORS * estimate.stderr if np.isfinite(estimate.stderr) else 0.0
+        relative = change / magnitude
+        if change > contained and relative > SAME_VALUE:
+            unit = f" {estimate.display_unit}" if estimate.display_unit else ""
+            differences.append((relative, f"{estimate.name} {value:.3g} instead of {estimate.value:.3g}{unit}"))
+    return [text for _, text in sorted(differences, reverse=True)[:MAX_NAMES]]
+
+
+def describe_flatness(
+    estimates: Sequence[Estimate], degrees_of_freedom: int, margins: Array | None = None
+) -> list[str]:
+    """A sentence on the unknowns that change widely at an rms residual that is hardly greater, by the linearised fit.
+
+    The sum of squares grows by one residual variance at a standard error, so the rms residual grows by the fraction r
+    at sqrt((2 r + r^2) (N - P)) standard errors. `margins` are those of `distinct_optima`.
+    """
+    ratio = float(np.sqrt((2 * SMALL_RMS + SMALL_RMS**2) * degrees_of_freedom))
+    sizes = zip(estimates, _magnitudes(estimates, margins), strict=True)
+    wide = [(ratio * e.stderr / size, e) for e, size in sizes if np.isfinite(e.stderr)]
+    wide = [each for each in wide if each[0] > WIDE_RANGE and ratio > MIN_STANDARD_ERRORS]
+    if not wide:
+        return []
+    texts = [
+        f"{e.name} {e.value - ratio * e.stderr:.3g} to {e.value + ratio * e.stderr:.3g} {e.display_unit}".rstrip()
+        for _, e in sorted(wide, key=lambda item: -item[0])[:MAX_NAMES]
+    ]
+    return [
+        f"an rms residual that is {100 * SMALL_RMS:.0f} % greater allows {', '.join(texts)}; with model error, other "
+        "bounds or another start can give any value in such a range, whatever the standard error"
+    ]
+
+
+def describe_bounds(
+    estimates: Sequence[Estimate], jacobian: Array, inverse: Array, on_bound: npt.NDArray[np.bool_], scales: Array,
+    origins: Array | None = None,
+) -> list[str]:  # fmt: skip
+    """Sentences on every unknown on its bound: no standard error, the consequence, and the effect on the others.
+
+    jacobian  of the residuals by the scaled unknowns, shape (R, P)
+    inverse   (J^T J)^-1 of the unknowns that are not on a bound, in their order; NaN where undetermined
+    scales    magnitudes of the unknowns [SI], shape (P,)
+    origins   values from which the unknowns are counted [SI], shape (P,); 0 by default
+    """
+    origins = np.zeros(on_bound.size) if origins is None else origins
+    inner = np.flatnonzero(~on_bound)
+    notes = []
+    for k in map(int, np.flatnonzero(on_bound)):
+        bound = estimates[k]
+        shifts = -inverse @ (jacobian[:, inner].T @ jacobian[:, k]) * scales[inner] / scales[k]
+        change = BOUND_SHIFT * (abs(bound.value - origins[k]) or scales[k])
+        moved = _moved([estimates[int(i)] for i in inner], shifts * change)
+        relative, absolute = f"{100 * BOUND_SHIFT:.0f} % greater", f"{change:.2g} {bound.display_unit} greater"
+        greater = absolute if origins[k] else relative
+        effect = f" If the bound were {greater}, it would move {', '.join(moved)}." if moved else ""
+        value = f"{bound.value:.4g} {bound.display_unit}".rstrip()
+        notes.append(
+            f"{bound.name} is on its bound, {value}, and has no standard error; the standard errors of the others hold "
+            f"only for this value. {_consequence(bound.name)}{effect}"
+        )
+    return notes
+
+
+def _moved(estimates: Sequence[Estimate], shifts: Array) -> list[str]:
+    """The unknowns that a shift of a bound moves by more than a standard error, the largest relative change first."""
+    described_shifts = []
+    for estimate, shift in zip(estimates, shifts, strict=True):
+        if np.isfinite(shift) and np.isfinite(estimate.stderr) and abs(shift) > estimate.stderr:
+            unit = f" {estimate.display_unit}" if estimate.display_unit else ""
+            text = f"{estimate.name} by {shift:+.2g}{unit} ({abs(shift) / estimate.stderr:.2g} standard errors)"
+            described_shifts.append((abs(shift) / max(abs(estimate.value), 1e-300), text))
+    return [text for _, text in sorted(described_shifts, reverse=True)[:MAX_NAMES]]
+
+
+def _consequence(name: str) -> str:
+    if name.startswith(("start time", "initial ")):
+        return RECORD_CONSEQUENCE
+    last = name.partition(" of record")[0].rpartition(".")[2].partition("[")[0]
+    return next((text for names, text in CONSEQUENCES if last in names), _OTHER_CONSEQUENCE)

@@ -1,0 +1,258 @@
+"""D-optimal design of static experiments: isobaric and isometric runs within the limits of a test rig.
+
+The information matrix of a design is M = Sum J^T J / sigma^2, where J holds the derivatives of the quantity that the
+law gives with respect to its free parameters, at every point of every run. D-optimal runs maximise det M, and so
+minimise the volume of the confidence ellipsoid. They are selected greedily and then improved by exchanges.
+Reference: Fedorov, V. V., Theory of Optimal Experiments, Academic Press, 1972.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Collection, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core.arrays import Array
+from ...core.errors import IdentificationError, ParameterError
+from ...physics.muscle.characteristic.base import Characteristic
+from ...physics.muscle.characteristic.validity_range import ValidityRange
+from ...recording import Recording
+from .censoring import UNCENSORED
+from .identifiability import EXACT_RANK_TOLERANCE, UndeterminedCombination, analyse_identifiability
+from .problem import make_problem
+
+LEVEL_COUNT = 13
+"""Levels of pressure, and of contraction, of the candidate runs; chosen."""
+MIN_FORCE_SHARE = 0.01
+"""Minimum force of a point, as a fraction of the maximum force of law and rig; below it nothing pulls (chosen)."""
+MIN_PRESSURE_SHARE = 0.02
+"""Minimum pressure of a point, as a fraction of the maximum pressure of the rig (chosen)."""
+MIN_POINTS = 3
+"""Minimum number of feasible points of a run; chosen."""
+REGULARISATION = 1e-9
+"""Relative information added in every direction, so that designs of fewer runs than parameters can be compared."""
+
+
+@dataclasses.dataclass(frozen=True)
+class BenchLimits:
+    """Limits of a test rig: the range of gauge pressure [Pa] and contraction [1], and the range of force [N]."""
+
+    validity_range: ValidityRange
+    max_force: float
+    min_force: float = 0.0
+    """Minimum force of a point [N]."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class PlannedRun:
+    """A static run: `constant` names the quantity that is kept constant while the other is swept.
+
+    The columns are gauge pressure [Pa], contraction [1] and the expected force [N], shape (points,) each.
+    """
+
+    constant: str
+    pressure: Array
+    contraction: Array
+    force: Array
+
+    @property
+    def swept(self) -> str:
+        """The quantity that is swept, `contraction` or `pressure`."""
+        return "contraction" if self.constant == "pressure" else "pressure"
+
+    @property
+    def level(self) -> float:
+        """The value of the constant quantity [SI]."""
+        return float(getattr(self, self.constant)[0])
+
+    @property
+    def sweep_limits(self) -> tuple[float, float]:
+        """First and last value of the swept quantity [SI]."""
+        values = getattr(self, self.swept)
+        return float(values[0]), float(values[-1])
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ExperimentPlan:
+    """The runs to measure, sorted by the constant quantity and its level, and the expected precision."""
+
+    runs: tuple[PlannedRun, ...]
+    names: tuple[str, ...]
+    values: Array
+    standard_errors: Array
+    """Expected standard error of every parameter [SI], for independent errors and a law that is true.
+
+    An error that a whole run shares, such as the zero or the gain of a sensor, is not contained. With s its standard
+    deviation, n points of a run and sigma that of one point, the standard errors are greater by up to
+    sqrt(1 + n s^2/sigma^2).
+    """
+    relative_d_efficiency: float
+    """(det M / det M_0)^(1/P), M_0 the information matrix of the same number of evenly spaced runs."""
+    undetermined: tuple[UndeterminedCombination, ...]
+
+    @property
+    def assumption(self) -> str:
+        """What the expected standard errors suppose, as a sentence."""
+        return (
+            "the expected standard errors suppose independent errors of the points; errors that a run shares (zero and "
+            "gain of the sensors) are not contained, and several points of a run do not reduce them"
+        )
+
+    def recording(self) -> Recording:
+        """The points in order, as a set-point list for the test rig: run, pressure, contraction, expected force."""
+        numbers = np.concatenate([np.full(r.force.size, i + 1.0) for i, r in enumerate(self.runs)])
+        columns = {n: np.concatenate([getattr(r, n) for r in self.runs]) for n in ("pressure", "contraction", "force")}
+        return Recording({"run": numbers, **columns}, "plan of static runs; force is that of the initial parameters")
+
+
+def optimal_design(
+    characteristic: Characteristic,
+    bench: BenchLimits,
+    *,
+    runs: int = 6,
+    points: int = 15,
+    sigma: float = 1.0,
+    fixed: Collection[str] = (),
+) -> ExperimentPlan:
+    """The D-optimal isobaric and isometric runs for fitting a characteristic, linearised at its present parameters.
+
+    runs    number of runs
+    points  points of a run, evenly spaced over the swept quantity
+    sigma   standard deviation of one observation, in the unit of the quantity that the law gives
+    fixed   parameters that will not be fitted
+
+    Raises IdentificationError where no run is feasible, ParameterError for invalid arguments.
+    """
+    for name, value, minimum in (("runs", runs, 1), ("points", points, MIN_POINTS)):
+        if value < minimum:
+            raise ParameterError(f"design of experiments: {name} is {value}; it must be at least {minimum}.")
+    for name, number in (("sigma", sigma), ("maximum force", bench.max_force)):
+        if not 0 < number < math.inf:
+            raise ParameterError(f"design of experiments: {name} is {number:g}; it must be positive and finite.")
+    candidates = candidate_runs(characteristic, bench, points)
+    names, values, jacobians = _jacobians(characteristic, candidates, fixed)
+    information = np.array([jacobian.T @ jacobian for jacobian in jacobians])
+    selected = _exchange(information, _select_greedily(information, runs))
+    selected.sort(key=lambda i: (candidates[i].constant != "pressure", candidates[i].level))
+    even = np.unique(np.linspace(0, len(candidates) - 1, runs).astype(int))
+    difference = (
+        _log_determinant(information, selected)
+        - _log_determinant(information, even)
+        + values.size * np.log(even.size / runs)
+    )
+    scales = np.where(values == 0, 1.0, np.abs(values))
+    scaled = np.vstack([jacobians[i] for i in selected]) / scales / sigma
+    analysis = analyse_identifiability(scaled, names, scales, tolerance=EXACT_RANK_TOLERANCE)
+    standard_errors = np.sqrt(np.diag(analysis.inverse())) * scales
+    efficiency = float(np.exp(difference / values.size))
+    chosen_runs = tuple(candidates[i] for i in selected)
+    return ExperimentPlan(chosen_runs, names, values, standard_errors, efficiency, analysis.undetermined)
+
+
+def candidate_runs(characteristic: Characteristic, bench: BenchLimits, points: int) -> list[PlannedRun]:
+    """Isobaric and isometric runs on evenly spaced levels, each limited to points at which the muscle pulls, up to the
+    maximum force."""
+    bench = _pulling(characteristic, bench)
+    limits = {"pressure": bench.validity_range.pressure, "contraction": bench.validity_range.contraction}
+    runs = []
+    for constant, swept in (("pressure", "contraction"), ("contraction", "pressure")):
+        (low, high), (first, last) = limits[constant], limits[swept]
+        for level in np.linspace(low, high, LEVEL_COUNT):
+            runs += _feasible_run(characteristic, bench, constant, float(level), np.linspace(first, last, 201), points)
+    if not runs:
+        raise IdentificationError(
+            f"no run is feasible: {type(characteristic).__name__} gives no force between 0 and {bench.max_force:g} N "
+            "within the pressures and contractions of the test rig. Widen the limits, or check the units."
+        )
+    return runs
+
+
+def _pulling(law: Characteristic, bench: BenchLimits) -> BenchLimits:
+    """The limits without the pressures and forces at which nothing pulls."""
+    (low, high), contractions = bench.validity_range.pressure, bench.validity_range.contraction
+    low = max(low, min(MIN_PRESSURE_SHARE * high, high))
+    grid = np.meshgrid(np.linspace(low, high, LEVEL_COUNT), np.linspace(*contractions, LEVEL_COUNT))
+    forces = np.asarray(law.force(*(each.ravel() for each in grid)), dtype=float)
+    reached = forces[np.isfinite(forces) & (forces > 0) & (forces <= bench.max_force)]
+    least = MIN_FORCE_SHARE * float(reached.max()) if reached.size else 0.0
+    pressures = ValidityRange(low, high, *contractions)
+    return dataclasses.replace(bench, validity_range=pressures, min_force=max(bench.min_force, least))
+
+
+def _feasible_run(
+    law: Characteristic, bench: BenchLimits, constant: str, level: float, sweep: Array, points: int
+) -> list[PlannedRun]:
+    feasible = sweep[_is_feasible(law, bench, constant, level, sweep)]
+    if feasible.size < MIN_POINTS:
+        return []
+    values = np.linspace(feasible[0], feasible[-1], points)
+    values = values[_is_feasible(law, bench, constant, level, values)]
+    if values.size < MIN_POINTS:
+        return []
+    pressure, contraction = _coordinates(constant, level, values)
+    return [PlannedRun(constant, pressure, contraction, np.asarray(law.force(pressure, contraction), dtype=float))]
+
+
+def _is_feasible(
+    law: Characteristic, bench: BenchLimits, constant: str, level: float, values: Array
+) -> npt.NDArray[np.bool_]:
+    force = np.asarray(law.force(*_coordinates(constant, level, values)), dtype=float)
+    return np.asarray(np.isfinite(force) & (force > 0) & (force >= bench.min_force) & (force <= bench.max_force))
+
+
+def _coordinates(constant: str, level: float, values: Array) -> tuple[Array, Array]:
+    """Pressure and contraction of the points of a sweep."""
+    levels = np.full(values.size, level)
+    return (levels, values) if constant == "pressure" else (values, levels)
+
+
+def _jacobians(
+    law: Characteristic, candidates: Sequence[PlannedRun], fixed: Collection[str]
+) -> tuple[tuple[str, ...], Array, list[Array]]:
+    """Names and values of the free parameters, and the Jacobian of every candidate by relative parameters."""
+    columns = {n: np.concatenate([getattr(r, n) for r in candidates]) for n in ("pressure", "contraction", "force")}
+    data = Recording(columns, "candidate runs")
+    problem = make_problem(law, data, UNCENSORED, np.ones(len(data)), fixed)
+    values = problem.initial_values
+    jacobian = problem.jacobian(values) * np.where(values == 0, 1.0, np.abs(values))
+    if not np.isfinite(jacobian).all():
+        raise IdentificationError(
+            f"the derivatives of {type(law).__name__} are not finite within the limits of the test rig. Increase the "
+            "minimum pressure or the minimum contraction."
+        )
+    ends = np.cumsum([r.force.size for r in candidates])[:-1]
+    paths = tuple(problem.leaves[i].path for i in problem.free)
+    return paths, values, np.split(jacobian, ends)
+
+
+def _log_determinant(information: Array, selected: Sequence[int] | Array) -> float:
+    """log det of the regularised information of these runs, scaled by the information of all candidates."""
+    size = information.shape[1]
+    lengths = np.sqrt(np.maximum(np.diag(information.sum(axis=0)), 1e-300))
+    scaled = information[list(selected)].sum(axis=0) / np.outer(lengths, lengths)
+    return float(np.linalg.slogdet(scaled + REGULARISATION * np.eye(size))[1])
+
+
+def _select_greedily(information: Array, runs: int) -> list[int]:
+    selected: list[int] = []
+    for _ in range(runs):
+        determinants = [_log_determinant(information, [*selected, i]) for i in range(len(information))]
+        selected.append(int(np.argmax(determinants)))
+    return selected
+
+
+def _exchange(information: Array, selected: list[int]) -> list[int]:
+    """Replace single runs as long as the determinant increases."""
+    best, improved = _log_determinant(information, selected), True
+    while improved:
+        improved = False
+        for k in range(len(selected)):
+            rest = selected[:k] + selected[k + 1 :]
+            determinants = [_log_determinant(information, [*rest, i]) for i in range(len(information))]
+            if max(determinants) > best + 1e-9:
+                best, improved = max(determinants), True
+                selected = [*rest, int(np.argmax(determinants))]
+    return selected

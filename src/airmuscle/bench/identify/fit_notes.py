@@ -1,0 +1,128 @@
+"""Notes of a static fit: rows, weights, bounds, losses and misfit that affect its interpretation, as sentences."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...core.arrays import Array
+from ...core.hints import Hint, HintedText
+from .censoring import UNCENSORED, Censoring, default_censoring
+from .fit_points import FitPoints
+from .loss import LeastSquares, Loss
+from .problem import FitProblem
+from .result import Fit
+from .solver import LeastSquaresSolution
+from .statistics import FitStatistics
+
+ILL_CONDITIONED = 1e5
+"""Condition number of the scaled design matrix above which a note is added (chosen): half of the digits are lost."""
+
+
+def misfit_notes(result: Fit, points: FitPoints) -> list[str]:
+    """A remark where the residuals in force exceed the scatter of the data."""
+    if result.scatter is None:
+        return []
+    knows_length = hasattr(result.model, "with_resting_length")
+    lengths = {run.constants.get("resting_length") for run in points.recordings} - {None}
+    count = 1 if knows_length else len(lengths)
+    return result.scatter.misfit_notes(result.rmse, result.data_ranges["force"][1], count)
+
+
+def weighting_notes(by_recording: Array | None, problem: FitProblem) -> list[str]:
+    """A remark where the rows of different test rigs are weighted by their sensors."""
+    if by_recording is None:
+        return []
+    unit = "" if problem.fitted_quantity.unit == "1" else f" {problem.fitted_quantity.unit}"
+    return [
+        HintedText(
+            "The recordings come from test rigs with different sensors: rows are weighted by standard deviations of "
+            f"{min(by_recording):.3g} to {max(by_recording):.3g}{unit}.",
+            Hint("To weight all rows equally", "sigma", 1.0),
+        )
+    ]
+
+
+def _row_notes(problem: FitProblem, statistics: FitStatistics, dropped: int) -> list[str]:
+    """Remarks on rows that are dropped, censored, or at zero force without being censored."""
+    notes: list[str] = []
+    censored = int(np.count_nonzero(problem.censoring))
+    at_zero = int(np.count_nonzero((problem.data["force"] <= 0) & (problem.censoring == 0)))
+    if dropped:
+        notes.append(f"{dropped} rows with a missing value (NaN) were dropped.")
+    if censored:
+        notes.append(
+            HintedText(
+                f"{censored} {'row is' if censored == 1 else 'rows are'} censored (at zero force, or at the limit of "
+                "the force range): counted only where the law violates the bound.",
+                Hint("To treat them as measured values", "censoring", UNCENSORED, constant="UNCENSORED"),
+            )
+        )
+    notes += _clamp_notes(problem)
+    if statistics.uncensored_rank < statistics.rank:
+        notes.append(
+            f"The uncensored rows determine {statistics.uncensored_rank} of {statistics.rank} parameters; the others "
+            "are limited only by the bounds of the censored rows, and the law is as close to these as possible."
+        )
+    if at_zero:
+        slack = Hint("To treat them as censored, if the muscle was slack there", "censoring", Censoring())
+        can_be_slack = default_censoring(problem.law) != UNCENSORED
+        text = f"{at_zero} rows at zero force or below are treated as measured values."
+        notes.append(HintedText(text, *([slack] if can_be_slack else [])))
+    return notes
+
+
+def _clamp_notes(problem: FitProblem) -> list[str]:
+    """A remark on rows above the upper limit of the law, which a fit does not change."""
+    limit = default_censoring(problem.law).max_force
+    above = int(np.count_nonzero((problem.data["force"] > limit) & (problem.censoring == -1)))
+    if not above:
+        return []
+    return [
+        f"{above} rows are above the upper limit of the force of the law, max_force {limit:.4g} N, which the fit does "
+        "not change: the law gives no greater force. Give a law with a greater max_force."
+    ]
+
+
+def collect_notes(problem: FitProblem, statistics: FitStatistics, loss: Loss, dropped: int) -> tuple[str, ...]:
+    """Remarks on the data and the fit that affect its interpretation, as sentences."""
+    notes = _row_notes(problem, statistics, dropped)
+    notes += _length_notes(problem)
+    notes += [
+        f"{name} is on its bound; its value is not determined by the data."
+        for name in _parameters_on_bound(problem, statistics)
+    ]
+    if not np.isfinite(statistics.sigma):
+        notes.append("There are as many rows as parameters, so the standard errors are unknown.")
+    if statistics.condition > ILL_CONDITIONED:
+        notes.append(f"The problem is ill-conditioned (condition number {statistics.condition:.2g}).")
+    if not isinstance(loss, LeastSquares):
+        unit = problem.fitted_quantity.unit
+        notes.append(f"Robust loss: {loss}{'' if unit == '1' else f', in {unit}'}.")
+    return tuple(notes)
+
+
+def loss_scale_notes(problem: FitProblem, solution: LeastSquaresSolution, loss: Loss) -> tuple[str, ...]:
+    """A remark where the scale of a robust loss is so small that most rows count as outliers."""
+    measured = problem.censoring == 0
+    residuals = np.abs(problem.residuals(solution.modelled))[measured]
+    inside = int(np.count_nonzero(residuals <= loss.scale))
+    if isinstance(loss, LeastSquares) or inside >= residuals.size / 2:
+        return ()
+    return (
+        f"Only {inside} of {residuals.size} residuals are within the scale of {loss}, so the standard errors are too "
+        "small. Use a scale of about three times the standard deviation of the noise.",
+    )
+
+
+def _length_notes(problem: FitProblem) -> list[str]:
+    """A remark where the law is of another resting length than the data, since contraction is relative to it."""
+    length = problem.data.constants.get("resting_length")
+    return [
+        f"The muscle in the recording has a resting length of {length:.4g} m, but {leaf.path} is {leaf.value:.4g} m."
+        for leaf in problem.leaves
+        if leaf.declared.name == "resting_length" and length is not None and abs(leaf.value - float(length)) > 1e-6
+    ]
+
+
+def _parameters_on_bound(problem: FitProblem, statistics: FitStatistics) -> list[str]:
+    return [problem.leaves[i].path for i, on_bound in zip(problem.free, statistics.on_bound, strict=True) if on_bound]

@@ -1,0 +1,241 @@
+"""FitPoints: the rows of one or several recordings as the points of static fits."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Collection, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core.arrays import Array
+from ...core.errors import IdentificationError
+from ...core.reference import cite
+from ...physics.muscle.characteristic.base import Characteristic, ForceLaw
+from ...recording import Recording
+from ..segment import ISOBARIC, ISOMETRIC, find_runs
+from ..segment.runs import RELATIVE_BAND
+from .censoring import Censoring, default_censoring, force_limits
+from .cross_validation import specimen_name
+from .data_checks import DataChecks
+from .parameter_covariance import Runs
+from .problem import RESTING_LENGTH, FitProblem, fitted_quantity_of, make_problem
+from .repeated_rows import RepeatedRows, find_repeated_rows
+from .weights import sensor_deviations
+
+LEVEL_BAND = 0.1
+"""Maximum range of a pressure that counts as constant in a run, as a fraction of its maximum (chosen)."""
+MIN_ROWS_OF_RUN = 12
+"""Minimum number of rows of a run whose constant quantity is replaced by its level (chosen)."""
+_MAX_ROWS_OF_POINTS = 2000
+"""Maximum number of rows of a recording that is examined for single points first (chosen)."""
+POINT_COLUMNS = ("pressure", "contraction", "force")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class FitPoints:
+    """The points of one or several recordings, for fits of any law; the sensors are estimated once.
+
+    `joined` has all rows of the recordings in order. `missing` is the mask of the rows that are not used, because they
+    lack a value or are `repeated` from another recording.
+    """
+
+    recordings: tuple[Recording, ...]
+    single: bool
+    """Whether one recording was given, not a sequence."""
+    joined: Recording
+    missing: npt.NDArray[np.bool_]
+    dropped: int
+    """Number of rows with a missing value."""
+    repeated: tuple[RepeatedRows, ...] = ()
+
+    @classmethod
+    def from_recordings(cls, recording: Recording | Sequence[Recording]) -> FitPoints:
+        """The points of one or several recordings. Raises IdentificationError for an infinite value."""
+        single = isinstance(recording, Recording)
+        runs = (recording,) if isinstance(recording, Recording) else tuple(recording)
+        joined, missing = _join_recordings(runs)
+        dropped, repeated = int(np.count_nonzero(missing)), find_repeated_rows(runs, POINT_COLUMNS)
+        starts = np.cumsum([0, *(len(run) for run in runs)])
+        for each in repeated:
+            missing[starts[each.recording] + each.rows.start : starts[each.recording] + each.rows.stop] = True
+        return cls(runs, single, joined, missing, dropped, repeated)
+
+    @functools.cached_property
+    def data(self) -> Recording:
+        """The complete rows that are not repeated."""
+        return self.joined.rows(~self.missing)
+
+    @functools.cached_property
+    def runs(self) -> Runs:
+        """The run and the specimen of each complete row."""
+        lengths = [len(run) for run in self.recordings]
+        specimens = np.unique([specimen_name(run) for run in self.recordings], return_inverse=True)[1]
+        index, specimen = (np.repeat(each, lengths)[~self.missing] for each in (np.arange(len(lengths)), specimens))
+        return Runs(index, specimen, all("time" in run for run in self.recordings))
+
+    def prepare(self) -> None:
+        """Compute the checks of the data before copies of the points are sent to other processes."""
+        _ = self.checks
+
+    @functools.cached_property
+    def checks(self) -> DataChecks:
+        """Contradictions, suspicious values and scatter of the recordings."""
+        return DataChecks.of(self.recordings)
+
+    def deviations(self, quantity: str) -> Array | None:
+        """The standard deviations of the sensors by recording; None unless they differ."""
+        if self.single or len(self.recordings) < 2:
+            return None
+        if quantity not in self._deviations:
+            self._deviations[quantity] = sensor_deviations(self.recordings, quantity)
+        return self._deviations[quantity]
+
+    @functools.cached_property
+    def at_levels(self) -> Recording:
+        """The complete rows of `data`, with every quantity that is constant in a run replaced by its level.
+
+        Its noise and its ripple vary in these rows, and its level in repeated runs, but do not show how the muscle
+        depends on it.
+        """
+        columns = [_columns_at_levels(run) for run in self.recordings]
+        levels: dict[str, Array] = {}
+        for name in ("pressure", "contraction"):
+            values, held = (np.concatenate([each[name] for each in part]) for part in zip(*columns, strict=True))
+            values[held] = _merged_levels(values[held])
+            levels[name] = values[~self.missing]
+        return self.data.with_columns(**levels)
+
+    @functools.cached_property
+    def _deviations(self) -> dict[str, Array | None]:
+        return {}
+
+    @functools.cached_property
+    def _force_limits(self) -> Censoring:
+        return force_limits(self.recordings)
+
+    def problem(
+        self,
+        characteristic: Characteristic,
+        *,
+        censoring: Censoring | None = None,
+        sigma: npt.ArrayLike | None = None,
+        fixed: Collection[str] = (),
+    ) -> FitProblem:
+        """The problem of fitting a law to these points; arguments as for `fit`. Raises IdentificationError."""
+        law = _with_validity_range(_with_length(characteristic, self.data), self.data)
+        if sigma is None:
+            by_recording = self.deviations(fitted_quantity_of(characteristic).name)
+            if by_recording is not None:
+                sigma = np.repeat(by_recording, [len(run) for run in self.recordings])
+        weights = _row_weights(self.joined, self.missing, sigma)[~self.missing]
+        return make_problem(law, self.data, censoring or self._censoring(law), weights, fixed)
+
+    def _censoring(self, law: Characteristic) -> Censoring:
+        default = default_censoring(law)
+        return default.within(self._force_limits) if isinstance(law, ForceLaw) else default
+
+
+def _join_recordings(runs: Sequence[Recording]) -> tuple[Recording, npt.NDArray[np.bool_]]:
+    """The points of one or several recordings, and the mask of the rows with a missing value."""
+    columns = {name: np.concatenate([run[name] for run in runs]) for name in POINT_COLUMNS} if runs else {}
+    origins = list(dict.fromkeys(run.origin for run in runs))
+    few = len(origins) <= 3
+    origin = " + ".join(origins if few else [*origins[:2], f"{len(origins) - 2} more"]) or "no recording"
+    for name, values in columns.items():
+        if np.isinf(values).any():
+            row = int(np.argmax(np.isinf(values)))
+            raise IdentificationError(
+                f"{origin}, row {row + 1}: {name} is {values[row]}. Remove such rows, for example with "
+                f"recording.rows(np.isfinite(recording['{name}']))."
+            )
+    missing = np.isnan(np.stack(list(columns.values()))).any(axis=0) if columns else np.zeros(0, dtype=bool)
+    lengths = {run.constants.get(RESTING_LENGTH) for run in runs} - {None}
+    if len(lengths) > 1 and all(RESTING_LENGTH in run.constants for run in runs):
+        by_row = [np.full(len(run), float(run.constants[RESTING_LENGTH])) for run in runs]
+        columns[RESTING_LENGTH] = np.concatenate(by_row)
+    length = lengths.pop() if len(lengths) == 1 else None
+    constants = {} if length is None else {"resting_length": length}
+    return Recording(columns, origin, constants, references=tuple(cite(runs))), missing
+
+
+def _columns_at_levels(recording: Recording) -> tuple[dict[str, Array], dict[str, npt.NDArray[np.bool_]]]:
+    """Pressure and contraction of the rows; that which is constant in a run is replaced by its level, in these rows."""
+    columns = {name: np.array(recording[name], dtype=float) for name in ("pressure", "contraction")}
+    held = {name: np.zeros(len(recording), dtype=bool) for name in columns}
+    finite = np.isfinite(recording["pressure"] + recording["contraction"] + recording["force"]).all()
+    if not finite:
+        return columns, held
+    bands = {"pressure": LEVEL_BAND * float(np.max(np.abs(columns["pressure"]), initial=0.0)), "contraction": 0.01}
+    if not any(_may_be_constant(columns[name], band) for name, band in bands.items()):
+        return columns, held
+    names = {ISOBARIC: "pressure", ISOMETRIC: "contraction"}
+    for run in find_runs(recording):
+        name, rows = names.get(run.kind), run.interval.rows
+        if name is not None and len(run.interval) >= MIN_ROWS_OF_RUN and _range(columns[name][rows]) <= bands[name]:
+            columns[name][rows], held[name][rows] = np.median(columns[name][rows]), True
+    return columns, held
+
+
+def _merged_levels(levels: Array) -> Array:
+    """The levels (N,) of runs, those within the band of a constant quantity replaced by the lowest of them."""
+    distinct, member = np.unique(levels, return_inverse=True)
+    band, merged = RELATIVE_BAND * float(np.max(np.abs(distinct), initial=0.0)), distinct.copy()
+    for i in range(1, merged.size):
+        merged[i] = merged[i - 1] if distinct[i] - merged[i - 1] <= band else distinct[i]
+    return np.asarray(merged[member])
+
+
+def _may_be_constant(values: Array, band: float) -> bool:
+    """Whether the values, but for one at each end, of some `MIN_ROWS_OF_RUN` consecutive rows fit into a band.
+
+    It is necessary for a run at a level, and quickly answered for single points: up to 101 rows have at most one value
+    at each end outside the band of 98 %, and longer runs have as many rows in succession without any.
+    """
+    if not MIN_ROWS_OF_RUN <= len(values) <= _MAX_ROWS_OF_POINTS:
+        return len(values) > _MAX_ROWS_OF_POINTS
+    windows = np.lib.stride_tricks.sliding_window_view(values, MIN_ROWS_OF_RUN)
+    ordered = np.sort(windows, axis=1)
+    return bool((ordered[:, -2] - ordered[:, 1] <= band * (1 + 1e-9)).any())
+
+
+def _range(values: Array) -> float:
+    """The width of the band that contains 98 % of the values."""
+    low, high = np.quantile(values, [0.01, 0.99])
+    return float(high - low)
+
+
+def _row_weights(data: Recording, dropped: npt.NDArray[np.bool_], sigma: npt.ArrayLike | None) -> Array:
+    if sigma is None:
+        return np.ones(len(data))
+    deviations = np.broadcast_to(np.asarray(sigma, dtype=float), (len(data),))
+    if not (np.isfinite(deviations) & (deviations > 0))[~dropped].all():
+        raise IdentificationError(f"{data.origin}: every sigma must be finite and positive.")
+    weights = 1.0 / deviations
+    return np.asarray(weights / np.sqrt(np.mean(weights[~dropped] ** 2)))
+
+
+def _with_length(law: Any, data: Recording) -> Any:
+    """A law for muscles of any resting length, at the resting length of the data if there is one."""
+    length = data.constants.get(RESTING_LENGTH)
+    return law.with_resting_length(float(length)) if length is not None and hasattr(law, "with_resting_length") else law
+
+
+def _with_validity_range(law: Characteristic, data: Recording) -> Characteristic:
+    """A surface scaled to the validity range of the data; any other law unchanged."""
+    with_validity_range = getattr(law, "with_validity_range", None)
+    if with_validity_range is None or not len(data):
+        return law
+    for name, unit in (("pressure", " Pa"), ("contraction", "")):
+        if np.ptp(data[name]) == 0:
+            raise IdentificationError(
+                f"{data.origin}: {name} is {data[name][0]:g}{unit} in every row, so a surface cannot be fitted. "
+                f"Measure at several levels of {name}.",
+                cause=f"{name} does not vary",
+            )
+    scaled: Characteristic = with_validity_range(
+        *((float(data[n].min()), float(data[n].max())) for n in ("pressure", "contraction"))
+    )
+    return scaled

@@ -1,0 +1,226 @@
+"""Gauss-Newton iteration from parameters that are already close to the optimum, as in refits to parts of the data.
+
+The normal equations are formed in an orthonormal basis of the Jacobian at the start, in which they stay near the
+identity. A parameter on a bound is held there while the descent direction points outwards (projected Gauss-Newton).
+References: Björck, Numerical Methods for Least Squares Problems (1996), section 9.2; Bertsekas, SIAM Journal on Control
+and Optimization 20:221 (1982).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core.arrays import Array
+from .problem import FitProblem
+
+BoolArray = npt.NDArray[np.bool_]
+RELATIVE_STEP = 1e-9
+"""Step, in standard deviations of the residuals, at which the iteration ends (chosen)."""
+MIN_EIGENVALUE = 1e-6
+"""Minimum eigenvalue of the normal matrix in the basis of the start (chosen)."""
+BOUND_MARGIN = 1e-6
+"""Relative distance from a bound within which a parameter is on it (chosen): a search may stop strictly inside."""
+_MAX_ITERATIONS = 50
+_MAX_REDUCTIONS = 20
+"""Maximum reductions of the length of one step (chosen)."""
+_REDUCTION = 0.5
+"""Ratio of a reduced step to the one that increased the sum of squares (chosen)."""
+_PROBE = 0.1
+"""Fraction of the step at which the second derivative along it is estimated (reference: 0.1)."""
+
+
+class StepBasis(NamedTuple):
+    """The free parameters, mask (P,), and the matrix (P, F) from an orthonormal basis to steps of all parameters."""
+
+    free: BoolArray
+    directions: Array
+
+
+class FirstStep(NamedTuple):
+    """Known quantities at the start of an iteration: the basis, the first step in it (F,) and the sum of squares."""
+
+    basis: StepBasis
+    step: Array
+    sum_of_squares: float
+
+
+class _Point(NamedTuple):
+    """Parameters (P,), the fitted quantity (N,) and the weighted residuals (N,) there."""
+
+    values: Array
+    modelled: Array
+    residuals: Array
+
+    @property
+    def sum_of_squares(self) -> float:
+        return float(self.residuals @ self.residuals)
+
+
+class _Linearisation(NamedTuple):
+    """The basis, the weighted Jacobian in it (N, F), the normal matrix (F, F) and the gradient (F,)."""
+
+    basis: StepBasis
+    columns: Array
+    normal: Array
+    gradient: Array
+
+
+def gauss_newton(
+    problem: FitProblem, start: Array, known: FirstStep | None = None, relative_step: float = RELATIVE_STEP
+) -> tuple[Array, Array, Array] | None:
+    """The parameters (P,) of least squares near `start`, with the fitted quantity (N,) and its Jacobian (N, P) there.
+
+    None where the iteration is not certain: redundant parameters, a step that does not reduce the sum of squares, or
+    slow convergence. With `known` the first step needs no Jacobian, and the last Jacobian is one step old.
+    """
+    point, basis, previous, fraction = _evaluate(problem, np.asarray(start, dtype=float)), None, 0.0, 1.0
+    if known is not None:
+        basis = known.basis
+        first = _evaluate(problem, point.values + basis.directions @ known.step)
+        if first.sum_of_squares <= known.sum_of_squares:
+            point, previous = first, float(np.linalg.norm(known.step))
+    for _ in range(_MAX_ITERATIONS):
+        jacobian = problem.jacobian(point.values)
+        if not (np.isfinite(point.residuals).all() and np.isfinite(jacobian).all()):
+            return None
+        linear = _linearise(problem, point, jacobian, basis)
+        if linear is None:
+            return None
+        basis, length = linear.basis, float(np.linalg.norm(np.linalg.solve(linear.normal, linear.gradient)))
+        tolerance = residual_std(point.residuals, point.values.size)
+        if length <= RELATIVE_STEP * tolerance:
+            return point.values, point.modelled, jacobian
+        moved = _curved_step(problem, point, linear, min(2 * fraction, 1.0))
+        if moved is None:
+            return None
+        point, fraction = moved
+        ratio = min(length / previous, 1.0) if previous > 0 else 1.0
+        if fraction == 1 and length * ratio <= relative_step * tolerance and relative_step > RELATIVE_STEP:
+            return point.values, point.modelled, jacobian  # the next step is smaller by the same ratio at least
+        previous = length
+    return None
+
+
+def _evaluate(problem: FitProblem, values: Array) -> _Point:
+    """The point within the bounds that is closest to these parameters."""
+    inside = np.clip(values, *problem.bounds)
+    modelled = problem.predict(inside)
+    return _Point(inside, modelled, problem.residuals(modelled))
+
+
+def _linearise(problem: FitProblem, point: _Point, jacobian: Array, basis: StepBasis | None) -> _Linearisation | None:
+    """The normal equations of the parameters that are not held on a bound; None for redundant parameters.
+
+    A parameter on a bound is held where the gradient or the step of all free parameters points outwards: a step that
+    the bound cuts off, along a narrow valley, would make no progress in the others.
+    """
+    matrix = (problem.weights * problem.active_rows(point.modelled))[:, None] * jacobian
+    free = ~held_on_bounds(problem, point.values, matrix.T @ point.residuals)
+    linear = _in_basis(matrix, point, free, basis)
+    while linear is not None:
+        step = -linear.basis.directions @ np.linalg.solve(linear.normal, linear.gradient)
+        held = linear.basis.free & held_on_bounds(problem, point.values, -step)
+        if not held.any() or np.array_equal(held, linear.basis.free):
+            break
+        linear = _in_basis(matrix, point, linear.basis.free & ~held, basis)
+    return linear
+
+
+def _in_basis(matrix: Array, point: _Point, free: BoolArray, basis: StepBasis | None) -> _Linearisation | None:
+    """The normal equations of the free parameters in the given basis, or in a new one where it is of other parameters
+    or the normal matrix is nearly singular; None for redundant parameters."""
+    for each in (basis if basis is not None and np.array_equal(free, basis.free) else None, None):
+        current = orthonormal_basis(matrix, free) if each is None else each
+        if current is None:
+            return None
+        columns = matrix @ current.directions
+        normal, gradient = normal_equations(columns, point.residuals)
+        if np.linalg.eigvalsh(normal)[0] >= MIN_EIGENVALUE:
+            return _Linearisation(current, columns, normal, gradient)
+    return None
+
+
+def _curved_step(
+    problem: FitProblem, point: _Point, linear: _Linearisation, fraction: float
+) -> tuple[_Point, float] | None:
+    """The point after at most this fraction of a Gauss-Newton step with geodesic acceleration, and the fraction made.
+
+    The acceleration follows the curved valley of correlated parameters; the fraction decreases until the sum of squares
+    does not increase. The direction stays that of the full step: damping the normal matrix would damp the motion along
+    the valley first. Reference: Transtrum and Sethna, arXiv:1201.5885 (2012).
+    """
+    low, high = problem.bounds
+    active = problem.weights * problem.active_rows(point.modelled)
+    directions, inverse = linear.basis.directions, np.asarray(np.linalg.inv(linear.normal), dtype=float)
+    for _ in range(_MAX_REDUCTIONS):
+        step, fixed = _bounded_step(
+            -fraction * inverse @ linear.gradient, inverse, linear.basis, low - point.values, high - point.values
+        )
+        ahead = problem.predict(np.clip(point.values + _PROBE * directions @ step, low, high))
+        second = 2 / _PROBE * (active * (ahead - point.modelled) / _PROBE - linear.columns @ step)
+        bend = fixed @ (-0.5 * inverse @ (linear.columns.T @ second))
+        if np.isfinite(bend).all():
+            trial = _evaluate(problem, point.values + directions @ (step + bend))
+            if trial.sum_of_squares <= point.sum_of_squares * (1 + 1e-12):
+                return trial, fraction
+        fraction *= _REDUCTION
+    return None
+
+
+def _bounded_step(step: Array, inverse: Array, basis: StepBasis, low: Array, high: Array) -> tuple[Array, Array]:
+    """The step (F,) with the least square of which no parameter leaves its bounds, and the projection (F, F) onto the
+    steps that keep the parameters on a bound there."""
+    projection, fixed = np.eye(step.size), np.zeros(low.size, dtype=bool)
+    bounded = step
+    for _ in range(step.size):
+        move = basis.directions @ bounded
+        beyond = ((move < low) | (move > high)) & basis.free & ~fixed
+        if not beyond.any() or np.count_nonzero(fixed | beyond) >= step.size:
+            break
+        fixed |= beyond
+        rows = basis.directions[fixed]
+        gain = inverse @ rows.T @ np.linalg.inv(rows @ inverse @ rows.T)
+        bounded = step - gain @ (rows @ step - np.clip(rows @ step, low[fixed], high[fixed]))
+        projection = np.eye(step.size) - gain @ rows
+    return bounded, projection
+
+
+def residual_std(residuals: Array, parameters: int) -> float:
+    """Standard deviation of N weighted residuals with N - P degrees of freedom."""
+    return float(np.linalg.norm(residuals) / np.sqrt(max(residuals.size - parameters, 1)))
+
+
+def held_on_bounds(problem: FitProblem, values: Array, gradient: Array) -> BoolArray:
+    """Mask (P,) of the parameters on a bound that steps against the gradient would leave outwards."""
+    low, high = problem.bounds
+    margin = BOUND_MARGIN * np.maximum(np.abs(values), np.abs(problem.initial_values))
+    with np.errstate(invalid="ignore"):
+        return np.asarray(((values - low <= margin) & (gradient >= 0)) | ((high - values <= margin) & (gradient <= 0)))
+
+
+def orthonormal_basis(matrix: Array, free: BoolArray) -> StepBasis | None:
+    """The basis in which the free columns of a matrix (N, P) are orthonormal; None for redundant columns."""
+    norms = np.linalg.norm(matrix[:, free], axis=0)
+    if matrix.shape[0] < norms.size or not norms.size or not (norms > 0).all():
+        return None
+    triangle = np.linalg.qr(matrix[:, free] / norms, mode="r")
+    if np.linalg.svd(triangle, compute_uv=False)[-1] < 1e-9:
+        return None
+    directions = np.zeros((free.size, norms.size))
+    directions[free] = np.linalg.inv(triangle) / norms[:, None]
+    return StepBasis(free, directions)
+
+
+def normal_equations(matrix: Array, residuals: Array) -> tuple[Array, Array]:
+    """Normal matrix (F, F) and gradient (F,)."""
+    return matrix.T @ matrix, matrix.T @ residuals
+
+
+def normal_step(normal: Array, gradient: Array) -> Array | None:
+    """The step in the orthonormal basis, shape (F,); None where the normal matrix is nearly singular."""
+    if np.linalg.eigvalsh(normal)[0] < MIN_EIGENVALUE:
+        return None
+    return np.asarray(-np.linalg.solve(normal, gradient))

@@ -1,0 +1,200 @@
+"""Friction from inflating and deflating branches: `fit_hysteresis`."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+
+import numpy as np
+import numpy.typing as npt
+
+from ....core.arrays import Array
+from ....core.declaration import model, parameter
+from ....core.errors import IdentificationError
+from ....core.hints import Hint
+from ....physics.muscle.characteristic.base import Characteristic
+from ....physics.muscle.friction import BoucWen, Dahl, Friction, LuGre, MaxwellSlip, PrandtlIshlinskii
+from ....recording import Recording
+from ...segment import motion_direction
+from .axis import MILLIMETRES, Axis
+from .limits import data_limits, resolved_stiffness
+from .result import HysteresisFit, assess_fit
+from .search import free_parameters, search_parameters
+from .series import LoopSeries
+
+RowMask = npt.NDArray[np.bool_]
+
+
+class FrictionPath(abc.ABC):
+    """The displacement along which the friction slides, as a function of the recorded columns."""
+
+    @abc.abstractmethod
+    def displacement(self, recording: Recording) -> Array:
+        """Displacement [m] at every row, shape (N,)."""
+
+    @property
+    def axis(self) -> Axis:
+        """The axis of figures."""
+        return MILLIMETRES
+
+
+@model
+class ContractionPath(FrictionPath):
+    """x = eps L0: friction against shortening, visible in loops at constant pressure or load."""
+
+    def displacement(self, recording: Recording) -> Array:
+        return np.asarray(recording["contraction"] * _resting_length(recording))
+
+
+@model
+class PressurePath(FrictionPath):
+    """x = c p: friction of braid threads that shift with pressure, visible in a muscle at constant length.
+
+    Only k_i c, a force by pressure, is determined; c is chosen as 1 mm for each 100 kPa, so that the friction laws keep
+    their units. Such a friction describes isometric loops only and cannot be part of a plant.
+    """
+
+    displacement_per_pressure: float = parameter(
+        "m/Pa", "c", "displacement of the threads by pressure", bounds=(1e-12, 1e-3), fitted=False, default=1e-8
+    )
+
+    def displacement(self, recording: Recording) -> Array:
+        return self.displacement_per_pressure * recording["pressure"]
+
+    @property
+    def axis(self) -> Axis:
+        return Axis(
+            "gauge pressure [kPa]", 1e-3 / self.displacement_per_pressure, "Pa", 1.0 / self.displacement_per_pressure
+        )
+
+
+class StaticCurve(abc.ABC):
+    """The force without friction: a known part, and columns whose coefficients are fitted with the friction."""
+
+    @abc.abstractmethod
+    def known_force(self, recording: Recording) -> Array:
+        """The known part of the force [N] at every row, shape (N,)."""
+
+    @abc.abstractmethod
+    def design_matrix(self, recording: Recording) -> Array:
+        """The columns whose coefficients are fitted, shape (N, coefficients)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class FixedCharacteristic(StaticCurve):
+    """A known characteristic with a fitted constant offset of the force."""
+
+    characteristic: Characteristic
+
+    def known_force(self, recording: Recording) -> Array:
+        return np.asarray(self.characteristic.force(recording["pressure"], recording["contraction"]), dtype=float)
+
+    def design_matrix(self, recording: Recording) -> Array:
+        return np.ones((len(recording), 1))
+
+
+@dataclasses.dataclass(frozen=True)
+class PolynomialCurve(StaticCurve):
+    """A fitted polynomial in one column: `pressure` in isometric runs, `contraction` in isobaric runs."""
+
+    column: str
+    degree: int = 3
+
+    def known_force(self, recording: Recording) -> Array:
+        return np.zeros(len(recording))
+
+    def design_matrix(self, recording: Recording) -> Array:
+        scale = 1e5 if self.column == "pressure" else 0.1  # so that the coefficients have similar magnitudes
+        return np.vander(recording[self.column] / scale, self.degree + 1)
+
+
+def initial_friction_laws(path: Array, force: Array, elements: int = 8) -> tuple[Friction, ...]:
+    """Every friction law with initial parameters, scaled by a path [m] and the forces [N] along it.
+
+    `elements` is the number of elements of MaxwellSlip and PrandtlIshlinskii. Raises IdentificationError for a constant
+    path.
+    """
+    stroke, amplitude = float(np.ptp(path)), max(float(np.std(force)), 1e-3)
+    if not stroke > 0:
+        raise IdentificationError(
+            "the displacement of the friction is constant, so it cannot be identified. Give a run with a rising and a "
+            "falling branch."
+        )
+    limits = tuple(stroke * np.geomspace(0.01, 0.7, elements))
+    stiffness, equal = 10 * amplitude / stroke, (amplitude / elements / stroke,) * elements
+    return (
+        Dahl(stiffness, amplitude),
+        LuGre(stiffness, amplitude, 0.2 * amplitude, stroke / 5.0),
+        BoucWen(stiffness, amplitude, 1.5, 0.6),
+        MaxwellSlip(equal, limits),
+        PrandtlIshlinskii(equal, limits, (0.1 * amplitude, -0.1 * amplitude), (0.0, 0.0)),
+    )
+
+
+def fit_hysteresis(
+    friction: Friction,
+    recording: Recording,
+    *,
+    static_curve: StaticCurve,
+    friction_path: FrictionPath = ContractionPath(),
+    fitted_rows: RowMask | None = None,
+    repeat: tuple[Recording, RowMask | None] | None = None,
+) -> HysteresisFit:
+    """Fit a friction law to the difference between a loop and its static curve, and test whether the data justify it.
+
+    friction       the law with its initial parameters, see `initial_friction_laws`
+    static_curve   the force without friction; its coefficients are fitted with the friction, and once more without it
+                   for a fair comparison
+    friction_path  the displacement along which the friction slides
+    fitted_rows    mask of the rows whose residuals are minimised: quasi-static rows with a positive force. The path
+                   includes all rows from the first, where the bristles are relaxed
+    repeat         a second run of the same loop with its mask, for the repeatability and the error on other data
+
+    Raises IdentificationError where there are too few rows or the path is constant.
+    """
+    run = make_loop_series(recording, static_curve, friction_path, fitted_rows)
+    free = free_parameters(friction)
+    if run.fitted_rows.sum() <= free + run.design_matrix.shape[1] + 2 or not np.ptp(run.path) > 0:
+        raise IdentificationError(
+            f"{recording.origin}: {int(run.fitted_rows.sum())} fitted rows along a path of {np.ptp(run.path):.3g} m "
+            f"cannot determine {free} parameters of {type(friction).__name__} and {run.design_matrix.shape[1]} of "
+            "the static curve. Give a run with a rising and a falling branch, or include more rows."
+        )
+    fitted, undetermined = search_parameters(friction, (run,))
+    second_run = make_loop_series(repeat[0], static_curve, friction_path, repeat[1]) if repeat else None
+    return assess_fit(fitted, undetermined, run, second_run)
+
+
+def make_loop_series(
+    recording: Recording, static_curve: StaticCurve, friction_path: FrictionPath, fitted_rows: RowMask | None
+) -> LoopSeries:
+    """The arrays of a run for a fit of friction."""
+    target = recording["force"] - static_curve.known_force(recording)
+    finite = np.isfinite(target)
+    rows = finite if fitted_rows is None else np.asarray(fitted_rows, dtype=bool) & finite
+    path = friction_path.displacement(recording)
+    time = recording.columns.get("time")
+    series = LoopSeries(
+        origin=recording.origin,
+        path=path,
+        time=time,
+        target=target,
+        design_matrix=static_curve.design_matrix(recording),
+        fitted_rows=rows,
+        direction=motion_direction(path, time),
+        pressure=recording.columns.get("pressure"),
+        limits=data_limits(recording["force"], path, time, rows),
+        axis=friction_path.axis,
+    )
+    stiffness = resolved_stiffness(path[rows], series.fitted_residuals(None))
+    return dataclasses.replace(series, limits=dataclasses.replace(series.limits, stiffness=stiffness))
+
+
+def _resting_length(recording: Recording) -> float:
+    length = recording.constants.get("resting_length")
+    if not isinstance(length, float | int):
+        raise IdentificationError(
+            f"{recording.origin}: friction against shortening needs the resting length.",
+            hint=Hint("To state it", "resting_length", function="read"),
+        )
+    return float(length)

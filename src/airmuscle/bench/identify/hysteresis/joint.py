@@ -1,0 +1,174 @@
+"""Joint fit of one friction law to the loops of several runs, with a force scale that depends on the pressure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from ....core.arrays import Array
+from ....physics.muscle.friction import Friction, IdentifiedFriction, PressureScaledFriction
+from ...segment.runs import RELATIVE_BAND
+from ..identifiability import UndeterminedCombination
+from ..model_evidence import aicc, effective_sample_size, f_test_p_value
+from .agreement import agreement_of_run, force_amplitude
+from .fit import make_loop_series
+from .joint_result import JointFit
+from .limits import combine_limits
+from .loops import LoopFit
+from .result import SIGNIFICANCE_LEVEL, HysteresisFit
+from .search import free_parameters, search_parameters
+from .series import LoopSeries
+
+MIN_PRESSURE_RATIO = 1.2
+"""Minimum ratio of the highest to the lowest pressure of the runs for a fitted dependence on pressure (chosen)."""
+PRESSURE_QUANTILES = (0.01, 0.99)
+"""Quantiles of the pressures of the fitted rows that count as the range of the data (chosen)."""
+
+
+def joinable_fits(loop_fits: Sequence[LoopFit]) -> tuple[LoopFit, ...]:
+    """The loops whose friction a plant can use and whose rows give no reason against a friction."""
+    return tuple(each for each in loop_fits if not _reason_against(each))
+
+
+def loops_not_joined(loop_fits: Sequence[LoopFit]) -> tuple[str, ...]:
+    """Sentences that name each loop that the joint fit does not use, and the reason."""
+    reasons = [(each.loop, _reason_against(each)) for each in loop_fits]
+    return tuple(
+        f"Not in the joint fit: {loop.recording.origin}, {loop.description}. {why}" for loop, why in reasons if why
+    )
+
+
+def _reason_against(loop_fit: LoopFit) -> str:
+    """Why a loop is not fitted together with others, as sentences; empty if it is."""
+    if not loop_fit.usable_in_plant:
+        return "The friction acts along the pressure, which a plant cannot use."
+    if not loop_fit.fits:
+        return "No law could be fitted to it alone."
+    return " ".join(loop_fit.fits[0].reservations_of_rows)
+
+
+def fit_jointly(loop_fits: Sequence[LoopFit], *, progress: Callable[[str], None] | None = None) -> tuple[JointFit, ...]:
+    """Fit every friction law to all loops together, lowest AICc first; empty for fewer than two usable loops.
+
+    Each run has its own static curve, all runs have one friction. Its force scale depends on the pressure
+    (`PressureScaledFriction`) if the F test and AICc favour this, and is constant otherwise.
+    """
+    usable = joinable_fits(loop_fits)
+    if len(usable) < 2:
+        return ()
+    fits = []
+    for law in {type(fit.friction): None for each in usable for fit in each.fits}:
+        own = [next((fit for fit in each.fits if type(fit.friction) is law), None) for each in usable]
+        complete = [fit for fit in own if fit is not None]
+        if len(complete) == len(usable):
+            if progress is not None:
+                progress(f"{law.__name__}, all runs")
+            fits.append(_fit_law(complete, usable))
+    return tuple(sorted(fits, key=lambda fit: -fit.aicc_reduction))
+
+
+def identified_friction(friction: Friction, runs: Sequence[LoopSeries]) -> Friction:
+    """The friction with the range of pressure and speed of the runs it was fitted to."""
+    pressures = [run.pressure[run.fitted_rows] for run in runs if run.pressure is not None]
+    if not pressures:
+        return friction
+    low, high = np.quantile(np.concatenate(pressures), PRESSURE_QUANTILES)
+    margin = RELATIVE_BAND * max(abs(low), abs(high), 1e3)
+    speed = combine_limits(tuple(run.limits for run in runs)).high_speed
+    range_of_speed = {"max_speed": speed} if np.isfinite(speed) and speed > 0 else {}
+    return IdentifiedFriction(friction, float(low - margin), float(high + margin), **range_of_speed)
+
+
+def _fit_law(own: Sequence[HysteresisFit], usable: Sequence[LoopFit]) -> JointFit:
+    """One law fitted to all runs, with a constant and with a pressure-dependent scale; the better of the two."""
+    runs = [fit.series for fit in own]
+    pressures = np.array([_mean_pressure(run) for run in runs])
+    reference = int(np.argmax(pressures))
+    constant = search_parameters(own[len(own) // 2].friction, runs)
+    candidates = [(constant, float("nan"))]
+    lowest = float(pressures.min())  # -inf where a run has no pressure
+    if np.isfinite(lowest) and pressures[reference] > max(1e3, MIN_PRESSURE_RATIO * lowest):
+        scaled = search_parameters(_initial_scale(own, pressures, reference), runs)
+        p_value = _f_test(constant[0], scaled[0], runs)
+        size = _sample_size(scaled[0], runs)
+        better = p_value < SIGNIFICANCE_LEVEL and _aicc(scaled[0], runs, size) < _aicc(constant[0], runs, size)
+        candidates = [(scaled if better else constant, p_value)]
+    (friction, weak), scale_p_value = candidates[0]
+    return _assess(friction, weak, scale_p_value, own, usable)
+
+
+def _initial_scale(own: Sequence[HysteresisFit], pressures: Array, reference: int) -> PressureScaledFriction:
+    """The friction of the run at the highest pressure, with a scale by the amplitudes of all runs."""
+    amplitudes = [force_amplitude(fit.series, fit.friction) for fit in own]
+    slope, offset = np.polyfit(pressures, amplitudes, 1)
+    rounded = float(f"{pressures[reference]:.3g}")
+    at_reference = offset + slope * rounded
+    ratio = offset / at_reference if at_reference > 0 else 1.0
+    return PressureScaledFriction(own[reference].friction, float(np.clip(ratio, 0.01, 5.0)), rounded)
+
+
+def _mean_pressure(run: LoopSeries) -> float:
+    return float("-inf") if run.pressure is None else float(np.mean(run.pressure[run.fitted_rows]))
+
+
+def _residuals(friction: Friction | None, runs: Sequence[LoopSeries]) -> Array:
+    return np.concatenate([run.fitted_residuals(friction) for run in runs])
+
+
+def _sample_size(friction: Friction | None, runs: Sequence[LoopSeries]) -> float:
+    return float(sum(effective_sample_size(run.fitted_residuals(friction)) for run in runs))
+
+
+def _parameter_count(friction: Friction | None, runs: Sequence[LoopSeries]) -> int:
+    own = 0 if friction is None else free_parameters(friction)
+    return own + sum(int(run.design_matrix.shape[1]) for run in runs)
+
+
+def _aicc(friction: Friction | None, runs: Sequence[LoopSeries], sample_size: float) -> float:
+    return aicc(float(np.mean(_residuals(friction, runs) ** 2)), sample_size, _parameter_count(friction, runs))
+
+
+def _f_test(smaller: Friction | None, larger: Friction, runs: Sequence[LoopSeries]) -> float:
+    """p-value of the parameters that a friction has beyond those of another one, or beyond none."""
+    square, reduced = (float(np.mean(_residuals(friction, runs) ** 2)) for friction in (smaller, larger))
+    count = _parameter_count(larger, runs)
+    added = count - _parameter_count(smaller, runs)
+    return f_test_p_value(square, reduced, _sample_size(larger, runs), count, added)
+
+
+def _assess(
+    friction: Friction,
+    weak: tuple[UndeterminedCombination, ...],
+    scale_p_value: float,
+    own: Sequence[HysteresisFit],
+    usable: Sequence[LoopFit],
+) -> JointFit:
+    runs = [fit.series for fit in own]
+    size = _sample_size(friction, runs)
+    repeats = [
+        make_loop_series(each.loop.repeat[0], each.loop.static_curve, each.loop.friction_path, each.loop.repeat[1])
+        for each in usable
+        if each.loop.repeat is not None
+    ]
+    return JointFit(
+        friction=friction,
+        series=tuple(runs),
+        agreement=tuple(
+            agreement_of_run(friction, fit, each.loop.description, _mean_pressure(fit.series))
+            for fit, each in zip(own, usable, strict=True)
+        ),
+        rmse=_rms(_residuals(friction, runs)),
+        rmse_without_friction=_rms(_residuals(None, runs)),
+        effective_sample_size=size,
+        aicc_reduction=_aicc(None, runs, size) - _aicc(friction, runs, size),
+        p_value=_f_test(None, friction, runs),
+        scale_p_value=scale_p_value,
+        repeat_rmse=_rms(_residuals(friction, repeats)) if repeats else float("nan"),
+        repeat_rmse_without_friction=_rms(_residuals(None, repeats)) if repeats else float("nan"),
+        weak_combinations=weak,
+    )
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))

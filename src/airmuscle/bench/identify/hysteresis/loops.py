@@ -1,0 +1,268 @@
+"""Hysteresis loops in recordings: kind, fitted rows and repeated runs, and the fit of all friction laws to a loop."""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from ....core.errors import AirmuscleWarning, IdentificationError
+from ....core.hints import Hint, HintedText
+from ....core.short_repr import ShortRepr
+from ....physics.muscle.characteristic.base import Characteristic
+from ....recording import Recording
+from ...segment import (
+    ISOBARIC,
+    ISOMETRIC,
+    Run,
+    Sensor,
+    estimate_sensors,
+    find_runs,
+    motion_direction,
+    quasi_static_rows,
+)
+from ...segment.runs import CONTRACTION_BAND, RELATIVE_BAND
+from .fit import (
+    ContractionPath,
+    FixedCharacteristic,
+    FrictionPath,
+    PolynomialCurve,
+    PressurePath,
+    RowMask,
+    StaticCurve,
+    fit_hysteresis,
+    initial_friction_laws,
+    make_loop_series,
+)
+from .limits import speed_reservation
+from .preference import preferred_fit
+from .result import HysteresisFit
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class HysteresisLoop(ShortRepr):
+    """One run with a rising and a falling branch, the path of the friction, the static curve and the fitted rows."""
+
+    recording: Recording
+    run: Run
+    friction_path: FrictionPath
+    static_curve: StaticCurve
+    fitted_rows: RowMask
+    transient_rows: int = 0
+    """Number of fitted rows in which the pressure changes quickly."""
+    repeat: tuple[Recording, RowMask] | None = None
+    """A second run of the same kind at the same level, for validation, and its fitted rows."""
+
+    @property
+    def description(self) -> str:
+        """Kind and level of the run, for example `isobaric at 300 kPa`."""
+        if self.run.constant_column is None or self.run.constant_value is None:
+            return self.run.kind.name
+        levels = {"pressure": f"{self.run.constant_value / 1e3:.4g} kPa", "force": f"{self.run.constant_value:.4g} N",
+                  "contraction": f"{100 * (round(self.run.constant_value, 4) + 0.0):.2f} %"}  # fmt: skip
+        return f"{self.run.kind.name} at {levels.get(self.run.constant_column, f'{self.run.constant_value:.4g} m')}"
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class LoopFit(ShortRepr):
+    """The friction laws fitted to one loop, lowest AICc first, and the reasons why others could not be fitted."""
+
+    loop: HysteresisLoop
+    fits: tuple[HysteresisFit, ...]
+    failed: Mapping[str, str]
+
+    @property
+    def recommended(self) -> HysteresisFit | None:
+        """The preferred law among those that the data justify, or None."""
+        return preferred_fit(self.fits)
+
+    @property
+    def usable_in_plant(self) -> bool:
+        """Whether the friction acts along the contraction; friction along pressure describes isometric loops only."""
+        return isinstance(self.loop.friction_path, ContractionPath)
+
+
+def find_loops(
+    recordings: Sequence[Recording],
+    *,
+    characteristic: Characteristic | None = None,
+    degree: int = 3,
+    all_rows: bool = False,
+) -> tuple[HysteresisLoop, ...]:
+    """The loops in the runs of recordings, one for each kind and level; a second run at a level validates the first.
+
+    Each run with a rising and a falling branch gives a loop; if a recording has several runs, the loop is named after
+    the file and the rows of the run, and runs of one direction are left out. A muscle of another resting length or
+    another specimen gives no repeat. A recording without a usable run is left out with an AirmuscleWarning if another
+    one has a loop.
+
+    The static curve is a polynomial of `degree` in the swept quantity, fitted with the friction, or `characteristic`
+    with an offset. The fitted rows have a positive force below the limit of the sensor and, unless `all_rows`, are
+    quasi-static. Raises IdentificationError if no run gives a loop: each has one branch, or is neither isobaric nor
+    isometric while no characteristic is given.
+    """
+    sensors, loops, failed = estimate_sensors(recordings), list[HysteresisLoop](), list[IdentificationError]()
+    empty = [recording.origin for recording in recordings if not len(recording)]
+    failed += [IdentificationError(f"{origin}: the recording has no rows. Give one with a loop.") for origin in empty]
+    each_run = [part for recording in recordings if len(recording) for part in _separate_runs(recording, sensors)]
+    for recording, run in each_run:
+        try:
+            loop = _make_loop(recording, run, sensors, characteristic, degree, all_rows)
+        except IdentificationError as error:
+            failed.append(error)
+            continue
+        same = next((i for i, other in enumerate(loops) if _is_repeat(other, loop)), None)
+        if same is None:
+            loops.append(loop)
+        elif loops[same].repeat is None:
+            loops[same] = dataclasses.replace(loops[same], repeat=(recording, loop.fitted_rows))
+    if failed and not loops:
+        raise failed[0]
+    for reason in failed:
+        warnings.warn(AirmuscleWarning(HintedText("left out: ", reason.message)), stacklevel=2)
+    return tuple(loops)
+
+
+def _is_repeat(first: HysteresisLoop, other: HysteresisLoop) -> bool:
+    """Whether a loop is of the same muscle as the first, and of the same kind and level."""
+    constants = [
+        (loop.recording.constants.get("resting_length"), loop.recording.constants.get("specimen"))
+        for loop in (first, other)
+    ]
+    return constants[0] == constants[1] and _is_same_level(first.run, other.run)
+
+
+def _separate_runs(recording: Recording, sensors: Mapping[str, Sensor]) -> list[tuple[Recording, Run]]:
+    """The runs of a recording with two directions, each with its rows; the longest run if no run has two.
+
+    Runs at one level belong together, and so do all rows of a recording with a single level.
+    """
+    runs = find_runs(recording, sensors)
+    longest = max(runs, key=lambda run: len(run.interval))
+    if all(_is_same_level(longest, run) for run in runs) or longest.kind not in (ISOBARIC, ISOMETRIC):
+        return [(recording, longest)]
+    parts = [(_rows_of_run(recording, run), run) for run in runs]
+    both = [(part, run) for part, run in parts if {1.0, -1.0} <= set(_directions(part, _path_of(run)))]
+    return both or [(_rows_of_run(recording, longest), longest)]
+
+
+def _rows_of_run(recording: Recording, run: Run) -> Recording:
+    """The rows of a run, named after the file and the rows."""
+    origin = f"{recording.origin}, rows {run.interval.start + 1} to {run.interval.stop}"
+    return dataclasses.replace(recording.rows(run.interval.rows), origin=origin)
+
+
+def _path_of(run: Run) -> FrictionPath:
+    return PressurePath() if run.kind == ISOMETRIC else ContractionPath()
+
+
+def _directions(recording: Recording, friction_path: FrictionPath) -> np.ndarray:
+    return motion_direction(friction_path.displacement(recording), recording.columns.get("time"))
+
+
+def _make_loop(
+    recording: Recording,
+    run: Run,
+    sensors: Mapping[str, Sensor],
+    law: Characteristic | None,
+    degree: int,
+    all_rows: bool,
+) -> HysteresisLoop:
+    friction_path = _path_of(run)
+    if law is not None:
+        static_curve: StaticCurve = FixedCharacteristic(law)
+    elif run.kind in (ISOBARIC, ISOMETRIC):
+        static_curve = PolynomialCurve("contraction" if run.kind == ISOBARIC else "pressure", degree)
+    else:
+        raise IdentificationError(
+            f"{recording.origin}: the run is {run.kind.name}, so pressure and contraction change together and the "
+            "static curve cannot be a polynomial in one of them.",
+            hint=Hint("To take the muscle's characteristic as the static curve", "characteristic"),
+        )
+    rows = _select_rows(recording, sensors, all_rows)
+    direction = _directions(recording, friction_path)
+    _check_two_directions(recording, direction, rows)
+    transient = 0 if run.kind == ISOBARIC else int(np.count_nonzero(rows & ~_has_steady_pressure(recording, sensors)))
+    return HysteresisLoop(recording, run, friction_path, static_curve, rows, transient)
+
+
+def _has_steady_pressure(recording: Recording, sensors: Mapping[str, Sensor]) -> RowMask:
+    """Mask of the rows in which the pressure changes slowly, whatever the length does."""
+    columns = {name: recording[name] for name in ("time", "pressure") if name in recording}
+    return quasi_static_rows(dataclasses.replace(recording, columns=columns), sensors)
+
+
+def _select_rows(recording: Recording, sensors: Mapping[str, Sensor], all_rows: bool) -> RowMask:
+    force = recording["force"]
+    rows = (force > 0) & np.isfinite(force)
+    if "force" in sensors:
+        rows &= sensors["force"].censoring(force) == 0
+    return rows if all_rows else rows & quasi_static_rows(recording, sensors)
+
+
+def _check_two_directions(recording: Recording, direction: np.ndarray, fitted_rows: RowMask) -> None:
+    for sign, branch in ((1, "rising"), (-1, "falling")):
+        rows, fitted = np.count_nonzero(direction == sign), np.count_nonzero((direction == sign) & fitted_rows)
+        if not fitted:
+            detail = (
+                f" ({rows} rows of it are excluded, because they are not quasi-static, have no force, or are saturated)"
+                if rows
+                else ""
+            )
+            raise IdentificationError(
+                f"{recording.origin}: the {branch} branch has no rows to fit{detail}, but a loop needs a rising and a "
+                "falling branch. Give such a run, or run it more slowly where its rows are not quasi-static.",
+                hint=Hint("To fit all rows, if only the length changes quickly", "all_rows", True),
+            )
+
+
+def _is_same_level(one: Run, other: Run) -> bool:
+    """Whether two runs have the same constant quantity and level, within the tolerance of one run."""
+    if (
+        one.kind is not other.kind
+        or one.constant_column != other.constant_column
+        or one.constant_value is None
+        or other.constant_value is None
+    ):
+        return False
+    size = max(abs(one.constant_value), abs(other.constant_value))
+    bands = {"contraction": CONTRACTION_BAND, "length": CONTRACTION_BAND * size}
+    band = bands.get(one.constant_column or "", RELATIVE_BAND * size)
+    return abs(one.constant_value - other.constant_value) <= band
+
+
+def fit_loop(loop: HysteresisLoop, *, elements: int = 8, progress: Callable[[str], None] | None = None) -> LoopFit:
+    """Fit every friction law to a loop and sort the fits by AICc.
+
+    A law with terms of speed is left out if the speed in the loop hardly varies.
+
+    `elements` is the number of elements of MaxwellSlip and PrandtlIshlinskii; `progress` is called with the name of
+    each law.
+    """
+    series = make_loop_series(loop.recording, loop.static_curve, loop.friction_path, loop.fitted_rows)
+    fits, failed = list[HysteresisFit](), dict[str, HintedText]()
+    for initial in initial_friction_laws(series.path[loop.fitted_rows], series.fitted_residuals(None), elements):
+        name = type(initial).__name__
+        too_uniform = "" if initial.rate_independent else speed_reservation(series.limits, series.axis)
+        if too_uniform:
+            failed[name] = HintedText(too_uniform)
+            continue
+        if progress is not None:
+            progress(name)
+        try:
+            fit = fit_hysteresis(
+                initial,
+                loop.recording,
+                static_curve=loop.static_curve,
+                friction_path=loop.friction_path,
+                fitted_rows=loop.fitted_rows,
+                repeat=loop.repeat,
+            )
+        except IdentificationError as error:
+            failed[name] = error.message
+        else:
+            marked = dataclasses.replace(fit.series, transient_rows=loop.transient_rows)
+            fits.append(dataclasses.replace(fit, series=marked))
+    return LoopFit(loop, tuple(sorted(fits, key=lambda fit: -fit.aicc_reduction)), failed)

@@ -1,0 +1,204 @@
+"""HysteresisFit: fitted friction, reduction of the error, and the tests whether the data justify it."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from ....core.arrays import Array
+from ....core.notebook import Card, NotebookDisplay
+from ....core.tree import leaves
+from ....physics.muscle.friction import Friction
+from ..identifiability import UndeterminedCombination
+from ..model_evidence import aicc, effective_sample_size, f_test_p_value, format_p_value
+from . import branches
+from .limits import limit_reservations, parameters_on_bounds, undetermined_parameters
+from .plot import plot_hysteresis
+from .series import LoopSeries
+
+SIGNIFICANCE_LEVEL = 0.01
+"""p-value below which an F test is significant (chosen)."""
+
+MAX_TRANSIENT_RATIO = 0.1
+"""Maximum part of the fitted rows in which the pressure may change quickly for a friction to be justified (chosen)."""
+
+MIN_BRANCH_RATIO = 0.1
+"""Minimum ratio of the rows of the two branches for a friction to be justified (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class HysteresisFit(NotebookDisplay):
+    """A friction law fitted to a loop, compared with the same static curve without friction; forces in N.
+
+    `gap` is the rms difference of the falling and the rising branch, `residual_gap` the part that the friction does not
+    explain. `repeat_rmse` and `repeat_rmse_without_friction` are the errors on a second run, where only the static
+    coefficients are fitted again, because the level may shift between runs. `repeatability` is the standard deviation
+    of one run about the mean of the two; an error below it means overfitting. These three are NaN without a second run.
+    """
+
+    friction: Friction
+    coefficients: Array
+    """Coefficients of the static curve."""
+    rmse: float
+    rmse_without_friction: float
+    gap: float
+    residual_gap: float
+    effective_sample_size: float
+    aicc_reduction: float
+    """AICc without friction minus AICc with friction; positive where the friction is the better model."""
+    p_value: float
+    """p-value of the F test of the friction parameters."""
+    repeat_rmse: float
+    repeat_rmse_without_friction: float
+    repeatability: float
+    series: LoopSeries
+    weak_combinations: tuple[UndeterminedCombination, ...] = ()
+    """Combinations of parameters that the data determine poorly or not at all."""
+
+    @property
+    def on_bounds(self) -> tuple[str, ...]:
+        """Paths of the parameters that the search moved to a bound, declared or set by the data."""
+        return parameters_on_bounds(self.friction, self.series.limits)
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Paths of the parameters that the data do not determine: on a bound, or with a large standard error."""
+        return undetermined_parameters(self.friction, self.series.limits, self.weak_combinations)
+
+    @property
+    def justified(self) -> bool:
+        """Whether AICc, the F test and, if there is one, the second run favour the friction, without reservations."""
+        confirmed = not self.repeat_rmse >= self.repeat_rmse_without_friction
+        is_significant = self.aicc_reduction > 0 and self.p_value < SIGNIFICANCE_LEVEL
+        return is_significant and confirmed and not self.reservations
+
+    @property
+    def reservations(self) -> tuple[str, ...]:
+        """The reasons, as sentences, why this loop cannot justify a friction whatever the statistical tests say."""
+        reasons = list(self.reservations_of_rows)
+        if self.rmse < self.repeatability:
+            reasons.append("The error is below the repeatability, which indicates overfitting.")
+        series = self.series
+        return (*reasons, *limit_reservations(self.friction, series.limits, self.weak_combinations, series.axis))
+
+    @property
+    def reservations_of_rows(self) -> tuple[str, ...]:
+        """The reasons, as sentences, that follow from the fitted rows of the loop and hold for every law."""
+        reasons = []
+        direction = self.series.direction[self.series.fitted_rows]
+        up, down = int(np.count_nonzero(direction > 0)), int(np.count_nonzero(direction < 0))
+        if MIN_BRANCH_RATIO * max(up, down) > min(up, down):
+            reasons.append(
+                f"One branch has very few rows ({min(up, down)} against {max(up, down)}); measure the loop more slowly."
+            )
+        if not np.isfinite(self.gap):
+            reasons.append("The branches have no common part of the path in the fitted rows.")
+        transient = self.series.transient_rows
+        if transient > MAX_TRANSIENT_RATIO * direction.size:
+            reasons.append(
+                f"The pressure changes quickly in {transient} of {direction.size} fitted rows; there the pulses of "
+                "valves and the dynamics of the gas appear as friction."
+            )
+        return tuple(reasons)
+
+    @property
+    def verdict(self) -> str:
+        """Whether the data justify this friction, as sentences with the numbers."""
+        text = (
+            f"{type(self.friction).__name__} reduces the rms error from {self.rmse_without_friction:.3g} to "
+            f"{self.rmse:.3g} N{self._gap_text}. Difference in AICc {-self.aicc_reduction:.4g}, effective sample size "
+            f"{self.effective_sample_size:.0f}; F test {format_p_value(self.p_value)}."
+        )
+        if np.isfinite(self.repeat_rmse):
+            text += (
+                f" On the second run the rms error changes from {self.repeat_rmse_without_friction:.3g} to "
+                f"{self.repeat_rmse:.3g} N; the repeatability of the runs is {self.repeatability:.3g} N."
+            )
+        text = " ".join([text, *self.reservations])
+        if self.undetermined:
+            text += f" Not determined: {', '.join(self.undetermined)}."
+        text = " ".join([text, *(str(each) for each in self.weak_combinations)])
+        return f"{text} The data {'justify' if self.justified else 'do not justify'} this friction."
+
+    @property
+    def _gap_text(self) -> str:
+        if not np.isfinite(self.gap):
+            return ""
+        return f" and the gap between the branches from {self.gap:.3g} to {self.residual_gap:.3g} N"
+
+    @property
+    def displayed_parameters(self) -> tuple[tuple[str, str, float, str, str], ...]:
+        """Path, symbol, value, unit and meaning of the parameters, in units of the driving quantity.
+
+        A friction driven by the pressure has Pa instead of m: N/Pa of a stiffness, Pa/s of a speed.
+        """
+        return tuple(
+            (leaf.path, leaf.declared.symbol, *self.series.axis.display(leaf.value, leaf.declared.unit),
+             leaf.declared.meaning)
+            for leaf in leaves(self.friction)
+        )  # fmt: skip
+
+    def plot(self, *, ax: Any = None) -> Any:
+        """Plot the loop with the friction force, and the residuals.
+
+        `ax` is an Axes for the loop, or a sequence of two, also for the residuals, and is returned; without it a new
+        figure is returned. Raises ParameterError for another `ax`.
+        """
+        rms = f"{self.rmse_without_friction:.3g} N without, {self.rmse:.3g} N with friction"
+        title = f"{self.series.origin}: rms error {rms}"
+        return plot_hysteresis(self.series, self.friction, self.coefficients, title, ax=ax)
+
+    def _card(self) -> Card:
+        rows = [(path, symbol, f"{value:.4g}", unit, meaning) for path, symbol, value, unit, meaning in
+                self.displayed_parameters]  # fmt: skip
+        title = f"{type(self.friction).__name__} fitted to {self.series.origin}"
+        return Card(title, [("parameter", "symbol", "value", "unit", "meaning"), *rows], self.plot, [self.verdict])
+
+    def __str__(self) -> str:
+        lines = [
+            f"{path:<16}{symbol:<9}{value:<12.4g}{unit}".rstrip()
+            for path, symbol, value, unit, _ in self.displayed_parameters
+        ]
+        return "\n".join([f"{type(self.friction).__name__} fitted to {self.series.origin}", *lines, self.verdict])
+
+
+def assess_fit(
+    friction: Friction, weak: tuple[UndeterminedCombination, ...], run: LoopSeries, repeat: LoopSeries | None
+) -> HysteresisFit:
+    """The statistics of a fitted friction with its poorly determined combinations, compared with the static curve."""
+    free = sum(leaf.declared.fitted for leaf in leaves(friction))
+    coefficients, static = run.coefficients(friction), run.coefficients(None)
+    rows = run.fitted_rows
+    residuals, plain = run.residuals(friction, coefficients)[rows], run.residuals(None, static)[rows]
+    square, plain_square = float(np.mean(residuals**2)), float(np.mean(plain**2))
+    sample_size, base = effective_sample_size(residuals), run.design_matrix.shape[1]
+    path, direction = run.path[rows], run.direction[rows]
+    repeat_rmse = plain_repeat_rmse = repeatability = float("nan")
+    if repeat is not None:
+        repeat_rmse = _rms(repeat.fitted_residuals(friction))
+        plain_repeat_rmse = _rms(repeat.fitted_residuals(None))
+        values = repeat.residuals(None, static)[repeat.fitted_rows]
+        second_run = (repeat.path[repeat.fitted_rows], values, repeat.direction[repeat.fitted_rows])
+        repeatability = branches.repeat_difference(path, plain, direction, *second_run).rms / np.sqrt(2)
+    return HysteresisFit(
+        friction=friction,
+        coefficients=coefficients,
+        rmse=float(np.sqrt(square)),
+        rmse_without_friction=float(np.sqrt(plain_square)),
+        gap=branches.branch_gap(path, plain, direction).rms,
+        residual_gap=branches.branch_gap(path, residuals, direction).rms,
+        effective_sample_size=sample_size,
+        aicc_reduction=aicc(plain_square, sample_size, base) - aicc(square, sample_size, base + free),
+        p_value=f_test_p_value(plain_square, square, sample_size, base + free, free),
+        repeat_rmse=repeat_rmse,
+        repeat_rmse_without_friction=plain_repeat_rmse,
+        repeatability=repeatability,
+        series=run,
+        weak_combinations=weak,
+    )
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")

@@ -1,0 +1,223 @@
+"""Error of a recorded resting length, estimated as a nuisance parameter of a fit to several specimens.
+
+The shortening L_0 - L of a specimen is taken as measured, and its resting length as wrong by d: its contraction is then
+(L_0 - L)/(L_0 + d). Such an error leaves no residual at rest and residuals of one sign elsewhere.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core.arrays import Array
+from ...core.errors import IdentificationError, ParameterError
+from ...core.short_repr import ShortRepr
+from ...physics.muscle.characteristic.base import Characteristic
+from ...recording import Recording
+from .candidates import blank_surface
+from .cross_validation import specimen_name
+from .fit_points import FitPoints
+from .loss import LeastSquares
+from .model_evidence import effective_sample_size
+from .pooling import population_of
+from .problem import evaluate
+from .solver import solve
+from .static_fit import refit
+
+PRIOR_STD = 2e-3
+"""Standard deviation [m] of the error of a resting length before the fit (chosen: a ruler between two fittings)."""
+MIN_STANDARD_ERRORS = 3.0
+"""Standard errors above which an error of a length is reported (chosen)."""
+MIN_EXPLAINED = 0.9
+"""Minimum share of the misfit that the correction of one length must explain to be reported (chosen)."""
+MIN_MISFIT = 1.1
+"""Ratio of the rms residual to that of separate fits of the specimens below which there is no misfit (chosen)."""
+_SEPARATE_DEGREE = 4
+"""Degree of the surfaces that are fitted to each specimen alone (chosen)."""
+_STEP = 1e-4
+"""Change of length [m] for the derivative (chosen)."""
+_ITERATIONS = 6
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class LengthError(ShortRepr):
+    """The estimated error of the resting length of one specimen; all SI."""
+
+    specimen: str
+    resting_length: float
+    """The recorded resting length [m]."""
+    offset: float
+    """Correction of the resting length [m]: negative where the specimen behaves as if it were shorter."""
+    standard_error: float
+    rmse_before: float
+    """Root mean square residual of all specimens with the recorded length, in the fitted quantity."""
+    rmse_after: float
+    """The same with the corrected length."""
+    model: Characteristic
+    """The law fitted with the corrected length."""
+
+    def explains(self, separate_rmse: float) -> bool:
+        """Whether the correction exceeds three standard errors and explains the misfit of one law for all specimens.
+
+        `separate_rmse` is the root mean square residual of separate fits of the specimens.
+        """
+        excess = self.rmse_before**2 - separate_rmse**2
+        explained = self.rmse_before**2 - self.rmse_after**2 >= MIN_EXPLAINED * excess
+        significant = abs(self.offset) > MIN_STANDARD_ERRORS * self.standard_error
+        return self.rmse_before > MIN_MISFIT * separate_rmse and explained and significant
+
+    def __str__(self) -> str:
+        change = "less" if self.offset < 0 else "more"
+        return (
+            f"that of {self.specimen} were {abs(self.offset) * 1e3:.2g} mm {change} (standard error "
+            f"{self.standard_error * 1e3:.1g} mm)"
+        )
+
+
+def length_notes(errors: Sequence[LengthError]) -> tuple[str, ...]:
+    """The remark that one recorded resting length is probably wrong; empty without errors."""
+    if not errors:
+        return ()
+    before, after = errors[0].rmse_before, max(each.rmse_after for each in errors)
+    several = " The data do not decide between these." if len(errors) > 1 else ""
+    return (
+        "One resting length is probably recorded wrongly, which leaves no residual at rest and residuals of one sign "
+        f"elsewhere: as if {', or '.join(map(str, errors))}. The rms residual falls from {before:.3g} to {after:.3g} "
+        f"with this correction.{several} Measure the length again.",
+    )
+
+
+def corrected_length(run: Recording, offset: float) -> Recording:
+    """The recording with a resting length that is greater by `offset` [m] at the same shortening.
+
+    Raises ParameterError where the recording states no resting length, or the corrected one is not positive.
+    """
+    length = run.constants.get("resting_length")
+    if length is None or not float(length) + offset > 0:
+        raise ParameterError(
+            f"{run.origin}: the resting length {'is not stated' if length is None else f'{float(length):g} m'}, so it "
+            f"cannot be corrected by {offset:g} m; allowed: a sum greater than 0."
+        )
+    corrected = float(length) + offset
+    columns = {name: run[name] for name in ("pressure", "force") if name in run}
+    columns["contraction"] = run["contraction"] * float(length) / corrected
+    if "time" in run.columns:
+        columns["time"] = run["time"]
+    constants = {**run.constants, "resting_length": corrected}
+    return Recording(columns, run.origin, constants, references=run.references)
+
+
+def estimate_length_error(
+    model: Characteristic, recordings: Sequence[Recording], specimen: str, prior_std: float = PRIOR_STD
+) -> LengthError:
+    """The error of the resting length of one specimen, estimated together with the parameters of a law.
+
+    model       the law fitted to all recordings, as initial values; of a PooledLengthLaw its population law, because
+                effects of the specimens take up an error of their length
+    specimen    name as SpecimenSplit gives it: the constant `specimen`, or the resting length in mm
+    prior_std   standard deviation [m] of the normal prior of the error, whose mean is 0
+
+    Rows are correlated, so that the squares are divided by the ratio of rows to effective rows. Raises
+    IdentificationError where the corrected data do not determine the law, ParameterError for an unknown specimen.
+    """
+    members = [specimen_name(run) == specimen for run in recordings]
+    if not any(members):
+        known = ", ".join(dict.fromkeys(specimen_name(run) for run in recordings))
+        raise ParameterError(f"no recording is of specimen '{specimen}'; the specimens are {known}.")
+    recorded = float(recordings[members.index(True)].constants["resting_length"])
+    model = population_of(model)
+    offset, first, state = 0.0, np.nan, None
+    for _ in range(_ITERATIONS):
+        state = _State.at(model, recordings, members, offset)
+        model = state.model
+        first = state.rmse if np.isnan(first) else first
+        change = state.newton_step(offset, prior_std)
+        offset = float(np.clip(offset + change, -0.2 * recorded, 0.2 * recorded))
+        if abs(change) < 1e-3 * state.standard_error(prior_std):
+            break
+    assert state is not None
+    return LengthError(specimen, recorded, offset, state.standard_error(prior_std), first, state.rmse, model)
+
+
+def find_length_errors(model: Characteristic, recordings: Sequence[Recording]) -> tuple[LengthError, ...]:
+    """The errors of one resting length that explain why one law does not fit all specimens; the smallest first.
+
+    Each specimen is corrected alone. Several entries are alternatives: a law with free parameters for the effect of the
+    length explains an error in one of three lengths by an error in either of the others. Empty unless there are three
+    specimens with resting lengths or more.
+    """
+    names = list(dict.fromkeys(specimen_name(run) for run in recordings))
+    model = population_of(model)
+    complete = all("resting_length" in run.constants for run in recordings)
+    if len(names) < 3 or not complete or not hasattr(model, "with_resting_length"):
+        return ()
+    try:
+        separate = _separate_rmse(recordings, names)
+        if _rmse(model, recordings) <= MIN_MISFIT * separate:
+            return ()
+        estimates = [estimate_length_error(model, recordings, name) for name in names]
+    except IdentificationError:
+        return ()
+    return tuple(sorted((e for e in estimates if e.explains(separate)), key=lambda e: abs(e.offset)))
+
+
+def _rmse(model: Characteristic, recordings: Sequence[Recording]) -> float:
+    """Root mean square residual of a fitted law, in the fitted quantity."""
+    problem = FitPoints.from_recordings(recordings).problem(model)
+    return float(np.sqrt(np.mean(problem.residuals(problem.predict(problem.initial_values)) ** 2)))
+
+
+def _separate_rmse(recordings: Sequence[Recording], names: Sequence[str]) -> float:
+    """Root mean square residual [N] of surfaces fitted to each specimen alone."""
+    residuals = []
+    for name in names:
+        points = FitPoints.from_recordings([run for run in recordings if specimen_name(run) == name])
+        problem = points.problem(blank_surface(_SEPARATE_DEGREE))
+        residuals.append(problem.residuals(solve(problem, LeastSquares()).modelled))
+    return float(np.sqrt(np.mean(np.concatenate(residuals) ** 2)))
+
+
+class _State(NamedTuple):
+    """The fit with one correction: the law, its weighted residuals and Jacobian, and the derivative by the length."""
+
+    model: Characteristic
+    residuals: Array
+    derivative: Array
+    variance: float
+    rmse: float
+
+    @classmethod
+    def at(cls, start: Characteristic, runs: Sequence[Recording], members: Sequence[bool], offset: float) -> _State:
+        low, here, high = (
+            FitPoints.from_recordings([corrected_length(r, d) if m else r for r, m in zip(runs, members, strict=True)])
+            for d in (offset - _STEP, offset, offset + _STEP)
+        )
+        model = refit(start, here)
+        problem = here.problem(model)
+        quantity = problem.fitted_quantity
+        below, above = (evaluate(model, quantity.method, quantity.arguments, points.data) for points in (low, high))
+        modelled = problem.predict(problem.initial_values)
+        weights = problem.weights * problem.active_rows(modelled)
+        matrix = weights[:, None] * problem.jacobian(problem.initial_values)
+        basis = np.linalg.qr(matrix / np.maximum(np.linalg.norm(matrix, axis=0), 1e-300))[0]
+        derivative = weights * (above - below) / (2 * _STEP)
+        residuals = problem.residuals(modelled)
+        share = effective_sample_size(residuals) / residuals.size
+        variance = float(residuals @ residuals) / max(residuals.size - matrix.shape[1], 1) / share
+        rmse = float(np.sqrt(np.mean(residuals**2)))
+        return cls(model, residuals, derivative - basis @ (basis.T @ derivative), variance, rmse)
+
+    def newton_step(self, offset: float, prior_std: float) -> float:
+        """The change of the offset [m] that minimises the squares and the prior."""
+        gradient = float(self.derivative @ self.residuals) + self.variance * offset / prior_std**2
+        return -gradient / self._curvature(prior_std)
+
+    def standard_error(self, prior_std: float) -> float:
+        """The standard error of the offset [m]."""
+        return float(np.sqrt(self.variance / self._curvature(prior_std)))
+
+    def _curvature(self, prior_std: float) -> float:
+        return float(self.derivative @ self.derivative) + self.variance / prior_std**2

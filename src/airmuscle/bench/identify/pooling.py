@@ -1,0 +1,262 @@
+"""Partial pooling: fits of a PooledLengthLaw, from the fit of its population law to all specimens."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core import tree
+from ...core.arrays import Array
+from ...core.errors import IdentificationError
+from ...physics.muscle.characteristic import Characteristic, ContractileSurface, PooledLengthLaw
+from ...recording import Recording
+from .bounded_effects import BoundedRows, bounded_coefficients
+from .candidates import UNREACHED_FORCE
+from .correlation_index import correlation_index
+from .cross_validation import specimen_name
+from .fit_points import FitPoints
+from .model_evidence import batch_sample_size
+from .problem import RESTING_LENGTH, SPECIMEN, FitProblem, evaluate, of_length
+from .result import Fit
+from .row_errors import WorstPoint, rms_of_rows, row_errors
+from .slack_rows import PULL_RATIO, Slackness
+from .solver import design_matrix
+from .specimen_effects import SpecimenEffects, Sums, predict_effects
+
+Rows = npt.NDArray[np.bool_]
+DECAY_RANGE = 0.05
+"""Force below zero of the population, as a fraction of the greatest measured force, at which the effects have decayed
+(chosen): where the population is far from pulling, no specimen pulls."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Specimens:
+    """The specimens of N rows: names, resting lengths [m], and the index of the specimen of each row (N,)."""
+
+    names: tuple[str, ...]
+    lengths: tuple[float, ...]
+    member: npt.NDArray[np.intp]
+
+    @classmethod
+    def of(cls, points: FitPoints) -> Specimens:
+        """The specimens of the complete rows. Raises IdentificationError for fewer than two, or without a length."""
+        names = [specimen_name(run) for run in points.recordings]
+        lengths = _lengths(points.recordings, names)
+        if len(lengths) < 2:
+            raise IdentificationError(
+                f"{points.joined.origin}: partial pooling needs two specimens or more, but there is one, "
+                f"{names[0] if names else 'none'}. Give recordings of several muscles of the type, or a law of one.",
+                cause="it needs recordings of two specimens or more",
+            )
+        order = list(lengths)
+        member = np.repeat([order.index(name) for name in names], [len(run) for run in points.recordings])
+        return cls(tuple(order), tuple(lengths.values()), member[~points.missing])
+
+
+def _lengths(recordings: Sequence[Recording], names: Sequence[str]) -> dict[str, float]:
+    """The resting length [m] of each specimen. Raises IdentificationError where it is missing or has two values."""
+    lengths: dict[str, float] = {}
+    for run, name in zip(recordings, names, strict=True):
+        stated = run.constants.get("resting_length")
+        if stated is None or abs(lengths.setdefault(name, float(stated)) - float(stated)) > 1e-6:
+            what = "no resting length" if stated is None else f"two resting lengths, {lengths[name]:g} and {stated:g} m"
+            raise IdentificationError(
+                f"{run.origin}: specimen {name} has {what}. State one resting length for each specimen, or different "
+                "names of specimens.",
+                cause=f"specimen {name} has {what}",
+            )
+    return lengths
+
+
+class PredictedEffects(NamedTuple):
+    """The effects of the specimens, the surface whose scaling they have, and their decay [1/N] below zero force."""
+
+    effects: SpecimenEffects
+    surface: ContractileSurface
+    decay: float
+
+
+def _decayed(basis: Array, population: Array, decay: float) -> Array:
+    """The basis (N, K) of the effects with their share at these unclamped forces of the population (N,) [N]."""
+    return np.asarray(basis * np.clip(1.0 + decay * population, 0.0, 1.0)[:, None])
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Pooling:
+    """The rows from which effects of specimens are predicted: the problem of the population law and the specimens."""
+
+    problem: FitProblem
+    specimens: Specimens
+    effect: ContractileSurface
+    """Structure of the effect of one specimen."""
+
+    def predict(self, values: Array, rows: Rows | None = None) -> PredictedEffects:
+        """The effects for these population parameters (P,) from all rows, or those of a mask (N,).
+
+        The variances follow from the rows that are active in the population law. Rows of one run are correlated: the
+        likelihood counts them with their effective number, so that effects are shrunk as by independent rows. With
+        these variances the effects of each specimen are limited by its slack rows: a bound counts where the law of the
+        specimen violates it.
+        """
+        problem, (pressure, contraction) = self.problem, self.problem.arguments
+        matrix, constant = self._design
+        modelled = matrix @ values + constant
+        kept = np.ones(len(modelled), dtype=bool) if rows is None else rows
+        ranges = [(float(x[kept].min()), float(x[kept].max())) for x in (pressure, contraction)]
+        surface = self.effect.with_validity_range(*ranges)
+        decay = 1.0 / (DECAY_RANGE * max(float(np.max(problem.data["force"][kept])), 1e-9))
+        basis = _decayed(np.array(surface.basis(pressure, contraction)).T, modelled, decay)
+        used = problem.active_rows(modelled) & kept
+        weights = np.where(used, problem.weights, 0.0)  # no sum changes with a row of zeros
+        members = self.specimens.member, len(self.specimens.names)
+        rest = problem.target - modelled
+        sums = Sums.of(weights[:, None] * matrix, weights[:, None] * basis, weights * rest, *members,
+                       int(np.count_nonzero(used)))  # fmt: skip
+        effects = predict_effects(sums, self.specimens.names)
+        left = (weights * (rest - np.sum(basis * effects.coefficients[members[0]], axis=1)))[used]
+        effects = predict_effects(sums.scaled(batch_sample_size(left) / left.size), self.specimens.names)
+        predicted = PredictedEffects(effects, surface, decay)
+        if not (problem.censoring > 0).any():
+            return predicted
+        measured = [
+            BoundedRows(basis[own], rest[own], problem.censoring[own], problem.weights[own])
+            for own in (kept & (self.specimens.member == i) for i in range(members[1]))
+        ]
+        regions = [self._slack_region(i, predicted, values, kept) for i in range(members[1])]
+        ratio = (effects.sigma / effects.deviation) ** 2 * left.size / batch_sample_size(left)
+        limited = [
+            bounded_coefficients(own.joined(region), ratio, start)
+            for own, region, start in zip(measured, regions, effects.coefficients, strict=True)
+        ]
+        effects = dataclasses.replace(effects, coefficients=np.array(limited))
+        return predicted._replace(effects=effects)
+
+    def _slack_region(self, index: int, predicted: PredictedEffects, values: Array, kept: Rows) -> BoundedRows:
+        """The bounds in the slack region of one specimen, which weigh together as much as its rows."""
+        problem, own, surface = self.problem, kept & (self.specimens.member == index), predicted.surface
+        pressure, contraction = (x[own] for x in problem.arguments)
+        side, weights, force = problem.censoring[own], problem.weights[own], problem.data["force"][own]
+        pulls = (side == 0) & (force > PULL_RATIO * predicted.effects.sigma)
+        steps = Slackness.of(pressure, contraction, side > 0, pulls)
+        region = steps.region(surface.min_pressure, surface.max_contraction)
+        law = tree.with_parameters(problem.law, problem.leaf_values(values))
+        modelled = np.asarray(of_length(law, self.specimens.lengths[index]).unclamped_force(*region))
+        count = modelled.size
+        equal = np.full(count, np.sqrt(float(weights @ weights) / max(count, 1)))
+        basis = _decayed(np.array(surface.basis(*region)).T, modelled, predicted.decay)
+        return BoundedRows(basis, -modelled, np.ones(count), equal)
+
+    @property
+    def _design(self) -> tuple[Array, Array]:
+        stored: tuple[Array, Array] | None = self.__dict__.get("_stored_design")
+        if stored is None:
+            stored = self.__dict__["_stored_design"] = design_matrix(self.problem)
+        return stored
+
+    def law(self, population: Any, values: Array, rows: Rows | None = None) -> PooledLengthLaw:
+        """The pooled law of a population law with these parameters."""
+        return _pooled(population, self.specimens, self.predict(values, rows))
+
+
+def _pooled(population: Any, specimens: Specimens, predicted: PredictedEffects) -> PooledLengthLaw:
+    limits: dict[str, Any] = {"min_force": -UNREACHED_FORCE, "max_force": UNREACHED_FORCE}
+    rows, surface = predicted.effects.coefficients.tolist(), predicted.surface
+    effects = tuple(dataclasses.replace(surface, coefficients=tuple(row), **limits) for row in rows)
+    names, lengths = specimens.names, specimens.lengths
+    return PooledLengthLaw(population, effects, names, lengths, effect_decay=predicted.decay)
+
+
+def check_poolable(law: PooledLengthLaw, points: FitPoints) -> Specimens:
+    """The specimens of the points. Raises IdentificationError for fewer than two, or an effect that is no surface."""
+    if not isinstance(law.effects[0], ContractileSurface):
+        raise IdentificationError(
+            f"{points.joined.origin}: the effects of a PooledLengthLaw are {type(law.effects[0]).__name__}; only those "
+            "of a ContractileSurface can be fitted. Give ContractileSurface.blank(2)."
+        )
+    return Specimens.of(points)
+
+
+def make_pooling(law: PooledLengthLaw, points: FitPoints, problem: FitProblem) -> Pooling:
+    """The rows of the fit of a population law. Raises IdentificationError as `check_poolable`."""
+    effect: Any = law.effects[0]
+    return Pooling(problem, check_poolable(law, points), effect)
+
+
+def pool(law: PooledLengthLaw, population: Fit, points: FitPoints) -> Fit:
+    """The fit of a pooled law, from the fit of its population law to the same points.
+
+    Estimates and correlations are those of the population parameters, with the scatter of the specimens; `effects` has
+    those of the specimens. The problem remains that of the population law.
+    """
+    pooling = make_pooling(law, points, population.problem)
+    predicted = pooling.predict(population.values)
+    model, effects = _pooled(population.model, pooling.specimens, predicted), predicted.effects
+    data = population.recording.with_columns(**{SPECIMEN: pooling.specimens.member.astype(float)})
+    modelled = evaluate(model, "force", population.fitted_quantity.arguments, data)
+    errors, measured = row_errors(population.problem, modelled), population.censoring == 0
+    deviations = np.sqrt(np.diag(effects.population_covariance))
+    estimates = zip(population.estimates, deviations.tolist(), strict=True)
+    target = data["force"]
+    return dataclasses.replace(
+        population,
+        model=model,
+        estimates=tuple(dataclasses.replace(each, stderr=error) for each, error in estimates),
+        correlations=effects.population_covariance / np.outer(deviations, deviations),
+        sigma=effects.sigma,
+        rmse=rms_of_rows(errors, measured),
+        max_error=WorstPoint.of(errors, data),
+        correlation_index=correlation_index(target[measured], modelled[measured]),
+        recording=data,
+        effects=effects,
+        notes=(*population.notes, *_notes(effects)),
+    )
+
+
+def _notes(effects: SpecimenEffects) -> tuple[str, ...]:
+    count = len(effects.specimens)
+    return (
+        f"Partial pooling of {count} specimens: coefficients of the specimen effects with a standard deviation of "
+        f"{effects.deviation:.3g} N (restricted maximum likelihood) and {effects.degrees_of_freedom:.3g} effective "
+        f"parameters of {effects.coefficients.size}. The standard errors of the population parameters contain this "
+        "scatter.",
+    )
+
+
+def band_terms(fit: Fit, points: Recording, jacobian: Array) -> tuple[Array, Array]:
+    """The offset (N,) of the specimen that `points` state from the population, and the variance (N,) of the force.
+
+    A specimen that the fit does not know has the mean of the prior, and the variance of the prior is added.
+    """
+    effects, model = fit.effects, fit.model
+    assert effects is not None
+    assert isinstance(model, PooledLengthLaw)
+    surface: Any = model.effects[0]
+    state = points["pressure"], points["contraction"]
+    length = points.constants.get(RESTING_LENGTH)
+    law = of_length(model.population, None if length is None else float(length))
+    basis = np.array(surface.basis(*state)).T * np.asarray(model.effect_share(law.unclamped_force(*state)))[:, None]
+    name, size = specimen_name(points), basis.shape[1]
+    gradient = np.zeros((len(points), len(effects.covariance)))
+    gradient[:, : jacobian.shape[1]] = jacobian
+    offset, extra = np.zeros(len(points)), effects.deviation**2 * np.sum(basis**2, axis=1)
+    if name in effects.specimens:
+        index = effects.specimens.index(name)
+        start = jacobian.shape[1] + index * size
+        gradient[:, start : start + size] = basis
+        offset, extra = basis @ effects.coefficients[index], np.zeros(len(points))
+    return offset, np.einsum("ni,ij,nj->n", gradient, effects.covariance, gradient) + extra
+
+
+def population_of(law: Any) -> Any:
+    """The population law of a pooled law; any other law unchanged."""
+    return law.population if isinstance(law, PooledLengthLaw) else law
+
+
+def refit_pooled(law: PooledLengthLaw, population: Characteristic, points: FitPoints) -> PooledLengthLaw:
+    """The pooled law of a population law that was refitted to these points."""
+    problem = points.problem(population)
+    return make_pooling(law, points, problem).law(population, problem.initial_values)

@@ -1,0 +1,195 @@
+"""Prediction of a transient record by an identified plant: simulation of its input, with the band of the fit."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ....core.arrays import Array
+from ....core.errors import IdentificationError, ParameterError
+from ....core.field_types import check_field_types
+from ....core.short_repr import ShortRepr
+from ....engine.compile import System
+from ....engine.run.integrators import Integrator, Rodas4
+from ..dynamic.ambient import describe_other_ambient
+from ..dynamic.experiment import Experiment, InitialValue, ParameterPaths, RecordUnknown, Unknown, make_unknowns
+from ..dynamic.fit import fit_dynamic
+from ..dynamic.record_model import ModelOutputs, RecordModel
+from ..dynamic.reliability import RECORD_CONSEQUENCE
+from ..dynamic.result import DynamicFit
+from .fitted_range import NOISY_MARGIN, range_notes, rate_notes, rows_outside, with_band_notes
+from .result import QuantityPrediction, RecordPrediction
+
+NORMAL_QUANTILE = 1.959963984540054
+"""97.5 % quantile of the normal distribution."""
+UNKNOWN = "not known from one record"
+"""Words in place of the band of a plant that was fitted to one record, which does not show how records differ."""
+ASSUMED_DEVIATION = 0.01
+"""Standard deviation of a quantity without a stated one, relative to its range in the record (chosen)."""
+USUAL = (
+    "another valve opening, supply or muscle, a wrong start time, and another initial pressure (--own, --start-margin)"
+)
+"""Usual causes of a band that does not hold, where nothing recorded shows one."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class PlantUncertainty(ShortRepr):
+    """The uncertainty of an identified plant.
+
+    deviations  standard deviation of the residuals of each observed quantity [SI], with the model error that the
+                records of the fit showed
+    parameters  the fitted parameters; several paths have one common value
+    covariance  their covariance matrix [SI], shape (P, P)
+    records     number of records of the fit; None if it is not known
+    factors     half width of the band in standard deviations, from records that were predicted by the others; with
+                `records`, a quantity without a factor has no band
+    ranges      ends of the measured quantities in the records of the fit [SI]
+    rates       their maximum rates of change [SI per s]
+    """
+
+    deviations: Mapping[str, float]
+    parameters: tuple[ParameterPaths, ...] = ()
+    covariance: Array = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
+    records: int | None = None
+    factors: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    ranges: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
+    rates: Mapping[str, float] = dataclasses.field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
+
+    def factor(self, name: str) -> float | None:
+        """Half width of the band of a quantity in standard deviations; None where it is not known."""
+        if name not in self.deviations:
+            return None
+        return self.factors.get(name, None if self.records else NORMAL_QUANTILE)
+
+    def source(self, name: str) -> str:
+        """Where the band of a quantity comes from, or why there is none."""
+        if self.factor(name) is None:
+            if name not in self.deviations:
+                return ""
+            return UNKNOWN if self.records == 1 else "not known, because the records did not predict each other"
+        if not self.records:
+            return "residuals of the fit of the plant, and the covariance of its parameters"
+        return (
+            f"errors of {self.records} records, each predicted by the others, and the covariance of the parameters; "
+            f"half width of {name}: {self.factor(name):.3g} standard deviations (Student's t)"
+        )
+
+
+def predict_dynamic(
+    plant: System,
+    experiment: Experiment,
+    observed: Mapping[str, float],
+    *,
+    uncertainty: PlantUncertainty | None = None,
+    own: Sequence[RecordUnknown] = (),
+    method: Integrator | None = None,
+) -> RecordPrediction:
+    """Predict quantities of a transient record by simulating an identified plant from its initial conditions.
+
+    plant        the identified plant; that of the experiment replaces it, for example one in other ambient air, which a
+                 note states
+    observed     the quantities to predict, outputs of the plant that the recording has, each with the standard
+                 deviation of its sensor [SI], which weights the estimation of `own`; 0 where it is not known
+    uncertainty  of the plant; the half width of the 95 % band is k sqrt(g^T C g + s^2) with the sensitivities g to the
+                 fitted parameters, their covariance C, the standard deviation s of the residuals and its factor k
+    own          unknowns that are estimated from the record itself before the prediction: StartTime(margin),
+                 CommandInstants(margin), InitialValue(name, margin) or paths, such as a supply pressure
+    method       by default Rodas4(rtol=1e-6)
+
+    Raises IdentificationError where the simulation fails, ParameterError for unknown names.
+    """
+    notes = describe_other_ambient(plant, experiment)
+    other_air = ["other ambient air"] if notes else []
+    plant = experiment.plant or plant
+    deviations = {name: sensor or _deviation(name, experiment, uncertainty) for name, sensor in observed.items()}
+    if own:
+        fit = fit_dynamic(plant, [experiment], free=(), per_record=own, observed=deviations, method=method)
+        plant, experiment = fit.plant(), _with_estimates(fit, experiment)
+        notes += _describe_estimates(fit)
+    modelled, unknowns = _simulate(plant, experiment, deviations, uncertainty, method or Rodas4())
+    spread = _parameter_variance(modelled, unknowns, uncertainty)
+    recording, quantities = experiment.recording, []
+    for i, name in enumerate(observed):
+        half, factor = None, None if uncertainty is None else uncertainty.factor(name)
+        if uncertainty is not None and factor is not None:
+            half = factor * np.sqrt(spread[:, i] + uncertainty.deviations[name] ** 2)
+        measured, predicted = recording[name], modelled.values[:, i]
+        compared = np.isfinite(measured) & np.isfinite(predicted)
+        band = "" if uncertainty is None else uncertainty.source(name)
+        quantities.append(QuantityPrediction(name, measured, predicted, half, compared, band))
+    ranges, rates = ({}, {}) if uncertainty is None else (uncertainty.ranges, uncertainty.rates)
+    faster = rate_notes(recording, rates)
+    notes += [*range_notes(recording, ranges, NOISY_MARGIN), *faster]
+    notes += [f"the band of {q.name} is {q.band}" for q in quantities if q.half_width is None and q.band]
+    outside = rows_outside(recording, ranges, NOISY_MARGIN)
+    prediction = RecordPrediction(recording, tuple(quantities), tuple(notes), outside)
+    return with_band_notes(prediction, [*other_air, *(["faster changes"] if faster else [])], USUAL)
+
+
+def _describe_estimates(fit: DynamicFit) -> list[str]:
+    """The unknowns estimated from the record itself, and those of them that are on a bound."""
+    texts = [f"{e.name.removesuffix(' of record 1')} {e.value:.4g} {e.display_unit}".rstrip() for e in fit.estimates]
+    bounded = [text for text, e in zip(texts, fit.estimates, strict=True) if e.on_bound]
+    return [
+        f"estimated from the record itself: {', '.join(texts)} (SI)",
+        *(f"on its bound: {text}. {RECORD_CONSEQUENCE}" for text in bounded),
+    ]
+
+
+def _deviation(name: str, experiment: Experiment, uncertainty: PlantUncertainty | None) -> float:
+    if uncertainty is not None and name in uncertainty.deviations:
+        return float(uncertainty.deviations[name])
+    values = experiment.recording[name]
+    return ASSUMED_DEVIATION * float(np.nanmax(values) - np.nanmin(values)) or 1.0
+
+
+def _with_estimates(fit: DynamicFit, experiment: Experiment) -> Experiment:
+    """The experiment with its estimated start time and initial values, and the plant with its own parameters."""
+    model = fit.problem.record_models[0]
+    known = dict(experiment.initial_conditions.known)
+    for estimate, unknown in zip(fit.estimates, fit.unknowns, strict=True):
+        target = unknown.target
+        if isinstance(target, InitialValue):
+            known[target.name] = estimate.value
+    conditions = dataclasses.replace(experiment.initial_conditions, known=known)
+    return dataclasses.replace(
+        experiment,
+        plant=fit.plant(),
+        start_time=model.start_time(fit.values),
+        initial_conditions=conditions,
+        command=model.command(fit.values),
+    )
+
+
+def _simulate(
+    plant: System, experiment: Experiment, deviations: Mapping[str, float], uncertainty: PlantUncertainty | None,
+    method: Integrator,
+) -> tuple[ModelOutputs, tuple[Unknown, ...]]:  # fmt: skip
+    """The outputs at the rows of the record, with their derivatives by the fitted parameters."""
+    groups = () if uncertainty is None else uncertainty.parameters
+    unknowns = make_unknowns(plant, [experiment], groups, (), {}) if groups else ()
+    model = RecordModel(plant, experiment, 0, unknowns, deviations, method)
+    values = np.array([unknown.value for unknown in unknowns])
+    return model.evaluate(values), unknowns
+
+
+def _parameter_variance(
+    modelled: ModelOutputs, unknowns: Sequence[Unknown], uncertainty: PlantUncertainty | None
+) -> Array:
+    """Variance of the outputs by the covariance of the parameters [SI], shape (N, Q)."""
+    if not unknowns or uncertainty is None:
+        return np.zeros(modelled.values.shape)
+    if uncertainty.covariance.shape != (len(unknowns),) * 2:
+        raise ParameterError(
+            f"PlantUncertainty: {len(unknowns)} parameters need a covariance of {len(unknowns)} rows and columns, not "
+            f"{uncertainty.covariance.shape}."
+        )
+    variance = np.einsum("nqi,ij,nqj->nq", modelled.jacobian, uncertainty.covariance, modelled.jacobian)
+    if not np.isfinite(variance).all():
+        raise IdentificationError("the sensitivities of the prediction are not finite. Check the plant and the input.")
+    return np.asarray(np.maximum(variance, 0.0))

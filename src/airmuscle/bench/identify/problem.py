@@ -1,0 +1,284 @@
+"""FitProblem: law, free parameters, data points and the quantity in which residuals are taken."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Collection, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core import autodiff, tree
+from ...core.arrays import Array, as_slice
+from ...core.errors import IdentificationError, ParameterError, suggestion
+from ...core.hints import Hint
+from ...core.tree import Leaf
+from ...physics.muscle.characteristic import PooledLengthLaw
+from ...physics.muscle.characteristic.base import Characteristic, ContractionLaw, ForceLaw, PressureLaw
+from ...recording import Recording
+from ...recording.columns import QUANTITIES
+from .censoring import UNCENSORED, Censoring
+
+RESTING_LENGTH = "resting_length"
+"""Column with the resting length [m] of every row, in data of several specimens."""
+SPECIMEN = "specimen"
+"""Column with the index of the specimen of every row, in data of a PooledLengthLaw."""
+
+
+@dataclasses.dataclass(frozen=True)
+class FittedQuantity:
+    """The quantity that a law gives as a function of the other two: the method that computes it and its arguments."""
+
+    method: str
+    arguments: tuple[str, str]
+    name: str
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the quantity."""
+        return QUANTITIES[self.name].unit
+
+
+FORCE = FittedQuantity("unclamped_force", ("pressure", "contraction"), "force")
+CONTRACTION = FittedQuantity("contraction", ("pressure", "force"), "contraction")
+PRESSURE = FittedQuantity("pressure", ("contraction", "force"), "pressure")
+
+
+def rows_by_length(law: Any, data: Recording) -> list[tuple[float | None, npt.NDArray[np.intp]]]:
+    """Each resting length in the data with the indices of its rows; once None, if the law does not depend on it."""
+    if RESTING_LENGTH not in data.columns or not hasattr(law, "with_resting_length"):
+        return [(None, np.arange(len(data)))]
+    lengths = data[RESTING_LENGTH]
+    return [(float(length), np.flatnonzero(lengths == length)) for length in np.unique(lengths)]
+
+
+def of_length(law: Any, length: float | None) -> Any:
+    """As `law.with_resting_length`, but without validation, because a search may pass through invalid parameters."""
+    if length is None:
+        return law
+    leaves = tree.leaves(law)
+    return tree.unflatten(law, [length if leaf.path == RESTING_LENGTH else leaf.value for leaf in leaves])
+
+
+def evaluate(law: Any, method: str, arguments: tuple[str, str], data: Recording) -> Array:
+    """The values of `law.method(*arguments)` at every row, with the law of the row's resting length; shape (N,)."""
+    values = np.zeros(len(data))
+    for single, rows in _laws_by_rows(law, data):
+        values[rows] = getattr(single, method)(*(data[name][rows] for name in arguments))
+    return values
+
+
+def _laws_by_rows(law: Any, data: Recording) -> list[tuple[Any, npt.NDArray[np.intp]]]:
+    """The law of each specimen, or of each resting length, with the indices of its rows."""
+    if isinstance(law, PooledLengthLaw) and SPECIMEN in data.columns:
+        member = data[SPECIMEN].astype(int)
+        return [(law.for_specimen(law.specimens[i]), np.flatnonzero(member == i)) for i in np.unique(member).tolist()]
+    return [(of_length(law, length), rows) for length, rows in rows_by_length(law, data)]
+
+
+def fitted_quantity_of(law: Characteristic) -> FittedQuantity:
+    """The quantity that a law gives, in which residuals are taken. Raises IdentificationError."""
+    for kind, quantity in ((ForceLaw, FORCE), (ContractionLaw, CONTRACTION), (PressureLaw, PRESSURE)):
+        if isinstance(law, kind):
+            return quantity
+    raise IdentificationError(
+        f"{type(law).__name__} cannot be fitted, because it gives neither force nor contraction nor pressure."
+    )
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class FitProblem:
+    """N data points and the P free parameters of a law."""
+
+    law: Any
+    fitted_quantity: FittedQuantity
+    data: Recording
+    target: Array
+    """Measured value, or the bound of a censored row, in the fitted quantity [SI]; shape (N,)."""
+    censoring: Array
+    """0 uncensored, 1 the law may lie below the target, -1 the law may lie above it; shape (N,)."""
+    weights: Array
+    """Factors of the residuals, with a root mean square of 1; shape (N,)."""
+    leaves: tuple[Leaf, ...]
+    free: tuple[int, ...]
+    """Indices of the leaves that are fitted."""
+
+    @property
+    def arguments(self) -> tuple[Array, Array]:
+        """The arguments of the law at every row [SI]; shape (N,) each."""
+        first, second = self.fitted_quantity.arguments
+        return self.data[first], self.data[second]
+
+    @property
+    def initial_values(self) -> Array:
+        """The free parameters as the law has them; shape (P,)."""
+        return np.array([self.leaves[i].value for i in self.free], dtype=float)
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lower and upper bounds of the free parameters; shape (P,) each."""
+        pairs = np.array([self.leaves[i].declared.bounds for i in self.free], dtype=float)
+        return pairs[:, 0], pairs[:, 1]
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """A short label for each free parameter: its term in a polynomial, else its symbol, else its path."""
+        terms = getattr(self.law, "term_labels", ())
+        field = getattr(self.law, "linear_in", None)
+        texts = {f"{field}[{i}]": f"a({term})" for i, term in enumerate(terms)}
+        symbols = [self.leaves[i].declared.symbol for i in self.free]
+        paths = [self.leaves[i].path for i in self.free]
+        names = (s if symbols.count(s) == 1 else path for s, path in zip(symbols, paths, strict=True))
+        return tuple(texts.get(path, name) for path, name in zip(paths, names, strict=True))
+
+    def leaf_values(self, values: Sequence[float] | Array) -> list[float]:
+        """All leaves of the law with these values of the free parameters."""
+        leaf_values = [leaf.value for leaf in self.leaves]
+        for i, value in zip(self.free, values, strict=True):
+            leaf_values[i] = float(value)
+        return leaf_values
+
+    def rows(self, selection: npt.NDArray[Any]) -> FitProblem:
+        """The problem of these rows, a mask or indices."""
+        return dataclasses.replace(
+            self,
+            data=self.data.rows(selection),
+            target=self.target[selection],
+            censoring=self.censoring[selection],
+            weights=self.weights[selection],
+        )
+
+    def predict(self, values: Array) -> Array:
+        """The fitted quantity at every row with these parameters [SI]; shape (N,)."""
+        method = self.fitted_quantity.method
+        with np.errstate(all="ignore"):  # non-finite values raise an error at the start; later the search backtracks
+            return self._join([getattr(law, method)(*x) for law, x in self._laws(values)])
+
+    def _laws(self, values: Array) -> Iterator[tuple[Any, tuple[Array, ...]]]:
+        """The law of each resting length with these parameters, not validated, and the arguments of its rows."""
+        leaf_values = self.leaf_values(values)
+        which = [i for i, leaf in enumerate(self.leaves) if leaf.path == RESTING_LENGTH]
+        for length, _, arguments in self._points:
+            if length is not None:
+                for i in which:
+                    leaf_values[i] = length
+            yield tree.unflatten(self.law, leaf_values), arguments
+
+    @functools.cached_property
+    def _points(self) -> list[tuple[float | None, slice | npt.NDArray[np.intp], tuple[Array, ...]]]:
+        """Each resting length with its rows and their arguments."""
+        groups = [(length, as_slice(rows)) for length, rows in rows_by_length(self.law, self.data)]
+        return [(length, rows, tuple(x[rows] for x in self.arguments)) for length, rows in groups]
+
+    def _join(self, parts: Sequence[Any]) -> Array:
+        """Values by resting length in the order of the rows, shape (N, ...)."""
+        first = np.asarray(parts[0])
+        values = np.empty((len(self.data), *first.shape[1:]))
+        for (_, rows, _), part in zip(self._points, parts, strict=True):
+            values[rows] = part
+        return values
+
+    def residuals(self, modelled: Array) -> Array:
+        """Weighted residuals; that of a censored row is 0 unless the law violates its bound; shape (N,)."""
+        difference = modelled - self.target
+        return self.weights * np.where(self.censoring * difference < 0, 0.0, difference)
+
+    def active_rows(self, modelled: Array) -> npt.NDArray[np.bool_]:
+        """Mask of the uncensored rows and of the censored rows whose bound the law violates; shape (N,)."""
+        return np.asarray((self.censoring == 0) | (self.censoring * (modelled - self.target) > 0))
+
+    def jacobian(self, values: Array) -> Array:
+        """Derivatives of `predict` with respect to the free parameters, shape (N, P).
+
+        Exact if the law is traceable, otherwise by central differences.
+        """
+        return self.partial_jacobian(values, range(len(self.free)))
+
+    def partial_jacobian(self, values: Array, which: Sequence[int]) -> Array:
+        """The columns of `jacobian` of these free parameters, shape (N, len(which))."""
+        if _is_traceable(self.law):
+            leaves, method = [self.free[i] for i in which], self.fitted_quantity.method
+            return self._join([autodiff.parameter_derivatives(law, method, x, leaves) for law, x in self._laws(values)])
+        return self._finite_differences(values, which)
+
+    def _finite_differences(self, values: Array, which: Sequence[int]) -> Array:
+        low, high = self.bounds
+        columns = []
+        for i in which:
+            value = values[i]
+            step = np.cbrt(np.finfo(float).eps) * max(abs(value), abs(self.initial_values[i]), 1e-8)
+            up, down = values.copy(), values.copy()
+            up[i], down[i] = min(value + step, high[i]), max(value - step, low[i])
+            columns.append((self.predict(up) - self.predict(down)) / (up[i] - down[i]))
+        return np.column_stack(columns)
+
+
+def _is_traceable(thing: Any) -> bool:
+    """Whether a law and all models inside it are closed-form expressions."""
+    if isinstance(thing, tuple):
+        return all(_is_traceable(item) for item in thing)
+    kind: type[Any] = type(thing)
+    if not dataclasses.is_dataclass(kind):
+        return True
+    inside = (getattr(thing, field.name) for field in dataclasses.fields(thing))
+    return autodiff.is_traceable(kind) and all(_is_traceable(item) for item in inside)
+
+
+def make_problem(
+    law: Characteristic, data: Recording, censoring: Censoring, weights: Array, fixed: Collection[str]
+) -> FitProblem:
+    """The problem of fitting a law to data points; `fixed` names parameters that are not fitted.
+
+    Raises IdentificationError where there are too few rows, ParameterError for an unknown name.
+    """
+    quantity = fitted_quantity_of(law)
+    signs = censoring.signs(data["force"])
+    target = data[quantity.name]
+    if quantity == FORCE:
+        target = np.where(signs > 0, censoring.min_force, np.where(signs < 0, censoring.max_force, target))
+    elif quantity == PRESSURE:
+        signs = -signs  # a smaller force at the same pressure means that the stated force needs a higher pressure
+    leaves = tuple(tree.leaves(law))
+    _check_known(law, leaves, fixed)
+    free = tuple(i for i, leaf in enumerate(leaves) if leaf.declared.fitted and not _is_fixed(leaf, fixed))
+    measured = int(np.count_nonzero(signs == 0))
+    _check_row_count(law, data, len(free), measured)
+    return FitProblem(law, quantity, data, target, signs, weights, leaves, free)
+
+
+def _is_fixed(leaf: Leaf, fixed: Collection[str]) -> bool:
+    return leaf.path in fixed or leaf.path.partition("[")[0] in fixed
+
+
+def _check_known(law: Characteristic, leaves: Sequence[Leaf], fixed: Collection[str]) -> None:
+    known = list(dict.fromkeys(name for leaf in leaves for name in (leaf.path.partition("[")[0], leaf.path)))
+    for name in fixed:
+        if name not in known:
+            fields = list(dict.fromkeys(leaf.path.partition("[")[0] for leaf in leaves))
+            raise ParameterError(
+                f"{type(law).__name__} has no parameter '{name}' to be fixed; its parameters are {', '.join(fields)}."
+                f"{suggestion(name, known)}"
+            )
+
+
+def _check_row_count(law: Characteristic, data: Recording, free: int, measured: int) -> None:
+    name = f"{data.origin}: {type(law).__name__}"
+    if free == 0:
+        raise IdentificationError(f"{name} has no free parameter. Fix fewer parameters.")
+    censored = len(data) - measured
+    if len(data) and not measured:
+        raise IdentificationError(
+            f"{name}: all {censored} rows are censored (at zero force, or at the limit of the force range), so there "
+            "is no measured value. Give rows with a positive force.",
+            hint=Hint("To treat them as measured values", "censoring", UNCENSORED, constant="UNCENSORED"),
+        )
+    if measured < free:
+        also = f" ({censored} further rows are censored and give bounds only)" if censored else ""
+        raise IdentificationError(
+            f"{name} has {free} free parameters, but only {measured} rows are measured values{also}. Measure more "
+            "points, or choose a law with fewer parameters or a lower degree.",
+            hint=Hint("To fix parameters", "fixed"),
+            cause=f"{free} parameters, but {measured} measured values",
+        )

@@ -1,0 +1,123 @@
+"""Profile-likelihood confidence intervals of a static fit."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from ...core.errors import IdentificationError
+from .loss import LeastSquares
+from .problem import FitProblem
+from .result import Fit
+from .solver import is_linear, solve
+
+_HIGH_CORRELATION = 0.99
+"""Absolute correlation above which the standard error of a parameter is not trusted (chosen)."""
+_HIGH_RELATIVE_ERROR = 0.5
+"""Standard error relative to the value above which it is not trusted (chosen)."""
+_MAX_DOUBLINGS = 12
+"""Maximum number of outward steps, each twice the previous one: up to 4096 standard errors."""
+_BISECTIONS = 18
+
+
+@dataclasses.dataclass(frozen=True)
+class ProfileLikelihood:
+    """Confidence interval of a parameter; a limit that the data do not determine is infinite."""
+
+    name: str
+    unit: str
+    value: float
+    low: float
+    high: float
+    level: float
+
+    def __str__(self) -> str:
+        ends = [f"{end:.4g}" if np.isfinite(end) else "unbounded" for end in (self.low, self.high)]
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        interval = f"{100 * self.level:.0f} % confidence interval {ends[0]} to {ends[1]}"
+        return f"{self.name} {self.value:.4g}{unit}, {interval}"
+
+
+def weakly_determined(fit: Fit) -> tuple[str, ...]:
+    """Names of the parameters whose standard error is not reliable.
+
+    These are highly correlated with another parameter or, in a nonlinear fit, have a large relative standard error.
+    """
+    free = np.array([not e.on_bound for e in fit.estimates], dtype=bool)
+    design, correlation = fit.parameter_covariance.design_correlations, np.zeros(free.size)
+    correlation[free] = np.abs(design - np.eye(len(design))).max(axis=1, initial=0.0)
+    nonlinear = not is_linear(fit.problem)  # in a linear fit a standard error is exact, however large
+    return tuple(
+        e.name
+        for e, r in zip(fit.estimates, correlation, strict=True)
+        if not e.on_bound and (r > _HIGH_CORRELATION or (nonlinear and e.stderr > _HIGH_RELATIVE_ERROR * abs(e.value)))
+    )
+
+
+def profile(fit: Fit, name: str, *, level: float = 0.95) -> ProfileLikelihood:
+    """The profile-likelihood interval of one parameter (Bates and Watts (1988), Nonlinear Regression, 6.1).
+
+    It holds all values for which the sum of squares, minimised over the other parameters, stays below
+    S (1 + F/(N - P)), where F is the quantile of Fisher's distribution with 1 and N - P degrees of freedom; P counts
+    the parameters that are not on a bound. Where rows are correlated, F is multiplied by the squared ratio of the half
+    width of the interval by standard errors (`fit.error_basis`) to that for independent rows. Raises
+    IdentificationError for a robust fit, a parameter on its bound, or without degrees of freedom.
+    """
+    if not isinstance(fit.loss, LeastSquares):
+        raise IdentificationError(
+            "a likelihood profile needs a fit by least squares, because a robust loss is no likelihood of the noise. "
+            "Fit with LeastSquares()."
+        )
+    estimate = fit[name]
+    degrees_of_freedom = fit.degrees_of_freedom
+    if degrees_of_freedom <= 0 or not np.isfinite(estimate.stderr):
+        raise IdentificationError(
+            f"{name} has no likelihood profile, because it is on its bound or there are no more uncensored rows than "
+            "parameters."
+        )
+    index = fit.names.index(name)
+    minimum = _sum_of_squares(fit.problem, fit.values)
+    covariance, free = fit.parameter_covariance, sum(not e.on_bound for e in fit.estimates[:index])
+    independent = covariance.sigma * float(np.linalg.norm(covariance.basis[free]))
+    half = float(covariance.parameter_half_widths(level)[free])
+    threshold = minimum * (1 + (half / independent) ** 2 / degrees_of_freedom)
+    low, high = (_find_limit(fit, index, sign * estimate.stderr, threshold) for sign in (-1, 1))
+    return ProfileLikelihood(name, estimate.unit, estimate.value, low, high, level)
+
+
+def _sum_of_squares(problem: FitProblem, values: np.ndarray) -> float:
+    return float(np.sum(problem.residuals(problem.predict(values)) ** 2))
+
+
+def _find_limit(fit: Fit, index: int, step: float, threshold: float) -> float:
+    """The value at which the profile exceeds the threshold on one side.
+
+    Infinite where it never does, or where a bound is reached first.
+    """
+    problem, estimate = fit.problem, fit.estimates[index]
+    leaf = problem.free[index]
+    low, high = problem.leaves[leaf].declared.bounds
+    others = tuple(i for i in problem.free if i != leaf)
+    inside, outside = estimate.value, estimate.value
+    for doubling in range(_MAX_DOUBLINGS):
+        inside, outside = outside, float(np.clip(estimate.value + step * 2.0**doubling, low, high))
+        if inside == outside:  # the bound is reached below the threshold
+            return -np.inf if step < 0 else np.inf
+        if _constrained_sum_of_squares(problem, others, leaf, outside) > threshold:
+            break
+    else:
+        return -np.inf if step < 0 else np.inf
+    for _ in range(_BISECTIONS):
+        middle = (inside + outside) / 2
+        above = _constrained_sum_of_squares(problem, others, leaf, middle) > threshold
+        inside, outside = (inside, middle) if above else (middle, outside)
+    return (inside + outside) / 2
+
+
+def _constrained_sum_of_squares(problem: FitProblem, others: tuple[int, ...], leaf: int, value: float) -> float:
+    """The minimum sum of squares with one leaf fixed at a value."""
+    leaves = list(problem.leaves)
+    leaves[leaf] = dataclasses.replace(leaves[leaf], value=value)
+    constrained = dataclasses.replace(problem, leaves=tuple(leaves), free=others)
+    return _sum_of_squares(constrained, solve(constrained, LeastSquares()).values if others else np.zeros(0))

@@ -1,0 +1,278 @@
+"""Fit: estimates, standard errors and residual statistics of a static fit."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core.arrays import Array
+from ...core.display import contraction_text, in_display_unit, quantity_text
+from ...core.errors import ParameterError, suggestion
+from ...core.listed_names import continues_list
+from ...core.notebook import Card, NotebookDisplay
+from ...physics.muscle.characteristic.base import Characteristic
+from ...physics.muscle.characteristic.validity_range import ValidityRange
+from ...recording import Recording
+from .correlation_index import CorrelationIndex
+from .data_checks.scatter import Scatter
+from .loss import Loss
+from .parameter_covariance import ParameterCovariance
+from .plot import plot_fit
+from .problem import CONTRACTION, FORCE, FitProblem, FittedQuantity, evaluate
+from .row_errors import WorstPoint
+from .specimen_effects import SpecimenEffects
+
+
+@dataclasses.dataclass(frozen=True)
+class Estimate:
+    """A fitted parameter with its standard error, NaN on a bound or without degrees of freedom; SI."""
+
+    name: str
+    label: str
+    value: float
+    stderr: float
+    unit: str
+    meaning: str
+    on_bound: bool
+
+    @property
+    def display_unit(self) -> str:
+        """The unit as text, empty for a dimensionless parameter."""
+        return "" if self.unit == "1" else self.unit
+
+    def format_interval(self) -> str:
+        """Two standard errors as text, or why there are none."""
+        if self.on_bound:
+            return "on bound"
+        return f"{2 * self.stderr:.3g}" if np.isfinite(self.stderr) else "unknown"
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Fit(NotebookDisplay):
+    """A fitted characteristic with its data and statistics; `print` it, or `.plot()` it.
+
+    Residuals are in the fitted quantity. `rmse` and `correlation_index` are over the uncensored rows, `max_error` over
+    all rows; a censored row has a residual only where the law violates its bound. `sigma` is over the rows that
+    determine the parameters: uncensored rows where the law is not slack, and violated bounds.
+    """
+
+    model: Characteristic
+    estimates: tuple[Estimate, ...]
+    correlations: Array
+    """Correlation matrix of the estimates, in their order, shape (P, P)."""
+    parameter_covariance: ParameterCovariance
+    """How the covariance of the estimates was computed; for a PooledLengthLaw that of its population law alone."""
+    rank: int
+    condition: float
+    """Condition number of the design matrix at the solution, with columns of unit norm."""
+    sigma: float
+    """Standard deviation of the residuals with N - P degrees of freedom [SI]."""
+    rmse: float
+    """Root mean square error of the measured rows [SI]; violations of the bounds of censored rows are added."""
+    max_error: WorstPoint
+    """The greatest error of all rows; that of a censored row is the violation of its bound."""
+    correlation_index: CorrelationIndex | None
+    """IK and R^2; None where the measured values do not vary."""
+    rows_censored: int
+    rows_dropped: int
+    recording: Recording
+    """The rows of the fit: pressure, contraction, force."""
+    fitted_quantity: FittedQuantity
+    censoring: npt.NDArray[np.float64]
+    """By row: 0 uncensored, 1 the model may lie below the bound, -1 the model may lie above it."""
+    problem: FitProblem
+    """The fitted problem, for refits: data, targets, weights and free parameters."""
+    loss: Loss
+    notes: tuple[str, ...] = ()
+    scatter: Scatter | None = None
+    """Noise and repeatability of the measured force; None for laws that give contraction or pressure."""
+    effects: SpecimenEffects | None = None
+    """The effects of the specimens on a PooledLengthLaw. Estimates and problem are those of its population law."""
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Number of the uncensored rows minus that of the parameters that are not on a bound; negative where fewer."""
+        return int(np.count_nonzero(self.censoring == 0)) - sum(not estimate.on_bound for estimate in self.estimates)
+
+    def __getitem__(self, name: str) -> Estimate:
+        """An estimate by the path of its parameter, for example `geometry.radius`. Raises ParameterError."""
+        for estimate in self.estimates:
+            if estimate.name == name:
+                return estimate
+        raise ParameterError(
+            f"the fit has no parameter '{name}'; it has {', '.join(self.names)}.{suggestion(name, self.names)}"
+        )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Paths of the fitted parameters."""
+        return tuple(estimate.name for estimate in self.estimates)
+
+    @property
+    def values(self) -> Array:
+        """Estimated values [SI], shape (P,)."""
+        return np.array([estimate.value for estimate in self.estimates])
+
+    @property
+    def standard_errors(self) -> Array:
+        """Standard errors of the estimates [SI], shape (P,); NaN for a parameter on a bound.
+
+        With correlated errors they contain Student's factor, so that 1.96 of them are the half width of a 95 % interval
+        (see `ParameterCovariance`).
+        """
+        return np.array([estimate.stderr for estimate in self.estimates])
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance matrix of the estimates, in their order, shape (P, P); NaN for a parameter on a bound."""
+        return np.asarray(self.correlations * np.outer(self.standard_errors, self.standard_errors))
+
+    @property
+    def error_basis(self) -> str:
+        """What the standard errors and bands were estimated from, and what they do not contain, as a phrase."""
+        if self.effects is not None:
+            return (
+                "from independent rows and the scatter of the specimens; the correlation within runs is not contained"
+            )
+        bound = [estimate.name for estimate in self.estimates if estimate.on_bound]
+        known = f"; {', '.join(bound)} on the bound counts as known" if bound else ""
+        return self.parameter_covariance.describe() + known
+
+    @property
+    def rows_used(self) -> int:
+        """Number of rows of the fit, including the censored ones."""
+        return len(self.recording)
+
+    @property
+    def r2(self) -> float | None:
+        """Coefficient of determination over the uncensored rows; None where they do not vary."""
+        return None if self.correlation_index is None else self.correlation_index.r_squared
+
+    @property
+    def ik(self) -> float | None:
+        """Correlation index sqrt(R^2), or None where it is undefined."""
+        return None if self.correlation_index is None else self.correlation_index.value
+
+    @property
+    def modelled(self) -> Array:
+        """The fitted quantity of the model at the rows of the fit, clamped as the model is [SI]; shape (N,)."""
+        quantity = self.fitted_quantity
+        return evaluate(self.model, quantity.name, quantity.arguments, self.recording)
+
+    @property
+    def residuals(self) -> Array:
+        """Model - measured at the rows of the fit, clamped as the model is [SI]; shape (N,)."""
+        return self.modelled - self.recording[self.fitted_quantity.name]
+
+    @property
+    def data_ranges(self) -> dict[str, tuple[float, float]]:
+        """Minimum and maximum of pressure, contraction and force in the data; outside them the fit is extrapolated."""
+        columns = ((name, self.recording[name]) for name in ("pressure", "contraction", "force"))
+        return {name: (float(values.min()), float(values.max())) for name, values in columns}
+
+    @property
+    def validity_range(self) -> ValidityRange:
+        """The range of the data in pressure and contraction. Raises ParameterError where one of them did not vary."""
+        ranges = self.data_ranges
+        return ValidityRange(*ranges["pressure"], *ranges["contraction"])
+
+    def plot(self, *, ax: Any = None) -> Any:
+        """Plot the modelled against the measured values, and the residuals.
+
+        `ax` is an Axes for the values, or a sequence of two, also for the residuals, and is returned; without it a new
+        figure is returned. Raises ParameterError for another `ax`.
+        """
+        quantity = self.fitted_quantity.name
+        return plot_fit(quantity, self.recording[quantity], self.modelled, self.censoring != 0, self._title, ax=ax)
+
+    @property
+    def _title(self) -> str:
+        return f"{type(self.model).__name__} fitted to {self.recording.origin}"
+
+    def __str__(self) -> str:
+        notes = [f"note: {note}" for note in self.notes]
+        statistics = (f"{name:<18}{text}" for name, text in self.summary())
+        return "\n".join([self._title, "", *estimate_table(self.estimates), "", *statistics, *notes])
+
+    def summary(self) -> list[tuple[str, str]]:
+        """The goodness of fit as pairs of a name and a text with units."""
+        worst = self.max_error
+        point = f"at {_point_text(worst.pressure, worst.contraction, worst.force)}"
+        undefined = "undefined, because the measured values do not vary"
+        index = undefined if self.correlation_index is None else str(self.correlation_index)
+        r2 = undefined if self.r2 is None else f"{self.r2:.6f}"
+        ranges = self.data_ranges
+        (p0, p1), (f0, f1) = ranges["pressure"], ranges["force"]
+        contractions = " to ".join(contraction_text(c) for c in ranges["contraction"])
+        return [
+            ("rows", f"{self.rows_used} used, {self.rows_censored} of them censored; {self.rows_dropped} dropped"),
+            ("rms error", self.format_residual(self.rmse) + self._limited_text()),
+            *([("scatter of data", str(self.scatter))] if self.scatter and str(self.scatter) else []),
+            ("maximum error", f"{self.format_residual(worst.error)} {point}"),
+            ("residual std", self.format_residual(self.sigma)),
+            ("standard errors", self.error_basis),
+            ("R2", r2),
+            ("correlation index", index),
+            ("rank, condition", f"{self.rank} of {len(self.estimates)}, {self.condition:.3g}"),
+            ("data range", f"{_range_text(p0, p1, 'Pa', 'kPa')}, {contractions}, {_range_text(f0, f1, 'N', 'N')}"),
+        ]
+
+    def _limited_text(self) -> str:
+        """The rms error of a robust fit with its residuals limited, as in a comparison; empty if none is limited."""
+        residuals = self.residuals[self.censoring == 0]
+        limit = self.loss.limit(residuals)
+        count = int(np.count_nonzero(np.abs(residuals) > limit))
+        if not count:
+            return ""
+        rmse = float(np.sqrt(np.mean(np.clip(residuals, -limit, limit) ** 2)))
+        rows = "1 row" if count == 1 else f"{count} rows"
+        return f"; {self.format_residual(rmse)} with {rows} limited to {self.format_residual(limit)}"
+
+    def format_residual(self, residual: float) -> str:
+        """A residual [SI] as text in the usual unit of the fitted quantity."""
+        if self.fitted_quantity == FORCE:
+            return quantity_text(residual, "N", "N")
+        if self.fitted_quantity == CONTRACTION:
+            return contraction_text(residual, 4)
+        return quantity_text(residual, "Pa", "kPa")
+
+    def _card(self) -> Card:
+        lines = [f"{name}: {text}" for name, text in self.summary()]
+        return Card(
+            self._title, estimate_rows(self.estimates), self.plot, ["; ".join(lines[:4]), *lines[4:], *self.notes]
+        )
+
+
+def _point_text(pressure: float, contraction: float, force: float) -> str:
+    texts = (quantity_text(pressure, "Pa", "kPa"), contraction_text(contraction), quantity_text(force, "N", "N"))
+    return ", ".join(texts)
+
+
+def _range_text(low: float, high: float, si_unit: str, default: str) -> str:
+    """A range as text with its unit behind the upper limit."""
+    return f"{quantity_text(low, si_unit, default).partition(' ')[0]} to {quantity_text(high, si_unit, default)}"
+
+
+def estimate_rows(estimates: Sequence[Estimate]) -> list[tuple[str, ...]]:
+    """The rows of a table of estimates in display units, with its header; SE is the standard error.
+
+    The values of a list, coefficients[0], coefficients[1], ..., state their meaning once.
+    """
+    rows: list[tuple[str, ...]] = [("parameter", "", "value", "2 SE", "unit", "meaning")]
+    for e, continued in zip(estimates, continues_list([e.name for e in estimates]), strict=True):
+        value, unit = in_display_unit(e.value, e.unit)
+        shown = dataclasses.replace(e, value=value, stderr=in_display_unit(e.stderr, e.unit)[0], unit=unit)
+        meaning = "" if continued else e.meaning
+        rows.append((e.name, e.label, f"{value:.4g}", shown.format_interval(), shown.display_unit, meaning))
+    return rows
+
+
+def estimate_table(estimates: Sequence[Estimate]) -> list[str]:
+    """The lines of a text table of estimates; SE is the standard error."""
+    rows = estimate_rows(estimates)
+    widths = [max(len(row[i]) for row in rows) for i in range(5)]
+    return ["  ".join([*(c.ljust(w) for c, w in zip(row, widths, strict=False)), row[5]]).rstrip() for row in rows]

@@ -1,0 +1,122 @@
+"""Slack rows: measured points without force, where a law must not pull, and the region that they imply.
+
+Force rises with pressure and falls with contraction. A muscle that is slack at one point is therefore slack at every
+lower pressure and greater contraction, unless a measured force at one of these contradicts it: such a row is a
+transient of the rig, friction or an error of the sensor.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core.arrays import Array
+from ...core.display import contraction_text, quantity_text
+
+Rows = npt.NDArray[np.bool_]
+MIN_PULL = 0.02
+"""Force at a slack row, as a fraction of the greatest measured force, below which a law does not count as pulling
+(chosen)."""
+PULL_RATIO = 3.0
+"""The same in root mean square errors of the law on the measured rows (chosen: friction and noise move the limit of
+slackness by as much as they change the force)."""
+_GRID = (21, 11)
+"""Points of the slack region of a specimen in contraction and pressure (chosen)."""
+
+
+class Slackness(NamedTuple):
+    """Steps of one specimen: greatest slack pressure up to a contraction, least pulling pressure from one on."""
+
+    slack_contraction: Array
+    slack_pressure: Array
+    pull_contraction: Array
+    pull_pressure: Array
+
+    @classmethod
+    def of(cls, pressure: Array, contraction: Array, slack: Rows, pulls: Rows) -> Slackness:
+        """The steps of rows (N,), of which two masks are slack and pull."""
+        order, last = np.argsort(contraction[slack]), np.argsort(-contraction[pulls])
+        return cls(
+            contraction[slack][order], np.maximum.accumulate(pressure[slack][order]),
+            -contraction[pulls][last], np.minimum.accumulate(pressure[pulls][last]),
+        )  # fmt: skip
+
+    def slack_limit(self, contraction: Array) -> Array:
+        """Pressure [Pa] up to which a slack row shows the muscle to be slack; -inf where none does."""
+        found = np.searchsorted(self.slack_contraction, contraction, side="right")
+        return np.asarray(np.append(-np.inf, self.slack_pressure)[found])
+
+    def pull_limit(self, contraction: Array) -> Array:
+        """Pressure [Pa] from which a measured force shows the muscle to pull; inf where none does."""
+        found = np.searchsorted(self.pull_contraction, -contraction, side="right")
+        return np.asarray(np.append(np.inf, self.pull_pressure)[found])
+
+    def region(
+        self, lowest_pressure: float, highest_contraction: float, share: float = 1.0, grid: tuple[int, int] = _GRID
+    ) -> tuple[Array, Array]:
+        """Points (M,) of the slack region, pressure [Pa] and contraction, down to a pressure and up to a contraction.
+
+        share  of the slack range of pressure at each contraction
+        grid   numbers of points in contraction and in pressure
+
+        None without slack rows.
+        """
+        if not self.slack_contraction.size:
+            return np.zeros(0), np.zeros(0)
+        contraction = np.linspace(self.slack_contraction[0], highest_contraction, grid[0])
+        limit = np.minimum(self.slack_limit(contraction), self.pull_limit(contraction))
+        inside = limit > lowest_pressure
+        steps = np.linspace(0.0, share, grid[1])
+        pressure = lowest_pressure + (limit[inside] - lowest_pressure)[:, None] * steps
+        return pressure.ravel(), np.repeat(contraction[inside], grid[1])
+
+
+@dataclasses.dataclass(frozen=True)
+class SlackPull:
+    """The force of a law at the slack rows of measurements; SI."""
+
+    rows: int
+    """Number of slack rows."""
+    pulling: int
+    """Number of slack rows at which the law pulls more than its limit, and that no measured force contradicts."""
+    limit: float
+    """Force [N] above which a law counts as pulling."""
+    greatest: float
+    """Greatest force [N] of the law at these rows; 0 without slack rows."""
+    pressure: float = 0.0
+    contraction: float = 0.0
+    """The point of the greatest force."""
+
+    def __str__(self) -> str:
+        at = f"{quantity_text(self.pressure, 'Pa', 'kPa')} and {contraction_text(self.contraction)}"
+        return f"it pulls at {self.pulling} of {self.rows} slack rows, up to {self.greatest:.3g} N at {at}"
+
+
+def pull_limit(rmse: float, greatest_force: float) -> float:
+    """Force [N] at a slack row above which a law with this error on the measured rows counts as pulling."""
+    return max(PULL_RATIO * rmse, MIN_PULL * greatest_force)
+
+
+def slack_pull(
+    pressure: Array, contraction: Array, force: Array, modelled: Array, limit: float, specimen: Array | None = None
+) -> SlackPull:
+    """The forces `modelled` (N,) [N] of a law at the rows of measured force <= 0, of which `limit` [N] are permitted.
+
+    specimen  labels (N,) of the specimens, whose slack regions are separate; by default one
+    """
+    slack = force <= 0
+    judged = np.zeros(force.size, dtype=bool)
+    for name in np.unique(specimen) if specimen is not None else (None,):
+        own = np.ones(force.size, dtype=bool) if specimen is None else np.asarray(specimen == name)
+        p, c, f = pressure[own], contraction[own], force[own]
+        judged[own] = (f <= 0) & (p < Slackness.of(p, c, f <= 0, f > limit).pull_limit(c))
+    if not judged.any():
+        return SlackPull(int(np.count_nonzero(slack)), 0, limit, 0.0)
+    worst = int(np.argmax(np.where(judged, modelled, -np.inf)))
+    pulling = int(np.count_nonzero(judged & (modelled > limit)))
+    greatest = max(float(modelled[worst]), 0.0)
+    point = float(pressure[worst]), float(contraction[worst])
+    return SlackPull(int(np.count_nonzero(slack)), pulling, limit, greatest, *point)

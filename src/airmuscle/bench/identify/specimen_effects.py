@@ -1,0 +1,143 @@
+"""Specimen effects (random effects) of a law of muscles of one type, by restricted maximum likelihood.
+
+The population parameters are those of least squares over all rows (working independence: Liang and Zeger, Biometrika
+73:13 (1986)). The effects of the specimens are polynomials in scaled contraction and pressure, whose coefficients have
+a normal prior of mean 0 and one variance. Its ratio to the residual variance maximises the restricted likelihood
+(Patterson and Thompson, Biometrika 58:545 (1971)); the effects are then the best linear unbiased predictions from the
+residuals of the population law (Robinson, Statistical Science 6:15 (1991)).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core.arrays import Array, as_slice
+
+RATIO_RANGE = (-8.0, 10.0)
+"""Decimal logarithms of the ratios of the residual variance to that of the effects that are searched (chosen)."""
+_STEPS = (0.25, 0.01)
+"""Steps of the search in decimal logarithms, one within the other (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SpecimenEffects:
+    """The effects of S specimens, with K coefficients each, and their standard errors; all SI."""
+
+    specimens: tuple[str, ...]
+    coefficients: Array
+    """Predicted coefficients, shape (S, K)."""
+    deviation: float
+    """Standard deviation of a coefficient between specimens."""
+    sigma: float
+    """Standard deviation of the residuals within the specimens."""
+    covariance: Array
+    """Covariance of the errors of the P population parameters and, after them, of the S K coefficients."""
+    degrees_of_freedom: float
+    """Effective number of parameters of the effects: the trace of their smoother, from 0 to S K (Hodges and Sargent,
+    Biometrika 88:367 (2001))."""
+
+    @property
+    def standard_errors(self) -> Array:
+        """Standard errors of the predicted coefficients, shape (S, K)."""
+        size = self.coefficients.size
+        return np.asarray(np.sqrt(np.diag(self.covariance)[-size:]).reshape(self.coefficients.shape))
+
+    @property
+    def population_covariance(self) -> Array:
+        """Covariance of the population parameters, with the scatter of the specimens, shape (P, P)."""
+        size = len(self.covariance) - self.coefficients.size
+        return self.covariance[:size, :size]
+
+
+class Sums(NamedTuple):
+    """Sums of products of the weighted rows: design matrix X (N, P) of the population, Z (N, S K) of the effects, and
+    residuals r (N,) of the population law."""
+
+    xx: Array
+    xz: Array
+    zz: Array
+    xr: Array
+    zr: Array
+    rr: float
+    rows: float
+
+    def scaled(self, share: float) -> Sums:
+        """The sums for rows that count only as this share of independent ones."""
+        xx, xz, zz, xr, zr = (share * each for each in (self.xx, self.xz, self.zz, self.xr, self.zr))
+        return Sums(xx, xz, zz, xr, zr, share * self.rr, share * self.rows)
+
+    @classmethod
+    def of(
+        cls,
+        matrix: Array,
+        basis: Array,
+        residuals: Array,
+        member: npt.NDArray[np.intp],
+        count: int,
+        rows: float | None = None,
+    ) -> Sums:
+        """The sums for a basis (N, K); the rows of each specimen, `member` (N,), have their own coefficients.
+
+        `rows` is the number of rows that count, by default all; the others are zero.
+        """
+        size = basis.shape[1]
+        xz, zz, zr = np.zeros((matrix.shape[1], count * size)), np.zeros((count * size,) * 2), np.zeros(count * size)
+        for i in range(count):
+            part, own = as_slice(np.flatnonzero(member == i)), slice(i * size, (i + 1) * size)
+            xz[:, own], zz[own, own] = matrix[part].T @ basis[part], basis[part].T @ basis[part]
+            zr[own] = basis[part].T @ residuals[part]
+        return cls(
+            matrix.T @ matrix, xz, zz, matrix.T @ residuals, zr, float(residuals @ residuals),
+            len(residuals) if rows is None else rows,
+        )  # fmt: skip
+
+
+def predict_effects(sums: Sums, specimens: tuple[str, ...]) -> SpecimenEffects:
+    """The effects, their variance and their standard errors."""
+    scale = np.sqrt(np.diag(sums.xx))
+    inverse = np.linalg.inv(sums.xx / np.outer(scale, scale)) / np.outer(scale, scale)
+    projected = inverse @ sums.xz  # effects of the rows that the population law takes up
+    within = sums.zz - sums.xz.T @ projected
+    within = (within + within.T) / 2
+    size, freedom = len(within), sums.rows - len(sums.xx)
+    taken_up = inverse @ sums.xr  # not 0 where bounds keep the population law from the least squares of these rows
+    gradient, squares = sums.zr - sums.xz.T @ taken_up, sums.rr - float(sums.xr @ taken_up)
+    ratio, sigma = _variance_ratio(within, gradient, squares, freedom)
+    shrunk = np.linalg.inv(sums.zz + ratio * np.eye(size))
+    smoother = shrunk @ within
+    by_effects = np.vstack([projected, smoother - np.eye(size)])
+    by_residuals = np.zeros((len(sums.xx) + size,) * 2)
+    by_residuals[: len(sums.xx), : len(sums.xx)] = inverse
+    by_residuals[len(sums.xx) :, len(sums.xx) :] = smoother @ shrunk
+    covariance = sigma**2 * (by_residuals + by_effects @ by_effects.T / ratio)
+    coefficients = (shrunk @ sums.zr).reshape(len(specimens), -1)
+    deviation = sigma / float(np.sqrt(ratio))
+    return SpecimenEffects(specimens, coefficients, deviation, sigma, covariance, float(np.trace(smoother)))
+
+
+def _variance_ratio(within: Array, gradient: Array, squares: float, freedom: float) -> tuple[float, float]:
+    """The ratio of variances with the largest restricted likelihood, and the standard deviation of the residuals.
+
+    `within` and `gradient` are the normal matrix and the right-hand side of the effects, orthogonal to the population.
+    """
+    eigenvalues, vectors = np.linalg.eigh(within)
+    eigenvalues = np.maximum(eigenvalues, 0.0)[:, None]
+    components = ((vectors.T @ gradient) ** 2)[:, None]
+
+    def sum_of_squares(ratio: Array) -> Array:
+        return np.asarray(np.maximum(squares - np.sum(components / (eigenvalues + ratio), axis=0), 1e-300))
+
+    def likelihood(ratio: Array) -> Array:
+        determinant = np.sum(np.log1p(eigenvalues / ratio), axis=0)
+        return np.asarray(-0.5 * determinant - 0.5 * freedom * np.log(sum_of_squares(ratio)))
+
+    exponents = np.arange(RATIO_RANGE[0], RATIO_RANGE[1] + _STEPS[0], _STEPS[0])
+    best = float(exponents[int(np.argmax(likelihood(10.0**exponents)))])
+    fine = np.clip(np.arange(best - _STEPS[0], best + _STEPS[0], _STEPS[1]), *RATIO_RANGE)
+    ratio = 10.0 ** fine[int(np.argmax(likelihood(10.0**fine)))]
+    sigma = float(np.sqrt(sum_of_squares(np.array([ratio]))[0] / max(freedom, 1)))
+    return float(ratio), sigma

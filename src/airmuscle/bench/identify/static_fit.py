@@ -1,0 +1,193 @@
+"""Fit of a static characteristic to measured points: `fit`."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Collection, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core import tree
+from ...core.errors import IdentificationError
+from ...physics.muscle.characteristic import PooledLengthLaw
+from ...physics.muscle.characteristic.base import Characteristic
+from ...recording import Recording
+from .branch_residuals import branch_distance, branch_notes
+from .censoring import Censoring
+from .correlation_index import correlation_index
+from .fit_arguments import check_arguments
+from .fit_notes import collect_notes, loss_scale_notes, misfit_notes, weighting_notes
+from .fit_points import FitPoints
+from .gauss_newton import gauss_newton
+from .loss import LeastSquares, Loss
+from .pooling import check_poolable, pool, refit_pooled
+from .problem import FORCE, FitProblem, evaluate
+from .result import Estimate, Fit
+from .row_errors import WorstPoint, rms_of_rows, row_errors
+from .slack_bounds import solve_bounded
+from .solver import LeastSquaresSolution, is_linear
+from .statistics import FitStatistics, check_determined, check_determined_by_levels, compute_statistics
+from .variable_projection import find_initial_values
+
+
+def fit(
+    characteristic: Characteristic,
+    recording: Recording | Sequence[Recording],
+    *,
+    loss: Loss = LeastSquares(),
+    censoring: Censoring | None = None,
+    sigma: npt.ArrayLike | None = None,
+    fixed: Collection[str] = (),
+) -> Fit:
+    """Estimate the parameters of a characteristic from measured points.
+
+    characteristic  structure and initial values; parameters declared as not fitted keep their value
+    recording       one recording or several, with the columns pressure [Pa], contraction [1] and force [N]
+    loss            LeastSquares(), Huber(scale) or SoftL1(scale), the scale in the unit of the fitted quantity
+    censoring       the range of force within which rows are measured values. By default rows at zero force, at the
+                    clamp of the law, or at the limit of the force sensor are censored: they contribute only where the
+                    law violates their bound. `UNCENSORED` treats all rows as measured values
+    sigma           standard deviations of the rows, of which only the ratios matter. By default the rows of different
+                    test rigs are weighted by the standard deviations of their sensors; `sigma=1.0` weights all rows
+                    equally
+    fixed           names of further parameters that keep their value
+
+    Residuals are taken in the quantity that the law gives (force, contraction or pressure), and the parameters stay
+    within their declared bounds. Raises IdentificationError where the data do not determine the parameters, and names
+    these.
+    """
+    check_arguments(characteristic, recording)
+    points = FitPoints.from_recordings(recording)
+    return fit_to_points(characteristic, points, loss=loss, censoring=censoring, sigma=sigma, fixed=fixed)
+
+
+def fit_to_points(
+    characteristic: Characteristic,
+    points: FitPoints,
+    *,
+    loss: Loss = LeastSquares(),
+    censoring: Censoring | None = None,
+    sigma: npt.ArrayLike | None = None,
+    fixed: Collection[str] = (),
+) -> Fit:
+    """As `fit`, for points whose sensors and runs are estimated once for several laws."""
+    if not isinstance(characteristic, PooledLengthLaw):
+        result = _fit_law(characteristic, points, loss, censoring, sigma, fixed)
+    else:
+        check_poolable(characteristic, points)
+        result = pool(
+            characteristic, _fit_law(characteristic.population, points, loss, censoring, sigma, fixed), points
+        )
+    notes = (*points.checks.notes, *map(str, points.repeated), *result.notes, *misfit_notes(result, points))
+    return dataclasses.replace(result, notes=notes)
+
+
+def _fit_law(
+    characteristic: Characteristic, points: FitPoints, loss: Loss, censoring: Censoring | None,
+    sigma: npt.ArrayLike | None, fixed: Collection[str],
+) -> Fit:  # fmt: skip
+    problem = points.problem(characteristic, censoring=censoring, sigma=sigma, fixed=fixed)
+    solution = solve_bounded(problem, points, loss)
+    statistics = compute_statistics(problem, solution, loss, points.runs)
+    check_determined_by_levels(problem, solution, points.at_levels)
+    by_recording = None if sigma is not None else points.deviations(problem.fitted_quantity.name)
+    notes = (*collect_notes(problem, statistics, loss, points.dropped), *weighting_notes(by_recording, problem))
+    notes += loss_scale_notes(problem, solution, loss)
+    distance = _branch_distance(points, problem, solution)
+    notes += tuple(
+        branch_notes(points.recordings, distance, problem.fitted_quantity.name, delayed=points.checks.delay is not None)
+    )
+    result = _build_result(problem, solution, statistics, loss, points.dropped, notes)
+    if problem.fitted_quantity != FORCE:
+        return result
+    return dataclasses.replace(result, scatter=dataclasses.replace(points.checks.scatter, branches=distance))
+
+
+def refit(
+    characteristic: Characteristic, points: FitPoints, *, loss: Loss = LeastSquares(), fixed: Collection[str] = ()
+) -> Characteristic:
+    """The law that `fit` finds for these points if its search starts at the parameters of `characteristic`.
+
+    Other initial values are tried only where the search does not converge, and nothing but the rank is computed of the
+    solution. Raises IdentificationError where the points do not determine the parameters.
+    """
+    if isinstance(characteristic, PooledLengthLaw):
+        return refit_pooled(characteristic, refit(characteristic.population, points, loss=loss, fixed=fixed), points)
+    problem = points.problem(characteristic, fixed=fixed)
+    near = None if is_linear(problem) or loss != LeastSquares() else gauss_newton(problem, problem.initial_values)
+    try:
+        solution = (
+            solve_bounded(problem, points, loss, find_initial_values(problem, multi_start=False))
+            if near is None
+            else LeastSquaresSolution(*near)
+        )
+    except IdentificationError:
+        solution = solve_bounded(problem, points, loss)
+    check_determined(problem, solution)
+    model: Characteristic = tree.with_parameters(problem.law, problem.leaf_values(solution.values))
+    return model
+
+
+def _build_result(
+    problem: FitProblem,
+    solution: LeastSquaresSolution,
+    statistics: FitStatistics,
+    loss: Loss,
+    dropped: int,
+    notes: tuple[str, ...],
+) -> Fit:
+    data, quantity = problem.data, problem.fitted_quantity.name
+    model = tree.with_parameters(problem.law, problem.leaf_values(solution.values))
+    clamped = evaluate(model, quantity, problem.fitted_quantity.arguments, data)
+    measured = problem.censoring == 0
+    errors = row_errors(problem, clamped)
+    varies = bool(np.ptp(data[quantity][measured]) > 0)
+    return Fit(
+        model=model,
+        estimates=_build_estimates(problem, solution, statistics),
+        correlations=statistics.correlations,
+        parameter_covariance=statistics.covariance,
+        rank=statistics.rank,
+        condition=statistics.condition,
+        sigma=statistics.sigma,
+        rmse=rms_of_rows(errors, measured),
+        max_error=WorstPoint.of(errors, data),
+        correlation_index=correlation_index(data[quantity][measured], clamped[measured]) if varies else None,
+        rows_censored=int(np.count_nonzero(~measured)),
+        rows_dropped=dropped,
+        recording=data,
+        fitted_quantity=problem.fitted_quantity,
+        censoring=problem.censoring,
+        problem=dataclasses.replace(problem, law=model, leaves=tuple(tree.leaves(model))),
+        loss=loss,
+        notes=notes,
+    )
+
+
+def _build_estimates(
+    problem: FitProblem, solution: LeastSquaresSolution, statistics: FitStatistics
+) -> tuple[Estimate, ...]:
+    leaves = (problem.leaves[i] for i in problem.free)
+    columns = zip(
+        leaves,
+        problem.labels,
+        solution.values.tolist(),
+        statistics.standard_errors.tolist(),
+        statistics.on_bound.tolist(),
+        strict=True,
+    )
+    return tuple(
+        Estimate(leaf.path, label, value, stderr, leaf.declared.unit, leaf.declared.meaning, on_bound)
+        for leaf, label, value, stderr, on_bound in columns
+    )
+
+
+def _branch_distance(points: FitPoints, problem: FitProblem, solution: LeastSquaresSolution) -> float:
+    """The distance of the residuals of opposite directions of motion [SI]; 0 where they do not differ."""
+    residuals = np.full(len(points.joined), np.nan)
+    quantity = problem.fitted_quantity.name
+    differences = solution.modelled - problem.data[quantity]
+    residuals[~points.missing] = np.where(problem.censoring == 0, differences, np.nan)
+    ends = np.cumsum([len(run) for run in points.recordings])
+    return branch_distance(points.recordings, np.split(residuals, ends[:-1]), quantity)

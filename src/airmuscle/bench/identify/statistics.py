@@ -1,0 +1,175 @@
+"""Rank, condition number, standard errors and correlation of the estimates."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core.arrays import Array
+from ...core.errors import IdentificationError
+from ...core.hints import Hint
+from ...physics.muscle.characteristic import ContractileSurface
+from ...recording import Recording
+from ..segment.runs import RELATIVE_BAND
+from .censored_least_squares import RANK_TOLERANCE, uncensored_rank
+from .loss import Loss
+from .parameter_covariance import ParameterCovariance, Runs, estimate_covariance
+from .problem import FitProblem
+from .solver import LeastSquaresSolution
+
+_MAX_NAMES = 3
+"""Maximum number of parameters that the cause of a rank deficiency lists (chosen)."""
+DEGREE_REMEDY = "For the greatest degree that the levels determine"
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class FitStatistics:
+    """Statistics of the design matrix and the residuals at the solution; parameters on a bound have NaN."""
+
+    rank: int
+    uncensored_rank: int
+    """Rank without the censored rows."""
+    condition: float
+    """Condition number of the design matrix with columns of unit norm."""
+    sigma: float
+    """Standard deviation of the residuals, in the unit of the fitted quantity; NaN without degrees of freedom."""
+    covariance: ParameterCovariance
+    """Covariance of the parameters that are not on a bound."""
+    standard_errors: Array
+    correlations: Array
+    on_bound: npt.NDArray[np.bool_]
+
+
+def compute_statistics(problem: FitProblem, solution: LeastSquaresSolution, loss: Loss, runs: Runs) -> FitStatistics:
+    """Statistics of a solution. Raises IdentificationError where the design matrix is rank-deficient."""
+    values, jacobian = solution.values, solution.jacobian
+    on_bound, active, norms, singular, vectors = _decompose(problem, solution)
+    residuals = problem.residuals(solution.modelled)[active]
+    sigma, influences = _residual_std(residuals, singular.size, loss)
+    weighted = problem.weights[active, None] * jacobian[np.ix_(active, ~on_bound)]
+    basis = vectors.T / singular / norms[:, None]
+    covariance = estimate_covariance(basis, weighted, influences, sigma, runs.rows(active))
+    standard_errors, correlations = np.full(values.size, np.nan), np.full((values.size, values.size), np.nan)
+    standard_errors[~on_bound] = np.sqrt(np.diag(covariance.matrix))
+    correlations[np.ix_(~on_bound, ~on_bound)] = covariance.correlations
+    condition = float(singular[0] / singular[-1]) if singular.size else 1.0
+    measured = uncensored_rank(problem, jacobian[:, ~on_bound]) if problem.censoring.any() else singular.size
+    return FitStatistics(singular.size, measured, condition, sigma, covariance, standard_errors, correlations, on_bound)
+
+
+def check_determined(problem: FitProblem, solution: LeastSquaresSolution) -> None:
+    """Raise IdentificationError where the design matrix at the solution is rank-deficient."""
+    _decompose(problem, solution)
+
+
+def check_determined_by_levels(problem: FitProblem, solution: LeastSquaresSolution, at_levels: Recording) -> None:
+    """Raise IdentificationError where only the noise or ripple of a constant quantity determines the parameters.
+
+    `at_levels` are the data of the problem with the constant quantity of each run at its level.
+    """
+    if all(np.array_equal(at_levels[name], problem.data[name]) for name in problem.fitted_quantity.arguments):
+        return
+    levelled = dataclasses.replace(problem, data=at_levels)
+    check_determined(levelled, solution._replace(jacobian=levelled.jacobian(solution.values)))
+
+
+class _Decomposition(NamedTuple):
+    """Parameters on a bound, active rows, and the singular values of the others' columns, scaled to unit norm."""
+
+    on_bound: npt.NDArray[np.bool_]
+    active: npt.NDArray[np.bool_]
+    norms: Array
+    singular_values: Array
+    right_singular_vectors: Array
+
+
+def _decompose(problem: FitProblem, solution: LeastSquaresSolution) -> _Decomposition:
+    on_bound = _on_bound(problem, solution.values)
+    active = problem.active_rows(solution.modelled)
+    matrix = problem.weights[active, None] * solution.jacobian[np.ix_(active, ~on_bound)]
+    norms = np.linalg.norm(matrix, axis=0)
+    # R of the QR factorisation has the singular values and right singular vectors of the tall matrix, at less cost
+    triangle = np.linalg.qr(matrix / np.where(norms > 0, norms, 1.0), mode="r")
+    _, singular, vectors = np.linalg.svd(np.vstack([triangle, np.zeros((norms.size - len(triangle), norms.size))]))
+    null = singular <= RANK_TOLERANCE * singular[0] if singular.size else np.zeros(0, dtype=bool)
+    if null.any():
+        shares = np.sqrt(np.sum(vectors[null] ** 2, axis=0))
+        raise _rank_deficiency(problem, ~on_bound, shares, int(np.count_nonzero(~null)))
+    return _Decomposition(on_bound, active, norms, singular, vectors)
+
+
+def _on_bound(problem: FitProblem, values: Array) -> npt.NDArray[np.bool_]:
+    """Mask of the parameters on a bound, within a margin, because the search stays strictly inside the bounds."""
+    low, high = problem.bounds
+    margin = 1e-6 * np.maximum(np.abs(values), np.abs(problem.initial_values))
+    return (values - low <= margin) | (high - values <= margin)
+
+
+def _residual_std(residuals: Array, parameters: int, loss: Loss) -> tuple[float, Array]:
+    """The sigma for which sigma^2 (J^T J)^-1 is the covariance of the estimates, and psi/mean(psi') of every residual.
+
+    For least squares these are sqrt(SSE/(N - P)) and the residuals; for a loss with influence function psi(e) = e rho'
+    sigma is sqrt(Sum psi^2/(N - P))/mean(psi'). Reference: Huber, Robust Statistics (1981), section 7.6.
+    """
+    z = (residuals / loss.scale) ** 2
+    _, first, second = loss.rho(z)
+    influences = residuals * first / (np.mean(first + 2 * z * second) if residuals.size else 1.0)
+    degrees_of_freedom = residuals.size - parameters
+    if degrees_of_freedom <= 0:
+        return float("nan"), influences
+    return float(np.sqrt(np.sum(influences**2) / degrees_of_freedom)), influences
+
+
+def _rank_deficiency(problem: FitProblem, free: npt.NDArray[np.bool_], shares: Array, rank: int) -> IdentificationError:
+    """The parameters with a share in the null space, and what to do; `shares` (P,) are their norms in it."""
+    labels = [label for label, is_free in zip(problem.labels, free, strict=True) if is_free]
+    names = [label for label, share in zip(labels, shares, strict=True) if share > 1e-3 * shares.max()]
+    quantities = problem.fitted_quantity.arguments
+    levels = [count_levels(values) for values in problem.arguments]
+    counts = [f"{count} of {name}" for count, name in zip(levels, quantities, strict=True)]
+    path = problem.leaves[problem.free[int(np.flatnonzero(free)[int(np.argmax(shares))])]].path
+    law = type(problem.law).__name__
+    ranks = f"(rank {rank} of {len(labels)} parameters)"
+    listed = ", ".join(names[:_MAX_NAMES])
+    more = f" and {len(names) - _MAX_NAMES} other parameters" if len(names) > _MAX_NAMES else ""
+    few = [names[0], f"{len(names) - 1} other parameters"] if more else names
+    what, cause = f"cannot separate {listed}{more}", f"cannot separate {' and '.join(few)}"
+    if len(names) == 1:
+        what = cause = f"do not depend on {names[0]}"
+    text, hint = _degree_remedy(problem, min(levels) - 1)
+    return IdentificationError(
+        f"{problem.data.origin}: the data {what} of {law} {ranks}. Number of levels: {', '.join(counts)}. {text}"
+        "Measure at more levels, or choose a lower degree or a law with fewer parameters.",
+        hint=hint or Hint("To fix one parameter", "fixed", (path,)),
+        cause=f"the data {cause} (rank {rank} of {len(labels)})",
+    )
+
+
+def _degree_remedy(problem: FitProblem, degree: int) -> tuple[str, Hint | None]:
+    """What the terms of a surface are, and the greatest total degree that the levels determine: one less than their
+    number, for the pure powers of each quantity."""
+    if not isinstance(problem.law, ContractileSurface):
+        return "", None
+    text = (
+        "a(x^i q^j) is the coefficient of the powers i of the contraction and j of the pressure, each scaled to -1..1; "
+        "powers up to n need n + 1 levels. "
+    )
+    possible = 0 < degree < problem.law.degree
+    return text, Hint(
+        DEGREE_REMEDY, "degree", degree, "muscle.characteristic.ContractileSurface.blank"
+    ) if possible else None
+
+
+def count_levels(values: Array) -> int:
+    """The number of levels: of groups of values that differ by at most the band of a constant quantity."""
+    if not values.size:
+        return 0
+    ordered = np.sort(values)
+    band, count, start = RELATIVE_BAND * float(np.max(np.abs(ordered))), 1, float(ordered[0])
+    for value in ordered.tolist():
+        if value - start > band:
+            count, start = count + 1, value
+    return count

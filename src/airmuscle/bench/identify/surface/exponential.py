@@ -1,0 +1,188 @@
+"""Fit of the exponential surface k = k_max (1 - exp v(p, F)) by the procedure of Borzíková et al., for any muscle.
+
+`fit_linearised` is the method of the paper: v is fitted to ln(1 - k/k_max). `fit_nonlinear` is least squares in k
+itself. Both use Chebyshev polynomials on the validity range of the data and return the coefficients in bar and newton.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from ....core.arrays import Array
+from ....core.errors import IdentificationError
+from ....physics.muscle.characteristic.borzikova import BorzikovaExponential
+from ....recording import Recording
+from ..correlation_index import CorrelationIndex, correlation_index
+from .basis import Chebyshev, Conditioning, LoadRange
+
+
+@dataclasses.dataclass(frozen=True)
+class SurfaceFit:
+    """A fitted exponential surface and its errors over all points, including those that the fit could not use."""
+
+    model: BorzikovaExponential
+    procedure: str
+    points: int
+    points_dropped: int
+    """Points that the procedure cannot use: k >= k_max has no logarithm."""
+    rmse: float
+    """Root mean square error in contraction [1]."""
+    max_error: float
+    """Maximum absolute error in contraction [1]."""
+    correlation_index: CorrelationIndex
+    conditioning: Conditioning
+
+    def __str__(self) -> str:
+        dropped = f", {self.points_dropped} of them not used (k >= k_max)" if self.points_dropped else ""
+        return (
+            f"{self.procedure}: rms error {100 * self.rmse:.4f} %, maximum error {100 * self.max_error:.4f} %, "
+            f"correlation index {self.correlation_index} over {self.points} points{dropped}; {self.conditioning}"
+        )
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SurfaceProblem:
+    """Validated data, degrees and k_max of a surface fit, and the design matrix of v."""
+
+    recording: Recording
+    saturation: float
+    pressure_degree: int
+    force_degree: int
+    basis: Chebyshev
+    design_matrix: Array
+    contraction: Array
+
+    @classmethod
+    def from_recording(
+        cls, recording: Recording, saturation: float, pressure_degree: int, force_degree: int
+    ) -> SurfaceProblem:
+        """The problem for the points of a recording. Raises IdentificationError where it cannot be solved."""
+        _check_usable(recording, pressure_degree, force_degree)
+        pressure, force = recording["pressure"], recording["force"]
+        basis = Chebyshev(LoadRange.from_recording(recording))
+        matrix = basis.design_matrix(pressure, force, pressure_degree, force_degree)
+        contraction = recording["contraction"]
+        problem = cls(recording, saturation, pressure_degree, force_degree, basis, matrix, contraction)
+        problem.check_determined(matrix)
+        return problem
+
+    def check_determined(self, rows: Array) -> None:
+        """Raise IdentificationError where these rows of the design matrix do not determine all coefficients."""
+        conditioning = Conditioning.from_design_matrix(rows)
+        if conditioning.rank < conditioning.coefficients:
+            loads = _list_loads(self.recording["force"])
+            raise IdentificationError(
+                f"{self.recording.origin}: {len(rows)} points at loads of {loads} determine {conditioning.rank} of the "
+                f"{conditioning.coefficients} coefficients (degree {self.pressure_degree} in pressure, "
+                f"{self.force_degree} in force). Measure at {self.force_degree + 1} or more loads and "
+                f"{self.pressure_degree + 1} or more pressures, or choose a lower degree."
+            )
+
+    def predict(self, coefficients: Array) -> Array:
+        """Contraction [1] at the points from the Chebyshev coefficients of v, shape (N,)."""
+        return np.asarray(self.saturation * (1.0 - np.exp(self.design_matrix @ coefficients)))
+
+    def jacobian(self, coefficients: Array) -> Array:
+        """Exact derivatives of `predict` with respect to the coefficients, shape (N, coefficients)."""
+        return np.asarray(-self.saturation * np.exp(self.design_matrix @ coefficients)[:, None] * self.design_matrix)
+
+    def linear_targets(self) -> tuple[Array, Array]:
+        """Targets and weights for a linear fit of v that approximates a fit of k; 1 - k/k_max is limited to 0.01."""
+        remaining = np.maximum(1.0 - self.contraction / self.saturation, 0.01)
+        return np.log(remaining), remaining
+
+    def build_fit(self, coefficients: Array, procedure: str, dropped: int = 0) -> SurfaceFit:
+        """The fit with these Chebyshev coefficients of v."""
+        degrees = (self.pressure_degree, self.force_degree)
+        plain = self.basis.to_bar_and_newton(coefficients, *degrees)
+        law = BorzikovaExponential(tuple(plain), *self.basis.validity_range, *degrees, saturation=self.saturation)
+        modelled = np.asarray(law.contraction(self.recording["pressure"], self.recording["force"]))
+        residuals = modelled - self.contraction
+        return SurfaceFit(
+            model=law,
+            procedure=procedure,
+            points=len(self.recording),
+            points_dropped=dropped,
+            rmse=float(np.sqrt(np.mean(residuals**2))),
+            max_error=float(np.abs(residuals).max()),
+            correlation_index=correlation_index(self.contraction, modelled),
+            conditioning=Conditioning.from_design_matrix(self.design_matrix),
+        )
+
+
+def fit_linearised(
+    recording: Recording, saturation: float, *, pressure_degree: int = 4, force_degree: int = 2
+) -> SurfaceFit:
+    """Fit v to ln(1 - k/k_max) by linear least squares, as in the paper.
+
+    `recording` has pressure [Pa], force [N] and contraction [1]; `saturation` is k_max [1]. Points with k >= k_max have
+    no logarithm; they are omitted, and the result states their number. Raises IdentificationError.
+    """
+    problem = SurfaceProblem.from_recording(recording, saturation, pressure_degree, force_degree)
+    usable = problem.contraction < saturation
+    problem.check_determined(problem.design_matrix[usable])
+    targets = np.log(1.0 - problem.contraction[usable] / saturation)
+    coefficients = np.linalg.lstsq(problem.design_matrix[usable], targets, rcond=None)[0]
+    return problem.build_fit(np.asarray(coefficients, dtype=float), "linearised least squares", int((~usable).sum()))
+
+
+def fit_nonlinear(
+    recording: Recording, saturation: float, *, pressure_degree: int = 4, force_degree: int = 2
+) -> SurfaceFit:
+    """Fit k itself by nonlinear least squares, S(A) = Sum (k_i - f(p_i, F_i, A))^2, with exact derivatives.
+
+    `recording` has pressure [Pa], force [N] and contraction [1]; `saturation` is k_max [1]. All points are used, also
+    those with k >= k_max. Raises IdentificationError.
+    """
+    from scipy.optimize import least_squares
+
+    problem = SurfaceProblem.from_recording(recording, saturation, pressure_degree, force_degree)
+    targets, weights = problem.linear_targets()
+    start = np.linalg.lstsq(weights[:, None] * problem.design_matrix, weights * targets, rcond=None)[0]
+    result = least_squares(
+        lambda c: problem.predict(c) - problem.contraction,
+        start,
+        jac=problem.jacobian,
+        method="lm",
+        xtol=1e-15,
+        ftol=1e-15,
+        gtol=1e-15,
+    )
+    if not result.success:
+        raise IdentificationError(
+            f"{recording.origin}: nonlinear least squares did not converge ({result.message}). Choose a lower degree, "
+            "or use fit_linearised."
+        )
+    return problem.build_fit(np.asarray(result.x), "nonlinear least squares")
+
+
+def _check_usable(recording: Recording, pressure_degree: int, force_degree: int) -> None:
+    """Raise IdentificationError for non-finite values, too few rows, or a pressure or force that does not vary."""
+    for name in ("pressure", "force", "contraction"):
+        bad = np.flatnonzero(~np.isfinite(recording[name]))
+        if bad.size:
+            raise IdentificationError(
+                f"{recording.origin}, row {bad[0] + 1}: {name} is not a finite number. Remove such rows first."
+            )
+    required = (pressure_degree + 1) * (force_degree + 1)
+    if len(recording) < required:
+        raise IdentificationError(
+            f"{recording.origin}: {len(recording)} points cannot determine {required} coefficients (degree "
+            f"{pressure_degree} in pressure, {force_degree} in force). Measure more points, or choose a lower degree."
+        )
+    for name, unit in (("pressure", "Pa"), ("force", "N")):
+        values = recording[name]
+        if values.min() == values.max():
+            raise IdentificationError(
+                f"{recording.origin}: {name} is {values[0]:g} {unit} in every row, so a surface cannot be fitted. "
+                f"Measure at {force_degree + 1} or more loads and {pressure_degree + 1} or more pressures."
+            )
+
+
+def _list_loads(forces: Array) -> str:
+    loads = np.unique(forces)
+    if loads.size > 6:
+        return f"{loads[0]:g} to {loads[-1]:g} N ({loads.size} levels)"
+    return f"{', '.join(f'{load:g}' for load in loads)} N"

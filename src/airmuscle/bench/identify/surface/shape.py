@@ -1,0 +1,139 @@
+"""Shape-constrained force surface: force never falls with pressure and never rises with contraction.
+
+Both conditions are linear in the coefficients of a surface. They are imposed on the Bernstein coefficients of its
+slopes on a few cells, which enclose the slopes, and therefore hold at every point of the validity range, not only on a
+grid.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.polynomial import polynomial
+
+from ....core.arrays import Array
+from ....core.errors import IdentificationError
+from ....core.short_repr import ShortRepr
+from ....physics.muscle.characteristic.base import ForceLaw
+from ....physics.muscle.characteristic.contractile_surface import ContractileSurface, exponents
+from ....physics.muscle.characteristic.validity_range import ValidityRange
+from ....recording import Recording
+from ..result import Fit
+from ..static_fit import fit
+from .bernstein import bernstein_coefficients, solve_constrained_least_squares
+from .monotonicity import MonotonicityRule, MonotonicityViolation, find_violations
+
+_MIN_SLOPE = 1e-9
+"""Minimum slope relative to the maximum force, on the validity range scaled to -1..1, so that rounding cannot change
+the sign; chosen."""
+FALLS_WITH_PRESSURE = MonotonicityRule("force falls with pressure", "force", 0, -1.0)
+RISES_WITH_CONTRACTION = MonotonicityRule("force rises with contraction", "force", 1, 1.0)
+
+
+def find_shape_violations(
+    law: ForceLaw, validity_range: ValidityRange, *, points: int = 101
+) -> tuple[MonotonicityViolation, ...]:
+    """The regions of a validity range where a force falls with pressure or rises with contraction, largest first.
+
+    Exact slopes are evaluated on an even grid of `points` pressures and contractions.
+    """
+    sides = (np.linspace(*validity_range.pressure, points), np.linspace(*validity_range.contraction, points))
+    return find_violations(law, (FALLS_WITH_PRESSURE, RISES_WITH_CONTRACTION), *np.meshgrid(*sides, indexing="ij"))
+
+
+def shape_violations_of_fit(fit: Fit, *, points: int = 101) -> tuple[MonotonicityViolation, ...]:
+    """The shape violations of a fitted law in the range of its data; none for laws that are no closed-form force."""
+    law = fit.model
+    varies = all(low < high for low, high in fit.data_ranges.values())
+    if not isinstance(law, ForceLaw) or not law.traceable or not varies:
+        return ()
+    return find_shape_violations(law, fit.validity_range, points=points)
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class ShapeConstrainedFit(ShortRepr):
+    """A shape-constrained surface and its error, with the error and the violations of the unconstrained surface."""
+
+    model: ContractileSurface
+    rmse: float
+    """Root mean square error over the fitted rows [N]."""
+    unconstrained_rmse: float
+    """The same without constraints [N]."""
+    unconstrained_violations: tuple[MonotonicityViolation, ...]
+    """The regions where the unconstrained surface violates a rule."""
+
+
+def fit_shape_constrained(
+    surface: ContractileSurface,
+    recording: Recording | Sequence[Recording],
+    *,
+    free: Recording | None = None,
+    cells: tuple[int, int] = (6, 6),
+) -> ShapeConstrainedFit:
+    """Fit a surface by least squares with the constraint that its force never falls with p and never rises with eps.
+
+    The constraint holds on the validity range of the data. `free` holds points (pressure, contraction) of free
+    contraction, where the force is required to be zero. The slopes are enclosed on `cells` in pressure and contraction;
+    more cells are slower and less conservative. The rows are those that are active in the unconstrained fit. Raises
+    IdentificationError where no surface of this degree satisfies the constraints.
+    """
+    runs = [recording] if isinstance(recording, Recording) else list(recording)
+    if free is not None:  # as censored rows they only extend the validity range
+        runs.append(free.with_columns(force=np.zeros(len(free))))
+    unconstrained = fit(surface, runs)
+    law = unconstrained.model
+    assert isinstance(law, ContractileSurface)
+    active = unconstrained.problem.active_rows(unconstrained.problem.predict(unconstrained.values))
+    data = unconstrained.recording.rows(active)
+    matrix = np.array(law.basis(data["pressure"], data["contraction"])).T
+    target = unconstrained.problem.target[active]
+    rows = shape_constraints(law.degree, cells)
+    scale = float(np.abs(target).max())
+    basis = _free_contraction_basis(law, free)
+    minimum = _MIN_SLOPE if free is None else 0.0
+    scaled = basis @ solve_constrained_least_squares(matrix @ basis, target / scale, rows @ basis, minimum)
+    model = dataclasses.replace(law, coefficients=tuple(float(a) for a in scale * scaled))
+    residuals = matrix @ (scale * scaled) - target
+    rmse = float(np.sqrt(np.mean(residuals**2)))
+    return ShapeConstrainedFit(model, rmse, unconstrained.rmse, find_shape_violations(law, law.validity_range))
+
+
+def _free_contraction_basis(law: ContractileSurface, free: Recording | None) -> Array:
+    """A basis of the coefficients for which the force at the points of free contraction is zero (null space)."""
+    size = len(law.coefficients)
+    if free is None:
+        return np.eye(size)
+    conditions = np.array(law.basis(free["pressure"], free["contraction"])).T
+    _, singular, vectors = np.linalg.svd(conditions)
+    rank = int(np.count_nonzero(singular > 1e-10 * singular[0]))
+    if rank >= size:
+        raise IdentificationError(
+            f"{free.origin}: {rank} points of free contraction determine all {size} coefficients. Give fewer points, "
+            "or choose a surface of a higher degree."
+        )
+    return np.asarray(vectors[rank:].T)
+
+
+def shape_constraints(degree: int, cells: tuple[int, int]) -> Array:
+    """Rows g: the shape is kept on the validity range if all g @ coefficients >= 0.
+
+    `cells` are the numbers of cells in pressure and in contraction.
+    """
+    columns = [j * (degree + 1) + i for i, j in exponents(degree)]
+    rises = np.kron(_bernstein_matrix(degree, cells[0], slope=True), _bernstein_matrix(degree, cells[1], slope=False))
+    falls = -np.kron(_bernstein_matrix(degree, cells[0], slope=False), _bernstein_matrix(degree, cells[1], slope=True))
+    return np.vstack([rises[:, columns], falls[:, columns]])
+
+
+def _bernstein_matrix(degree: int, cells: int, *, slope: bool) -> Array:
+    """Bernstein coefficients, on equal cells of -1..1, of 1, x, .. x^degree or their slopes, one column each."""
+    if not slope:
+        return bernstein_coefficients(lambda x: np.asarray(polynomial.polyvander(x, degree)), degree + 1, cells)
+    powers = np.arange(1, degree + 1)
+
+    def slopes(x: Array) -> Array:
+        return np.column_stack([np.zeros(x.size), polynomial.polyvander(x, degree - 1) * powers])
+
+    return bernstein_coefficients(slopes, degree, cells)

@@ -1,0 +1,154 @@
+"""Initial values by variable projection, for laws that are linear in some of their parameters.
+
+For given values of the nonlinear parameters the linear ones follow by linear least squares. The search therefore runs
+over the nonlinear parameters alone, from several initial guesses (multi-start).
+The Jacobian of the projected residuals is that of the law in the nonlinear parameters, projected onto the complement of
+the linear columns.
+References: Golub and Pereyra, SIAM Journal on Numerical Analysis 10:413 (1973); Kaufman, BIT Numerical Mathematics
+15:49 (1975).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core.arrays import Array
+from .censored_least_squares import solve_censored_least_squares
+from .problem import FitProblem
+
+_GUESS_COUNT = 16
+"""Initial guesses at which the projected residuals are evaluated, including the given one (chosen)."""
+_SEARCH_COUNT = 2
+"""Searches, from the best of these (chosen)."""
+_SPREAD_FACTOR = 4.0
+"""Maximum factor between an initial guess and the given value (chosen)."""
+_RANGE_FRACTION = 0.01
+"""Additional shift as a fraction of the range between the bounds, so that a value of zero is varied too (chosen)."""
+_MAX_ROWS = 2000
+"""Rows of the multi-start search, drawn at random of more (chosen): one search over all rows follows."""
+
+
+def linear_fields(law: Any) -> tuple[str, ...]:
+    """The paths of the fields in which a law declares itself linear."""
+    declared = getattr(law, "linear_in", ())
+    return (declared,) if isinstance(declared, str) else tuple(declared)
+
+
+def is_linear_parameter(problem: FitProblem) -> npt.NDArray[np.bool_]:
+    """Mask of the free parameters in which the law is linear, shape (P,)."""
+    fields = linear_fields(problem.law)
+    return np.array([problem.leaves[i].path.partition("[")[0] in fields for i in problem.free], dtype=bool)
+
+
+def find_initial_values(problem: FitProblem, multi_start: bool = True) -> Array:
+    """The best free parameters by variable projection, shape (P,); the given ones where none are better.
+
+    Without `multi_start` there is one search, from the given parameters.
+    """
+    linear = is_linear_parameter(problem)
+    if linear.all() or not linear.any():
+        return problem.initial_values
+    projection, thinned = _Projection(problem, linear), _thinned(problem)
+    best = problem.initial_values[~linear]
+    if multi_start:
+        preview = projection if thinned is problem else _Projection(thinned, linear)
+        guesses = sorted(_initial_guesses(problem, ~linear), key=preview.sum_of_squares)[:_SEARCH_COUNT]
+        best = min((preview.search(guess) for guess in guesses), key=preview.sum_of_squares)
+    if not multi_start or thinned is not problem:
+        best = projection.search(best)
+    low, high = problem.bounds
+    values = np.clip(projection.complete(best), low, high)
+    after, before = (_sum_of_squares(problem.residuals(problem.predict(v))) for v in (values, problem.initial_values))
+    return values if after < before else problem.initial_values
+
+
+def _thinned(problem: FitProblem) -> FitProblem:
+    """The problem with at most `_MAX_ROWS` rows, drawn with a constant seed, as a regular choice could miss levels."""
+    count = len(problem.data)
+    if count <= _MAX_ROWS:
+        return problem
+    return problem.rows(np.sort(np.random.default_rng(1).permutation(count)[:_MAX_ROWS]))
+
+
+class _Projection:
+    """The residuals of a problem as a function of its nonlinear parameters alone."""
+
+    def __init__(self, problem: FitProblem, linear: npt.NDArray[np.bool_]) -> None:
+        self._problem, self._linear = problem, linear
+        self._linear_indices = np.flatnonzero(linear).tolist()
+        self._bounds = tuple(bound[~linear] for bound in problem.bounds)
+        initial = problem.initial_values[~linear]
+        self._scale = np.where(initial != 0, np.abs(initial), 1.0)
+        self._last: tuple[bytes, tuple[Array, Array, Array]] | None = None
+
+    def complete(self, nonlinear: Array) -> Array:
+        """All free parameters for these nonlinear ones; NaN for the linear ones where the law is not finite."""
+        return self._solve(nonlinear)[0]
+
+    def _solve(self, nonlinear: Array) -> tuple[Array, Array, Array]:
+        """All free parameters (P,), the fitted quantity (N,) and the columns of the linear parameters; kept for the
+        Jacobian at the same point."""
+        key = nonlinear.tobytes()
+        if self._last is None or self._last[0] != key:
+            values = np.zeros(self._linear.size)
+            values[~self._linear] = nonlinear
+            constant = self._problem.predict(values)
+            columns = self._problem.partial_jacobian(values, self._linear_indices)
+            finite = np.isfinite(columns).all() and np.isfinite(constant).all()
+            values[self._linear] = solve_censored_least_squares(self._problem, columns, constant) if finite else np.nan
+            self._last = key, (values, columns @ values[self._linear] + constant, columns)
+        return self._last[1]
+
+    def residuals(self, nonlinear: Array) -> Array:
+        """Weighted residuals with the optimal linear parameters, shape (N,)."""
+        return self._problem.residuals(self._solve(nonlinear)[1])
+
+    def jacobian(self, nonlinear: Array) -> Array:
+        """Derivatives of the residuals with respect to the nonlinear parameters, after Kaufman; shape (N, K)."""
+        values, modelled, columns = self._solve(nonlinear)
+        row_weights = (self._problem.weights * self._problem.active_rows(modelled))[:, None]
+        slopes = row_weights * self._problem.partial_jacobian(values, np.flatnonzero(~self._linear).tolist())
+        norms = np.linalg.norm(columns, axis=0)
+        linear = row_weights * (columns / np.where(norms > 0, norms, 1.0))
+        return np.asarray(slopes - linear @ np.linalg.lstsq(linear, slopes, rcond=None)[0])
+
+    def sum_of_squares(self, nonlinear: Array) -> float:
+        """Sum of the squared residuals; infinite where one is not finite."""
+        return _sum_of_squares(self.residuals(nonlinear))
+
+    def search(self, start: Array) -> Array:
+        """The minimum found from one initial guess, or the guess itself where the search fails."""
+        from scipy.optimize import least_squares
+
+        if not np.isfinite(self.sum_of_squares(start)):
+            return start
+        low, high = (bound / self._scale for bound in self._bounds)
+        inside = np.clip(start / self._scale, low + 1e-9, high - 1e-9)
+        try:
+            result = least_squares(
+                lambda x: self.residuals(x * self._scale), inside, bounds=(low, high), x_scale="jac", max_nfev=60,
+                jac=lambda x: self.jacobian(x * self._scale) * self._scale,
+            )  # fmt: skip
+        except (ValueError, np.linalg.LinAlgError):  # the law is not finite at a trial point
+            return start
+        return np.asarray(result.x * self._scale)
+
+
+def _initial_guesses(problem: FitProblem, nonlinear: npt.NDArray[np.bool_]) -> list[Array]:
+    """The given nonlinear parameters and random guesses around them within the bounds, with a constant seed."""
+    start = problem.initial_values[nonlinear]
+    low, high = (bound[nonlinear] for bound in problem.bounds)
+    random = np.random.default_rng(1)
+    width = np.where(np.isfinite(high - low), high - low, 0.0)
+    guesses = [start]
+    for _ in range(_GUESS_COUNT - 1):
+        factor, shift = _SPREAD_FACTOR ** random.uniform(-1, 1, start.size), random.uniform(-1, 1, start.size)
+        guesses.append(np.clip(start * factor + _RANGE_FRACTION * width * shift, low, high))
+    return guesses
+
+
+def _sum_of_squares(residuals: Array) -> float:
+    return float(residuals @ residuals) if np.isfinite(residuals).all() else np.inf

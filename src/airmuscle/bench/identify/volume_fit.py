@@ -1,0 +1,211 @@
+"""Volume identification: one volume law of a muscle from a water column, or from fills at held lengths.
+
+A water column gives the volume at every contraction. A fill at a held contraction gives one volume from the mass of air
+that enters between two settled pressures, V = Delta m R T/Delta p. A fill without the mass of air determines only the
+ratio of volume and valve conductance: see `bench.identify.dynamic`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core.arrays import Array
+from ...core.errors import ColumnError, IdentificationError, ParameterError
+from ...physics.muscle.geometry import Braid, ChebyshevGeometry, Geometry
+from ...physics.pneumatics.gas import GAS_CONSTANT
+from ...recording import Recording
+
+HELD = 0.005
+"""Range of the contraction within which it is held during a fill (chosen)."""
+MIN_RISE = 2e4
+"""Minimum pressure rise of a fill [Pa] (chosen)."""
+SETTLED = 0.05
+"""Fraction of the rows at either end of a fill over which mass and pressure are averaged (chosen)."""
+MAX_DEGREE = 4
+"""Maximum degree of a polynomial (chosen)."""
+EQUIVALENT = 2.0
+"""Difference of AICc up to which laws are equivalent; the one with the fewest coefficients is then taken (Burnham and
+Anderson, Model Selection and Multimodel Inference, Springer, 2002)."""
+RESOLUTION = 1e-6
+"""Residual relative to the volume below which laws are not distinguished (chosen)."""
+
+
+class VolumePoints(NamedTuple):
+    """Measured volumes [m3] at contractions [1], shape (N,) each, and the number of fills among them."""
+
+    contraction: Array
+    volume: Array
+    fills: int
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class VolumeFit:
+    """Volume law of a muscle with its covariance, and the AICc of every law that was compared."""
+
+    geometry: Geometry
+    points: VolumePoints
+    rmse: float
+    """Root mean square of the residuals [m3]."""
+    aicc: dict[str, float]
+    covariance: Array
+    """Covariance of the linear coefficients, shape (P, P)."""
+
+    def standard_deviation(self, contraction: Array) -> Array:
+        """Standard deviation of the fitted volume [m3] at contractions (N,)."""
+        design = _design(self.geometry, np.asarray(contraction, dtype=float))
+        deviation: Array = np.sqrt(np.sum(design @ self.covariance * design, axis=1))
+        return deviation
+
+    @property
+    def residuals(self) -> Array:
+        """Fitted minus measured volumes [m3], shape (N,)."""
+        return np.asarray(self.geometry.volume(self.points.contraction)) - self.points.volume
+
+
+def volume_points(recordings: Sequence[Recording], temperature: float = 293.15) -> VolumePoints:
+    """The volumes of recordings with a column `volume`, or with `pressure` and `air_mass` or `mass_flow` of a fill.
+
+    `temperature` [K] is that of the air before and after a fill, for which the muscle must come to rest. Raises
+    ColumnError for a recording with neither, a contraction that was not held, or a fill without a rise of pressure.
+    """
+    contractions, volumes, fills = [], [], 0
+    for recording in recordings:
+        if not len(recording):
+            raise ColumnError(f"{recording.origin}: the recording has no rows. Give one with measured values.")
+        if "volume" in recording.columns:
+            contractions.append(recording["contraction"])
+            volumes.append(recording["volume"])
+        else:
+            contractions.append(np.array([float(np.mean(_held_contraction(recording)))]))
+            volumes.append(np.array([_fill_volume(recording, temperature)]))
+            fills += 1
+    if not contractions:
+        raise IdentificationError("a volume fit needs at least one recording.")
+    return VolumePoints(np.concatenate(contractions), np.concatenate(volumes), fills)
+
+
+def _held_contraction(recording: Recording) -> Array:
+    contraction = recording["contraction"]
+    if np.ptp(contraction) > HELD:
+        raise ColumnError(
+            f"{recording.origin}: the contraction varies by {100 * np.ptp(contraction):.2f} % during the fill; it "
+            f"must be held within {100 * HELD:.1f} %. Hold the muscle, or measure the volume in a water column "
+            "(a column 'volume')."
+        )
+    return contraction
+
+
+def _fill_volume(recording: Recording, temperature: float) -> float:
+    """Volume [m3] from the mass of air and the pressures at both ends of a fill."""
+    if "air_mass" in recording.columns:
+        mass = recording["air_mass"]
+    elif "mass_flow" in recording.columns:
+        flow, time = recording["mass_flow"], recording["time"]
+        mass = np.concatenate([[0.0], np.cumsum((flow[1:] + flow[:-1]) / 2 * np.diff(time))])
+    else:
+        raise ColumnError(
+            f"{recording.origin}: neither a column 'volume' (water column) nor the mass of air of a fill ('air_mass' "
+            "or 'mass_flow'). A fill without it determines only the ratio of volume and conductance: use "
+            "airmuscle fit-dynamic."
+        )
+    pressure = recording["pressure"]
+    count = max(1, round(SETTLED * len(recording)))
+    rise = float(np.mean(pressure[-count:]) - np.mean(pressure[:count]))
+    if rise < MIN_RISE:
+        raise ColumnError(
+            f"{recording.origin}: the pressure rises by {rise / 1e3:.4g} kPa; a volume needs a rise of at least "
+            f"{MIN_RISE / 1e3:g} kPa between settled ends."
+        )
+    entered = float(np.mean(mass[-count:]) - np.mean(mass[:count]))
+    return entered * GAS_CONSTANT * temperature / rise
+
+
+def fit_volume(points: VolumePoints, resting_length: float) -> VolumeFit:
+    """The volume law by AICc: a Braid, or a polynomial of degree 1 to 4 in the contraction; the simplest of equivalent
+    ones.
+
+    `resting_length` [m]. The standard deviation follows from the residuals; that of the muscle's own reproducibility is
+    contained if the points are of several runs. Raises ParameterError for a length that is not positive, and
+    IdentificationError for fewer than four points, or points at fewer than three contractions.
+    """
+    if not resting_length > 0.0:
+        raise ParameterError(f"fit_volume: the resting length is {resting_length:g} m; it must be greater than zero.")
+    levels = np.unique(np.round(points.contraction, 4)).size
+    if points.volume.size < 4 or levels < 3:
+        raise IdentificationError(
+            f"a volume law needs four points at three contractions or more; there are {points.volume.size} at "
+            f"{levels}. Fill the muscle at further lengths."
+        )
+    candidates: list[Geometry | None] = [_braid(points, resting_length)]
+    degrees = range(1, min(MAX_DEGREE, levels - 2, points.volume.size - 3) + 1)
+    candidates += [_polynomial(points, resting_length, degree) for degree in degrees]
+    laws = [law for law in candidates if law is not None]
+    aicc = {_name(law): _aicc(law, points) for law in laws}
+    lowest = min(aicc.values())
+    best = min((law for law in laws if aicc[_name(law)] <= lowest + EQUIVALENT), key=_size)
+    residuals = np.asarray(best.volume(points.contraction)) - points.volume
+    design = _design(best, points.contraction)
+    variance = float(residuals @ residuals) / max(points.volume.size - design.shape[1], 1)
+    covariance = variance * np.linalg.pinv(design.T @ design)
+    return VolumeFit(best, points, float(np.sqrt(np.mean(residuals**2))), aicc, covariance)
+
+
+def _name(law: Geometry) -> str:
+    return f"polynomial of degree {_size(law) - 1}" if isinstance(law, ChebyshevGeometry) else "Braid"
+
+
+def _size(law: Geometry) -> int:
+    """Number of coefficients."""
+    return len(law.coefficients) if isinstance(law, ChebyshevGeometry) else 2
+
+
+def _braid(points: VolumePoints, resting_length: float) -> Braid | None:
+    """The braid of least squares, V = A s - B s^3 with s = 1 - eps; None if no braid has these coefficients."""
+    a, b = np.linalg.lstsq(_braid_terms(points.contraction), points.volume, rcond=None)[0]
+    cosine_squared = float(b / a)
+    if not a > 0.0 or not 0.0 < cosine_squared < 1.0:
+        return None
+    radius = float(np.sqrt(a * (1.0 - cosine_squared) / (np.pi * resting_length)))
+    try:
+        return Braid(radius, float(np.arccos(np.sqrt(cosine_squared))), resting_length)
+    except ParameterError:
+        return None
+
+
+def _polynomial(points: VolumePoints, resting_length: float, degree: int) -> ChebyshevGeometry:
+    low, high = float(points.contraction.min()), float(points.contraction.max())
+    terms = _chebyshev_terms(points.contraction, low, high, degree)
+    coefficients = np.linalg.lstsq(terms, points.volume, rcond=None)[0]
+    return ChebyshevGeometry(tuple(map(float, coefficients)), low, high, resting_length)
+
+
+def _design(law: Geometry, contraction: Array) -> Array:
+    """Terms of the law, in whose coefficients the volume is linear, shape (N, P)."""
+    if isinstance(law, ChebyshevGeometry):
+        limits = (law.min_contraction, law.max_contraction)
+        return _chebyshev_terms(contraction, *limits, len(law.coefficients) - 1)
+    return _braid_terms(contraction)
+
+
+def _braid_terms(contraction: Array) -> Array:
+    stretch = 1.0 - contraction
+    return np.column_stack([stretch, -(stretch**3)])
+
+
+def _chebyshev_terms(contraction: Array, low: float, high: float, degree: int) -> Array:
+    scaled = np.clip((2 * contraction - low - high) / (high - low), -1.0, 1.0)
+    return np.asarray(np.polynomial.chebyshev.chebvander(scaled, degree))
+
+
+def _aicc(law: Geometry, points: VolumePoints) -> float:
+    """Akaike's criterion with correction for small samples."""
+    size = points.volume.size
+    count = _design(law, points.contraction).shape[1] + 1
+    squares = float(np.sum((np.asarray(law.volume(points.contraction)) - points.volume) ** 2))
+    floor = size * (RESOLUTION * float(np.abs(points.volume).max())) ** 2
+    correction = 2 * count * (count + 1) / (size - count - 1) if size > count + 1 else np.inf
+    return float(size * np.log(max(squares, floor) / size) + 2 * count + correction)

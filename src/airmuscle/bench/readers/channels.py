@@ -1,0 +1,155 @@
+"""Channels with individual time vectors, resampled to common rows."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...core.arrays import Array
+from ...core.errors import ColumnError
+from ...recording.heading import find_quantity_name
+from .table import Cells, RawTable
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Channel:
+    """A channel as stored in a file: `values` (N,), their times (N,) [s] if the file states any, and the unit.
+
+    is_quantity  whether its name may state a quantity
+    """
+
+    name: str
+    values: Any
+    time: Array | None = None
+    unit: str = ""
+    is_quantity: bool = True
+
+
+def merge_channels(
+    origin: str, channels: Sequence[Channel], constants: Mapping[str, float | str], row_label: str = "row"
+) -> RawTable:
+    """The table with one column for each channel.
+
+    If the time vectors differ, the rows of the table are those of the channel with the most samples, within the time
+    that all channels cover. The other channels are interpolated linearly, integer-valued ones (a valve, a counter) by
+    zero-order hold, and a note reports each. Raises ColumnError if the channels cannot be merged.
+    """
+    channels = [c for c in channels if np.ndim(c.values) == 1 and len(c.values)]
+    if not channels:
+        raise ColumnError(f"{origin}: no channel contains a vector of numbers.")
+    timed = [c for c in channels if c.time is not None]
+    if not timed or all(_same_time(c, timed[0]) for c in channels):
+        _check_equal_lengths(origin, channels)
+        return _make_table(origin, channels, timed[0].time if timed else None, (), constants, row_label)
+    _check_timed(origin, channels)
+    _check_ordered(origin, channels)
+    return _resample(origin, channels, constants, row_label)
+
+
+def _same_time(channel: Channel, reference: Channel) -> bool:
+    assert reference.time is not None
+    if len(channel.values) != len(reference.values):
+        return False
+    return channel.time is None or bool(np.array_equal(channel.time, reference.time))
+
+
+def _check_equal_lengths(origin: str, channels: Sequence[Channel]) -> None:
+    if len({len(c.values) for c in channels}) > 1:
+        sizes = ", ".join(f"{c.name} {len(c.values)}" for c in channels)
+        raise ColumnError(
+            f"{origin}: the channels have different numbers of rows ({sizes}) and no time to align them. "
+            "Select a group whose channels have equal lengths, or export the channels with their time."
+        )
+
+
+def _check_timed(origin: str, channels: Sequence[Channel]) -> None:
+    untimed = [c.name for c in channels if c.time is None]
+    if untimed:
+        raise ColumnError(
+            f"{origin}: the channels have different rows, and no time is stated for {', '.join(untimed)}. "
+            "Select a group whose channels have equal lengths, or export the channels with their time."
+        )
+
+
+def _check_ordered(origin: str, channels: Sequence[Channel]) -> None:
+    """Raise ColumnError where the time of a channel decreases, so that no interpolation is defined."""
+    for channel in channels:
+        if channel.time is None:
+            continue
+        decreasing = np.flatnonzero(np.diff(channel.time) < 0.0)
+        if decreasing.size:
+            raise ColumnError(
+                f"{origin}: the time of channel '{channel.name}' decreases at its row {decreasing[0] + 2}, and the "
+                "channels have different rows. Write each run to a file of its own."
+            )
+
+
+def _resample(
+    origin: str, channels: Sequence[Channel], constants: Mapping[str, float | str], row_label: str
+) -> RawTable:
+    leader = max(channels, key=lambda c: len(c.values))
+    low = max(float(c.time[0]) for c in channels if c.time is not None)
+    high = min(float(c.time[-1]) for c in channels if c.time is not None)
+    assert leader.time is not None
+    rounding = _rounding(leader.time)
+    time = leader.time[(leader.time >= low - rounding) & (leader.time <= high + rounding)]
+    if not len(time):
+        raise ColumnError(f"{origin}: the time ranges of the channels do not overlap. Select one group of channels.")
+    resampled, notes = [], []
+    for channel in channels:
+        same = channel.time is not None and np.array_equal(channel.time, leader.time)
+        resampled.append(dataclasses.replace(channel, values=_interpolate(channel, time), time=time))
+        if not same:
+            rows = f"its {len(channel.values)} rows are interpolated to the {len(time)} rows of '{leader.name}'"
+            notes.append(f"Channel '{channel.name}' has its own time vector: {rows}.")
+    return _make_table(origin, resampled, time, tuple(notes), constants, row_label)
+
+
+def _interpolate(channel: Channel, time: Array) -> Any:
+    """The values at other times: zero-order hold for integers and texts, linear interpolation otherwise."""
+    assert channel.time is not None
+    values = np.asarray(channel.values)
+    if values.dtype.kind in "biuUSO":
+        at_or_before = np.searchsorted(channel.time, time + _rounding(time), side="right") - 1
+        return values[np.clip(at_or_before, 0, None)]
+    return np.interp(time, channel.time, values)
+
+
+def _rounding(time: Array) -> float:
+    """The difference [s] by which equal times may differ through rounding; times may count from 1970."""
+    return float(1e-9 * np.ptp(time) + 8.0 * np.spacing(np.max(np.abs(time))))
+
+
+def _make_table(
+    origin: str,
+    channels: Sequence[Channel],
+    time: Array | None,
+    notes: tuple[str, ...],
+    constants: Mapping[str, float | str],
+    row_label: str,
+) -> RawTable:
+    has_time = any(find_quantity_name(c.name.partition(" ")[0].partition("_")[0]) == "time" for c in channels)
+    if time is not None and not has_time:
+        channels = [Channel("time", time - time[0], unit="s"), *channels]
+    headings = tuple(c.name for c in channels)
+    units = tuple("s" if np.asarray(c.values).dtype.kind in "Mm" else c.unit for c in channels)  # see `to_cells`
+    columns = tuple(to_cells(c.values) for c in channels)
+    rows = np.arange(1, len(channels[0].values) + 1)
+    fields = frozenset(c.name for c in channels if not c.is_quantity)
+    return RawTable(origin, headings, units if any(units) else None, columns, rows, row_label, constants, notes, fields)
+
+
+def to_cells(values: Any) -> Cells:
+    """Values as cells of a RawTable: numbers as floats, dates as seconds from the first, durations in seconds, anything
+    else as text."""
+    array = np.asarray(values)
+    if array.dtype.kind in "Mm":
+        return np.asarray(
+            (array - array[0] if array.dtype.kind == "M" else array) / np.timedelta64(1, "s"), dtype=float
+        )
+    if array.dtype.kind in "biuf":
+        return np.ascontiguousarray(array, dtype=float)
+    return [v.decode("utf-8", errors="replace") if isinstance(v, bytes) else str(v) for v in array.tolist()]

@@ -1,0 +1,99 @@
+"""Constants of a run, given by the user, by a comment in the file, or by a column with a single value."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ...core.arrays import Array
+from ...core.errors import ColumnError
+from ...core.units import conversion, quantity
+from .table import RawTable
+
+CONSTANT_UNITS = {"resting_length": "m", "ambient": "Pa", "ambient_temperature": "K", "displacement_zero": "m"}
+"""The SI units of the constants that have a unit."""
+CONSTANT_QUANTITIES = {
+    "resting_length": "length", "ambient": "pressure", "ambient_temperature": "temperature",
+    "displacement_zero": "length",
+}  # fmt: skip
+"""The quantities of these constants, which have their display units."""
+CONSTANT_RANGES = {
+    "resting_length": (1e-3, 20.0), "ambient": (1e3, 2e5), "ambient_temperature": (200.0, 400.0),
+    "displacement_zero": (-20.0, 20.0),
+}  # fmt: skip
+"""The allowed ranges in SI units, those of the parameters of a geometry and of the ambient air."""
+_NAMES = {
+    "resting_length": ("resting_length", "rest_length", "initial_length", "original_length", "l0", "l_0", "ruhelänge"),
+    "ambient": ("ambient", "ambient_pressure", "atmospheric_pressure", "barometer", "umgebungsdruck", "luftdruck"),
+    "ambient_temperature": ("ambient_temperature", "room_temperature", "umgebungstemperatur", "raumtemperatur"),
+    "displacement_zero": ("displacement_zero",),
+}
+_WITH_UNIT = re.compile(
+    r"(?P<name>.*?)[\s_]*"
+    r"(?:\[(?P<square>[^\]]*)\]|\((?P<round>[^)]*)\)|[\s_/](?P<loose>mm|cm|m|kPa|hPa|mbar|bar|Pa))"
+)
+
+
+def parse_constant_name(text: str) -> tuple[str, str] | None:
+    """Name and unit ('' if not stated) of the constant in a heading; None if it names no constant."""
+    match = _WITH_UNIT.fullmatch(text.strip())
+    name, unit = (match["name"], match["square"] or match["round"] or match["loose"] or "") if match else (text, "")
+    for constant, names in _NAMES.items():
+        if re.sub(r"[\s-]+", "_", name.strip()).lower() in names:
+            return constant, unit
+    return None
+
+
+def collect_constants(table: RawTable, user_constants: Mapping[str, float | str]) -> dict[str, Any]:
+    """The constants of a run in SI units; those given by the user override those in the comments of the file.
+
+    Raises ColumnError or UnitError.
+    """
+    constants: dict[str, Any] = {}
+    for text, value in {**table.constants, **user_constants}.items():
+        parsed = parse_constant_name(text)
+        if parsed and parsed[1] and not isinstance(value, str):
+            value = f"{value!r} {parsed[1]}"
+        constants[parsed[0] if parsed else text] = value
+    for name, unit in CONSTANT_UNITS.items():
+        if name in constants:
+            constants[name] = quantity(constants[name], unit, ambient=0.0, where=f"{table.origin}: {name}")
+    return constants
+
+
+def check_constants(table: RawTable, constants: Mapping[str, Any]) -> None:
+    """Raise ColumnError for a constant that is not positive, or outside its allowed range."""
+    for name, (low, high) in CONSTANT_RANGES.items():
+        value, unit = constants.get(name, low), CONSTANT_UNITS[name]
+        if low > 0 and not value > 0:
+            raise ColumnError(f"{table.origin}: {name} is {value:g} {unit}; it must be positive.")
+        if not low <= value <= high:
+            raise ColumnError(
+                f"{table.origin}: {name} is {value:g} {unit}; allowed range: {low:g} to {high:g} {unit}. Check the "
+                "unit; a number without a unit is in SI units."
+            )
+
+
+def constant_from_column(table: RawTable, heading: str, unit: str | None, values: Array) -> tuple[str, float] | None:
+    """Name and SI value of the constant that a column states in every row; None if the heading names no constant.
+
+    Raises ColumnError if the values differ between rows.
+    """
+    parsed = parse_constant_name(heading)
+    if parsed is None:
+        return None
+    name, own_unit = parsed
+    change = conversion(
+        unit or own_unit or CONSTANT_UNITS[name], CONSTANT_UNITS[name], ambient=0.0, where=f"{table.origin}: {heading}"
+    )
+    first = float(values[0])
+    if not np.allclose(values, first, rtol=1e-9, atol=0.0):
+        row = int(np.argmax(~np.isclose(values, first, rtol=1e-9, atol=0.0)))
+        raise ColumnError(
+            f"{table.location(row)}: {heading} changes from {first:g} to {values[row]:g}, but must be constant "
+            "within a run. Write each specimen to a separate file."
+        )
+    return name, float(change(first))

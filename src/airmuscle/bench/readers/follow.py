@@ -1,0 +1,187 @@
+"""Follower of a growing table: rows of a file, a pipe or a serial log as they arrive, in SI units."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import time
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+
+from ...core.annotation import abridged
+from ...core.errors import ColumnError, FileError, ParameterError
+from ...core.units import AMBIENT_PRESSURE, UnitConversion
+from ...recording.displacement import displacement_columns
+from ...recording.heading import find_quantity_name
+from .header import is_number
+from .interpret import interpret, resolve_headings, unit_conversion
+from .plausibility import CONTRACTION_RANGE, MAX_MAGNITUDE
+from .table import RawTable
+from .text_format import TextFormat, TextHeader, has_content, is_comment, parse_header, split_cells
+
+MAX_UNREADABLE = 100
+"""Consecutive unreadable rows after which a stream is refused (chosen)."""
+MAX_HEADER_LINES = 1000
+"""Lines before the first row of numbers after which a stream is refused (chosen)."""
+MAX_LINE = 65536
+"""Characters of a line after which a stream is refused (chosen)."""
+
+
+class RowReader:
+    """Reader of one row at a time: the header first, then each row of numbers as quantities in SI units.
+
+    columns    headings by number (from 1) or by the heading in the stream, such as {"1": "pressure [bar]"}
+    units      units by quantity, as in `read_csv`
+    constants  resting_length, ambient, displacement_zero, or quantities that are held, as in `read`
+    skip_rows  number of lines above the headings, or above the first row of numbers without headings
+
+    `skipped` counts rows that could not be read: a damaged or incomplete line of a serial log is left out. `notes` are
+    the assumptions on units, as of `read_csv`.
+    """
+
+    def __init__(
+        self, origin: str, *, columns: Mapping[str, str] | None = None, units: Mapping[str, str] | None = None,
+        constants: Mapping[str, float | str] | None = None, skip_rows: int = 0,
+    ) -> None:  # fmt: skip
+        for name, given in (("columns", columns), ("units", units), ("constants", constants)):
+            if not (given is None or isinstance(given, Mapping)):
+                raise ParameterError(f"RowReader: {name} must be a mapping or None; it is {abridged(given)}.")
+        self.origin, self.skipped, self.skip_rows = origin, 0, skip_rows
+        self.notes: tuple[str, ...] = ()
+        self._names, self._units, self._constants = dict(columns or {}), dict(units or {}), dict(constants or {})
+        self._head: list[tuple[int, str]] = []
+        self._conversions: list[tuple[int, str, UnitConversion]] | None = None
+        self._line = self._unreadable = 0
+
+    def read(self, line: str) -> dict[str, float] | None:
+        """The quantities of a line [SI]; None for a line of the header, a comment, or a row that cannot be read.
+
+        Raises ColumnError, FileError or UnitError for a header without known quantities, or for too many unreadable
+        rows in succession.
+        """
+        self._line += 1
+        if not has_content(line) or self._line <= self.skip_rows:
+            return None
+        if self._conversions is None:
+            return self._read_header(line.rstrip("\r\n"))
+        return None if is_comment(line) else self._read_row(line)
+
+    def _read_header(self, line: str) -> dict[str, float] | None:
+        self._head.append((self._line, line))
+        if len(self._head) > MAX_HEADER_LINES:
+            raise FileError(f"{self.origin}: no row of numbers in the first {MAX_HEADER_LINES} lines.")
+        text_format = TextFormat(headerless=bool(self._names))
+        delimiter = text_format.detect_delimiter(line)
+        cells = split_cells(line, delimiter)
+        while cells and not cells[-1]:
+            cells.pop()  # a delimiter at the end of the line
+        if is_comment(line) or not cells or not all(is_number(cell) for cell in cells):
+            return None
+        header = parse_header(self.origin, self._head, text_format)
+        self._delimiter, self._comma = header.delimiter, header.delimiter != ","
+        self._start(header, [float(self._point(cell)) for cell in cells])
+        return self._read_row(line)
+
+    def _start(self, header: TextHeader, first: list[float]) -> None:
+        """Conversions of the columns, from the header and the first row, which is checked as a recording."""
+        headings = tuple(self._names.get(text, self._names.get(str(i), text))
+                         for i, text in enumerate(header.headings, 1))  # fmt: skip
+        headings = headings[: len(first)] if not any(headings[len(first) :]) else headings
+        missing = [name for name in self._names if name not in {*header.headings, *map(str, range(1, len(first) + 1))}]
+        if missing:
+            raise ColumnError(
+                f"{self.origin}: there is no column '{missing[0]}'; the columns are {', '.join(header.headings)}."
+            )
+        cells = tuple(np.array([value]) for value in first)
+        rows = np.array([self._line], dtype=np.int64)
+        table = RawTable(self.origin, headings, header.units, cells, rows, constants=header.constants)
+        recording = interpret(table, units=self._units, constants=self._constants)
+        self._first, self.notes = recording, recording.notes
+        self._ambient = ambient = float(recording.constants.get("ambient", AMBIENT_PRESSURE))
+        held = {find_quantity_name(name) for name in self._constants}
+        self._held = {name: float(recording[name][0]) for name in recording if name in held}
+        self._width = len(headings)
+        self._conversions = [
+            (i, heading.name, unit_conversion(table, heading, ambient))
+            for i, heading in enumerate(resolve_headings(table, self._units))
+            if heading.known
+        ]
+
+    def _read_row(self, line: str) -> dict[str, float] | None:
+        try:
+            cells = split_cells(line, self._delimiter)
+            if len(cells) < self._width or any(cells[self._width :]):
+                raise ValueError
+            values = [float(self._point(cell)) for cell in cells[: self._width]]
+        except (ValueError, csv.Error):  # such as a carriage return within the line
+            self._skip()
+            return None
+        assert self._conversions is not None
+        row = {**self._held, **{name: float(convert(values[i])) for i, name, convert in self._conversions}}
+        if not all(self._is_possible(name, value) for name, value in row.items()):
+            self._skip()
+            return None
+        self._unreadable = 0
+        row, _ = displacement_columns(row, self._first.constants)
+        length = self._first.constants.get("resting_length")
+        if "contraction" not in row and "length" in row and isinstance(length, float):
+            row["contraction"] = (length - row["length"]) / length
+        return row
+
+    def _is_possible(self, name: str, value: float) -> bool:
+        """Whether a value may be a measurement: a damaged number may still be a number."""
+        quantity = name.rpartition(".")[2]
+        low, high = {"pressure": (-self._ambient, MAX_MAGNITUDE), "contraction": CONTRACTION_RANGE}.get(
+            quantity, (-MAX_MAGNITUDE, MAX_MAGNITUDE)
+        )
+        return low < value < high
+
+    def _skip(self) -> None:
+        self.skipped += 1
+        self._unreadable += 1
+        if self._unreadable > MAX_UNREADABLE:
+            raise ColumnError(
+                f"{self.origin}, line {self._line}: {MAX_UNREADABLE} successive lines are no rows of {self._width} "
+                "numbers. Check the baud rate and the format of the stream."
+            )
+
+    def _point(self, cell: str) -> str:
+        return cell.replace(",", ".") if self._comma else cell
+
+
+def follow_lines(
+    source: str | Path | TextIO, *, idle: float, poll: float = 0.005, clock: Callable[[], float] = time.monotonic,
+    pause: Callable[[float], Any] = time.sleep,
+) -> Iterator[str]:  # fmt: skip
+    """Complete lines of a growing file, or of an open stream, until nothing has arrived for `idle` seconds.
+
+    A line without its end is held back until the rest of it comes, or until the end. A stream that is closed, such as
+    a pipe, ends at once. Raises FileError if the file cannot be opened, or for a line of more than 65 536 characters.
+    """
+    if not isinstance(source, str | Path):
+        yield from source
+        return
+    with contextlib.ExitStack() as stack:
+        try:
+            file = stack.enter_context(Path(source).open(encoding="utf-8", errors="replace", newline=""))
+        except OSError as reason:
+            raise FileError(f"{source}: cannot be read ({reason.strerror}). Check the name and the folder.") from None
+        partial, last = "", clock()
+        while True:
+            line = file.readline(MAX_LINE)
+            if not line:
+                if clock() - last >= idle:
+                    break
+                pause(poll)
+                continue
+            partial, last = partial + line, clock()
+            if len(partial) >= MAX_LINE:
+                raise FileError(f"{source}: a line has more than {MAX_LINE} characters. It is not a table of text.")
+            if partial.endswith("\n"):
+                yield partial
+                partial = ""
+        if partial:
+            yield partial

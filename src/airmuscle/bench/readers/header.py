@@ -1,0 +1,130 @@
+"""Table header: heading row, unit row and comments with constants, for text files and worksheets alike."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import re
+from collections.abc import Iterable, Sequence
+
+from ...core.errors import ColumnError, UnitError
+from ...core.hints import Hint
+from ...core.units import conversion
+from ...recording.heading import parse_heading
+from .constants import parse_constant_name
+
+COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
+"""A number with a decimal comma, without thousands separators."""
+POINT_NUMBER = re.compile(r"[-+]?\d*\.\d+(?:[eE][-+]?\d+)?")
+"""A number with a decimal point, without thousands separators."""
+_CONSTANT_COMMENT = re.compile(r"[#%]\s*(?P<name>[^\W\d][\w -]*?)(?:\s*\[(?P<unit>[^\]]*)\])?\s*[=:]\s*(?P<value>.+)")
+MAX_PREAMBLE = 1000
+"""Maximum number of lines above the headings (chosen)."""
+_TEXT_CONSTANTS = ("resting_length", "ambient", "ambient_temperature", "specimen", "run")
+
+
+def is_number(cell: str) -> bool:
+    """Whether a cell contains a number, with a decimal point or a decimal comma."""
+    try:
+        float(cell.replace(",", "."))
+    except ValueError:
+        return False
+    return True
+
+
+def are_headings(cells: Sequence[str]) -> bool:
+    """Whether a row of cells contains headings: at least one cell is not a number."""
+    return not all(is_number(cell) for cell in cells if cell)
+
+
+def bare_heading(text: str) -> str:
+    """A heading without the unit in brackets, `force` of `force [N]`."""
+    return text.partition("[")[0].partition("(")[0].strip()
+
+
+def stated_heading_row(
+    rows: Iterable[tuple[int, Sequence[str]]], named: Sequence[str], skip_rows: int | None
+) -> int | None:
+    """The index of the row of headings that the user states; None if nothing is stated or found.
+
+    rows       numbers in the file, counted from 1, and cells
+    named      headings that the row contains, complete or without unit: the row with most of them
+    skip_rows  number of rows of the file above the headings
+    """
+    best, most = None, 0
+    for index, (number, cells) in enumerate(itertools.islice(rows, None if skip_rows else MAX_PREAMBLE)):
+        if skip_rows is not None:
+            if number > skip_rows:
+                return index
+            continue
+        found = len({*cells, *map(bare_heading, cells)} & set(named))
+        if found > most:
+            best, most = index, found
+        if most == len(named):
+            break
+    return best
+
+
+def missing_header_error(location: str) -> ColumnError:
+    """The error for numbers in the place of the heading row."""
+    return ColumnError(
+        f"{location}: the heading row is missing. Insert a row above the numbers with name and unit of each column, "
+        "such as 'pressure [kPa], contraction [%], force [N]'.",
+        hint=Hint("To map columns by their numbers", "columns", {1: "pressure [kPa]", 2: "force [N]"}, "read"),
+    )
+
+
+def parse_unit_row(headings: Sequence[str], cells: Sequence[str]) -> tuple[str, ...] | None:
+    """The units in the row below the headings; None if the row is not a unit row.
+
+    A unit row contains at least one unit and no number except 1.
+    """
+    bare = [re.sub(r"^\[(.*)\]$|^\((.*)\)$", r"\1\2", cell) for cell in cells]
+    if any(is_number(cell) and cell != "1" for cell in bare):
+        return None
+    candidates = [pair for pair in zip(headings, bare, strict=False) if pair[1] not in ("", "1")]
+    return tuple(bare) if any(_is_unit(text, cell) for text, cell in candidates) else None
+
+
+def count_cells(cells: Sequence[object]) -> int:
+    """The number of cells with content."""
+    return sum(cell not in (None, "") for cell in cells)
+
+
+def parse_constant_cells(cells: Sequence[str]) -> tuple[str, float | str] | None:
+    """A constant in two cells (`resting_length | 300 mm`), in three (`resting_length | 300 | mm`), or as a comment."""
+    filled = [cell for cell in cells if cell]
+    name, value = (filled[0].rstrip(" :="), " ".join(filled[1:])) if len(filled) > 1 else (filled[0], "")
+    text = f"{name} = {value}" if value else name
+    return parse_constant_comment(text if text[0] in "#%" else f"# {text}")
+
+
+def _is_unit(heading: str, cell: str) -> bool:
+    """Whether a cell is a unit of the quantity in its heading."""
+    target = parse_heading(heading).target
+    try:
+        return target is not None and bool(conversion(cell, target))
+    except UnitError:
+        return False
+
+
+def parse_constant_comment(line: str) -> tuple[str, float | str] | None:
+    """Name and value in `# resting_length [mm] = 300` or `# resting_length: 300 mm`; None for any other comment.
+
+    Any number or quoted text (JSON) after one word is a constant of the run; another text only after a known name.
+    """
+    match = _CONSTANT_COMMENT.fullmatch(line.strip())
+    if not match:
+        return None
+    name, text = match["name"], match["value"].strip()
+    known = name in _TEXT_CONSTANTS or parse_constant_name(name) is not None
+    if not known and not name.isidentifier():
+        return None
+    try:
+        value = json.loads(text)
+    except (ValueError, RecursionError):  # no JSON, an integer of thousands of digits, or lists in lists
+        stated = f"{text} {match['unit']}" if match["unit"] and is_number(text) else text  # `1013.` is no JSON
+        return (name, stated) if known else None
+    if not isinstance(value, float | int | str) or isinstance(value, bool):
+        return None
+    return name, f"{text} {match['unit']}" if match["unit"] else value

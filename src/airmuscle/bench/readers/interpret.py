@@ -1,0 +1,258 @@
+"""Conversion of a raw table, from any file format, into a Recording in SI units.
+
+Units are converted, absolute pressures become gauge pressures, and implausible values are rejected.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+from collections.abc import Mapping
+
+import numpy as np
+
+from ...core.arrays import Array
+from ...core.constants import STANDARD_GRAVITY
+from ...core.errors import ColumnError, UnitError, suggestion
+from ...core.hints import Hint, HintedText
+from ...core.units import AMBIENT_PRESSURE, UnitConversion, conversion, quantity
+from ...recording.columns import QUANTITIES
+from ...recording.displacement import displacement_columns, proposal
+from ...recording.heading import UNIT_SPELLINGS, Heading, find_quantity_name, parse_heading
+from ...recording.recording import Recording
+from .clock import seconds_from_clock
+from .constants import check_constants, collect_constants, constant_from_column, parse_constant_name
+from .missing_values import MissingValues, RefuseMissing
+from .plausibility import check_plausible
+from .repeated_columns import check_unique, without_repeated_columns
+from .specimens import label_texts
+from .table import Cells, RawTable
+from .time_base import RecordedTime, TimeBase
+
+MAX_LABELS = 8
+"""Maximum number of different texts of a column that is kept (chosen), such as the names of specimens."""
+MIN_LABEL_ROWS = 3
+"""Minimum number of rows of each of these texts (chosen)."""
+
+
+def interpret(
+    table: RawTable, *, units: Mapping[str, str], constants: Mapping[str, float | str],
+    time_base: TimeBase = RecordedTime(), missing: MissingValues = RefuseMissing(),
+) -> Recording:  # fmt: skip
+    """Convert a table to a Recording; `units` and `constants` given by the user override those of the file.
+
+    A constant that is the name of a quantity, `length`, gives a column with this value in every row.
+    Raises ColumnError or UnitError; the message names file, row, value and remedy.
+    """
+    table = without_repeated_columns(table)
+    held = {name: value for name, value in constants.items() if _is_quantity(name)}
+    run_constants = collect_constants(table, {n: value for n, value in constants.items() if n not in held})
+    headings = resolve_headings(table, units)
+    table = missing.treat(table, headings)
+    for heading, cells in zip(headings, table.columns, strict=True):
+        if not heading.known and not isinstance(cells, list):
+            constant = constant_from_column(table, heading.text, heading.unit, cells)
+            run_constants = {constant[0]: constant[1], **run_constants} if constant else run_constants
+    check_constants(table, run_constants)
+    ambient = float(run_constants.get("ambient", AMBIENT_PRESSURE))
+    columns: dict[str, Array] = {}
+    notes: list[str] = [*table.notes, *_override_notes(table, headings)]
+    for heading, cells in zip(headings, table.columns, strict=True):
+        if heading.known:
+            columns[heading.name], note = _convert_column(table, heading, cells, ambient)
+        else:
+            note = _keep_unknown_column(table, heading, cells, columns)
+        notes += [note] if note and note not in notes else []
+    notes += _standard_atmosphere(table, headings) if "ambient" not in run_constants else []
+    notes += _add_held(table, columns, held, ambient)
+    columns, displaced = displacement_columns(columns, run_constants)
+    notes += displaced
+    notes += _apply_time_base(table, columns, time_base)
+    check_plausible(table, columns, run_constants.get("resting_length"), ambient, ordered=time_base.ordered)
+    written = {h.name: h.unit for h in headings if h.known and h.unit and h.name in columns}
+    return Recording(columns, table.origin, run_constants, tuple(notes), written)
+
+
+def _is_quantity(name: str) -> bool:
+    return parse_constant_name(name) is None and parse_heading(name).known
+
+
+def _standard_atmosphere(table: RawTable, headings: list[Heading]) -> list[str]:
+    """A note where absolute pressures become gauge pressures although the ambient pressure is not stated."""
+    absolute = [h.name for h in headings if h.target == "Pa" and unit_conversion(table, h, AMBIENT_PRESSURE).offset]
+    if not absolute:
+        return []
+    return [
+        f"The {' and '.join(absolute)} is absolute, and the ambient pressure is not stated: it is converted to gauge "
+        f"with the standard atmosphere, {AMBIENT_PRESSURE / 1e3:.4g} kPa."
+    ]
+
+
+def _add_held(table: RawTable, columns: dict[str, Array], held: Mapping[str, float | str], ambient: float) -> list[str]:
+    """Add a column for each quantity that the user states for the whole run; returns a note on each."""
+    notes = []
+    rows = len(table.rows)
+    for text, value in held.items():
+        heading = parse_heading(text)
+        where = f"{table.origin}: {heading.name}"
+        if heading.name in columns:
+            raise ColumnError(f"{where} is stated as a constant, but a column contains it. Omit one of them.")
+        number = f"{value!r} {heading.unit}" if heading.unit and not isinstance(value, str) else value
+        si = _held_value(number, heading.target or "1", ambient, where)
+        columns[heading.name] = np.full(rows, si)
+        unit = "" if heading.target == "1" else f" {heading.target}"
+        notes.append(f"The {heading.name} is {si:.6g}{unit} in every row, as specified by the user.")
+    return notes
+
+
+def _held_value(stated: float | str, target: str, ambient: float, where: str) -> float:
+    """The value of a held quantity in SI; a force may be stated as a load in g or kg, as in a column."""
+    if target == "N" and isinstance(stated, str):
+        with contextlib.suppress(UnitError):
+            return quantity(stated, "kg") * STANDARD_GRAVITY
+    return quantity(stated, target, ambient=ambient, where=where)
+
+
+def _apply_time_base(table: RawTable, columns: dict[str, Array], time_base: TimeBase) -> list[str]:
+    """Replace or remove the time column; returns a note if it is changed."""
+    if "time" not in columns:
+        return []
+    time, note = time_base.apply(table, columns["time"])
+    if time is None:
+        del columns["time"]
+    else:
+        columns["time"] = time
+    return [note] if note else []
+
+
+def resolve_headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]:
+    """The headings with their units, from the user, the unit row or the heading itself, in this order of precedence."""
+    parsed = [Heading(h, h, None, False) if h in table.fields else parse_heading(h) for h in table.headings]
+    user_units = {find_quantity_name(key) or key: unit for key, unit in units.items()}
+    keys = [key for heading in parsed for key in (heading.name, heading.text)]
+    for key in user_units:
+        if key not in keys:
+            names = [heading.name for heading in parsed]
+            raise ColumnError(
+                f"{table.origin}: a unit is given for '{key}', but the columns are {', '.join(names)}."
+                f"{suggestion(key, names)}"
+            )
+    row = table.units or ()
+    headings = [
+        Heading(h.text, h.name, user_units.get(h.name, user_units.get(h.text)) or below or h.unit, h.known)
+        for h, below in zip(parsed, [*row, *[""] * (len(parsed) - len(row))], strict=False)
+    ]
+    check_unique(table, headings)
+    if not any(heading.known for heading in headings):
+        raise _no_known_column(table, headings)
+    return headings
+
+
+def _override_notes(table: RawTable, headings: list[Heading]) -> list[str]:
+    """One note for each column whose unit in the file was overridden by the user."""
+    row = [*(table.units or ()), *[""] * len(headings)]
+    own = [below or parse_heading(h.text).unit for h, below in zip(headings, row, strict=False)]
+    return [
+        f"The {h.name} is read in {h.unit}, as specified by the user; the file states {unit}."
+        for h, unit in zip(headings, own, strict=True)
+        if unit and h.unit and unit != h.unit
+    ]
+
+
+def _no_known_column(table: RawTable, headings: list[Heading]) -> ColumnError:
+    names = [heading.text for heading in headings]
+    near = [n for name in names for n in difflib.get_close_matches(name.lower(), QUANTITIES, n=1)]
+    hint = f" Did you mean '{near[0]}'?" if near else ""
+    return ColumnError(
+        f"{table.origin}: no column is a known quantity ({', '.join(names)}); known quantities are "
+        f"{', '.join(QUANTITIES)}.{hint}",
+        hint=Hint("To state the number of lines above the headings", "skip_rows", 1, "read"),
+    )
+
+
+def _convert_column(table: RawTable, heading: Heading, cells: Cells, ambient: float) -> tuple[Array, str]:
+    """A known column in SI units, and a note on any assumption about its unit."""
+    if heading.name == "time" and isinstance(cells, list):
+        seconds = seconds_from_clock(cells)
+        if seconds is not None:
+            return seconds, f"The time column contains clock times; time is counted from the first, {cells[0]}."
+    change = unit_conversion(table, heading, ambient)
+    values = np.array(cells, dtype=float)
+    if change.assumed_gauge:
+        reason = f"the unit '{heading.unit}' does not state it. Write bara or kPa(a) for an absolute pressure."
+        return change(values), f"The {heading.name} is read as gauge: {reason}"
+    if heading.unit is None:
+        return values, f"The {heading.name} has no unit and is read as a ratio."
+    if heading.target == "N" and _is_mass(heading.unit):
+        assumption = f"stated in {heading.unit} and converted with standard gravity, {STANDARD_GRAVITY} m/s2."
+        return change(values), f"The {heading.name} is {assumption}"
+    return change(values), ""
+
+
+def unit_conversion(table: RawTable, heading: Heading, ambient: float) -> UnitConversion:
+    target = heading.target or "1"
+    where = f"{table.origin}, column '{heading.text}'"
+    usual = ", ".join(UNIT_SPELLINGS[target])
+    if heading.unit is None:
+        if target == "1":
+            return UnitConversion(1.0)
+        example = f"{heading.name} [{UNIT_SPELLINGS[target][1 % len(UNIT_SPELLINGS[target])]}]"
+        raise UnitError(
+            f"{where}: no unit is stated. State that of the values in the column header, for example "
+            f"'{example}'; usual units are {usual}.",
+            hint=Hint("To state the unit", "units", {heading.name: ...}),
+        )
+    try:
+        if target == "N" and _is_mass(heading.unit):
+            return UnitConversion(conversion(heading.unit, "kg").factor * STANDARD_GRAVITY)
+        return conversion(heading.unit, target, ambient=ambient, where=where)
+    except UnitError as reason:
+        cases = {spelling.lower(): spelling for spelling in UNIT_SPELLINGS[target]}
+        near = difflib.get_close_matches(heading.unit.lower(), cases, n=1)
+        hint = f" Did you mean '{cases[near[0]]}'?" if near else f" Usual units of the {heading.name} are {usual}."
+        raise UnitError(HintedText(reason.message, hint)) from None
+
+
+def _is_mass(unit: str) -> bool:
+    if unit in UNIT_SPELLINGS["N"]:
+        return False
+    try:
+        return bool(conversion(unit, "kg"))
+    except UnitError:
+        return False
+
+
+def _keep_unknown_column(table: RawTable, heading: Heading, cells: Cells, columns: dict[str, Array]) -> str:
+    """Keep an unknown numeric column without conversion, and return the note on the column, if any."""
+    if isinstance(cells, list):
+        if not any(cells):
+            return ""
+        return _keep_labels(heading, cells, columns)
+    constant = constant_from_column(table, heading.text, heading.unit, cells)
+    if constant:
+        return f"Column '{heading.text}' is constant and states the {constant[0]}: {constant[1]:.4g} (SI)."
+    columns[heading.text or "unnamed"] = cells
+    if heading.text in table.fields:
+        return _field_note(heading)
+    near = difflib.get_close_matches(heading.text.partition(" ")[0].lower(), QUANTITIES, n=1)
+    hint = proposal(heading.text) or (f" Did you mean '{near[0]}'?" if near else "")
+    return f"Column '{heading.text}' is not a known quantity and is kept without conversion.{hint}"
+
+
+def _field_note(heading: Heading) -> str:
+    """The note on a field of a message, with the mapping that makes it a quantity."""
+    fits = [name for name, quantity in QUANTITIES.items() if quantity.unit == heading.unit]
+    mapped = f"'{heading.text}' = '{fits[0] if fits else 'force'} [{heading.unit if fits else 'N'}]'"
+    unit = f" in {heading.unit}" if heading.unit else ""
+    return f"Column '{heading.text}'{unit} is a field of a message and kept as it is; [columns] {mapped} maps it."
+
+
+def _keep_labels(heading: Heading, cells: list[str], columns: dict[str, Array]) -> str:
+    """Keep a column with a few different texts as their numbers, and return the note on a column of text."""
+    labels = label_texts(cells)
+    values, numbers, counts = np.unique(labels, return_inverse=True, return_counts=True)
+    if not 2 <= values.size <= MAX_LABELS or counts.min() < MIN_LABEL_ROWS:
+        return f"Column '{heading.text}' contains text and is ignored."
+    columns[heading.text] = (numbers.ravel() + 1).astype(np.float64)
+    texts = ", ".join(f"{i} {value or 'empty'}" for i, value in enumerate(values.tolist(), 1))
+    return f"Column '{heading.text}' contains text and is kept as numbers: {texts}."

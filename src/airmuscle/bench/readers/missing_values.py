@@ -1,0 +1,203 @@
+"""Missing values: empty cells, markers such as `---` or `#N/A`, and stated codes; refused, left out or interpolated."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+import re
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core.arrays import Array
+from ...core.errors import ColumnError
+from ...core.field_types import check_field_types
+from ...core.hints import Hint, HintedText
+from ...recording.heading import Heading
+from ...recording.row_notes import RowNote, list_rows
+from .clock import seconds_from_clock
+from .missing_cells import MAX_LISTED, ExaminedColumn, Mask, describe_faulty, examine, faulty_cells, number
+from .table import Cells, RawTable
+
+MAX_GAP = 5.0
+"""Longest gap that is interpolated, in sample times between its neighbours (chosen; a longer one is a gap in time)."""
+_GROUPED = re.compile(r"[-+]?\d{1,3}(\.\d{3})+,\d*|[-+]?\d{1,3}(,\d{3})+\.\d*")
+_HELD = ("branch", "fill", "discharge", "latched")
+
+
+class MissingValues(abc.ABC):
+    """Treatment of missing values in the columns of known quantities.
+
+    A value is missing where a cell is empty, not a number (NaN), a marker (`---`, `n/a`, `#N/A`, `#DIV/0!`), or one of
+    the `codes`, numbers or texts that the data acquisition writes for missing values, such as -999.
+    """
+
+    codes: tuple[float | str, ...] = ()
+
+    @abc.abstractmethod
+    def treat(self, table: RawTable, headings: Sequence[Heading]) -> RawTable:
+        """The table in which every cell of a known quantity is a number or a time. Raises ColumnError, which lists
+        the cells that are not."""
+
+
+@dataclasses.dataclass(frozen=True)
+class RefuseMissing(MissingValues):
+    """Missing values are an error, which lists them."""
+
+    codes: tuple[float | str, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
+
+    def treat(self, table: RawTable, headings: Sequence[Heading]) -> RawTable:
+        cells = examine(table, headings, self.codes)
+        _refuse(table, cells, missing=True)
+        return table
+
+
+@dataclasses.dataclass(frozen=True)
+class DropMissing(MissingValues):
+    """Rows with a missing value are left out; a note reports them."""
+
+    codes: tuple[float | str, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
+
+    def treat(self, table: RawTable, headings: Sequence[Heading]) -> RawTable:
+        cells = examine(table, headings, self.codes)
+        _refuse(table, cells)
+        return _without_rows(table, np.any([each.missing for each in cells], axis=0)) if cells else table
+
+
+@dataclasses.dataclass(frozen=True)
+class InterpolateMissing(MissingValues):
+    """Missing values are interpolated linearly in time where the gap is short; the other rows are left out.
+
+    A gap is short if the readings before and after it are at most `max_gap` sample times (median steps) apart. Valve
+    commands, branches and latches keep the value before the gap. Requires time.
+    """
+
+    codes: tuple[float | str, ...] = ()
+    max_gap: float = MAX_GAP
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
+
+    def treat(self, table: RawTable, headings: Sequence[Heading]) -> RawTable:
+        cells = examine(table, headings, self.codes)
+        _refuse(table, cells)
+        if not any(each.missing.any() for each in cells):
+            return table
+        timed = next((each for each in cells if each.heading.name == "time"), None)
+        if timed is None:
+            raise ColumnError(
+                f"{table.origin}: missing values are interpolated in time, but there is no time column.",
+                hint=Hint("To leave out the rows", "missing", DropMissing(self.codes), "read"),
+            )
+        table, cells, time = _with_time(table, cells, timed)
+        columns, filled = list(table.columns), np.zeros(len(time), dtype=bool)
+        left = np.zeros(len(time), dtype=bool)
+        for each in cells:
+            if each.missing.any():
+                columns[each.index], done = _interpolated(each, time, self.max_gap)
+                filled, left = filled | done, left | (each.missing & ~done)
+        table = dataclasses.replace(table, columns=tuple(columns))
+        if (filled & ~left).any():
+            rows = list_rows(table.row_label, table.rows[filled & ~left], MAX_LISTED)
+            count = np.count_nonzero(filled & ~left)
+            note = f"{table.origin}: rows with values interpolated in time: {count} of {len(filled)} ({rows})."
+            table = dataclasses.replace(table, notes=(*table.notes, RowNote(note)))
+        return _without_rows(table, left)
+
+
+MISSING_VALUES: dict[str, type[RefuseMissing] | type[DropMissing] | type[InterpolateMissing]] = {
+    "error": RefuseMissing, "drop": DropMissing, "interpolate": InterpolateMissing,
+}  # fmt: skip
+"""Treatments by their names in mapping files and on the command line."""
+
+
+def parse_code(text: str) -> float | str:
+    """The code of a missing value that a text states: a number, or else the text without outer blanks."""
+    try:
+        return float(text)
+    except ValueError:
+        return text.strip()
+
+
+def _refuse(table: RawTable, columns: Sequence[ExaminedColumn], *, missing: bool = False) -> None:
+    """Raise ColumnError for the cells that are no numbers, and with `missing` also for those without a value."""
+    found = faulty_cells(columns, missing=missing)
+    if found:
+        raise ColumnError(HintedText(describe_faulty(table, found), *_remedies(found)))
+
+
+def _remedies(found: Sequence[tuple[int, ExaminedColumn]]) -> Iterator[Hint]:
+    texts = [each.cells[row] for row, each in found if each.bad[row]]
+    if any(isinstance(text, str) and _GROUPED.fullmatch(text) for text in texts):
+        text = next(text for text in texts if isinstance(text, str) and _GROUPED.fullmatch(text))
+        sign = "," if text.rfind(",") > text.rfind(".") else "."
+        yield Hint("To specify the decimal sign", "decimal", sign, "read")
+    elif not texts:
+        yield Hint("To leave out the rows with missing values", "missing", DropMissing(), "read")
+        yield Hint("To interpolate short gaps", "missing", InterpolateMissing(), "read")
+    elif len(set(texts)) == 1 and isinstance(texts[0], str) and not any(map(str.isdigit, texts[0])):
+        yield Hint("If it stands for a missing value", "missing", DropMissing((texts[0],)), "read")
+
+
+def _without_rows(table: RawTable, left_out: Mask) -> RawTable:
+    if not left_out.any():
+        return table
+    if left_out.all():
+        raise ColumnError(f"{table.origin}: every row contains a missing value; no row is left.")
+    kept = np.flatnonzero(~left_out)
+    note = (
+        f"{table.origin}: rows left out, because a value is missing: {np.count_nonzero(left_out)} of {len(left_out)} "
+        f"({list_rows(table.row_label, table.rows[left_out], MAX_LISTED)})."
+    )
+    columns = tuple(_take(cells, kept) for cells in table.columns)
+    return dataclasses.replace(table, columns=columns, rows=table.rows[kept], notes=(*table.notes, RowNote(note)))
+
+
+def _take(cells: Cells, rows: npt.NDArray[np.intp]) -> Cells:
+    return [cells[i] for i in rows] if isinstance(cells, list) else cells[rows]
+
+
+def _with_time(
+    table: RawTable, cells: list[ExaminedColumn], timed: ExaminedColumn
+) -> tuple[RawTable, list[ExaminedColumn], Array]:
+    """The rows whose time is known, and their times [in the unit of the file]."""
+    kept = np.flatnonzero(~timed.missing)
+    table = _without_rows(table, timed.missing)
+    cells = [
+        dataclasses.replace(c, cells=_take(c.cells, kept), missing=c.missing[kept], bad=c.bad[kept]) for c in cells
+    ]
+    time = _take(timed.cells, kept)
+    if isinstance(time, list):
+        clock = seconds_from_clock(time)
+        time = np.array([float(cell) for cell in time]) if clock is None else clock
+    return table, cells, time
+
+
+def _interpolated(column: ExaminedColumn, time: Array, max_gap: float) -> tuple[Array, Mask]:
+    """The values (N,) with short gaps filled, and the filled rows."""
+    values = np.array([number(c) for c in column.cells] if isinstance(column.cells, list) else column.cells)
+    known = np.flatnonzero(~column.missing)
+    steps = np.diff(time)
+    sample_time = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+    rows = np.flatnonzero(column.missing)
+    after = np.searchsorted(known, rows)
+    inside = (after > 0) & (after < len(known))
+    rows, after = rows[inside], after[inside]
+    first, last = known[after - 1], known[np.minimum(after, len(known) - 1)]
+    span = time[last] - time[first]
+    short = (span > 0) & (span <= (max_gap + 1e-6) * sample_time)
+    rows, first, last, span = rows[short], first[short], last[short], span[short]
+    share = (
+        np.zeros(len(rows)) if column.heading.name.rpartition(".")[2] in _HELD else (time[rows] - time[first]) / span
+    )
+    values[rows] = values[first] + share * (values[last] - values[first])
+    filled = np.zeros(len(time), dtype=bool)
+    filled[rows] = True
+    return values, filled

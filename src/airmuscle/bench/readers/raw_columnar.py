@@ -1,0 +1,223 @@
+"""Readers of Parquet and HDF5 files: columns with their names and units."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...core.errors import FileError, suggestion
+from .channels import Channel, merge_channels
+from .downsampling import Decimation, Downsampling
+from .optional_dependency import import_lab_package, run_reader
+from .pieces import Reduction, check_reduced_lengths, read_reduced, with_reduction
+from .separate_process import read_in_separate_process
+from .table import RawTable
+
+
+class StoredTable(NamedTuple):
+    """The channels and constants of a group or a dataset of an HDF5 file, and the reduction of its rows."""
+
+    name: str
+    channels: list[Channel]
+    constants: dict[str, float | str]
+    reduction: Reduction
+
+
+def read_parquet_tables(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
+    """Read the table of a Parquet file; the metadata `unit` of a column states its unit, that of the file constants.
+
+    A Parquet file has no groups; `group` is not used. Raises FileError or ColumnError.
+    """
+    tables: tuple[RawTable, ...] = read_in_separate_process("pyarrow", __name__, "read_parquet_tables_here", path)
+    return tables
+
+
+def read_parquet_tables_here(path: Path) -> tuple[RawTable, ...]:
+    """As `read_parquet_tables`, in this process."""
+    parquet = import_lab_package("pyarrow.parquet", path)
+
+    def read() -> tuple[RawTable, ...]:
+        table = parquet.read_table(str(path))
+        channels = [
+            Channel(field.name, table.column(i).to_numpy(), unit=_text((field.metadata or {}).get(b"unit", b"")))
+            for i, field in enumerate(table.schema)
+            if not field.name.startswith("__index_level_")
+        ]
+        metadata = {_text(name): _text(value) for name, value in (table.schema.metadata or {}).items()}
+        constants: dict[str, float | str] = {
+            name: _number(text) for name, text in metadata.items() if name not in ("pandas", "ARROW:schema")
+        }
+        return (merge_channels(path.name, channels, constants),)
+
+    return run_reader(path, "Parquet", read)
+
+
+def read_hdf5_tables(
+    path: Path, group: str | None = None, downsampling: Downsampling = Decimation()
+) -> tuple[RawTable, ...]:
+    """Read one table from each group with vectors, or from the named group; the attribute `unit` states a unit.
+
+    A dataset of records (named fields) is a table of its own, and so is a matrix with an attribute `columns`. A table
+    of more than `downsampling.max_rows` rows is read by pieces and reduced. Raises FileError or ColumnError.
+    """
+    tables: tuple[RawTable, ...] = read_in_separate_process(
+        "h5py", __name__, "read_hdf5_tables_here", path, group, downsampling
+    )
+    return tables
+
+
+def read_hdf5_tables_here(
+    path: Path, group: str | None, downsampling: Downsampling = Decimation()
+) -> tuple[RawTable, ...]:
+    """As `read_hdf5_tables`, in this process."""
+    h5py = import_lab_package("h5py", path)
+
+    def read() -> dict[str, StoredTable]:
+        with h5py.File(path, "r") as file:
+            check_own_values(h5py, file, path)
+            return {each.name: each for each in _groups(h5py, file, path.name, downsampling) if each.channels}
+
+    contents = run_reader(path, "HDF5", read)
+    if not contents:
+        raise FileError(
+            f"{path.name}: no dataset is a vector of numbers, a matrix with columns, or a table of records."
+        )
+    if group is not None and group not in contents:
+        names = ", ".join(contents)
+        raise FileError(f"{path.name}: no group '{group}'; the groups are {names}.{suggestion(group, contents)}")
+    several, selected = len(contents) > 1, contents if group is None else {group: contents[group]}
+    tables = []
+    for name, each in selected.items():
+        table = merge_channels(f"{path.name}, group '{name}'" if several else path.name, each.channels, each.constants)
+        tables.append(with_reduction(table, each.reduction, downsampling))
+    return tuple(tables)
+
+
+def check_own_values(h5py: Any, file: Any, path: Path) -> None:
+    """Raise FileError if the values of a dataset are in another file, which might be any file of this machine."""
+
+    def is_outside(name: str, item: Any) -> bool | None:
+        return True if isinstance(item, h5py.Dataset) and (item.external or item.is_virtual) else None
+
+    if file.visititems(is_outside):
+        raise FileError(
+            f"{path.name}: the values of a dataset are in another file, which is not read. Store them in this file."
+        )
+
+
+def check_no_external_links(h5py: Any, group: Any, path: Path) -> None:
+    """Raise FileError if a group, or one inside it, has a link to another file."""
+    for name in group:
+        link = group.get(name, getlink=True)
+        if isinstance(link, h5py.ExternalLink):
+            raise FileError(f"{path.name}: '{name}' is a link to another file, which is not read. Store the values.")
+        if isinstance(link, h5py.HardLink) and isinstance(group[name], h5py.Group):
+            check_no_external_links(h5py, group[name], path)
+
+
+def _groups(
+    h5py: Any,
+    group: Any,
+    origin: str,
+    downsampling: Downsampling,
+    outer: Mapping[str, float | str] = MappingProxyType({}),
+) -> Iterator[StoredTable]:
+    """The table of each group with vectors and of each dataset that is a table; no links are followed.
+
+    The constants of the `outer` groups and of the file count in each group, which may state others.
+    """
+    vectors: list[Any] = []
+    tables: list[Any] = []
+    groups: list[Any] = []
+    for name in group:
+        if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+            continue
+        item = group[name]
+        if isinstance(item, h5py.Group):
+            groups.append(item)
+        elif item.size and item.ndim:
+            (vectors if item.ndim == 1 and item.dtype.names is None else tables).append(item)
+    constants, numeric = {**outer, **_constants(group.attrs)}, [d for d in vectors if d.dtype.kind in "biuf"]
+    reduction = Reduction.of((d.size for d in numeric), downsampling)
+    channels = [Channel(_name(d), _values(d, reduction.step, downsampling), unit=_unit(d.attrs)) for d in numeric]
+    place = f"{origin}, group '{group.name}'"
+    check_reduced_lengths(place, (d.size for d in numeric), (len(c.values) for c in channels))
+    yield StoredTable(group.name, channels, constants, reduction)
+    for dataset in tables:
+        reduction = Reduction.of([dataset.shape[0]], downsampling)
+        channels = _columns(dataset, reduction.step, downsampling)
+        yield StoredTable(dataset.name, channels, {**constants, **_constants(dataset.attrs)}, reduction)
+    for inner in groups:
+        yield from _groups(h5py, inner, origin, downsampling, constants)
+
+
+def _values(dataset: Any, step: int, downsampling: Downsampling, field: str | None = None) -> Any:
+    """The reduced rows of a dataset, or of one of its fields."""
+
+    def get(first: int, end: int) -> Any:
+        return dataset[first:end] if field is None else dataset[first:end][field]
+
+    return read_reduced(get, dataset.shape[0], step, downsampling)
+
+
+def _columns(dataset: Any, step: int, downsampling: Downsampling) -> list[Channel]:
+    """Channels of a dataset of records, or of a matrix with an attribute `columns`; empty for another dataset."""
+    units = _texts(dataset.attrs.get("units", ()))
+    if dataset.dtype.names is not None and dataset.ndim == 1:
+        names = list(dataset.dtype.names)
+        values = [_values(dataset, step, downsampling, name) for name in names]
+    else:
+        names = _texts(dataset.attrs.get("columns", ()))
+        if dataset.ndim != 2 or len(names) != dataset.shape[1]:
+            return []
+        values = list(np.asarray(_values(dataset, step, downsampling)).T)
+    units = units if len(units) == len(names) else [""] * len(names)
+    return [Channel(name, value, unit=unit) for name, value, unit in zip(names, values, units, strict=True)]
+
+
+def _name(dataset: Any) -> str:
+    return str(dataset.name).rpartition("/")[2]
+
+
+def _unit(attributes: Mapping[str, Any]) -> str:
+    return next((_text(attributes[key]) for key in ("unit", "units", "Unit", "Units") if key in attributes), "")
+
+
+def _constants(attributes: Mapping[str, Any]) -> dict[str, float | str]:
+    """Attributes that are single numbers or texts."""
+    scalars = {name: value for name, value in attributes.items() if np.ndim(value) == 0}
+    return {
+        name: float(value) if isinstance(value, np.number | int | float) else _text(value)
+        for name, value in scalars.items()
+        if isinstance(value, np.number | int | float | str | bytes) and name.isidentifier()
+    }
+
+
+def _text(value: Any) -> str:
+    return value.decode("utf-8", errors="replace") if isinstance(value, bytes) else str(value)
+
+
+def _texts(values: Any) -> list[str]:
+    return [_text(value) for value in np.atleast_1d(np.asarray(values, dtype=object))]
+
+
+def _number(text: str) -> float | str:
+    """A constant in the metadata: a number, a text in quotation marks, or any other text as it is."""
+    try:
+        return float(text)
+    except ValueError:
+        return _without_quotation_marks(text)
+
+
+def _without_quotation_marks(text: str) -> str:
+    """The text that `write` put in quotation marks because it looks like a number; any other text as it is."""
+    try:
+        value = json.loads(text)
+    except json.JSONDecodeError:
+        return text
+    return value if isinstance(value, str) else text

@@ -1,0 +1,246 @@
+"""Reader of MATLAB files, v5 to v7.3: one table for the vectors of each struct, and for those outside any struct.
+
+Also supported: a matrix next to a list of column names (`importdata` writes `data` and `colheaders`), and the
+structure with time that Simulink saves; tables and timetables with the package mat-io.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...core.errors import ColumnError, FileError, suggestion
+from ...core.hints import Hint
+from ...recording.heading import parse_heading
+from .channels import Channel, merge_channels
+from .downsampling import Decimation, Downsampling
+from .large_mat import LargeContents, is_version_7_3, read_large_mat
+from .mat_objects import READABLE, MatlabObject, find_objects, read_objects
+from .optional_dependency import import_lab_package, run_reader
+from .pieces import Reduction, with_reduction
+from .raw_columnar import check_no_external_links, check_own_values, read_hdf5_tables
+from .separate_process import read_in_separate_process
+from .table import RawTable
+
+_INTERNAL_PREFIXES = ("__", "#")
+"""Beginnings of names that no MATLAB variable has: header, function workspace, references, subsystem."""
+HDF5_SIGNATURE, HDF5_BLOCK = b"\x89HDF\r\n\x1a\n", 512
+"""Signature of an HDF5 file, and the least size of the block before it [bytes] (HDF5 file format, superblock)."""
+_UNNAMED = "None"
+"""Name that SciPy gives to objects."""
+
+
+def read_mat_tables(
+    path: Path, group: str | None = None, columns: Sequence[str] = (), downsampling: Downsampling = Decimation()
+) -> tuple[RawTable, ...]:
+    """Read one table from each struct with vectors, or from the named struct. Raises FileError or ColumnError.
+
+    If the vectors of a struct differ in length, those of the length of the mapped `columns` are read, or without any
+    those of the length of the known quantities.
+
+    A file with a variable of more than `downsampling.max_rows` rows is reduced while it is read, see `read_large_mat`.
+    The packages for this format are native code, therefore a separate process reads the file.
+    """
+    if _is_plain_hdf5(path):
+        return read_hdf5_tables(path, group, downsampling)
+    tables: tuple[RawTable, ...] = read_in_separate_process(
+        "pymatreader", __name__, "read_mat_tables_here", path, group, tuple(columns), downsampling
+    )
+    return tables
+
+
+def read_mat_tables_here(
+    path: Path, group: str | None, columns: Sequence[str] = (), downsampling: Downsampling = Decimation()
+) -> tuple[RawTable, ...]:
+    """As `read_mat_tables`, in this process."""
+    pymatreader = import_lab_package("pymatreader", path)
+    _check_links(path)
+    large = run_reader(path, "MATLAB", lambda: read_large_mat(path, pymatreader, downsampling))
+
+    def read() -> Mapping[str, Any]:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # about unreadable objects; the error below reports missing vectors
+            return dict(pymatreader.read_mat(str(path))) if large is None else large.variables
+
+    contents = run_reader(path, "MATLAB", read)
+    objects = find_objects(path)
+    tables = run_reader(path, "MATLAB", lambda: read_objects(path, objects))
+    unread = [each for each in objects if each.name not in tables]
+    opaque = {each.name for each in objects}
+    variables = {
+        name: value
+        for name, value in contents.items()
+        if not name.startswith(_INTERNAL_PREFIXES) and name not in opaque and name != _UNNAMED
+    } | tables
+    groups = dict(_find_groups("", variables))
+    if group is not None and group not in groups:
+        names = ", ".join(name or "(no struct)" for name in groups)
+        raise FileError(
+            f"{path.name}: no struct '{group}' with vectors; the structs are {names}.{suggestion(group, groups)}"
+        )
+    selected = groups if group is None else {group: groups[group]}
+    if not selected:
+        raise FileError(
+            f"{path.name}: no vector of numbers (the file contains "
+            f"{', '.join([*variables, *map(str, unread)]) or 'no variables'}). {_remedy(unread)}"
+        )
+    constants = _scalar_fields(variables)
+    made = [_make_table(path, name, fields, constants, len(groups) > 1, columns) for name, fields in selected.items()]
+    notes = tuple(f"Not read: {each}. {_remedy([each])}" for each in unread)
+    if large is not None:
+        made, notes = _with_reductions(selected, made, large, downsampling), notes + large.notes
+    return tuple(dataclasses.replace(table, notes=(*table.notes, *notes)) for table in made)
+
+
+def _is_plain_hdf5(path: Path) -> bool:
+    """Whether a file is HDF5 without the header of MATLAB, as h5py writes it."""
+    if not path.is_file():  # a pipe may have no end; the reader states the reason
+        return False
+    try:
+        with path.open("rb") as file:
+            beginning = file.read(2 * HDF5_BLOCK)
+    except OSError:
+        return False
+    starts = (0, HDF5_BLOCK)  # without and with the least user block
+    return not beginning.startswith(b"MATLAB") and any(beginning.startswith(HDF5_SIGNATURE, i) for i in starts)
+
+
+def _with_reductions(
+    names: Iterable[str], tables: Sequence[RawTable], large: LargeContents, downsampling: Downsampling
+) -> list[RawTable]:
+    whole = Reduction(0, 1)
+    return [
+        with_reduction(table, large.reductions.get(name, whole), downsampling)
+        for name, table in zip(names, tables, strict=True)
+    ]
+
+
+def _remedy(unread: Sequence[MatlabObject]) -> str:
+    """The commands of MATLAB that export the objects, and the package that reads tables."""
+    if not unread:
+        return "Save the measured columns as vectors, or as a struct with vectors."
+    commands = "; ".join(f"{each.name}: {each.export}" for each in unread)
+    readable = any(each.class_name in READABLE for each in unread)
+    package = " Tables and timetables are also read with the package mat-io: pip install mat-io." if readable else ""
+    return f"Export in MATLAB: {commands}.{package}"
+
+
+def _check_links(path: Path) -> None:
+    """Raise FileError if a file of version 7.3, which is HDF5, takes values from another file."""
+    if not is_version_7_3(path):
+        return
+    h5py = import_lab_package("h5py", path)
+
+    def check() -> None:
+        with h5py.File(path, "r") as file:
+            check_own_values(h5py, file, path)
+            check_no_external_links(h5py, file, path)
+
+    run_reader(path, "MATLAB", check)
+
+
+def _find_groups(name: str, fields: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """The structs with vectors by their dotted names; the variables outside any struct have the name ''."""
+    if "time" in fields and "signals" in fields:
+        yield name, _simulink_signals(fields)
+        return
+    if any(_is_vector(value) or _is_matrix(value) for value in fields.values()):
+        yield name, fields
+    for key, value in fields.items():
+        if isinstance(value, Mapping):
+            yield from _find_groups(f"{name}.{key}".lstrip("."), value)
+
+
+def _is_vector(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "biuf" and value.size > 1
+
+
+def _is_matrix(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and value.ndim == 2 and value.dtype.kind in "biuf" and min(value.shape) > 0
+
+
+def _simulink_signals(fields: Mapping[str, Any]) -> dict[str, Any]:
+    signals = fields["signals"]
+    parts = signals if isinstance(signals, Sequence) else [signals]
+    if isinstance(signals, Mapping) and isinstance(
+        signals.get("values"), list
+    ):  # an array of structs, stored field by field
+        parts = [dict(zip(signals, each, strict=True)) for each in zip(*signals.values(), strict=True)]
+    named = {str(p.get("label") or f"signal {i}"): np.asarray(p["values"]) for i, p in enumerate(parts, 1)}
+    return {"time_s": fields["time"], **named}
+
+
+def _scalar_fields(fields: Mapping[str, Any]) -> dict[str, float | str]:
+    """The fields that are single numbers or texts."""
+    return {
+        name: value.item() if isinstance(value, np.generic) else value
+        for name, value in fields.items()
+        if isinstance(value, float | int | str | np.generic) and not isinstance(value, bool)
+    }
+
+
+def _make_table(
+    path: Path, name: str, fields: Mapping[str, Any], constants: Mapping[str, float | str], several: bool,
+    columns: Sequence[str],
+) -> RawTable:  # fmt: skip
+    origin = f"{path.name}, {name or 'variables'}" if several else path.name
+    channels, notes = _of_one_length(origin, list(_channels(origin, fields)), columns)
+    table = merge_channels(origin, channels, {**constants, **_scalar_fields(fields)})
+    return dataclasses.replace(table, notes=(*table.notes, *notes))
+
+
+def _of_one_length(
+    origin: str, channels: list[Channel], columns: Sequence[str]
+) -> tuple[list[Channel], tuple[str, ...]]:
+    """The channels of the length of the mapped ones, or of the known quantities, and a note on the others.
+
+    Raises ColumnError where the length remains open.
+    """
+    lengths = sorted({len(channel.values) for channel in channels})
+    if len(lengths) < 2:
+        return channels, ()
+    mapped = [c for c in channels if c.name in columns or c.name.partition("[")[0].strip() in columns]
+    selecting = mapped or [c for c in channels if parse_heading(c.name).known]
+    selected = {len(channel.values) for channel in selecting}
+    if len(selected) != 1:
+        sizes = "; ".join(
+            f"{length} rows: {', '.join(c.name for c in channels if len(c.values) == length)}" for length in lengths
+        )
+        raise ColumnError(
+            f"{origin}: the vectors have different lengths ({sizes}). Name the columns of one length; the others are "
+            "then not read.",
+            hint=Hint("To map a column", "columns", {f"{channels[0].name}": "time [s]"}, function="read"),
+        )
+    (length,) = selected
+    left_out = [f"{c.name} ({len(c.values)} rows)" for c in channels if len(c.values) != length]
+    note = f"Not read, because their length differs from the {length} rows of the table: {', '.join(left_out)}."
+    return [c for c in channels if len(c.values) == length], (note,)
+
+
+def _channels(origin: str, fields: Mapping[str, Any]) -> Iterator[Channel]:
+    units_field = fields.get("units", fields.get("unit", {}))
+    units = units_field if isinstance(units_field, Mapping) else {}
+    for name, value in fields.items():
+        if _is_vector(value):
+            yield Channel(name, value, unit=str(units.get(name, "")))
+        elif _is_matrix(value):
+            names = _column_names(name, value.shape[1], fields)
+            yield from (Channel(names[j], value[:, j]) for j in range(value.shape[1]))
+        elif isinstance(value, np.ndarray) and value.ndim > 2:
+            raise ColumnError(
+                f"{origin}: '{name}' has {value.ndim} dimensions; a table has two. Save its columns separately."
+            )
+
+
+def _column_names(name: str, width: int, fields: Mapping[str, Any]) -> list[str]:
+    """The column names from a list of texts next to the matrix, otherwise MATLAB index expressions: `data(:,1)`."""
+    for value in fields.values():
+        texts = value.tolist() if isinstance(value, np.ndarray) and value.dtype.kind in "UO" else value
+        if isinstance(texts, list) and len(texts) == width and all(isinstance(t, str) for t in texts):
+            return [t.strip() for t in texts]
+    return [f"{name}(:,{j})" for j in range(1, width + 1)]

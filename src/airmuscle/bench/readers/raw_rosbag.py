@@ -1,0 +1,105 @@
+"""Reader of ROS bags: numbers of all topics as channels with the times of their messages; needs the extra `ros`."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...core.errors import FileError
+from .channels import Channel, merge_channels
+from .optional_dependency import import_lab_package, run_reader
+from .ros_units import FIELD_UNITS, QUANTITY_FIELDS, is_quantity_field
+from .table import RawTable
+
+MAX_ELEMENTS = 64
+"""Elements of a list of numbers that become columns at most (chosen): joints, not pictures."""
+
+
+@dataclasses.dataclass(frozen=True)
+class _Field:
+    """A number of a message: its path, its unit, and whether its name may state a quantity."""
+
+    name: str
+    unit: str
+    is_quantity: bool
+
+
+def read_rosbag_tables(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
+    """One table from a bag of ROS 1 (.bag) or ROS 2 (.db3 or .mcap, in a folder with metadata.yaml).
+
+    Columns are named `topic.field`: `joint_states.position.elbow`, with the name of the joint where a message has some.
+    The field `data` alone is named by its topic. Fields of standard messages have the units of their type, and are no
+    quantities by their names, except those of FluidPressure (absolute) and Temperature. The time is that at which a
+    message was recorded, from the first one on. `group` selects one topic. Files of one ROS 2 bag are read together.
+    Raises FileError or ColumnError.
+    """
+    highlevel = import_lab_package("rosbags.highlevel", path)
+    folder = path if path.suffix == ".bag" else path.parent
+    if path.suffix != ".bag" and not (folder / "metadata.yaml").exists():
+        raise FileError(f"{path}: there is no metadata.yaml next to it; copy the whole folder of the ROS 2 bag.")
+    if path.suffix != ".bag" and path != min(p for p in folder.iterdir() if p.suffix == path.suffix):
+        return ()
+
+    def read() -> dict[str, list[tuple[float, dict[_Field, float]]]]:
+        typestore = import_lab_package("rosbags.typesys", path)
+        default = typestore.get_typestore(typestore.Stores.ROS2_HUMBLE)
+        with highlevel.AnyReader([folder], default_typestore=default) as bag:
+            return _messages(bag, group)
+
+    topics = run_reader(path, "ROS bag", read)
+    channels = [channel for topic, messages in topics.items() for channel in _channels(topic, messages)]
+    if not channels:
+        raise FileError(f"{path}: no topic contains numbers{f', or there is no topic {group}' if group else ''}.")
+    return (merge_channels(folder.name, channels, {}, "message"),)
+
+
+def _messages(bag: Any, group: str | None) -> dict[str, list[tuple[float, dict[_Field, float]]]]:
+    """Time [s] and numbers of every message, by topic."""
+    chosen = [c for c in bag.connections if group is None or c.topic.strip("/") == group.strip("/")]
+    messages: dict[str, list[tuple[float, dict[_Field, float]]]] = {}
+    for connection, stamp, raw in bag.messages(connections=chosen) if chosen else ():
+        message = bag.deserialize(raw, connection.msgtype)
+        numbers = dict(_numbers(message, ""))
+        if numbers:
+            topic = connection.topic.strip("/").replace("/", ".")
+            messages.setdefault(topic, []).append(((stamp - bag.start_time) * 1e-9, numbers))
+    return messages
+
+
+def _numbers(value: Any, path: str, unit: str = "") -> Iterator[tuple[_Field, float]]:
+    """The numbers of a message by their fields; headers are left out."""
+    names, kind = getattr(value, "name", None), str(getattr(value, "__msgtype__", ""))
+    labels = [str(n) for n in names] if isinstance(names, list | tuple) else []
+    for field in getattr(value, "__dataclass_fields__", {}):
+        item, within = getattr(value, field), FIELD_UNITS.get((kind, field), unit)
+        stated = bool(within) and field in QUANTITY_FIELDS
+        inner = ".".join([*([path] if path else []), QUANTITY_FIELDS[field] if stated else field])
+        if field in ("header", "layout", "__msgtype__") or field.endswith("covariance"):
+            continue
+        if isinstance(item, bool | int | float | np.number):
+            number = item.item() if isinstance(item, np.number) else item
+            yield _Field(inner, within, stated or is_quantity_field(kind, field)), number
+        elif isinstance(item, np.ndarray) and item.dtype.kind in "biuf" and 0 < item.size <= MAX_ELEMENTS:
+            words = labels if len(labels) == item.size else [str(i) for i in range(item.size)]
+            fields = (_Field(f"{inner}.{word}", within, False) for word in words)
+            yield from zip(fields, item.ravel().tolist(), strict=True)
+        elif hasattr(item, "__dataclass_fields__"):
+            yield from _numbers(item, inner, within)
+
+
+def _channels(topic: str, messages: list[tuple[float, dict[_Field, float]]]) -> list[Channel]:
+    """One channel for each number of a topic; where a message lacks it, there is no row."""
+    fields = dict.fromkeys(field for _, numbers in messages for field in numbers)
+    channels = []
+    for field in fields:
+        rows = [(time, numbers[field]) for time, numbers in messages if field in numbers]
+        time = np.array([row[0] for row in rows])
+        values = np.array([row[1] for row in rows])  # integers remain integers, which are held between messages
+        first = np.concatenate([[True], np.diff(time) > 0])
+        name = topic if field.name == "data" else f"{topic}.{field.name}"
+        channels.append(Channel(name, values[first], time[first], field.unit, field.is_quantity))
+    return channels

@@ -1,0 +1,209 @@
+"""Text table format: encoding, delimiter, decimal sign, headings and units."""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import dataclasses
+import re
+from collections.abc import Mapping
+
+from ...core.errors import FileError, ParameterError
+from .header import (
+    are_headings,
+    count_cells,
+    is_number,
+    missing_header_error,
+    parse_constant_cells,
+    parse_constant_comment,
+    parse_unit_row,
+    stated_heading_row,
+)
+
+NumberedLines = list[tuple[int, str]]
+"""Lines of a file with their numbers, counted from 1."""
+
+_DELIMITERS = ("\t", ";", ",", "|", " ")
+_DECIMALS = (".", ",")
+
+
+@dataclasses.dataclass(frozen=True)
+class TextFormat:
+    """Format of a text table: `delimiter` and `decimal`; None means automatic detection.
+
+    With `headerless`, the columns of a table without headings are named by their numbers, "1", "2" and so on. The
+    headings are in the line that contains most of `named`, or in the first one below `skip_rows` lines if it is given.
+    """
+
+    delimiter: str | None = None
+    decimal: str | None = None
+    headerless: bool = False
+    named: tuple[str, ...] = ()
+    skip_rows: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.delimiter is not None and self.delimiter not in _DELIMITERS:
+            raise ParameterError(
+                f"delimiter is {self.delimiter!r}; it must be a comma, semicolon, tab, blank or '|'. Omit it for "
+                "automatic detection."
+            )
+        if self.decimal is not None and self.decimal not in _DECIMALS:
+            raise ParameterError(
+                f"decimal is {self.decimal!r}; it must be '.' or ','. Omit it for automatic detection."
+            )
+        if self.delimiter == self.decimal == ",":
+            raise ParameterError("delimiter and decimal are both ','; they must differ. Export the table with ';'.")
+
+    def detect_delimiter(self, line: str) -> str:
+        """The given delimiter, otherwise the one detected in a line of the table; blanks only between numbers."""
+        sign = next((d for d in "\t;" if d in line), "|" if "|" in line and "," not in line else "")
+        return self.delimiter or sign or (" " if _are_numbers_and_blanks(line) else ",")
+
+    def with_blanks(self, body: NumberedLines) -> TextFormat:
+        """The format with blanks as the delimiter, if none is given and they separate the first numbers of a table."""
+        if self.delimiter is None:
+            for _, line in body:
+                delimiter = self.detect_delimiter(line)
+                if delimiter == " ":
+                    return dataclasses.replace(self, delimiter=delimiter)
+                if delimiter != "," or _is_numeric(split_cells(line, delimiter)):
+                    break
+        return self
+
+
+@dataclasses.dataclass(frozen=True)
+class TextHeader:
+    """Header of a text table: headings, unit row, constants in comments, and the delimiter."""
+
+    headings: tuple[str, ...]
+    units: tuple[str, ...] | None
+    constants: Mapping[str, float | str]
+    delimiter: str
+    header_lines: int
+    """Number of lines, without comments, above the numbers: headings, unit row, and lines above the headings."""
+
+
+def detect_encoding(content: bytes) -> str:
+    """The encoding of a file from its beginning: UTF-16 if it starts with a BOM, UTF-8 if valid, otherwise Latin-1."""
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return "utf-16"
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(content)  # a truncated last character is not an error
+    except UnicodeDecodeError:
+        return "latin-1"
+    return "utf-8-sig"
+
+
+def is_comment(line: str) -> bool:
+    """Whether a line with content is a comment."""
+    return line.lstrip().startswith(("#", "%"))
+
+
+def has_content(line: str) -> bool:
+    """Whether a line contains more than delimiters and blanks."""
+    return bool(line.strip(' \t;,"\r\n'))
+
+
+def split_cells(line: str, delimiter: str) -> list[str]:
+    """The cells of a line; a blank before a unit in brackets, `time [s] force [N]`, does not separate cells."""
+    if delimiter == " " and '"' not in line:
+        return re.split(r"(?<=[\])])\s+|\s+(?![\[(])", line.strip())
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))]
+
+
+def check_cell_sizes(origin: str, lines: NumberedLines) -> None:
+    """Raise FileError for a cell with more characters than the parser of the cells takes."""
+    limit = csv.field_size_limit()
+    for i, line in lines:
+        if len(line) > limit and max(map(len, re.split("[\t;,| ]", line))) > limit:
+            raise FileError(f"{origin}, line {i}: a cell has more than {limit} characters. It is no table of numbers.")
+
+
+def parse_header(origin: str, lines: NumberedLines, text_format: TextFormat) -> TextHeader:
+    """Parse the header of a table from its first non-empty lines. Raises FileError or ColumnError."""
+    check_cell_sizes(origin, lines)
+    comments = [(i, line) for i, line in lines if is_comment(line)]
+    body = [(i, line) for i, line in lines if not is_comment(line)]
+    if not body:
+        raise FileError(
+            f"{origin}: the file contains no table. A table consists of a row of headings and rows of numbers."
+        )
+    text_format = text_format.with_blanks(body)
+    above = _lines_above_headings(body, text_format)
+    if text_format.skip_rows is not None and body[-1][0] <= text_format.skip_rows:
+        raise FileError(f"{origin}: there is no table below the {text_format.skip_rows} lines of skip_rows.")
+    preamble, body = body[:above], body[above:]
+    delimiter = text_format.detect_delimiter(body[0][1])
+    headings, count = _find_headings(origin, comments, body, delimiter, text_format.headerless)
+    below = split_cells(body[count][1], delimiter) if len(body) > count else []
+    units = parse_unit_row(headings, below)
+    count += 1 if units else 0
+    if len(body) <= count:
+        raise FileError(f"{origin}: no rows of numbers below the headings ({', '.join(headings)}).")
+    cells = [parse_constant_cells(split_cells(line, delimiter)) for _, line in preamble]
+    constants = dict(
+        constant for constant in (*cells, *(parse_constant_comment(line) for _, line in comments)) if constant
+    )
+    return TextHeader(tuple(headings), units, constants, delimiter, above + count)
+
+
+def _lines_above_headings(body: NumberedLines, text_format: TextFormat) -> int:
+    """The number of lines above the headings, such as the title and the settings of a logger.
+
+    The headings are where the user states them; otherwise the line above the first row of numbers that has as many
+    cells, or the line above the unit row.
+    """
+    cells_of = ((i, split_cells(line, text_format.detect_delimiter(line))) for i, line in body)
+    stated = stated_heading_row(cells_of, text_format.named, text_format.skip_rows)
+    if stated is not None:
+        return stated
+    rows: list[tuple[str, list[str]]] = []
+    for _, line in body:
+        delimiter = text_format.detect_delimiter(line)
+        cells = split_cells(line, delimiter)
+        if _is_numeric(cells):
+            if not rows or (_is_numeric(rows[-1][1]) and is_number(cells[0]) and is_number(rows[-1][1][0])):
+                return 0  # no heading is found above the first rows of numbers
+            above = _heading_above(rows, delimiter, count_cells(cells))
+            if above is not None:
+                return above
+        rows.append((delimiter, cells))
+    return 0
+
+
+def _heading_above(rows: list[tuple[str, list[str]]], delimiter: str, width: int) -> int | None:
+    """The index of the headings of a first row of numbers with `width` filled cells; None if they are not above it."""
+    last = [row for row in rows[-2:] if row[0] == delimiter]
+    if not last or rows[-1][0] != delimiter or _is_numeric(last[-1][1]):
+        return None
+    if len(last) == 2 and parse_unit_row(last[0][1], last[1][1]):
+        return len(rows) - 2 if max(count_cells(cells) for _, cells in last) >= width else None
+    return len(rows) - 1 if count_cells(last[-1][1]) >= width else None
+
+
+def _are_numbers_and_blanks(line: str) -> bool:
+    """Whether a line consists of two numbers or more between blanks."""
+    cells = line.split()
+    return len(cells) > 1 and all(is_number(cell) and not cell.endswith(",") for cell in cells)
+
+
+def _is_numeric(cells: list[str]) -> bool:
+    """Whether a row has two cells or more, and more than half of them are numbers, clock times or dates."""
+    filled = [cell for cell in cells if cell]
+    numbers = sum(is_number(cell) or not any(map(str.isalpha, cell)) for cell in filled)
+    return len(filled) > 1 and 2 * numbers > len(filled)
+
+
+def _find_headings(
+    origin: str, comments: NumberedLines, body: NumberedLines, delimiter: str, headerless: bool
+) -> tuple[list[str], int]:
+    """The headings, and the number of table lines that they occupy: 0 if they are in the last comment above."""
+    first, cells = body[0][0], split_cells(body[0][1], delimiter)
+    if are_headings(cells):
+        return cells, 1
+    above = [split_cells(line.lstrip("#% \t"), delimiter) for i, line in comments if i < first]
+    if above and len(above[-1]) == len(cells) and are_headings(above[-1]):
+        return above[-1], 0
+    if headerless:
+        return [str(i) for i in range(1, len(cells) + 1)], 0
+    raise missing_header_error(f"{origin}, line {first}")

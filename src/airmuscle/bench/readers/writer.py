@@ -1,0 +1,85 @@
+"""Writer of recordings as CSV, Parquet and HDF5; the extension gives the format, and `read` reads them again."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...core.atomic_output import atomic_file
+from ...core.errors import AirmuscleError, FileError
+from ...recording.heading import split_unit
+from ...recording.recording import Recording, column_heading
+from .csv_writer import write_csv
+from .header import is_number
+from .optional_dependency import import_lab_package
+
+
+def write(recording: Recording, path: str | Path) -> Path:
+    """Write a recording in SI units as .csv, .parquet, .h5 or .hdf5, and return the path.
+
+    Units are metadata of the columns, constants those of the file; the notes are in CSV only. The file is replaced
+    atomically. Raises FileError for another extension, a missing package, or a file that cannot be written.
+    """
+    path = Path(path)
+    if path.suffix.lower() == ".csv":
+        return write_csv(recording, path)
+    writer = _WRITERS.get(path.suffix.lower())
+    if writer is None:
+        raise FileError(f"{path}: a recording cannot be written as '{path.suffix}'; allowed: {', '.join(EXTENSIONS)}.")
+    try:
+        with atomic_file(path) as temporary:
+            writer(recording, temporary, path)
+    except AirmuscleError:
+        raise
+    except Exception as reason:  # each package raises its own exceptions
+        text = getattr(reason, "strerror", None) or " ".join(str(reason).split())[:120]
+        raise FileError(
+            f"{path}: cannot be written ({text}). Choose an existing folder with write permission."
+        ) from None
+    return path
+
+
+def _columns(recording: Recording) -> list[tuple[str, str, Any]]:
+    """Name, unit and values of every column."""
+    columns = []
+    for name in recording:
+        plain, unit = split_unit(column_heading(name))
+        columns.append((plain if unit else name, unit or "", np.asarray(recording[name])))
+    return columns
+
+
+def _write_parquet(recording: Recording, temporary: Path, path: Path) -> None:
+    arrow, parquet = import_lab_package("pyarrow", path), import_lab_package("pyarrow.parquet", path)
+    columns = _columns(recording)
+    fields = [arrow.field(name, arrow.float64(), metadata={"unit": unit}) for name, unit, _ in columns]
+    metadata = {name: _constant_text(value) for name, value in recording.constants.items()}
+    schema = arrow.schema(fields, metadata=metadata)
+    table = arrow.Table.from_arrays([arrow.array(values) for _, _, values in columns], schema=schema)
+    parquet.write_table(table, str(temporary))
+
+
+def _constant_text(value: float | str) -> str:
+    """A constant as text; a text that looks like a number, such as the specimen `007`, in quotation marks."""
+    is_text = isinstance(value, str) and (is_number(value) or value.startswith('"'))
+    return json.dumps(value, ensure_ascii=False) if is_text else str(value)
+
+
+def _write_hdf5(recording: Recording, temporary: Path, path: Path) -> None:
+    h5py = import_lab_package("h5py", path)
+    with h5py.File(temporary, "w") as file:
+        file.attrs.update(dict(recording.constants))
+        for name, unit, values in _columns(recording):
+            file.create_dataset(name.replace("/", "_"), data=values).attrs["unit"] = unit
+
+
+_WRITERS: Mapping[str, Callable[[Recording, Path, Path], None]] = {
+    ".parquet": _write_parquet,
+    ".h5": _write_hdf5,
+    ".hdf5": _write_hdf5,
+}
+EXTENSIONS = (".csv", *_WRITERS)
+"""Extensions of the formats that can be written."""

@@ -1,0 +1,194 @@
+"""Branches: motion of the driven quantity in one direction, such as inflation and deflation.
+
+The driven quantity of an isobaric run is the contraction, length or position; that of all other runs is the pressure. A
+branch ends where this quantity has moved back from an extreme by more than a fraction `reversal` of its range; smaller
+ripples do not end it. A branch ends with its run, too, because the muscle was moved or loaded anew before the next run.
+A dwell at an extreme belongs to the branch before it, because friction depends on the previous motion: the reversal is
+placed at the last row before the quantity leaves the level of the dwell. A branch column in the file is not used;
+`branch_column_agreement` compares it with the result.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...core.arrays import Array
+from ...recording.recording import Recording
+from .interval import Interval, running_median
+from .remembered import remembered
+from .runs import AT_REST, ISOBARIC, ISOMETRIC, ISOTONIC, Run, find_runs, moved_column
+from .sampling import count_rows
+from .sensor import Sensor, estimate_noise
+
+REVERSAL_FRACTION = 0.05
+"""Fraction of the range by which the pressure must move back for a reversal (chosen)."""
+SPIKE_DURATION = 0.15
+"""Overshoots of a valve pulse shorter than this [s] are not reversals (chosen)."""
+EXIT_FRACTION = 0.25
+"""Fraction of the reversal threshold by which the pressure leaves a dwell (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Branch:
+    """Rows of one direction of the driven quantity `column`, and the pressures at both ends [Pa].
+
+    `direction` is 1 where the muscle inflates or contracts, -1 where it deflates or extends.
+    """
+
+    interval: Interval
+    direction: int
+    start_pressure: float
+    end_pressure: float
+    column: str = "pressure"
+
+    @property
+    def name(self) -> str:
+        """`inflating` or `deflating` where the pressure is driven, otherwise `contracting` or `extending`."""
+        return branch_name(self.column, self.direction)
+
+
+def branch_name(column: str, direction: int) -> str:
+    """The name of a branch of a driven column: inflating, deflating, contracting or extending."""
+    names = ("inflating", "deflating") if column == "pressure" else ("contracting", "extending")
+    return names[0] if direction > 0 else names[1]
+
+
+@remembered
+def find_branches(
+    recording: Recording,
+    sensor: Sensor | None = None,
+    *,
+    reversal: float = REVERSAL_FRACTION,
+    runs: tuple[Run, ...] | None = None,
+) -> tuple[Branch, ...]:
+    """The branches of a recording in order; empty if there is no pressure or if the driven quantity is constant.
+
+    A reversal exceeds the fraction `reversal` of the range of the driven quantity and ten standard deviations of its
+    sensor; `sensor` is that of the pressure. `runs` are those of `find_runs`. Without time, the order of the rows is
+    taken as the history.
+    """
+    if "pressure" not in recording or len(recording) < 3:
+        return ()
+    runs = find_runs(recording) if runs is None else runs
+    column = moved_column(recording)
+    isobaric = [run.interval for run in runs if run.kind == ISOBARIC and column in run.swept_columns]
+    if 2 * sum(len(interval) for interval in isobaric) > len(recording):
+        return tuple(b for each in isobaric for b in _motion_branches(recording, column, each, reversal))
+    if sensor is None and any(run.kind == AT_REST for run in runs):
+        sensor = Sensor("pressure", 0.0, estimate_noise(recording["pressure"]))
+    return tuple(_pressure_branches(recording, _split_at_runs(recording, runs), sensor, reversal))
+
+
+def _split_at_runs(recording: Recording, runs: tuple[Run, ...]) -> list[Interval]:
+    """The intervals that no branch of the pressure leaves: runs at other lengths or loads, and the rows between them.
+
+    The whole recording if it is one run, or if most of its rows belong to no such run.
+    """
+    separate = [run.interval for run in runs if run.kind in (ISOMETRIC, ISOTONIC)]
+    if 2 * sum(len(interval) for interval in separate) <= len(recording):
+        separate = []
+    inner = {row for a, b in itertools.pairwise(separate) for row in (a.stop, b.start)}
+    return [Interval(a, b) for a, b in itertools.pairwise(sorted({0, *inner, len(recording)}))]
+
+
+def _pressure_branches(
+    recording: Recording, parts: list[Interval], sensor: Sensor | None, reversal: float
+) -> Iterator[Branch]:
+    time, pressure = recording.columns.get("time"), recording["pressure"]
+    smooth = [_remove_spikes(pressure[part.rows], None if time is None else time[part.rows]) for part in parts]
+    threshold = max(reversal * float(np.ptp(np.concatenate(smooth))), 10.0 * (sensor.std if sensor else 0.0))
+    for part, values in zip(parts, smooth, strict=True):
+        for each, direction in _monotonic_intervals(values, threshold):
+            ends = float(values[each.start]), float(values[each.stop - 1])
+            yield Branch(Interval(part.start + each.start, part.start + each.stop), direction, *ends)
+
+
+def _motion_branches(recording: Recording, column: str | None, run: Interval, reversal: float) -> Iterator[Branch]:
+    """The branches of the motion in one isobaric run; none if the motion is not measured."""
+    if column is None:
+        return
+    shortening = -1 if column == "length" else 1
+    time, pressure = recording.columns.get("time"), recording["pressure"]
+    smooth = _remove_spikes(recording[column][run.rows], None if time is None else time[run.rows])
+    noise = estimate_noise(smooth) if time is not None else 0.0
+    for part, direction in _monotonic_intervals(smooth, max(reversal * float(np.ptp(smooth)), 10.0 * noise)):
+        interval = Interval(run.start + part.start, run.start + part.stop)
+        ends = float(pressure[interval.start]), float(pressure[interval.stop - 1])
+        yield Branch(interval, shortening * direction, *ends, column)
+
+
+def motion_direction(values: Array, time: Array | None = None, *, reversal: float = REVERSAL_FRACTION) -> Array:
+    """The direction of motion (N,) of any signal (N,): 1 rising, -1 falling, 0 everywhere if the signal is constant.
+
+    Reversals are detected as for the branches of the pressure.
+    """
+    smooth = _remove_spikes(values, time)
+    signs = np.zeros(len(values))
+    threshold = reversal * float(np.ptp(smooth)) if len(smooth) else 0.0
+    for interval, direction in _monotonic_intervals(smooth, threshold):
+        signs[interval.rows] = direction
+    return signs
+
+
+def _remove_spikes(values: Array, time: Array | None) -> Array:
+    return values if time is None else running_median(values, 2 * count_rows(SPIKE_DURATION / 2.0, time, 1) + 1)
+
+
+def _monotonic_intervals(smooth: Array, threshold: float) -> list[tuple[Interval, int]]:
+    """The intervals between reversals, each with its direction; empty if the range does not exceed `threshold`."""
+    if not len(smooth) or not float(np.ptp(smooth)) > threshold:
+        return []
+    reversals = list(_find_reversals(smooth, threshold))
+    starts = [0, *(row for row, _ in reversals[1:]), len(smooth)]
+    pairs = zip(itertools.pairwise(starts), reversals, strict=True)
+    return [(Interval(a, b), direction) for (a, b), (_, direction) in pairs]
+
+
+def _find_reversals(pressure: Array, threshold: float) -> Iterator[tuple[int, int]]:
+    """First row and direction of each branch; the first direction is known once the pressure has moved."""
+    direction, extreme = 0, 0
+    low = high = 0
+    values = pressure.tolist()
+    for i, value in enumerate(values):
+        if direction == 0:
+            low, high = (i if value < values[low] else low), (i if value > values[high] else high)
+            if values[high] - values[low] >= threshold:
+                direction, extreme = (1, high) if high > low else (-1, low)
+                yield 0, direction
+        elif direction * (value - values[extreme]) >= 0.0:
+            extreme = i
+        elif direction * (values[extreme] - value) >= threshold:
+            yield _end_of_dwell(values, extreme, i, direction, threshold), -direction
+            direction, extreme = -direction, i
+
+
+def _end_of_dwell(values: list[float], extreme: int, current: int, direction: int, threshold: float) -> int:
+    """The first row that has left the level of the extreme, between the extreme and the current row."""
+    last = max(
+        (j for j in range(extreme, current) if direction * (values[extreme] - values[j]) < EXIT_FRACTION * threshold),
+        default=extreme,
+    )
+    return last + 1
+
+
+def branch_directions(recording: Recording, branches: tuple[Branch, ...]) -> Array:
+    """The direction (N,) of each row: 1 inflating or contracting, -1 deflating or extending, 0 outside."""
+    signs = np.zeros(len(recording))
+    for branch in branches:
+        signs[branch.interval.rows] = branch.direction
+    return signs
+
+
+def branch_column_agreement(recording: Recording, branches: tuple[Branch, ...]) -> float | None:
+    """Fraction of rows that agree with the branch column of the file (1 inflating, 2 deflating); None without it.
+
+    None also for branches of a motion at constant pressure.
+    """
+    if "branch" not in recording or any(branch.column != "pressure" for branch in branches):
+        return None
+    stated = np.where(recording["branch"] == 1, 1.0, -1.0)
+    return float(np.mean(stated == branch_directions(recording, branches)))

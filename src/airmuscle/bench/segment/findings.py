@@ -1,0 +1,183 @@
+"""Findings: data-quality problems of a recording and their remedies."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from ...core.errors import ColumnError
+from ...core.hints import Hint, HintedText
+from ...recording.columns import quantity_of
+from ...recording.displacement import ZERO_NOT_STATED
+from ...recording.recording import Recording
+from ..readers.time_base import UNIFORM, WITHOUT_TIME
+from .quasi_static import quasi_static_rows
+from .runs import AT_REST, FREE, KINDS, Run, moved_column
+from .sampling import Sampling
+from .sensor import Sensor
+from .static_points import find_static_points
+
+MAX_SATURATED_FRACTION = 0.5
+"""Fraction of saturated rows above which too few rows remain for a fit (chosen)."""
+MAX_FINAL_CHANGE = 0.02
+"""A record is too short if its last tenth changes by more than this fraction of the range (chosen)."""
+NOISE_FACTOR = 10.0
+"""A pressure with a range below this multiple of the sensor's standard deviation is constant (chosen)."""
+MIN_ROWS_PER_STEP = 5
+"""A step sampled by fewer rows than this is undersampled (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Finding:
+    """A data-quality finding. If it is `serious`, a fit of the recording would fail or mislead."""
+
+    text: str
+    serious: bool = False
+
+
+def collect_findings(
+    recording: Recording, sampling: Sampling | None, sensors: Mapping[str, Sensor], runs: tuple[Run, ...]
+) -> tuple[Finding, ...]:
+    """All findings on a recording, the serious ones first."""
+    findings = [
+        *_time_findings(recording, sampling),
+        *_sensor_findings(recording, sensors),
+        *_run_findings(recording, runs),
+        *_motion_findings(recording),
+        *_duration_findings(recording, sampling, sensors),
+    ]
+    return tuple(sorted(findings, key=lambda finding: not finding.serious))
+
+
+def check_swept(recording: Recording, runs: tuple[Run, ...]) -> None:
+    """Raise ColumnError if no quantity of a recording varies, or if the run is not of the stated kind."""
+    for finding in _run_findings(recording, runs):
+        if finding.serious:
+            raise ColumnError(f"{recording.origin}: {finding.text}")
+
+
+def _time_findings(recording: Recording, sampling: Sampling | None) -> Iterator[Finding]:
+    points = find_static_points(recording)
+    if points is not None:
+        slack = int(np.count_nonzero(recording["force"] <= 0)) if "force" in recording else 0
+        at_zero = f", {slack} of them without tension" if slack else ""
+        yield Finding(
+            f"no time column: {points.description}{at_zero}. The order of the rows has no meaning, so that noise, "
+            "saturation, branches and outliers are not assessed."
+        )
+        return
+    if sampling is None:
+        yield Finding("no time column: rows are taken as steady states; sampling and outliers cannot be assessed.")
+        return
+    for rows, verb in ((sampling.repeated_rows, "repeats"), (sampling.backward_rows, "decreases")):
+        if rows:
+            hints = (UNIFORM, WITHOUT_TIME) if sampling.rounded else (WITHOUT_TIME,)
+            text = f"time {verb} in {_count(len(rows), 'row')}, first in row {rows[0] + 1}. Sort the rows, delete "
+            yield Finding(HintedText(f"{text}duplicates, or write two runs to two files.", *hints), serious=True)
+    if sampling.gaps:
+        longest = max(sampling.gaps, key=lambda gap: gap.duration)
+        yield Finding(
+            f"{_count(len(sampling.gaps), 'gap')} in time, the longest of {longest.duration:.4g} s after row "
+            f"{longest.row + 1} (sample time {sampling.sample_time:.4g} s). Do not fit dynamics across gaps."
+        )
+
+
+def _sensor_findings(recording: Recording, sensors: Mapping[str, Sensor]) -> Iterator[Finding]:
+    for name, sensor in sensors.items():
+        for limit, adjective in ((sensor.lower_limit, "lower"), (sensor.upper_limit, "upper")):
+            if name not in recording.columns or not np.isfinite(limit):
+                continue
+            count = int(np.count_nonzero(np.abs(recording[name] - limit) <= 0.25 * sensor.resolution))
+            fraction = count / len(recording)
+            quantity = quantity_of(name)
+            unit = f" {quantity.unit}" if quantity and quantity.unit != "1" else ""
+            if count:
+                yield Finding(
+                    f"the {name} sensor saturates at its {adjective} limit, {limit:.4g}{unit}, in "
+                    f"{_count(count, 'row')} ({100 * fraction:.0f} %). These rows are bounds (censored), not values.",
+                    serious=fraction >= MAX_SATURATED_FRACTION,
+                )
+
+
+def _run_findings(recording: Recording, runs: tuple[Run, ...]) -> Iterator[Finding]:
+    stated = recording.constants.get("run")
+    if any(run.kind == AT_REST for run in runs):
+        subject = "no measured quantity varies" if len(recording.columns) > 2 else "the only quantity does not vary"
+        yield Finding(
+            f"{subject}{_pressure_range(recording)}: no characteristic can be identified. Vary the pressure of an "
+            "isometric run or the length of an isobaric run, and check that the sensors were connected.",
+            serious=True,
+        )
+    elif isinstance(stated, str) and runs:
+        kinds = {run.kind.name for run in runs}
+        open_kind = moved_column(recording) is None and kinds == {FREE.name}
+        if stated not in kinds and stated in {kind.name for kind in KINDS} and not open_kind:
+            yield Finding(
+                f"the run is stated to be {stated}, but the data are {' and '.join(sorted(kinds))}"
+                f"{_pressure_range(recording)}. Correct the statement, or use another file.",
+                serious=True,
+            )
+
+
+def _motion_findings(recording: Recording) -> Iterator[Finding]:
+    """A recording of pressure and force without a length: the kind of the run and the contraction remain open."""
+    if moved_column(recording) is None and "pressure" in recording and "force" in recording:
+        yield Finding(
+            HintedText(
+                "no length or contraction was recorded, so the kind of the run is open and no characteristic can be "
+                "identified.",
+                Hint("To state the held length of an isometric run", "constants", {"length": "73.2 mm"}, "read"),
+                Hint("To state its place in the names of the files", "file_name", "held{length [mm]}", "read"),
+            )
+        )
+    elif "pressure" in recording and "force" in recording and "contraction" not in recording:
+        yield Finding(_contraction_missing(str(moved_column(recording))))
+
+
+def _contraction_missing(moved: str) -> HintedText:
+    """The reason why a static fit will refuse a recording with this column of the motion, and the remedy."""
+    refused = "a static fit needs the contraction and will refuse this recording."
+    if moved == "position":
+        return HintedText(f"{refused} ", ZERO_NOT_STATED)
+    return HintedText(f"{refused}", Hint(f"To convert the {moved}", "resting_length", "300 mm", "read"))
+
+
+def _pressure_range(recording: Recording) -> str:
+    """The pressure range as ` (pressure 298.8 to 301.2 kPa)`, to show which pressure was taken as constant."""
+    if "pressure" not in recording:
+        return ""
+    low, high = np.quantile(recording["pressure"], [0.01, 0.99])
+    return f" (pressure {low / 1e3:.4g} to {high / 1e3:.4g} kPa)"
+
+
+def _duration_findings(
+    recording: Recording, sampling: Sampling | None, sensors: Mapping[str, Sensor]
+) -> Iterator[Finding]:
+    """Records that end before the pressure has settled, and steps faster than the sampling."""
+    if sampling is None or "pressure" not in recording or sampling.rows < 2 * MIN_ROWS_PER_STEP:
+        return
+    pressure = recording["pressure"]
+    span = float(np.ptp(pressure))
+    if span <= NOISE_FACTOR * (sensors["pressure"].std if "pressure" in sensors else 0.0):
+        return
+    last = pressure[-max(len(pressure) // 10, 3) :]
+    quasi_static = quasi_static_rows(recording, sensors)
+    if span > 0 and not quasi_static[-1] and abs(last[-1] - last[0]) > MAX_FINAL_CHANGE * span:
+        change = f"{abs(last[-1] - last[0]) / 1e3:.4g} kPa"
+        yield Finding(
+            f"the record ends before the pressure has settled (it changes by {change} in the last tenth) and may be "
+            "shorter than the dynamics. Record until the pressure has settled.",
+            serious=True,
+        )
+    max_step = float(np.max(np.abs(np.diff(pressure)))) if len(pressure) > 1 else 0.0
+    if max_step > 0.5 * span > 0:
+        yield Finding(
+            f"the pressure changes by {max_step / 1e3:.4g} kPa between two rows, more than half of its range: the step "
+            f"is undersampled at {sampling.rate:.4g} rows per second."
+        )
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

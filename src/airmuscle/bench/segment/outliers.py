@@ -1,0 +1,136 @@
+"""Outliers: readings that contradict their neighbours, detected robustly, listed, and left out on request.
+
+An outlier consists of one or two rows that differ from the rows before and after by more than eight standard deviations
+of the sensor, while those rows agree with each other. The overshoot of a step is not an outlier, because the rows after
+it are at another level. Nor is the turning point of a ramp, because it lies on a line through the rows before or after.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core.arrays import Array
+from ...recording.display_units import display_scale
+from ...recording.recording import Recording
+from ...recording.row_notes import RowNote
+from .sensor import Sensor, estimate_sensors
+
+MIN_DEVIATIONS = 8.0
+"""Minimum distance of an outlier in standard deviations (chosen: noise with heavy tails reaches five or six)."""
+MAX_NEIGHBOUR_DIFFERENCE = 0.25
+"""Maximum difference between the rows before and after, as a fraction of the outlier's distance (chosen)."""
+MIN_EXTRAPOLATION_ERROR = 0.5
+"""Minimum distance of an outlier from the extrapolated neighbours, as a fraction of its distance (chosen)."""
+SLOPE_STEPS = 5
+"""Number of steps between rows whose median is the slope before and after a row."""
+WINDOW = 3
+"""Number of rows before and after that are compared."""
+MAX_LISTED = 8
+"""Maximum number of outliers that a note lists (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Outlier:
+    """A suspected outlier: column, row (from 0), reading, value expected from its neighbours [SI], and distance.
+
+    `deviations` is the distance from the expected value in standard deviations of the sensor.
+    """
+
+    column: str
+    row: int
+    value: float
+    expected: float
+    deviations: float
+
+    def __str__(self) -> str:
+        factor, unit = display_scale(self.column)
+        reading, expected = (f"{each * factor:.4g} {unit}" for each in (self.value, self.expected))
+        return f"{self.column} in row {self.row + 1} ({reading}, neighbours {expected})"
+
+
+def find_outliers(recording: Recording, sensors: Mapping[str, Sensor] | None = None) -> tuple[Outlier, ...]:
+    """The suspected outliers of a recording; empty without time, because rows are then not neighbours in time."""
+    if "time" not in recording or len(recording) < 2 * WINDOW + 2:
+        return ()
+    return tuple(
+        outlier
+        for name, sensor in (sensors or estimate_sensors(recording)).items()
+        if name in recording.columns
+        for outlier in _column_outliers(name, recording[name], sensor)
+    )
+
+
+def without_outliers(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
+    """The recordings of one test rig without the rows of suspected outliers; a note on each recording lists them."""
+    found = find_bench_outliers(recordings)
+    return tuple(leave_out(recording, outliers) for recording, outliers in zip(recordings, found, strict=True))
+
+
+def find_bench_outliers(recordings: Sequence[Recording]) -> tuple[tuple[Outlier, ...], ...]:
+    """The suspected outliers of each recording of one test rig, whose files share the noise of the sensors."""
+    sensors = estimate_sensors(recordings) if recordings else {}
+    return tuple(find_outliers(recording, sensors) for recording in recordings)
+
+
+def kept_rows(recording: Recording, outliers: Sequence[Outlier]) -> npt.NDArray[np.bool_]:
+    """The rows that contain none of the outliers, shape (N,)."""
+    kept = np.ones(len(recording), dtype=bool)
+    kept[[outlier.row for outlier in outliers]] = False
+    return kept
+
+
+def leave_out(recording: Recording, outliers: Sequence[Outlier]) -> Recording:
+    """The recording without the rows of these outliers, which a note lists."""
+    if "time" not in recording:
+        note = f"{recording.origin}: without time, rows are no neighbours, and no outlier is left out."
+        return dataclasses.replace(recording, notes=(*recording.notes, RowNote(note)))
+    if not outliers:
+        return recording
+    kept = kept_rows(recording, outliers)
+    count = int(np.count_nonzero(~kept))
+    more = f"; and {len(outliers) - MAX_LISTED} more" if len(outliers) > MAX_LISTED else ""
+    note = (
+        f"{recording.origin}: rows left out as suspected outliers: {count} of {len(kept)}: "
+        f"{'; '.join(map(str, outliers[:MAX_LISTED]))}{more}."
+    )
+    return dataclasses.replace(recording.rows(kept), notes=(*recording.notes, RowNote(note)))
+
+
+def _column_outliers(name: str, values: Array, sensor: Sensor) -> Iterator[Outlier]:
+    scale = sensor.std or 1e-9 * float(np.max(np.abs(values)))
+    if scale == 0.0:
+        return
+    before, after = _neighbour_medians(values)
+    distance = values - 0.5 * (before + after)
+    is_far = np.abs(distance) > MIN_DEVIATIONS * scale
+    agree = np.abs(before - after) < MAX_NEIGHBOUR_DIFFERENCE * np.abs(distance)
+    is_far &= _distance_from_lines(values, before, after) > MIN_EXTRAPOLATION_ERROR * np.abs(distance)
+    for row in np.flatnonzero(is_far & agree):
+        expected = float(values[row] - distance[row])
+        yield Outlier(name, int(row), float(values[row]), expected, float(abs(distance[row]) / scale))
+
+
+def _neighbour_medians(values: Array) -> tuple[Array, Array]:
+    """The medians of the rows before and after each row; the row itself near the ends, where there are too few rows."""
+    medians = np.median(np.lib.stride_tricks.sliding_window_view(values, WINDOW), axis=1)
+    before, after = values.copy(), values.copy()
+    before[WINDOW:] = medians[:-1]
+    after[:-WINDOW] = medians[1:]
+    before[-WINDOW:] = values[-WINDOW:]
+    after[:WINDOW] = values[:WINDOW]
+    return before, after
+
+
+def _distance_from_lines(values: Array, before: Array, after: Array) -> Array:
+    """The smaller distance of each row from the lines through the rows before and after it."""
+    back, ahead = np.zeros(len(values)), np.zeros(len(values))
+    if len(values) > SLOPE_STEPS + 1:
+        slopes = np.median(np.lib.stride_tricks.sliding_window_view(np.diff(values), SLOPE_STEPS), axis=1)
+        back[SLOPE_STEPS + 1 :] = slopes[:-1]
+        ahead[: -(SLOPE_STEPS + 1)] = slopes[1:]
+    reach = 0.5 * (WINDOW + 1)
+    return np.asarray(np.minimum(np.abs(values - before - reach * back), np.abs(values - after + reach * ahead)))

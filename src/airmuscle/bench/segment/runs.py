@@ -1,0 +1,215 @@
+"""Runs: intervals of a recording in which one quantity is constant while others are swept.
+
+A run with constant pressure is isobaric, with constant length or contraction isometric, with constant force isotonic. A
+quantity is constant if it stays within `RELATIVE_BAND` of its maximum (within `CONTRACTION_BAND` for a contraction), or
+within the noise of its sensor. A run is isotonic only if its motion was measured. A file may contain
+many consecutive runs, as tables of static points do: these are runs at the levels of the quantity that explains the
+most rows. A pressure that oscillates within `RIPPLE_BAND` while the muscle is moved is the ripple of its regulator, and
+counts as constant.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from ...core.arrays import Array
+from ...recording.displacement import MOVED
+from ...recording.recording import Recording
+from .interval import Interval, level_intervals
+from .remembered import remembered
+from .sensor import Sensor, estimate_sensors
+from .static_points import StaticPoints, find_static_points
+
+RELATIVE_BAND = 0.02
+"""Band of a constant quantity, as a fraction of its maximum (chosen)."""
+RIPPLE_BAND = 0.06
+"""Band of a pressure that oscillates while the muscle is moved, as a fraction of its maximum (chosen)."""
+MIN_RIPPLE_REVERSALS = 3
+"""Number of crossings of the mean that makes a fluctuation a ripple, not a step between two levels (chosen)."""
+MOVED_BANDS = 4.0
+"""A muscle is moved if its length changes by more than this number of constant bands (chosen)."""
+CONTRACTION_BAND = 0.005
+"""Band of a constant contraction, and of a constant length as a fraction of its maximum (chosen)."""
+SWEEP_FRACTION = 0.1
+"""Minimum change of a swept quantity, as a fraction of its range in the recording (chosen)."""
+MIN_ROWS = 3
+"""Minimum number of rows of a run (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class RunKind:
+    """Kind of a run, and the columns that may be constant in it; the first available column is used."""
+
+    name: str
+    constant_columns: tuple[str, ...]
+
+
+ISOBARIC = RunKind("isobaric", ("pressure",))
+ISOMETRIC = RunKind("isometric", MOVED)
+ISOTONIC = RunKind("isotonic", ("force",))
+AT_REST = RunKind("at rest", ())
+FREE = RunKind("free", ())
+KINDS = (ISOBARIC, ISOMETRIC, ISOTONIC)
+"""The kinds of run with one constant quantity; in AT_REST all measured quantities are constant, in FREE none."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Run:
+    """Rows of one kind of run: `constant_column` stays at `constant_value` [SI] while `swept_columns` change."""
+
+    interval: Interval
+    kind: RunKind
+    constant_column: str | None
+    constant_value: float | None
+    swept_columns: tuple[str, ...]
+
+
+@remembered
+def find_runs(recording: Recording, sensors: Mapping[str, Sensor] | None = None) -> tuple[Run, ...]:
+    """The runs of a recording; one run of kind FREE if no quantity is constant, none for an empty recording."""
+    if not len(recording):
+        return ()
+    points = find_static_points(recording)
+    if points is not None:
+        return _runs_of_points(recording, points)
+    bands = _constant_bands(recording, sensors or estimate_sensors(recording))
+    whole = _classify(recording, Interval(0, len(recording)), bands)
+    if whole.kind != FREE:
+        return (whole,)
+    candidates = [runs for kind in _kinds_of(recording) if (runs := _runs_at_levels(recording, kind, bands))]
+    return max(candidates, key=lambda runs: sum(len(run.interval) for run in runs), default=(whole,))
+
+
+def _runs_of_points(recording: Recording, points: StaticPoints) -> tuple[Run, ...]:
+    """The runs of static points at one pressure or length each, whose rows follow each other; one run of kind FREE if
+    neither do."""
+    for kind, name, levels, swept in (
+        (ISOBARIC, "pressure", points.pressure_level, points.moved),
+        (ISOMETRIC, points.moved, points.length_level, "pressure"),
+    ):
+        edges = [0, *(np.flatnonzero(np.diff(levels)) + 1).tolist(), levels.size]
+        if len(edges) == int(levels.max()) + 2:
+            intervals = [Interval(a, b) for a, b in itertools.pairwise(edges)]
+            return tuple(_constant_run(recording, each, kind, name, (swept, "force")) for each in intervals)
+    return (Run(Interval(0, levels.size), FREE, None, None, ("pressure", points.moved)),)
+
+
+def _kinds_of(recording: Recording) -> tuple[RunKind, ...]:
+    """The kinds that the columns can tell: without a measured motion, a constant force is that of a slack muscle at a
+    held length as well as an isotonic one."""
+    return KINDS if moved_column(recording) is not None else tuple(kind for kind in KINDS if kind != ISOTONIC)
+
+
+def _column(recording: Recording, kind: RunKind) -> str | None:
+    return next((name for name in kind.constant_columns if name in recording), None)
+
+
+def _constant_bands(recording: Recording, sensors: Mapping[str, Sensor]) -> dict[str, float]:
+    """The width of the band within which each measured quantity counts as constant [SI]."""
+    stds = {name: sensor.std for name, sensor in sensors.items()}
+    return {
+        name: max(_min_band(recording, name), 8.0 * stds.get(name, 0.0))
+        for kind in KINDS
+        if (name := _column(recording, kind))
+    }
+
+
+def _min_band(recording: Recording, name: str) -> float:
+    if name == "contraction":
+        return CONTRACTION_BAND
+    maximum = float(np.max(np.abs(recording[name])))
+    return maximum * (CONTRACTION_BAND if name == "length" else RELATIVE_BAND)
+
+
+def _classify(recording: Recording, interval: Interval, bands: dict[str, float]) -> Run:
+    """The run in an interval. Of several constant quantities, pressure takes precedence, then length, then force."""
+    names = {kind: name for kind in KINDS if (name := _column(recording, kind))}
+    possible = _kinds_of(recording)
+    constant = [
+        kind
+        for kind, name in names.items()
+        if _spread(recording[name][interval.rows]) <= bands[name]
+        or (kind == ISOBARIC and _has_ripple(recording, interval, bands))
+    ]
+    swept = tuple(name for kind, name in names.items() if kind not in constant)
+    isotonic_only = constant == [ISOTONIC] and ISOTONIC not in possible
+    if not constant or (len(names) == 1 and swept) or (isotonic_only and swept):
+        return Run(interval, FREE, None, None, swept)
+    if not swept:
+        return Run(interval, AT_REST, None, None, ())
+    return _constant_run(recording, interval, constant[0], names[constant[0]], swept)
+
+
+def _constant_run(recording: Recording, interval: Interval, kind: RunKind, name: str, swept: tuple[str, ...]) -> Run:
+    return Run(interval, kind, name, float(np.median(recording[name][interval.rows])), swept)
+
+
+def _spread(values: Array) -> float:
+    """The width of the band that contains 98 % of the values, so that a single outlier does not end a run."""
+    low, high = np.quantile(values, [0.01, 0.99])
+    return float(high - low)
+
+
+def _runs_at_levels(recording: Recording, kind: RunKind, bands: dict[str, float]) -> tuple[Run, ...]:
+    """The runs in which the quantity of one kind stays at a level while another quantity is swept."""
+    name = _column(recording, kind)
+    if name is None:
+        return ()
+    runs = []
+    intervals = list(level_intervals(recording[name], bands[name]))
+    for interval in _join_ripple(recording, intervals, bands) if kind == ISOBARIC else intervals:
+        swept = tuple(
+            other
+            for other, band in bands.items()
+            if other != name and _spread(recording[other][interval.rows]) > max(band, _min_sweep(recording, other))
+        )
+        if len(interval) >= MIN_ROWS and swept:
+            runs.append(_constant_run(recording, interval, kind, name, swept))
+    return tuple(runs)
+
+
+def _min_sweep(recording: Recording, name: str) -> float:
+    """The minimum change of a swept quantity [SI], from its range in the whole recording."""
+    return SWEEP_FRACTION * float(np.ptp(recording[name]))
+
+
+def moved_column(recording: Recording) -> str | None:
+    """The measured column of the motion: contraction, length, shortening or position; None without any."""
+    return _column(recording, ISOMETRIC)
+
+
+def _has_ripple(recording: Recording, interval: Interval, bands: dict[str, float]) -> bool:
+    """Whether the pressure of an interval only oscillates within the band of a ripple while the muscle is moved."""
+    moved, pressure = moved_column(recording), recording["pressure"][interval.rows]
+    if moved is None or _spread(pressure) > RIPPLE_BAND * float(np.max(np.abs(recording["pressure"]))):
+        return False
+    is_moved = _spread(recording[moved][interval.rows]) > MOVED_BANDS * bands[moved]
+    return is_moved and _count_crossings(pressure) >= MIN_RIPPLE_REVERSALS
+
+
+def _count_crossings(values: Array) -> int:
+    """The number of crossings of the middle of the range, with a dead band of a fifth of the range."""
+    low, high = np.quantile(values, [0.01, 0.99])
+    distance = values - 0.5 * (low + high)
+    side = np.sign(distance[np.abs(distance) > 0.1 * (high - low)])
+    return int(np.count_nonzero(np.diff(side)))
+
+
+def _join_ripple(recording: Recording, intervals: list[Interval], bands: dict[str, float]) -> Iterator[Interval]:
+    """The intervals at pressure levels, those between which the pressure only ripples joined to one."""
+    pressure, i = recording["pressure"], 0
+    band = RIPPLE_BAND * float(np.max(np.abs(pressure)))
+    ranges = [(float(pressure[each.rows].min()), float(pressure[each.rows].max())) for each in intervals]
+    while i < len(intervals):
+        j, (low, high) = i, ranges[i]
+        while j + 1 < len(intervals) and max(high, ranges[j + 1][1]) - min(low, ranges[j + 1][0]) <= band:
+            j += 1
+            low, high = min(low, ranges[j][0]), max(high, ranges[j][1])
+        joined = Interval(intervals[i].start, intervals[j].stop)
+        last = j if j > i and _has_ripple(recording, joined, bands) else i
+        yield Interval(intervals[i].start, intervals[last].stop)
+        i = last + 1

@@ -1,0 +1,181 @@
+"""Sensor resolution, noise and saturation limits, estimated from a recording.
+
+The resolution is the step of which all differences between readings are multiples. The noise is the robust standard
+deviation from second differences, which a slowly varying signal does not affect. A limit is the extreme reading of a
+sensor that stays exactly constant there although it has noise everywhere else.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ...core.arrays import Array
+from ...recording.columns import quantity_of
+from ...recording.recording import Recording
+from .interval import Mask, true_intervals
+from .remembered import remembered
+from .static_points import find_static_points
+
+MIN_DISTINCT_VALUES = 15
+"""Minimum number of distinct readings for a resolution; fewer may be the set points of the test (chosen)."""
+MAX_RMS_OFFSET = 0.12
+"""Maximum RMS distance of the differences from multiples of the step, in steps (chosen; random differences: 0.29)."""
+SAME_READING = 0.05
+"""Readings closer than this fraction of a step are the same reading (chosen)."""
+MIN_NOISE = 0.2
+"""Minimum noise, in units of the resolution, at which readings vary (chosen)."""
+ROUNDING_ERROR = 1e-9
+"""Noise below this fraction of the readings is rounding error (chosen)."""
+MIN_SATURATED_ROWS = 5
+"""Minimum number of consecutive rows that show saturation (chosen)."""
+_IGNORED = ("time", "branch", "fill", "discharge", "latched")
+
+
+@dataclasses.dataclass(frozen=True)
+class Sensor:
+    """The sensor of a column: resolution (0 if not detectable), noise and saturation limits, in SI units.
+
+    `lower_limit` and `upper_limit` are the readings at which the sensor saturates, infinite if it does not;
+    `at_lower_limit` and `at_upper_limit` are the numbers of rows at these limits.
+    """
+
+    name: str
+    resolution: float
+    noise: float
+    lower_limit: float = -math.inf
+    upper_limit: float = math.inf
+    at_lower_limit: int = 0
+    at_upper_limit: int = 0
+
+    @property
+    def std(self) -> float:
+        """Standard deviation of one reading from noise and quantisation; its inverse is the weight in a fit."""
+        return math.hypot(self.noise, self.resolution / math.sqrt(12.0))
+
+    def censoring(self, values: Array) -> Array:
+        """The censoring (N,) of readings (N,): 0 measured, 1 at the lower limit (true value below), -1 at the upper."""
+        tolerance = 0.25 * self.resolution
+        at_lower, at_upper = values <= self.lower_limit + tolerance, values >= self.upper_limit - tolerance
+        return at_lower * 1.0 - at_upper * 1.0
+
+
+@remembered
+def estimate_sensors(recordings: Recording | Sequence[Recording]) -> Mapping[str, Sensor]:
+    """The sensors of the columns of a recording, or of several recordings from one test rig, by column name.
+
+    Several recordings show the limits more reliably, because a single run may hardly reach them. Resolution and noise
+    are medians over the recordings. Recordings without rows do not count; static points (`find_static_points`) show the
+    resolution only.
+    """
+    given = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
+    several = [recording for recording in given if len(recording)]
+    names = dict.fromkeys(n for r in several for n in r.columns if n.rpartition(".")[2] not in _IGNORED)
+    ordered = [recording for recording in several if find_static_points(recording) is None]
+    return {
+        name: _estimate_sensor(
+            name, *([r.columns[name] for r in part if name in r.columns] for part in (several, ordered))
+        )
+        for name in names
+        if quantity_of(name)
+    }
+
+
+def _estimate_sensor(name: str, all_runs: list[Array], runs: list[Array]) -> Sensor:
+    """The sensor of a column: its resolution from all runs, the rest from those whose order has a meaning."""
+    steps = [step for values in all_runs if (step := estimate_resolution(values))]
+    together = steps or len(all_runs) == 1
+    resolution = float(np.median(steps or 0.0)) if together else estimate_resolution(np.concatenate(all_runs))
+    if not runs:
+        return Sensor(name, resolution, 0.0)
+    low, at_low = _upper_limit([-v for v in runs], resolution)
+    high, at_high = _upper_limit(runs, resolution)
+    sensor = Sensor(name, resolution, 0.0, -low, high, at_low, at_high)
+    noise = float(np.median([estimate_noise(values[sensor.censoring(values) == 0.0]) for values in runs]))
+    return dataclasses.replace(sensor, noise=noise)
+
+
+def estimate_noise(values: Array) -> float:
+    """The robust standard deviation of white noise on a slowly varying signal; 0 for fewer than five rows."""
+    if len(values) < 5:
+        return 0.0
+    second = values[:-2] - 2.0 * values[1:-1] + values[2:]
+    noise = float(1.4826 * np.median(np.abs(second)) / math.sqrt(6.0))
+    return noise if noise > ROUNDING_ERROR * float(np.max(np.abs(values))) else 0.0
+
+
+def estimate_resolution(values: Array) -> float:
+    """The largest step of which the differences of adjacent readings are multiples; 0 if there is none."""
+    distinct = np.unique(values)
+    if len(distinct) < MIN_DISTINCT_VALUES:
+        return 0.0
+    gaps = np.diff(distinct)
+    candidates = sorted({float(q) for q in np.quantile(gaps, [0.02, 0.1, 0.25, 0.5])}, reverse=True)
+    for candidate in candidates:
+        # One reading may be written in two ways, 71.70 and 71.71; both count as one.
+        steps = np.diff(distinct[np.concatenate(([True], gaps > SAME_READING * candidate))])
+        step = _refine_step(candidate, steps[steps < 8.5 * candidate])
+        if step > 0.0 and _are_multiples(steps, step):
+            return step
+    return 0.0
+
+
+def _refine_step(step: float, differences: Array) -> float:
+    """The least-squares step for differences of a few steps; 0 if no difference is as large as a step."""
+    for _ in range(3):
+        counts = np.round(differences / step)
+        total = float(counts @ counts)
+        if total == 0.0:
+            return 0.0
+        step = float(counts @ differences) / total
+    return step
+
+
+def _are_multiples(steps: Array, step: float) -> bool:
+    """Whether nearly all small differences are integer multiples of a step, and enough of them are single steps."""
+    small = steps[steps < 8.5 * step] / step
+    count = len(small)
+    if count < 10:
+        return False
+    multiples = np.round(small)
+    offset = small - multiples
+    if math.sqrt(float(offset @ offset) / count) >= MAX_RMS_OFFSET:
+        return False
+    return bool(np.count_nonzero(multiples == 1) >= 3 and np.count_nonzero(multiples > 0) > 0.98 * count)
+
+
+def _upper_limit(runs: list[Array], resolution: float) -> tuple[float, int]:
+    """The upper limit at which readings saturate, and the number of rows at this limit; infinite without saturation.
+
+    The readings must stay constant at the limit for many more consecutive rows than at any other reading, and the
+    sensor must have noise elsewhere.
+    """
+    combined = np.concatenate(runs)
+    top, tolerance = float(combined.max()), 0.25 * resolution
+    at_top = [values >= top - tolerance for values in runs]
+    below = combined[combined < top - tolerance]
+    if not len(below):
+        return math.inf, 0
+    count = len(combined) - len(below)
+    rows_at_top = max(_longest_interval(mask) for mask in at_top)
+    if rows_at_top < MIN_SATURATED_ROWS:
+        return math.inf, 0
+    between = [values[(values < top - tolerance) & (values > combined.min() + tolerance)] for values in runs]
+    rows_elsewhere = max(_longest_constant(values, tolerance) for values in between)
+    noise = max(estimate_noise(values) for values in between)
+    is_noisy = noise > max(MIN_NOISE * resolution, 1e-6 * float(np.ptp(combined)))
+    saturated = is_noisy and rows_at_top > 2 * rows_elsewhere
+    return (top, count) if saturated else (math.inf, 0)
+
+
+def _longest_interval(mask: Mask) -> int:
+    """The length of the longest interval of true rows."""
+    return max((len(interval) for interval in true_intervals(mask)), default=0)
+
+
+def _longest_constant(values: Array, tolerance: float) -> int:
+    """The maximum number of consecutive rows with the same reading."""
+    return 1 + _longest_interval(np.abs(np.diff(values)) <= tolerance)

@@ -1,0 +1,90 @@
+"""UnscentedKalmanFilter: states and outputs of a plant from measured columns, by sigma points."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import ClassVar
+
+import numpy as np
+
+from ...core.errors import ParameterError
+from ...core.reference import Reference
+from ...engine.compile.cache.kernel import Kernel
+from .state_estimator import BoundFilter, StateEstimator
+
+JULIER_UHLMANN2004 = Reference(
+    key="julier-uhlmann-2004",
+    authors="Julier, S. J., Uhlmann, J. K.",
+    title="Unscented filtering and nonlinear estimation",
+    where="Proceedings of the IEEE 92(3):401-422",
+    year=2004,
+    doi="10.1109/JPROC.2003.823141",
+    note="the unscented transformation",
+)
+WAN_VAN_DER_MERWE2000 = Reference(
+    key="wan-van-der-merwe-2000",
+    authors="Wan, E. A., van der Merwe, R.",
+    title="The unscented Kalman filter for nonlinear estimation",
+    where="Proc. IEEE Adaptive Systems for Signal Processing, Communications, and Control Symposium, 153-158",
+    year=2000,
+    doi="10.1109/ASSPCC.2000.882463",
+    note="scaled sigma points with alpha, beta and kappa",
+)
+_predict = Kernel("predict_unscented", "unscented_kalman_filter")
+_correct = Kernel("correct_unscented", "unscented_kalman_filter")
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class UnscentedKalmanFilter(StateEstimator):
+    """Unscented Kalman filter of a plant; its first fields are those of StateEstimator.
+
+        sigma points  X_0 = x,   X_i = x +- gamma (column i of L),   L L^T = P,   gamma^2 = alpha^2 (n + kappa)
+        weights       W_i = 1/(2 gamma^2),   W_0 = 1 - n/gamma^2 of the mean,   W_0 + 1 - alpha^2 + beta of covariances
+        prediction    x^- = sum W_i g(X_i),   P^- = sum W_i (g(X_i) - x^-)(g(X_i) - x^-)^T + Q h
+        correction    sigma points of x^- and P^-, Y_i = o(X_i),   S = cov(Y, Y) + R,   K = cov(X, Y) S^-1,
+                      x = x^- + K (y - y^-),   P = P^- - K S K^T
+
+    g is the exponential Euler step of ExtendedKalmanFilter. No derivative of the outputs is used. For a linear plant
+    it is the Kalman filter. The defaults of alpha and kappa (chosen) give weights W_i >= 0.
+    References: Julier and Uhlmann (2004); Wan and van der Merwe (2000).
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (JULIER_UHLMANN2004, WAN_VAN_DER_MERWE2000)
+
+    alpha: float = 1.0
+    beta: float = 2.0
+    kappa: float = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        n = len(self.states)
+        if not (0.0 < self.alpha <= 10.0 and -n < self.kappa < float("inf") and 0.0 <= self.beta < float("inf")):
+            raise ParameterError(
+                f"UnscentedKalmanFilter: alpha, beta and kappa are {self.alpha!r}, {self.beta!r} and {self.kappa!r}; "
+                f"allowed range: alpha above 0 to 10, beta from 0, kappa above {-n} (minus the number of states)."
+            )
+
+    @property
+    def weights(self) -> tuple[float, float, float]:
+        """Weights of the central point in means and in covariances, and of every other point."""
+        gamma_squared = self.alpha**2 * (len(self.states) + self.kappa)
+        centre = 1.0 - len(self.states) / gamma_squared
+        return centre, centre + 1.0 - self.alpha**2 + self.beta, 0.5 / gamma_squared
+
+    def _bind(self) -> BoundFilter:
+        functions, total, p = self._functions, len(self.states), len(self.measured)
+        n, h = self._compiled.sizes.states, float(self.sample_time)
+        spread, weights = float(0.5 / self.weights[2]) ** 0.5, np.array(self.weights)
+        x, u, covariance = np.zeros(total), np.zeros(self._compiled.sizes.inputs), np.zeros((total, total))
+        values, difference, s = np.zeros(p), np.zeros(p), np.zeros((p, p))
+        points, root = np.zeros((2 * total + 1, total)), np.zeros((total, total))
+        predict = _predict.bind(
+            functions.rates, functions.constants, self.magnitudes, h, spread, weights, self.noise, x, u, covariance,
+            points, root, np.zeros(n), np.zeros((n, total)), np.zeros((5, n, total + 1)),
+        )  # fmt: skip
+        correct = _correct.bind(
+            functions.measured, functions.constants, spread, weights, self.variances, x, u, covariance, values,
+            difference, s, np.zeros((p, p)), points, root, np.zeros((2 * total + 1, p)), np.zeros((p, total)),
+            np.zeros((total, p)), np.zeros((total, p)),
+        )  # fmt: skip
+        return self._bound((x, covariance, u, values, difference, s), np.zeros((0, 0)), predict, correct)

@@ -1,0 +1,106 @@
+"""StateFeedback: linear state feedback with an observer and integral action."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from ...core import ops
+from ...core.declaration import model, parameter
+from ...core.errors import ParameterError
+from ...core.ops import Value
+from ...core.reference import Reference
+from ...core.variables import select_prefix, with_prefix
+from ...engine.loop.control_law import ControlLaw
+from ...engine.loop.controller import Measurement
+from ...engine.loop.multivariable import MultivariableController
+
+FRANKLIN1998 = Reference(
+    key="franklin-1998",
+    authors="Franklin, G. F., Powell, J. D., Workman, M. L.",
+    title="Digital Control of Dynamic Systems",
+    where="3rd edition, Addison-Wesley, Menlo Park, chapters 8 and 9",
+    year=1998,
+    note="state feedback with a predictor-corrector observer and integral action",
+)
+
+
+@model
+class StateFeedback(MultivariableController, ControlLaw):
+    """u_k = u_0 - L x_k - L_I w_k,   x_k = x^-_k + K (y_k - y_0 - C x^-_k),   w_(k+1) = w_k + h (z_k - r_k).
+
+    x deviation of the states from the operating point, y measured columns, z controlled ones, r their set points. The
+    prediction is x^-_(k+1) = A x_k + B (u_k - u_0) with the command as limited to the range of the inputs, which is
+    the anti-windup of the observer; w_k is held while a command is limited. The observer starts at the first
+    measurement. Matrices are given row by row; `airmuscle.control.design_lqg` designs them for a linearised plant.
+    Reference: Franklin, Powell and Workman (1998), chapters 8 and 9.
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (FRANKLIN1998,)
+
+    measured: tuple[str, ...]
+    controlled: tuple[str, ...]
+    commanded: tuple[str, ...]
+    state_names: tuple[str, ...]
+    transition: tuple[float, ...] = parameter("SI", "A", "state matrix, discrete (n, n)", fitted=False)
+    input_matrix: tuple[float, ...] = parameter("SI", "B", "input matrix, discrete (n, m)", fitted=False)
+    output_matrix: tuple[float, ...] = parameter("SI", "C", "matrix of the measured columns (p, n)", fitted=False)
+    observer_gain: tuple[float, ...] = parameter("SI", "K", "gain of the observer (n, p)")
+    feedback_gain: tuple[float, ...] = parameter("SI", "L", "gain of the state feedback (m, n)")
+    integral_gain: tuple[float, ...] = parameter("SI", "L_I", "gain of the integral action (m, q)")
+    measured_offset: tuple[float, ...] = parameter("SI", "y_0", "measured columns at the operating point", fitted=False)
+    input_offset: tuple[float, ...] = parameter("SI", "u_0", "inputs at the operating point", fitted=False)
+
+    def check(self) -> None:
+        n, m, p, q = map(len, (self.state_names, self.commanded, self.measured, self.controlled))
+        sizes = {"transition": n * n, "input_matrix": n * m, "output_matrix": p * n, "observer_gain": n * p,
+                 "feedback_gain": m * n, "integral_gain": m * q, "measured_offset": p, "input_offset": m}  # fmt: skip
+        for name, size in sizes.items():
+            if len(getattr(self, name)) != size:
+                raise ParameterError(
+                    f"StateFeedback: {name} has {len(getattr(self, name))} numbers; for {n} states, {m} inputs, {p} "
+                    f"measured and {q} controlled columns it must have {size}, row by row."
+                )
+        for name in self.controlled:
+            if name not in self.measured:
+                raise ParameterError(
+                    f"StateFeedback: '{name}' is controlled and not measured; measured are {', '.join(self.measured)}."
+                )
+
+    @property
+    def initial_memory(self) -> dict[str, float]:
+        """The predicted deviation of each state, `state.pressure`, and the integral of each controlled column."""
+        states = with_prefix("state.", dict.fromkeys(self.state_names, 0.0))
+        return {**states, **with_prefix("integral.", dict.fromkeys(self.controlled, 0.0))}
+
+    def step(
+        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
+    ) -> tuple[dict[str, Value], dict[str, Value]]:
+        predicted = list(select_prefix("state.", memory).values())
+        integrals = select_prefix("integral.", memory)
+        deviations = zip(self.measured, self.measured_offset, strict=True)
+        y = [measurement.columns[name] - offset for name, offset in deviations]
+        innovation = [a - b for a, b in zip(y, product(self.output_matrix, predicted), strict=True)]
+        x = [a + b for a, b in zip(predicted, product(self.observer_gain, innovation), strict=True)]
+        by_state = product(self.feedback_gain, x)
+        by_integral = product(self.integral_gain, list(integrals.values()), len(self.commanded))
+        commands: dict[str, Value] = {}
+        limited: Value = 0.0
+        for name, offset, a, b in zip(self.commanded, self.input_offset, by_state, by_integral, strict=True):
+            wanted = offset - a - b
+            commands[name] = ops.clip(wanted, *measurement.ranges[name])
+            limited = limited + ops.absolute_value(commands[name] - wanted)
+        applied = [commands[name] - offset for name, offset in zip(self.commanded, self.input_offset, strict=True)]
+        by_input = product(self.input_matrix, applied, len(x))
+        later = [a + b for a, b in zip(product(self.transition, x), by_input, strict=True)]
+        errors = {name: measurement.columns[name] - measurement.setpoints[name] for name in self.controlled}
+        kept = {name: w + ops.where(limited > 0.0, 0.0, dt * errors[name]) for name, w in integrals.items()}
+        states = dict(zip(self.state_names, later, strict=True))
+        return commands, {**with_prefix("state.", states), **with_prefix("integral.", kept)}
+
+
+def product(matrix: tuple[Value, ...], vector: list[Value], rows: int = 0) -> list[Value]:
+    """Matrix, given row by row, times vector; `rows` is needed for an empty vector."""
+    width = len(vector)
+    rows = rows or len(matrix) // width
+    return [sum((matrix[i * width + j] * vector[j] for j in range(width)), 0.0) for i in range(rows)]

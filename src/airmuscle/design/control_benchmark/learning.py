@@ -1,0 +1,130 @@
+"""Iterative learning in the control benchmark: a task repeated on the truth, with a learned feed-forward signal."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import replace
+
+import numpy as np
+
+from ...control.laws.iterative_learning import IterativeLearning
+from ...core.arrays import Array
+from ...core.errors import ParameterError
+from ...core.short_repr import ShortRepr
+from ...core.tree import leaves
+from ...engine.loop.control_loop import ControlLoop
+from ...engine.loop.sensors import WithSensors
+from ...engine.run.run import simulate
+from ...physics.plant.plant import Plant
+from .benchmark import TunedContender
+from .joints import ENCODER_STEP, BenchmarkJoint
+from .task_signals import TaskSignals, disturbance, task_signals
+from .tasks import ControlTask
+
+SIGNAL, RATE = "feed_forward", "feed_forward_rate"
+REPETITIONS = 30
+"""Trials with the last signal and other noise (chosen)."""
+STEP = 0.05e5
+"""Step of the feed-forward signal [Pa] from which the impulse response of the model is computed (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class LearningCurve(ShortRepr):
+    """The trials of a task: rms errors (J,) [degree] from the task's begin on, and the last signal (N,) [Pa].
+
+    The first trial is that before any learning. `spread` is the range of the rms errors [degree] of the last signal,
+    repeated with other noise: differences of trials below it are no effect of the learning.
+    """
+
+    task: ControlTask
+    contender: str
+    errors: Array
+    signal: Array
+    spread: float
+
+    @property
+    def is_monotone(self) -> bool:
+        """Whether no trial is worse than the one before by more than the noise explains."""
+        return bool((np.diff(self.errors) <= self.spread).all())
+
+
+def learn(
+    joint: BenchmarkJoint, contender: TunedContender, task: ControlTask, *, trials: int = 31, cutoff: float = 12.0,
+    change_weight: float = 0.03, seed: int = 1,
+) -> LearningCurve:  # fmt: skip
+    """Repeat a task on the truth and improve the feed-forward of a tuned contender by `IterativeLearning`.
+
+    The impulse response is that of the nominal model with the contender's feedback; the error is that of the encoder,
+    whose dead time is known afterwards. Each trial begins at the same state with other noise. `cutoff` [Hz] of the
+    filter and `change_weight` are chosen. Raises ParameterError for a contender without the set points `feed_forward`
+    and `feed_forward_rate`, or fewer than two trials.
+    """
+    law = contender.law
+    if not {SIGNAL, RATE} <= set(law.setpoints) or not isinstance(law, WithSensors):
+        raise ParameterError(
+            f"learn: contender '{contender.name}' has no set points '{SIGNAL}' and '{RATE}', which are learned, or is "
+            "no ControlLaw."
+        )
+    if trials < 2:
+        raise ParameterError(f"learn: {trials} trials; give at least 2.")
+    signals = task_signals(joint, task)
+    count = round(task.duration / joint.sample_time)
+    signal = _present_signal(contender, signals)[:count]
+    learning = _learning(joint, law, task, signals, count, cutoff, change_weight)
+    start, wanted = joint.start(joint.truth), signals.angle[1 : count + 1]
+    judged = signals.time[1 : count + 1] >= task.begin
+
+    def tried(number: int, signal: Array) -> tuple[Array, float]:
+        """The angle (N,) [rad] of a trial with its own noise, and its rms error [degree]."""
+        angle = _trial(joint, joint.truth, replace(law, seed=float(seed + number)), task, signals, signal, start)
+        return angle, float(np.degrees(np.sqrt(np.mean((wanted - angle)[judged] ** 2))))
+
+    errors, last = [], signal
+    for number in range(trials):
+        last = signal
+        angle, error = tried(number, signal)
+        errors.append(error)
+        signal = learning.improve(signal, wanted - ENCODER_STEP * np.round(angle / ENCODER_STEP))
+    repeated = [errors[-1], *(tried(trials + i, last)[1] for i in range(REPETITIONS))]
+    return LearningCurve(task, contender.name, np.array(errors), last, float(np.ptp(repeated)))
+
+
+def _present_signal(contender: TunedContender, signals: TaskSignals) -> Array:
+    """The feed-forward signal of a contender before learning, with its lead time."""
+    lead = next((leaf.value for leaf in leaves(contender.law) if leaf.path.endswith("lead_time")), 0.0)
+    return np.asarray(signals.feed_forward + lead * signals.feed_forward_rate)
+
+
+def _learning(
+    joint: BenchmarkJoint, law: WithSensors, task: ControlTask, signals: TaskSignals, count: int, cutoff: float,
+    change_weight: float,
+) -> IterativeLearning:  # fmt: skip
+    """The learning law from the response of the model at rest to a step of the signal."""
+    rest = signals._replace(angle=np.zeros_like(signals.angle))
+    start = joint.start(joint.model)
+    silent = replace(law, sensors=tuple(replace(s, noise=0.0, resolution=0.0) for s in law.sensors))
+    quiet = replace(task, torque=(), stiffening=(), stuck=None)
+    with_step, without = (
+        _trial(joint, joint.model, silent, quiet, rest, np.full(count, value), start) for value in (STEP, 0.0)
+    )
+    span = joint.pressure_span
+    return IterativeLearning.from_step_response(
+        with_step - without, STEP, joint.sample_time, change_weight=change_weight, cutoff=cutoff, minimum=-span,
+        maximum=span,
+    )  # fmt: skip
+
+
+def _trial(
+    joint: BenchmarkJoint, plant: Plant, law: WithSensors, task: ControlTask, signals: TaskSignals, signal: Array,
+    start: dict[str, float],
+) -> Array:  # fmt: skip
+    """The angle (N,) [rad] one sample after each element of a feed-forward signal (N,) [Pa]."""
+    padded = np.append(signal, np.full(signals.time.size - signal.size, signal[-1]))
+    further = {SIGNAL: padded, RATE: np.zeros_like(padded)}
+    drivers = joint.truth_drivers if plant is joint.truth else joint.model_drivers
+    loop = ControlLoop(
+        law, joint.sample_time, signals.setpoint(law.setpoints, further), disturbance(task, plant.inputs), drivers
+    )
+    duration = signal.size * joint.sample_time
+    record = simulate(plant, loop, duration=duration, initial_state=start, output_times=joint.sample_time)
+    return np.interp(signals.time[1 : signal.size + 1], record["time"], record["angle"])

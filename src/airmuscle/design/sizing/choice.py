@@ -1,0 +1,167 @@
+"""Choices of a sizing: length, number, end points, air and energy of a muscle that meets a requirement."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+from ...core.errors import ParameterError
+from ...core.short_repr import ShortRepr
+from ...files.library.entry import Entry
+from ...physics.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, Ambient, Isothermal, absolute_pressure
+from .requirement import JointRequirement, LiftRequirement, SizingConditions
+from .static_muscle import EndPoint, StaticMuscle
+
+Requirement = LiftRequirement | JointRequirement
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class MuscleDesign(ShortRepr):
+    """Design of one requirement: end points of a muscle, pulley radius and force reserve.
+
+    extended    end point at which the muscle is long: start of the lift, stretched muscle of the joint
+    contracted  end point at which the muscle is short
+    reserve     least capacity divided by the need, minus 1, along the stroke of a lift and at the ends of the range of
+                a joint; at least the safety factor minus 1
+    radius      pulley radius [m] of a joint; None for a lift
+    radii       minimum and maximum pulley radius [m] of a muscle that is a tenth longer; None for a lift
+    """
+
+    extended: EndPoint
+    contracted: EndPoint
+    reserve: float
+    radius: float | None = None
+    radii: tuple[float, float] | None = None
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class MuscleChoice(ShortRepr):
+    """A muscle type that meets a requirement, at its shortest length.
+
+    muscle  the entry at this length and its working range
+    length  nominal length [m]
+    count   number of muscles in parallel; with a joint, on each side
+    """
+
+    muscle: StaticMuscle
+    length: float
+    count: int
+    design: MuscleDesign
+    requirement: Requirement
+    conditions: SizingConditions
+
+    @property
+    def entry(self) -> Entry:
+        """The library entry, scaled to the length."""
+        return self.muscle.entry
+
+    @property
+    def total_count(self) -> int:
+        """Number of all muscles."""
+        return self.count * (2 if isinstance(self.requirement, JointRequirement) else 1)
+
+    @property
+    def contraction_used(self) -> float:
+        """Difference of the contractions of both end points [1]."""
+        return self.design.contracted.contraction - self.design.extended.contraction
+
+    @property
+    def air(self) -> float | None:
+        """Mass of the air [kg] that all muscles take in a cycle; None without a geometry.
+
+        The magnitude of the difference of m = p V/(R T) between both end points, at ambient temperature, without tubes.
+        """
+        masses = [self._air_mass(point) for point in (self.design.contracted, self.design.extended)]
+        if masses[0] is None or masses[1] is None:
+            return None
+        return self.total_count * abs(masses[0] - masses[1])
+
+    def _air_mass(self, point: EndPoint) -> float | None:
+        volume, ambient = self.muscle.volume(point.pressure, point.contraction), self.conditions.ambient
+        if volume is None:
+            return None
+        return float(Isothermal().air_mass(absolute_pressure(point.pressure, ambient), volume, ambient))
+
+    @property
+    def reference_volume(self) -> float | None:
+        """Volume of the air of a cycle [m3] at the reference atmosphere of ISO 8778; None without a geometry."""
+        return None if self.air is None else self.air / REFERENCE_DENSITY
+
+    @property
+    def air_energy(self) -> float | None:
+        """Available energy [J] of the air of a cycle at the supply pressure; None without a geometry."""
+        return None if self.air is None else available_energy(self.air, self.conditions.supply, self.conditions.ambient)
+
+    @property
+    def efficiency(self) -> float | None:
+        """Work against the load divided by the available energy of the air [1]; None without a geometry."""
+        return None if not self.air_energy else self.requirement.work / self.air_energy
+
+    @property
+    def diameter(self) -> float | None:
+        """Maximum outer diameter at the contracted end point [m], without the wall; None without a geometry."""
+        return self.muscle.diameter(self.design.contracted.contraction)
+
+
+@dataclasses.dataclass(frozen=True)
+class UnsuitableMuscle:
+    """A muscle that does not meet a requirement: the number that was tried, 0 for an unusable law, and the reason."""
+
+    name: str
+    count: int
+    reason: str
+
+
+def available_energy(air: float, supply: float, ambient: Ambient) -> float:
+    """Available energy [J] of a mass of air [kg] at a supply gauge pressure [Pa]: m R T ln(p_s/p_amb), isothermal."""
+    ratio = absolute_pressure(supply, ambient) / ambient.pressure
+    return air * GAS_CONSTANT * ambient.temperature * math.log(ratio)
+
+
+SortKey = Callable[[MuscleChoice], float | None]
+"""Criterion of a ranking: the smaller the better; a choice without a value is last."""
+
+
+def by_air(choice: MuscleChoice) -> float | None:
+    """Air of a cycle [kg]."""
+    return choice.air
+
+
+def by_length(choice: MuscleChoice) -> float | None:
+    """Nominal length [m]."""
+    return choice.length
+
+
+def by_count(choice: MuscleChoice) -> float | None:
+    """Number of all muscles."""
+    return float(choice.total_count)
+
+
+def by_reserve(choice: MuscleChoice) -> float | None:
+    """Force reserve, largest first."""
+    return -choice.design.reserve
+
+
+def by_diameter(choice: MuscleChoice) -> float | None:
+    """Maximum outer diameter [m]."""
+    return choice.diameter
+
+
+SORT_KEYS: Mapping[str, SortKey] = MappingProxyType({
+    "air": by_air, "length": by_length, "count": by_count, "reserve": by_reserve, "diameter": by_diameter,
+})  # fmt: skip
+"""The criteria by their names."""
+
+
+def rank(choices: list[MuscleChoice], sort: SortKey) -> tuple[MuscleChoice, ...]:
+    """The choices by a criterion, equal ones by length, then by number and name. Raises ParameterError."""
+    if not callable(sort):
+        raise ParameterError(f"sort is {sort!r}; it must be a function of a choice, such as by_air or by_length.")
+
+    def order(choice: MuscleChoice) -> tuple[float, float, int, str]:
+        value = sort(choice)
+        return (math.inf if value is None else value, choice.length, choice.count, choice.entry.name)
+
+    return tuple(sorted(choices, key=order))

@@ -1,0 +1,162 @@
+"""Requirements of a sizing: a lift over a stroke or a joint over an angle, and the conditions of operation."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any, ClassVar
+
+from ...core.arrays import Array
+from ...core.constants import STANDARD_GRAVITY
+from ...core.declaration import model, parameter
+from ...core.errors import ParameterError
+from ...physics.pneumatics.gas import Ambient
+
+MAX_COUNT = 20
+"""Maximum number of muscles in parallel that is tried (chosen)."""
+PATH_POINTS = 33
+"""Points of a stroke at which the load is compared with the muscle (chosen)."""
+
+
+@model
+class LiftRequirement:
+    """Lift: muscles in parallel move a load over a stroke; F(s) = m g + F_0 + k s at a displacement s from the start.
+
+    m mass, F_0 constant force, k stiffness of a spring that is relaxed at the start. The load must pull at both ends.
+    The mass adds the force of a harmonic motion over the stroke with the cycle time, m (S/2 - s) (2 pi/T)^2.
+    """
+
+    from_file: ClassVar[bool] = False
+
+    stroke: float = parameter("m", "S", "stroke", bounds=(1e-4, 10.0))
+    mass: float = parameter("kg", "m", "mass of the load", bounds=(0.0, 1e5), default=0.0)
+    force: float = parameter("N", "F_0", "constant force of the load", bounds=(0.0, 1e6), default=0.0)
+    stiffness: float = parameter("N/m", "k", "stiffness of a spring", bounds=(-1e7, 1e7), default=0.0)
+
+    def check(self) -> None:
+        for position, place in ((0.0, "start"), (self.stroke, "end")):
+            if not self.load(position) > 0.0:
+                raise ParameterError(
+                    f"LiftRequirement: the load at the {place} of the stroke is {self.load(position):.4g} N; it must "
+                    "be greater than 0, because a muscle only pulls. Give a mass, a force, or a spring with a preload."
+                )
+
+    def load(self, displacement: Any) -> Any:
+        """Force of the load at rest [N] at a displacement [m] from the start of the stroke; arrays as well."""
+        return self.mass * STANDARD_GRAVITY + self.force + self.stiffness * displacement
+
+    @property
+    def path(self) -> tuple[Array, Array]:
+        """Displacements [m] and loads at rest [N] along the stroke, (PATH_POINTS,) each."""
+        import numpy as np
+
+        displacement = np.linspace(0.0, self.stroke, PATH_POINTS)
+        return displacement, np.broadcast_to(self.load(displacement), displacement.shape)
+
+    def loads(self, displacement: Array, cycle_time: float) -> tuple[Array, Array]:
+        """Least and greatest force of the load [N] at displacements [m], at rest or moving with a cycle time [s]."""
+        import numpy as np
+
+        held = self.load(displacement)
+        moving = held + self.mass * (0.5 * self.stroke - displacement) * (2 * math.pi / cycle_time) ** 2
+        return np.minimum(held, moving), np.maximum(held, moving)
+
+    @property
+    def work(self) -> float:
+        """Work against the load over the stroke [J]."""
+        return float(0.5 * (self.load(0.0) + self.load(self.stroke)) * self.stroke)
+
+    def reduced(self, load: float = 1.0, travel: float = 1.0) -> LiftRequirement:
+        """The requirement with a fraction of the load and of the stroke."""
+        return dataclasses.replace(
+            self, mass=load * self.mass, force=load * self.force, stiffness=load * self.stiffness / travel,
+            stroke=travel * self.stroke,
+        )  # fmt: skip
+
+    def describe(self) -> str:
+        """Load and stroke as text."""
+        first, last = self.load(0.0), self.load(self.stroke)
+        load = f"{first:.4g} N" if math.isclose(first, last) else f"{first:.4g} to {last:.4g} N"
+        load = f"{self.mass:.4g} kg ({load})" if self.mass else load
+        return f"{load} over {1e3 * self.stroke:.4g} mm"
+
+
+@model
+class JointRequirement:
+    """Joint: two equal groups of muscles turn a joint over an angle, symmetric about its middle, on equal pulleys.
+
+    The torque may act in either direction, also at the ends of the range. The inertia adds the torque of a harmonic
+    motion over the range with the cycle time, J (Theta/2) (2 pi/T)^2, at the ends.
+    """
+
+    from_file: ClassVar[bool] = False
+
+    angle: float = parameter("rad", "Theta", "range of the angle", bounds=(1e-3, 2 * math.pi))
+    torque: float = parameter("N m", "M", "torque of the load", bounds=(0.0, 1e5), default=0.0)
+    inertia: float = parameter("kg m^2", "J", "moment of inertia about the joint axis", bounds=(0.0, 1e4), default=0.0)
+
+    def check(self) -> None:
+        if not self.torque > 0.0:
+            raise ParameterError(
+                "JointRequirement: the torque of the load is 0 N m; it must be greater than 0: with it the joint holds "
+                "the ends of its range. Give the maximum torque of weight, friction or disturbance."
+            )
+
+    def acceleration_torque(self, cycle_time: float) -> float:
+        """Torque that accelerates the inertia at the ends of a harmonic motion with this cycle time [s]; in N m."""
+        return self.inertia * 0.5 * self.angle * (2 * math.pi / cycle_time) ** 2
+
+    @property
+    def work(self) -> float:
+        """Work against the torque in a cycle, once over the range in each direction [J]."""
+        return 2.0 * self.torque * self.angle
+
+    def reduced(self, load: float = 1.0, travel: float = 1.0) -> JointRequirement:
+        """The requirement with a fraction of torque and inertia, and of the angle."""
+        return dataclasses.replace(
+            self, torque=load * self.torque, inertia=load * self.inertia, angle=travel * self.angle
+        )
+
+    def describe(self) -> str:
+        """Torque and angle as text."""
+        return f"{self.torque:.4g} N m over {math.degrees(self.angle):.4g} degrees"
+
+
+@model
+class SizingConditions:
+    """Conditions of operation of a sizing: supply, safety factor, cycle time and limits of size.
+
+    The muscle holds the safety factor times the load at the working range of pressure, and within its permitted force.
+    The defaults are chosen. A safety factor of at least 1.05 keeps a pressure difference for the flow into the muscle.
+    """
+
+    from_file: ClassVar[bool] = False
+
+    supply: float = parameter("Pa", "p_s", "supply pressure (gauge)", bounds=(1e4, 2e6), plausible=1e3)
+    safety_factor: float = parameter(
+        "1", "S_F", "factor on the load that the muscle must hold", bounds=(1.05, 20.0), default=1.5
+    )
+    cycle_time: float = parameter("s", "T", "time of a cycle, there and back", bounds=(0.02, 1e4), default=2.0)
+    max_length: float = parameter("m", "L_max", "maximum nominal length", bounds=(1e-3, 20.0), default=20.0)
+    max_diameter: float = parameter("m", "D_max", "maximum outer diameter", bounds=(1e-3, 1.0), default=1.0)
+    min_pressure: float = parameter(
+        "Pa", "p_min", "minimum working pressure; discharge to 0 takes an infinite time", bounds=(0.0, 1e6), default=1e4
+    )
+    max_count: int = 3
+    """Maximum number of muscles in parallel; with a joint, on each side."""
+    min_count: int = 1
+    """Least number of muscles in parallel."""
+    ambient: Ambient = Ambient()
+
+    def check(self) -> None:
+        for name, least in (("min_count", 1), ("max_count", self.min_count)):
+            count = getattr(self, name)
+            if isinstance(count, bool) or not least <= count <= MAX_COUNT:
+                raise ParameterError(
+                    f"SizingConditions: {name} is {count!r}; allowed range: {least} to {MAX_COUNT} muscles in parallel."
+                )
+        if not self.min_pressure < self.supply:
+            raise ParameterError(
+                f"SizingConditions: min_pressure is {self.min_pressure:g} Pa; it must be less than the supply "
+                f"pressure, {self.supply:g} Pa."
+            )

@@ -1,0 +1,171 @@
+"""Scenario of a choice: a lift with on/off valves or a joint with pressure regulators, as text for `load_scenario`.
+
+A quarter of the cycle is rest, in two parts; fill and discharge take the rest in equal parts (chosen). The valves of a
+lift are open for these times: the air that they move brings the load to the ends of its stroke.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+from ...core.constants import STANDARD_GRAVITY
+from ...core.errors import SolveError
+from ...files.library.write import scenario_toml
+from ...physics.mechanism import AntagonisticJoint, HangingMass, Isotonic, Mechanism, SpringLoad
+from ...physics.muscle import LinearDamper, Muscle
+from ...physics.plant.plant import Plant
+from ...physics.pneumatics import FillDischarge, ProportionalRegulator, SecondOrderLag, Supply, Valve
+from ...physics.pneumatics.gas import Isothermal
+from .choice import MuscleChoice
+from .requirement import JointRequirement, LiftRequirement
+from .valve_sizing import discharge_valve, fill_valve
+
+MOVING, RESTING = 0.375, 0.125
+"""Parts of the cycle for each motion and for each rest (chosen)."""
+DAMPING_RATIO = 0.7
+"""Damping ratio of the load on the stiffness of the muscles in the middle of the motion (chosen)."""
+FORCE_MASS = 0.1
+"""Moving mass of a load that is a force: this part of the mass with the same weight (chosen)."""
+LAG = SecondOrderLag(20.0)
+"""Lag of the set point of a regulator (chosen)."""
+BAND = 5e3
+"""Proportional band of a regulator [Pa] (chosen)."""
+JOINT_MASS_TIME = 0.1
+"""Inertia of a joint without a stated one: the torque turns it over its range in this part of the cycle (chosen)."""
+
+
+def scenario_text(choice: MuscleChoice) -> str:
+    """The scenario of a choice, with the chosen values in comments at its beginning.
+
+    Raises SolveError for a choice without a geometry, or a joint with several muscles on each side.
+    """
+    return _lift_text(choice) if isinstance(choice.requirement, LiftRequirement) else _joint_text(choice)
+
+
+def scenario_valves(choice: MuscleChoice | None) -> tuple[Valve, ...]:
+    """Fill and discharge valve of each muscle in the scenario of a choice; none without a choice."""
+    if choice is None:
+        return ()
+    duration = MOVING * choice.conditions.cycle_time
+    return fill_valve(choice, duration), discharge_valve(choice, duration)
+
+
+def _muscles(choice: MuscleChoice, names: tuple[str, ...], damping: float) -> tuple[Muscle, ...]:
+    muscle = choice.muscle.muscle
+    assert muscle is not None  # the valves were sized with its volume
+    damper = muscle.damper if choice.entry.damper is not None else LinearDamper(damping)
+    return tuple(dataclasses.replace(muscle, name=name, damper=damper) for name in names)
+
+
+def _stiffness(choice: MuscleChoice) -> float:
+    """Stiffness [N/m] of one muscle at constant pressure in the middle between its end points."""
+    muscle, (first, last) = choice.muscle.muscle, (choice.design.extended, choice.design.contracted)
+    assert muscle is not None
+    pressure, contraction = 0.5 * (first.pressure + last.pressure), 0.5 * (first.contraction + last.contraction)
+    return max(float(muscle.stiffness(pressure, contraction)), 0.0) / choice.length
+
+
+def _load(choice: MuscleChoice, requirement: LiftRequirement) -> tuple[Mechanism, float]:
+    """The mechanism of a lift and its moving mass [kg]; the position 0 is that of the muscles at rest."""
+    start = choice.design.extended.contraction * choice.length
+    mass = requirement.mass or FORCE_MASS * requirement.load(0.0) / STANDARD_GRAVITY
+    mechanism: Mechanism
+    if requirement.stiffness:
+        preload = requirement.load(0.0) - requirement.stiffness * start
+        if requirement.stiffness < 0.0:
+            raise SolveError(
+                "the scenario of a load that decreases over the stroke is not written; give a constant load."
+            )
+        mechanism = SpringLoad(mass, requirement.stiffness, preload=preload)
+    elif requirement.force:
+        mechanism = Isotonic(requirement.load(0.0), mass)
+    else:
+        mechanism = HangingMass(mass)
+    return mechanism, mass
+
+
+def _lift_text(choice: MuscleChoice) -> str:
+    assert isinstance(choice.requirement, LiftRequirement)
+    cycle = choice.conditions.cycle_time
+    mechanism, mass = _load(choice, choice.requirement)
+    fill, discharge = scenario_valves(choice)
+    damping = 2.0 * DAMPING_RATIO * math.sqrt(choice.count * _stiffness(choice) * mass) / choice.count
+    names = tuple(f"muscle{i + 1}" for i in range(choice.count)) if choice.count > 1 else ("muscle",)
+    circuit = FillDischarge(Supply(choice.conditions.supply), fill, discharge)
+    plant = _plant(choice, _muscles(choice, names, damping), circuit, mechanism)
+    rows = {"fill": (RESTING, RESTING + MOVING), "discharge": (2 * RESTING + MOVING, 1.0)}
+    prefixes = [f"{name}." for name in names] if choice.count > 1 else [""]
+    inputs = {f"{prefix}{name}": [[start * cycle, 1.0], [end * cycle, 0.0]]
+              for prefix in prefixes for name, (start, end) in rows.items()}  # fmt: skip
+    start = choice.design.extended
+    run = {
+        "duration": (1.0 + RESTING) * cycle,
+        "output_times": cycle / 400.0,
+        "initial_state": {"pressure": start.pressure, "position": start.contraction * choice.length},
+    }
+    return scenario_toml(_title(choice), plant, inputs, run, _note(choice, mass != choice.requirement.mass))
+
+
+def _joint_text(choice: MuscleChoice) -> str:
+    requirement, cycle = choice.requirement, choice.conditions.cycle_time
+    assert isinstance(requirement, JointRequirement)
+    if choice.count > 1:
+        raise SolveError(
+            f"{choice.entry.name}: the joint of a scenario has one muscle on each side, not {choice.count}. Give a "
+            "maximum number of 1."
+        )
+    design, half = choice.design, 0.5 * requirement.angle
+    fill, discharge = scenario_valves(choice)  # raises for a choice without a geometry
+    assert design.radius is not None
+    inertia = requirement.inertia or requirement.torque * (JOINT_MASS_TIME * cycle) ** 2 / requirement.angle
+    stiffness = 2.0 * _stiffness(choice) * design.radius**2
+    damping = 2.0 * DAMPING_RATIO * math.sqrt(stiffness * inertia) / (2.0 * design.radius**2)
+    weight = requirement.torque / math.sin(min(half, 0.5 * math.pi))
+    joint = AntagonisticJoint(
+        design.radius, inertia, weight_torque=weight, min_angle=-1.5 * half, max_angle=1.5 * half,
+        offset=0.5 * (design.extended.contraction + design.contracted.contraction),
+    )  # fmt: skip
+    regulator = ProportionalRegulator(
+        Supply(choice.conditions.supply), fill, discharge, LAG, BAND, max_setpoint=choice.conditions.supply
+    )
+    plant = _plant(choice, _muscles(choice, ("left", "right"), damping), regulator, joint)
+    low, high = design.extended.pressure, design.contracted.pressure
+    middle = 0.5 * (low + high)
+    inputs = {
+        f"{name}.setpoint": [[0.0, middle], [RESTING * cycle, first], [(1.0 - MOVING) * cycle, second]]
+        for name, first, second in (("left", high, low), ("right", low, high))
+    }
+    run = {
+        "duration": (1.0 + MOVING) * cycle,
+        "output_times": cycle / 400.0,
+        "initial_state": {"pressure": middle, "angle": 0.0},
+    }
+    return scenario_toml(_title(choice), plant, inputs, run, _note(choice, inertia != requirement.inertia))
+
+
+def _plant(choice: MuscleChoice, muscles: tuple[Muscle, ...], circuit: Any, mechanism: Mechanism) -> Plant:
+    single = len(muscles) == 1
+    return Plant(
+        muscles[0] if single else muscles, circuit if single else (circuit,) * len(muscles), mechanism, Isothermal(),
+        choice.conditions.ambient,
+    )  # fmt: skip
+
+
+def _title(choice: MuscleChoice) -> str:
+    return f"{choice.total_count} x {choice.entry.name}, {1e3 * choice.length:.4g} mm: {choice.requirement.describe()}"
+
+
+def _note(choice: MuscleChoice, chosen_inertia: bool) -> str:
+    lines = [
+        "Sized by airmuscle size; SI units.",
+        f"The valves are sized after ISO 6358 to fill and to discharge in {100 * MOVING:.4g} % of the cycle.",
+        "Chosen: this part, the critical pressure ratio of the valves, isothermal air"
+        + ("" if choice.entry.damper is not None else f", the damper (damping ratio {DAMPING_RATIO:g})")
+        + (", the moving mass or inertia" if chosen_inertia else "")
+        + ".",
+    ]
+    if isinstance(choice.requirement, JointRequirement):
+        lines.append("Chosen: the regulators, and a pendulum that gives the torque at both ends of the range.")
+    return "\n".join(lines)

@@ -1,0 +1,263 @@
+"""Search of the muscles of a catalogue that meet a requirement, ranked, with the reasons for all others."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import functools
+import warnings
+from collections.abc import Callable, Iterable
+
+import numpy as np
+
+from ...core.errors import AirmuscleError, AirmuscleWarning, ParameterError, SolveError
+from ...core.short_repr import ShortRepr
+from ...files.library.entry import Entry
+from ...files.library.files import LAWS, list_laws, list_products, read_toml
+from ...files.library.law_file import load_law
+from .choice import MuscleChoice, Requirement, SortKey, UnsuitableMuscle, by_air, rank
+from .joint import JointSearch
+from .lift import LiftSearch
+from .requirement import LiftRequirement, SizingConditions
+from .static_muscle import LengthRange, at_length, length_range, own_length, static_muscle
+
+LENGTHS = 49
+"""Lengths that are tried for a law that depends on its length, before the shortest is refined (chosen)."""
+BISECTIONS = 7
+"""Bisections of the fraction of a load or a stroke that can be reached, for a message (chosen)."""
+Search = LiftSearch | JointSearch
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class SizingResult(ShortRepr):
+    """Choices of muscles for a requirement, best first, and the muscles that do not meet it, with reasons."""
+
+    requirement: Requirement
+    conditions: SizingConditions
+    choices: tuple[MuscleChoice, ...]
+    unsuitable: tuple[UnsuitableMuscle, ...]
+    entries: tuple[Entry, ...]
+    """All entries that were tried."""
+
+    @property
+    def best(self) -> MuscleChoice:
+        """The first choice. Raises SolveError, with what can be reached, if there is none."""
+        self.check_reachable()
+        return self.choices[0]
+
+    def check_reachable(self) -> None:
+        """Raise SolveError if no muscle meets the requirement; the message states what can be reached."""
+        if self.choices:
+            return
+        reasons = "; ".join(f"{item.name}: {item.reason}" for item in self.unsuitable[:3])
+        more = f"; and {len(self.unsuitable) - 3} more" if len(self.unsuitable) > 3 else ""
+        raise SolveError(
+            f"no muscle meets the requirement of {self.requirement.describe()}: {reasons}{more}. {self._reachable()}"
+        )
+
+    def _reachable(self) -> str:
+        """What is reachable of the load and of the travel, as sentences."""
+        usable = {item.name for item in self.unsuitable if item.count}
+        entries = [entry for entry in self.entries if entry.name in usable]
+        parts = [text for what in ("load", "travel") if (text := self._greatest(what, entries))]
+        if not parts:
+            return "Change the requirement or the conditions, or give other muscles."
+        return f"Reachable: {' or '.join(parts)}."
+
+    def _greatest(self, what: str, entries: list[Entry]) -> str:
+        """The largest fraction of a load or travel that one of the entries reaches, as text; empty if there is none.
+
+        Bisection: it is assumed that every smaller fraction is reachable, too.
+        """
+        best: MuscleChoice | None = None
+        low, high = 0.0, 1.0
+        for _ in range(BISECTIONS):
+            fraction = 0.5 * (low + high)
+            choice = _any_choice(_reduced(self.requirement, what, fraction), self.conditions, entries)
+            low, high, best = (low, fraction, best) if choice is None else (fraction, high, choice)
+        if best is None:
+            return ""
+        size = f"{best.total_count} x {best.entry.name} of {1e3 * best.length:.4g} mm"
+        return f"{best.requirement.describe()} ({size})"
+
+
+def catalogue() -> tuple[Entry, ...]:
+    """Entries of the library whose maker states permitted values and that have no restriction of use."""
+    entries = (load_quietly(name) for name in list_laws() if "product" in read_toml(LAWS / f"{name}.toml"))
+    return tuple(entry for entry in entries if not entry.warning)
+
+
+def products_without_law() -> tuple[UnsuitableMuscle, ...]:
+    """Products of the library of which no law is published, as unsuitable muscles."""
+    with_law = {read_toml(LAWS / f"{name}.toml").get("product") for name in list_laws()}
+    names = (name for name in list_products() if name not in with_law)
+    return tuple(UnsuitableMuscle(name, 0, "no law of this product is published") for name in names)
+
+
+@functools.cache
+def load_quietly(name: str) -> Entry:
+    """A law of the library or of a file, without its warning. Raises UnknownNameError or FileError."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AirmuscleWarning)
+        return load_law(name)
+
+
+def size_muscles(
+    requirement: Requirement,
+    conditions: SizingConditions,
+    muscles: Iterable[Entry] | None = None,
+    sort: SortKey = by_air,
+    progress: Callable[[float], None] | None = None,
+) -> SizingResult:
+    """The muscles that meet a requirement, each at its shortest length, and the others with the reason.
+
+    `muscles` are library entries; by default those of `catalogue`. Each is tried with `conditions.min_count` to
+    `conditions.max_count` muscles in parallel; a number is a choice if fewer muscles are longer or take more air.
+    `sort` is the criterion of the ranking, `progress` is called with the fraction done. Raises ParameterError for other
+    arguments.
+    """
+    if not isinstance(requirement, Requirement) or not isinstance(conditions, SizingConditions):
+        raise ParameterError(
+            "size_muscles: give a LiftRequirement or a JointRequirement, and SizingConditions; these are "
+            f"{type(requirement).__name__} and {type(conditions).__name__}."
+        )
+    entries = catalogue() if muscles is None else tuple(muscles)
+    if not entries or not all(isinstance(entry, Entry) for entry in entries):
+        raise ParameterError("size_muscles: muscles must be one or more library entries; load them with am.load(NAME).")
+    choices: list[MuscleChoice] = []
+    unsuitable: list[UnsuitableMuscle] = []
+    for done, entry in enumerate(entries):
+        if progress is not None:
+            progress(done / len(entries))
+        choices_of_entry, failed = _choices_of(entry, requirement, conditions)
+        choices += choices_of_entry
+        unsuitable += [] if choices_of_entry else [failed]
+    unsuitable.sort(key=lambda item: item.count == 0)
+    others = products_without_law() if muscles is None else ()
+    return SizingResult(requirement, conditions, rank(choices, sort), (*unsuitable, *others), entries)
+
+
+def _choices_of(
+    entry: Entry, requirement: Requirement, conditions: SizingConditions
+) -> tuple[list[MuscleChoice], UnsuitableMuscle]:
+    """The choices of an entry, and the reason of the maximum number that does not suffice.
+
+    A number is left out if fewer muscles are as short and take as little air.
+    """
+    choices: list[MuscleChoice] = []
+    failed = UnsuitableMuscle(entry.name, 0, "")
+    for count in range(conditions.min_count, conditions.max_count + 1):
+        try:
+            choice = choose(entry, requirement, conditions, count)
+        except AirmuscleError as error:
+            reason = str(error).removeprefix(f"{entry.name}: ").rstrip(".")
+            failed = UnsuitableMuscle(entry.name, count if isinstance(error, SolveError) else 0, reason)
+        else:
+            choices += [] if any(_is_dominated(choice, other) for other in choices) else [choice]
+    return choices, failed
+
+
+def _is_dominated(choice: MuscleChoice, other: MuscleChoice) -> bool:
+    """Whether another choice of the same type with fewer muscles is as short and takes as little air."""
+    less_air = choice.air is None or other.air is None or other.air <= choice.air
+    return less_air and other.length <= choice.length * (1.0 + 1e-9)
+
+
+def choose(entry: Entry, requirement: Requirement, conditions: SizingConditions, count: int = 1) -> MuscleChoice:
+    """The shortest muscles of one type, `count` in parallel (with a joint, on each side), that meet a requirement.
+
+    Raises SolveError or ParameterError, with the reason, if there are none.
+    """
+    if isinstance(count, bool) or not isinstance(count, int) or count < 1:
+        raise ParameterError(f"choose: count is {count!r}; it must be an integer of at least 1.")
+    kind = LiftSearch if isinstance(requirement, LiftRequirement) else JointSearch
+    search: Search = kind(requirement, conditions, count)  # type: ignore[arg-type]
+    lengths = length_range(entry, conditions.max_length)
+    length = _shortest_length(entry, search, lengths)
+    muscle = static_muscle(at_length(entry, length), conditions)
+    design = search.design(muscle, length)
+    if design is None:
+        raise SolveError(f"{entry.name}: {search.shortfall(muscle, length)}.")
+    choice = MuscleChoice(muscle, length, count, design, requirement, conditions)
+    _check_diameter(choice)
+    return choice
+
+
+def _shortest_length(entry: Entry, search: Search, lengths: LengthRange) -> float:
+    """The shortest length of the range that suffices, or the largest of the range."""
+
+    def needed(length: float) -> float:
+        return search.required_length(static_muscle(at_length(entry, length), search.conditions))
+
+    if lengths.low == lengths.high:
+        return lengths.high
+    if not _depends_on_length(entry, search, lengths):
+        return float(np.clip(needed(lengths.high), *lengths))
+    previous = lengths.low
+    for length in np.geomspace(*lengths, LENGTHS).tolist():
+        if _is_sufficient(needed, length):
+            return length if length == lengths.low else _refine(needed, previous, length)
+        previous = length
+    return lengths.high
+
+
+def _is_sufficient(needed: Callable[[float], float], length: float) -> bool:
+    try:
+        return needed(length) <= length
+    except AirmuscleError:
+        return False
+
+
+def _refine(needed: Callable[[float], float], low: float, high: float) -> float:
+    """The shortest sufficient length between one that is not and one that is, to rounding."""
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if _is_sufficient(needed, middle) else (middle, high)
+    return high
+
+
+def _depends_on_length(entry: Entry, search: Search, lengths: LengthRange) -> bool:
+    """Whether the force at equal pressure and contraction, or its range, depends on the length."""
+    if own_length(entry) is None:
+        return False
+    try:
+        first, second = (static_muscle(at_length(entry, length), search.conditions) for length in lengths)
+    except ParameterError:  # the law is not defined for the least length
+        return True
+    if not np.allclose(first.contraction_range, second.contraction_range, rtol=1e-12, atol=1e-12):
+        return True
+    grid = np.linspace(*first.contraction_range, 17)
+    short, long = (np.asarray(muscle.force(muscle.pressure_range[1], grid)) for muscle in (first, second))
+    return not np.allclose(short, long, rtol=1e-9, atol=1e-9 * float(np.abs(short).max()))
+
+
+def _check_diameter(choice: MuscleChoice) -> None:
+    limit, diameter = choice.conditions.max_diameter, choice.diameter
+    if limit == SizingConditions.max_diameter:  # no limit was given
+        return
+    if diameter is None:
+        raise ParameterError("its diameter is not known, because its law has no geometry")
+    if diameter > limit:
+        raise ParameterError(
+            f"its diameter at the contracted end is {1e3 * diameter:.4g} mm; at most {1e3 * limit:.4g} mm is allowed"
+        )
+
+
+def _reduced(requirement: Requirement, what: str, fraction: float) -> Requirement | None:
+    try:
+        return requirement.reduced(**{what: fraction})
+    except ParameterError:
+        return None
+
+
+def _any_choice(
+    requirement: Requirement | None, conditions: SizingConditions, entries: list[Entry]
+) -> MuscleChoice | None:
+    """A choice of any of the entries, with the maximum number of muscles or with one; None if there is none."""
+    if requirement is None:
+        return None
+    for entry in entries:
+        for count in (conditions.max_count, conditions.min_count):
+            with contextlib.suppress(AirmuscleError):
+                return choose(entry, requirement, conditions, count)
+    return None

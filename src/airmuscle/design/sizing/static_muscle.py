@@ -1,0 +1,223 @@
+"""Static force of a muscle within its working range: validity range, ratings, supply pressure and geometry."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...core import leaves
+from ...core.arrays import Array
+from ...core.errors import ParameterError, SolveError
+from ...core.short_repr import ShortRepr
+from ...files.library.entry import Entry
+from ...files.library.scaling import scale_entry
+from ...physics.muscle import ElasticSeriesElement, Muscle
+from ...physics.muscle.characteristic import Characteristic, ForceLaw
+from ...physics.muscle.characteristic.base import ContractionLaw, PressureLaw
+from ...physics.muscle.characteristic.validity_range import validity_range_of
+from ...physics.muscle.ratings import LENGTH_BOUNDS
+from .requirement import SizingConditions
+
+LEAST_DIAMETERS = 3.0
+"""Least nominal length over the nominal diameter (chosen). The makers state one range of lengths for all diameters; a
+muscle shorter than three diameters is its two end fittings, to which no law of a cylinder applies."""
+EXPANSION = 1.75
+"""Ratio of the diameter at pressure to that at rest, for a law without a geometry (chosen): that of a braid of 25
+degrees at a contraction of 25 %."""
+OUTLINE_POINTS = 33
+"""Contractions at which the diameter is evaluated; linear between them (chosen)."""
+BISECTIONS = 80
+"""Bisections of the force of a law that is not solved for it; they reach rounding precision."""
+TRIAL_RATIO = 1.001
+"""Ratio of lengths of the trial that finds whether a law can be scaled (chosen)."""
+
+
+class LengthRange(NamedTuple):
+    """Nominal lengths [m] of a muscle; both are equal if the law holds for one length only."""
+
+    low: float
+    high: float
+
+
+class EndPoint(NamedTuple):
+    """End point of a motion for one muscle: gauge pressure [Pa], contraction [1], tension [N], and the tension [N] of
+    which the muscle is capable there at its maximum pressure."""
+
+    pressure: float
+    contraction: float
+    force: float
+    capacity: float
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class StaticMuscle(ShortRepr):
+    """Static force of an entry, and its working range of gauge pressure [Pa] and contraction [1]."""
+
+    entry: Entry
+    pressure_range: tuple[float, float]
+    contraction_range: tuple[float, float]
+
+    @functools.cached_property
+    def muscle(self) -> Muscle | None:
+        """The muscle of the entry; None for a law without a geometry."""
+        is_muscle = self.entry.geometry is not None and isinstance(self.entry.characteristic, ForceLaw)
+        return self.entry.muscle if is_muscle else None
+
+    @property
+    def max_force(self) -> float:
+        """Force that the maker permits [N]; infinity if it is not stated."""
+        ratings = self.entry.ratings
+        return ratings.max_force if ratings is not None and "max_force" in ratings.stated else float("inf")
+
+    def force(self, pressure: Any, contraction: Any) -> Any:
+        """Static tension [N] at gauge pressure [Pa] and contraction [1]; arrays broadcast."""
+        if self.muscle is not None:
+            return self.muscle.static_force(pressure, contraction)
+        return _solve_for_force(self.entry.characteristic, pressure, contraction)
+
+    def capacity(self, contraction: Any) -> Any:
+        """Maximum permitted tension [N] at a contraction [1]: that at the maximum pressure, or that of the maker."""
+        return np.minimum(self.force(self.pressure_range[1], contraction), self.max_force)
+
+    def floor(self, contraction: Any) -> Any:
+        """Least tension [N] at a contraction [1]: that at the least pressure, or 0 where the muscle is slack."""
+        return np.maximum(self.force(self.pressure_range[0], contraction), 0.0)
+
+    def end_point(self, contraction: float, force: float) -> EndPoint:
+        """The end point with this tension [N] at a contraction [1]. Raises SolveError if no pressure gives it."""
+        from scipy.optimize import brentq
+
+        def residual(pressure: float) -> float:
+            return float(self.force(pressure, contraction)) - force
+
+        low, high = self.pressure_range
+        capacity = float(self.capacity(contraction))
+        if residual(low) >= 0.0:  # within rounding of the least pressure
+            return EndPoint(low, contraction, float(self.floor(contraction)), capacity)
+        if residual(high) < 0.0:
+            raise SolveError(
+                f"{self.entry.name}: the force at {high / 1e5:.4g} bar and {100 * contraction:.4g} % is "
+                f"{residual(high) + force:.4g} N; {force:.4g} N is needed."
+            )
+        pressure = float(brentq(residual, low, high, xtol=1e-9, rtol=8.9e-16, maxiter=300))
+        return EndPoint(pressure, contraction, float(self.force(pressure, contraction)), capacity)
+
+    def volume(self, pressure: float, contraction: float) -> float | None:
+        """Enclosed volume [m3]; None for a law without a geometry."""
+        if self.muscle is None:
+            return None
+        return float(self.muscle.volume(contraction, self.muscle.steady_state(pressure, contraction)))
+
+    def diameter(self, contraction: float) -> float | None:
+        """Maximum outer diameter of the enclosed volume [m], without the wall; None without a geometry."""
+        if self.entry.geometry is None:
+            return None
+        _, radii = self.entry.geometry.outline(contraction)
+        return 2.0 * float(np.max(radii))
+
+    def outer_diameter(self, contraction: Array) -> Array:
+        """Outer diameter at pressure [m] at contractions (N,), without the wall; 0 if it is not known.
+
+        That of the geometry; without one, 1.75 times the nominal diameter of the product.
+        """
+        if self.entry.geometry is None:
+            nominal = self.entry.ratings.diameter if self.entry.ratings is not None else 0.0
+            return np.full(np.shape(contraction), EXPANSION * nominal)
+        return np.interp(contraction, *self._outline)
+
+    @functools.cached_property
+    def _outline(self) -> tuple[Array, Array]:
+        """Contractions [1] and outer diameters [m], (OUTLINE_POINTS,) each."""
+        contractions = np.linspace(*self.contraction_range, OUTLINE_POINTS)
+        return contractions, np.array([self.diameter(float(each)) for each in contractions])
+
+
+def static_muscle(entry: Entry, conditions: SizingConditions) -> StaticMuscle:
+    """The static muscle of an entry. Raises ParameterError if it has no working range, with the reason."""
+    valid = validity_range_of(entry.characteristic, entry.validity_range)
+    if valid is None:
+        raise ParameterError("no validity range is stated for its law; add [validity_range] to a muscle file")
+    if isinstance(entry.series, ElasticSeriesElement):
+        raise ParameterError("it has a series spring, of which the sizing does not know the stretch")
+    limits = {row.quantity: row for row in entry.ratings.ranges()} if entry.ratings is not None else {}
+    rated_pressure, rated_contraction = limits.get("pressure"), limits.get("contraction")
+    if rated_pressure is not None and not conditions.supply <= rated_pressure.high * (1 + 1e-9):
+        raise ParameterError(
+            f"the supply pressure of {conditions.supply / 1e5:.4g} bar exceeds the permitted "
+            f"{rated_pressure.high / 1e5:.4g} bar; reduce it"
+        )
+    low = max(valid.min_pressure, conditions.min_pressure, rated_pressure.low if rated_pressure else -np.inf)
+    high = min(valid.max_pressure, conditions.supply)
+    if not low < high:
+        raise ParameterError(
+            f"its law is valid from {valid.min_pressure / 1e5:.4g} to {valid.max_pressure / 1e5:.4g} bar; the working "
+            f"range is {conditions.min_pressure / 1e5:.4g} to {conditions.supply / 1e5:.4g} bar"
+        )
+    ranges = [valid.contraction, entry.characteristic.contraction_range]
+    ranges += [entry.geometry.contraction_range] if entry.geometry is not None else []
+    ranges += [(rated_contraction.low, rated_contraction.high)] if rated_contraction is not None else []
+    contraction = max(r[0] for r in ranges), min(r[1] for r in ranges)
+    if not contraction[0] < contraction[1]:
+        raise ParameterError("the ranges of contraction of its law and of its maker do not overlap")
+    return StaticMuscle(entry, (low, high), contraction)
+
+
+def own_length(entry: Entry) -> float | None:
+    """Resting length [m] of the law or geometry of an entry; None if it has none."""
+    parts = (part for part in (entry.characteristic, entry.geometry) if part is not None)
+    lengths = (leaf.value for part in parts for leaf in leaves(part) if leaf.declared.name == "resting_length")
+    return next((float(length) for length in lengths), None)
+
+
+def length_range(entry: Entry, max_length: float) -> LengthRange:
+    """Nominal lengths [m] for which the law of an entry can be used, from three diameters (chosen) up to `max_length`.
+
+    Raises ParameterError if there are none, with the reason.
+    """
+    low, high = LENGTH_BOUNDS if entry.ratings is None else (entry.ratings.min_length, entry.ratings.max_length)
+    length = own_length(entry)
+    if length is not None and not _can_be_scaled(entry, length):
+        low = high = length
+    elif entry.ratings is not None:
+        low = max(low, LEAST_DIAMETERS * entry.ratings.diameter)
+    if low > max_length:
+        what = "only length" if low == high else "least length"
+        raise ParameterError(f"its {what} is {1e3 * low:.4g} mm; at most {1e3 * max_length:.4g} mm is allowed")
+    return LengthRange(low, min(high, max_length))
+
+
+def at_length(entry: Entry, length: float) -> Entry:
+    """The entry with this resting length [m]; a law in pressure and contraction alone is unchanged."""
+    own = own_length(entry)
+    return entry if own is None or own == length else scale_entry(entry, resting_length=length)
+
+
+def _can_be_scaled(entry: Entry, length: float) -> bool:
+    unrated = dataclasses.replace(entry, ratings=None)
+    try:
+        scale_entry(unrated, resting_length=TRIAL_RATIO * length)
+    except ParameterError:
+        return False
+    return True
+
+
+def _solve_for_force(law: Characteristic, pressure: Any, contraction: Any) -> Any:
+    """Tension [N]; of a law that is not solved for it by bisection, limited to the range of forces of the law."""
+    if not isinstance(law, ContractionLaw | PressureLaw):
+        return law.force(pressure, contraction)
+    p, eps = np.broadcast_arrays(np.asarray(pressure, dtype=float), np.asarray(contraction, dtype=float))
+    exceeds: Callable[[Array], Any] = (
+        (lambda force: law.contraction(p, force) < eps)
+        if isinstance(law, ContractionLaw)
+        else (lambda force: law.pressure(eps, force) > p)
+    )
+    low, high = (np.full(p.shape, limit) for limit in law.force_range)
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        above = exceeds(middle)
+        low, high = np.where(above, low, middle), np.where(above, middle, high)
+    return 0.5 * (low + high)

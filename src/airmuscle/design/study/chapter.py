@@ -1,0 +1,157 @@
+"""Report chapter of a parameter study, and its result files."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+
+from ...core.output_folder import atomic_folder
+from ...core.reference import cite
+from ...report.chapter import Chapter, Table
+from ...report.write import save_table, write_into
+from .distributions import LevelSet, Variation
+from .plots import study_plots
+from .result import StudyResult
+from .sensitivity import SobolIndices
+from .study import Study
+
+RESULTS_FILE, TIME_SERIES_FILE = "results.csv", "time_series.npz"
+MAX_LISTED_LEVELS = 6
+"""Maximum number of levels that are listed; of more levels, only range and number are printed."""
+MAX_LISTED_REASONS = 20
+
+
+def write_study(result: StudyResult, folder: Path | str) -> Path:
+    """Write results.csv, time_series.npz (if the study has time series) and the report; return the path of its page.
+
+    The files are written atomically: all or none. Raises FileError if the folder cannot be written to.
+    """
+    study = result.study
+    with atomic_folder(folder) as place:
+        save_table(result.table(), place / RESULTS_FILE)
+        if study.time_series:
+            times = {f"{name}_time": course.times for name, course in study.time_series.items()}
+            np.savez(place / TIME_SERIES_FILE, **times, **result.time_series)  # type: ignore[arg-type]
+        write_into(place, [study_chapter(result)], title="Parameter study")
+    return Path(folder) / "report.html"
+
+
+def study_chapter(result: StudyResult) -> Chapter:
+    """The report chapter: design, statistics, sensitivities and figures of a study."""
+    study, indices = result.study, result.indices()
+    tables = [variation_table(study)]
+    tables += [result.statistics()] if study.scalars else []
+    tables += [sensitivity_table(study, indices)] if indices else []
+    tables += [failure_table(result)] if result.failed.size else []
+    return Chapter(
+        paper="study",
+        title=study.title,
+        summary="\n\n".join(summary(result, indices)),
+        plots=study_plots(result, indices),
+        tables=tuple(tables),
+        references=tuple(cite(study.template.scenario.plant)),
+        chosen=_settings(study),
+    )
+
+
+def summary(result: StudyResult, indices: dict[str, SobolIndices]) -> list[str]:
+    """The paragraphs above the tables: number of runs, files, failed runs and excluded base points."""
+    study = result.study
+    paragraphs = [f"{len(study)} runs, {study.design}. {RESULTS_FILE} contains one row per run."]
+    if study.time_series:
+        names = ", ".join(study.time_series)
+        paragraphs.append(f"{TIME_SERIES_FILE} contains the time series ({names}), one row per run, and their times.")
+    if result.failed.size:
+        paragraphs.append(
+            f"Failed runs: {result.failed.size}. They are excluded from the statistics; the table states the reasons."
+        )
+    excluded = max((each.excluded_points for each in indices.values()), default=0)
+    if excluded:
+        paragraphs.append(f"Base points excluded from the sensitivities, because a metric is missing: {excluded}.")
+    return paragraphs
+
+
+def variation_table(study: Study) -> Table:
+    """The varied parameters with their distributions or levels and their sampled range."""
+    return Table(
+        "varied",
+        "Varied parameters",
+        {
+            "parameter": [parameter.path for parameter in study.parameters],
+            "unit": [parameter.unit for parameter in study.parameters],
+            "values": [describe_variation(variation) for variation in study.variations],
+            "min": study.values.min(axis=0),
+            "max": study.values.max(axis=0),
+            "also applied to": [_follower_paths(study, i) for i in range(len(study.parameters))],
+        },
+        "Values in SI units.",
+    )
+
+
+def _follower_paths(study: Study, index: int) -> str:
+    return ", ".join(parameter.path for parameter, leader in study.follow if leader == index)
+
+
+def describe_variation(variation: Variation) -> str:
+    """A variation as one line of text."""
+    if not isinstance(variation, LevelSet):
+        return str(variation)
+    if len(variation.values) > MAX_LISTED_LEVELS:
+        low, high = variation.support
+        return f"{len(variation.values)} values from {low:.4g} to {high:.4g}"
+    return ", ".join(f"{value:.4g}" for value in variation.values)
+
+
+def sensitivity_table(study: Study, indices: dict[str, SobolIndices]) -> Table:
+    """The Sobol indices of each metric with respect to each parameter, with their confidence intervals."""
+    rows = [(name, parameter.path, i) for name in indices for i, parameter in enumerate(study.parameters)]
+
+    def column(field: str, bound: int | None = None) -> list[float]:
+        values = [getattr(indices[name], field) for name, _, _ in rows]
+        return [float((v if bound is None else v[bound])[i]) for v, (_, _, i) in zip(values, rows, strict=True)]
+
+    return Table(
+        "sensitivities",
+        "Variance-based sensitivities (Sobol indices)",
+        {
+            "metric": [name for name, _, _ in rows],
+            "parameter": [path for _, path, _ in rows],
+            "first order": column("first"),
+            "first order, lower": column("first_interval", 0),
+            "first order, upper": column("first_interval", 1),
+            "total": column("total"),
+            "total, lower": column("total_interval", 0),
+            "total, upper": column("total_interval", 1),
+        },
+        "Bounds of 95 % bootstrap confidence intervals. First order: fraction of the variance removed if the parameter "
+        "were known; total: fraction that remains if all other parameters were known.",
+    )
+
+
+def failure_table(result: StudyResult) -> Table:
+    """The reasons of failed runs, the most frequent first."""
+    counts = Counter(result.failure_reasons[i] for i in result.failed).most_common(MAX_LISTED_REASONS)
+    return Table(
+        "failed",
+        "Failed runs",
+        {
+            "runs": [count for _, count in counts],
+            "first run": [result.failure_reasons.index(reason) for reason, _ in counts],
+            "reason": [reason for reason, _ in counts],
+        },
+        f"At most {MAX_LISTED_REASONS} reasons are listed." if len(counts) == MAX_LISTED_REASONS else "",
+    )
+
+
+def _settings(study: Study) -> tuple[tuple[str, str, str], ...]:
+    scenario = study.template.scenario
+    metrics = [(f"metric {name}", str(metric), "study") for name, metric in study.metrics.items()]
+    return (
+        ("scenario", scenario.title, str(study.path.name)),
+        ("design", str(study.design), "study"),
+        *metrics,
+        ("integrator", str(scenario.problem.integrator), "scenario"),
+        ("input signal", str(scenario.problem.input), "scenario"),
+    )

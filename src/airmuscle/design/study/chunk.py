@@ -1,0 +1,131 @@
+"""Chunks: groups of runs of a study, their results, and the files in which these are stored.
+
+The name of a chunk file is the fingerprint of everything that its content depends on. An existing chunk therefore need
+not be computed again, even if the study was interrupted; if an input has changed, no file matches, and the chunk is
+computed.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core.arrays import Array
+from ...core.atomic_output import atomic_file
+from ...core.errors import FileError
+from ...core.fingerprint import fingerprint, program_fingerprint
+from ...core.processes import check_running
+from ...files.scenario.scenario import Scenario
+from ...recording import Recording
+from .scenario_runs import RUN_ERRORS, failure_reason, simulate_all
+from .study import Study, load_study
+
+_loaded: dict[tuple[str, str], Study] = {}
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Chunk:
+    """Results of n runs.
+
+    scalars          scalar metrics (n, k); NaN if a run failed or does not have the metric
+    time_series      time series by name (n, T)
+    failure_reasons  reason of each failed run (n,); empty for other runs
+    """
+
+    scalars: Array
+    time_series: Mapping[str, Array]
+    failure_reasons: npt.NDArray[np.str_]
+
+
+def study_fingerprint(study: Study) -> str:
+    """The fingerprint of a study and of the program version that runs it."""
+    return fingerprint(program_fingerprint(), study.fingerprint(), study.values)
+
+
+def chunk_file_name(study: Study, index: int) -> str:
+    """The name of the file of a chunk."""
+    runs = study.chunk_runs(index)
+    values = study.values[runs.start : runs.stop]
+    return f"{fingerprint(program_fingerprint(), study.fingerprint(), values)}.npz"
+
+
+def register_study(study: Study) -> str:
+    """Make this process use the given study in `run_chunk`, without reading its file; return its fingerprint."""
+    identity = study_fingerprint(study)
+    _loaded[str(study.path.resolve()), identity] = study
+    return identity
+
+
+def run_chunk(path: str, identity: str, index: int) -> Chunk:
+    """Run one chunk of the study in a file, in any process; the plants are built in that process.
+
+    Raises FileError if the study in the file does not have the fingerprint `identity`.
+    """
+    if (path, identity) not in _loaded:
+        study = load_study(path)
+        if study_fingerprint(study) != identity:
+            raise FileError(
+                f"{path}: a worker process has read a different study. Either the file was edited after the start, or "
+                "the worker uses other versions of airmuscle, of its dependencies, or of the files named in the study."
+            )
+        _loaded[path, identity] = study
+    return compute_chunk(_loaded[path, identity], index)
+
+
+def compute_chunk(study: Study, index: int) -> Chunk:
+    """The results of one chunk; a failed run is recorded as NaN with its reason."""
+    runs = study.chunk_runs(index)
+    chunk = Chunk(
+        np.full((len(runs), len(study.scalars)), np.nan),
+        {name: np.full((len(runs), series.times.size), np.nan) for name, series in study.time_series.items()},
+        np.array([""] * len(runs), dtype=object),
+    )
+    scenarios: dict[int, Scenario] = {}
+    for row, (run, initial_state) in enumerate(zip(runs, study.initial_states(runs), strict=True)):
+        check_running()
+        try:
+            scenarios[row] = study.scenario(run, initial_state)
+        except RUN_ERRORS as error:
+            chunk.failure_reasons[row] = failure_reason(error)
+    outcomes = simulate_all(list(scenarios.values()), metric_times(study))
+    for row, outcome in zip(scenarios, outcomes, strict=True):
+        check_running()
+        if isinstance(outcome, str):
+            chunk.failure_reasons[row] = outcome
+        else:
+            _store(study, outcome, chunk, row)
+    return dataclasses.replace(chunk, failure_reasons=chunk.failure_reasons.astype(str))
+
+
+def metric_times(study: Study) -> Array:
+    """All times [s] at which the metrics of a study are evaluated, sorted."""
+    return np.unique(np.concatenate([metric.times for metric in study.metrics.values()]))
+
+
+def _store(study: Study, recording: Recording, chunk: Chunk, row: int) -> None:
+    time = recording["time"]
+    chunk.scalars[row] = [metric.value(time, recording[metric.column]) for metric in study.scalars.values()]
+    for name, series in study.time_series.items():
+        chunk.time_series[name][row] = series.sample(time, recording[series.column])
+
+
+def write_chunk(chunk: Chunk, path: Path) -> None:
+    """Write a chunk to its file atomically."""
+    series = {f"series:{name}": rows for name, rows in chunk.time_series.items()}
+    with atomic_file(path) as unfinished, unfinished.open("wb") as file:
+        np.savez(file, scalars=chunk.scalars, failure_reasons=chunk.failure_reasons, **series)  # type: ignore[arg-type]
+
+
+def read_chunk(path: Path) -> Chunk | None:
+    """The chunk in a file; None if the file is missing or damaged."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            series = {n.removeprefix("series:"): file[n] for n in file.files if n.startswith("series:")}
+            return Chunk(file["scalars"], series, file["failure_reasons"])
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return None

@@ -1,0 +1,247 @@
+"""Parameter distributions and level sets."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...core.arrays import Array
+from ...core.errors import ParameterError
+from ...files.library.build import build, custom_field
+from ...files.library.location import Location, read_finite_number
+from .fields import read_count, read_difference, read_quantity, read_ratio
+
+MIN_PROBABILITY = 1e-6
+"""Minimum probability of the range of a truncated distribution, so that its bounds are exact to ten digits."""
+
+
+class Variation(abc.ABC):
+    """The values that one parameter takes in a study."""
+
+    @abc.abstractmethod
+    def ppf(self, probabilities: Array) -> Array:
+        """The quantiles (N,) at probabilities (N,) in (0, 1): the inverse of the cumulative distribution function."""
+
+    @property
+    @abc.abstractmethod
+    def support(self) -> tuple[float, float]:
+        """The minimum and the maximum value; infinite if unbounded."""
+
+
+@dataclasses.dataclass(frozen=True)
+class LevelSet(Variation):
+    """Discrete values with equal probability. In a study file: a list."""
+
+    values: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        _check_finite(self, *self.values)
+        if not self.values:
+            raise ParameterError("LevelSet: the list is empty; give at least one value.")
+
+    def ppf(self, probabilities: Array) -> Array:
+        index = np.floor(probabilities * len(self.values)).astype(int)
+        values: Array = np.array(self.values)[np.minimum(index, len(self.values) - 1)]
+        return values
+
+    @property
+    def support(self) -> tuple[float, float]:
+        return min(self.values), max(self.values)
+
+
+@dataclasses.dataclass(frozen=True)
+class Range:
+    """Equidistant levels, including both ends."""
+
+    low: float = custom_field(read_quantity, "first value")
+    high: float = custom_field(read_quantity, "last value")
+    count: int = custom_field(read_count, "number of values")
+
+    def __post_init__(self) -> None:
+        _check_finite(self, self.low, self.high)
+        if not 2 <= self.count <= 1_000_000 or self.low == self.high:
+            raise ParameterError(
+                f"Range: {self.count} values from {self.low:g} to {self.high:g}; two different ends and 2 to 1000000 "
+                "values are required."
+            )
+
+    @property
+    def levels(self) -> LevelSet:
+        """The values as a LevelSet."""
+        return LevelSet(tuple(np.linspace(self.low, self.high, self.count).tolist()))
+
+
+class Distribution(Variation):
+    """A continuous probability distribution, evaluated by scipy.stats."""
+
+    @abc.abstractmethod
+    def scipy_distribution(self) -> Any:
+        """The frozen distribution of scipy.stats."""
+
+    def ppf(self, probabilities: Array) -> Array:
+        return np.asarray(self.scipy_distribution().ppf(probabilities), dtype=float)
+
+    @property
+    def support(self) -> tuple[float, float]:
+        low, high = self.scipy_distribution().support()
+        return float(low), float(high)
+
+
+@dataclasses.dataclass(frozen=True)
+class Uniform(Distribution):
+    """Uniform distribution between two bounds."""
+
+    low: float = custom_field(read_quantity, "lower bound")
+    high: float = custom_field(read_quantity, "upper bound")
+
+    def __post_init__(self) -> None:
+        _check_finite(self, self.low, self.high)
+        _check_order(self, ("low", self.low), ("high", self.high))
+
+    def scipy_distribution(self) -> Any:
+        from scipy import stats
+
+        return stats.uniform(self.low, self.high - self.low)
+
+
+@dataclasses.dataclass(frozen=True)
+class Normal(Distribution):
+    """Normal distribution. It is unbounded: use Truncated if values beyond a bound are impossible."""
+
+    mean: float = custom_field(read_quantity, "mean")
+    std: float = custom_field(read_difference, "standard deviation")
+
+    def __post_init__(self) -> None:
+        _check_finite(self, self.mean, self.std)
+        _check_positive(self, "std", self.std)
+
+    def scipy_distribution(self) -> Any:
+        from scipy import stats
+
+        return stats.norm(self.mean, self.std)
+
+
+@dataclasses.dataclass(frozen=True)
+class LogNormal(Distribution):
+    """Log-normal distribution: the natural logarithm of the value is normally distributed."""
+
+    median: float = custom_field(read_quantity, "median")
+    log_std: float = custom_field(
+        read_ratio, "standard deviation of the natural logarithm; approximately the relative standard deviation"
+    )
+
+    def __post_init__(self) -> None:
+        _check_finite(self, self.median, self.log_std)
+        _check_positive(self, "median", self.median)
+        _check_positive(self, "log_std", self.log_std)
+
+    def scipy_distribution(self) -> Any:
+        from scipy import stats
+
+        return stats.lognorm(self.log_std, scale=self.median)
+
+
+@dataclasses.dataclass(frozen=True)
+class Triangular(Distribution):
+    """Triangular distribution with a mode between two bounds."""
+
+    low: float = custom_field(read_quantity, "lower bound")
+    mode: float = custom_field(read_quantity, "mode")
+    high: float = custom_field(read_quantity, "upper bound")
+
+    def __post_init__(self) -> None:
+        _check_finite(self, self.low, self.mode, self.high)
+        _check_order(self, ("low", self.low), ("high", self.high))
+        if not self.low <= self.mode <= self.high:
+            raise ParameterError(
+                f"Triangular: mode is {self.mode:g}; it must lie between low, {self.low:g}, and high, {self.high:g}."
+            )
+
+    def scipy_distribution(self) -> Any:
+        from scipy import stats
+
+        return stats.triang((self.mode - self.low) / (self.high - self.low), self.low, self.high - self.low)
+
+
+def _read_inner(value: Any, unit: str, where: str) -> Distribution:
+    inner: Distribution = build(value, Location(where, "", Path()), classes=DISTRIBUTIONS, unit=unit)
+    return inner
+
+
+@dataclasses.dataclass(frozen=True)
+class Truncated(Variation):
+    """A distribution truncated to the range between two bounds."""
+
+    inner: Distribution = custom_field(_read_inner, "the distribution to be truncated, a table with a model")
+    low: float = custom_field(read_quantity, "lower bound")
+    high: float = custom_field(read_quantity, "upper bound")
+
+    def __post_init__(self) -> None:
+        _check_finite(self, self.low, self.high)
+        _check_order(self, ("low", self.low), ("high", self.high))
+        if not isinstance(self.inner, Distribution):
+            raise ParameterError(f"Truncated: {self.inner!r} is not a continuous distribution; only these are allowed.")
+        below, above = self._probability_range()
+        if above - below < MIN_PROBABILITY:
+            raise ParameterError(
+                f"Truncated: the probability of {self.low:g} to {self.high:g} in {self.inner} is {above - below:.2g}; "
+                f"it must be at least {MIN_PROBABILITY:g}."
+            )
+
+    def _probability_range(self) -> tuple[float, float]:
+        below, above = self.inner.scipy_distribution().cdf([self.low, self.high])
+        return float(below), float(above)
+
+    def ppf(self, probabilities: Array) -> Array:
+        below, above = self._probability_range()
+        return np.clip(self.inner.ppf(below + probabilities * (above - below)), self.low, self.high)
+
+    @property
+    def support(self) -> tuple[float, float]:
+        low, high = self.inner.support
+        return max(low, self.low), min(high, self.high)
+
+
+DISTRIBUTIONS: dict[str, type[Any]] = {cls.__name__: cls for cls in (Uniform, Normal, LogNormal, Triangular)}
+"""The continuous distributions that may be truncated."""
+VARIATIONS: dict[str, type[Any]] = {"Range": Range, **DISTRIBUTIONS, "Truncated": Truncated}
+"""The variations that a study file may name."""
+
+
+def read_variation(value: Any, unit: str, location: Location) -> Variation:
+    """The variation in a list or table of a study file. Raises ParameterError, UnitError or UnknownNameError."""
+    if isinstance(value, list):
+        if not value:
+            raise ParameterError(f"{location}: the list is empty; give at least one value.")
+        return LevelSet(tuple(read_finite_number(item, unit, f"{location}[{i}]") for i, item in enumerate(value)))
+    if not isinstance(value, Mapping):
+        raise ParameterError(
+            f'{location} is {value!r}; write a list of values, or a distribution such as {{ model = "Uniform", '
+            "low = ..., high = ... }."
+        )
+    variation = build(value, location, classes=VARIATIONS, unit=unit)
+    return variation.levels if isinstance(variation, Range) else variation
+
+
+def _check_finite(variation: Any, *values: float) -> None:
+    if not all(math.isfinite(value) for value in values):
+        raise ParameterError(f"{variation}: all values must be finite.")
+
+
+def _check_positive(variation: Any, name: str, value: float) -> None:
+    if not value > 0:
+        raise ParameterError(f"{type(variation).__name__}: {name} is {value:g}; it must be positive.")
+
+
+def _check_order(variation: Any, lower: tuple[str, float], upper: tuple[str, float]) -> None:
+    if not lower[1] < upper[1]:
+        raise ParameterError(
+            f"{type(variation).__name__}: {lower[0]} is {lower[1]:g} and {upper[0]} is {upper[1]:g}; {lower[0]} must "
+            f"be less than {upper[0]}."
+        )

@@ -1,0 +1,250 @@
+"""Metrics stored for each run: scalar values of a column, and time series.
+
+Means are over time: the integral (trapezoidal rule) between the recorded rows, divided by the duration of the window. A
+level is reached where the straight line between two rows crosses it. The output step of the scenario ([run] output)
+therefore determines the accuracy of the metrics.
+"""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...core.arrays import Array
+from ...core.errors import ParameterError
+from ...files.library.build import custom_field
+from .fields import read_name, read_quantity, read_ratio, read_time
+
+
+class Window(NamedTuple):
+    """A time window of a column: times (N,) [s] and values (N,)."""
+
+    time: Array
+    values: Array
+
+
+@dataclasses.dataclass(frozen=True)
+class Metric(abc.ABC):
+    """A metric of one column of each run, within a time window [s] or over the whole run."""
+
+    column: str = custom_field(read_name, "column of the run")
+    begin: float = custom_field(read_time, "start of the time window", default=-math.inf, kw_only=True)
+    end: float = custom_field(read_time, "end of the time window", default=math.inf, kw_only=True)
+
+    def __post_init__(self) -> None:
+        if not self.begin < self.end:
+            raise ParameterError(
+                f"{type(self).__name__}: the window is {self.begin:g} to {self.end:g} s; its end must be later than "
+                "its begin."
+            )
+
+    def window(self, time: Array, values: Array) -> Window:
+        """The part of a run (N,) within the time window; values at its bounds are interpolated."""
+        first, last = max(self.begin, time[0]), min(self.end, time[-1])
+        if not first <= last:
+            return Window(np.empty(0), np.empty(0))
+        inside = (time > first) & (time < last)
+        bounds = np.unique([first, last])
+        times = np.concatenate([bounds[:1], time[inside], bounds[1:]])
+        return Window(times, np.interp(times, time, values))
+
+    def check_range(self, start: float, duration: float) -> None:
+        """Raise ParameterError if the time window does not overlap a run of `duration` [s] from `start` [s]."""
+        if not max(self.begin, start) <= min(self.end, start + duration):
+            raise ParameterError(
+                f"{type(self).__name__}: the window {self.begin:g} to {self.end:g} s does not overlap the run, "
+                f"{start:g} to {start + duration:g} s."
+            )
+
+    @property
+    def times(self) -> Array:
+        """The times [s] that must be among the rows of a run."""
+        return np.array([t for t in (self.begin, self.end) if math.isfinite(t)])
+
+    @abc.abstractmethod
+    def unit(self, column_unit: str) -> str:
+        """The unit of the metric, given that of the column."""
+
+
+class Scalar(Metric):
+    """A metric that is a single number; NaN if it does not exist for a run."""
+
+    def value(self, time: Array, values: Array) -> float:
+        """The metric of a run with times (N,) [s] and values (N,) of the column."""
+        window = self.window(time, values)
+        return self._evaluate(window) if window.time.size else math.nan
+
+    @abc.abstractmethod
+    def _evaluate(self, window: Window) -> float:
+        """The metric of a window with at least one row."""
+
+    def unit(self, column_unit: str) -> str:
+        return column_unit
+
+
+class Final(Scalar):
+    """Final value."""
+
+    def _evaluate(self, window: Window) -> float:
+        return float(window.values[-1])
+
+
+class Maximum(Scalar):
+    """Maximum value."""
+
+    def _evaluate(self, window: Window) -> float:
+        return float(window.values.max())
+
+
+class Minimum(Scalar):
+    """Minimum value."""
+
+    def _evaluate(self, window: Window) -> float:
+        return float(window.values.min())
+
+
+class Mean(Scalar):
+    """Mean over time."""
+
+    def _evaluate(self, window: Window) -> float:
+        return _time_mean(window.time, window.values)
+
+
+class RootMeanSquare(Scalar):
+    """Root mean square over time."""
+
+    def _evaluate(self, window: Window) -> float:
+        # the square of a linear function is a parabola, which Simpson's rule integrates exactly
+        a, b = window.values[:-1], window.values[1:]
+        steps = np.diff(window.time)
+        if not steps.sum() > 0:
+            return abs(float(window.values[0]))
+        return math.sqrt(float(steps @ (a * a + a * b + b * b)) / 3.0 / float(steps.sum()))
+
+
+@dataclasses.dataclass(frozen=True)
+class TimeToReach(Scalar):
+    """Time [s] from the start of the window until the column first reaches a level, from above or below."""
+
+    level: float = custom_field(read_quantity, "value to be reached")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not math.isfinite(self.level):
+            raise ParameterError(f"TimeToReach: level is {self.level}; it must be finite.")
+
+    def _evaluate(self, window: Window) -> float:
+        return _first_crossing(window, self.level) - float(window.time[0])
+
+    def unit(self, column_unit: str) -> str:
+        return "s"
+
+
+class Overshoot(Scalar):
+    """Overshoot beyond the final value, as a fraction of the difference between final and initial value [1]."""
+
+    def _evaluate(self, window: Window) -> float:
+        change = window.values[-1] - window.values[0]
+        if change == 0.0:
+            return math.nan
+        return max(0.0, float(((window.values - window.values[-1]) / change).max()))
+
+    def unit(self, column_unit: str) -> str:
+        return "1"
+
+
+@dataclasses.dataclass(frozen=True)
+class SettlingTime(Scalar):
+    """Time [s] from the start of the window until the column remains within a band around its final value.
+
+    Half the width of the band is the fraction `band` of the difference between final and initial value, by default 2 %.
+    """
+
+    band: float = custom_field(
+        read_ratio, "half-width of the band, relative to the change of the column", default=0.02, kw_only=True
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0 < self.band < 1:
+            raise ParameterError(f"SettlingTime: band is {self.band:g}; it must be between 0 and 1.")
+
+    def _evaluate(self, window: Window) -> float:
+        error, begin = window.values - window.values[-1], float(window.time[0])
+        half_width = self.band * abs(float(error[0]))
+        outside = np.flatnonzero(np.abs(error) > half_width)
+        if half_width == 0.0:
+            return 0.0 if outside.size == 0 else math.nan
+        if outside.size == 0:
+            return 0.0
+        i = int(outside[-1])
+        entry = Window(window.time[i : i + 2], error[i : i + 2])
+        return _first_crossing(entry, math.copysign(half_width, error[i])) - begin
+
+    def unit(self, column_unit: str) -> str:
+        return "s"
+
+
+@dataclasses.dataclass(frozen=True)
+class TimeSeries(Metric):
+    """The column at equidistant times; NaN after the end of a run that was aborted."""
+
+    sample_time: float = custom_field(read_time, "sample time")
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not 0 < self.sample_time < math.inf:
+            raise ParameterError(f"TimeSeries: sample_time is {self.sample_time:g} s; it must be positive and finite.")
+
+    def clip_to_run(self, start: float, duration: float) -> TimeSeries:
+        """A copy whose window is clipped to a run, which fixes its times. Raises ParameterError."""
+        begin, end = max(self.begin, start), min(self.end, start + duration)
+        if not begin < end or (end - begin) / self.sample_time > 1_000_000:
+            raise ParameterError(
+                f"TimeSeries: {begin:g} to {end:g} s with a sample time of {self.sample_time:g} s; 2 to 1000000 "
+                "samples must lie within the run."
+            )
+        return dataclasses.replace(self, begin=begin, end=end)
+
+    @property
+    def times(self) -> Array:
+        steps = math.floor((self.end - self.begin) / self.sample_time * (1 + 1e-12))
+        return np.asarray(self.begin + self.sample_time * np.arange(steps + 1), dtype=float)
+
+    def unit(self, column_unit: str) -> str:
+        return column_unit
+
+    def sample(self, time: Array, values: Array) -> Array:
+        """The column (T,) at `times`, from a run with times (N,) [s] and values (N,)."""
+        tolerance = 1e-9 * (self.end - self.begin)
+        samples = np.interp(self.times, time, values)
+        return np.where((self.times >= time[0] - tolerance) & (self.times <= time[-1] + tolerance), samples, np.nan)
+
+
+METRICS: dict[str, type[Any]] = {
+    cls.__name__: cls
+    for cls in (Final, Maximum, Minimum, Mean, RootMeanSquare, TimeToReach, Overshoot, SettlingTime, TimeSeries)
+}
+"""The metrics that a study file may name."""
+
+
+def _time_mean(time: Array, values: Array) -> float:
+    duration = float(time[-1] - time[0])
+    return float(np.trapezoid(values, time)) / duration if duration > 0 else float(values[0])
+
+
+def _first_crossing(window: Window, level: float) -> float:
+    """The time at which the lines between the rows first cross a level; NaN if they do not."""
+    distance = window.values - level
+    crossings = np.flatnonzero(np.append(distance[:-1] * distance[1:] < 0.0, False) | (distance == 0.0))
+    if crossings.size == 0:
+        return math.nan
+    i = crossings[0]
+    if distance[i] == 0.0:
+        return float(window.time[i])
+    fraction = distance[i] / (distance[i] - distance[i + 1])
+    return float(window.time[i] + fraction * (window.time[i + 1] - window.time[i]))

@@ -1,0 +1,178 @@
+"""Parameter paths: the numbers of a scenario that a study may vary.
+
+All declared parameters of the plant may vary, with the paths of `airmuscle.core.leaves`: `circuit.fill.conductance`. Of
+the other tables, all numbers may vary: `input.fill[0][1]` (value of the first point; `[0][0]` is its time),
+`run.duration`, `run.initial_state.pressure`, `run.integrator.rtol`.
+"""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...core.absolute_pressure import AbsolutePressure
+from ...core.arrays import Array
+from ...core.declaration import parameters
+from ...core.errors import ParameterError, suggestion
+from ...core.tree import absolute_pressures, flatten, leaves, with_parameters
+from ...core.units import ABSOLUTE
+from ...engine.loop.control_loop import ControlLoop
+from ...files.library.location import Location
+from ...files.library.models import model_class
+from ...files.scenario.controller import controller_number_paths
+from ...files.scenario.scenario import Scenario, build_scenario, initial_pressure, run_column_units
+from ...physics.equilibrium import find_equilibrium_of_each
+
+Keys = tuple[str | int, ...]
+"""Nested keys of a number in the tables of a scenario."""
+
+
+@dataclasses.dataclass(frozen=True)
+class ScenarioParameter:
+    """A number of a scenario: path, unit, bounds, and location: the index of a leaf of the plant, or nested keys."""
+
+    path: str
+    unit: str
+    bounds: tuple[float, float]
+    location: int | Keys
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ScenarioTemplate:
+    """The nominal scenario of a study, its tables and their location in the file."""
+
+    tables: Mapping[str, Any]
+    location: Location
+    scenario: Scenario
+
+    def parameters(self) -> dict[str, ScenarioParameter]:
+        """All parameters that may vary, by path."""
+        plant, input_table = self.scenario.plant, self.tables.get("input", {})
+        available = [
+            ScenarioParameter(leaf.path, leaf.declared.unit, leaf.declared.bounds, i)
+            for i, leaf in enumerate(leaves(plant))
+        ]
+        for keys, unit in (
+            *_input_parameters(input_table, self.scenario),
+            *_run_parameters(self.tables["run"], self.scenario),
+        ):
+            available.append(ScenarioParameter(_format_path(keys), unit, (-math.inf, math.inf), keys))
+        return {parameter.path: parameter for parameter in available}
+
+    def parameter(self, path: str, where: str) -> ScenarioParameter:
+        """The parameter with a path. Raises ParameterError with the closest path."""
+        known = self.parameters()
+        if path not in known:
+            near = suggestion(path, known) or f" The parameters are {', '.join(known)}."
+            raise ParameterError(f"{where}: the scenario has no parameter '{path}'.{near}")
+        return known[path]
+
+    def initial_states(self, varied: Sequence[ScenarioParameter], values: Array) -> list[dict[str, float] | None]:
+        """The initial equilibria of several runs with other parameter values (R, d), computed together.
+
+        None for a run whose initial state must be computed individually. The values are not validated.
+        """
+        plant, individually = self.scenario.plant, [None] * len(values)
+        pressure = initial_pressure(self.tables, self.location, plant)
+        if pressure is None or any(
+            p.location[:2] == ("run", "initial_state")
+            if not isinstance(p.location, int)
+            else p.unit == ABSOLUTE and isinstance(pressure, AbsolutePressure)
+            for p in varied
+        ):
+            return list(individually)
+        leaf_values = np.repeat(flatten(plant)[None, :], len(values), axis=0)
+        of_plant = {p.path: column for p, column in zip(varied, values.T, strict=True) if isinstance(p.location, int)}
+        of_plant |= absolute_pressures(plant, of_plant)
+        for place, leaf in enumerate(leaves(plant)):
+            if leaf.path in of_plant:
+                leaf_values[:, place] = of_plant[leaf.path]
+        pressures, inputs = (pressure,) * len(plant.muscles), np.zeros(len(plant.inputs))
+        states = find_equilibrium_of_each(self.scenario.problem.compiled, leaf_values, pressures, inputs)
+        names = [s.name for s in plant.states]
+        return [dict(zip(names, x, strict=True)) if np.isfinite(x).all() else None for x in states.tolist()]
+
+    def with_values(
+        self,
+        varied: Sequence[ScenarioParameter],
+        values: Sequence[float],
+        initial_state: dict[str, float] | None = None,
+    ) -> Scenario:
+        """The scenario with other parameter values, validated as if they were in its file.
+
+        The initial state is computed, unless `initial_state` is given. Raises ParameterError or PhysicsError.
+        """
+        scenario, tables = self.scenario, self.tables
+        leaf_values = [leaf.value for leaf in leaves(scenario.plant)]
+        for parameter, value in zip(varied, values, strict=True):
+            if isinstance(parameter.location, int):
+                leaf_values[parameter.location] = float(value)
+            else:
+                tables = _replace_number(tables, parameter.location, float(value))
+        # the failure reason must be the same on every machine and therefore names the file without its folder
+        location = dataclasses.replace(self.location, file=Path(self.location.file).name)
+        return build_scenario(tables, location, with_parameters(scenario.plant, leaf_values), initial_state)
+
+
+def _input_parameters(table: Mapping[str, Any], scenario: Scenario) -> Iterator[tuple[Keys, str]]:
+    """Keys and units of the numbers under [input]."""
+    units = run_column_units(scenario.problem)
+    for name, value in table.items():
+        if isinstance(scenario.problem.input, ControlLoop) and name == "controller":
+            yield from (
+                (("input", name, *keys), unit)
+                for keys, unit in controller_number_paths(value, scenario.problem.input, units)
+            )
+        elif name == "period":
+            yield ("input", name), "s"
+        elif isinstance(value, list):
+            for i, _ in enumerate(value):
+                yield ("input", name, i, 0), "s"
+                yield ("input", name, i, 1), units[name]
+        elif isinstance(value, Mapping):
+            yield from _model_parameters(value, ("input", name))
+
+
+def _run_parameters(table: Mapping[str, Any], scenario: Scenario) -> Iterator[tuple[Keys, str]]:
+    """Keys and units of the numbers under [run]."""
+    for name in ("duration", "start_time", "output_times"):
+        if name in table:
+            yield ("run", name), "s"
+    yield ("run", "initial_state", "pressure"), "Pa"
+    for coordinate in scenario.plant.mechanism.coordinates:
+        yield ("run", "initial_state", coordinate.name), coordinate.unit
+        yield ("run", "initial_state", coordinate.speed), f"{coordinate.unit}/s"
+    yield from _model_parameters(table.get("integrator"), ("run", "integrator"))
+
+
+def _model_parameters(value: Any, keys: Keys) -> Iterator[tuple[Keys, str]]:
+    """Keys and units of the declared parameters of all models in a table or list, at any depth."""
+    if isinstance(value, list):
+        for i, item in enumerate(value):
+            yield from _model_parameters(item, (*keys, i))
+    elif isinstance(value, Mapping):
+        if isinstance(value.get("model"), str):
+            for declared in parameters(model_class(value["model"], _format_path(keys))):
+                yield (*keys, declared.name), declared.unit
+        for name, item in value.items():
+            yield from _model_parameters(item, (*keys, name))
+
+
+def _format_path(keys: Keys) -> str:
+    return "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in keys).lstrip(".")
+
+
+def _replace_number(tables: Mapping[str, Any], keys: Keys, value: float) -> Mapping[str, Any]:
+    """A copy of the tables with one number replaced; missing tables are created."""
+    changed: Any = copy.deepcopy(dict(tables))
+    inner = changed
+    for key in keys[:-1]:
+        inner = inner.setdefault(key, {}) if isinstance(inner, dict) else inner[key]
+    inner[keys[-1]] = value
+    return dict(changed)

@@ -1,0 +1,250 @@
+"""Study files: a scenario, its varied parameters, the design of experiments and the metrics.
+
+title = "Spread of two valves"                     optional
+scenario = "fill_discharge.toml"                   a scenario file next to this one; or the tables [scenario.plant],
+                                                   [scenario.input] and [scenario.run] of a scenario
+chunk_size = 32                                    optional: number of runs that are saved together
+[vary]                                             varied parameters by their paths, see paths.py
+"mechanism.mass" = ["5 kg", "10 kg"]               levels; also { model = "Range", low = , high = , count = }
+"circuit.fill.conductance" = { model = "Normal", mean = "...", std = "..." }             see distributions.py
+[follow]                                           optional: parameters that take the value of a varied parameter
+"circuit.discharge.conductance" = "circuit.fill.conductance"
+[design]
+model = "LatinHypercube"                           see design.py
+count = 256
+seed = 1
+[metrics]                                          see metrics.py
+contraction = { model = "Final", column = "contraction" }
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core.absolute_pressure import ambient_pressure
+from ...core.errors import ParameterError, suggestion
+from ...core.fingerprint import fingerprint
+from ...core.short_repr import ShortRepr
+from ...files.library.build import build
+from ...files.library.files import read_toml
+from ...files.library.location import Location, check_keys, located_errors, read_text
+from ...files.scenario.scenario import Scenario, build_scenario, load_scenario, run_column_units
+from .design import DESIGNS, Design
+from .distributions import Variation, read_variation
+from .fields import read_count
+from .metrics import METRICS, Metric, Scalar, TimeSeries
+from .paths import ScenarioParameter, ScenarioTemplate
+
+TABLES = ("title", "scenario", "chunk_size", "vary", "follow", "design", "metrics")
+CHUNK_SIZE = 32
+"""Default number of runs that are saved together (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Study(ShortRepr):
+    """A parameter study: many runs of one scenario.
+
+    parameters  the d varied parameters
+    variations  their distributions or level sets
+    follow      further parameters, each with the index of the varied parameter whose value it takes
+    design      the design of experiments
+    values      the parameter values (N, d), one row per run
+    metrics     the metrics kept from each run, by name
+    """
+
+    title: str
+    path: Path
+    template: ScenarioTemplate
+    parameters: tuple[ScenarioParameter, ...]
+    variations: tuple[Variation, ...]
+    follow: tuple[tuple[ScenarioParameter, int], ...]
+    design: Design
+    values: npt.NDArray[np.float64]
+    metrics: Mapping[str, Metric]
+    chunk_size: int = CHUNK_SIZE
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    @property
+    def scalars(self) -> dict[str, Scalar]:
+        """The scalar metrics by name."""
+        return {name: metric for name, metric in self.metrics.items() if isinstance(metric, Scalar)}
+
+    @property
+    def time_series(self) -> dict[str, TimeSeries]:
+        """The time series by name."""
+        return {name: metric for name, metric in self.metrics.items() if isinstance(metric, TimeSeries)}
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The units of the metrics."""
+        known = columns_of(self.template.scenario)
+        return {name: metric.unit(known[metric.column]) for name, metric in self.metrics.items()}
+
+    def chunk_runs(self, index: int) -> range:
+        """The runs of one chunk."""
+        return range(index * self.chunk_size, min((index + 1) * self.chunk_size, len(self)))
+
+    @property
+    def chunks(self) -> range:
+        """The indices of the chunks."""
+        return range(-(-len(self) // self.chunk_size))
+
+    @property
+    def varying_parameters(self) -> tuple[ScenarioParameter, ...]:
+        """The varied parameters and those that follow them."""
+        return (*self.parameters, *(parameter for parameter, _ in self.follow))
+
+    def varying_values(self, runs: Sequence[int]) -> npt.NDArray[np.float64]:
+        """The values (R, D) of the D varying parameters in R runs."""
+        values = self.values[runs]
+        return np.hstack([values, values[:, [i for _, i in self.follow]]])
+
+    def initial_states(self, runs: Sequence[int]) -> list[dict[str, float] | None]:
+        """The initial states of some runs, computed together; None if a run must be computed individually."""
+        return self.template.initial_states(self.varying_parameters, self.varying_values(runs))
+
+    def scenario(self, run: int, initial_state: dict[str, float] | None = None) -> Scenario:
+        """The scenario of one run. Raises ParameterError or PhysicsError if its parameter values are not valid."""
+        return self.template.with_values(self.varying_parameters, self.varying_values([run])[0].tolist(), initial_state)
+
+    def fingerprint(self) -> str:
+        """The fingerprint of everything that the results depend on, except for the program."""
+        scenario = dataclasses.replace(self.template.scenario, title="")
+        tables = {name: table for name, table in self.template.tables.items() if name != "title"}
+        return fingerprint(scenario, tables, self.parameters, self.follow, self.metrics)
+
+
+def columns_of(scenario: Scenario) -> dict[str, str]:
+    """The units of all columns that a run has."""
+    return run_column_units(scenario.problem)
+
+
+def load_study(path: str | Path) -> Study:
+    """Read a study file. Raises FileError, ParameterError, UnitError or UnknownNameError with the location."""
+    file = Path(path)
+    tables = read_toml(file)
+    location = Location(str(file), "", file.parent)
+    check_keys(tables, TABLES, location)
+    template = _read_scenario(tables.get("scenario"), location)
+    with ambient_pressure(template.scenario.plant.ambient.pressure):
+        return _build_study(file, tables, location, template)
+
+
+def _build_study(file: Path, tables: Mapping[str, Any], location: Location, template: ScenarioTemplate) -> Study:
+    """The study of a scenario, whose ambient pressure is that of the texts."""
+    vary = _require_table(tables, "vary", location)
+    parameters = {path: template.parameter(path, str(location.inside("vary"))) for path in vary}
+    variations = [_read_variation(vary[path], parameter, location) for path, parameter in parameters.items()]
+    design: Design = build(_require_table(tables, "design", location), location.inside("design"), classes=DESIGNS)
+    with located_errors(location.inside("design")):
+        values = design.values(variations)
+    metrics = _require_table(tables, "metrics", location)
+    return Study(
+        title=read_text(tables, "title", location, needed=False) or template.scenario.title,
+        path=file,
+        template=template,
+        parameters=tuple(parameters.values()),
+        variations=tuple(variations),
+        follow=_read_follow(tables.get("follow", {}), template, list(parameters), location.inside("follow")),
+        design=design,
+        values=values,
+        metrics=_read_metrics(metrics, template.scenario, location.inside("metrics")),
+        chunk_size=_read_chunk_size(tables.get("chunk_size", CHUNK_SIZE), f"{location}, chunk_size"),
+    )
+
+
+def _read_scenario(value: Any, location: Location) -> ScenarioTemplate:
+    if isinstance(value, str):
+        file = location.folder / value
+        with located_errors(f"{location}, scenario"):
+            return ScenarioTemplate(read_toml(file), Location(str(file), "", file.parent), load_scenario(file))
+    if not isinstance(value, Mapping):
+        raise ParameterError(
+            f'{location}: scenario is {value!r}; name a file, scenario = "fill.toml", or write the tables '
+            "[scenario.plant], [scenario.input] and [scenario.run]."
+        )
+    return ScenarioTemplate(value, location.inside("scenario"), build_scenario(value, location.inside("scenario")))
+
+
+_EXAMPLES = {
+    "vary": '"mechanism.mass" = ["5 kg", "10 kg"]',
+    "design": 'model = "Grid"',
+    "metrics": 'highest = { model = "Maximum", column = "position" }',
+}
+"""An entry of each table that a study needs."""
+
+
+def _require_table(tables: Mapping[str, Any], key: str, location: Location) -> Mapping[str, Any]:
+    table = tables.get(key)
+    if not isinstance(table, Mapping) or not table:
+        problem = "is missing" if table is None else "is empty" if table == {} else f"is {table!r}, not a table"
+        raise ParameterError(
+            f"{location}: [{key}] {problem}; it must contain at least one entry, such as {_EXAMPLES[key]}."
+        )
+    return table
+
+
+def _read_variation(value: Any, parameter: ScenarioParameter, location: Location) -> Variation:
+    entry = Location(f'{location}, [vary], "{parameter.path}"', "", location.folder)
+    variation = read_variation(value, parameter.unit, entry)
+    low, high = parameter.bounds
+    unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+    outside = [v for v in variation.support if np.isfinite(v) and not low <= v <= high]
+    if outside:
+        raise ParameterError(f"{entry} includes {outside[0]:g}{unit}; allowed range: {low:g} to {high:g}{unit}.")
+    return variation
+
+
+def _read_follow(
+    table: Any, template: ScenarioTemplate, varied: list[str], location: Location
+) -> tuple[tuple[ScenarioParameter, int], ...]:
+    if not isinstance(table, Mapping):
+        raise ParameterError(f'{location} is {table!r}; write "path" = "path of a varied parameter".')
+    followers = []
+    for path, leader in table.items():
+        parameter = template.parameter(path, str(location))
+        if path in varied:
+            raise ParameterError(f"{location}: '{path}' is also under [vary]; remove it from [vary] or from [follow].")
+        if leader not in varied:
+            near = suggestion(str(leader), varied)
+            raise ParameterError(f"{location}: '{path}' follows {leader!r}, which is not under [vary].{near}")
+        unit = template.parameter(leader, str(location)).unit
+        if unit != parameter.unit:
+            raise ParameterError(
+                f"{location}: '{path}' [{parameter.unit}] cannot follow '{leader}' [{unit}]; their units must be equal."
+            )
+        followers.append((parameter, varied.index(leader)))
+    return tuple(followers)
+
+
+def _read_metrics(tables: Mapping[str, Any], scenario: Scenario, location: Location) -> dict[str, Metric]:
+    known = columns_of(scenario)
+    metrics: dict[str, Metric] = {}
+    for name, table in tables.items():
+        inner = location.inside(name)
+        column = table.get("column") if isinstance(table, Mapping) else None
+        if isinstance(column, str) and column not in known:
+            near = suggestion(column, known)
+            raise ParameterError(f"{inner}: a run has no column '{column}'; its columns are {', '.join(known)}.{near}")
+        metric = build(table, inner, classes=METRICS, unit=known.get(str(column), "1") or "1")
+        with located_errors(inner):
+            metric.check_range(scenario.problem.start_time, scenario.problem.duration)
+            if isinstance(metric, TimeSeries):
+                metric = metric.clip_to_run(scenario.problem.start_time, scenario.problem.duration)
+        metrics[name] = metric
+    return metrics
+
+
+def _read_chunk_size(value: Any, where: str) -> int:
+    size = read_count(value, "1", where)
+    if not size:
+        raise ParameterError(f"{where} is 0; it must be at least 1.")
+    return size

@@ -1,0 +1,155 @@
+"""Report chapter of a tuning."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...core.errors import AirmuscleError
+from ...core.reference import cite
+from ...core.tree import leaves
+from ...engine.loop.control_loop import ControlLoop
+from ...engine.run import simulate
+from ...engine.run.integrators import Integrator
+from ...recording import Recording
+from ...report.chapter import Chapter, Plot, Table
+from .case import loop_with_gains
+from .figures import convergence_figure, pareto_figure, response_figure
+from .result import Tuning
+from .rules import RuleSettings
+
+
+def tuning_chapter(
+    tuning: Tuning, title: str, units: Mapping[str, str], notes: Sequence[str] = (), rules: Sequence[RuleSettings] = (),
+    integrator: Integrator | None = None,
+) -> Chapter:  # fmt: skip
+    """The chapter of a tuning: gains, cases, figures and settings.
+
+    units  of the gains by path, and of the columns of the plant by name
+    rules  settings of tuning rules that were among the starts
+    """
+    column, unit = next(iter(tuning.scales)), _error_unit(tuning, units)
+    runs = _runs(tuning, integrator)
+    plots = [
+        Plot(
+            "convergence", "Objective over the budget; a failed set of gains is not drawn.", convergence_figure(tuning)
+        )
+    ]
+    caption = "Mean tracking index over the cases against mean air drawn and mean switchings, with the Pareto fronts."
+    plots.append(Plot("pareto", caption, pareto_figure(tuning, tuning.index.unit(unit))))
+    if runs:
+        plots.append(
+            Plot("response", "Nominal case with present and tuned gains.", response_figure(runs, column, unit))
+        )
+    return Chapter(
+        paper="tuning",
+        title=title,
+        summary="\n\n".join([_summary(tuning), *(f"{note[:1].upper()}{note[1:]}." for note in notes)]),
+        tables=(gain_table(tuning, units), case_table(tuning, units), *([rule_table(rules)] if rules else [])),
+        plots=tuple(plots),
+        references=(*tuning.references, *cite(tuple(rules))),
+        chosen=_settings(tuning),
+    )
+
+
+def _runs(tuning: Tuning, integrator: Integrator | None) -> dict[str, Recording]:
+    """Runs of the nominal case; one that fails is left out."""
+    case, runs = tuning.cases[0], {}
+    for name, gains in (("present gains", {}), ("tuned gains", tuning.gains)):
+        loop: ControlLoop = loop_with_gains(case, gains)
+        try:
+            runs[name] = simulate(
+                case.plant, loop, duration=tuning.duration, start_time=tuning.start_time, initial_state=case.start(),
+                output_times=loop.sample_time, integrator=integrator,
+            )  # fmt: skip
+        except AirmuscleError:
+            continue
+    return runs
+
+
+def _summary(tuning: Tuning) -> str:
+    present, bound = tuning.present_objective, tuning.on_bound
+    before = "" if present is None else f"; with the present gains it is {present:.4g}"
+    parts = [
+        f"{tuning.simulated_loops} loops were simulated: {len(tuning.history)} sets of gains in "
+        f"{len(tuning.cases)} cases. The objective is {tuning.objective:.4g}{before}."
+    ]
+    if bound:
+        parts.append(f"On a bound of its range: {', '.join(bound)}; a wider range may give a smaller objective.")
+    failed = int(np.count_nonzero(~np.isfinite(tuning.history.objective)))
+    if failed:
+        parts.append(f"{failed} sets of gains failed in at least one case.")
+    if tuning.interrupted:
+        parts.append(f"The search was interrupted before its budget of {tuning.budget} loops was used.")
+    return " ".join(parts)
+
+
+def gain_table(tuning: Tuning, units: Mapping[str, str]) -> Table:
+    """The gains before and after, with their ranges [SI]."""
+    present = {leaf.path: leaf.value for leaf in leaves(tuning.cases[0].controller)}
+    columns: dict[str, Any] = {
+        "gain": [each.path for each in tuning.ranges],
+        "unit": [units.get(each.path, "") for each in tuning.ranges],
+        "minimum": [each.low for each in tuning.ranges],
+        "maximum": [each.high for each in tuning.ranges],
+        "present": [present[each.path] for each in tuning.ranges],
+        "tuned": [tuning.gains[each.path] for each in tuning.ranges],
+    }
+    return Table("gains", "Gains", columns, "Values in SI units.")
+
+
+def _error_unit(tuning: Tuning, units: Mapping[str, str]) -> str:
+    """The unit of the tracking error [SI], that of its first column."""
+    return "1" if tuning.index.scales else units.get(next(iter(tuning.scales))) or "1"
+
+
+def case_table(tuning: Tuning, units: Mapping[str, str]) -> Table:
+    """The metrics of every case with the present gains, if these were simulated, and with the tuned gains.
+
+    units  of the columns of the plant by name
+    """
+    unit = tuning.index.unit(_error_unit(tuning, units))
+    shown = "" if unit == "1" else f" [{unit}]"
+    metrics, best = tuning.history.metrics, tuning.best
+    columns: dict[str, Any] = {"case": [case.name for case in tuning.cases]}
+    if tuning.start:
+        columns[f"index, present gains{shown}"] = metrics.index[0].tolist()
+    columns[f"index, tuned gains{shown}"] = metrics.index[best].tolist()
+    columns["air drawn [g/s]"] = (1e3 * metrics.air[best]).tolist()
+    columns["switchings [1/s]"] = metrics.switchings[best].tolist()
+    return Table("cases", "Cases", columns, f"Index: {type(tuning.index).__name__}.")
+
+
+def history_table(tuning: Tuning) -> Table:
+    """Every set of gains with its objective and mean metrics [SI]."""
+    history = tuning.history
+    columns: dict[str, Any] = {"set": list(range(len(history)))}
+    columns |= {path: history.gains[:, i] for i, path in enumerate(history.paths)}
+    columns["objective"] = history.objective
+    columns |= {f"mean {name}": history.means(name) for name in ("index", "air", "switchings")}
+    return Table("history", "Sets of gains", columns, shown=False)
+
+
+def rule_table(rules: Sequence[RuleSettings]) -> Table:
+    """The settings of tuning rules."""
+    columns: dict[str, Any] = {
+        "rule": [each.rule for each in rules],
+        "gain": [each.gain for each in rules],
+        "integral time [s]": [each.integral_time for each in rules],
+        "derivative time [s]": [each.derivative_time for each in rules],
+        "set-point weight": [each.setpoint_weight for each in rules],
+    }
+    return Table("rules", "Settings of tuning rules, among the starts", columns, "The gain is in SI units.")
+
+
+def _settings(tuning: Tuning) -> tuple[tuple[str, str, str], ...]:
+    controller = tuning.cases[0].controller
+    return (
+        ("controller", type(controller).__name__, "scenario"),
+        ("index", str(tuning.index), "chosen"),
+        ("objective", str(tuning.criterion), "chosen"),
+        ("optimiser", f"differential evolution, seed {tuning.seed}, budget {tuning.budget} loops", "chosen"),
+        ("duration of a run", f"{tuning.duration:g} s", "scenario"),
+    )

@@ -1,0 +1,196 @@
+"""Evaluation of sets of gains: the loops of all cases in batches, and the metrics of their runs."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core.arrays import Array
+from ...core.errors import AirmuscleError
+from ...core.tree import flatten, leaves, structure
+from ...engine.loop.control_law import ControlLaw
+from ...engine.loop.control_loop import COMMAND, SETPOINT, ControlLoop
+from ...engine.loop.law_design import with_designed_laws
+from ...engine.run.batch import BatchSolution, simulate_batch
+from ...engine.run.batch.loops import CONTROLLER
+from ...engine.run.batch.thread_pool import hidden_progress
+from ...engine.run.integrators import Integrator
+from ...physics.plant.plant import Plant
+from .case import LoopCase, loop_with_gains, with_gains
+from .objective import CaseMetrics
+from .tracking import TrackingIndex
+
+MAX_VALUES = 20_000_000
+"""Values of all columns of one batch, which is 160 MB; more sets of gains are simulated in several batches (chosen)."""
+AIR_MASS = "air_mass"
+"""Last part of the name of the states that hold the air of a muscle."""
+
+
+class Interrupted(Exception):
+    """The user stopped the simulation of a batch; never leaves this package."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class CaseGroup:
+    """Cases whose loops run in one batch: plants of one structure with the same loop.
+
+    places          the cases among all
+    plant, loop     of the first of them
+    full_paths      the tuned gains as paths of `loop.controller`
+    varied          values (m,) of the parameters in which the m plants differ, by path
+    initial_states  values (m,) by state
+    """
+
+    places: npt.NDArray[np.intp]
+    cases: tuple[LoopCase, ...]
+    varied: Mapping[str, Array]
+    initial_states: Mapping[str, Array]
+    scales: Mapping[str, float]
+
+    @property
+    def plant(self) -> Plant:
+        return self.cases[0].plant
+
+    @property
+    def loop(self) -> ControlLoop:
+        return self.cases[0].loop
+
+    @property
+    def kept(self) -> tuple[str, ...]:
+        """The columns from which metrics are computed."""
+        errors = (column for name in self.scales for column in (name, f"{SETPOINT}{name}"))
+        commands = (f"{COMMAND}{name}" for name in self.loop.controller.inputs)
+        return (*errors, *commands, *self.air_states)
+
+    @property
+    def air_states(self) -> tuple[str, ...]:
+        """The states that hold the air of the muscles."""
+        return tuple(s.name for s in self.plant.states if s.name.rpartition(".")[2] == AIR_MASS)
+
+
+def group_cases(cases: Sequence[LoopCase], index: TrackingIndex) -> tuple[CaseGroup, ...]:
+    """The cases in groups that can be simulated together. Raises what an impossible loop or initial state raises."""
+    members: dict[Any, list[int]] = {}
+    for i, case in enumerate(cases):
+        members.setdefault((id(structure(case.plant)), id(case.loop), case.controller_path), []).append(i)
+    return tuple(_group([cases[i] for i in places], np.array(places), index) for places in members.values())
+
+
+def _group(cases: list[LoopCase], places: npt.NDArray[np.intp], index: TrackingIndex) -> CaseGroup:
+    first, starts = cases[0], [case.start() for case in cases]
+    table = np.array([flatten(case.plant) for case in cases])
+    differing = np.flatnonzero((table != table[0]).any(axis=0))
+    paths = [leaf.path for leaf in leaves(first.plant)]
+    columns = (*(s.name for s in first.plant.states), *_outputs(first, starts[0]))
+    try:
+        first.loop.check_columns(columns, first.plant.inputs)
+        scales = index.scales_for(first.loop.controller.setpoints, columns)
+    except AirmuscleError as error:
+        raise error.located(f"case '{first.name}'") from None
+    varied = {paths[i]: table[:, i] for i in differing.tolist()}
+    states = {name: np.array([start[name] for start in starts]) for name in starts[0]}
+    return CaseGroup(places, tuple(cases), varied, states, scales)
+
+
+def _outputs(case: LoopCase, state: Mapping[str, float]) -> tuple[str, ...]:
+    return tuple(case.plant.outputs(state, dict.fromkeys(case.plant.inputs, 0.0)))
+
+
+@dataclasses.dataclass(eq=False)
+class Evaluator:
+    """Simulation of sets of gains (E, D) in all cases.
+
+    `reasons` are why sets of gains were refused or runs failed, with the number of each, for the message where nothing
+    can be found.
+    """
+
+    cases: tuple[LoopCase, ...]
+    groups: tuple[CaseGroup, ...]
+    paths: tuple[str, ...]
+    duration: float
+    index: TrackingIndex
+    integrator: Integrator | None
+    start_time: float = 0.0
+    reasons: dict[str, int] = dataclasses.field(default_factory=dict)
+
+    def metrics(self, gains: Array) -> CaseMetrics:
+        """The metrics (E, M). Raises Interrupted if the user stops the simulation."""
+        shape = len(gains), len(self.cases)
+        metrics = CaseMetrics(
+            np.full(shape, np.inf), np.full(shape, np.nan), np.full(shape, np.nan), np.zeros(shape, bool)
+        )
+        possible = np.array([i for i, row in enumerate(gains.tolist()) if self._is_possible(row)], dtype=np.intp)
+        for group in self.groups:
+            for part in self._parts(possible, group):
+                self._evaluate(group, gains, part, metrics)
+        return metrics
+
+    def _is_possible(self, row: list[float]) -> bool:
+        """Whether the controller accepts these gains together."""
+        try:
+            with_gains(self.cases[0].controller, dict(zip(self.paths, row, strict=True)))
+        except AirmuscleError as error:
+            self._note(str(error))
+            return False
+        return True
+
+    def _note(self, reason: str) -> None:
+        self.reasons[reason] = self.reasons.get(reason, 0) + 1
+
+    def _parts(self, rows: npt.NDArray[np.intp], group: CaseGroup) -> Iterator[npt.NDArray[np.intp]]:
+        samples = self.duration / group.loop.sample_time + 2
+        each = max(1, int(MAX_VALUES / (samples * len(group.kept) * len(group.cases))))
+        return (rows[i : i + each] for i in range(0, rows.size, each))
+
+    def _evaluate(self, group: CaseGroup, gains: Array, rows: npt.NDArray[np.intp], metrics: CaseMetrics) -> None:
+        """Write the metrics of some sets of gains in the cases of a group."""
+        batch = self._simulate(group, gains[rows])
+        if batch.interrupted:
+            raise Interrupted
+        for reason in batch.reasons.values():
+            self._note(reason)
+        shape, at = (rows.size, len(group.cases)), np.ix_(rows, group.places)
+        with np.errstate(invalid="ignore", over="ignore"):
+            index = self.index.values(batch.time - batch.time[0], batch.columns, group.scales)
+        completed = (batch.status == 0) & np.isfinite(index)
+        metrics.index[at] = np.where(completed, index, np.inf).reshape(shape)
+        metrics.air[at] = _air_drawn(batch, group).reshape(shape) / self.duration
+        metrics.switchings[at] = _switchings(batch, group).reshape(shape) / self.duration
+        metrics.completed[at] = completed.reshape(shape)
+
+    def _simulate(self, group: CaseGroup, gains: Array) -> BatchSolution:
+        """The loops of sets of gains (E, D) and m cases as a batch of E m rows, the cases of one set together."""
+        sets, m = len(gains), len(group.cases)
+        first = group.cases[0]
+        variations = {path: np.tile(values, sets) for path, values in group.varied.items()}
+        loop: ControlLoop | list[ControlLoop] = group.loop
+        controller = group.loop.controller
+        if isinstance(controller, ControlLaw) and with_designed_laws(controller) is controller:
+            for i, path in enumerate(self.paths):
+                variations[f"{CONTROLLER}{first.full_path(path)}"] = np.repeat(gains[:, i], m)
+        else:
+            of_set = (loop_with_gains(first, dict(zip(self.paths, row, strict=True))) for row in gains.tolist())
+            loop = [each for each in of_set for _ in range(m)]
+        with hidden_progress():
+            return simulate_batch(
+                group.plant, variations, loop, duration=self.duration, output_times=group.loop.sample_time,
+                initial_states={name: np.tile(values, sets) for name, values in group.initial_states.items()},
+                integrator=self.integrator, keep=group.kept, start_time=self.start_time,
+            )  # fmt: skip
+
+
+def _air_drawn(batch: BatchSolution, group: CaseGroup) -> Array:
+    """The sum (N,) of the increments of the air masses [kg] from sample to sample; NaN for a run that ended early."""
+    grown = [np.maximum(np.diff(batch[name], axis=1), 0.0).sum(axis=1) for name in group.air_states]
+    return np.sum(grown, axis=0) if grown else np.full(len(batch), np.nan)
+
+
+def _switchings(batch: BatchSolution, group: CaseGroup) -> Array:
+    """The number (N,) of changes of the commands between zero and not zero; NaN for a run that ended early."""
+    commands = [batch[f"{COMMAND}{name}"] for name in group.loop.controller.inputs]
+    counts = np.sum([np.count_nonzero(np.diff(values != 0.0, axis=1), axis=1) for values in commands], axis=0)
+    return np.where(batch.status == 0, counts, np.nan)

@@ -1,0 +1,190 @@
+"""Optimisation of gains: differential evolution whose generations are batches of control loops."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...core.arrays import Array
+from ...core.errors import ParameterError, SimulationError
+from ...core.tree import leaves
+from ...engine.run.integrators import Integrator
+from .case import LoopCase, check_cases
+from .evaluation import Evaluator, Interrupted, group_cases
+from .gain_ranges import GainRange, gain_ranges, to_coordinates, to_gains
+from .objective import CaseMetrics, Objective, RobustObjective
+from .result import Tuning, TuningHistory
+from .tracking import RootMeanSquareError, TrackingIndex
+
+MIN_SETS = 8
+"""Smallest population, and smallest number of sets of gains of a budget (chosen)."""
+Progress = Callable[[int, int], None]
+
+
+def tune(
+    cases: Sequence[LoopCase],
+    bounds: Mapping[str, tuple[float, float]],
+    *,
+    duration: float,
+    index: TrackingIndex = RootMeanSquareError(),
+    objective: Objective = RobustObjective(),
+    budget: int = 4000,
+    seed: int = 0,
+    start: Sequence[Mapping[str, float]] = (),
+    start_time: float = 0.0,
+    integrator: Integrator | None = None,
+    progress: Progress | None = None,
+) -> Tuning:
+    """Find the gains of a controller that minimise an objective over a family of cases.
+
+    cases       the family: LoopCase with the same controller; the first one is the nominal case
+    bounds      minimum and maximum [SI] of each gain by its path in the controller; see `GainRange` for the scale
+    duration    of each run [s]
+    index       tracking index of a run, evaluated at the sampling instants
+    objective   from the metrics (E, M) of E sets of gains in M cases to values (E,); smaller is better
+    budget      maximum number of simulated loops: sets of gains times cases
+    seed        of the optimiser; the same seed gives the same result on any number of cores
+    start       sets of gains for the first generation, such as those of tuning rules; the present gains of the
+                controller are always among them if they are within the bounds, so that the result is never worse
+    start_time, integrator  as in simulate_batch
+    progress    called with the number of loops simulated so far, and the budget
+
+    The optimiser is differential evolution (Storn and Price 1997) as implemented by SciPy, with the same settings for
+    every controller: best/1/bin, mutation 0.5 to 1, recombination 0.7 (SciPy's defaults), a population of Sobol points
+    whose size is the power of two from 5 D on, no polish and no stopping rule but the budget. It requires bounds alone,
+    accepts a discontinuous objective (saturation, switchings, failed runs), and evaluates a generation at once, which
+    is one batch on all cores. A set of gains that fails in a share p of the cases ranks behind all that do not, in the
+    order of p; its objective is infinite.
+
+    If the user interrupts, the best gains so far are returned (`Tuning.interrupted`), unless there are none. Raises
+    ParameterError for impossible cases, bounds or options, SimulationError if every set of gains fails.
+    """
+    family = check_cases(cases)
+    duration = _check_options(duration, index, objective, budget, seed, len(family))
+    ranges = gain_ranges(family[0].controller, bounds)
+    evaluator = Evaluator(
+        family,
+        group_cases(family, index),
+        tuple(each.path for each in ranges),
+        duration,
+        index,
+        integrator,
+        start_time,
+    )
+    search = _Search(evaluator, ranges, objective, budget, progress or (lambda done, total: None))
+    given = search.given(start)
+    interrupted = search.run(given, seed)
+    if not search.values:
+        raise KeyboardInterrupt
+    result = Tuning(
+        family, ranges, index, evaluator.groups[0].scales, objective, duration, start_time, seed, budget,
+        search.history(), search.present_count, interrupted,
+    )  # fmt: skip
+    if not math.isfinite(result.objective):
+        raise SimulationError(_nothing_found(evaluator, len(result.history)))
+    return result
+
+
+def _check_options(duration: Any, index: Any, objective: Any, budget: Any, seed: Any, count: int) -> float:
+    if isinstance(duration, bool) or not isinstance(duration, int | float) or not 0 < duration < math.inf:
+        raise ParameterError(f"tune: duration is {duration!r} s; it must be positive and finite.")
+    if not isinstance(index, TrackingIndex):
+        raise ParameterError(f"tune: index is {index!r}; give a TrackingIndex, such as RootMeanSquareError().")
+    if not callable(objective):
+        raise ParameterError(f"tune: objective is {objective!r}; give RobustObjective() or a function of CaseMetrics.")
+    for name, value, least in (("budget", budget, MIN_SETS * count), ("seed", seed, 0)):
+        if isinstance(value, bool) or not isinstance(value, int) or value < least:
+            why = f", {MIN_SETS} sets of gains for each of {count} cases" if name == "budget" else ""
+            raise ParameterError(f"tune: {name} is {value!r}; it must be a whole number of at least {least}{why}.")
+    return float(duration)
+
+
+def _nothing_found(evaluator: Evaluator, sets: int) -> str:
+    reason = max(evaluator.reasons, key=lambda text: evaluator.reasons[text], default="the index is not finite")
+    return (
+        f"tune: each of {sets} sets of gains fails in at least one case; most frequent reason: {reason}. "
+        "Narrow the bounds, check the set point, or leave out the cases that no controller can hold."
+    )
+
+
+class _Search:
+    """One search: it evaluates populations and records them."""
+
+    def __init__(
+        self, evaluator: Evaluator, ranges: tuple[GainRange, ...], objective: Objective, budget: int, progress: Progress
+    ) -> None:
+        self.evaluator, self.ranges, self.objective, self.progress = evaluator, ranges, objective, progress
+        self.budget, self.sets = budget, budget // len(evaluator.cases)
+        self.present_count = 0
+        self.gains: list[Array] = []
+        self.metrics: list[CaseMetrics] = []
+        self.values: list[Array] = []
+
+    @property
+    def population(self) -> int:
+        """The power of two from 5 D on, smaller where the budget has not four generations of it."""
+        size = max(MIN_SETS, 1 << math.ceil(math.log2(5 * len(self.ranges))))
+        while size > MIN_SETS and 4 * size > self.sets:
+            size //= 2
+        return size
+
+    def given(self, start: Sequence[Mapping[str, float]]) -> list[Array]:
+        """The coordinates (D,) of the present gains, if they are within the ranges, and of those given."""
+        present = {leaf.path: leaf.value for leaf in leaves(self.evaluator.cases[0].controller)}
+        own = to_coordinates(self.ranges, present)
+        self.present_count = 0 if own is None else 1
+        points = [] if own is None else [own]
+        for number, gains in enumerate(start):
+            unknown = [path for path in gains if path not in self.evaluator.paths]
+            if unknown:
+                raise ParameterError(f"tune: start {number} names '{unknown[0]}', which bounds does not name.")
+            point = to_coordinates(self.ranges, {**present, **gains})
+            if point is None:
+                raise ParameterError(f"tune: start {number} is outside the bounds: {dict(gains)}. Extend the bounds.")
+            points.append(point)
+        if len(points) > self.population:
+            raise ParameterError(f"tune: {len(start)} starts; at most {self.population - 1} fit the first generation.")
+        return points
+
+    def run(self, given: list[Array], seed: int) -> bool:
+        """Search until the budget is used; whether the user interrupted."""
+        from scipy.optimize import differential_evolution
+        from scipy.stats import qmc
+
+        size, dimension = self.population, len(self.ranges)
+        first = qmc.Sobol(d=dimension, scramble=True, seed=np.random.default_rng(seed)).random(size)
+        first[: len(given)] = given if given else first[:0]
+        try:
+            differential_evolution(
+                self._energies, [(0.0, 1.0)] * dimension, init=first, maxiter=self.sets // size - 1, vectorized=True,
+                updating="deferred", polish=False, tol=0.0, atol=0.0, seed=np.random.default_rng([seed, 1]),
+            )  # fmt: skip
+        except (Interrupted, KeyboardInterrupt):
+            return True
+        return False
+
+    def _energies(self, coordinates: Array) -> Array:
+        """The energies (S,) of a population (D, S): the objective, or a large number by the share of failed runs."""
+        gains = to_gains(self.ranges, np.clip(coordinates.T, 0.0, 1.0))
+        metrics = self.evaluator.metrics(gains)
+        values = np.asarray(self.objective(metrics), dtype=float)
+        if values.shape != (len(gains),):
+            raise ParameterError(f"tune: the objective returned {values.shape}; it must return ({len(gains)},) values.")
+        values = np.where(np.isnan(values), np.inf, values)
+        self.gains.append(gains)
+        self.metrics.append(metrics)
+        self.values.append(values)
+        self.progress(sum(map(len, self.values)) * len(self.evaluator.cases), self.budget)
+        failed = 1.0 - metrics.completed.mean(axis=1)
+        return np.where(np.isfinite(values), values, 1e30 * (1.0 + failed))
+
+    def history(self) -> TuningHistory:
+        """All that was simulated."""
+        fields = ("index", "air", "switchings", "completed")
+        joined = (np.concatenate([getattr(each, name) for each in self.metrics]) for name in fields)
+        return TuningHistory(
+            self.evaluator.paths, np.concatenate(self.gains), np.concatenate(self.values), CaseMetrics(*joined)
+        )

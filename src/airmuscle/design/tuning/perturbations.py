@@ -1,0 +1,207 @@
+"""Perturbations of a plant and its loop: the family of cases for which gains are tuned."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...core.annotation import abridged
+from ...core.errors import AirmuscleError, ParameterError
+from ...core.field_types import check_field_types
+from ...core.tree import Leaf, leaves, with_parameters
+from ...engine.loop.control_law import ControlLaw
+from ...engine.loop.control_loop import ControlLoop
+from ...engine.loop.sensors import MAX_DELAY, ColumnSensor, WithSensors
+from ...files.library.location import located_errors
+from ...files.library.uncertainty import ParameterUncertainty
+from ...physics.plant.plant import Plant
+from ...physics.pneumatics import Valve, WithLeak
+from .case import LoopCase
+
+LOADS = ("mass", "inertia", "weight_torque", "payload", "force")
+"""Parameters of a mechanism that a factor of the load multiplies."""
+LEAK_CRITICAL_RATIO = 0.3
+"""Critical pressure ratio of the leak (chosen)."""
+MAX_ATTEMPTS = 1000
+"""Draws after which a distribution is considered impossible (chosen)."""
+_SUPPLY = re.compile(r"(^|\.)supply\.pressure$")
+_CONDUCTANCE = re.compile(r"\.conductance$")
+InitialState = Callable[[Plant], Mapping[str, float] | None]
+
+
+@dataclasses.dataclass(frozen=True)
+class Perturbations:
+    """Perturbations of the nominal plant, each of which gives one case; all defaults are chosen.
+
+    loads     factors of the load: mass, inertia, weight torque, payload and force of the mechanism together
+    supplies  factors of the supply pressure
+    leak      conductance of a leak at every muscle, as a share of the largest conductance of its circuit; 0: none
+    delay     dead time of all measurements, in samples; 0: none
+    draws     number of random draws of fitted parameters, from their covariance in the muscle files
+    """
+
+    loads: tuple[float, ...] = (0.5, 2.0)
+    supplies: tuple[float, ...] = (0.8,)
+    leak: float = 0.01
+    delay: int = 1
+    draws: int = 4
+
+    def __post_init__(self) -> None:
+        for name, greatest in (("delay", MAX_DELAY), ("draws", 10_000)):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= greatest:
+                raise ParameterError(f"Perturbations: {name} is {abridged(value)}; allowed range: 0 to {greatest}.")
+        check_field_types(self)
+        for name in ("loads", "supplies"):
+            for factor in getattr(self, name):
+                if not 0 < factor < math.inf or factor == 1.0:
+                    raise ParameterError(
+                        f"Perturbations: {name} contains {factor:g}; a factor must be positive, finite and not 1."
+                    )
+        if not 0 <= self.leak <= 1:
+            raise ParameterError(f"Perturbations: leak is {self.leak:g}; allowed range: 0 to 1.")
+
+
+class PerturbedFamily(NamedTuple):
+    """The cases of a family, the nominal one first, and notes on perturbations that the plant does not have."""
+
+    cases: tuple[LoopCase, ...]
+    notes: tuple[str, ...]
+
+
+def perturbed_family(
+    plant: Plant,
+    loop: ControlLoop,
+    perturbations: Perturbations = Perturbations(),
+    *,
+    initial_state: InitialState = lambda plant: None,
+    uncertainties: Sequence[ParameterUncertainty | None] = (),
+    seed: int = 0,
+) -> PerturbedFamily:
+    """The nominal case and one case for each perturbation.
+
+    initial_state   function from a perturbed plant to its initial state; None is equilibrium at ambient pressure
+    uncertainties   of the fitted parameters of each muscle, as `load(name).uncertainty`. Muscles with equal
+                    uncertainty have equal deviations, because their parameters come from one fit
+    seed            of the random draws
+
+    A perturbation that the plant does not have, such as the load of an isometric muscle, is stated in the notes. Raises
+    ParameterError where a perturbed parameter is outside its declared range.
+    """
+    cases, notes = [LoopCase("nominal", plant, loop, initial_state(plant))], list[str]()
+    changed: list[tuple[str, Plant]] = []
+    for factors, symbol, chosen in (
+        (perturbations.loads, "load", _is_load),
+        (perturbations.supplies, "supply", _is_supply),
+    ):
+        if factors and not any(chosen(leaf) for leaf in leaves(plant)):
+            notes.append(f"no case with another {symbol}: the plant has no parameter of that kind")
+        elif factors:
+            changed += [(f"{symbol} x {factor:g}", _multiplied(plant, chosen, factor, symbol)) for factor in factors]
+    if perturbations.leak:
+        leaking = _leaking(plant, perturbations.leak)
+        notes += [] if leaking else ["no case with a leak: a circuit has no conductance"]
+        changed += [("leak", leaking)] if leaking else []
+    drawn = list(_draws(plant, uncertainties, perturbations.draws, seed))
+    if perturbations.draws and not drawn:
+        notes.append("no drawn parameters: no muscle file states the uncertainty of its parameters")
+    changed += drawn
+    for name, each in changed:
+        with located_errors(f"case '{name}'"):
+            cases.append(LoopCase(name, each, loop, initial_state(each)))
+    if perturbations.delay and not isinstance(loop.controller, ControlLaw):
+        notes.append("no case with a delay: the controller is no ControlLaw")
+    elif perturbations.delay:
+        delayed = dataclasses.replace(loop, controller=_delayed(loop.controller, perturbations.delay))
+        cases.append(LoopCase(f"delay {perturbations.delay}", plant, delayed, cases[0].initial_state, "law"))
+    return PerturbedFamily(tuple(cases), tuple(notes))
+
+
+def _is_load(leaf: Leaf) -> bool:
+    return leaf.path.startswith("mechanism.") and leaf.declared.name in LOADS
+
+
+def _is_supply(leaf: Leaf) -> bool:
+    return bool(_SUPPLY.search(leaf.path))
+
+
+def _multiplied(plant: Plant, chosen: Callable[[Leaf], bool], factor: float, what: str) -> Plant:
+    """The plant with some of its parameters multiplied by a factor, validated."""
+    try:
+        return with_parameters(plant, [leaf.value * (factor if chosen(leaf) else 1.0) for leaf in leaves(plant)])
+    except AirmuscleError as error:
+        raise error.located(f"{what} x {factor:g}") from None
+
+
+def _leaking(plant: Plant, share: float) -> Plant | None:
+    """The plant with a leak at every muscle; None where a circuit has no conductance."""
+    circuits = []
+    for circuit in plant.circuits:
+        known = [leaf.value for leaf in leaves(circuit) if _CONDUCTANCE.search(leaf.path)]
+        if not known:
+            return None
+        circuits.append(WithLeak(circuit, Valve(share * max(known), LEAK_CRITICAL_RATIO)))
+    return dataclasses.replace(plant, circuit=tuple(circuits) if isinstance(plant.circuit, tuple) else circuits[0])
+
+
+def _delayed(law: Any, delay: int) -> WithSensors:
+    return WithSensors(law, tuple(ColumnSensor(name, delay=delay) for name in law.measured_columns))
+
+
+def _draws(
+    plant: Plant, uncertainties: Sequence[ParameterUncertainty | None], count: int, seed: int
+) -> Iterator[tuple[str, Plant]]:
+    """Plants whose fitted parameters deviate by draws of a normal distribution that are within the declared ranges."""
+    if len(uncertainties) not in (0, len(plant.muscles)):
+        raise ParameterError(
+            f"perturbed_family: {len(uncertainties)} uncertainties for {len(plant.muscles)} muscles; give one for each."
+        )
+    if not any(each is not None for each in uncertainties):
+        return
+    random = np.random.default_rng(seed)
+    for number in range(count):
+        yield f"drawn {number + 1}", _drawn(plant, uncertainties, random)
+
+
+def _drawn(plant: Plant, uncertainties: Sequence[ParameterUncertainty | None], random: np.random.Generator) -> Plant:
+    known = list(leaves(plant))
+    message = "no draw"
+    for _ in range(MAX_ATTEMPTS):
+        deviations: dict[ParameterUncertainty, Any] = {}
+        shifts: dict[str, float] = {}
+        for i, uncertainty in enumerate(uncertainties):
+            if uncertainty is None:
+                continue
+            if uncertainty not in deviations:
+                deviates = random.standard_normal(len(uncertainty.parameters))
+                deviations[uncertainty] = uncertainty.deviations(deviates)
+            prefix = f"muscle[{i}]." if isinstance(plant.muscle, tuple) else "muscle."
+            shifts |= dict(zip(muscle_paths(uncertainty, prefix), deviations[uncertainty].tolist(), strict=True))
+        _check_known(shifts, known)
+        try:
+            return with_parameters(plant, [leaf.value + shifts.get(leaf.path, 0.0) for leaf in known])
+        except AirmuscleError as error:
+            message = str(error)
+    raise ParameterError(
+        f"perturbed_family: {MAX_ATTEMPTS} draws of the fitted parameters are all impossible; the last: {message}"
+    )
+
+
+def muscle_paths(uncertainty: ParameterUncertainty, prefix: str) -> list[str]:
+    """The paths of uncertain parameters in a plant; in a muscle file the contractile element is the characteristic."""
+    return [f"{prefix}{re.sub('^characteristic[.]', 'contractile.', name)}" for name in uncertainty.parameters]
+
+
+def _check_known(shifts: Mapping[str, float], known: Sequence[Leaf]) -> None:
+    paths = {leaf.path for leaf in known}
+    unknown = [path for path in shifts if path not in paths]
+    if unknown:
+        raise ParameterError(
+            f"perturbed_family: the plant has no parameter '{unknown[0]}', of which an uncertainty is given; remove it "
+            "from the uncertainty, or restore the part of the muscle that the plant replaces."
+        )

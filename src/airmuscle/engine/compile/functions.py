@@ -1,0 +1,219 @@
+"""Functions that a system is printed as, in LLVM text or any other target language."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from ...core import autodiff
+from ...core.errors import TraceError
+from ...core.system import System
+from .ir import emission
+from .ir.emission import FunctionBlock, TargetLanguage
+from .ir.instructions import Code, Operand, finished, hoisted, instructions, recorded
+from .ir.jacobian import ZERO, Tape, derivatives
+from .ir.sparse_lu import Factors
+from .llvm.emit import LlvmLanguage
+
+LLVM = LlvmLanguage()
+PARAMETERS = "p"
+"""The argument of a traced function that holds parameters; it is replaced by what `prepare` left in `c`."""
+
+
+@dataclasses.dataclass(frozen=True)
+class TracedSystem:
+    """A system as CasADi expressions: states x, inputs u, their slopes w, parameters p, rates f, outputs o."""
+
+    x: Any
+    u: Any
+    w: Any
+    p: Any
+    f: Any
+    o: Any
+    output_names: tuple[str, ...]
+
+
+def trace_system(system: System) -> TracedSystem:
+    """Call a system once with symbols; raises TraceError where that does not give finite expressions."""
+    import casadi
+
+    model, p = autodiff.symbolic(system)
+    names = [s.name for s in system.states]
+    x, u = casadi.SX.sym("x", len(names)), casadi.SX.sym("u", len(system.inputs))
+    w = casadi.SX.sym("w", len(system.inputs))
+    state = {name: x[i] for i, name in enumerate(names)}
+    inputs = {name: u[i] for i, name in enumerate(system.inputs)}
+    rates, outputs = model.rates_and_outputs(state, inputs)
+    if set(rates) != set(names):
+        raise TraceError(f"{type(system).__name__}: states are {names}, but rates are given for {list(rates)}.")
+    # Dense, because a printed function writes non-zeros one after the other.
+    f = casadi.densify(casadi.vertcat(*(rates[name] for name in names)))
+    o = casadi.densify(casadi.vertcat(*outputs.values())) if outputs else casadi.SX(0, 1)
+    autodiff.check_finite(casadi.vertcat(f, o), type(system).__name__)
+    f, o = casadi.cse([f, o])  # once, so that the same need not be found again for every printed function
+    return TracedSystem(x, u, w, p, f, o, tuple(outputs))
+
+
+@dataclasses.dataclass(frozen=True)
+class ArraySizes:
+    """Lengths of the arrays that the printed functions read and write."""
+
+    states: int
+    inputs: int
+    parameters: int
+    held: int
+    jacobian: int
+    factors: int
+    outputs: int
+
+
+class Printer:
+    """Collects functions; what each needs of the parameters alone is gathered into one `prepare(p, c)`.
+
+    The text is in LLVM unless another language is given.
+    """
+
+    def __init__(self, language: TargetLanguage = LLVM) -> None:
+        self.text: list[str] = []
+        self.needed: dict[str, int] = {}
+        self._language = language
+        self._prepare = language.body()
+        self._places: dict[str, int] = {}
+
+    @property
+    def held(self) -> int:
+        """How long `c` must be."""
+        return len(self._places)
+
+    def add(self, name: str, inputs: dict[str, Any], outputs: dict[str, Any], scalars: Sequence[str] = ()) -> None:
+        """Print `name(inputs..., outputs...)`, with `c` in place of the parameters."""
+        code = instructions(list(inputs.values()), list(outputs.values()))
+        self.add_code(name, list(inputs), code, list(outputs), scalars)
+
+    def add_code(
+        self, name: str, inputs: Sequence[str], code: Code, outputs: Sequence[str], scalars: Sequence[str] = ()
+    ) -> None:
+        """The same of instructions."""
+        block = self._language.body(scalars)
+        for (output, index), value in self.compute(block, code, inputs).items():
+            block.store(outputs[output], index, value)
+        self.end(name, inputs, outputs, block)
+
+    def compute(
+        self, block: FunctionBlock, code: Code, names: Sequence[str], given: Mapping[Operand, str] | None = None
+    ) -> dict[tuple[int, int], str]:
+        """Append code to a function: `names` are its arguments, `given` inputs whose values are there already.
+
+        Returns the names of the results by output and index; nothing is stored.
+        """
+        code, held = self.set_apart(code, names)
+        return emission.computed(block, code, names, held, given or {})
+
+    def end(self, name: str, inputs: Sequence[str], outputs: Sequence[str], block: FunctionBlock) -> None:
+        """Close a function; the argument that holds parameters becomes `c`."""
+        inputs = ["c" if a == PARAMETERS else a for a in inputs]
+        self.text.append(self._language.function(name, inputs, outputs, block))
+        self.needed |= {**block.needed, **self._prepare.needed}
+
+    def without_parameters(self, inputs: dict[str, Any], outputs: dict[str, Any]) -> tuple[Code, dict[Operand, int]]:
+        """The code of outputs without what depends on parameters alone, and where in `c` that stands."""
+        return self.set_apart(instructions(list(inputs.values()), list(outputs.values())), list(inputs))
+
+    def set_apart(self, code: Code, names: Sequence[str]) -> tuple[Code, dict[Operand, int]]:
+        """Code less what depends on parameters alone, which goes to `prepare`, and where in `c` that stands."""
+        if PARAMETERS not in names:
+            return code, {}
+        code, once, handed = hoisted(code, names.index(PARAMETERS))
+        return code, emission.hand_over(self._prepare, once, handed, names, self._places)
+
+    def module(self) -> str:
+        """`prepare` and all functions, as one text."""
+        return "\n".join([self._language.preparation("prepare", [PARAMETERS], ["c"], self._prepare), *self.text])
+
+
+Extension = Callable[[Printer], None]
+"""What adds further functions to a module; they share its `prepare`."""
+
+
+def no_extension(printer: Printer) -> None:
+    """The functions of the module alone."""
+
+
+def implicit_module(
+    t: TracedSystem, language: TargetLanguage = LLVM, extend: Extension = no_extension
+) -> tuple[str, ArraySizes]:
+    """What an implicit method needs: rhs, jac, factor, solve, stage, df_dt and outputs.
+
+    rhs(x, u, c, f)              f = rates
+    jac(x, u, c, f, J)           rates, and the non-zeros of df/dx, equal ones once
+    factor(J, d, A)              LU of d I - J
+    solve(A, b, y)               y = (d I - J)^-1 b
+    stage(x, u, c, A, g, k)      k = (d I - J)^-1 (f(x, u) + g)
+    df_dt(x, u, c, w, f)         (df/du) w, the rates' own slope in time while inputs move at w
+    outputs(x, u, c, o)
+    """
+    import casadi
+
+    size = t.x.shape[0]
+    code = recorded([t.x, t.u, t.p], [t.f])
+    slopes, places, slots = _rates_and_slopes(t, code)
+    lu = Factors(places, slots, size)
+    a, g, b = (casadi.SX.sym(n, k) for n, k in (("A", lu.values.numel()), ("g", size), ("b", size)))
+    stage, solve = lu.solved(a, [t.f[i] + g[i] for i in range(size)]), lu.solved(a, [b[i] for i in range(size)])
+    point = {"x": t.x, "u": t.u, PARAMETERS: t.p}
+    printer = Printer(language)
+    printer.add_code("rhs", list(point), finished(code), ["f"])
+    printer.add_code("jac", list(point), slopes, ["f", "J"])
+    printer.add("factor", {"J": lu.j, "d": lu.d}, {"A": lu.values}, ["d"])
+    printer.add("solve", {"A": a, "b": b}, {"y": casadi.vertcat(*solve)})
+    printer.add("stage", {**point, "A": a, "g": g}, {"k": casadi.vertcat(*stage)})
+    df_dt = casadi.densify(casadi.jtimes(t.f, t.u, t.w) if t.u.numel() else casadi.SX(size, 1))
+    printer.add("df_dt", {**point, "w": t.w}, {"f": df_dt})
+    printer.add("outputs", point, {"o": t.o})
+    extend(printer)
+    sizes = ArraySizes(size, t.u.shape[0], t.p.shape[0], printer.held, lu.j.numel(), lu.values.numel(), t.o.shape[0])
+    return printer.module(), sizes
+
+
+def rates_module(
+    t: TracedSystem, language: TargetLanguage = LLVM, extend: Extension = no_extension
+) -> tuple[str, ArraySizes]:
+    """What a caller with an integrator of its own needs: rhs and outputs, as in `implicit_module`."""
+    printer, point = Printer(language), {"x": t.x, "u": t.u, PARAMETERS: t.p}
+    printer.add("rhs", point, {"f": t.f})
+    printer.add("outputs", point, {"o": t.o})
+    extend(printer)
+    sizes = ArraySizes(t.x.numel(), t.u.numel(), t.p.numel(), printer.held, 0, 0, t.o.numel())
+    return printer.module(), sizes
+
+
+def _rates_and_slopes(t: TracedSystem, code: Code) -> tuple[Code, tuple[tuple[int, int], ...], tuple[int, ...]]:
+    """The rates and the distinct non-zeros of their Jacobian; its places, and which non-zero stands in each."""
+    tape, by_index = Tape(code.body), {index: operand for _, index, operand in code.outputs}
+    rates = [by_index.get(i, ZERO) for i in range(t.x.numel())]
+    rows = derivatives(tape, rates, [("in", 0, j) for j in range(t.x.numel())])
+    slopes = {(i, j): row[x] for i, row in enumerate(rows) for j in range(len(rows)) if (x := ("in", 0, j)) in row}
+    distinct = list(dict.fromkeys(slopes.values()))
+    outputs = [(k, i, operand) for k, operands in enumerate((rates, distinct)) for i, operand in enumerate(operands)]
+    slots = tuple(distinct.index(operand) for operand in slopes.values())
+    return finished(Code(tuple(tape.body), tuple(outputs))), tuple(slopes), slots
+
+
+def explicit_module(t: TracedSystem, a: Sequence[Sequence[float]], b: Sequence[float]) -> tuple[str, int]:
+    """One whole step of an explicit Runge-Kutta method: step(x, u, c, w, h, y), and how long `c` must be.
+
+    `a` are the rows of the tableau below its first, `b` its weights; nodes are the row sums. Inputs move at w.
+    """
+    import casadi
+
+    rates = casadi.Function("rates", [t.x, t.u, t.p], [t.f])
+    h = casadi.SX.sym("h")
+    slopes: list[Any] = []
+    for row in ([], *a):
+        increment = sum((weight * k for weight, k in zip(row, slopes, strict=True) if weight), casadi.SX(0))
+        slopes.append(rates(t.x + h * increment if row else t.x, t.u + sum(row) * h * t.w, t.p))
+    step = t.x + h * sum((weight * k for weight, k in zip(b, slopes, strict=True) if weight), casadi.SX(0))
+    printer = Printer()
+    printer.add("step", {"x": t.x, "u": t.u, PARAMETERS: t.p, "w": t.w, "h": h}, {"y": step}, ["h"])
+    return printer.module(), printer.held

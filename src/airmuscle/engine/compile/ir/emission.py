@@ -1,0 +1,177 @@
+"""Emission of instructions into functions of a target language: straight-line code, and branches around blocks."""
+
+from __future__ import annotations
+
+import abc
+from collections.abc import Callable, Mapping, Sequence
+
+from ....core.errors import TraceError
+from .branches import COMMANDED, STEADY, VARYING, skipping
+from .instructions import Code, Instruction, Operand, Operation
+from .scheduling import ConditionalBlock, Item
+
+LEVEL = {"u": COMMANDED, "w": STEADY, "h": STEADY}
+"""Arguments that do not depend on the states: inputs, their slopes, and the step size."""
+
+
+class FunctionBlock(abc.ABC):
+    """The lines of one function under construction, with elimination of common subexpressions.
+
+    `needed` are the functions that the target must be given a definition of, with the number of their arguments.
+    """
+
+    def __init__(self, scalars: Sequence[str] = ()) -> None:
+        self.lines: list[str] = []
+        self.scalars = frozenset(scalars)
+        self.needed: dict[str, int] = {}
+        self._known: dict[str, str] = {}
+        self._named = 0
+
+    def put(self, expression: str) -> str:
+        """The name of the value of `expression`; the instruction is appended unless it exists already."""
+        name = self._known.get(expression)
+        if name is None:
+            name = self._known[expression] = self.new_name()
+            self.lines.append(self.assignment(name, expression))
+        return name
+
+    def new_name(self) -> str:
+        """A name that no value has."""
+        self._named += 1
+        return f"v{self._named}"
+
+    @abc.abstractmethod
+    def assignment(self, name: str, expression: str) -> str:
+        """The line that gives a value its name."""
+
+    @abc.abstractmethod
+    def constant(self, value: float) -> str:
+        """A constant."""
+
+    @abc.abstractmethod
+    def load(self, array: str, index: int) -> str:
+        """The value of an array element, or of a scalar argument."""
+
+    @abc.abstractmethod
+    def store(self, array: str, index: int, value: str) -> None:
+        """Write a value into an array element."""
+
+    @abc.abstractmethod
+    def operate(self, operation: Operation, x: Sequence[str]) -> str:
+        """The value of one operation, whose instructions are appended; raises TraceError for an unknown operation."""
+
+    @abc.abstractmethod
+    def unless_zero(
+        self, gates: Sequence[str], compute: Callable[[], dict[Operand, str]], instead: Mapping[Operand, str]
+    ) -> dict[Operand, str]:
+        """The results that `compute` appends and returns if a gate is not zero, otherwise those of `instead`."""
+
+
+class TargetLanguage(abc.ABC):
+    """A language in which functions of arrays are printed. Arrays are arguments that do not overlap."""
+
+    @abc.abstractmethod
+    def body(self, scalars: Sequence[str] = ()) -> FunctionBlock:
+        """An empty function of which some arguments are numbers, the others arrays."""
+
+    @abc.abstractmethod
+    def function(self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: FunctionBlock) -> str:
+        """The text of a function of arrays and numbers that computes the arrays `outputs`."""
+
+    def preparation(self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: FunctionBlock) -> str:
+        """The text of a function that is called once for a set of parameters."""
+        return self.function(name, inputs, outputs, body)
+
+
+def unknown_operation(operation: Operation, target: str) -> TraceError:
+    """The error of a language that lacks an operation."""
+    return TraceError(f"operation {operation.name} has no {target} form; write the law over airmuscle.core.ops.")
+
+
+def computed(
+    block: FunctionBlock, code: Code, inputs: Sequence[str], held: Mapping[Operand, int], given: Mapping[Operand, str]
+) -> dict[tuple[int, int], str]:
+    """Append code to a block and return the names of its results by output and index.
+
+    `inputs` are the names of the arrays, `held` the indices of precomputed operands in `c`, `given` the names of known
+    values.
+    """
+    values = run(block, with_gates(code, inputs, held), inputs, held, given)
+    return {(o, i): value_of(block, operand, inputs, held, values) for o, i, operand in code.outputs}
+
+
+def with_gates(
+    code: Code, inputs: Sequence[str], held: Mapping[Operand, int], early: frozenset[Operand] = frozenset()
+) -> list[Item]:
+    """The instructions of `code`, with those that a zero factor or an inactive clamp makes redundant in blocks."""
+
+    def level(operand: Operand) -> int:
+        return STEADY if operand in held else LEVEL.get(inputs[operand[1]], VARYING)
+
+    return skipping(code, level, early)
+
+
+def run(
+    block: FunctionBlock,
+    body: Sequence[Item],
+    inputs: Sequence[str],
+    held: Mapping[Operand, int],
+    given: Mapping[Operand, str] | None = None,
+) -> dict[Operand, str]:
+    """Append instructions to a block; return the names of their results and of the operands in `given`."""
+    values = dict(given or {})
+    for line in body:
+        append(block, line, inputs, held, values)
+    return values
+
+
+def append(
+    block: FunctionBlock, line: Item, inputs: Sequence[str], held: Mapping[Operand, int], values: dict[Operand, str]
+) -> None:
+    """Append an instruction or a conditional block, and add the names of its results to `values`."""
+    if isinstance(line, ConditionalBlock):
+        instead = {operand: value_of(block, value, inputs, held, values) for operand, value in line.instead}
+        gates = [value_of(block, gate, inputs, held, values) for gate in line.gates]
+        values |= block.unless_zero(gates, lambda: run(block, line.body, inputs, held, values), instead)
+        return
+    arguments = [value_of(block, a, inputs, held, values) for a in line.arguments]
+    values[line.result] = block.operate(line.operation, arguments)
+
+
+def value_of(
+    block: FunctionBlock,
+    operand: Operand,
+    inputs: Sequence[str],
+    held: Mapping[Operand, int],
+    values: Mapping[Operand, str],
+) -> str:
+    """The name of the value of an operand, which is loaded if it is an array element."""
+    if operand in values:
+        return values[operand]
+    if operand in held:
+        return block.load("c", held[operand])
+    if operand[0] == "c":
+        return block.constant(float(operand[1]))
+    return block.load(inputs[operand[1]], operand[2])
+
+
+def hand_over(
+    block: FunctionBlock,
+    once: Sequence[Instruction],
+    handed: Sequence[Operand],
+    inputs: Sequence[str],
+    places: dict[str, int],
+) -> dict[Operand, int]:
+    """Append the part of a function that depends on parameters only; return the indices of its results in `c`.
+
+    `places` contains the indices of values that are stored already, so that functions share equal values.
+    """
+    values = run(block, once, inputs, {})
+    held = {}
+    for operand in handed:
+        value = value_of(block, operand, inputs, {}, values)
+        if value not in places:
+            places[value] = len(places)
+            block.store("c", places[value], value)
+        held[operand] = places[value]
+    return held

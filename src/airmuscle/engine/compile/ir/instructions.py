@@ -1,0 +1,259 @@
+"""CasADi expressions as a list of instructions; those that depend on parameters only are separated."""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import functools
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from ....core.errors import TraceError
+
+Operand = tuple[Any, ...]
+"""("t", k) the result of instruction k, ("c", value) a constant, ("in", argument, index) an input."""
+
+
+class Operation(enum.IntEnum):
+    """Operations of an instruction list; all but the last three have the meaning that CasADi gives them.
+
+    MASK(condition, x) is x where the condition is not zero, else 0. SELECT(condition, a, b) is a where the condition
+    is not zero, else b. MAXIMUM and MINIMUM select one of two numbers, as one machine instruction does.
+    """
+
+    ASSIGN = enum.auto()
+    ADD = enum.auto()
+    SUBTRACT = enum.auto()
+    MULTIPLY = enum.auto()
+    DIVIDE = enum.auto()
+    NEGATE = enum.auto()
+    SQUARE = enum.auto()
+    TWICE = enum.auto()
+    INVERSE = enum.auto()
+    SQRT = enum.auto()
+    ABS = enum.auto()
+    SIGN = enum.auto()
+    FLOOR = enum.auto()
+    POWER = enum.auto()
+    CONSTANT_POWER = enum.auto()
+    EXP = enum.auto()
+    LOG = enum.auto()
+    LOG1P = enum.auto()
+    EXPM1 = enum.auto()
+    SIN = enum.auto()
+    COS = enum.auto()
+    TAN = enum.auto()
+    ASIN = enum.auto()
+    ACOS = enum.auto()
+    ATAN = enum.auto()
+    SINH = enum.auto()
+    COSH = enum.auto()
+    TANH = enum.auto()
+    ASINH = enum.auto()
+    FMIN = enum.auto()
+    FMAX = enum.auto()
+    LESS = enum.auto()
+    LESS_EQUAL = enum.auto()
+    EQUAL = enum.auto()
+    NOT_EQUAL = enum.auto()
+    NOT = enum.auto()
+    AND = enum.auto()
+    OR = enum.auto()
+    MASK = enum.auto()
+    SELECT = enum.auto()
+    MAXIMUM = enum.auto()
+    MINIMUM = enum.auto()
+
+
+_CASADI_NAMES = {
+    Operation.SUBTRACT: "SUB", Operation.MULTIPLY: "MUL", Operation.DIVIDE: "DIV", Operation.NEGATE: "NEG",
+    Operation.SQUARE: "SQ", Operation.INVERSE: "INV", Operation.ABS: "FABS", Operation.POWER: "POW",
+    Operation.CONSTANT_POWER: "CONSTPOW", Operation.LESS: "LT", Operation.LESS_EQUAL: "LE", Operation.EQUAL: "EQ",
+    Operation.NOT_EQUAL: "NE", Operation.MASK: "IF_ELSE_ZERO",
+}  # fmt: skip
+"""Names in CasADi that differ, without their prefix OP_."""
+_OWN = (Operation.SELECT, Operation.MAXIMUM, Operation.MINIMUM)
+_COMPARE = (Operation.LESS_EQUAL, Operation.LESS)
+
+CALLED = frozenset({
+    Operation.EXP, Operation.LOG, Operation.SIN, Operation.COS, Operation.TAN, Operation.ATAN, Operation.SINH,
+    Operation.COSH, Operation.TANH, Operation.ASINH, Operation.ASIN, Operation.ACOS, Operation.LOG1P, Operation.EXPM1,
+    Operation.POWER, Operation.CONSTANT_POWER,
+})  # fmt: skip
+"""The operations for which a function of the C library is called."""
+
+
+class Instruction(NamedTuple):
+    """`result = operation(arguments)`; every result is assigned once."""
+
+    operation: Operation
+    result: Operand
+    arguments: tuple[Operand, ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class Code:
+    """Instructions in execution order, and the destinations of results: (output number, index, operand)."""
+
+    body: tuple[Instruction, ...]
+    outputs: tuple[tuple[int, int, Operand], ...]
+
+
+@functools.cache
+def _casadi_operations() -> dict[int, Operation]:
+    """Operations by their number in CasADi."""
+    import casadi
+
+    named = {
+        operation: _CASADI_NAMES.get(operation, operation.name) for operation in Operation if operation not in _OWN
+    }
+    return {getattr(casadi, f"OP_{name}"): operation for operation, name in named.items()}
+
+
+def instructions(inputs: Sequence[Any], outputs: Sequence[Any]) -> Code:
+    """The instructions that compute the non-zeros of `outputs` (CasADi SX) from `inputs`."""
+    return finished(recorded(inputs, outputs))
+
+
+def recorded(inputs: Sequence[Any], outputs: Sequence[Any]) -> Code:
+    """The instructions as recorded by CasADi; maxima and minima are still selections, which can be differentiated."""
+    import casadi
+
+    operations = _casadi_operations()
+    function = casadi.Function("code", list(inputs), casadi.cse(list(outputs)))
+    current: dict[int, Operand] = {}
+    body: list[Instruction] = []
+    results: list[tuple[int, int, Operand]] = []
+    for k in range(function.n_instructions()):
+        code = function.instruction_id(k)
+        target, source = function.instruction_output(k), function.instruction_input(k)
+        if code == casadi.OP_CONST:
+            current[target[0]] = ("c", function.instruction_constant(k))
+        elif code == casadi.OP_INPUT:
+            current[target[0]] = ("in", source[0], source[1])
+        elif code == casadi.OP_OUTPUT:
+            results.append((target[0], target[1], current[source[0]]))
+        else:
+            name = ("t", len(body))
+            if code not in operations:
+                raise TraceError(f"CasADi operation {code} is not supported; write the law over airmuscle.core.ops.")
+            body.append(Instruction(operations[code], name, tuple(current[i] for i in source)))
+            current[target[0]] = name
+    return Code(tuple(_selects(body)), tuple(results))
+
+
+def finished(code: Code) -> Code:
+    """Code ready for printing: maxima and minima are recognised, unused instructions are removed."""
+    body = _selects(code.body)
+    by_result = {line.result: line for line in body}
+    chosen: list[Instruction] = []
+    for line in body:
+        if line.operation == Operation.MASK:
+            chosen += _extreme_of_zero(line, by_result)
+        else:
+            chosen.append(_extreme(line, by_result) if line.operation == Operation.SELECT else line)
+    return _without_unused(chosen, code.outputs)
+
+
+def _selects(body: Sequence[Instruction]) -> list[Instruction]:
+    """The instructions with each sum of a mask and its complementary mask as one Operation.SELECT."""
+    by_result = {line.result: line for line in body}
+
+    def mask(operand: Operand) -> Instruction | None:
+        line = by_result.get(operand)
+        return line if line is not None and line.operation == Operation.MASK else None
+
+    def negated(operand: Operand) -> Operand | None:
+        line = by_result.get(operand)
+        return line.arguments[0] if line is not None and line.operation == Operation.NOT else None
+
+    chosen = []
+    for line in body:
+        first, second = (mask(a) for a in line.arguments) if line.operation == Operation.ADD else (None, None)
+        if first and second and negated(second.arguments[0]) == first.arguments[0]:
+            line = Instruction(
+                Operation.SELECT, line.result, (first.arguments[0], first.arguments[1], second.arguments[1])
+            )
+        elif first and second and negated(first.arguments[0]) == second.arguments[0]:
+            line = Instruction(
+                Operation.SELECT, line.result, (second.arguments[0], second.arguments[1], first.arguments[1])
+            )
+        chosen.append(line)
+    return chosen
+
+
+def _extreme_of_zero(line: Instruction, by_result: Mapping[Operand, Instruction]) -> list[Instruction]:
+    """A mask of the positive or negative part of a value as a maximum or minimum with zero; also within a product,
+    which can then be fused with a sum.
+
+    NaN is treated as by the mask: if the comparison is false, the second operand is selected.
+    """
+    (condition, masked), zero = line.arguments, ("c", 0.0)
+    test, product = by_result.get(condition), by_result.get(masked)
+    opposite = test is not None and test.operation == Operation.NOT
+    if test is not None and opposite:
+        test = by_result.get(test.arguments[0])
+    if test is None or test.operation not in _COMPARE or zero not in test.arguments:
+        return [line]
+    number = test.arguments[test.arguments[0] == zero]
+    larger = (test.arguments[0] == zero) != opposite
+    pair = (zero, number) if opposite else (number, zero)
+    extreme = Instruction(Operation.MAXIMUM if larger else Operation.MINIMUM, line.result, pair)
+    if number == masked:
+        return [extreme]
+    if product is None or product.operation != Operation.MULTIPLY or number not in product.arguments:
+        return [line]
+    other = product.arguments[product.arguments[0] == number]
+    extreme = Instruction(extreme.operation, ("t", "extreme of", line.result), pair)
+    return [extreme, Instruction(Operation.MULTIPLY, line.result, (extreme.result, other))]
+
+
+def _extreme(line: Instruction, by_result: Mapping[Operand, Instruction]) -> Instruction:
+    """An Operation.SELECT of the greater or smaller of two compared values as Operation.MAXIMUM or MINIMUM."""
+    condition, a, b = line.arguments
+    test = by_result.get(condition)
+    if test is not None and test.operation in _COMPARE:
+        if test.arguments == (b, a):
+            return Instruction(Operation.MAXIMUM, line.result, (a, b))
+        if test.arguments == (a, b):
+            return Instruction(Operation.MINIMUM, line.result, (a, b))
+    return line
+
+
+def _without_unused(body: list[Instruction], outputs: tuple[tuple[int, int, Operand], ...]) -> Code:
+    needed = {operand for _, _, operand in outputs}
+    kept = []
+    for line in reversed(body):
+        if line.result in needed:
+            kept.append(line)
+            needed.update(line.arguments)
+    return Code(tuple(reversed(kept)), outputs)
+
+
+def hoisted(code: Code, parameter_input: int) -> tuple[Code, tuple[Instruction, ...], tuple[Operand, ...]]:
+    """Loop-invariant code motion: the remaining code, the instructions that depend on parameters only, their results.
+
+    The results are the operands that the remaining code uses, in order. A division by such an operand becomes a product
+    with its precomputed inverse.
+    """
+    varies: dict[Operand, bool] = {}
+
+    def depends(operand: Operand) -> bool:
+        if operand[0] == "t":
+            return varies[operand]
+        return bool(operand[0] == "in" and operand[1] != parameter_input)
+
+    once: list[Instruction] = []
+    always: list[Instruction] = []
+    for line in code.body:
+        if line.operation == Operation.DIVIDE and depends(line.arguments[0]) and not depends(line.arguments[1]):
+            inverse = Instruction(Operation.INVERSE, ("t", "inverse of", line.arguments[1]), line.arguments[1:])
+            if inverse.result not in varies:
+                once.append(inverse)
+                varies[inverse.result] = False
+            line = Instruction(Operation.MULTIPLY, line.result, (line.arguments[0], inverse.result))
+        varies[line.result] = any(depends(a) for a in line.arguments)
+        (always if varies[line.result] else once).append(line)
+    used = [a for line in always for a in line.arguments] + [operand for _, _, operand in code.outputs]
+    handed = tuple(dict.fromkeys(a for a in used if a[0] != "c" and not depends(a)))
+    return Code(tuple(always), code.outputs), tuple(once), handed

@@ -1,0 +1,111 @@
+"""Source of kernels: functions and constants of a module of `compile/kernels/` as syntax trees."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import functools
+import inspect
+import io
+import tokenize
+from collections.abc import Mapping
+from importlib import resources
+
+import numpy as np
+
+from ....core.errors import TraceError
+from ....core.status import Status
+from .. import kernel_layout
+
+_PACKAGE = __package__.rpartition(".")[0] + ".kernels"
+
+
+@dataclasses.dataclass(frozen=True)
+class KernelSource:
+    """A function of a kernel module.
+
+    constants  values of the constants of its module, by name
+    imported   modules of the functions that it may call, by name
+    comments   comments by line
+    """
+
+    file: str
+    node: ast.FunctionDef
+    constants: Mapping[str, float]
+    imported: Mapping[str, str]
+    comments: Mapping[int, str]
+
+    @property
+    def name(self) -> str:
+        """Name of the function."""
+        return self.node.name
+
+    @property
+    def arguments(self) -> list[str]:
+        """Names of the arguments."""
+        return [argument.arg for argument in self.node.args.args]
+
+    @property
+    def description(self) -> list[str]:
+        """Lines of the docstring."""
+        return inspect.cleandoc(ast.get_docstring(self.node) or "").splitlines()
+
+    @property
+    def body(self) -> list[ast.stmt]:
+        """Statements after the docstring."""
+        return self.node.body[1:] if ast.get_docstring(self.node) else self.node.body
+
+    def unprintable(self, node: ast.AST, what: str) -> TraceError:
+        """The error of a construct that has no printed form."""
+        line = getattr(node, "lineno", self.node.lineno)
+        text = f": `{ast.unparse(node)}`" if isinstance(node, ast.expr) else ""
+        return TraceError(f"{self.file}, line {line}, {self.name}: {what} has no printed form{text}.")
+
+
+def read_kernels(module: str) -> dict[str, KernelSource]:
+    """The functions of a module of `compile/kernels/`, by name."""
+    text = resources.files(_PACKAGE).joinpath(f"{module}.py").read_text(encoding="utf-8")
+    return dict(_functions(text, f"{module}.py"))
+
+
+@functools.lru_cache(maxsize=8)
+def _functions(text: str, file: str) -> dict[str, KernelSource]:
+    nodes = ast.parse(text).body
+    defined = [node for node in nodes if isinstance(node, ast.FunctionDef)]
+    imported = {node.name: file.removesuffix(".py") for node in defined}
+    for node in nodes:
+        if isinstance(node, ast.ImportFrom) and node.level == 1 and node.module:
+            imported |= {alias.name: node.module for alias in node.names}
+    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+    comments = {t.start[0]: t.string.lstrip("# ") for t in tokens if t.type == tokenize.COMMENT and t.start[1]}
+    comments = {
+        line: comment for line, comment in comments.items() if not comment.startswith(("fmt:", "type:", "noqa"))
+    }
+    return {node.name: KernelSource(file, node, _constants(nodes), imported, comments) for node in defined}
+
+
+def read_text(text: str, file: str) -> dict[str, KernelSource]:
+    """The functions of the text of a module, by name; `file` is its name in messages."""
+    return _functions(text, file)
+
+
+def _constants(nodes: list[ast.stmt]) -> dict[str, float]:
+    """The values of the constants of a module."""
+    known = {"np": np, "Status": Status, **vars(kernel_layout)}
+    values = {}
+    for node in nodes:
+        if isinstance(node, ast.Assign) and all(
+            isinstance(n, ast.Name) and n.id.isupper() for n in _flat(node.targets)
+        ):
+            if not {n.id for n in ast.walk(node.value) if isinstance(n, ast.Name)} <= {*known, "int"}:
+                continue  # a value that another module computes
+            value = eval(compile(ast.Expression(node.value), "constant", "eval"), known)
+            names = _flat(node.targets)
+            for name, each in zip(names, [value] if len(names) == 1 else value, strict=True):
+                if isinstance(each, int | float) and isinstance(name, ast.Name):
+                    values[name.id] = each
+    return values
+
+
+def _flat(targets: list[ast.expr]) -> list[ast.expr]:
+    return targets[0].elts if isinstance(targets[0], ast.Tuple) else targets

@@ -1,0 +1,84 @@
+"""Finite control set: the sequence of modes of a plant with the least cost, by enumeration with bounds."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+
+from ....core.status import Status
+from .calls import invoke, pointer
+from .exponential import exponential_step
+from .parts import PART
+
+DONE, NOT_FINITE = Status.DONE.value, Status.NOT_FINITE.value
+
+
+@PART
+def tracking_cost(y: Any, wanted: Any, weights: Any) -> Any:
+    """The weighted sum of the squared errors."""
+    cost = 0.0
+    for i in range(y.shape[0]):
+        cost += weights[i] * (y[i] - wanted[i]) ** 2
+    return cost
+
+
+@PART
+def keep_best(cost: Any, sequence: Any, best: Any) -> None:
+    """Keep a complete sequence and its cost."""
+    best[0] = cost
+    for k in range(1, best.shape[0]):
+        best[k] = sequence[k]
+
+
+@numba.njit(error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
+def choose_mode(
+    rates: Any, measured: Any, c: Any, sizes: Any, h: Any, modes: Any, changes: Any, wanted: Any, weights: Any,
+    states: Any, costs: Any, sequence: Any, best: Any, count: Any, f: Any, a: Any, work: Any, y: Any, slopes: Any,
+) -> Any:  # fmt: skip
+    """The sequence of modes with the least sum of weights (y - wanted)^2 and of the costs of changes of mode.
+
+    rates, measured  addresses of the functions of AugmentedRates
+    modes            (M, m) inputs; changes (M, M) cost of the change from one mode to another
+    states           (K + 1, N): the first row is the state now; costs (K + 1,)
+    sequence         (K + 1,): the first is the mode before now; best (K + 1,): the cost in [0], the modes after it
+    count            (2,): steps that were computed, and sequences that were complete
+    y, slopes        (p,), (p, N); f, a, work as in `predict_extended`: workspace
+
+    A sequence whose cost exceeds the best one so far is not continued. Of equal sequences the first one is kept.
+    """
+    n, total, horizon = f.shape[0], states.shape[1], costs.shape[0] - 1
+    e = work[3]
+    best[0] = 1e300
+    count[0] = count[1] = 0
+    costs[0] = 0.0
+    depth = 0
+    sequence[1] = -1
+    while depth >= 0:
+        mode = sequence[depth + 1] + 1
+        if mode == modes.shape[0]:
+            depth -= 1
+            continue
+        sequence[depth + 1] = mode
+        cost = costs[depth] + changes[sequence[depth], mode]
+        if not cost < best[0]:
+            continue
+        x, later, u = states[depth], states[depth + 1], modes[mode]
+        count[0] += 1
+        if exponential_step(rates, c, sizes, x, u, h, f, a, work[0], work[1], work[2], e, work[4]) != DONE:
+            return NOT_FINITE
+        for i in range(total):
+            later[i] = x[i] + sizes[i] * e[i, total] if i < n else x[i]
+        invoke(measured, (pointer(later), pointer(u), pointer(c), pointer(y), pointer(slopes)))
+        cost += tracking_cost(y, wanted, weights)
+        if not cost < best[0]:
+            continue
+        depth += 1
+        costs[depth] = cost
+        if depth == horizon:
+            count[1] += 1
+            keep_best(cost, sequence, best)
+            depth -= 1
+        else:
+            sequence[depth + 1] = -1
+    return DONE if best[0] < 1e300 else NOT_FINITE

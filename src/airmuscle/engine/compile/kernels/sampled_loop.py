@@ -1,0 +1,217 @@
+"""Kernel: a sampled loop, from one sampling instant to the next: measure, command, drive the inputs, integrate."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+
+from ....core.status import Status
+from ..kernel_layout import Progress
+from .calls import call_kernel, invoke, pointer
+from .driven_inputs import drive_inputs, is_full
+from .parts import PART
+
+DONE, PAUSED, NOT_FINITE = Status.DONE.value, Status.PAUSED.value, Status.NOT_FINITE.value
+NON_FINITE_COMMAND, BELOW_LIMIT = Status.NON_FINITE_COMMAND.value, Status.NEGATIVE_AIR_MASS.value
+LARGEST = 1.7976931348623157e308
+DRIVER_WIDTH = 4
+"""Numbers of the settings and of the state of a driver."""
+INTERVAL, RUNNING, SEGMENTS, ROWS, SAMPLES, STEPS_BEFORE, FULL, FIRST_SEGMENT, FIRST_ROW, WAITING = map(int, Progress)
+
+
+@PART
+def measure(outputs: Any, y: Any, applied: Any, c: Any, o: Any, measured_at: Any, measured: Any) -> Any:
+    """Write the measured columns; DONE, or NOT_FINITE."""
+    n, needs_outputs, status = y.shape[0], False, DONE
+    for i in range(measured_at.shape[0]):
+        needs_outputs = needs_outputs or measured_at[i] >= n
+    if needs_outputs:
+        invoke(outputs, (pointer(y), pointer(applied), pointer(c), pointer(o)))
+    for i in range(measured.shape[0]):
+        at = measured_at[i]
+        x = y[at] if at < n else o[at - n]
+        if not abs(x) <= LARGEST:
+            status = NOT_FINITE
+            break
+        measured[i] = x
+    return status
+
+
+@PART
+def limit_commands(command: Any, low: Any, high: Any) -> Any:
+    """Limit each command to the range of its input; DONE, or NON_FINITE_COMMAND."""
+    status = DONE
+    for i in range(command.shape[0]):
+        x = 0.0 + command[i]
+        if low[i] > x:
+            x = low[i]
+        if high[i] < x:
+            x = high[i]
+        if not abs(x) <= LARGEST:
+            status = NON_FINITE_COMMAND
+            break
+        command[i] = x
+    return status
+
+
+@PART
+def take_sample(
+    outputs: Any, y: Any, applied: Any, c: Any, o: Any, measured_at: Any, sample: Any, setpoint: Any, low: Any,
+    high: Any, period: Any, parameters: Any, controlled: Any, memory: Any, measured: Any, command: Any, progress: Any,
+) -> Any:  # fmt: skip
+    """Copy the memory; where the interval is controlled: measure, call the controller, limit its commands; a status.
+
+    PAUSED where the controller is called from Python: its commands are limited when the kernel is called again.
+    """
+    status, waited = DONE, progress[WAITING] == 1
+    if not waited:
+        for i in range(memory.shape[1]):
+            memory[1, i] = memory[0, i]
+        if controlled:
+            status = measure(outputs, y, applied, c, o, measured_at, measured)
+        if status == DONE and controlled and sample != 0:
+            invoke(sample, (
+                pointer(measured), pointer(setpoint), pointer(memory[0]), pointer(low), pointer(high),
+                pointer(period), pointer(parameters), pointer(command), pointer(memory[1]),
+            ))  # fmt: skip
+    progress[WAITING] = 0
+    if status == DONE and controlled:
+        if sample != 0 or waited:
+            status = limit_commands(command, low, high)
+        else:
+            status = PAUSED
+            progress[WAITING] = 1
+    return status
+
+
+@PART
+def apply_sample(
+    k: Any, measured: Any, samples: Any, command: Any, commands: Any, commanded_at: Any, first: Any, values: Any
+) -> None:
+    """Write the measurements and the commands of interval `k`, and the commands into its segments."""
+    for i in range(measured.shape[0]):
+        samples[k, i] = measured[i]
+    for i in range(command.shape[0]):
+        commands[k, i] = command[i]
+        for row in range(first[k], first[k + 1]):
+            values[row, commanded_at[i]] = command[i]
+
+
+@PART
+def start_integrator(
+    slots: Any, places: Any, progress: Any, clock: Any, count: Any, begin: Any, at_segment: Any, pieces: Any,
+    at_row: Any, wanted: Any, ends: Any, values: Any, slopes: Any, times: Any, rows: Any,
+) -> None:  # fmt: skip
+    """Give the integrator the segments, output times and rows of an interval, and set its clock and counts."""
+    progress[FIRST_SEGMENT], progress[FIRST_ROW] = at_segment, at_row
+    progress[SEGMENTS], progress[ROWS] = at_segment + pieces, at_row
+    progress[STEPS_BEFORE], progress[RUNNING] = count[2], 1
+    clock[0], clock[1], clock[2] = begin, 0.0, begin
+    count[0] = count[1] = 0
+    slots[places[0]], slots[places[1]] = pointer(ends[at_segment:]), pointer(values[at_segment:])
+    slots[places[2]], slots[places[3]] = pointer(slopes[at_segment:]), pointer(times[at_row:])
+    slots[places[4]] = pointer(rows[at_row:])
+    slots[places[0] + 1] = slots[places[1] + 1] = slots[places[2] + 1] = pieces
+    slots[places[3] + 1] = slots[places[4] + 1] = wanted
+
+
+@PART
+def is_below(y: Any, bounds: Any) -> Any:
+    """Whether a state is below its bound."""
+    below = False
+    for i in range(y.shape[0]):
+        below = below or y[i] < bounds[i]
+    return below
+
+
+@PART
+def end_interval(
+    progress: Any, begin: Any, end: Any, ends: Any, values: Any, slopes: Any, applied: Any, kept_applied: Any,
+    y: Any, kept: Any, memory: Any, states: Any, kept_states: Any,
+) -> None:  # fmt: skip
+    """Keep inputs, state, memory and drivers at the end of an interval."""
+    progress[INTERVAL], progress[RUNNING] = progress[INTERVAL] + 1, 0
+    last = progress[SEGMENTS] - 1
+    start = ends[last - 1] if last > progress[FIRST_SEGMENT] else begin
+    for i in range(applied.shape[0]):
+        applied[i] = values[last, i] + slopes[last, i] * (end - start)
+        kept_applied[i] = applied[i]
+    for i in range(y.shape[0]):
+        kept[i] = y[i]
+    for i in range(memory.shape[1]):
+        memory[0, i] = memory[1, i]
+    for d in range(states.shape[0]):
+        for i in range(DRIVER_WIDTH):
+            kept_states[d, i] = states[d, i]
+
+
+@numba.njit(error_model="numpy", nogil=True)
+def sampled_loop(
+    integrate: Any, slots: Any, places: Any, clock: Any, count: Any, y: Any,
+    outputs: Any, c: Any, o: Any, measured_at: Any,
+    sample: Any, parameters: Any, period: Any, low: Any, high: Any, commanded_at: Any,
+    edges: Any, ulps: Any, first_sample: Any, setpoints: Any,
+    ends: Any, values: Any, slopes: Any, first: Any, grid: Any, grid_row: Any,
+    kinds: Any, settings: Any, states: Any, columns: Any, counts: Any, scratch: Any, begins: Any,
+    bounds: Any, applied: Any, memory: Any, measured: Any, command: Any,
+    kept: Any, kept_applied: Any, kept_states: Any,
+    new_ends: Any, new_values: Any, new_slopes: Any, times: Any, rows: Any, samples: Any, commands: Any,
+    progress: Any, budget: Any,
+) -> Any:  # fmt: skip
+    """Run the intervals until the end, an event, or the step limit of one call; a status.
+
+    integrate, slots, places, clock, count, y  entry point of the integrator, its slots, the places in them of ends,
+                  values, slopes, times and rows; its clock, counts and state
+    outputs, c, o, measured_at  printed outputs; where each measured column stands among states and outputs
+    sample(measured, setpoints, memory, low, high, period, parameters, command, memory)  address of the controller; 0:
+                  the kernel pauses at each sample, and its caller writes the commands
+    edges (K + 1,), ulps (K + 1,), setpoints (K, s)  intervals; samples begin with number `first_sample`
+    ends .. slopes, first (K + 1,), grid, grid_row (K + 1,)  segments and output times, and the first of each interval
+    kinds .. begins  drivers (D, ..) and their workspace
+    memory (2, ..)  of the last completed interval, and of the present one
+    kept, kept_applied, kept_states  state, inputs and drivers at the end of the last completed interval
+    new_ends .. rows  buffers: segments, times and rows of the run, with the instants that drivers add
+    samples (K, ..), commands (K, ..)  measurements and commands of every interval
+    progress      see `kernel_layout.Progress`
+    """
+    intervals, driven, steps_at_call = edges.shape[0] - 1, kinds.shape[0], count[2]
+    while progress[INTERVAL] < intervals:
+        k = progress[INTERVAL]
+        begin, end = edges[k], edges[k + 1]
+        if progress[RUNNING] == 0:
+            wanted = grid_row[k + 1] - grid_row[k]
+            progress[FULL] = 1 if driven and is_full(progress, columns, wanted, new_ends, times) else 0
+            if progress[FULL] == 1 or count[2] - steps_at_call >= budget:
+                return PAUSED
+            status = take_sample(
+                outputs, y, applied, c, o, measured_at, sample, setpoints[k], low, high, period, parameters,
+                k >= first_sample, memory, measured, command, progress,
+            )  # fmt: skip
+            if status != DONE:
+                return status
+            apply_sample(k, measured, samples, command, commands, commanded_at, first, values)
+            progress[SAMPLES] = k + 1
+            at_segment, at_row, pieces = first[k], grid_row[k], first[k + 1] - first[k]
+            if driven:
+                at_segment, at_row = progress[SEGMENTS], progress[ROWS]
+                pieces, wanted = drive_inputs(
+                    kinds, settings, kept_states, states, columns, counts, scratch, begins, begin, ulps[k + 1],
+                    ends, values, slopes, first[k], pieces, new_ends, new_values, new_slopes, at_segment,
+                    grid, grid_row[k], grid_row[k + 1], 1e-9 * period[0], times, at_row,
+                )  # fmt: skip
+            start_integrator(
+                slots, places, progress, clock, count, begin, at_segment, pieces, at_row, wanted,
+                new_ends, new_values, new_slopes, times, rows,
+            )  # fmt: skip
+        status = call_kernel(integrate, pointer(slots))
+        progress[ROWS] = progress[FIRST_ROW] + count[1]
+        if status != DONE:
+            return status
+        if is_below(y, bounds):
+            return BELOW_LIMIT
+        end_interval(
+            progress, begin, end, new_ends, new_values, new_slopes, applied, kept_applied, y, kept, memory, states,
+            kept_states,
+        )  # fmt: skip
+    return DONE

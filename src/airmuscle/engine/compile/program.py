@@ -1,0 +1,270 @@
+"""Compiled systems: machine code shared by all systems of one structure, and the data of one system."""
+
+from __future__ import annotations
+
+import ctypes
+import dataclasses
+import functools
+import math
+import threading
+import weakref
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...core import tree
+from ...core.arrays import Array
+from ...core.system import SensitivitySystem, System
+from . import functions, sensitivities, sensitivities_explicit
+from .cache.kernel import address_of
+from .cache.module import load_module
+from .functions import ArraySizes, TracedSystem
+from .functions_simd import lanes_module, row_outputs, rows_at_once
+from .llvm.types import LlvmType
+
+Tableau = tuple[tuple[tuple[float, ...], ...], tuple[float, ...]]
+"""Rows of an explicit Runge-Kutta tableau below its first, and its weights."""
+INPUT_TOLERANCE = 1e-9
+"""Part of an input's range by which it may be exceeded through rounding."""
+SMALLEST_POSITIVE = math.ulp(0.0)
+"""The smallest number above zero."""
+_FUNCTIONS = ("rhs", "jac", "factor", "solve", "stage", "df_dt", "outputs")
+
+
+class _ExplicitStep(NamedTuple):
+    """The address of a compiled step, its `prepare`, how many values that gives, and the owner of the machine code."""
+
+    address: int
+    prepare: Callable[[Array, int], Array]
+    size: int
+    engine: Any
+
+
+class Program:
+    """The compiled functions of one structure; it owns the machine code and cannot be pickled."""
+
+    def __init__(self, system: System) -> None:
+        self._system = system
+        self._form: TracedSystem | sensitivities.TangentSystem
+        rows = 1
+        if isinstance(system, SensitivitySystem):
+            self._form = sensitivities.tangent_system(system)
+            text, self.sizes = sensitivities.implicit_module(self._form)
+        else:
+            self._form = functions.trace_system(system)
+            rows = rows_at_once(self._form)
+            extend = row_outputs(self._form) if rows > 1 else functions.no_extension
+            text, self.sizes = functions.implicit_module(self._form, extend=extend)
+        self.output_names = self._form.output_names
+        self._engine = load_module(text)
+        self.address = {name: int(self._engine.get_function_address(name)) for name in _FUNCTIONS}
+        at_rows = int(self._engine.get_function_address("row_outputs" if rows > 1 else "outputs"))
+        self.outputs_at_rows = at_rows, rows
+        """The address of the function that computes the outputs at rows, and at how many at once."""
+        self._prepare = prepare_function(self._engine)
+        self._steps: dict[Any, _ExplicitStep] = {}
+        self._lane_modules: dict[Any, tuple[Any, int]] = {}
+        self._compiling = threading.Lock()  # of two threads that need a step, one compiles it: an engine must stay
+
+    @functools.cached_property
+    def traced(self) -> TracedSystem:
+        """The system's own rates and outputs as expressions, also of a differentiated one."""
+        return self._form if isinstance(self._form, TracedSystem) else functions.trace_system(self._system)
+
+    def precompute(self, parameters: Array) -> Array:
+        """Values that the functions need of a set of parameters, computed once."""
+        return self._prepare(parameters, self.sizes.held)
+
+    def step(self, tableau: Tableau, parameters: Array) -> tuple[int, Array]:
+        """The address of an explicit step with this tableau, and the values that it needs of the parameters."""
+        with self._compiling:
+            if tableau not in self._steps:
+                text, size = self._step_module(tableau)
+                engine = load_module(text)
+                address = int(engine.get_function_address("step"))
+                self._steps[tableau] = _ExplicitStep(address, prepare_function(engine), size, engine)
+        step = self._steps[tableau]
+        return step.address, step.prepare(parameters, step.size)
+
+    def _step_module(self, tableau: Tableau) -> tuple[str, int]:
+        if isinstance(self._form, sensitivities.TangentSystem):
+            return sensitivities_explicit.explicit_module(self._form, *tableau)
+        return functions.explicit_module(self._form, *tableau)
+
+    def lanes(self, tableau: Tableau, number: LlvmType) -> tuple[tuple[int, int, int], int]:
+        """The addresses of `prepare`, the explicit step and `outputs` in lanes, and the length of `c`."""
+        with self._compiling:
+            if (tableau, number) not in self._lane_modules:
+                text, size = lanes_module(self.traced, *tableau, number)
+                self._lane_modules[tableau, number] = load_module(text), size
+        engine, size = self._lane_modules[tableau, number]
+        prepare, step, outputs = (int(engine.get_function_address(n)) for n in ("prepare", "step", "outputs"))
+        return (prepare, step, outputs), size
+
+
+_PREPARE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
+
+
+def prepare_function(engine: Any) -> Callable[[Array, int], Array]:
+    """The function `prepare` of an engine: from parameters to so many values for its other functions."""
+    function = _PREPARE(engine.get_function_address("prepare"))
+
+    def prepare(parameters: Array, size: int) -> Array:
+        values = np.zeros(max(size, 1))
+        function(parameters.ctypes.data, address_of(values))
+        return values
+
+    return prepare
+
+
+class Description:
+    """Data of one system that runs need, derived once and stored for the lifetime of the system."""
+
+    def __init__(self, system: System) -> None:
+        self.program = _program(system)
+        self.parameters = tree.flatten(system)
+        self.precomputed = self.program.precompute(self.parameters)
+        states, inputs = system.states, system.input_variables
+        self.state_names = tuple(s.name for s in states)
+        self.input_names = tuple(i.name for i in inputs)
+        self.output_names = self.program.output_names
+        self.nominal = np.array([s.nominal for s in states])
+        self.lower_bounds = np.array(system.state_lower_bounds, dtype=float)
+        self.input_minimum = np.array([i.minimum for i in inputs])
+        self.input_maximum = np.array([i.maximum for i in inputs])
+        with np.errstate(invalid="ignore"):
+            slack = np.nan_to_num(INPUT_TOLERANCE * (self.input_maximum - self.input_minimum), posinf=0.0)
+        self.input_lower_limits, self.input_upper_limits = self.input_minimum - slack, self.input_maximum + slack
+        positive = set(system.positive_outputs)
+        self.positive_outputs = np.array([i for i, n in enumerate(self.output_names) if n in positive], dtype=np.intp)
+        self.constants = dict(system.constants)
+        self.remarks = system.describe()
+        self.default_state: Array | None = None
+        """The default initial state, once it has been found."""
+        self.checked_state: list[float] | None = None
+        """The last initial state that was checked and found possible."""
+        self.checked_input: tuple[Any, Any, Any] = None, None, None
+        """The last segments of inputs that were found within their ranges, what output times a run with them asked for,
+        and these times, if nobody can write to the arrays."""
+        self.integrators: dict[Any, list[Any]] = {}
+        """Integrators bound to this system that no run uses at present, by their integrator."""
+        self.holders: dict[Any, list[Any]] = {}
+        """The same for steps with held inputs."""
+        self.loop_runs: dict[Any, list[Any]] = {}
+        """Runs of control loops at this system that nothing uses at present, by the form of the loop."""
+        self.cited: dict[Any, tuple[Any, ...]] = {}
+        """Sources of the models and of an integrator, by the integrator."""
+        self.recorders: list[Any] = []
+        """Kernels of the rows bound to this system that no run uses at present."""
+        self._name_columns()
+        self._name_ranges(system)
+
+    def _name_columns(self) -> None:
+        """The columns of a run, their order, and the limits of states and inputs by their names."""
+        self.column_names = (*self.state_names, *self.input_names, *self.output_names)
+        self.recorded_names = ("time", *self.state_names, *self.output_names, *self.input_names)
+        """The columns of a recording, in their order."""
+        self.remark_texts = tuple(remark.message for remark in self.remarks)
+        self.state_limits = dict(zip(self.state_names, self.lower_bounds.tolist(), strict=True))
+        """The lower bound of each state by its name."""
+        limits = zip(self.input_lower_limits.tolist(), self.input_upper_limits.tolist(), strict=True)
+        self.input_limits = dict(zip(self.input_names, enumerate(limits), strict=True))
+        """The index and the limits, with their tolerance, of each input by its name."""
+
+    def _name_ranges(self, system: System) -> None:
+        """The states and outputs that have a limit, with which their range in a run is compared."""
+        names, bounds = (*self.state_names, *self.output_names), self.lower_bounds.tolist()
+        bounded = {name: low for name, low in zip(self.state_names, bounds, strict=True) if low > -math.inf}
+        positive = [self.output_names[i] for i in self.positive_outputs.tolist()]
+        limited = [limit.column for limit in system.column_limits if limit.column in names]
+        self.ranged_names = tuple(dict.fromkeys((*bounded, *positive, *limited)))
+        self.range_places = {name: i for i, name in enumerate(self.ranged_names)}
+        """The place of each of them among the ranges of a run."""
+        self.ranged_columns = np.array([names.index(name) for name in self.ranged_names], dtype=np.int64)
+        """Their places among the states and, after these, the outputs."""
+        self.range_floors = [*bounded.values(), *(SMALLEST_POSITIVE for _ in positive)]
+        """The smallest possible values of the first of them: those of states, then of outputs that must be positive."""
+
+
+_programs: dict[tree.Structure, Program] = {}
+_descriptions: dict[int, tuple[weakref.ref[System], Description]] = {}
+
+
+def _program(system: System) -> Program:
+    structure = tree.structure(system)
+    if structure not in _programs:
+        _programs[structure] = Program(system)
+    return _programs[structure]
+
+
+def describe(system: System) -> Description:
+    """The description of a system, stored for the lifetime of the system."""
+    key = id(system)
+    stored = _descriptions.get(key)
+    if stored is not None and stored[0]() is system:
+        return stored[1]
+    description = Description(system)
+    _descriptions[key] = weakref.ref(system, functools.partial(_forget, _descriptions, key)), description
+    return description
+
+
+def _forget(descriptions: dict[int, Any], key: int, _: object) -> None:
+    """Remove a description; its dictionary is an argument, because module names are gone while Python exits."""
+    descriptions.pop(key, None)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class CompiledSystem:
+    """A system with its program: addresses, parameters, and the layout of its arrays."""
+
+    system: System
+    program: Program
+    parameters: Array
+    precomputed: Array
+    nominal: Array
+    """The size of each state below which its relative error no longer matters."""
+    description: Description
+
+    @property
+    def sizes(self) -> ArraySizes:
+        """Lengths of the arrays that the functions read and write."""
+        return self.program.sizes
+
+    @property
+    def address(self) -> dict[str, int]:
+        """The functions' addresses by name."""
+        return self.program.address
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """The outputs, in the order of their vector."""
+        return self.program.output_names
+
+    def at(self, parameters: Array, nominal: Array) -> CompiledSystem:
+        """The same system with other parameters and nominal sizes, for callers that change them often."""
+        precomputed = self.program.precompute(parameters)
+        return dataclasses.replace(self, parameters=parameters, precomputed=precomputed, nominal=nominal)
+
+    def call(self, name: str, *arrays: Array | float) -> None:
+        """Call one compiled function; arrays are passed by address, floats by value."""
+        kinds = [ctypes.c_double if isinstance(a, float) else ctypes.c_void_p for a in arrays]
+        values = [a if isinstance(a, float) else a.ctypes.data for a in arrays]
+        ctypes.CFUNCTYPE(None, *kinds)(self.address[name])(*values)
+
+    def rates(self, state: Sequence[float], inputs: Sequence[float]) -> Array:
+        """The compiled rates at a state vector (n,) under inputs (m,)."""
+        x, u = np.array(state, dtype=float), np.array(inputs, dtype=float)
+        f = np.empty(self.sizes.states)
+        self._rhs(*map(address_of, (x, u, self.precomputed, f)))
+        return f
+
+    @functools.cached_property
+    def _rhs(self) -> Any:
+        return ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 4)(self.address["rhs"])
+
+
+def compile_system(system: System) -> CompiledSystem:
+    """The system with compiled functions, at no cost where one of the same structure was compiled before."""
+    known = describe(system)
+    return CompiledSystem(system, known.program, known.parameters, known.precomputed, known.nominal, known)

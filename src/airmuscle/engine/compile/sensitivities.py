@@ -1,0 +1,281 @@
+"""A system with the derivatives of its states along columns, and the functions of an implicit step of both.
+
+The state is x (n,) followed by S = dx/dtheta (n, K), row by row. All columns share the rates, their Jacobian J and
+the LU factors of d I - J; what differs from column to column is one vector operation. A Rosenbrock step also needs
+dJ = (dJ/dx) S + dJ/dtheta: without it the derivatives converge with order one. Inputs that depend on the columns have
+derivatives V = du/dtheta, further inputs (M, K), row by row; all of the above then has a term of V too.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ...core.system import SensitivitySystem
+from .functions import PARAMETERS, ArraySizes, Printer, TracedSystem, trace_system
+from .ir.instructions import Code, Operand, finished, recorded
+from .ir.jacobian import ZERO, Tape, derivatives
+from .ir.sparse_lu import Factors
+from .llvm.emit import FunctionBody
+from .llvm.vectors import LlvmValue, loaded, packed
+
+POINT = ("x", "u", PARAMETERS)
+"""The arguments that rates and outputs depend on."""
+
+
+@dataclasses.dataclass(frozen=True)
+class TangentSystem:
+    """A traced system, and for every column the places in its parameters that move together; none moves nothing."""
+
+    inner: TracedSystem
+    groups: tuple[tuple[int, ...], ...]
+    output_names: tuple[str, ...]
+    inputs: tuple[int, ...] = ()
+
+    @property
+    def size(self) -> int:
+        """How many states the system has without their derivatives."""
+        return int(self.inner.x.numel())
+
+    @property
+    def lanes(self) -> int:
+        """How many columns there are."""
+        return len(self.groups)
+
+    def rows(self, block: FunctionBody, array: str) -> list[LlvmValue]:
+        """The rows of S, which follow the states in an array."""
+        return [loaded(block, array, self.size + i * self.lanes, self.lanes) for i in range(self.size)]
+
+    def input_rows(self, block: FunctionBody, array: str = "u") -> list[LlvmValue]:
+        """The rows of V, which follow the inputs in an array, or those of its slope in time."""
+        first = int(self.inner.u.numel())
+        return [loaded(block, array, first + j * self.lanes, self.lanes) for j in range(len(self.inputs))]
+
+
+def tangent_system(system: SensitivitySystem) -> TangentSystem:
+    """The traced inner system of a differentiated one, with the observed quantities as its outputs."""
+    import casadi
+
+    inner, names = trace_system(system.inner), [s.name for s in system.inner.states]
+    outputs = {
+        **{n: inner.x[i] for i, n in enumerate(names)},
+        **{n: inner.o[i] for i, n in enumerate(inner.output_names)},
+    }
+    observed = casadi.densify(casadi.vertcat(casadi.SX(0, 1), *(outputs[n] for n in system.observed_names)))
+    traced = dataclasses.replace(inner, o=observed)
+    return TangentSystem(traced, system.parameter_indices, system.output_names, system.input_indices)
+
+
+class Values:
+    """Expressions of a point as instructions, and how they change along every column:
+    dv = (dv/dx) S + (dv/du) V + dv/dtheta."""
+
+    def __init__(self, t: TangentSystem, expressions: Any, further: Sequence[Any] = ()) -> None:
+        code = recorded([*(getattr(t.inner, name) for name in POINT), *further], [expressions])
+        self.t, self.tape = t, Tape(code.body)
+        by_index = {index: operand for _, index, operand in code.outputs}
+        self.results = [by_index.get(i, ZERO) for i in range(expressions.numel())]
+
+    def along(self, results: Sequence[Operand]) -> DirectionalDerivative:
+        """The derivatives of some operands of the tape."""
+        states = [("in", POINT.index("x"), i) for i in range(self.t.size)]
+        inputs = [("in", POINT.index("u"), i) for i in self.t.inputs]
+        leaves = {place: ("in", POINT.index(PARAMETERS), place) for group in self.t.groups for place in group}
+        by_state, by_input, by_column = [], [], []
+        for row in derivatives(self.tape, results, [*states, *inputs, *leaves.values()]):
+            by_state.append({j: row[x] for j, x in enumerate(states) if row.get(x, ZERO) != ZERO})
+            by_input.append({j: row[u] for j, u in enumerate(inputs) if row.get(u, ZERO) != ZERO})
+            sums = dict.fromkeys(range(self.t.lanes), ZERO)
+            for k, group in enumerate(self.t.groups):
+                for place in group:
+                    sums[k] = self.tape.add(sums[k], row.get(leaves[place], ZERO))
+            by_column.append({k: part for k, part in sums.items() if part != ZERO})
+        return DirectionalDerivative(tuple(by_state), tuple(by_input), tuple(by_column))
+
+    def compute(
+        self, printer: Printer, block: FunctionBody, wanted: Sequence[Operand], names: Sequence[str] = POINT,
+        given: Mapping[Operand, str] | None = None,
+    ) -> dict[Operand, LlvmValue]:  # fmt: skip
+        """Append the instructions that some operands need to a function; the values of the operands."""
+        distinct = tuple(dict.fromkeys(wanted))
+        code = finished(Code(tuple(self.tape.body), tuple((0, i, operand) for i, operand in enumerate(distinct))))
+        results = printer.compute(block, code, names, given)
+        return {operand: LlvmValue(block, results[0, i]) for i, operand in enumerate(distinct)}
+
+
+@dataclasses.dataclass(frozen=True)
+class DirectionalDerivative:
+    """The non-zero derivatives of each of some operands, by state, by input with derivatives, and by column."""
+
+    by_state: tuple[dict[int, Operand], ...]
+    by_input: tuple[dict[int, Operand], ...]
+    by_column: tuple[dict[int, Operand], ...]
+
+    @property
+    def parts(self) -> list[Operand]:
+        """All of them."""
+        return [part for row in (*self.by_state, *self.by_input, *self.by_column) for part in row.values()]
+
+    def rows(
+        self, values: Mapping[Operand, LlvmValue], s: Sequence[LlvmValue], v: Sequence[LlvmValue]
+    ) -> list[LlvmValue]:
+        """The change of each operand, a column, from the values of the parts and the rows of S and V."""
+        rows_along = []
+        for states, inputs, columns in zip(self.by_state, self.by_input, self.by_column, strict=True):
+            direct = {k: values[part].name for k, part in columns.items()}
+            row = packed(s[0].block, direct, s[0].lanes)
+            for j, part in states.items():
+                row = row + s[j] * values[part]
+            for j, part in inputs.items():
+                row = row + v[j] * values[part]
+            rows_along.append(row)
+        return rows_along
+
+    def along_inputs(self, values: Mapping[Operand, LlvmValue], v: Sequence[LlvmValue]) -> list[LlvmValue | None]:
+        """The part of each change that is due to the inputs alone; None without one."""
+        totals: list[LlvmValue | None] = []
+        for inputs in self.by_input:
+            total: LlvmValue | None = None
+            for j, part in inputs.items():
+                term = v[j] * values[part]
+                total = term if total is None else total + term
+            totals.append(total)
+        return totals
+
+
+def stored(values: Sequence[LlvmValue], array: str) -> None:
+    """Write values and columns one after the other."""
+    index = 0
+    for value in values:
+        value.store(array, index)
+        index += max(value.lanes, 1)
+
+
+def implicit_module(t: TangentSystem) -> tuple[str, ArraySizes]:
+    """The functions of `printed.implicit_module` for the states and their derivatives.
+
+    J holds the distinct non-zeros of the inner df/dx, then dJ of those that change, K numbers each; A the factors of
+    the inner d I - J, then the same dJ, because `solve` and `stage` need it: (d I - J) dk = db + dJ k.
+    """
+    import casadi
+
+    inner, printer, step = t.inner, Printer(), _Step(t)
+    step.print_rates(printer)
+    step.print_factor(printer)
+    step.print_solve(printer)
+    step.print_stage(printer)
+    df_dt = casadi.jtimes(inner.f, inner.u, inner.w) if inner.u.numel() else casadi.SX(t.size, 1)
+    _print_along(printer, "df_dt", Values(t, casadi.densify(df_dt), [inner.w]), [*POINT, "w"], "f", moving=step.rates)
+    outputs = Values(t, inner.o)
+    slope = Values(t, casadi.densify(casadi.jtimes(inner.o, inner.x, inner.f)))
+    _print_along(printer, "outputs", outputs, POINT, "o", slope)
+    further, count = len(step.moving) * t.lanes, inner.o.numel()
+    return printer.module(), ArraySizes(
+        states=t.size * (1 + t.lanes),
+        inputs=inner.u.numel() + len(t.inputs) * t.lanes,
+        parameters=inner.p.numel() + t.lanes,  # a scale for each column comes last
+        held=printer.held,
+        jacobian=len(step.jacobian) + further,
+        factors=step.lu.values.numel() + further,
+        outputs=count * (2 + t.lanes),
+    )
+
+
+def _print_along(
+    printer: Printer, name: str, values: Values, arguments: Sequence[str], target: str, last: Values | None = None,
+    moving: Values | None = None,
+) -> None:  # fmt: skip
+    """A function that writes values, their derivatives by every column, and the final values.
+
+    To the derivatives, those of `moving` along the slopes in time of V are added.
+    """
+    t, block, along = values.t, FunctionBody(), values.along(values.results)
+    computed = values.compute(printer, block, [*values.results, *along.parts], arguments)
+    columns = along.rows(computed, t.rows(block, "x"), t.input_rows(block))
+    if moving is not None and t.inputs:
+        further = moving.along(moving.results)
+        parts = moving.compute(printer, block, [part for row in further.by_input for part in row.values()], arguments)
+        added = further.along_inputs(parts, t.input_rows(block, "w"))
+        columns = [row if more is None else row + more for row, more in zip(columns, added, strict=True)]
+    rows = [computed[v] for v in values.results] + columns
+    if last is not None:
+        final = last.compute(printer, block, last.results)
+        rows += [final[v] for v in last.results]
+    stored(rows, target)
+    printer.end(name, arguments, [target], block)
+
+
+class _Step:
+    """Common data of the functions of a Rosenbrock step."""
+
+    def __init__(self, t: TangentSystem) -> None:
+        self.t, self.rates = t, Values(t, t.inner.f)
+        self.slopes = self.rates.along(self.rates.results)
+        places = [((i, j), part) for i, row in enumerate(self.slopes.by_state) for j, part in row.items()]
+        self.places = tuple(place for place, _ in places)
+        self.jacobian = list(dict.fromkeys(part for _, part in places))
+        self.slots = tuple(self.jacobian.index(part) for _, part in places)
+        self.bends = self.rates.along(self.jacobian)
+        self.lu = Factors(self.places, self.slots, t.size)
+
+    @property
+    def moving(self) -> list[int]:
+        """Which of the distinct non-zeros of J change along a column."""
+        all_rows = zip(self.bends.by_state, self.bends.by_input, self.bends.by_column, strict=True)
+        return [q for q, rows in enumerate(all_rows) if any(rows)]
+
+    def _bends(self, block: FunctionBody, array: str, first: int) -> dict[int, LlvmValue]:
+        """dJ by number of the distinct non-zero, from an array where they stand from `first` on."""
+        lanes = self.t.lanes
+        return {q: loaded(block, array, first + m * lanes, lanes) for m, q in enumerate(self.moving)}
+
+    def print_rates(self, printer: Printer) -> None:
+        """rhs(x, u, c, f) and jac(x, u, c, f, J)."""
+        block, s, t = FunctionBody(), self.slopes, self.t
+        rates = self.rates.compute(printer, block, [*self.rates.results, *s.parts])
+        columns = s.rows(rates, t.rows(block, "x"), t.input_rows(block))
+        stored([rates[f] for f in self.rates.results] + columns, "f")
+        printer.end("rhs", POINT, ["f"], block)
+        block = FunctionBody()
+        wanted = [*self.rates.results, *s.parts, *self.bends.parts]
+        computed, rows, v = self.rates.compute(printer, block, wanted), t.rows(block, "x"), t.input_rows(block)
+        stored([computed[f] for f in self.rates.results] + s.rows(computed, rows, v), "f")
+        bends = self.bends.rows(computed, rows, v)
+        stored([computed[part] for part in self.jacobian] + [bends[q] for q in self.moving], "J")
+        printer.end("jac", POINT, ["f", "J"], block)
+
+    def print_factor(self, printer: Printer) -> None:
+        """factor(J, d, A)."""
+        code, block = finished(recorded([self.lu.j, self.lu.d], [self.lu.values])), FunctionBody(["d"])
+        computed = printer.compute(block, code, ["J", "d"])
+        bends = self._bends(block, "J", len(self.jacobian))
+        stored([LlvmValue(block, computed[0, i]) for i in range(self.lu.values.numel())] + list(bends.values()), "A")
+        printer.end("factor", ["J", "d"], ["A"], block)
+
+    def print_solve(self, printer: Printer) -> None:
+        """solve(A, b, y)."""
+        block = FunctionBody()
+        right = [loaded(block, "b", i) for i in range(self.t.size)]
+        stored(self._solved(block, right, self.t.rows(block, "b")), "y")
+        printer.end("solve", ["A", "b"], ["y"], block)
+
+    def print_stage(self, printer: Printer) -> None:
+        """stage(x, u, c, A, g, k)."""
+        t, block = self.t, FunctionBody()
+        computed = self.rates.compute(printer, block, [*self.rates.results, *self.slopes.parts])
+        right = [computed[f] + loaded(block, "g", i) for i, f in enumerate(self.rates.results)]
+        slopes = self.slopes.rows(computed, t.rows(block, "x"), t.input_rows(block))
+        columns = [d + more for d, more in zip(slopes, t.rows(block, "g"), strict=True)]
+        stored(self._solved(block, right, columns), "k")
+        printer.end("stage", [*POINT, "A", "g"], ["k"], block)
+
+    def _solved(self, block: FunctionBody, right: list[LlvmValue], columns: list[LlvmValue]) -> list[LlvmValue]:
+        """k = (d I - J)^-1 right, then (d I - J)^-1 (columns + dJ k), with the factors and dJ that stand in A."""
+        count = self.lu.values.numel()
+        factors = [loaded(block, "A", q) for q in range(count)]
+        k, bends = self.lu.solved(factors, right), self._bends(block, "A", count)
+        for (i, j), slot in zip(self.places, self.slots, strict=True):
+            if slot in bends:
+                columns[i] = columns[i] + bends[slot] * k[j]
+        return k + self.lu.solved(factors, columns)

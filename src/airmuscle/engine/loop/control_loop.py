@@ -1,0 +1,211 @@
+"""ControlLoop: a sampled controller at a plant, with its sample time, set points, other inputs and drivers."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...core.annotation import abridged
+from ...core.errors import ParameterError, suggestion
+from ...core.short_repr import ShortRepr
+from ...recording.recording import Recording
+from .controller import Controller
+from .driver import Driver
+from .inputs import ZERO_INPUT, InputSignal, Schedule, check_input_names, check_input_signal
+from .parameter_units import named_signal_units
+from .piecewise_linear import PiecewiseLinear, merge_columns
+from .with_drivers import WithDrivers
+
+COMMAND, SETPOINT, MEASURED = "command.", "setpoint.", "measured."
+"""Prefixes of the columns of a recording that hold commands, set points and measurements of a controller."""
+
+
+class ControlLoopState(NamedTuple):
+    """A control loop at one instant.
+
+    controller      the controller's memory
+    origin, time    when the loop began, and this instant [s]
+    sample_count    samples so far
+    measured, commanded    values of the last sample
+    applied_inputs  the plant's inputs just before this instant
+    drivers         the drivers' states
+    """
+
+    controller: Any
+    origin: float
+    time: float
+    sample_count: int
+    measured: tuple[float, ...]
+    commanded: tuple[float, ...]
+    applied_inputs: tuple[float, ...]
+    drivers: Mapping[str, tuple[Any, ...]]
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class ControlLoop(ShortRepr):
+    """A sampled control loop: every `sample_time` [s], from the start of a run, the controller measures and commands.
+
+    setpoint      an InputSignal whose names are the controller's set points,
+                  `Schedule({"pressure": ((0, 1e5), (2, 3e5))})`
+    other_inputs  an InputSignal for the inputs that the controller does not command; zero by default
+    drivers       between commands and openings, as in WithDrivers; the command of a driver is within 0 and 1
+
+    Between two samples a command is held. It is limited to the range that the plant declares for its input.
+    """
+
+    controller: Controller
+    sample_time: float
+    setpoint: InputSignal
+    other_inputs: InputSignal = ZERO_INPUT
+    drivers: Mapping[str, Driver | tuple[Driver, ...]] = dataclasses.field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.controller, Controller):
+            raise ParameterError(
+                f"ControlLoop.controller is {abridged(self.controller)}; give a PID or another Controller."
+            )
+        sample_time = self.sample_time
+        if (
+            isinstance(sample_time, bool)
+            or not isinstance(sample_time, float | int)
+            or not 0 < sample_time <= sys.float_info.max
+        ):
+            raise ParameterError(
+                f"ControlLoop.sample_time is {abridged(sample_time)} s; it must be positive and finite."
+            )
+        check_input_signal(self.setpoint)
+        check_input_signal(self.other_inputs)
+        self._check_names()
+        WithDrivers(self.other_inputs, self.drivers)
+
+    def _check_names(self) -> None:
+        controller = self.controller
+        named = self.setpoint.names
+        if named is not None and set(named) != set(controller.setpoints):
+            raise ParameterError(
+                f"ControlLoop.setpoint names {', '.join(named) or 'nothing'}; the set points of "
+                f"{type(controller).__name__} are {', '.join(controller.setpoints)}."
+            )
+        twice = [name for name in self.other_inputs.names or () if name in controller.inputs]
+        if twice:
+            raise ParameterError(f"the input '{twice[0]}' is commanded by the controller and by other_inputs.")
+
+    def init(self, start: float) -> ControlLoopState:
+        """The state of a loop that begins at `start` [s]: no sample yet, every driver at rest."""
+        controller = self.controller
+        return ControlLoopState(
+            controller=controller.init(),
+            origin=start,
+            time=start,
+            sample_count=0,
+            measured=(math.nan,) * len(controller.measured_columns),
+            commanded=(0.0,) * len(controller.inputs),
+            applied_inputs=(),
+            drivers=WithDrivers(self.other_inputs, self.drivers).init(start) if self.drivers else {},
+        )
+
+    def check_columns(self, columns: Sequence[str], inputs: Sequence[str]) -> None:
+        """Raise ParameterError, with the nearest name, for a column or input that the plant does not have."""
+        check_present(self.controller, columns, inputs)
+        check_input_names((*(self.other_inputs.names or ()), *self.drivers), inputs)
+
+    def check_sample_time(self, duration: float) -> None:
+        """Raise ParameterError where a run of `duration` [s] ends before the second sample."""
+        if self.sample_time > duration:
+            raise ParameterError(
+                f"the sample time of the controller is {self.sample_time:g} s, longer than the run of {duration:g} s. "
+                "Shorten the sample time, or simulate longer."
+            )
+
+    def units(self, known: Mapping[str, str]) -> dict[str, str]:
+        """The units of the columns that the loop adds to a recording, from those of the plant's columns."""
+        known = {**named_signal_units(self.controller), **{name: unit for name, unit in known.items() if unit}}
+        kinds = (
+            (SETPOINT, self.controller.setpoints),
+            (MEASURED, self.controller.measured_columns),
+            (COMMAND, self.controller.inputs),
+        )
+        return {f"{kind}{name}": known.get(name, "") for kind, names in kinds for name in names}
+
+    def describe(self, units: Mapping[str, str]) -> str:
+        """Controller, sample time, controlled and manipulated variables; `units` by the names of columns and inputs."""
+        measured, commanded = (
+            ", ".join(f"{name} [{units[name]}]" if units.get(name, "1") not in ("", "1") else name for name in names)
+            for names in (self.controller.measured_columns, self.controller.inputs)
+        )
+        return (
+            f"{self._controller_text}, sample time {_milliseconds(self.sample_time)}, "
+            f"measured {measured}, commanded {commanded}"
+        )
+
+    @functools.cached_property
+    def _controller_text(self) -> str:
+        """The controller and its fields."""
+        return _describe_controller(self.controller)
+
+    def as_open_loop(self, recording: Recording) -> InputSignal:
+        """The commands of a complete recorded run as an input signal without a controller.
+
+        It gives the same run: to plot the outputs of the drivers, or to simulate another plant with the same commands.
+        """
+        time = recording["time"].tolist()
+        commands = {name: recording[f"{COMMAND}{name}"].tolist() for name in self.controller.inputs}
+        changes = {
+            name: tuple((time[i], v) for i, v in enumerate(values) if i == 0 or v != values[i - 1])
+            for name, values in commands.items()
+        }
+        signal = CombinedSignal(Schedule(changes), self.other_inputs)
+        return WithDrivers(signal, self.drivers) if self.drivers else signal
+
+
+def check_present(controller: Controller, columns: Sequence[str], inputs: Sequence[str]) -> None:
+    """Raise ParameterError, with the nearest name, for a column or input that the plant does not have."""
+    for name in controller.measured_columns:
+        if name not in columns:
+            raise ParameterError(
+                f"{type(controller).__name__} measures '{name}', which the plant does not have; there are "
+                f"{', '.join(columns)}.{suggestion(name, columns)}"
+            )
+    check_input_names(controller.inputs, inputs)
+
+
+@dataclasses.dataclass(frozen=True)
+class CombinedSignal(InputSignal):
+    """The inputs that `inner` names from `inner`, all others from `other`."""
+
+    inner: InputSignal
+    other: InputSignal
+
+    @property
+    def names(self) -> tuple[str, ...] | None:
+        other = self.other.names
+        return None if other is None else (*(self.inner.names or ()), *other)
+
+    def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
+        inner, other = (signal.segments(inputs, start, duration) for signal in (self.inner, self.other))
+        own = self.inner.names or ()
+        columns = [(inner if name in own else other).column(i) for i, name in enumerate(inputs)]
+        if not columns:
+            return other
+        ends, values, slopes = merge_columns(columns, start)
+        shape = (len(ends), len(inputs))
+        return PiecewiseLinear(np.array(ends), np.array(values).reshape(shape), np.array(slopes).reshape(shape))
+
+
+def _milliseconds(seconds: float) -> str:
+    return f"{seconds * 1e3:.4g} ms" if seconds < 1 else f"{seconds:.4g} s"
+
+
+def _describe_controller(controller: Controller) -> str:
+    """A controller and its fields; floats with twelve digits, which hides the rounding of a unit conversion."""
+    known = dataclasses.fields(controller) if dataclasses.is_dataclass(controller) else tuple[Any, ...]()
+    names = [field.name for field in known if field.repr]
+    values = [(name, getattr(controller, name)) for name in names]
+    texts = [f"{name}={value:.12g}" if isinstance(value, float) else f"{name}={value!r}" for name, value in values]
+    return f"{type(controller).__name__}({', '.join(texts)})"

@@ -1,0 +1,141 @@
+"""WithSensors: a control law that receives its measurements through sensors with finite quality."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+import numpy as np
+
+from ...core import ops
+from ...core.arrays import Array
+from ...core.declaration import Parameter, model, parameter
+from ...core.errors import ParameterError
+from ...core.ops import Value
+from ...core.reference import Reference
+from ...core.variables import select_prefix, with_prefix
+from .control_law import ControlLaw
+from .controller import Measurement, SignalRelated
+from .enclosing_law import EnclosingLaw
+from .random_numbers import LECUYER1999, STATE, drawn_normal, seeded
+
+MAX_DELAY = 1000
+"""Maximum delay of a sensor in samples (chosen)."""
+
+
+@model
+class ColumnSensor(SignalRelated):
+    """Sensor of one column: first-order lag T y' = x - y, noise, quantisation, delay, in this order.
+
+        y_k = y_(k-1) + (1 - exp(-h/T)) (x_k - y_(k-1)),   z_k = q floor((y_k + sigma n_k)/q + 1/2),   output z_(k-d)
+
+    x column, h sample time, n_k normal deviates. The lag starts at the first measurement, and the first value is
+    delivered until the delay has passed. A parameter that is 0 disables its part. All are in the unit of the column.
+    """
+
+    column: str
+    resolution: float = parameter("y", "q", "resolution; 0: continuous", bounds=(0.0, 1e9), fitted=False, default=0.0)
+    noise: float = parameter("y", "sigma", "standard deviation of the noise", bounds=(0.0, 1e9), default=0.0)
+    lag: float = parameter("s", "T", "time constant of the lag; 0: none", bounds=(0.0, 1e3), default=0.0)
+    delay: int = 0
+
+    def check(self) -> None:
+        if not 0 <= self.delay <= MAX_DELAY:
+            raise ParameterError(f"ColumnSensor: delay is {self.delay} samples; allowed range: 0 to {MAX_DELAY}.")
+
+    def unit_of(self, declared: Parameter, index: int, units: Mapping[str, str]) -> str:
+        """The unit of a parameter: y is that of the column."""
+        return units[self.column] or "1" if declared.unit == "y" else declared.unit
+
+    @property
+    def initial_memory(self) -> dict[str, float]:
+        """The lagged value, and the values on their way, the oldest first."""
+        return {"lagged": 0.0, **{f"delayed{i}": 0.0 for i in range(self.delay)}}
+
+    def measure(
+        self, memory: Mapping[str, Value], value: Value, deviate: Value, started: Value, dt: Value
+    ) -> tuple[Value, dict[str, Value]]:
+        """The output of the sensor for a value and a normal deviate, and its memory; first sample: `started` is 0."""
+        lag = ops.where(self.lag > 0, self.lag, 1.0)
+        share = ops.where(self.lag > 0, 1.0 - ops.exp(-dt / lag), 1.0)
+        lagged = ops.where(started > 0, memory["lagged"] + share * (value - memory["lagged"]), value)
+        noisy = lagged + self.noise * deviate
+        step = ops.where(self.resolution > 0, self.resolution, 1.0)
+        read = ops.where(self.resolution > 0, step * ops.floor(noisy / step + 0.5), noisy)
+        if not self.delay:
+            return read, {"lagged": lagged}
+        waiting = [ops.where(started > 0, memory[f"delayed{i}"], read) for i in range(self.delay)]
+        moved = [*waiting[1:], read]
+        return waiting[0], {"lagged": lagged, **{f"delayed{i}": each for i, each in enumerate(moved)}}
+
+
+@model
+class WithSensors(EnclosingLaw):
+    """A control law whose measurements pass through sensors; a column without a sensor is measured exactly.
+
+    The noise is a sequence of the generator MRG32k3a that the seed determines, a whole number: the same in every run,
+    whether compiled or called from Python. In `simulate_batch` the seed may vary, `"controller.seed"`. The columns
+    `measured.` of a recording hold the values in front of the sensors. Also used to state the dead time of a computer,
+    as a delay of all columns.
+    Reference: L'Ecuyer (1999) for the generator.
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (LECUYER1999,)
+    simulated: ClassVar[bool] = True
+
+    law: ControlLaw
+    sensors: tuple[ColumnSensor, ...]
+    seed: float = parameter("1", "seed", "seed of the noise", bounds=(0.0, 2147483644.0), fitted=False, default=0.0)
+
+    def check(self) -> None:
+        named = [sensor.column for sensor in self.sensors]
+        for name in named:
+            if name not in self.law.measured_columns:
+                raise ParameterError(
+                    f"WithSensors: the law does not measure '{name}'; it measures "
+                    f"{', '.join(self.law.measured_columns) or 'nothing'}."
+                )
+            if named.count(name) > 1:
+                raise ParameterError(f"WithSensors: '{name}' has two sensors; give one for each column.")
+        if self.seed % 1.0:
+            raise ParameterError(f"WithSensors: seed is {self.seed:g}; it must be a whole number.")
+
+    @property
+    def initial_memory(self) -> dict[str, float]:
+        """Whether it has started (0 or 1), and the values of the sensors, of the generator and of the law."""
+        memory = {"started": 0.0}
+        for sensor in self.sensors:
+            memory |= with_prefix(f"sensor.{sensor.column}.", sensor.initial_memory)
+        random = with_prefix("random.", dict.fromkeys(STATE, 0.0))
+        return {**memory, **random, **with_prefix("law.", self.law.initial_memory)}
+
+    def step(
+        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
+    ) -> tuple[Mapping[str, Value], dict[str, Value]]:
+        columns, later = self._read(memory, measurement.columns, dt)
+        commands, law = self.law.step(select_prefix("law.", memory), measurement._replace(columns=columns), dt)
+        return commands, {**later, **with_prefix("law.", law)}
+
+    def readings(self, measured: Array, sample_time: float) -> Array:
+        """The outputs (K, m) of the sensors for the values (K, m) in front of them, at successive samples."""
+        memory, rows = self.initial_memory, []
+        for row in measured.tolist():
+            columns, later = self._read(memory, dict(zip(self.measured_columns, row, strict=True)), sample_time)
+            memory = {**memory, **later}
+            rows.append(list(columns.values()))
+        return np.array(rows, dtype=float).reshape(measured.shape)
+
+    def _read(
+        self, memory: Mapping[str, Value], measured: Mapping[str, Value], dt: Value
+    ) -> tuple[dict[str, Value], dict[str, Value]]:
+        """The measured columns behind their sensors, and the memory of sensors and generator."""
+        started = memory["started"]
+        fresh, kept = seeded(self.seed), select_prefix("random.", memory)
+        random: dict[str, Value] = {name: ops.where(started > 0, kept[name], fresh[name]) for name in STATE}
+        columns, later = dict(measured), {"started": 1.0}
+        for sensor in self.sensors:
+            deviate, random = drawn_normal(random)
+            own = select_prefix(f"sensor.{sensor.column}.", memory)
+            columns[sensor.column], after = sensor.measure(own, columns[sensor.column], deviate, started, dt)
+            later |= with_prefix(f"sensor.{sensor.column}.", after)
+        return columns, {**later, **with_prefix("random.", random)}

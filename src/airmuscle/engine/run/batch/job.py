@@ -1,0 +1,171 @@
+"""BatchJob: the arguments shared by all execution back ends of a batch, and where results are written."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ....core.arrays import Array
+from ....core.status import Status
+from ...compile.program import CompiledSystem
+from ...loop.piecewise_linear import PiecewiseLinear
+from ..bound_integrator import RawSolution
+from ..compiled_loop import CompiledRun
+from ..integrators import Integrator
+from ..rows import RowRecorder
+from .loops import LoopBatch
+from .variations import Variations
+
+NOT_RUN = -1
+"""Status of a plant that has not been run yet."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class BatchJob:
+    """N plants to be simulated: initial states (N, n), segments of the inputs of each, rows and columns to be stored.
+
+    Results are written into `columns` (N, T) by name, `final` (N, n), `status` (N,), the number of rows `reached` (N,),
+    and `reasons`, which say why plants failed.
+    """
+
+    compiled: CompiledSystem
+    variations: Variations
+    integrator: Integrator
+    initial_states: Array
+    segments: tuple[PiecewiseLinear, ...]
+    start_time: float
+    duration: float
+    times: Array
+    columns: dict[str, npt.NDArray[Any]]
+    final: Array
+    status: npt.NDArray[np.int64]
+    reached: npt.NDArray[np.int64]
+    reasons: dict[int, str]
+    nominal: Array
+    loops: LoopBatch | None = None
+    _recorders: list[RowRecorder] = dataclasses.field(default_factory=list)
+
+    @functools.cached_property
+    def names(self) -> tuple[str, ...]:
+        """All columns that can be stored: states, then outputs, then inputs."""
+        known = self.compiled.description
+        of_loop = () if self.loops is None else self.loops.column_names
+        return (*known.state_names, *known.output_names, *known.input_names, *of_loop)
+
+    @functools.cached_property
+    def kept(self) -> npt.NDArray[np.int64]:
+        """Indices of the stored columns among `names`."""
+        return np.array([self.names.index(name) for name in self.columns], dtype=np.int64)
+
+    @property
+    def lower_bounds(self) -> Array:
+        """The smallest possible value of each state (n,)."""
+        return self.compiled.description.lower_bounds
+
+    def run_single(self, index: int) -> None:
+        """Simulate one plant alone, exactly as `simulate` would, and write its results."""
+        one = self.compiled.at(self.variations.parameters(index), self.nominal[index])
+        if self.loops is None:
+            segments, state = self.segments[index], self.initial_states[index]
+            raw = self.integrator.run(one, segments, self.start_time, state, self.times)
+            self._write(index, one, self._truncate(raw), segments, {})
+        else:
+            self._run_loop(index, one, self.loops)
+
+    def _run_loop(self, index: int, one: CompiledSystem, loops: LoopBatch) -> None:
+        """Simulate a control loop and write its results."""
+        run = loops.run(index, self.variations, one, self.initial_states[index])
+        times, rows = run.rows
+        if not isinstance(run, CompiledRun) or run.prepared.loop.drivers:  # there may be further rows
+            at = np.searchsorted(times, self.times - 1e-9 * loops.template.duration)
+            rows = rows[at[at < times.size]]
+        state = run.bound.state.copy() if len(run.measured) else run.state
+        raw = RawSolution(rows, len(rows), run.stopped_at, state, run.status, *run.bound.step_counts)
+        signal = run.signal
+        if not signal.ends.size:
+            inputs = np.zeros((1, self.compiled.sizes.inputs))
+            signal = PiecewiseLinear(self.times[-1:], inputs, inputs)
+        more = loops.columns(index, self.columns, run, len(rows)) if len(run.measured) else {}
+        self._write(index, one, self._truncate(raw), signal, more)
+        loops.release(run)
+
+    def _truncate(self, raw: RawSolution) -> RawSolution:
+        """The solution up to the first row with a negative air mass, as `simulate` ends it."""
+        rows, bounds = raw.rows[: raw.reached], self.lower_bounds
+        if not (rows < bounds).any() and not (raw.state < bounds).any():
+            return raw
+        rows = np.vstack([rows, raw.state])
+        row = int(np.flatnonzero((rows < bounds).any(axis=1))[0])
+        time = float(self.times[row]) if row < raw.reached else raw.time
+        return raw._replace(reached=row, time=time, state=rows[row], status=Status.NEGATIVE_AIR_MASS)
+
+    def _write(
+        self, index: int, one: CompiledSystem, raw: RawSolution, segments: PiecewiseLinear, more: Mapping[str, Array]
+    ) -> None:
+        reached = raw.reached
+        states = np.ascontiguousarray(raw.rows[:reached])
+        parts = [states, *(self._outputs_and_inputs(one, states, segments) if self._needs_rows else ())]
+        values = [column for part in parts for column in part.T]
+        with np.errstate(over="ignore"):  # a column in single precision
+            for place, (name, column) in zip(self.kept.tolist(), self.columns.items(), strict=True):
+                if place < self._own:
+                    column[index, :reached] = values[place]
+                else:
+                    column[index, :reached] = more[name][:reached] if more else np.nan
+                column[index, reached:] = np.nan
+        self.final[index], self.status[index], self.reached[index] = raw.state, raw.status, reached
+        if raw.status:
+            self.reasons[index] = self._reason(raw)
+
+    @functools.cached_property
+    def _own(self) -> int:
+        """The number of columns of the plant: states, outputs and inputs."""
+        sizes = self.compiled.sizes
+        return sizes.states + sizes.outputs + sizes.inputs
+
+    @functools.cached_property
+    def _needs_rows(self) -> bool:
+        """Whether outputs or inputs are stored."""
+        return bool(((self.kept >= self.compiled.sizes.states) & (self.kept < self._own)).any())
+
+    def _outputs_and_inputs(self, one: CompiledSystem, states: Array, segments: PiecewiseLinear) -> tuple[Array, Array]:
+        """Outputs and inputs at the first rows (R, n) of a plant."""
+        recorder = self._recorder(one)
+        table = recorder.evaluate(states, self.times[: len(states)], segments, self.start_time)
+        self._recorders.append(recorder)
+        return table.outputs, table.inputs
+
+    def _recorder(self, one: CompiledSystem) -> RowRecorder:
+        """A recorder that no thread uses at present, for this plant."""
+        try:
+            recorder = self._recorders.pop()
+        except IndexError:
+            return RowRecorder(one)
+        recorder.adopt(one)
+        return recorder
+
+    def _reason(self, raw: RawSolution) -> str:
+        states = self.compiled.system.states
+        at = ", ".join(f"{s.name} {v:.4g} {s.unit}" for s, v in zip(states, raw.state, strict=True))
+        return (
+            f"the run ended at {raw.time:.6g} of {self.start_time + self.duration:.6g} s because "
+            f"{raw.status.message}, after {raw.steps} steps, at {at}"
+        )
+
+    def mark_not_run(self, index: int, status: Status, reason: str | None = None) -> None:
+        """Write that a plant was not simulated."""
+        self.status[index], self.final[index], self.reached[index] = status, np.nan, 0
+        for column in self.columns.values():
+            column[index] = np.nan
+        if reason is not None:
+            self.reasons[index] = reason
+
+    def mark_interrupted(self) -> None:
+        """Write that the plants that have not been run were left out because the user stopped."""
+        for index in np.flatnonzero(self.status == NOT_RUN):
+            self.mark_not_run(int(index), Status.INTERRUPTED)

@@ -1,0 +1,259 @@
+"""Simulation of many plants of one structure at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from ....core.annotation import one_line
+from ....core.arrays import Array
+from ....core.declaration import as_float
+from ....core.errors import ParameterError, suggestion
+from ....core.status import Status
+from ....core.system import System
+from ...compile.program import CompiledSystem, compile_system
+from ...loop.control_loop import ControlLoop
+from ...loop.inputs import InputSignal
+from ...loop.piecewise_linear import PiecewiseLinear
+from ...state import check_system
+from ..bound_integrator import MAX_STEPS
+from ..integrators import ExplicitRungeKutta, Integrator, default_integrator
+from ..output_times import output_times as times_of
+from ..problem import check_input_range
+from .initial_states import check_states, count_of_states, default_states, given_states
+from .job import NOT_RUN, BatchJob
+from .lanes import check_precision, lane_workers
+from .loop_lanes import loop_lane_workers, run_in_lanes
+from .loops import LoopBatch, loops_of, vary
+from .precision import Double, Precision
+from .solution import BatchSolution
+from .storage import InMemory, OnDisk
+from .thread_pool import Queue, available_cores, progress, run_workers
+from .variations import Variations
+
+
+def simulate_batch(
+    plant: System,
+    variations: Mapping[str, npt.ArrayLike],
+    input: InputSignal | ControlLoop | Sequence[InputSignal] | Sequence[ControlLoop],
+    *,
+    duration: float,
+    initial_states: Mapping[str, npt.ArrayLike] | None = None,
+    start_time: float = 0.0,
+    output_times: float | npt.ArrayLike | None = None,
+    integrator: Integrator | None = None,
+    keep: Sequence[str] | None = None,
+    into: str | Path | None = None,
+    precision: Precision = Double(),
+    cores: int | None = None,
+) -> BatchSolution:
+    """Simulate N plants of one structure for `duration` [s] on all cores; a plant that fails does not stop the others.
+
+    plant           any System: a Plant, a user-defined one, or WithSensitivities(...), whose derivatives are then
+                    computed in the same pass
+    variations      values (N,) by the path of a parameter, as `airmuscle.core.tree.leaves` names it (`mechanism.mass`)
+    input           an InputSignal or a ControlLoop for all, or one for each. With one ControlLoop for all `variations`
+                    may name parameters of its controller, if it is a ControlLaw: `controller.gain`
+    initial_states  by state a number for all or a column (N,); by default each Plant's equilibrium at ambient pressure
+    output_times    as in `simulate`; with one input for all its instants are among the rows
+    integrator      Rodas4(rtol=1e-6) by default: each plant chooses its own steps, exactly as in `simulate`. With an
+                    integrator of fixed step, RungeKutta4(1e-3), sixteen plants are computed together, much faster;
+                    so are loops of control laws without drivers whose sampling instants are the same
+    keep            columns to be kept (N, T): states, outputs, inputs, those of a loop such as `command.fill`; all
+                    unless given, () for final states alone
+    into            folder for the columns, one .npy file each; without it they are held in memory
+    precision       Double() or Single()
+    cores           threads; all cores of this process unless given. The result does not depend on it
+
+    Raises ParameterError for an impossible path, value, initial state, input or column; the row is named. An
+    interrupted batch (Ctrl-C) is returned as far as it was computed; the other plants have Status.INTERRUPTED.
+    """
+    check_system("simulate_batch", plant)
+    loops = loops_of(input, plant)
+    duration = as_float("simulate_batch: duration", duration)
+    start_time = as_float("simulate_batch: start_time", start_time)
+    integrator = default_integrator(integrator)
+    _check_time(duration, start_time, integrator)
+    _check_options(initial_states, keep, into, precision, cores, integrator, loops=bool(loops))
+    varied, laws = vary(plant, variations, loops, _count(initial_states, input))
+    count = len(varied.values)
+    compiled = compile_system(plant)
+    segments = () if loops else _segments(compiled, input, count, start_time, duration)  # type: ignore[arg-type]
+    shared = segments[0].ends if isinstance(input, InputSignal) else None
+    times = _times(output_times, start_time, duration, shared, keep)
+    states, reasons = _initial_states(varied, initial_states, count)
+    batch = LoopBatch.of(plant, loops, laws, (start_time, duration), times, integrator) if loops else None
+    job, storage = _job(
+        compiled, varied, integrator, states, segments, start_time, duration, times, reasons, keep, into, precision,
+        batch,
+    )  # fmt: skip
+    try:
+        _run(job, precision, cores or available_cores())
+        return _solution(job, storage, precision)
+    except BaseException:
+        storage.abandon()
+        raise
+
+
+def _times(
+    given: float | npt.ArrayLike | None, start: float, duration: float, instants: Array | None,
+    keep: Sequence[str] | None,
+) -> Array:  # fmt: skip
+    """The times of the rows, with the instants of the input that all plants share; the end if no column is stored."""
+    end = np.array([start + duration])
+    if keep is not None and len(keep) == 0:
+        return end
+    return times_of(given, start, duration, end if instants is None else instants)
+
+
+def _check_time(duration: float, start_time: float, integrator: Integrator) -> None:
+    if not (np.isfinite(duration) and duration > 0 and start_time + duration > start_time):
+        raise ParameterError(
+            f"simulate_batch: duration is {duration:g} s from {start_time:g} s on; it must be positive and finite."
+        )
+    if isinstance(integrator, ExplicitRungeKutta) and duration / integrator.step > MAX_STEPS:
+        raise ParameterError(
+            f"simulate_batch: {duration:g} s in steps of {integrator.step:g} s are {duration / integrator.step:.3g} "
+            f"steps for each plant; the limit is {MAX_STEPS:g}. Increase the step, or shorten the run."
+        )
+
+
+def _check_options(
+    initial_states: object, keep: object, into: object, precision: object, cores: object, integrator: Integrator,
+    *, loops: bool,
+) -> None:  # fmt: skip
+    if initial_states is not None and not isinstance(initial_states, Mapping):
+        raise ParameterError(
+            f"initial_states is {one_line(initial_states)}; give for each state a number for all, or a column (N,)."
+        )
+    if keep is not None and not isinstance(keep, Sequence):
+        raise ParameterError(f"keep is {keep!r}; give names of columns, ('pressure', 'position').")
+    if into is not None and not isinstance(into, str | Path):
+        raise ParameterError(f"into is {into!r}; give the path of a folder.")
+    if not isinstance(precision, Precision):
+        raise ParameterError(f"precision is {precision!r}; give Double() or Single().")
+    check_precision(precision, integrator, loops=loops)
+    if cores is not None and (not isinstance(cores, int) or cores < 1):
+        raise ParameterError(f"simulate_batch: cores is {cores!r}; it must be a whole number from 1 on.")
+
+
+def _count(initial_states: Mapping[str, npt.ArrayLike] | None, input: object) -> int | None:
+    """The number of plants that initial states and inputs are given for."""
+    of_states = count_of_states(initial_states)
+    if isinstance(input, InputSignal | ControlLoop):
+        return of_states
+    if not isinstance(input, Sequence):
+        order = " The order of the arguments is: plant, variations, input." if isinstance(input, Mapping) else ""
+        raise ParameterError(
+            f"simulate_batch: the input is {one_line(input)}; give an InputSignal, a ControlLoop, or a list.{order}"
+        )
+    if of_states is not None and of_states != len(input):
+        raise ParameterError(
+            f"simulate_batch: there are {len(input)} inputs and initial states for {of_states} plants."
+        )
+    return len(input)
+
+
+def _segments(
+    compiled: CompiledSystem, input: InputSignal | Sequence[InputSignal], count: int, start: float, duration: float
+) -> tuple[PiecewiseLinear, ...]:
+    """The segments of the input of each plant; the same object where it is the same signal."""
+    known: dict[int, PiecewiseLinear] = {}
+    signals = [input] if isinstance(input, InputSignal) else list(input)
+    for row, one in enumerate(signals):
+        if id(one) in known:
+            continue
+        if not isinstance(one, InputSignal):
+            raise ParameterError(f"inputs, row {row} is {one_line(one)}; give a Schedule or a SampledSignal.")
+        try:
+            segments = one.segments(compiled.description.input_names, start, duration)
+            segments.check_shape(len(compiled.description.input_names), start)
+            check_input_range(compiled, segments, start)
+        except ParameterError as error:
+            raise (error if isinstance(input, InputSignal) else error.located(f"inputs, row {row}")) from None
+        known[id(one)] = segments
+    each = tuple(known[id(one)] for one in signals)
+    return each * count if isinstance(input, InputSignal) else each
+
+
+def _initial_states(
+    varied: Variations, given: Mapping[str, npt.ArrayLike] | None, count: int
+) -> tuple[Array, dict[int, str]]:
+    if given is not None:
+        states = given_states(varied.system, given, count)
+        check_states(varied, states)
+        return states, {}
+    with progress("computing the equilibrium of each plant", count) as advanced:
+        return default_states(varied, advanced)
+
+
+def _job(
+    compiled: CompiledSystem, varied: Variations, integrator: Integrator, states: Array,
+    segments: tuple[PiecewiseLinear, ...], start: float, duration: float, times: Array, reasons: dict[int, str],
+    keep: Sequence[str] | None, into: str | Path | None, precision: Precision, loops: LoopBatch | None,
+) -> tuple[BatchJob, InMemory]:  # fmt: skip
+    count, n = states.shape
+    by_lanes = isinstance(integrator, ExplicitRungeKutta) and loops is None
+    nominal = np.empty((count, n)) if by_lanes else varied.nominal()
+    final, status, reached = np.full((count, n), np.nan), np.full(count, NOT_RUN), np.zeros(count, dtype=np.int64)
+    given = (compiled, varied, integrator, states, segments, start, duration, times)
+    job = BatchJob(*given, {}, final, status, reached, reasons, nominal, loops)
+    names = job.names if keep is None else _kept(keep, job.names)
+    dtype = np.float64 if precision.number.bits == 64 else np.float32
+    if into is None:
+        storage = InMemory(names, count, times.size, dtype)
+    else:
+        storage = OnDisk(into, names, count, times.size, dtype)
+    job.columns.update(storage.columns)
+    return job, storage
+
+
+def _kept(keep: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
+    for name in [keep] if isinstance(keep, str) else keep:
+        if name not in names:
+            raise ParameterError(f"keep: no column '{name}'; there are {', '.join(names)}.{suggestion(name, names)}")
+    return (keep,) if isinstance(keep, str) else tuple(dict.fromkeys(keep))
+
+
+def _run(job: BatchJob, precision: Precision, cores: int) -> None:
+    """Simulate all plants that have an initial state; those that an interruption leaves out are marked."""
+    for index, reason in job.reasons.copy().items():
+        job.mark_not_run(index, Status.NOT_STARTED, reason)
+    active = np.flatnonzero(np.isfinite(job.initial_states).all(axis=1))
+    if not active.size:
+        return
+    if job.loops is not None and run_in_lanes(job, active):
+        queue, workers, each = loop_lane_workers(job, job.loops, active, cores)
+    elif isinstance(job.integrator, ExplicitRungeKutta) and job.loops is None:
+        queue, workers, each = lane_workers(job, precision, active, cores)
+    else:
+        job.run_single(int(active[0]))  # what compiles, compiles here, before threads need it at once
+        queue, each = Queue(active.size - 1), 1
+        queue.stop[0] = job.status[active[0]] == Status.INTERRUPTED
+        active = active[1:]
+        workers = [lambda item: job.run_single(int(active[item]))] * min(cores, active.size)
+    with progress(f"simulating {active.size} plants", active.size) as advanced:
+        complete = run_workers(queue, workers, lambda done: advanced(min(done * each, active.size)))
+    if not complete or queue.stop[0]:
+        job.mark_interrupted()
+
+
+def _solution(job: BatchJob, storage: InMemory, precision: Precision) -> BatchSolution:
+    states = job.compiled.description.state_names
+    final = {name: job.final[:, i].copy() for i, name in enumerate(states)}
+    notes = tuple(note for note in (f"simulated by {job.integrator}, in a batch", precision.note) if note)
+    small = {
+        "time": job.times,
+        "status": job.status,
+        "reached": job.reached,
+        **{f"final {name}": values for name, values in final.items()},
+    }
+    remarks = {"notes": notes, "reasons": job.reasons, "varied": list(job.variations.paths)}
+    columns = storage.finish(small, remarks)
+    job.columns.clear()
+    return BatchSolution(
+        job.variations, job.integrator, job.times, columns, final, job.status, job.reached, job.reasons, notes
+    )

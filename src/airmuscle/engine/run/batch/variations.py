@@ -1,0 +1,202 @@
+"""Variations: parameters of N plants by path, checked as if each plant were constructed."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ....core import tree
+from ....core.annotation import one_line
+from ....core.arrays import Array
+from ....core.errors import AirmuscleError, ParameterError, suggestion
+from ....core.system import System
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Variations:
+    """A system, and for N others of its structure the values (N, V) of the parameters that differ."""
+
+    system: System
+    paths: tuple[str, ...]
+    places: npt.NDArray[np.intp]
+    values: Array
+
+    def parameters(self, index: int) -> Array:
+        """All parameters (P,) of one of the systems."""
+        parameters = tree.flatten(self.system).copy()
+        parameters[self.places] = self.values[index]
+        return parameters
+
+    def table(self, indices: npt.NDArray[np.intp]) -> Array:
+        """All parameters (R, P) of some of the systems."""
+        parameters = np.repeat(tree.flatten(self.system)[None, :], indices.size, axis=0)
+        parameters[:, self.places] = self.values[indices]
+        return parameters
+
+    def one(self, index: int) -> System:
+        """One of the systems."""
+        return tree.unflatten(self.system, self.parameters(index).tolist())
+
+    def nominal(self) -> Array:
+        """Nominal size (N, n) of each state, below which its relative error no longer matters, for every system."""
+        count = len(self.values)
+        if not self.paths:
+            sizes = [np.array([s.nominal for s in self.system.states])] * count
+            return np.array(sizes)
+        try:
+            columns = [np.broadcast_to(s.nominal, count) for s in self.as_columns().states]
+            return np.column_stack([c.astype(float) for c in columns])
+        except (TypeError, ValueError, AirmuscleError):  # a system whose `states` takes plain numbers only
+            return np.array([[s.nominal for s in self.one(i).states] for i in range(count)])
+
+    def as_columns(self) -> Any:
+        """The system with a column (N,) in place of every parameter that differs."""
+        leaves: list[Any] = tree.flatten(self.system).tolist()
+        for place, column in zip(self.places, self.values.T, strict=True):
+            leaves[place] = column.view(Column)
+        return tree.unflatten(self.system, leaves)
+
+    def check_consistent(self) -> None:
+        """Raise ParameterError, naming the row, where parameters of a model do not go together."""
+        for part in _checking(self.as_columns()):
+            if not _has_column(part):
+                continue
+            try:
+                part.check()
+            except (TypeError, ValueError, AirmuscleError):  # rows differ, or one of them is impossible: row by row
+                of_row = _rows_of(part)
+                for row in range(len(self.values)):
+                    _check_row(row, part if of_row is None else of_row(row))
+
+
+class Column(np.ndarray):
+    """A column with a truth value where all rows agree, so that one `if` serves for all of them."""
+
+    def __bool__(self) -> bool:
+        answers = np.asarray(self, dtype=bool)
+        if answers.any() and not answers.all():
+            raise ValueError("the rows differ")
+        return bool(answers.any())
+
+
+def _check_row(row: int, part: Any) -> None:
+    try:
+        part.check()
+    except ParameterError as error:
+        raise error.located(f"variations, row {row}") from None
+
+
+def _checking(thing: Any) -> Iterator[Any]:
+    """Every model within a model, itself too, that checks several of its parameters together."""
+    if isinstance(thing, tuple):
+        for item in thing:
+            yield from _checking(item)
+    elif dataclasses.is_dataclass(thing):
+        if hasattr(thing, "check"):
+            yield thing
+        for field in dataclasses.fields(thing):
+            yield from _checking(getattr(thing, field.name))
+
+
+def _has_column(thing: Any) -> bool:
+    """Whether there is a column anywhere inside a model."""
+    if isinstance(thing, tuple):
+        return any(_has_column(item) for item in thing)
+    if dataclasses.is_dataclass(thing):
+        return any(_has_column(getattr(thing, field.name)) for field in dataclasses.fields(thing))
+    return isinstance(thing, np.ndarray)
+
+
+def _rows_of(thing: Any) -> Callable[[int], Any] | None:
+    """A function from a row to the model with the numbers of that row instead of its columns (N,); None where it has no
+    column."""
+    if isinstance(thing, np.ndarray):
+        numbers = thing.tolist()
+        return lambda row: numbers[row]
+    if isinstance(thing, tuple):
+        items = [_rows_of(item) for item in thing]
+        if not any(items):
+            return None
+        return lambda row: tuple(item if of is None else of(row) for item, of in zip(thing, items, strict=True))
+    if not dataclasses.is_dataclass(thing):
+        return None
+    inside = {field.name: _rows_of(getattr(thing, field.name)) for field in dataclasses.fields(thing)}
+    changed = [(name, of_row) for name, of_row in inside.items() if of_row is not None]
+    fields = {field.name: getattr(thing, field.name) for field in dataclasses.fields(thing)}
+
+    def with_numbers(row: int) -> Any:
+        new = object.__new__(type(thing))
+        for name, value in fields.items():
+            object.__setattr__(new, name, value)
+        for name, of_row in changed:
+            object.__setattr__(new, name, of_row(row))
+        return new
+
+    return with_numbers if changed else None
+
+
+def variations_of(system: Any, given: Mapping[str, npt.ArrayLike], count: int | None) -> Variations:
+    """The variations of a System, or of a controller. Raises ParameterError for an unknown path or an impossible value.
+
+    `count` is the number of plants where initial states or inputs determine it.
+    """
+    if not isinstance(given, Mapping):
+        raise ParameterError(f"variations: they are {one_line(given)}; give a column of values for each path.")
+    leaves = {leaf.path: (place, leaf) for place, leaf in enumerate(tree.leaves(system))}
+    columns = []
+    for path, values in given.items():
+        if path not in leaves:
+            near = suggestion(str(path), leaves)
+            raise ParameterError(
+                f"variations: {type(system).__name__} has no parameter '{path}'.{near} "
+                "Its paths are those of airmuscle.core.tree.leaves(plant)."
+            )
+        columns.append(_column(leaves[path][1], values))
+    follow = tree.absolute_pressures(system, dict(zip(given, columns, strict=True)))
+    given = {**given, **follow}
+    columns += [_column(leaves[path][1], values) for path, values in follow.items()]
+    sizes = {path: len(column) for path, column in zip(given, columns, strict=True)}
+    if len({*sizes.values(), *(() if count is None else (count,))}) > 1:
+        others = "" if count is None else f", and initial states or inputs for {count}"
+        raise ParameterError(f"variations: every column needs one value per plant; there are {sizes}{others}.")
+    count = next(iter(sizes.values()), count)
+    if count is None:
+        raise ParameterError(
+            "simulate_batch: nothing varies; give variations, initial states or inputs, or use simulate."
+        )
+    if count == 0:
+        raise ParameterError("simulate_batch: there are no plants; give at least one row.")
+    table = np.column_stack(columns) if columns else np.empty((count, 0))
+    varied = Variations(system, tuple(given), np.array([leaves[p][0] for p in given], dtype=np.intp), table)
+    varied.check_consistent()
+    return varied
+
+
+def _column(leaf: tree.Leaf, given: npt.ArrayLike) -> Array:
+    """One parameter of all plants, within its bounds."""
+    try:
+        values = np.array(given, dtype=float)
+    except (TypeError, ValueError):
+        raise ParameterError(
+            f"variations: '{leaf.path}' must be numbers, one for each plant; it is {one_line(given)}."
+        ) from None
+    if values.ndim != 1:
+        raise ParameterError(
+            f"variations: '{leaf.path}' must be a column (N,), one value per plant; its shape is {values.shape}."
+        )
+    declared = leaf.declared
+    low, high = declared.bounds
+    unit = "" if declared.unit == "1" else f" {declared.unit}"
+    wrong = np.flatnonzero(~(np.isfinite(values) & (values >= low) & (values <= high)))
+    if wrong.size:
+        row = int(wrong[0])
+        more = f" ({wrong.size - 1} further rows too)" if wrong.size > 1 else ""
+        raise ParameterError(
+            f"variations, row {row}: '{leaf.path}' ({declared.symbol}, {declared.meaning}) is {values[row]:g}{unit}; "
+            f"allowed range: {low:g} to {high:g}{unit}{more}. Values are in SI units."
+        )
+    return values

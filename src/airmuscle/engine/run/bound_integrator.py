@@ -1,0 +1,198 @@
+"""Integrator bound to a compiled system: its kernel with all arguments, run after run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...core.arrays import Array, flat_view
+from ...core.status import Status
+from ..compile.cache.kernel import Kernel
+from ..compile.functions import ArraySizes
+from ..loop.piecewise_linear import PiecewiseLinear
+
+INTERRUPT_CHECK_STEPS = 100_000
+"""Steps between two checks whether the user wants to stop, or the state is impossible."""
+MAX_STEPS = 50_000_000
+"""Steps of one run, by default."""
+_PAUSED, _TOO_MANY = Status.PAUSED.value, Status.TOO_MANY_STEPS.value
+
+
+class RawSolution(NamedTuple):
+    """Result of an integrator: rows (N, n), number of rows reached, end time, status and counts."""
+
+    rows: Array
+    reached: int
+    time: float
+    state: Array
+    status: Status
+    steps: int
+    rejected: int
+
+
+class Binding(NamedTuple):
+    """Binding of an integrator to a system: kernel, arguments before and after those of a run, workspace size."""
+
+    kernel: Kernel
+    leading: tuple[Any, ...]
+    trailing: tuple[Any, ...]
+    work: int
+
+
+class BoundIntegrator:
+    """An integrator bound to one compiled system, with its workspace. For one thread at a time."""
+
+    def __init__(self, binding: Binding, sizes: ArraySizes) -> None:
+        self.state, self._progress = np.zeros(sizes.states), np.zeros(7, dtype=np.int64)
+        self._clock, self._count = self._progress[:3].view(np.float64), self._progress[3:]
+        self._duration = 1.0
+        self._end, self._inputs, slopes = np.ones(1), np.zeros((1, sizes.inputs)), np.zeros((1, sizes.inputs))
+        no_rows = np.zeros(0), np.zeros((0, sizes.states))
+        work = np.zeros(max(binding.work, 1))
+        run = (self.state, self._end, self._inputs, slopes, *no_rows)
+        end = (self._clock, self._count, INTERRUPT_CHECK_STEPS, work)
+        self._bound_values = (*binding.leading, *binding.trailing)
+        self._kernel = binding.kernel.bind(*binding.leading, *run, *binding.trailing, *end)
+        self._run, self._first = self._kernel.runner, len(binding.leading) + 1
+        self._clock_view, self._count_view = flat_view(self._clock), flat_view(self._count)
+        self._slots: list[int] = self.places.tolist()
+        self._words = None if self._kernel.entry_address is None else flat_view(self._kernel.slots)
+        self._budget = len(binding.leading) + len(run) + len(binding.trailing) + 2
+
+    def rebind(self, binding: Binding) -> None:
+        """Take the values of the same integrator at a system of the same structure with other parameters."""
+        for own, other in zip(self._bound_values, (*binding.leading, *binding.trailing), strict=True):
+            if isinstance(own, np.ndarray):
+                own[...] = other
+
+    def run(
+        self, segments: PiecewiseLinear, start: float, state: Array, times: Array, max_steps: int = MAX_STEPS,
+        rows: Array | None = None, check: Callable[[Array, float], Status] | None = None,
+    ) -> RawSolution:  # fmt: skip
+        """Integrate from `state` (n,) at `start` [s] through the segments; rows (N, n) at rising `times` (N,).
+
+        `check` states for a state (n,) and a time [s], DONE or why the run ends there; it is called between packets of
+        many steps, because the steps can become endlessly many where the model does not hold.
+        """
+        rows = np.empty((times.size, self.state.size)) if rows is None else rows
+        self.state[:] = state
+        for i, argument in enumerate((segments.ends, segments.values, segments.slopes, times), self._first):
+            self._kernel.replace_input(i, argument)
+        self._kernel.replace(self._first + 4, rows)
+        return self._solve(start, rows, max_steps, check)
+
+    def hold(self, state: Array, inputs: Array, duration: float) -> Status:
+        """Advance `state` (n,) in place by `duration` [s] with the inputs (m,) held. Not to be mixed with `run`."""
+        self.state[:] = state
+        self._inputs[0] = inputs
+        status = self.proceed(duration)
+        state[:] = self.state
+        return status
+
+    def proceed(self, duration: float) -> Status:
+        """Advance `self.state` by `duration` [s] with `self.held` held. Not to be mixed with `run`."""
+        if duration != self._duration:
+            self._end[0] = self._duration = duration
+        self._progress.fill(0)
+        status = self._run()
+        if status == _PAUSED:
+            status = self._continue(status, MAX_STEPS)
+        return Status.DONE if status == 0 else Status(status)
+
+    @property
+    def held(self) -> Array:
+        """The inputs (m,) of `proceed`."""
+        held: Array = self._inputs[0]
+        return held
+
+    def run_part(
+        self, begin: float, segments: tuple[int, int, int], count: int, times: int, rows: int, wanted: int
+    ) -> tuple[Status, int, float]:
+        """Go on from `self.state` at `begin` [s] through `count` segments: how it ended, rows reached, where.
+
+        Ends, values and slopes of the segments, times and rows are given by the addresses of their first numbers. Not
+        to be mixed with `run`.
+        """
+        if self._words is None:
+            self._kernel.point(self._first, segments, count)
+            self._kernel.point(self._first + 3, (times, rows), wanted)
+        else:
+            words, (a, b, c, d, e) = self._words, self._slots
+            words[a], words[b], words[c] = segments
+            words[a + 1] = words[b + 1] = words[c + 1] = count
+            words[d], words[e] = times, rows
+            words[d + 1] = words[e + 1] = wanted
+        clock, counts = self._clock_view, self._count_view
+        clock[0] = clock[2] = begin
+        clock[1] = 0.0
+        counts[0] = counts[1] = 0
+        before = counts[2]
+        status = self._run()
+        if status == _PAUSED:
+            status = self._continue(status, before + MAX_STEPS)
+            self._kernel.replace(self._budget, INTERRUPT_CHECK_STEPS)
+        return Status.DONE if status == 0 else Status(status), counts[1], clock[0]
+
+    @property
+    def entry_address(self) -> int | None:
+        """The address of the kernel's entry point, for a kernel that calls it; None without machine code."""
+        return self._kernel.entry_address
+
+    @property
+    def slots(self) -> Any:
+        """The slots of the kernel's arguments."""
+        return self._kernel.slots
+
+    @property
+    def places(self) -> Any:
+        """The places in the slots of ends, values and slopes of segments, and of times and rows (5,)."""
+        return np.array([self._kernel.slot_of(self._first + i) for i in range(5)], dtype=np.int64)
+
+    @property
+    def clock(self) -> Array:
+        """Time, next step, start of the current segment."""
+        return self._clock
+
+    @property
+    def count(self) -> Any:
+        """Segment, next row, steps, rejected steps."""
+        return self._count
+
+    @property
+    def step_counts(self) -> tuple[int, int]:
+        """Accepted and rejected steps since the counts were last reset."""
+        return int(self._count[2]), int(self._count[3])
+
+    def _solve(
+        self, start: float, rows: Array, max_steps: int, check: Callable[[Array, float], Status] | None
+    ) -> RawSolution:
+        clock, count = self._clock_view, self._count_view
+        clock[0], clock[1], clock[2] = start, 0.0, start
+        count[0] = count[1] = count[2] = count[3] = 0
+        if max_steps < INTERRUPT_CHECK_STEPS:
+            self._kernel.replace(self._budget, max_steps)
+        try:
+            status = self._kernel()
+            if status == _PAUSED:
+                status = self._continue(status, max_steps, check)
+        except KeyboardInterrupt:
+            status = Status.INTERRUPTED.value
+        self._kernel.replace(self._budget, INTERRUPT_CHECK_STEPS)
+        reached, ended = count[1], Status.DONE if status == 0 else Status(status)
+        if reached < len(rows):
+            rows[reached:] = np.nan
+        return RawSolution(rows, reached, clock[0], self.state.copy(), ended, count[2], count[3])
+
+    def _continue(self, status: int, max_steps: int, check: Callable[[Array, float], Status] | None = None) -> int:
+        """Go on where the kernel paused so that an interruption or an impossible state can be noticed."""
+        while status == _PAUSED:
+            if check is not None and (outcome := check(self.state, self._clock_view[0])) != Status.DONE:
+                return outcome.value
+            left = max_steps - int(self._count[2])
+            if left <= 0:
+                return _TOO_MANY
+            self._kernel.replace(self._budget, min(INTERRUPT_CHECK_STEPS, left))
+            status = self._kernel()
+        return status

@@ -1,0 +1,98 @@
+"""Simulation of a control loop: from one sampling instant to the next, each met exactly."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...core.arrays import Array
+from ...core.diagnostics import Diagnostic, DiagnosticCode
+from ...core.status import Status
+from ..loop.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop, ControlLoopState
+from ..loop.piecewise_linear import PiecewiseLinear
+from ..state_units import column_units
+from .bound_integrator import RawSolution
+from .called_run import CalledRun
+from .compiled_loop import CompiledLoop, CompiledRun, can_be_compiled
+from .kept_loops import form_of, keep_run, kept_run
+from .problem import Problem
+from .rows import make_recording, recorded_rows, truncate_at_invalid_row
+from .sampled_loop import SampledLoop, prepare_loop
+from .solution import Solution, Statistics
+
+
+def solve_closed_loop(problem: Problem) -> Solution:
+    """The solution of a problem with a ControlLoop, and the state from which the run can be continued.
+
+    The recording also has `setpoint.`, `measured.` and `command.` columns: the set points in time, and the controller's
+    measurements and commands at the last sample. Every sampling instant is a row. Measurements are taken just before
+    the command of the same instant: an output that jumps with an input has not jumped yet. Split at a sampling instant
+    and continued, a run equals the run in one, to the last bit; split between two, to the integrator's tolerance.
+    """
+    loop, form = problem.input, form_of(problem)
+    control_state = problem.control_state or loop.init(problem.start_time)  # type: ignore[union-attr]
+    run: CompiledRun | CalledRun | None = kept_run(problem, form, control_state)
+    if run is None:
+        run = start_run(problem, prepare_loop(problem, control_state), control_state)
+    run.integrate()
+    solution = _solution(problem, run)
+    if form is not None and isinstance(run, CompiledRun) and run.status == Status.DONE:
+        keep_run(problem, form, run)
+    return solution
+
+
+def start_run(problem: Problem, prepared: SampledLoop, control_state: ControlLoopState) -> CompiledRun | CalledRun:
+    """A run of the loop in one kernel where this implements the drivers, else one that calls them from Python."""
+    assert problem.integrator is not None
+    if can_be_compiled(prepared):
+        loop = CompiledLoop(problem.compiled, prepared)
+        run = CompiledRun(loop, problem.compiled, problem.integrator, problem.initial_vector, control_state)
+        if run.can_run:
+            return run
+    return CalledRun(problem, prepared, control_state)
+
+
+def _solution(problem: Problem, run: CompiledRun | CalledRun) -> Solution:
+    """The rows of all intervals as one solution."""
+    compiled, loop, integrator = problem.compiled, problem.input, problem.integrator
+    assert isinstance(loop, ControlLoop)
+    segments, (times, states) = run.signal, run.rows
+    if isinstance(run, CompiledRun):  # the next run may be in the same arrays
+        times, states = times.copy(), states.copy()
+    begun = len(run.measured) > 0
+    at, state = (run.stopped_at, run.bound.state.copy()) if begun else (run.time, run.state)
+    raw = RawSolution(states, times.size, at, state, run.status, *run.bound.step_counts)
+    if not segments.ends.size:  # the run ended before its first interval
+        shape = (1, compiled.sizes.inputs)
+        segments = PiecewiseLinear(np.array([problem.end_time]), np.zeros(shape), np.zeros(shape))
+    table = recorded_rows(compiled, states, times, segments, problem.start_time)
+    raw, table = truncate_at_invalid_row(compiled, raw, table, times)
+    compiled_law = isinstance(run, CompiledRun) and run.loop.law is not None
+    way = "compiled with the plant" if compiled_law else "called from Python at each sample"
+    measured = [name for name in loop.controller.measured_columns if name in compiled.output_names]
+    note = f"controlled by {loop.describe(column_units(problem.system, measured))}; {way}"
+    remark = Diagnostic(DiagnosticCode.CONTROLLER, type(loop.controller).__name__, note)
+    control_state = run.control_state
+    notes = loop.controller.notes(control_state.controller)
+    remarks = (remark, *(Diagnostic(DiagnosticCode.CONTROLLER, remark.subject, text) for text in notes))
+    more = _controller_columns(run, times[: raw.reached])
+    recording, diagnostics = make_recording(
+        compiled, raw, table, times, integrator, problem.end_time, problem.references, more, remarks
+    )
+    final = dict(zip(compiled.description.state_names, run.state.tolist(), strict=True))
+    statistics = Statistics(raw.steps, raw.rejected)
+    return Solution(problem, recording, raw.status, statistics, diagnostics, run.time, final, control_state)
+
+
+def _controller_columns(run: CompiledRun | CalledRun, times: Array) -> dict[str, Array]:
+    """Set points in time; measurements and commands of the last sample at every row."""
+    prepared, controller, count = run.prepared, run.prepared.loop.controller, times.size
+    at, setpoints = prepared.at(times) if prepared.loop.drivers else prepared.at_times  # drivers add rows
+    intervals, setpoints = np.minimum(at[:count], max(len(run.measured) - 1, 0)), setpoints[:count]
+    measured, commanded = (values.take(intervals, axis=0) for values in (run.measured, run.commanded))
+    columns: dict[str, Array] = {}
+    for values, prefix, names in (
+        (setpoints, SETPOINT, controller.setpoints), (measured, MEASURED, controller.measured_columns),
+        (commanded, COMMAND, controller.inputs),
+    ):  # fmt: skip
+        columns |= {f"{prefix}{name}": column for name, column in zip(names, values.T, strict=True)}
+    return columns

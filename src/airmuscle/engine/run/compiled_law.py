@@ -1,0 +1,145 @@
+"""Compiled sample of a control law: measurements, set points and memory to commands and memory, as machine code."""
+
+from __future__ import annotations
+
+import array
+import ctypes
+import dataclasses
+import itertools
+import math
+from typing import Any
+
+import numpy as np
+
+from ...core import autodiff, tree
+from ...core.arrays import Array
+from ...core.errors import TraceError
+from ..compile.function import Function
+from ..compile.lanes_function import LanesFunction
+from ..loop.control_law import ControlLaw
+from ..loop.controller import Measurement
+
+_ARGUMENTS = ("measured", "setpoints", "memory", "minimum", "maximum", "sample_time", "parameters")
+UNLIMITED = (-math.inf, math.inf)
+"""Range of an input that a measurement does not contain."""
+_functions: dict[tree.Structure, Function] = {}
+_lanes: dict[tuple[tree.Structure, int], LanesFunction] = {}
+
+
+def compiled_sample(law: ControlLaw) -> Function:
+    """A function (measured, setpoints, memory, minimum, maximum, sample time, parameters, commands, memory).
+
+    Control laws of one structure share it. Raises TraceError if the law cannot be traced.
+    """
+    structure = tree.structure(law)
+    if structure not in _functions:
+        _functions[structure] = Function(*_arguments(law))
+    return _functions[structure]
+
+
+class LawSample:
+    """The sample of a control law as machine code that is called from Python; its memory is a tuple.
+
+    Raises TraceError if the law cannot be traced.
+    """
+
+    def __init__(self, law: ControlLaw) -> None:
+        self._function = compiled_sample(law)
+        self._call = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 9)(self._function.address)
+        self._measured, self._setpoints, self._inputs = law.measured_columns, law.setpoints, law.inputs
+        self._parameters = parameters_of(law).tolist()
+        self.initial = tuple(float(value) for value in law.initial_memory.values())
+        sizes = (
+            len(self._measured), len(self._setpoints), len(self.initial), len(self._inputs), len(self._inputs), 1,
+            len(self._parameters), len(self._inputs), len(self.initial),
+        )  # fmt: skip
+        self._ends = list(itertools.accumulate(sizes))
+        self._offsets = [8 * (end - size) for end, size in zip(self._ends, sizes, strict=True)]
+
+    def step(
+        self, memory: tuple[float, ...], measurement: Measurement, dt: float
+    ) -> tuple[dict[str, float], tuple[float, ...]]:
+        """The commands of a sample and the memory after it, as `ControlLaw.step`."""
+        columns, setpoints, ranges = measurement
+        limits = [ranges.get(name, UNLIMITED) for name in self._inputs]
+        given = array.array("d", (
+            *[columns[name] for name in self._measured], *[setpoints[name] for name in self._setpoints], *memory,
+            *[low for low, _ in limits], *[high for _, high in limits], dt, *self._parameters,
+        ))  # fmt: skip
+        given.frombytes(bytes(8 * (self._ends[8] - self._ends[6])))
+        start = given.buffer_info()[0]
+        self._call(*[start + offset for offset in self._offsets])
+        commands = dict(zip(self._inputs, given[self._ends[6] : self._ends[7]], strict=True))
+        return commands, tuple(given[self._ends[7] :])
+
+
+def sample_in_lanes(law: ControlLaw, lanes: int) -> LanesFunction:
+    """The same function for so many loops at once, one a lane. Raises TraceError if the law cannot be traced."""
+    key = tree.structure(law), lanes
+    if key not in _lanes:
+        _lanes[key] = LanesFunction(*_arguments(law), lanes)
+    return _lanes[key]
+
+
+def parameters_of(law: ControlLaw) -> Array:
+    """The parameters of a law, for its compiled sample: at least one number, so that the array has an address."""
+    parameters = tree.flatten(law)
+    return parameters if len(parameters) else np.zeros(1)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class TracedSample:
+    """A sample of a control law as expressions; the arguments are vectors in the order of the names of the law."""
+
+    measured: Any
+    setpoints: Any
+    memory: Any
+    minimum: Any
+    maximum: Any
+    sample_time: Any
+    parameters: Any
+    commands: Any
+    later: Any
+
+
+def _arguments(law: ControlLaw) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Inputs and outputs of the function of a sample, as expressions."""
+    sample = trace_sample(law)
+    inputs = {name: getattr(sample, name) for name in _ARGUMENTS}
+    return inputs, {"commands": sample.commands, "later": sample.later}
+
+
+def trace_sample(law: ControlLaw) -> TracedSample:
+    """A sample of a law with symbols. Raises TraceError if the law cannot be traced."""
+    import casadi
+
+    symbolic, parameters = autodiff.symbolic(law)
+    names = {
+        "measured": law.measured_columns,
+        "setpoints": law.setpoints,
+        "memory": tuple(law.initial_memory),
+        "minimum": law.inputs,
+        "maximum": law.inputs,
+        "sample_time": ("sample_time",),
+    }
+    vectors = {key: casadi.SX.sym(key, len(each)) for key, each in names.items()}
+    by_name = {key: {n: vectors[key][i] for i, n in enumerate(each)} for key, each in names.items()}
+    ranges = {name: (by_name["minimum"][name], by_name["maximum"][name]) for name in law.inputs}
+    measurement = Measurement(by_name["measured"], by_name["setpoints"], ranges)
+    owner = type(law).__name__
+    try:
+        commands, memory = symbolic.step(by_name["memory"], measurement, vectors["sample_time"][0])
+        commanded = casadi.densify(casadi.vertcat(*(commands[name] for name in law.inputs)))
+        later = casadi.densify(casadi.vertcat(*(memory[name] for name in names["memory"])))
+    except KeyError as missing:
+        raise TraceError(
+            f"{owner}.step does not return {missing}; it must return a value for each of {', '.join(law.inputs)}, and "
+            f"for each of its memory: {', '.join(names['memory']) or 'none'}."
+        ) from None
+    except (TypeError, ValueError, RuntimeError) as reason:
+        raise TraceError(
+            f"{owner}.step cannot be compiled ({' '.join(str(reason).split())[:160]}). Use airmuscle.core.ops instead "
+            "of math, numpy and `if`, or derive the controller from Controller."
+        ) from None
+    autodiff.check_finite(casadi.vertcat(commanded, later), f"{owner}.step")
+    return TracedSample(**vectors, parameters=parameters, commands=commanded, later=later)

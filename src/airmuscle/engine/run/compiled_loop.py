@@ -1,0 +1,285 @@
+"""Control loop as one program: control law, drivers and plant from sample to sample without a return to Python.
+
+A controller that is no control law is called from Python; only then does the program pause at each sample.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...core.arrays import Array, flat_view
+from ...core.status import Status
+from ..compile.cache import kernel
+from ..compile.kernel_layout import Progress
+from ..compile.program import CompiledSystem
+from ..loop.control_law import ControlLaw
+from ..loop.control_loop import ControlLoopState
+from ..loop.piecewise_linear import PiecewiseLinear
+from .bound_integrator import INTERRUPT_CHECK_STEPS, MAX_STEPS
+from .called_controller import CalledController
+from .compiled_law import compiled_sample, parameters_of
+from .driver_table import MAX_CAPACITY, DriverTable, are_known, greatest_capacity
+from .integrators import Integrator
+from .sampled_loop import SampledLoop
+
+FIRST_SEGMENTS = 4096
+"""Segments and rows that the buffers of driven inputs hold at first."""
+_PAUSED, _WAITING, _INTERVAL = Status.PAUSED.value, Progress.WAITING.value, Progress.INTERVAL.value
+
+
+class CompiledLoop:
+    """A prepared loop with the data that all its runs share; `law` is None for a controller that is called."""
+
+    def __init__(self, compiled: CompiledSystem, prepared: SampledLoop) -> None:
+        loop, known = prepared.loop, compiled.description
+        controller = loop.controller
+        self.prepared, self.law = prepared, controller if isinstance(controller, ControlLaw) else None
+        self._function = compiled_sample(self.law) if self.law is not None else None
+        self.sample_address = 0 if self._function is None else self._function.address
+        self.parameters = parameters_of(self.law) if self.law is not None else np.zeros(1)
+        self.capacity = greatest_capacity(prepared) if loop.drivers else 0
+        columns = (*known.state_names, *known.output_names)
+        measured_at = np.array([columns.index(name) for name in controller.measured_columns], dtype=np.int64)
+        commanded_at = np.array(prepared.commanded, dtype=np.int64)
+        limits = np.array([prepared.ranges[name] for name in controller.inputs], dtype=float).reshape(-1, 2)
+        self.edges = prepared.instants
+        self.measuring = compiled.address["outputs"], measured_at
+        low, high = np.ascontiguousarray(limits[:, 0]), np.ascontiguousarray(limits[:, 1])
+        self.commanding = np.array([loop.sample_time]), low, high, commanded_at
+        self.intervals = (
+            self.edges, np.spacing(np.abs(self.edges)), 0 if prepared.sampled else 1,
+            prepared.setpoint_values,
+        )  # fmt: skip
+        self.offsets = prepared.first_segments
+        self.grid = prepared.times, prepared.first_rows
+
+    def memory_of(self, state: ControlLoopState) -> list[float]:
+        """The memory of the control law as numbers; none of a controller that is called."""
+        return [state.controller[name] for name in self.law.initial_memory] if self.law is not None else []
+
+
+def can_be_compiled(prepared: SampledLoop) -> bool:
+    """Whether all drivers of a loop are among those that kernels implement."""
+    loop = prepared.loop
+    return not loop.drivers or (are_known(loop) and greatest_capacity(prepared) <= MAX_CAPACITY)
+
+
+class CompiledRun:
+    """A run of a compiled loop; the results are those of `called_run.CalledRun`, with a control law to rounding errors.
+
+    compiled       the plant, whose structure is that of the loop's plant
+    initial_state  (n,)
+    parameters     of the control law (P,), an array of this run; those of the loop's controller unless given
+    """
+
+    def __init__(
+        self, loop: CompiledLoop, compiled: CompiledSystem, integrator: Integrator, initial_state: Array,
+        control_state: ControlLoopState, parameters: Array | None = None,
+    ) -> None:  # fmt: skip
+        self.loop, self._begin_state = loop, control_state
+        self._integrator, self._precomputed = integrator, compiled.precomputed
+        self.bound = integrator.bind(compiled)
+        self.bound.state[:] = initial_state
+        self.status, self.stopped_at = Status.DONE, float(loop.edges[0])
+        self._drivers = DriverTable(loop.prepared, control_state, loop.capacity)
+        self._make_arrays(compiled.sizes.states, compiled.sizes.inputs)
+        self._parameters = loop.parameters.copy() if parameters is None else parameters
+        arguments = self._arguments(compiled, self._parameters)
+        self._first_buffer, self._budget = len(arguments) - 9, len(arguments) - 1
+        self._kernel = kernel.sampled_loop.bind(*arguments)
+        self._controller = None if loop.law is not None else CalledController(loop.prepared)
+        self._forget_samples()
+
+    def restart(
+        self, compiled: CompiledSystem, initial_state: Array, parameters: Array,
+        control_state: ControlLoopState | None = None,
+    ) -> None:  # fmt: skip
+        """Begin again in the same arrays, with a plant of the same structure and other parameters; arguments as before.
+
+        `control_state` is by default that of the first time; another one differs from it in the controller's memory
+        alone. Everything that was returned by this run is overwritten.
+        """
+        if control_state is not None:
+            self._begin_state, self._begin_memory = control_state, self.loop.memory_of(control_state)
+        self.bound.rebind(self._integrator.binding(compiled))
+        self._precomputed[:], self._parameters[:] = compiled.precomputed, parameters
+        state, inputs = self._begin_state, self.loop.prepared.inputs
+        self.bound.state[:] = self._kept[:] = initial_state
+        self.bound.count[:] = 0
+        self.progress.fill(0)
+        self._kernel.replace(self._budget, INTERRUPT_CHECK_STEPS)
+        self._memory[:] = self._begin_memory
+        self._forget_samples()
+        self._measured[:], self._command[:] = state.measured, state.commanded
+        self._applied[:] = state.applied_inputs or inputs.values[0]
+        self._kept_inputs[:] = self._applied
+        self._drivers.restart()
+        self.status, self.stopped_at = Status.DONE, float(self.loop.edges[0])
+
+    @property
+    def prepared(self) -> SampledLoop:
+        """The prepared loop."""
+        return self.loop.prepared
+
+    @property
+    def room(self) -> int:
+        """Rows for which this run has arrays."""
+        return len(self._rows)
+
+    @property
+    def can_run(self) -> bool:
+        """Whether the machine code of the integrator can be called by another kernel."""
+        return self.bound.entry_address is not None
+
+    def _make_arrays(self, n: int, m: int) -> None:
+        prepared, state = self.loop.prepared, self._begin_state
+        inputs, intervals = prepared.inputs, self.loop.edges.size - 1
+        self.progress = np.zeros(len(Progress), dtype=np.int64)
+        self._begin_memory = self.loop.memory_of(state)
+        self._memory = np.array([self._begin_memory] * 2, dtype=float)
+        self._measured, self._command = np.array(state.measured, dtype=float), np.array(state.commanded, dtype=float)
+        self._applied = np.array(state.applied_inputs or inputs.values[0], dtype=float)
+        self._kept, self._kept_inputs = self.bound.state.copy(), self._applied.copy()
+        self._samples = np.empty((intervals, self._measured.size))
+        self._commands = np.empty((intervals, self._command.size))
+        self._inputs = inputs.ends, inputs.values.copy(), inputs.slopes
+        if self._drivers.kinds.size:
+            segments, rows = FIRST_SEGMENTS + self.loop.capacity * m, FIRST_SEGMENTS + 2 * self.loop.capacity * m
+            self._segments: Any = np.empty(segments), np.empty((segments, m)), np.empty((segments, m))
+            self._times, self._rows = np.empty(rows), np.empty((rows, n))
+        else:
+            self._segments = self._inputs
+            self._times, self._rows = prepared.times, np.empty((prepared.times.size, n))
+
+    def _arguments(self, compiled: CompiledSystem, parameters: Array) -> tuple[Any, ...]:
+        loop, bound, drivers = self.loop, self.bound, self._drivers
+        outputs, measured_at = loop.measuring
+        return (
+            bound.entry_address or 0, bound.slots, bound.places, bound.clock, bound.count, bound.state,
+            outputs, compiled.precomputed, np.empty(max(compiled.sizes.outputs, 1)), measured_at,
+            loop.sample_address, parameters, *loop.commanding, *loop.intervals, *self._inputs, loop.offsets,
+            *loop.grid, drivers.kinds, drivers.settings, drivers.states, drivers.columns, drivers.counts,
+            drivers.scratch, drivers.begins, compiled.description.lower_bounds, self._applied, self._memory,
+            self._measured, self._command, self._kept, self._kept_inputs, drivers.kept, *self._segments, self._times,
+            self._rows, self._samples, self._commands, self.progress, INTERRUPT_CHECK_STEPS,
+        )  # fmt: skip
+
+    def integrate(self) -> None:
+        """Run the loop until its end, or until an interval fails or the user stops it."""
+        run, flags = self._kernel.runner, flat_view(self.progress)
+        try:
+            status = run()
+            while status == _PAUSED:
+                if flags[_WAITING]:
+                    self._call_controller(flags[_INTERVAL])
+                elif flags[Progress.FULL]:
+                    self._extend()
+                elif self._takes_too_many_steps():
+                    break
+                status = run()
+        except KeyboardInterrupt:
+            status = Status.INTERRUPTED
+        self.status = Status.TOO_MANY_STEPS if status == Status.PAUSED else Status(status)
+        if self.progress[Progress.SAMPLES]:
+            self.stopped_at = float(self.bound.clock[0])
+        if self.status == Status.INTERRUPTED:
+            self._discard_interval()
+
+    def _forget_samples(self) -> None:
+        """No sample has been taken yet by a controller that is called."""
+        self._memories, self._called_at = [self._begin_state.controller] * 2, -1
+        self._views = flat_view(self._measured), flat_view(self._command)
+
+    def _call_controller(self, interval: int) -> None:
+        """Take the sample of an interval: from the measurements of the kernel to its commands."""
+        (measured, command), memories = self._views, self._memories
+        memories[0] = memories[1]
+        assert self._controller is not None
+        commands, memories[1] = self._controller.step(memories[0], measured.tolist(), interval)
+        self._called_at = interval
+        for i, value in enumerate(commands):
+            command[i] = value
+
+    def _takes_too_many_steps(self) -> bool:
+        running = self.progress[Progress.RUNNING]
+        return bool(running and self.bound.count[2] - self.progress[Progress.STEPS_BEFORE] >= MAX_STEPS)
+
+    def _extend(self) -> None:
+        """Longer buffers for the segments and rows of driven inputs."""
+        self._segments = tuple(map(_longer, self._segments))
+        self._times, self._rows = _longer(self._times), _longer(self._rows)
+        for i, array in enumerate((*self._segments, self._times, self._rows), self._first_buffer):
+            self._kernel.replace(i, array)
+        self.progress[Progress.FULL] = 0
+
+    def _discard_interval(self) -> None:
+        """Forget an interval that was interrupted, so that the run can be continued from its beginning."""
+        progress = self.progress
+        if progress[Progress.RUNNING]:
+            progress[Progress.SEGMENTS] = progress[Progress.FIRST_SEGMENT]
+            progress[Progress.ROWS] = progress[Progress.FIRST_ROW]
+            progress[Progress.SAMPLES] = progress[Progress.INTERVAL]
+        self.stopped_at, self.bound.state[:] = self.time, self._kept
+
+    @property
+    def time(self) -> float:
+        """The end of the last completed interval [s]."""
+        return float(self.loop.edges[self.progress[Progress.INTERVAL]])
+
+    @property
+    def state(self) -> Array:
+        """The state (n,) at the end of the last completed interval."""
+        return self._kept
+
+    @property
+    def measured(self) -> Array:
+        """Measurements (K, columns) of every interval that has begun."""
+        return self._samples[: self.progress[Progress.SAMPLES]]
+
+    @property
+    def commanded(self) -> Array:
+        """Commands (K, inputs) of every interval that has begun."""
+        return self._commands[: self.progress[Progress.SAMPLES]]
+
+    @property
+    def signal(self) -> PiecewiseLinear:
+        """The segments of all inputs of the intervals that have begun."""
+        count = int(self.progress[Progress.SEGMENTS])
+        return PiecewiseLinear(*(array[:count] for array in self._segments))
+
+    @property
+    def rows(self) -> tuple[Array, Array]:
+        """Times (N,) and states (N, n) of the rows that were reached."""
+        count = int(self.progress[Progress.ROWS])
+        return self._times[:count], self._rows[:count]
+
+    @property
+    def control_state(self) -> ControlLoopState:
+        """The state of the loop at the end of the last completed interval."""
+        done, begun = int(self.progress[Progress.INTERVAL]), self._begin_state
+        if not done:
+            return begun
+        return ControlLoopState(
+            controller=self._controller_memory(done),
+            origin=begun.origin,
+            time=self.time,
+            sample_count=begun.sample_count + done - (0 if self.loop.prepared.sampled else 1),
+            measured=tuple(self._samples[done - 1].tolist()),
+            commanded=tuple(self._commands[done - 1].tolist()),
+            applied_inputs=tuple(self._kept_inputs.tolist()),
+            drivers=self._drivers.as_mapping(),
+        )
+
+    def _controller_memory(self, done: int) -> Any:
+        """The memory of the controller after so many completed intervals."""
+        if self.loop.law is None:  # the last sample may be that of an interval that was not completed
+            return self._memories[1 if done > self._called_at else 0]
+        return dict(zip(self.loop.law.initial_memory, self._memory[0].tolist(), strict=True))
+
+
+def _longer(array: Array) -> Array:
+    longer = np.empty((2 * len(array), *array.shape[1:]))
+    longer[: len(array)] = array
+    return longer

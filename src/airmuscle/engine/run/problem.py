@@ -1,0 +1,246 @@
+"""Problem: a system, its input, initial state, duration, output times and integrator, checked as a whole."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import sys
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core.arrays import FEW, NUMBERS, Array
+from ...core.declaration import as_float
+from ...core.errors import ParameterError
+from ...core.reference import Reference, cite
+from ...core.short_repr import ShortRepr
+from ...core.system import System
+from ..compile.program import CompiledSystem, compile_system
+from ..loop.control_loop import ControlLoop, ControlLoopState
+from ..loop.inputs import InputSignal, Schedule, check_input_signal
+from ..loop.law_design import designed_loop
+from ..loop.piecewise_linear import PiecewiseLinear
+from ..loop.with_drivers import WithDrivers
+from ..state import check_system, state_vector
+from .integrators import Integrator, default_integrator
+from .output_times import output_times
+
+MAX_KEPT_ROWS = 100_000
+"""Output times that are kept with a plant for its next run, 0.8 MB (chosen)."""
+LARGEST = sys.float_info.max
+"""The largest finite number."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Problem(ShortRepr):
+    """An initial value problem: a system under an input for `duration` [s].
+
+    system         any System: a Plant, or a user-defined one
+    input          an InputSignal such as a Schedule, or a ControlLoop
+    initial_state  values by state; by default a Plant's equilibrium at ambient pressure
+    start_time     [s]
+    output_times   spacing [s] or times [s] of the rows; by default 1/1000 of the run, at most 10 ms. The instants of
+                   the input are always among the rows, with the inputs that begin there
+    integrator     Rodas4(rtol=1e-6) by default
+    control_state  state of the control loop, to continue a run
+
+    Raises ParameterError for an input or state that the system does not have, an input beyond its range, a duration
+    that is not positive, and wrong types.
+    """
+
+    system: System
+    input: InputSignal | ControlLoop
+    duration: float
+    initial_state: Mapping[str, float] | None = None
+    start_time: float = 0.0
+    output_times: float | npt.ArrayLike | None = None
+    integrator: Integrator | None = None
+    control_state: ControlLoopState | None = None
+
+    def __post_init__(self) -> None:
+        check_system("simulate", self.system)
+        object.__setattr__(self, "duration", as_float("simulate: duration", self.duration))
+        object.__setattr__(self, "start_time", as_float("simulate: start_time", self.start_time))
+        object.__setattr__(self, "integrator", default_integrator(self.integrator))
+        self._check_time()
+        if isinstance(self.input, ControlLoop):
+            object.__setattr__(self, "input", designed_loop(self.input, self.system))
+            known = self.compiled.description
+            self.input.check_columns((*known.state_names, *known.output_names), known.input_names)
+            if self.control_state is None:
+                self.input.check_sample_time(self.duration)
+            check_input_range(self.compiled, self._other_segments(self.input), self.start_time)
+        else:
+            check_input_signal(self.input)
+            check_input_range(self.compiled, self.segments, self.start_time)
+        if self.initial_state is not None:
+            _ = self.initial_vector
+
+    def _check_time(self) -> None:
+        if not 0 < self.duration < float("inf"):
+            raise ParameterError(f"simulate: duration is {self.duration!r} s; it must be positive and finite.")
+        if not self.start_time + self.duration > self.start_time:
+            raise ParameterError(
+                f"simulate: start_time is {self.start_time!r} s; a duration of {self.duration!r} s is lost in rounding."
+            )
+
+    def _other_segments(self, loop: ControlLoop) -> PiecewiseLinear:
+        """The signal of the inputs of a control loop that its controller does not command."""
+        inputs = self.compiled.description.input_names
+        driven = WithDrivers(loop.other_inputs, loop.drivers)
+        return driven.checked_segments(inputs, self.start_time, self.duration)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields alone: compiled code belongs to a process, and all else follows from the fields."""
+        return {field.name: self.__dict__[field.name] for field in dataclasses.fields(self)}
+
+    @property
+    def end_time(self) -> float:
+        """End of the run [s]."""
+        return self.start_time + self.duration
+
+    @property
+    def references(self) -> tuple[Reference, ...]:
+        """Sources of the models, of the integrator and of the controller, sorted by key."""
+        known = self.compiled.description.cited
+        if self.integrator not in known:
+            known[self.integrator] = tuple(cite((self.system, self.integrator)))
+        if type(self.input) is Schedule or not cite((self.input,)):
+            return known[self.integrator]
+        return tuple(cite((self.system, self.input, self.integrator)))
+
+    @functools.cached_property
+    def compiled(self) -> CompiledSystem:
+        """The compiled system."""
+        return compile_system(self.system)
+
+    @functools.cached_property
+    def segments(self) -> PiecewiseLinear:
+        """The input signal of an open-loop run."""
+        assert isinstance(self.input, InputSignal)
+        inputs = self.compiled.description.input_names
+        return self.input.checked_segments(inputs, self.start_time, self.duration)
+
+    @functools.cached_property
+    def times(self) -> Array:
+        """Output times (N,) [s] of an open-loop run; where the input is that of the last run with the plant, and so is
+        all that they depend on, those of the last run, which nobody can write to."""
+        known, segments, given = self.compiled.description, self.segments, self.output_times
+        asked = given, self.start_time, self.duration
+        kept, last_asked, last_times = known.checked_input
+        if segments is not kept or not (given is None or type(given) in NUMBERS):
+            return output_times(*asked, segments.ends)
+        times: Array = last_times if asked == last_asked else output_times(*asked, segments.ends)
+        if times is not last_times and times.size <= MAX_KEPT_ROWS:
+            times.setflags(write=False)
+            known.checked_input = segments, asked, times
+        return times
+
+    @functools.cached_property
+    def initial_vector(self) -> Array:
+        """The initial state (n,), given or the default."""
+        if self.initial_state is None:
+            return default_state(self.compiled)
+        return initial_vector(self.compiled, self.initial_state)
+
+
+def initial_vector(compiled: CompiledSystem, state: Mapping[str, float]) -> Array:
+    """A given initial state (n,), checked; that of the run before is not checked again."""
+    known, system = compiled.description, compiled.system
+    numbers = plain_numbers(state, known.state_limits)
+    if numbers is None or numbers != known.checked_state:
+        vector = state_vector(system, state)
+        system.check_state(state)
+        known.checked_state = vector.tolist()
+        return vector
+    return np.array(numbers)
+
+
+def plain_numbers(values: Mapping[str, float], limits: Mapping[str, float]) -> list[float] | None:
+    """The values in the order of their lower limits; None where `state_vector` must check them, or refuse them."""
+    if not isinstance(values, Mapping) or len(values) != len(limits):
+        return None
+    numbers: list[float] = []
+    for name, low in limits.items():
+        value: Any = values.get(name)
+        if type(value) not in NUMBERS or not low <= value or not abs(value) <= LARGEST:
+            return None
+        numbers.append(value)
+    return numbers
+
+
+def default_state(compiled: CompiledSystem) -> Array:
+    """The default initial state (n,): a Plant's equilibrium at ambient pressure, computed once for a system.
+
+    Raises ParameterError for a system that has none, EquilibriumError for a plant without a stable equilibrium.
+    """
+    known, system = compiled.description, compiled.system
+    if known.default_state is None:
+        state = system.default_state()
+        if state is None:
+            raise ParameterError(
+                f"simulate: give the initial_state of {type(system).__name__}, a value for each state."
+            )
+        known.default_state = state_vector(system, state)
+    return known.default_state
+
+
+def check_signal(system: System, signal: InputSignal, start: float, duration: float) -> None:
+    """Raise ParameterError where an input signal is beyond its range, from `start` [s] for `duration` [s]."""
+    compiled = compile_system(system)
+    check_input_range(compiled, signal.segments(compiled.description.input_names, start, duration), start)
+
+
+def check_input_range(compiled: CompiledSystem, segments: PiecewiseLinear, start: float) -> None:
+    """Raise ParameterError where an input is beyond its range."""
+    known = compiled.description
+    if segments is known.checked_input[0]:
+        return
+    if len(known.input_names):
+        _check_within(compiled, segments, start)
+    if not any(table.flags.writeable for table in (segments.ends, segments.values, segments.slopes)):
+        known.checked_input = segments, None, None
+
+
+def _check_within(compiled: CompiledSystem, segments: PiecewiseLinear, start: float) -> None:
+    """Raise ParameterError where an input is beyond its range, from the values of all segments."""
+    known = compiled.description
+    values, slopes = segments.values, segments.slopes
+    tables = [values]
+    if any(slopes.ravel().tolist()) if slopes.size <= FEW else slopes.any():
+        tables.append(values + slopes * (segments.ends - segments.starts(start))[:, None])
+    for table in tables:
+        if _are_within(table, known.input_limits.values()):
+            continue
+        low, high = known.input_lower_limits, known.input_upper_limits
+        row, column = np.argwhere(~((table >= low) & (table <= high)))[0]
+        _raise_for_input(compiled, int(column), table[row, column], f"before {segments.ends[row]:g} s")
+
+
+def check_inputs(compiled: CompiledSystem, values: Array, when: str) -> None:
+    """Raise ParameterError where one of the values (m,) of the inputs is beyond its range, or not a number."""
+    known = compiled.description
+    outside = np.flatnonzero(~((values >= known.input_lower_limits) & (values <= known.input_upper_limits)))
+    if outside.size:
+        _raise_for_input(compiled, int(outside[0]), values[outside[0]], when)
+
+
+def _raise_for_input(compiled: CompiledSystem, column: int, value: float, when: str) -> None:
+    variable = compiled.system.input_variables[column]
+    unit = "" if variable.unit in ("", "1") else f" {variable.unit}"
+    raise ParameterError(
+        f"the input '{variable.name}' is {value:g}{unit} {when}; allowed "
+        f"range: {variable.minimum:g} to {variable.maximum:g}{unit} ({variable.meaning})."
+    )
+
+
+def _are_within(table: Array, limits: Iterable[tuple[int, tuple[float, float]]]) -> bool:
+    """Whether every column of a table (N, m) is within its limits."""
+    if table.size > FEW:
+        smallest, largest = table.min(axis=0).tolist(), table.max(axis=0).tolist()
+    else:
+        columns = list(zip(*table.tolist(), strict=True))
+        smallest, largest = list(map(min, columns)), list(map(max, columns))
+    return all(low <= smallest[i] and largest[i] <= high for i, (low, high) in limits)

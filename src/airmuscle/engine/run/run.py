@@ -1,0 +1,207 @@
+"""Simulation of a problem, and the short ways in: `simulate` and `advance`."""
+
+from __future__ import annotations
+
+import functools
+import operator
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core.annotation import one_line
+from ...core.arrays import NUMBERS
+from ...core.declaration import as_float
+from ...core.errors import ParameterError, SimulationError
+from ...core.status import Status
+from ...core.system import System
+from ...recording import Recording
+from ..compile.program import CompiledSystem, compile_system
+from ..loop.control_loop import ControlLoop
+from ..loop.inputs import InputSignal, Schedule
+from ..loop.piecewise_linear import PiecewiseLinear
+from ..state import check_system, state_vector
+from .bound_integrator import INTERRUPT_CHECK_STEPS, BoundIntegrator, RawSolution
+from .closed_loop import solve_closed_loop
+from .integrators import Integrator, default_integrator
+from .problem import Problem, check_input_range, plain_numbers
+from .rows import early_end, make_recording, recorded_rows, status_of_state, truncate_at_invalid_row
+from .solution import Solution, Statistics
+
+_AT_POSSIBLE_STATE = {Status.DONE, Status.INTERRUPTED, Status.TOO_MANY_STEPS}
+"""How a run ends at a possible state."""
+INSTANTS = 1000
+"""Instants between two rows at which the first impossible state is looked for (chosen)."""
+
+
+def solve(problem: Problem) -> Solution:
+    """The solution of a problem; a run that ended early is returned as far as it was computed, with its status."""
+    return solve_closed_loop(problem) if isinstance(problem.input, ControlLoop) else _solve_open_loop(problem)
+
+
+def _solve_open_loop(problem: Problem) -> Solution:
+    compiled, integrator = problem.compiled, problem.integrator
+    assert integrator is not None
+    segments, times = problem.segments, problem.times
+    pool = compiled.description.integrators
+    bound = borrow(pool, compiled, integrator)
+    check = functools.partial(status_of_state, compiled, segments, problem.start_time)
+    raw = bound.run(segments, problem.start_time, problem.initial_vector, times, check=check)
+    give_back(pool, integrator, bound)
+    rows, reached = raw.rows, raw.reached
+    shown = (rows, times) if reached == times.size else (rows[:reached], times[:reached])
+    table = recorded_rows(compiled, *shown, segments, problem.start_time)
+    raw, table = truncate_at_invalid_row(compiled, raw, table, times)
+    if raw.status not in _AT_POSSIBLE_STATE and raw.reached > 0 and raw.steps < INTERRUPT_CHECK_STEPS:  # a short run
+        raw = _end_between_rows(problem, raw)
+    recording, diagnostics = make_recording(
+        compiled, raw, table, times, integrator, problem.end_time, problem.references, {}
+    )
+    final = dict(zip(compiled.description.state_names, raw.state.tolist(), strict=True))
+    statistics = Statistics(raw.steps, raw.rejected)
+    return Solution(problem, recording, raw.status, statistics, diagnostics, raw.time, final)
+
+
+def _end_between_rows(problem: Problem, raw: RawSolution) -> RawSolution:
+    """The solution, which ended early, with time, state and status of the first impossible one of many instants since
+    its last row, if there is one: beyond the model numbers can grow without limit. A run does not depend on its rows.
+    """
+    compiled, integrator = problem.compiled, problem.integrator
+    assert integrator is not None
+    instants = np.linspace(problem.times[raw.reached - 1], raw.time, INSTANTS + 1)[1:]
+    again = integrator.run(compiled, problem.segments, problem.start_time, problem.initial_vector, instants)
+    rows, reached = again.rows[: again.reached], instants[: again.reached]
+    table = recorded_rows(compiled, rows, reached, problem.segments, problem.start_time)
+    end, _ = truncate_at_invalid_row(compiled, again, table, instants)
+    return raw if end is again else raw._replace(time=end.time, state=end.state, status=end.status)
+
+
+def borrow(pool: dict[Any, list[Any]], compiled: CompiledSystem, integrator: Integrator) -> BoundIntegrator:
+    """An integrator bound to a system: one of the pool that no other run uses, or a new one."""
+    try:
+        idle: BoundIntegrator = pool[integrator].pop()
+    except (KeyError, IndexError):
+        return integrator.bind(compiled)
+    return idle
+
+
+def give_back(pool: dict[Any, list[Any]], integrator: Integrator, bound: BoundIntegrator) -> None:
+    """Keep a bound integrator for the next run."""
+    pool.setdefault(integrator, []).append(bound)
+
+
+def simulate(
+    plant: System,
+    input: InputSignal | ControlLoop,
+    *,
+    duration: float,
+    initial_state: Mapping[str, float] | None = None,
+    start_time: float = 0.0,
+    output_times: float | npt.ArrayLike | None = None,
+    integrator: Integrator | None = None,
+    complete: bool = True,
+) -> Recording:
+    """Simulate a plant for `duration` [s]; its states, outputs and inputs as a Recording.
+
+    plant          any System: a Plant, or a user-defined one
+    input          an InputSignal such as a Schedule, or a ControlLoop
+    initial_state  values by state; by default a Plant's equilibrium at ambient pressure
+    output_times   spacing [s] or times [s] of the rows; by default 1/1000 of the run, at most 10 ms. The instants of
+                   the input are always among the rows, with the inputs that begin there
+    integrator     Rodas4(rtol=1e-6) by default
+    complete       whether a run that ends early raises SimulationError (its `.recording` holds what was computed);
+                   otherwise that part is returned, with the reason in its notes
+
+    The short form of `solve(Problem(...)).recording`. The result does not depend on `output_times`. Raises
+    ParameterError for an input or state that the plant does not have.
+    """
+    solution = solve(Problem(plant, input, duration, initial_state, start_time, output_times, integrator))
+    return (solution.raise_if_incomplete() if complete else solution).recording
+
+
+def advance(
+    plant: System,
+    state: Mapping[str, float],
+    inputs: Mapping[str, float] | PiecewiseLinear,
+    dt: float,
+    integrator: Integrator | None = None,
+    *,
+    start_time: float = 0.0,
+) -> dict[str, float]:
+    """The state of a plant `dt` [s] later, with the inputs held.
+
+    Inputs that vary meanwhile are given as PiecewiseLinear from `start_time` on:
+    `segments, states = WithDrivers(signal, drivers).step(states, plant.inputs, start_time, dt)`. For many steps of one
+    plant a `Stepper` is quicker. Raises SimulationError where the step fails,
+    ParameterError for an unknown name or an input beyond its range.
+    """
+    check_system("advance", plant)
+    dt, start_time = as_float("advance: dt", dt), as_float("advance: start_time", start_time)
+    if not 0 < dt < float("inf"):
+        raise ParameterError(f"advance: dt is {dt!r} s; it must be positive and finite.")
+    compiled, integrator = compile_system(plant), default_integrator(integrator)
+    final = _hold(compiled, integrator, state, inputs, dt) if isinstance(inputs, Mapping) else None
+    if final is not None:
+        return dict(zip(compiled.description.state_names, final, strict=True))
+    segments = _segments(compiled, inputs, start_time, dt)
+    pool = compiled.description.integrators
+    bound = borrow(pool, compiled, integrator)
+    raw = bound.run(segments, start_time, state_vector(plant, state), _NO_TIMES)
+    give_back(pool, integrator, bound)
+    if raw.status == Status.DONE and (raw.state < compiled.description.lower_bounds).any():
+        raw = raw._replace(status=Status.NEGATIVE_AIR_MASS)
+    if raw.status != Status.DONE:
+        raise SimulationError(str(early_end(compiled, raw, start_time + dt)))
+    return dict(zip(compiled.description.state_names, raw.state.tolist(), strict=True))
+
+
+_NO_TIMES = np.empty(0)
+
+
+def _hold(
+    compiled: CompiledSystem, integrator: Integrator, state: Mapping[str, float], inputs: Mapping[str, float], dt: float
+) -> list[float] | None:
+    """The state after a step with held inputs; None if `advance` must check the arguments or report a failure."""
+    known = compiled.description
+    x = plain_numbers(state, known.state_limits)
+    if x is None:
+        return None
+    held = [0.0] * len(known.input_names)
+    for name, value in inputs.items():
+        column, (low, high) = known.input_limits.get(name, _NO_INPUT)
+        if type(value) not in NUMBERS or not low <= value <= high:
+            return None
+        held[column] = value
+    bound = borrow(known.holders, compiled, integrator)
+    vector = np.array(x)
+    status = bound.hold(vector, np.array(held), dt)
+    give_back(known.holders, integrator, bound)
+    final: list[float] = vector.tolist()
+    if status is not Status.DONE or any(map(operator.lt, final, known.state_limits.values())):
+        return None
+    return final
+
+
+_NO_INPUT = -1, (np.inf, -np.inf)
+
+
+def _segments(
+    compiled: CompiledSystem, inputs: Mapping[str, float] | PiecewiseLinear, start: float, dt: float
+) -> PiecewiseLinear:
+    """The inputs of one step, checked."""
+    known = compiled.description
+    if isinstance(inputs, PiecewiseLinear):
+        inputs.check_shape(len(known.input_names), start)
+        if abs(float(inputs.ends[-1]) - start - dt) > 1e-9 * dt:
+            raise ParameterError(
+                f"advance: the segments end at {inputs.ends[-1]:g} s; start_time + dt is {start + dt:g} s."
+            )
+        segments = inputs
+    elif isinstance(inputs, Mapping):
+        hold = Schedule({name: ((start, value),) for name, value in inputs.items()})
+        segments = hold.segments(known.input_names, start, dt)
+    else:
+        raise ParameterError(f"advance: inputs are {one_line(inputs)}; give a value for each name, or PiecewiseLinear.")
+    check_input_range(compiled, segments, start)
+    return segments

@@ -1,0 +1,215 @@
+"""Forward sensitivities: a system extended by the derivatives of its states with respect to chosen parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+from ...core import autodiff, ops, tree
+from ...core.declaration import model, parameter
+from ...core.errors import ParameterError, suggestion
+from ...core.ops import Value
+from ...core.system import SensitivitySystem, System
+from ...core.variables import Input, StateVariable
+
+TOLERANCE_FACTOR = 10.0
+"""How much more a derivative times its scale may err than the state. Chosen: without any control derivatives are lost
+while the states rest, and at 1 the steps double."""
+
+
+@model
+class WithSensitivities(SensitivitySystem):
+    """A system with s_k = dx/dtheta_k for every column k as further states, and its outputs' derivatives.
+
+        s_k' = (df/dx) s_k + (df/du) v_k + df/dtheta_k,    dy/dtheta_k = (dy/dx) s_k + (dy/du) v_k + dy/dtheta_k,
+        y' = (dy/dx) f
+
+    A column is a group of leaf paths that share one value (`("circuit.fill.conductance",
+    "circuit.discharge.conductance")`), or an empty group for something that acts on the start alone. A step of this
+    system is exactly the derivative of the same step of the inner system, because it uses the Jacobian of the whole.
+    Columns steer the step ten times less than states do. Inputs that move are held in y'. `observed` names the states
+    and outputs y; all of them unless named. v_k = du/dtheta_k are further inputs, `sensitivity("fill", k)`, of the
+    inputs that `dependent_inputs` names: those of a controller whose measurements or parameters depend on theta_k
+    (`differentiate_loop`). All other inputs are independent of the columns.
+
+    `rates` and `outputs` are the law; what runs is printed from the inner system, all columns in one vector.
+    """
+
+    from_file: ClassVar[bool] = False
+
+    inner: System
+    columns: tuple[tuple[str, ...], ...]
+    scales: tuple[float, ...] = parameter("1", "theta_k", "size of a change of each column", fitted=False)
+    observed: tuple[str, ...] = ()
+    dependent_inputs: tuple[str, ...] = ()
+
+    def check(self) -> None:
+        if not self.columns or len(self.scales) != len(self.columns):
+            raise ParameterError(
+                f"WithSensitivities: {len(self.columns)} columns need as many scales (1 or more); "
+                f"there are {len(self.scales)}."
+            )
+        known = [leaf.path for leaf in tree.leaves(self.inner)]
+        for path in (path for group in self.columns for path in group):
+            if path not in known:
+                raise ParameterError(
+                    f"{type(self.inner).__name__} has no parameter '{path}'; there are {', '.join(known)}."
+                    f"{suggestion(path, known)}"
+                )
+        for name in self.dependent_inputs:
+            if name not in self.inner.inputs:
+                raise ParameterError(
+                    f"{type(self.inner).__name__} has no input '{name}'; there are {', '.join(self.inner.inputs)}."
+                    f"{suggestion(name, self.inner.inputs)}"
+                )
+        values = _Symbols(self.inner).call("outputs") if self.observed else {}
+        for name in self.observed:
+            if name not in values:
+                raise ParameterError(
+                    f"{type(self.inner).__name__} has no state or output '{name}'; there are {', '.join(values)}."
+                    f"{suggestion(name, values)}"
+                )
+
+    @property
+    def parameter_indices(self) -> tuple[tuple[int, ...], ...]:
+        """For every column the places of its paths among the inner leaves."""
+        place = {leaf.path: i for i, leaf in enumerate(tree.leaves(self.inner))}
+        return tuple(tuple(place[path] for path in group) for group in self.columns)
+
+    @property
+    def input_indices(self) -> tuple[int, ...]:
+        """The places of the dependent inputs among the inner inputs."""
+        return tuple(self.inner.inputs.index(name) for name in self.dependent_inputs)
+
+    @property
+    def observed_names(self) -> tuple[str, ...]:
+        """Names of the observed quantities."""
+        return self.observed or tuple(_Symbols(self.inner).call("outputs"))
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """Names of the observed quantities, of the derivatives of each by every column, and of their slopes in time."""
+        names = self.observed_names
+        further = [sensitivity(n, k) for n in names for k in range(len(self.columns))]
+        return (*names, *further, *(f"{n}.rate" for n in names))
+
+    @property
+    def states(self) -> tuple[StateVariable, ...]:
+        """The inner system's states, then for each of them the derivatives by every column."""
+        inner = self.inner.states
+        further = [
+            StateVariable(
+                sensitivity(s.name, k), s.unit, TOLERANCE_FACTOR * s.nominal / scale, f"d {s.name} by column {k}"
+            )
+            for s in inner
+            for k, scale in enumerate(self.scales)
+        ]
+        return (*inner, *further)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The inner system's inputs, then for each dependent one its derivatives by every column."""
+        return (*self.inner.inputs, *(name for name, _ in self._input_sensitivities()))
+
+    @property
+    def input_variables(self) -> tuple[Input, ...]:
+        """The inner system's inputs, then the derivatives of the dependent ones, without bounds."""
+        further = (
+            Input(name, "", -float("inf"), float("inf"), f"derivative of {of}")
+            for name, of in self._input_sensitivities()
+        )
+        return (*self.inner.input_variables, *further)
+
+    def _input_sensitivities(self) -> list[tuple[str, str]]:
+        """Names of the derivatives of inputs, and of the input of each."""
+        return [(sensitivity(name, k), name) for name in self.dependent_inputs for k in range(len(self.columns))]
+
+    @property
+    def state_lower_bounds(self) -> Sequence[float]:
+        """Those of the inner system; derivatives have none."""
+        further = len(self.states) - len(self.inner.states)
+        return [*self.inner.state_lower_bounds, *([-float("inf")] * further)]
+
+    def rates(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
+        """The inner rates, and the variational equation of every column."""
+        rates, along = self._differentiated("rates", state, inputs)
+        order = [s.name for s in self.inner.states]
+        further = {sensitivity(n, k): column[n] for k, column in enumerate(along) for n in order}
+        return {**{n: rates[n] for n in order}, **further}
+
+    def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
+        """The observed quantities, their derivatives by every column, and their slopes in time (`pressure.rate`)."""
+        values, along = self._differentiated("outputs", state, inputs)
+        slopes, names = self._slopes(state, inputs), self.observed_names
+        further = {sensitivity(n, k): column[n] for n in names for k, column in enumerate(along)}
+        return {n: values[n] for n in names} | further | {f"{n}.rate": slopes[n] for n in names}
+
+    def _differentiated(
+        self, method: str, state: Mapping[str, Value], inputs: Mapping[str, Value]
+    ) -> tuple[dict[str, Value], list[dict[str, Value]]]:
+        """The result of `inner.method`, and its total derivative along every column."""
+        import casadi
+
+        traced = _Symbols(self.inner)
+        values = traced.call(method)
+        vector = casadi.vertcat(*(casadi.SX(v) for v in values.values()))
+        by_state, by_leaf = casadi.jacobian(vector, traced.x), casadi.jacobian(vector, traced.p)
+        by_input = casadi.jacobian(vector, traced.u)[:, list(self.input_indices)]
+        place = {leaf.path: i for i, leaf in enumerate(tree.leaves(self.inner))}
+        directions = [
+            casadi.mtimes(by_state, casadi.vertcat(*(state[sensitivity(n, k)] for n in traced.names)))
+            + casadi.mtimes(
+                by_input, casadi.vertcat(casadi.SX(0, 1), *(inputs[sensitivity(n, k)] for n in self.dependent_inputs))
+            )
+            + sum((by_leaf[:, place[path]] for path in group), casadi.SX(vector.numel(), 1))
+            for k, group in enumerate(self.columns)
+        ]
+        derivatives = traced.put_in(casadi.horzcat(vector, *directions), state, inputs, self.inner)
+        columns = [dict(zip(values, derivatives[k], strict=True)) for k in range(len(derivatives))]
+        return columns[0], columns[1:]
+
+    def _slopes(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
+        import casadi
+
+        traced = _Symbols(self.inner)
+        rates, values = traced.call("rates"), traced.call("outputs")
+        vector = casadi.vertcat(*(casadi.SX(v) for v in values.values()))
+        slope = casadi.jtimes(vector, traced.x, casadi.vertcat(*(casadi.SX(rates[n]) for n in traced.names)))
+        return dict(zip(values, traced.put_in(slope, state, inputs, self.inner)[0], strict=True))
+
+
+def sensitivity(name: str, column: int) -> str:
+    """The name of the derivative of a state or output by a column."""
+    return f"d {name}/d {column}"
+
+
+class _Symbols:
+    """A system's model over symbols of its own, and the way back to the values that it is asked at."""
+
+    def __init__(self, inner: System) -> None:
+        import casadi
+
+        self.model, self.p = autodiff.symbolic(inner)
+        self.names = [s.name for s in inner.states]
+        self.input_names = inner.inputs
+        self.x, self.u = casadi.SX.sym("x", len(self.names)), casadi.SX.sym("u", len(self.input_names))
+
+    def call(self, method: str) -> dict[str, Any]:
+        """`rates` of the model, or its `outputs` with the states among them."""
+        state = {name: self.x[i] for i, name in enumerate(self.names)}
+        inputs = {name: self.u[i] for i, name in enumerate(self.input_names)}
+        values = dict(getattr(self.model, method)(state, inputs))
+        return values if method == "rates" else {**state, **values}
+
+    def put_in(
+        self, matrix: Any, state: Mapping[str, Value], inputs: Mapping[str, Value], inner: System
+    ) -> list[list[Any]]:
+        """The columns of a matrix of expressions at these values, which may be symbols themselves."""
+        import casadi
+
+        values = [state[n] for n in self.names] + [inputs[n] for n in self.input_names]
+        values += [leaf.value for leaf in tree.leaves(inner)]
+        free = casadi.vertcat(self.x, self.u, self.p)
+        evaluated = casadi.substitute(casadi.cse(matrix), free, casadi.vertcat(*values))
+        columns = [[evaluated[i, k] for i in range(evaluated.shape[0])] for k in range(evaluated.shape[1])]
+        return columns if ops.is_symbol(*values) else [[float(v) for v in column] for column in columns]

@@ -1,0 +1,119 @@
+"""Files of the library: folders, entry names, and reading of TOML."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from ...bench.readers.file_kind import check_regular_file
+from ...core.errors import FileError, UnknownNameError, suggestion
+
+LAWS = Path(__file__).parent
+"""Folder of the muscles and laws."""
+VALVES = LAWS / "valves"
+"""Folder of the valves."""
+PLANTS = LAWS / "plants"
+"""Folder of the plants."""
+PRODUCTS = LAWS / "products"
+"""Folder of the ratings of commercial muscles."""
+DATA = LAWS / "data"
+"""Folder of the data sets."""
+
+
+def list_library() -> tuple[str, ...]:
+    """Names of all entries that `load` reads: muscles, laws, valves, plants and products, sorted."""
+    return tuple(sorted((*list_laws(), *list_valves(), *list_plants(), *list_products())))
+
+
+def list_laws() -> tuple[str, ...]:
+    """Names of all muscles and laws, sorted."""
+    return tuple(sorted(path.stem for path in LAWS.glob("*.toml")))
+
+
+def list_valves() -> tuple[str, ...]:
+    """Names of all valves, sorted."""
+    return tuple(sorted(path.stem for path in VALVES.glob("*.toml")))
+
+
+def list_plants() -> tuple[str, ...]:
+    """Names of all plants, sorted."""
+    return tuple(sorted(path.stem for path in PLANTS.glob("*.toml")))
+
+
+def list_products() -> tuple[str, ...]:
+    """Names of all commercial muscles of which the ratings are known, sorted."""
+    return tuple(sorted(path.stem for path in PRODUCTS.glob("*.toml")))
+
+
+def entries_of_product(name: str) -> tuple[str, ...]:
+    """Names of the muscles and laws of the library that were measured on a product, sorted."""
+    return tuple(law for law in list_laws() if read_toml(LAWS / f"{law}.toml").get("product") == name)
+
+
+def list_data() -> tuple[str, ...]:
+    """Names of all measured or tabulated data sets, sorted."""
+    return tuple(sorted(path.stem for path in DATA.glob("*.csv")))
+
+
+def complete_name(name: str, known: Iterable[str], kind: str) -> str:
+    """The known name that equals or uniquely begins with `name`, in any case and with blanks or "_" for "-".
+
+    Raises UnknownNameError, listing the known names and suggesting a similar one, or those that contain `name`.
+    """
+    known = tuple(known)
+    if name in known:
+        return name
+    folded = _folded(name)
+    if folded in known:
+        return folded
+    matches = [candidate for candidate in known if folded and candidate.lower().startswith(folded)]
+    if len(matches) > 1:
+        raise UnknownNameError(f"'{name}' is ambiguous: {', '.join(matches)}. Write more of the name.")
+    if not matches:
+        hint = _file_in_folder(name) or suggestion(folded, known) or _names_with(folded, known)
+        raise UnknownNameError(f"no {kind} '{name}'; there are {', '.join(known)}.{hint}")
+    return matches[0]
+
+
+def _file_in_folder(name: str) -> str:
+    """A sentence with the muscle file or the scenario in a folder of this name; empty if there is none."""
+    files = (Path(name) / file for file in ("muscle.toml", "scenario.toml"))
+    found = next((file.as_posix() for file in files if name and file.is_file()), "")
+    return f" '{name}' is a folder; write {found}." if found else ""
+
+
+def _folded(name: str) -> str:
+    """A name in the spelling of the library: lower case, with hyphens."""
+    return "-".join(name.lower().replace("_", " ").split())
+
+
+def _names_with(part: str, known: Iterable[str]) -> str:
+    """A sentence with up to three names that contain `part` or one of its words; empty if there are none."""
+    words = [word for word in (part, *part.split("-")) if len(word) > 2]
+    similar = list(dict.fromkeys(name for word in words for name in known if word in name.lower()))[:3]
+    return f" Did you mean {' or '.join(repr(name) for name in similar)}?" if similar else ""
+
+
+def is_path(name_or_path: str | Path) -> bool:
+    """Whether the argument is a path: a Path, or text with the suffix .toml or a folder separator."""
+    name = str(name_or_path)
+    return isinstance(name_or_path, Path) or name.endswith(".toml") or "/" in name or "\\" in name
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Tables of a TOML file. Raises FileError if the file cannot be read or is not valid TOML."""
+    try:
+        if "\0" not in str(path) and not path.exists():
+            raise FileError(f"{path}: there is no such file.")
+        check_regular_file(path)
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise FileError(f"{path}: cannot be read ({error.strerror}).") from None
+    except UnicodeDecodeError as error:
+        raise FileError(f"{path}: is not UTF-8 text (byte {error.start}). Save it as UTF-8.") from None
+    except tomllib.TOMLDecodeError as error:
+        raise FileError(f"{path}: is not valid TOML: {error}.") from None
+    except (ValueError, RecursionError) as error:  # a null byte in the path, or brackets nested too deeply
+        raise FileError(f"{path}: cannot be read ({error}).") from None

@@ -1,0 +1,113 @@
+"""Entry of a fitted muscle: the fitted law with its note, its geometry and its 95 % band."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ...bench.identify import Fit
+from ...bench.identify.candidate_scores import RankedModel
+from ...bench.identify.left_out import LEVEL
+from ...bench.identify.specimen_errors import SpecimenErrors, resting_lengths_of, specimens_of
+from ...bench.segment import maximum_rate
+from ...core.errors import printable
+from ...core.reference import cite
+from ...physics.muscle.geometry import Geometry
+from ...recording import Recording
+from .entry import MISSING_GEOMETRY, Entry
+from .stated_band import StatedBand
+
+MAX_NAMES, MAX_NAME = 3, 60
+"""Maximum number of file names in a title, and of characters of each (chosen)."""
+
+
+def fitted_entry(
+    result: Fit, initial: Entry, files: Sequence[Path], error_ratio: float = 1.0, recordings: Sequence[Recording] = (),
+    errors: SpecimenErrors | None = None,
+) -> Entry:  # fmt: skip
+    """The initial entry with the fitted characteristic, a new provenance and its 95 % bands, without its checks.
+
+    error_ratio  rms error of rows left out of the fit over that of its own rows, by which the band is widened
+    recordings   of the fit, whose specimens, resting lengths and rates the band holds for
+    errors       of specimens left out of the fit, for the band of a specimen that was not measured
+    """
+    summary = dict(result.summary())
+    names = list_files([f.name for f in files])
+    note = f"Fitted to {names}: rms error {summary['rms error']}, maximum error {summary['maximum error']}."
+    geometry = fitted_geometry(initial, result.model)
+    title = f"{type(result.model).__name__} fitted to {list_files([f.stem for f in files])}"
+    entry = dataclasses.replace(
+        initial, name="muscle", title=title, provenance="fitted", note=note, warning="", characteristic=result.model,
+        geometry=geometry, validity_range=result.validity_range, checks=(),
+        uncertainty=None, error_band=_error_band(result, error_ratio, recordings, errors),
+        references=tuple(cite((initial.references, result.recording.references))),
+    )  # fmt: skip
+    return dataclasses.replace(entry, note=" ".join([note, *missing_geometry(entry)]))
+
+
+def left_out_ratio(best: RankedModel) -> float:
+    """Rms error of the rows left out over that of all rows; 1 where it is unknown or smaller."""
+    if not (best.in_sample_rmse > 0.0 and np.isfinite(best.cross_validated_rmse)):
+        return 1.0
+    return max(best.cross_validated_rmse / best.in_sample_rmse, 1.0)
+
+
+def _error_band(
+    result: Fit, ratio: float, recordings: Sequence[Recording], errors: SpecimenErrors | None
+) -> StatedBand | None:
+    """The quantile of the residuals of the uncensored rows that contains 95 % of further ones [SI], for the measured
+    specimens, and the band of others by the errors of specimens left out."""
+    residuals = np.abs(result.residuals[result.censoring == 0])
+    size = residuals.size
+    half = ratio * float(np.quantile(residuals, min(np.ceil((size + 1) * LEVEL) / size, 1.0))) if size else 0.0
+    if not (np.isfinite(half) and half > 0.0):
+        return None
+    source = f"95 % quantile of the residuals of {size} rows of the fit"
+    if ratio != 1.0:
+        source += f", times {ratio:.3g}, the ratio of the rms errors of rows left out and of all rows"
+    return band_of_others(band_range(StatedBand(result.fitted_quantity.name, half, source), recordings), errors)
+
+
+def band_of_others(band: StatedBand, errors: SpecimenErrors | None) -> StatedBand:
+    """The band with that of specimens that were not measured; unchanged without errors, or for a law without force."""
+    if errors is None or band.quantity != "force":
+        return band
+    return dataclasses.replace(band, new_specimen_half_width=errors.half_width, new_specimen_source=str(errors))
+
+
+def band_range(band: StatedBand, recordings: Sequence[Recording]) -> StatedBand:
+    """The band with the specimens, the resting lengths and the maximum rates of the records that it holds for."""
+    timed = [run for run in recordings if "time" in run]
+    return dataclasses.replace(
+        band,
+        specimens=specimens_of(recordings),
+        resting_lengths=tuple(resting_lengths_of(recordings).values()),
+        max_contraction_rate=maximum_rate(timed, "contraction") if timed else None,
+        max_pressure_rate=maximum_rate(timed, "pressure") if timed else None,
+    )
+
+
+def list_files(names: Sequence[str]) -> str:
+    """The names of files for a title: up to three of them, else their number with the first and the last."""
+    shown = map(printable, names)
+    short = [name if len(name) <= MAX_NAME else f"{name[: MAX_NAME // 2]}…{name[-MAX_NAME // 2 :]}" for name in shown]
+    if len(short) <= MAX_NAMES:
+        return ", ".join(short)
+    return f"{len(short)} files, {short[0]} to {short[-1]}"
+
+
+def fitted_geometry(initial: Entry, law: object) -> Geometry | None:
+    """The geometry of a muscle after the fit of its law: that inside the law, unless the muscle has one of another
+    kind."""
+    inside = getattr(law, "geometry", None)
+    if isinstance(inside, Geometry) and (initial.geometry is None or type(initial.geometry) is type(inside)):
+        return inside
+    return initial.geometry
+
+
+def missing_geometry(entry: Entry) -> list[str]:
+    """The remark that the muscle has no geometry, how it is given and how it is measured; empty if it has one."""
+    return [] if entry.geometry is not None else [f"The muscle lacks {MISSING_GEOMETRY}."]

@@ -1,0 +1,102 @@
+"""Uncertainty of fitted parameters in a muscle file: standard errors and correlations by parameter path."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Collection, Mapping
+from typing import Any
+
+import numpy as np
+
+from ...core.arrays import Array
+from ...core.errors import ParameterError
+from .location import Location, check_keys
+
+KEYS = ("parameters", "standard_errors", "correlations")
+"""Keys of the table [uncertainty]."""
+
+
+@dataclasses.dataclass(frozen=True)
+class ParameterUncertainty:
+    """Standard errors [SI] and correlation matrix of fitted parameters, named by their paths in the muscle file.
+
+    A parameter on a bound is not listed. Parameters that were fitted separately have the correlation zero.
+    """
+
+    parameters: tuple[str, ...]
+    standard_errors: tuple[float, ...]
+    correlations: tuple[tuple[float, ...], ...]
+
+    def __post_init__(self) -> None:
+        count = len(self.parameters)
+        rows = [len(row) for row in self.correlations]
+        if len(self.standard_errors) != count or rows != [count] * count:
+            raise ParameterError(
+                f"ParameterUncertainty: {count} parameters have {len(self.standard_errors)} standard errors and a "
+                f"correlation matrix with rows of {rows}; give one standard error and one row of {count} values each."
+            )
+        matrix = np.array(self.correlations).reshape(count, count)
+        if not (np.isfinite(self.standard_errors).all() and (np.array(self.standard_errors) >= 0).all()):
+            raise ParameterError("ParameterUncertainty: standard errors must be finite and not negative.")
+        if not np.allclose(matrix, matrix.T, atol=1e-6) or not np.allclose(np.diag(matrix), 1.0, atol=1e-6):
+            raise ParameterError("ParameterUncertainty: the correlation matrix must be symmetric with a unit diagonal.")
+        if (np.abs(matrix) > 1.0 + 1e-6).any():
+            raise ParameterError("ParameterUncertainty: allowed range of a correlation: -1 to 1.")
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance matrix in the order of the parameters [SI], shape (P, P)."""
+        errors = np.array(self.standard_errors)
+        return np.asarray(np.array(self.correlations) * np.outer(errors, errors))
+
+    def deviations(self, normal: Array) -> Array:
+        """Deviations of the parameters [SI] with this covariance, from independent normal deviates (..., P).
+
+        They follow from the root of the correlation matrix: that of the covariance would lose the small standard
+        errors, because those in SI units differ by many powers of ten.
+        """
+        count = len(self.parameters)
+        variances, directions = np.linalg.eigh(np.array(self.correlations).reshape(count, count))
+        root = directions * np.sqrt(np.maximum(variances, 0.0))
+        return np.asarray(normal @ root.T * np.array(self.standard_errors))
+
+
+def read_uncertainty(table: Any, location: Location) -> ParameterUncertainty:
+    """The uncertainty of a table [uncertainty]. Raises ParameterError with the location."""
+    if not isinstance(table, Mapping):
+        raise ParameterError(f"{location} is {table!r}; it must be a table with {', '.join(KEYS)}.")
+    check_keys(table, KEYS, location)
+    missing = [key for key in KEYS if key not in table]
+    if missing:
+        raise ParameterError(f"{location}: '{missing[0]}' is missing; give {', '.join(KEYS)}.")
+    try:
+        names = tuple(str(name) for name in table["parameters"])
+        errors = tuple(float(value) for value in table["standard_errors"])
+        matrix = tuple(tuple(float(value) for value in row) for row in table["correlations"])
+    except (TypeError, ValueError):
+        raise ParameterError(
+            f"{location}: parameters must be a list of paths, standard_errors a list of numbers, and correlations a "
+            "list of rows of numbers."
+        ) from None
+    try:
+        return ParameterUncertainty(names, errors, matrix)
+    except ParameterError as error:
+        raise error.located(location) from None
+
+
+def uncertainty_table(uncertainty: ParameterUncertainty) -> dict[str, Any]:
+    """The table [uncertainty] of a muscle file."""
+    return {key: getattr(uncertainty, key) for key in KEYS}
+
+
+def without_parts(uncertainty: ParameterUncertainty, parts: Collection[str]) -> ParameterUncertainty | None:
+    """The uncertainty without the parameters of these tables, such as `friction`; None if no parameter remains."""
+    names = uncertainty.parameters
+    kept = [i for i, name in enumerate(names) if name.partition(".")[0] not in parts]
+    if not kept:
+        return None
+    return ParameterUncertainty(
+        tuple(names[i] for i in kept),
+        tuple(uncertainty.standard_errors[i] for i in kept),
+        tuple(tuple(uncertainty.correlations[i][k] for k in kept) for i in kept),
+    )

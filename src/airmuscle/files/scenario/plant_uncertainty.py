@@ -1,0 +1,162 @@
+"""Table [uncertainty] of a scenario: residuals of the fit of its plant, with the covariance of the parameters.
+
+[uncertainty]                               written by airmuscle fit-dynamic and campaign, read by airmuscle predict
+deviations = { pressure = 620.0 }           standard deviation of the residuals of each observed quantity
+records = 3                                 number of records of the fit
+factors = { pressure = 2.4 }                half width of the 95 % band in deviations, from records predicted by others
+ranges = { pressure = [0.0, 5e5] }          ends of the measured quantities in the records
+rates = { pressure = 1e6 }                  their maximum rates of change
+parameters = ["gas.exponent", "circuit.fill.conductance, circuit.discharge.conductance"]
+                                            fitted parameters; several paths have one common value
+standard_errors = [0.01, 2.1e-11]           SI
+correlations = [[1.0, 0.2], [0.2, 1.0]]
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...bench.identify.dynamic import DynamicFit
+from ...bench.identify.dynamic.cross_prediction import OF_RECORD
+from ...bench.identify.left_out import LEVEL, degrees_of_freedom, root_mean_square, t_quantile
+from ...bench.identify.prediction import PlantUncertainty
+from ...bench.identify.prediction.dynamic import NORMAL_QUANTILE
+from ...bench.segment import maximum_rate
+from ...bench.segment.sensor import estimate_noise
+from ...core import tree
+from ...core.arrays import Array
+from ...core.errors import ParameterError
+from ...physics.plant.plant import Plant
+from ..library.location import Location, check_keys, read_finite_number
+from ..library.uncertainty import KEYS, read_uncertainty
+from .record import optional_table, signal_unit
+from .study_tables import read_integer
+
+DEVIATIONS = "deviations"
+ALL_KEYS = (DEVIATIONS, "records", "factors", "ranges", "rates", *KEYS)
+"""Keys of the table."""
+SEPARATOR = ", "
+"""Between the paths of parameters with a common value."""
+
+
+def fit_uncertainty(fit: DynamicFit, cross: Sequence[Mapping[str, float]] = ()) -> dict[str, Any]:
+    """The table [uncertainty] of the scenarios of a dynamic fit; `cross` are the rms errors [SI] by quantity of each
+    record predicted by the others.
+
+    The deviation of a quantity is the rms residual of all records, or the rms error of the records predicted by each
+    other if that is greater. It is multiplied by the 95 % quantile of the residuals over that of a normal
+    distribution, if that is greater, because model errors are not normally distributed. The factor is the quantile of
+    Student's t for the number of records, as far as their errors exceed the noise; one record, or records that do not
+    predict each other, have none.
+    """
+    models = fit.problem.record_models
+    deviations, factors = {}, {}
+    for name in models[0].names:
+        joint = root_mean_square([fit.rms(name, i) for i in range(len(models))])
+        predicted = [each[name] for each in cross if name in each]
+        error = max([joint, *([root_mean_square(predicted)] if predicted else [])])
+        deviations[name] = error * tail_factor(fit, name)
+        if len(predicted) > 1:
+            factors[name] = t_quantile(degrees_of_freedom(error, _noise(fit, name), len(predicted)))
+    known = {name: value for name, value in deviations.items() if value > 0.0}
+    records = [model.experiment.recording for model in models]
+    table: dict[str, Any] = {DEVIATIONS: known, "records": len(models), **({"factors": factors} if factors else {})}
+    ranges = {name: _ends([record[name] for record in records]) for name in deviations}
+    return {**table, "ranges": ranges, "rates": {n: maximum_rate(records, n) for n in deviations}, **_covariance(fit)}
+
+
+def _noise(fit: DynamicFit, name: str) -> float:
+    """The rms noise of a quantity [SI] from the second differences of its residuals, which contain no model error."""
+    residuals = [fit.residuals(i)[name] for i in range(len(fit.problem.record_models))]
+    return root_mean_square([estimate_noise(each[np.isfinite(each)]) for each in residuals])
+
+
+def _ends(columns: Sequence[Array]) -> list[float]:
+    values = np.concatenate(columns)
+    return [float(np.nanmin(values)), float(np.nanmax(values))]
+
+
+def _covariance(fit: DynamicFit) -> dict[str, Any]:
+    """The parameters that all records share, with their standard errors and correlations."""
+    common = [
+        i
+        for i, (estimate, unknown) in enumerate(zip(fit.estimates, fit.unknowns, strict=True))
+        if unknown.paths and OF_RECORD not in estimate.name and np.isfinite(estimate.stderr)
+    ]
+    if not common:
+        return {}
+    return {
+        "parameters": [SEPARATOR.join(fit.unknowns[i].paths) for i in common],
+        "standard_errors": [fit.estimates[i].stderr for i in common],
+        "correlations": np.clip(fit.correlations[np.ix_(common, common)], -1.0, 1.0).tolist(),
+    }
+
+
+def tail_factor(fit: DynamicFit, name: str) -> float:
+    """The 95 % quantile of the residuals of a quantity over that of a normal distribution of their rms; at least 1."""
+    residuals = np.concatenate([fit.residuals(i)[name] for i in range(len(fit.problem.record_models))])
+    residuals = residuals[np.isfinite(residuals)]
+    rms = float(np.sqrt(np.mean(residuals**2)))
+    return 1.0 if rms == 0.0 else max(float(np.quantile(np.abs(residuals), LEVEL)) / (NORMAL_QUANTILE * rms), 1.0)
+
+
+def read_plant_uncertainty(table: Any, plant: Plant, location: Location) -> PlantUncertainty:
+    """The uncertainty of a table [uncertainty] of a scenario. Raises ParameterError or UnitError with the location."""
+    if not isinstance(table, Mapping):
+        raise ParameterError(f"{location} is {table!r}; it must be a table with {', '.join(ALL_KEYS)}.")
+    check_keys(table, ALL_KEYS, location)
+    found = PlantUncertainty(
+        _read_positive(table.get(DEVIATIONS), plant, location.inside(DEVIATIONS)),
+        records=read_integer(table, "records", 1, location) if "records" in table else None,
+        factors=_read_positive(table["factors"], None, location.inside("factors")) if "factors" in table else {},
+        ranges=_read_ranges(optional_table(table, "ranges", location), plant, location.inside("ranges")),
+        rates=_read_rates(optional_table(table, "rates", location), plant, location.inside("rates")),
+    )
+    given = {key: table[key] for key in KEYS if key in table}
+    if not given:
+        return found
+    parameters = read_uncertainty(given, location)
+    groups = tuple(tuple(name.split(SEPARATOR)) for name in parameters.parameters)
+    paths = {leaf.path for leaf in tree.leaves(plant)}
+    unknown = [path for group in groups for path in group if path not in paths]
+    if unknown:
+        raise ParameterError(f"{location}, parameters: the plant has no parameter '{unknown[0]}'.")
+    return dataclasses.replace(found, parameters=groups, covariance=parameters.covariance)
+
+
+def _read_positive(table: Any, plant: Plant | None, location: Location) -> dict[str, float]:
+    """Positive numbers by quantity [SI], or ratios without a plant."""
+    if not isinstance(table, Mapping) or not table:
+        raise ParameterError(
+            f"{location} is {table!r}; it must be a table of standard deviations, such as pressure = 620.0."
+        )
+    numbers = {}
+    for name, value in table.items():
+        unit = "1" if plant is None else signal_unit(name, plant) or "1"
+        numbers[name] = read_finite_number(value, unit, f"{location}, {name}")
+        if not numbers[name] > 0.0:
+            raise ParameterError(f"{location}, {name} is {value!r}; it must be greater than zero.")
+    return numbers
+
+
+def _read_ranges(table: Mapping[str, Any], plant: Plant, location: Location) -> dict[str, tuple[float, float]]:
+    """The ends of quantities [SI]."""
+    ranges = {}
+    for name, value in table.items():
+        if not isinstance(value, list) or len(value) != 2:
+            raise ParameterError(f"{location}, {name} is {value!r}; it must be a list of minimum and maximum.")
+        low, high = (read_finite_number(end, signal_unit(name, plant) or "1", f"{location}, {name}") for end in value)
+        ranges[name] = low, high
+    return ranges
+
+
+def _read_rates(table: Mapping[str, Any], plant: Plant, location: Location) -> dict[str, float]:
+    """Maximum rates of change of quantities [SI per s]."""
+    return {
+        name: read_finite_number(value, f"{signal_unit(name, plant) or '1'}/s", f"{location}, {name}")
+        for name, value in table.items()
+    }

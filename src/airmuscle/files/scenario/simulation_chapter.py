@@ -1,0 +1,138 @@
+"""Report chapter: a simulated run with its time series, inputs, parameters, settings and references."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ...core.plotting import BLACK, BLUE, legend_below, new_figure
+from ...core.reference import cite
+from ...engine.loop.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop
+from ...engine.loop.inputs import InputSignal, Periodic, SampledSignal, Schedule
+from ...engine.loop.with_drivers import WithDrivers
+from ...recording import Recording
+from ...report.chapter import Chapter, Plot
+from ...report.formatting import format_number, typographic
+from ...report.parameters import parameter_table
+from .control_loop_plot import controller_table, loop_plot, segment_vertices
+from .scenario import Scenario
+
+PLOTTED = ("pressure", "contraction", "force", "friction", "position", "angle", "speed", "angular_speed")
+"""Quantities plotted, in this order; the recording contains all."""
+MAX_DRIVER_SEGMENTS = 300
+"""Segments of an input with drivers that a figure resolves; of a longer input only the beginning is plotted."""
+MAX_SEGMENTS = 50_000
+"""Segments plotted without drivers: there are no pulses to resolve."""
+MAX_LISTED_CHANGES = 6
+"""Maximum number of changes of an input that are listed one by one."""
+
+
+def run_chapter(scenario: Scenario, recording: Recording) -> Chapter:
+    """Return the chapter of a run, complete or up to its early end."""
+    notes = "\n\n".join(_sentence(note) for note in recording.notes)
+    loop = scenario.problem.input if isinstance(scenario.problem.input, ControlLoop) else None
+    plots = [loop_plot(scenario, loop, recording)] if loop else []
+    plots.append(Plot("run", f"{scenario.title}: simulated time series.", recording.plot(*_plotted_columns(recording))))
+    if scenario.plant.inputs:
+        plots.append(_input_plot(scenario, recording))
+    return Chapter(
+        paper="simulation",
+        title=scenario.title,
+        summary=f"{_describe_duration(scenario, recording)} All columns are in recording.csv.\n\n{notes}",
+        plots=tuple(plots),
+        tables=(
+            parameter_table(scenario.plant, "parameters", "Parameters of the plant"),
+            *((controller_table(scenario, loop),) if loop else ()),
+        ),
+        references=tuple(cite((scenario.plant, loop))),
+        chosen=_settings(scenario),
+    )
+
+
+def _sentence(note: str) -> str:
+    return f"{note[:1].upper()}{note[1:].rstrip('.')}."
+
+
+def _describe_duration(scenario: Scenario, recording: Recording) -> str:
+    reached, problem = float(recording["time"][-1]), scenario.problem
+    if reached < problem.end_time:
+        return f"Simulation of {problem.duration:g} s, ended early at {reached:.4g} s; the last note gives the reason."
+    return f"Simulation of {problem.duration:g} s."
+
+
+def _plotted_columns(recording: Recording) -> list[str]:
+    columns = [name for name in recording if not name.startswith((SETPOINT, MEASURED, COMMAND))]
+    return [name for quantity in PLOTTED for name in columns if name.rpartition(".")[2] == quantity]
+
+
+def _input_plot(scenario: Scenario, recording: Recording) -> Plot:
+    """Return the plot of the inputs that act on the plant, with their steps, and of the commands of drivers."""
+    command, inputs = scenario.problem.input, scenario.plant.inputs
+    if isinstance(command, ControlLoop):
+        command = command.as_open_loop(recording)
+    units = {item.name: "" if item.unit == "1" else f"\n[{item.unit}]" for item in scenario.plant.input_variables}
+    start, reached = scenario.problem.start_time, float(recording["time"][-1])
+    end = reached if reached > start else start + scenario.problem.duration
+    applied = command.segments(inputs, start, end - start)
+    shortened = applied.ends.size > (MAX_DRIVER_SEGMENTS if isinstance(command, WithDrivers) else MAX_SEGMENTS)
+    if shortened:
+        applied = command.segments(inputs, start, float(applied.ends[MAX_DRIVER_SEGMENTS - 1]) - start)
+    plotted = float(applied.ends[-1]) - start
+    commanded = command.inner.segments(inputs, start, plotted) if isinstance(command, WithDrivers) else None
+    figure, axes = new_figure(
+        len(inputs), 1, height=0.9 + 0.9 * len(inputs), sharex=True, sharey=len(set(units.values())) == 1, squeeze=False
+    )  # one scale for inputs of the same unit: openings are compared
+    for i, (name, axis) in enumerate(zip(inputs, axes[:, 0], strict=True)):
+        if commanded is not None:
+            vertices = segment_vertices(commanded, start, i)
+            axis.plot(*vertices, color=BLACK, linestyle="--", linewidth=0.9, label="command")
+        axis.plot(*segment_vertices(applied, start, i), color=BLUE, label="applied input")
+        axis.set_ylabel(f"{name}{units[name]}")
+    axes[-1, 0].set_xlabel("time [s]")
+    figure.align_ylabels()
+    if commanded is not None:
+        legend_below(figure, axes[0, 0])
+    part = f" (first {MAX_DRIVER_SEGMENTS} segments)" if shortened else ""
+    legend = "; dashed: commands to the drivers" if commanded is not None else ""
+    return Plot("inputs", f"Inputs applied to the plant{part}{legend}.", figure)
+
+
+def _settings(scenario: Scenario) -> tuple[tuple[str, str, str], ...]:
+    start = ", ".join(f"{name} {typographic(format_number(value))}" for name, value in scenario.initial_state.items())
+    own = {key: "scenario" for key in ("integrator", "initial_state") if key not in scenario.defaults}
+    return (
+        ("integrator", str(scenario.problem.integrator), own.get("integrator", "default")),
+        ("initial state (SI)", start, own.get("initial_state", "default: equilibrium at ambient pressure")),
+        ("inputs", describe_input(scenario.problem.input), "scenario"),
+    )
+
+
+def describe_input(command: InputSignal | ControlLoop) -> str:
+    """Return an input signal or control loop as one sentence; long tables are summarised."""
+    if isinstance(command, ControlLoop):
+        controller = command.controller
+        name, inputs = type(controller).__name__, ", ".join(controller.inputs)
+        others = WithDrivers(command.other_inputs, command.drivers) if command.drivers else command.other_inputs
+        return (
+            f"{name}, sample time {command.sample_time:g} s, manipulated inputs {inputs}; set point: "
+            f"{describe_input(command.setpoint)}; other inputs: {describe_input(others)}"
+        )
+    if isinstance(command, WithDrivers):
+        chains = (f"{name}: {', '.join(map(str, chain))}" for name, chain in command.chains.items())
+        return f"{describe_input(command.inner)}; drivers: {'; '.join(chains)}"
+    if isinstance(command, Periodic):
+        return f"periodic, {command.period:g} s: {describe_input(command.inner)}"
+    if isinstance(command, Schedule):
+        return "; ".join(_describe_changes(name, rows, "from") for name, rows in command.changes.items()) or "none"
+    if isinstance(command, SampledSignal):
+        return "; ".join(_describe_changes(name, rows, "at") for name, rows in command.points.items()) or "none"
+    return str(command)
+
+
+def _describe_changes(name: str, rows: Sequence[tuple[float, float]], preposition: str) -> str:
+    if len(rows) > MAX_LISTED_CHANGES:
+        values = [value for _, value in rows]
+        return (
+            f"{name}: {len(rows)} values between {min(values):g} and {max(values):g}, "
+            f"{rows[0][0]:g} to {rows[-1][0]:g} s"
+        )
+    return f"{name} {', '.join(f'{value:g} {preposition} {time:g} s' for time, value in rows)}"

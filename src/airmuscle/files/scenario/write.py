@@ -1,0 +1,105 @@
+"""Writing of scenarios with input signals, drivers and control loops as TOML that `load_scenario` reads back."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ...core.errors import ParameterError
+from ...engine.loop.control_law import ControlLaw
+from ...engine.loop.control_loop import ControlLoop
+from ...engine.loop.inputs import InputSignal, Periodic, SampledSignal, Schedule
+from ...engine.loop.with_drivers import WithDrivers
+from ..library.location import Location
+from ..library.write import model_table, tables_toml, write_text
+from .scenario import Scenario, build_scenario
+
+
+def scenario_text(scenario: Scenario) -> str:
+    """The text of the file of a scenario: the plant, the input or the control loop, and the run, in SI units.
+
+    All parameters are written with all digits and the initial state by all states of the plant, so that the text is
+    read back as an equal scenario. Raises ParameterError for a controller that is no ControlLaw, an input signal that
+    has no form in a file, or a plant, an integrator or a law that no file describes.
+    """
+    tables = _tables(scenario)
+    text = tables_toml(tables)
+    if _tables(build_scenario(tomllib.loads(text), Location(scenario.title, "", Path()))) != tables:
+        raise ParameterError(
+            f"scenario '{scenario.title}': a file does not describe all of it; write it as a program in Python."
+        )
+    return text
+
+
+def save_scenario(scenario: Scenario, path: str | Path) -> Path:
+    """Write a scenario to a file that `load_scenario` reads; the file is complete or unchanged.
+
+    Raises FileError, and ParameterError as `scenario_text`.
+    """
+    return write_text(Path(path), scenario_text(scenario))
+
+
+def _tables(scenario: Scenario) -> dict[str, Any]:
+    """The tables of a scenario, whose values may be models."""
+    problem = scenario.problem
+    if problem.control_state is not None or not isinstance(problem.output_times, float | int | None):
+        raise ParameterError(
+            f"scenario '{scenario.title}': a file does not describe a continued run, or output times that are not "
+            "equidistant; write it as a program in Python."
+        )
+    run: dict[str, Any] = {"duration": problem.duration, "start_time": problem.start_time}
+    if problem.output_times is not None:
+        run["output_times"] = problem.output_times
+    run["initial_state"] = dict(scenario.initial_state)
+    if problem.integrator is not None:
+        run["integrator"] = problem.integrator
+    signal = problem.input
+    return {
+        "title": scenario.title,
+        "plant": {key: value for key, value in model_table(scenario.plant).items() if key != "model"},
+        "input": _loop_table(signal) if isinstance(signal, ControlLoop) else _signal_table(signal),
+        "run": run,
+        **({"output": {"columns": list(scenario.columns)}} if scenario.columns else {}),
+    }
+
+
+def _loop_table(loop: ControlLoop) -> dict[str, Any]:
+    """The table [input] of a control loop."""
+    if not isinstance(loop.controller, ControlLaw):
+        raise ParameterError(
+            f"scenario: {type(loop.controller).__name__} is no ControlLaw, so that no file describes it; write the "
+            "loop as a program in Python."
+        )
+    controller = {
+        **model_table(loop.controller),
+        "sample_time": loop.sample_time,
+        "setpoint": _signal_table(loop.setpoint),
+    }
+    drivers = {"drivers": _drivers(loop.drivers)} if loop.drivers else {}
+    return {**_signal_table(loop.other_inputs), "controller": controller, **drivers}
+
+
+def _signal_table(signal: InputSignal) -> dict[str, Any]:
+    """The table of an input signal. Raises ParameterError for one without a form in a file."""
+    if isinstance(signal, WithDrivers) and not isinstance(signal.inner, WithDrivers):
+        return {**_signal_table(signal.inner), "drivers": _drivers(signal.drivers)}
+    if isinstance(signal, Periodic) and isinstance(signal.inner, Schedule | SampledSignal):
+        return {**_signal_table(signal.inner), "period": signal.period}
+    if isinstance(signal, Schedule):
+        return _rows(signal.changes)
+    if isinstance(signal, SampledSignal):
+        return {"model": "SampledSignal", **_rows(signal.points)}
+    raise ParameterError(
+        f"scenario: the input signal {type(signal).__name__} has no form in a file; use Schedule, SampledSignal, "
+        "Periodic or WithDrivers."
+    )
+
+
+def _drivers(drivers: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: list(each) if isinstance(each, tuple) else each for name, each in drivers.items()}
+
+
+def _rows(signals: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: [[float(t), float(v)] for t, v in points] for name, points in signals.items()}

@@ -1,0 +1,194 @@
+"""The command `airmuscle`: table of its commands, errors and exit codes.
+
+Exit code 0: success. 1: failure, with one line on stderr that gives the reason. 2: wrong usage. 130: interrupted.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import importlib
+import warnings
+from collections.abc import Iterator
+from typing import Annotated, Any, NamedTuple
+
+import typer
+from typer.core import TyperGroup
+
+from ...core.errors import AirmuscleError, AirmuscleWarning, printable, suggestion
+from .completion import install_completion_classes, print_completion_script
+from .interruption import INTERRUPTED, check_interrupted, deferred_sigint
+from .option_hints import in_options
+from .terminal import echo
+
+SETTINGS: dict[str, Any] = {
+    "add_completion": False,
+    "pretty_exceptions_enable": False,
+    "rich_markup_mode": None,
+    "context_settings": {"help_option_names": ["-h", "--help"], "max_content_width": 110},
+}
+
+
+class CommandRow(NamedTuple):
+    """A command: its module in this package and its function there, imported on use; its summary for --help."""
+
+    name: str
+    module: str
+    function: str
+    summary: str
+
+
+COMMANDS = (
+    CommandRow("reproduce", "reproduce", "reproduce", "Reproduce three papers and test each of their claims."),
+    CommandRow("list", "list", "list_entries", "List muscles, laws, valves, plants, products and data sets."),
+    CommandRow("show", "show", "show", "Show parameters, sources and checks of a library entry."),
+    CommandRow("cite", "cite", "cite", "Print the references of a library entry."),
+    CommandRow("solve", "solve", "solve", "Solve for pressure, contraction or force, given the other two."),
+    CommandRow("inspect", "inspect", "inspect", "Inspect measurement files: columns, runs, sampling, outliers."),
+    CommandRow("fit", "fit", "fit", "Fit a characteristic to measured points, or compare several."),
+    CommandRow("convert", "convert", "convert", "Approximate one characteristic by another."),
+    CommandRow("convert-data", "convert_data", "convert_data", "Write measurement files as CSV, Parquet or HDF5."),
+    CommandRow("hysteresis", "hysteresis", "hysteresis", "Fit friction models to hysteresis loops."),
+    CommandRow("fit-dynamic", "fit_dynamic", "fit_dynamic", "Identify plant parameters from transient records."),
+    CommandRow("campaign", "campaign", "campaign", "Identify a muscle from all files of a test rig."),
+    CommandRow("predict", "predict", "predict", "Predict further records by an identified muscle or plant."),
+    CommandRow("fit-volume", "fit_volume", "fit_volume_command", "Fit the volume of a muscle over its contraction."),
+    CommandRow("plan", "plan", "plan", "Design the most informative experiments."),
+    CommandRow("bench", "bench", "bench", "Fit a surface while rows arrive; name the next point."),
+    CommandRow("size", "size", "size", "Size muscles of the catalogue for a lift or a joint."),
+    CommandRow("simulate", "simulate", "simulate", "Simulate the plant of a scenario file."),
+    CommandRow("sweep", "sweep", "sweep", "Run a parameter study of a scenario."),
+    CommandRow("tune", "tune", "tune", "Tune the controller of a scenario for a family of plants."),
+    CommandRow("compare", "compare", "compare", "Compare controllers of an antagonistic joint on common tasks."),
+    CommandRow("export", "export", "export", "Export to C, JavaScript, MATLAB, FMU, MuJoCo or Modelica."),
+    CommandRow("studio", "studio", "studio", "Show muscles and plants in the browser."),
+    CommandRow("schema", "schema", "schema", "Print the JSON schema of scenario or muscle files."),
+)
+"""All commands, in the order of use."""
+_ROWS = {row.name: row for row in COMMANDS}
+_UsageError: Any = typer.BadParameter.__base__
+
+
+class LazyCommands(TyperGroup):
+    """The commands of the table; a command's module is imported when the command is called."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        return list(_ROWS)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        row = _ROWS.get(cmd_name)
+        if row is None:
+            return None
+        function = getattr(importlib.import_module(f".{row.module}", __package__), row.function)
+        check_interrupted()
+        command = typer.Typer(**SETTINGS)
+        command.command(row.name)(function)
+        return _without_types(typer.main.get_command(command))
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        if args[0] not in _ROWS:
+            ctx.fail(f"No such command '{args[0]}'.{suggestion(args[0], _ROWS)}")
+        return super().resolve_command(ctx, args)
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(row.name, row.summary) for row in COMMANDS])
+
+    def make_context(self, *args: Any, **settings: Any) -> Any:
+        with _printable_usage_errors():
+            return super().make_context(*args, **settings)
+
+    def invoke(self, ctx: Any) -> Any:
+        with warnings.catch_warnings():
+            warnings.simplefilter("always", AirmuscleWarning)
+            warnings.showwarning = functools.partial(_show_warning, ctx, warnings.showwarning)
+            with _exit_codes(ctx), _printable_usage_errors(), deferred_sigint():
+                return super().invoke(ctx)
+
+
+def _without_types(command: Any) -> Any:
+    """The command, whose help shows no Python type after the name of an argument."""
+    for each in command.params:
+        if each.param_type_name == "argument":
+            each.display_type_rich = lambda ctx: ""
+    return command
+
+
+@contextlib.contextmanager
+def _exit_codes(ctx: Any) -> Iterator[None]:
+    """Turn errors into one line on stderr and an exit code."""
+    try:
+        yield
+    except AirmuscleError as error:
+        echo(f"error: {in_options(error.message, ctx.invoked_subcommand)}", err=True)
+        raise typer.Exit(1) from None
+    except BrokenPipeError:
+        raise
+    except OSError as error:  # a full disk, a closed terminal
+        echo(f"error: {error.filename or 'output'}: {error.strerror or error}.", err=True)
+        raise typer.Exit(1) from None
+    except KeyboardInterrupt:
+        echo("interrupted", err=True)
+        raise typer.Exit(INTERRUPTED) from None
+
+
+@contextlib.contextmanager
+def _printable_usage_errors() -> Iterator[None]:
+    """Escape control characters of arguments that a usage error quotes; typer prints the error itself."""
+    try:
+        yield
+    except _UsageError as error:
+        error.message = printable(error.message)
+        raise
+
+
+def _show_warning(
+    ctx: Any, show_other: Any, message: Warning | str, category: type[Warning], *location: Any, **options: Any
+) -> None:
+    """Print one line for a warning of airmuscle; other warnings are shown with their location in the code."""
+    if issubclass(category, AirmuscleWarning):
+        text = message.args[0] if isinstance(message, Warning) else message
+        echo(f"warning: {in_options(text, ctx.invoked_subcommand)}", err=True)
+    else:
+        show_other(message, category, *location, **options)
+
+
+install_completion_classes()
+app = typer.Typer(cls=LazyCommands, name="airmuscle", no_args_is_help=True, **SETTINGS)
+
+
+def _print_version(requested: bool) -> None:
+    if requested:
+        from importlib import metadata
+
+        echo(f"airmuscle {metadata.version('airmuscle')}")
+        raise typer.Exit
+
+
+@app.callback()
+def airmuscle(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+    completion: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SHELL",
+            callback=print_completion_script,
+            is_eager=True,
+            help="Print the completion script of bash, zsh or fish and exit.",
+        ),
+    ] = None,
+) -> None:
+    """Models, identification and simulation of pneumatic artificial muscles.
+
+    Pressures are gauge pressures unless the unit is an absolute one (bara, kPa(a), psia).
+    An absolute pressure is converted with the ambient pressure of the plant or file; without one, 101.325 kPa.
+
+    \b
+    Examples:
+      airmuscle reproduce --out report
+      airmuscle solve dmsp-20-300 --pressure "3 bar" --force "100 N" --out chart
+      airmuscle fit bench.csv --characteristic ContractileSurface --resting-length "300 mm" --out fit
+      airmuscle simulate scenario.toml --out run
+    """

@@ -1,0 +1,63 @@
+"""Measurement files as arguments of a command, with the options that complete them."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ...bench.readers import ColumnMapping, read
+from ...bench.segment import check_contents
+from ...core.errors import ParameterError
+from ...files.library.catalogue import load_data
+from ...recording import Recording
+from ...recording.row_notes import row_notes
+from .completion import complete_data
+from .progress import reading_progress
+from .reading_options import ReadingOptions
+from .terminal import echo
+
+Files = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="FILES",
+        help="CSV, Excel, MAT, TDMS or MDF files with pressure, contraction or length, and force.",
+        autocompletion=complete_data,
+    ),
+]
+_SINGULAR = {"units": "unit", "columns": "column", "constants": "constant", "missing_codes": "missing-code"}
+"""Options that may be repeated, by the names of their fields."""
+
+
+def print_row_notes(recordings: Iterable[Recording]) -> None:
+    """Print the notes on rows that were left out or filled, on the error stream."""
+    for note in row_notes(recordings):
+        echo(f"note: {note}", err=True)
+
+
+def read_recordings(files: list[Path], reading: ReadingOptions) -> list[Recording]:
+    """The recordings of the files, read together so that their units can be compared, then library data sets.
+
+    A name without suffix and folder that is not in the working directory is a data set of the library. Raises
+    ParameterError for options that a data set does not take.
+    """
+    units, mapping = reading.units, reading.column_mapping()
+    local = {entry.name for entry in Path().iterdir()}
+    names = [f for f in files if not f.suffix and len(f.parts) == 1 and f.name not in local]
+    paths = [f for f in files if f not in names]
+    default = ColumnMapping()
+    fields = [f.name for f in dataclasses.fields(mapping) if getattr(mapping, f.name) != getattr(default, f.name)]
+    named = dict.fromkeys([*(["unit"] if units else []), *fields, *mapping.constants])
+    set_options = [f"--{_SINGULAR.get(name, name).replace('_', '-')}" for name in named]
+    if names and set_options:
+        raise ParameterError(
+            f"{names[0]}: a data set of the library contains its units and constants; omit {', '.join(set_options)}."
+        )
+    with reading_progress() as progress:
+        recordings = read(paths, mapping=mapping, units=units, progress=progress) if paths else ()
+    check_contents(recordings)
+    print_row_notes(recordings)
+    return [*recordings, *(load_data(str(name)) for name in names)]

@@ -1,0 +1,166 @@
+"""`airmuscle compare`: control benchmark of an antagonistic joint."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import enum
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ...core.errors import InputError, SimulationError, suggestion
+from ...design.control_benchmark import (
+    BenchmarkJoint,
+    BenchmarkResult,
+    Contender,
+    LearningCurve,
+    compare_controllers,
+    learn,
+    on_off_joint,
+    proportional_joint,
+    scenario_contender,
+    standard_contenders,
+)
+from ...design.control_benchmark.benchmark import DEFAULT_BUDGET
+from ...design.control_benchmark.chapter import error_table, ranking_table, write_benchmark
+from ...design.control_benchmark.tasks import find_tasks
+from ...files.library.files import is_path
+from ...report.chapter import Table
+from ...report.formatting import format_number, table_rows
+from .interruption import check_interrupted
+from .options import Folder, Json
+from .terminal import echo, print_json, print_table
+
+LEARNED = "feed-forward + PID"
+"""The controller whose feed-forward is learned from trial to trial."""
+
+
+class Valves(enum.StrEnum):
+    """The joints of the benchmark, by their valves."""
+
+    PROPORTIONAL = "proportional"
+    ON_OFF = "on-off"
+
+
+Seed = Annotated[
+    int, typer.Option(min=0, max=1_000_000, metavar="N", help="Seed of the optimiser and of the noise.")
+]  # fmt: skip
+
+
+def compare(
+    valves: Annotated[Valves, typer.Option(help="Valves of the joint.")] = Valves.PROPORTIONAL,
+    controller: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME", help="A controller, or a scenario file with one; repeat it for several. Default: all."
+        ),
+    ] = None,
+    task: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="A task; repeat it for several. Default: all.")
+    ] = None,
+    budget: Annotated[
+        int, typer.Option(min=0, max=1_000_000, metavar="N", help="Simulated loops to tune each controller; 0: none.")
+    ] = DEFAULT_BUDGET,
+    seed: Seed = 1,
+    trials: Annotated[
+        int, typer.Option(min=0, max=1000, metavar="N", help="Trials of iterative learning at 2 Hz; 0: none.")
+    ] = 0,
+    out: Folder = Path("compare"),
+    json: Json = False,
+) -> None:
+    """Compare controllers of an antagonistic joint on common tasks.
+
+    \b
+    Every controller is tuned by the same optimiser and budget for perturbed models, and judged on a plant of another
+    kind: characteristic, friction, valves, tubes and heat differ, and the sensors have resolution, noise and dead time.
+    Writes DIR/report.html with the ranking, DIR/figures/ and DIR/data/ with all metrics.
+
+    \b
+    Examples:
+      airmuscle compare --out compare
+      airmuscle compare --controller PID --controller "feed-forward + PID" --task "sine 1 Hz" --trials 10
+      airmuscle compare --valves on-off --budget 2000
+      airmuscle compare --controller PID --controller examples/joint_cascade.toml
+    """
+    joint = proportional_joint() if valves is Valves.PROPORTIONAL else on_off_joint()
+    contenders, tasks = _contenders(joint, controller or []), find_tasks(tuple(task or ()))
+    if trials and (trials < 2 or LEARNED not in [each.name for each in contenders]):
+        raise InputError(f"--trials needs at least 2 trials and the controller '{LEARNED}'.")
+    with _progress() as show:
+        result = compare_controllers(joint, contenders, tasks, budget=budget, seed=seed, progress=show)
+    curves = _learned(result, trials, seed) if trials else []
+    page = write_benchmark(result, out, curves)
+    if json:
+        print_json(_to_dict(result, curves))
+    else:
+        _print(ranking_table(result))
+        _print(error_table(result, "rmse"), titled=True)
+    if not any(run.metrics for run in result.runs.values()):
+        raise SimulationError(f"all runs failed; reason of the first: {next(iter(result.runs.values())).reason}")
+    if not json:
+        for curve in curves:
+            echo(f"learning: {curve.errors[0]:.3g} degrees in trial 1, {curve.errors[-1]:.3g} in trial {trials}")
+        echo(f"report: {page}")
+
+
+def _contenders(joint: BenchmarkJoint, names: list[str]) -> tuple[Contender, ...]:
+    known = {each.name: each for each in standard_contenders(joint)}
+    for name in names:
+        if name not in known and is_path(name):
+            known[name] = scenario_contender(joint, name)
+        if name not in known:
+            raise InputError(f"there is no controller '{name}'; there are {', '.join(known)}.{suggestion(name, known)}")
+    return tuple(known[name] for name in dict.fromkeys(names)) or tuple(known.values())
+
+
+def _learned(result: BenchmarkResult, trials: int, seed: int) -> list[LearningCurve]:
+    """The trials of iterative learning with the tuned controller."""
+    tuned = next(each for each in result.contenders if each.name == LEARNED)
+    return [learn(result.joint, tuned, find_tasks(("sine 2 Hz",))[0], trials=trials, seed=seed)]
+
+
+@contextlib.contextmanager
+def _progress() -> Iterator[Callable[[str, int, int], None]]:
+    """Yield a callback (step, done, total) that draws one bar on stderr."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as display:
+        bar = display.add_task("control benchmark", total=None)
+
+        def show(step: str, done: int, total: int) -> None:
+            check_interrupted()
+            display.update(bar, description=step, completed=done, total=total)
+
+        yield show
+
+
+def _print(table: Table, titled: bool = False) -> None:
+    if titled:
+        echo(f"\n{table.title}")
+    rows = [tuple(v if isinstance(v, str) else format_number(v) for v in row) for row in table_rows(table)]
+    numeric = [header.strip() for header, values in table.columns.items() if not isinstance(next(iter(values)), str)]
+    print_table([header.strip() for header in table.columns], rows, right=numeric)
+
+
+def _to_dict(result: BenchmarkResult, curves: list[LearningCurve]) -> dict[str, Any]:
+    """A benchmark as plain data; units as in the report."""
+    return {
+        "joint": result.joint.name,
+        "valves": result.joint.valve,
+        "budget": result.budget,
+        "seed": result.seed,
+        "scores": result.scores(),
+        "gains": {each.name: each.tuning.gains for each in result.contenders if each.tuning},
+        "runs": [
+            {"controller": name, "task": task, "reason": run.reason}
+            | (dataclasses.asdict(run.metrics) if run.metrics else {})
+            for (name, task), run in result.runs.items()
+        ],
+        "learning": {curve.task.name: curve.errors for curve in curves},
+    }

@@ -1,0 +1,85 @@
+"""`airmuscle convert-data`: measurement files or recordings in another file format."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ...bench.readers import Decimation, read, write
+from ...bench.readers.csv_writer import write_csv
+from ...bench.readers.reader import find_files
+from ...bench.readers.writer import EXTENSIONS
+from ...core.errors import FileError
+from ...recording import Recording
+from .bench_files import print_row_notes
+from .options import Json
+from .reading_options import NO_OPTIONS, ReadingOptions, with_reading_options
+from .terminal import echo, print_json
+
+EVERY_ROW = 2**62
+"""A number of rows that no file has."""
+
+Source = Annotated[str, typer.Argument(metavar="FILE", help="A file, folder or glob pattern, as for inspect.")]
+Target = Annotated[Path, typer.Argument(metavar="TARGET", help=f"The file to write: {', '.join(EXTENSIONS)}.")]
+MaxRows = Annotated[
+    int | None,
+    typer.Option("--max-rows", min=1, metavar="N", help="Keep every n-th row, N at most; default: all rows."),
+]
+Plain = Annotated[bool, typer.Option("--plain", help="CSV without comments, as pandas and spreadsheets expect it.")]
+
+
+@with_reading_options
+def convert_data(
+    source: Source, target: Target, plain: Plain = False, max_rows: MaxRows = None,
+    reading: ReadingOptions = NO_OPTIONS, json: Json = False,
+) -> None:  # fmt: skip
+    """Write measurement files as CSV, Parquet or HDF5.
+
+    \b
+    Values are in SI units, and all rows are kept. One recording becomes TARGET; several become files with a number
+    before the extension.
+
+    \b
+    Examples:
+      airmuscle convert-data bench.tdms bench.parquet
+      airmuscle convert-data "runs/*.csv" runs.h5 --mapping rig.toml
+      airmuscle convert-data logger.csv run.parquet --time uniform --resting-length "300 mm"
+      airmuscle convert-data run/recording.csv plain.csv --plain
+    """
+    if plain and target.suffix.lower() != ".csv":
+        raise typer.BadParameter("--plain belongs to a target that ends in .csv.")
+    if target.suffix.lower() not in EXTENSIONS:
+        raise FileError(f"{target}: the extension must be one of {', '.join(EXTENSIONS)}.")
+    rows = Decimation(max_rows or EVERY_ROW)
+    recordings = read(source, mapping=reading.column_mapping(), units=reading.units, downsampling=rows)
+    print_row_notes(recordings)
+    paths = [_path(target, i, len(recordings)) for i in range(len(recordings))]
+    _check_no_source(paths, source)
+    for recording, path in zip(recordings, paths, strict=True):
+        _write(recording, path, plain)
+    if json:
+        print_json({"files": [{"file": str(p), "rows": len(r)} for r, p in zip(recordings, paths, strict=True)]})
+        return
+    for recording, path in zip(recordings, paths, strict=True):
+        echo(f"file: {path}: {len(recording)} rows of {', '.join(recording)}")
+
+
+def _check_no_source(targets: list[Path], source: str) -> None:
+    """Raise FileError if a file to be written is one of those that were read."""
+    sources = {path.resolve() for path in find_files(source)}
+    for target in targets:
+        if target.resolve() in sources:
+            raise FileError(f"{target}: is a file to be converted and would be lost. Choose another target.")
+
+
+def _path(target: Path, number: int, count: int) -> Path:
+    return target if count == 1 else target.with_name(f"{target.stem}_{number + 1:03d}{target.suffix}")
+
+
+def _write(recording: Recording, path: Path, plain: bool) -> None:
+    if plain:
+        write_csv(recording, path, comments=False)
+    else:
+        write(recording, path)

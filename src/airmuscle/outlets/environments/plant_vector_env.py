@@ -1,0 +1,230 @@
+"""PlantVectorEnv: thousands of plants with a task in lanes, as a Gymnasium vector environment. Gymnasium imports this
+module."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, NamedTuple
+
+import gymnasium
+import numpy as np
+import numpy.typing as npt
+from gymnasium.utils import seeding
+
+from ...core.arrays import Array
+from ...core.errors import ParameterError
+from ...engine.run import RungeKutta4
+from ...engine.run.batch import Double, Precision
+from ...engine.run.batch.stepper import BatchStepper
+from .default_tasks import arm_task, joint_task, lift_task
+from .episode import EpisodeDraw, whole_steps
+from .plant_env import STEP, action_space, observation_space
+from .randomisation import Randomisation
+from .registration import EPISODE_PERIODS
+from .task import EnvironmentTask
+
+Booleans = npt.NDArray[np.bool_]
+Autoreset = gymnasium.vector.AutoresetMode
+
+
+class _Stock(NamedTuple):
+    """The next episode of every plant: whether it is drawn (N,), its parameters (N, P) and initial state (N, n)."""
+
+    drawn: Booleans
+    parameters: Array
+    states: Array
+
+
+class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-ignore]
+    """Plants of one task, advanced together in lanes on all cores.
+
+    num_envs           number of plants N
+    task               an EnvironmentTask
+    randomisation      distributions of parameters, drawn anew for every episode of each plant
+    max_episode_steps  periods after which an episode is truncated
+    integrator         RungeKutta4(1e-3) by default; the period of the task is a whole number of its steps
+    precision          Double() or Single()
+    cores              threads; all cores of this process unless given
+    autoreset_mode     NEXT_STEP or SAME_STEP of gymnasium.vector.AutoresetMode
+
+    Plant i is what `PlantEnv` with the seed `seed + i` is, to the rounding of the lanes. An episode that is over begins
+    anew in the next step (NEXT_STEP): the action of that step is ignored, its reward is 0. With SAME_STEP it begins
+    anew at once, and `info["final_obs"]` holds the last observation of each plant whose episode is over, None for
+    others.
+    Beyond the arrays that it returns, a step in which no episode begins allocates some arrays (N,) of time and flags.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": [], "autoreset_mode": Autoreset.NEXT_STEP}
+
+    def __init__(
+        self, num_envs: int, task: EnvironmentTask, randomisation: tuple[Randomisation, ...] = (), *,
+        max_episode_steps: int = EPISODE_PERIODS, integrator: RungeKutta4 = STEP,
+        precision: Precision = Double(), cores: int | None = None, autoreset_mode: Any = Autoreset.NEXT_STEP,
+    ) -> None:  # fmt: skip
+        if not isinstance(max_episode_steps, int) or max_episode_steps < 1:
+            raise ParameterError(f"max_episode_steps is {max_episode_steps!r}; it must be a whole number from 1 on.")
+        if autoreset_mode not in (Autoreset.NEXT_STEP, Autoreset.SAME_STEP):
+            raise ParameterError(
+                f"autoreset_mode is {autoreset_mode!r}; allowed are AutoresetMode.NEXT_STEP and SAME_STEP of "
+                "gymnasium.vector."
+            )
+        self.metadata = {**type(self).metadata, "autoreset_mode": autoreset_mode}  # type: ignore[misc]
+        self._at_once = autoreset_mode is Autoreset.SAME_STEP
+        self._draw, self.task = EpisodeDraw(task, randomisation), task
+        self._steps, self.max_episode_steps = whole_steps(task, integrator), max_episode_steps
+        self._plants = BatchStepper(task, num_envs, integrator, precision=precision, cores=cores)
+        self.num_envs, self.render_mode = num_envs, None
+        self.single_observation_space, self.single_action_space = observation_space(task), action_space(task)
+        batch_space = gymnasium.vector.utils.batch_space
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        plants = self._plants
+        self._given = np.zeros((plants.blocks, plants.width, len(task.actions) + 1), plants.dtype)
+        self._elapsed = np.zeros(num_envs, np.int64)
+        self._over: Booleans = np.zeros(num_envs, bool)
+        self._generators: list[np.random.Generator] = []
+        sizes = plants.parameters.shape[1], plants.states.shape[1]
+        self._stock = _Stock(np.zeros(num_envs, bool), *(np.empty((num_envs, size)) for size in sizes))
+
+    def reset(
+        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
+        """Begin an episode of every plant: the first observations (N, k), and an empty dictionary.
+
+        With `seed`, plant i has the seed `seed + i`; a list has one for each. Without it, the generators go on.
+        """
+        self._seed(seed)
+        plants = self._plants
+        further = np.arange(self.num_envs, plants.blocks * plants.width)  # plants that fill the last block
+        self._place(further, *self._draw.begin(np.full((1, self._draw.dimension), 0.5)))
+        self._begin(np.arange(self.num_envs))
+        self._over[:] = False
+        return self._observed()[0], {}
+
+    def step(self, actions: Any) -> tuple[npt.NDArray[np.float32], Array, Booleans, Booleans, dict[str, Any]]:
+        """Hold an action (N, m) of every plant for one period: observations (N, k), rewards, terminated and truncated
+        (N,), and a dictionary, empty with NEXT_STEP. Raises ParameterError for another shape, or an action that is not
+        finite."""
+        count = len(self.task.actions)
+        if not self._generators:
+            raise ParameterError("the environment has no state yet; call reset() before the first step.")
+        actions = np.asarray(actions)
+        if actions.shape != (self.num_envs, count) or not np.isfinite(actions).all():
+            raise self._wrong_actions(actions, count)
+        np.clip(actions, -1.0, 1.0, out=self._inputs[:, :count], casting="same_kind")
+        self._elapsed += 1
+        np.multiply(self._elapsed, self.task.period, out=self._inputs[:, count], casting="same_kind")
+        self._plants.inputs[...] = self._given.transpose(0, 2, 1)
+        self._plants.advance(self._steps)
+        anew = np.flatnonzero(self._over)
+        if anew.size:
+            self._begin(anew)
+        observations, rewards, terminated = self._observed()
+        truncated: Booleans = self._elapsed >= self.max_episode_steps
+        rewards[anew], terminated[anew] = 0.0, False
+        over: Booleans = terminated | truncated
+        if not self._at_once:
+            self._over = over
+        elif over.any():
+            return self._begun_at_once(observations, over), rewards, terminated, truncated, _final(observations, over)
+        return observations, rewards, terminated, truncated, {}
+
+    @property
+    def _inputs(self) -> npt.NDArray[Any]:
+        """The inputs of the plants (N, m + 1), a view."""
+        return self._given.reshape(-1, self._given.shape[-1])[: self.num_envs]
+
+    def close_extras(self, **options: Any) -> None:
+        """End the threads."""
+        self._plants.close()
+
+    def _seed(self, seed: int | list[int | None] | None) -> None:
+        """Generators of all plants."""
+        if seed is None and self._generators:
+            return
+        if seed is None:
+            seed = int(np.random.SeedSequence().generate_state(1)[0])
+        seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int) else list(seed)
+        if len(seeds) != self.num_envs:
+            raise ParameterError(f"there are {len(seeds)} seeds for {self.num_envs} plants; give one for each.")
+        self._generators = [seeding.np_random(one)[0] for one in seeds]
+        self._stock.drawn[:] = False
+
+    def _begin(self, plants: npt.NDArray[np.intp]) -> None:
+        """Begin an episode of these plants, and compute the outputs of all."""
+        stock = self._stock
+        if not stock.drawn[plants].all():
+            self._refill()
+        self._place(plants, stock.parameters[plants], stock.states[plants])
+        stock.drawn[plants] = False
+        self._elapsed[plants] = 0
+        self._inputs[plants] = 0.0
+        self._plants.inputs[...] = self._given.transpose(0, 2, 1)
+        self._plants.advance(0)
+
+    def _begun_at_once(self, observations: npt.NDArray[np.float32], over: Booleans) -> npt.NDArray[np.float32]:
+        """The observations (N, k) after new episodes have begun in place of those that are over (N,)."""
+        self._begin(np.flatnonzero(over))
+        return np.where(over[:, None], self._observed()[0], observations)
+
+    def _refill(self) -> None:
+        """Draw the next episode of all plants that have none, which takes little more time than one draw."""
+        stock, size = self._stock, self._draw.dimension
+        plants = np.flatnonzero(~stock.drawn)
+        uniform = np.array([self._generators[i].random(size) for i in plants])
+        stock.parameters[plants], stock.states[plants] = self._draw.begin(uniform)
+        stock.drawn[plants] = True
+
+    def _place(self, plants: npt.NDArray[np.intp], parameters: Array, states: Array) -> None:
+        """Write parameters (R, P) and states (R, n) of plants into their lanes."""
+        block, lane = self._plants.lanes_of(plants)
+        self._plants.parameters[block, :, lane] = parameters
+        self._plants.states[block, :, lane] = states
+        self._plants.prepare(np.unique(block))
+
+    def _observed(self) -> tuple[npt.NDArray[np.float32], Array, Booleans]:
+        """Observations, rewards, and which episodes are terminated."""
+        plants, count = self._plants, len(self.task.observations)
+        observations = plants.rows(plants.outputs, 0, count, np.float32)
+        rewards = plants.column(plants.outputs, count, np.float64)
+        terminated: Booleans = plants.column(plants.outputs, count + 1, np.float64) > 0.5
+        impossible = ~np.isfinite(rewards)
+        if impossible.any():
+            observations[impossible], rewards[impossible], terminated[impossible] = 0.0, 0.0, True
+        return observations, rewards, terminated
+
+    def _wrong_actions(self, actions: npt.NDArray[Any], count: int) -> ParameterError:
+        if actions.shape != (self.num_envs, count):
+            return ParameterError(f"the actions have the shape {actions.shape}; give ({self.num_envs}, {count}).")
+        row = int(np.flatnonzero(~np.isfinite(actions).all(axis=1))[0])
+        return ParameterError(f"the actions, row {row}: {actions[row]}; give {count} finite numbers from -1 to 1.")
+
+
+def _final(observations: npt.NDArray[np.float32], over: Booleans) -> dict[str, Any]:
+    """The dictionary of a step in which episodes are over (N,), as that of Gymnasium's own vectors."""
+    last = np.full(over.size, None, dtype=object)
+    for i in np.flatnonzero(over):
+        last[i] = observations[i].copy()
+    return {"final_obs": last, "_final_obs": over.copy()}
+
+
+def make_joint_vector(num_envs: int = 1, task: EnvironmentTask | None = None, **options: Any) -> PlantVectorEnv:
+    """A vector of airmuscle/Joint-v0, or the same with another task."""
+    return _make(joint_task(), num_envs, task, options)
+
+
+def make_lift_vector(num_envs: int = 1, task: EnvironmentTask | None = None, **options: Any) -> PlantVectorEnv:
+    """A vector of airmuscle/Lift-v0, or the same with another task."""
+    return _make(lift_task(), num_envs, task, options)
+
+
+def make_arm_vector(num_envs: int = 1, task: EnvironmentTask | None = None, **options: Any) -> PlantVectorEnv:
+    """A vector of airmuscle/Arm-v0, or the same with another task."""
+    return _make(arm_task(), num_envs, task, options)
+
+
+def _make(
+    default: tuple[EnvironmentTask, tuple[Randomisation, ...]], count: int, task: Any, options: dict[str, Any]
+) -> PlantVectorEnv:
+    if task is None:
+        return PlantVectorEnv(count, default[0], **{"randomisation": default[1], **options})
+    return PlantVectorEnv(count, task, **options)

@@ -1,0 +1,173 @@
+"""Randomisation of parameters at the beginning of an episode: ranges, factors, and the covariance of a fit."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+import math
+import re
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core import tree
+from ...core.annotation import abridged, one_line
+from ...core.arrays import Array
+from ...core.errors import ParameterError, suggestion
+from ...core.field_types import check_field_types
+from ...core.short_repr import ShortRepr
+from ...files.library.uncertainty import ParameterUncertainty
+from .task import EnvironmentTask
+
+_LAW = "characteristic"
+"""Name of the law in a muscle file; a muscle calls it `contractile`."""
+
+
+class Randomisation(abc.ABC):
+    """Distribution of parameters of a task, drawn anew for every episode (interface).
+
+    A path is that of `airmuscle.core.tree.leaves(task)`: 'plant.mechanism.inertia', 'target_frequency'.
+    """
+
+    paths: tuple[str, ...]
+
+    @property
+    @abc.abstractmethod
+    def dimension(self) -> int:
+        """Number of independent uniform numbers that a draw takes."""
+
+    @abc.abstractmethod
+    def values(self, nominal: Array, uniform: Array) -> Array:
+        """Values (R, P) of the parameters, with their nominal values (P,), from uniform numbers (R, D) in [0, 1)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class UniformRange(Randomisation):
+    """One number, uniformly distributed from `low` to `high`, for all paths (base)."""
+
+    paths: tuple[str, ...]
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        name = type(self).__name__
+        if isinstance(self.paths, str) or (isinstance(self.paths, tuple | list) and not self.paths):
+            raise ParameterError(f"{name}: paths are {abridged(self.paths)}; give a tuple of one path or more.")
+        check_field_types(self)
+        if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low <= self.high):
+            raise ParameterError(
+                f"{name} of {self.paths[0]}: the range is {self.low} to {self.high}; it must be finite and rise."
+            )
+
+    @property
+    def dimension(self) -> int:
+        return 1
+
+    def _draw(self, uniform: Array) -> Array:
+        number: Array = self.low + (self.high - self.low) * uniform
+        return number
+
+
+@dataclasses.dataclass(frozen=True)
+class ValueRange(UniformRange):
+    """A value [SI], uniformly distributed from `low` to `high`; all paths take the same value."""
+
+    def values(self, nominal: Array, uniform: Array) -> Array:
+        return np.repeat(self._draw(uniform), nominal.size, axis=1)
+
+
+@dataclasses.dataclass(frozen=True)
+class FactorRange(UniformRange):
+    """A factor of the nominal values, uniformly distributed from `low` to `high`; all paths take the same factor."""
+
+    def values(self, nominal: Array, uniform: Array) -> Array:
+        return nominal * self._draw(uniform)
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class FitUncertainty(ShortRepr, Randomisation):
+    """Normal distribution about the fitted values with the covariance of the fit, from a muscle file.
+
+    uncertainty  standard errors and correlations of a muscle file: `am.load(PATH).uncertainty`
+    muscles      indices of the muscles of the plant to which it applies; all have the same draw, because it is the
+                 common law that is uncertain
+    """
+
+    uncertainty: ParameterUncertainty
+    muscles: tuple[int, ...] = (0,)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.uncertainty, ParameterUncertainty):
+            raise ParameterError(
+                f"FitUncertainty: uncertainty is {one_line(self.uncertainty)}; give that of a muscle file with a table "
+                "[uncertainty]: am.load(PATH).uncertainty."
+            )
+        check_field_types(self)
+
+    @property
+    def paths(self) -> tuple[str, ...]:  # type: ignore[override]
+        """The paths in the plant; those of a plant with one muscle that is not in a tuple have no index."""
+        names = [re.sub(rf"^{_LAW}\b", "contractile", name) for name in self.uncertainty.parameters]
+        return tuple(f"plant.muscle[{i}].{name}" for i in self.muscles for name in names)
+
+    @property
+    def dimension(self) -> int:
+        return len(self.uncertainty.parameters)
+
+    def values(self, nominal: Array, uniform: Array) -> Array:
+        from scipy.special import ndtri
+
+        draws = self.uncertainty.deviations(ndtri(np.clip(uniform, 1e-12, 1.0 - 1e-12)))
+        values: Array = nominal + np.tile(draws, len(self.muscles))
+        return values
+
+
+class ParameterDraw:
+    """Parameters (R, P) of a task under its randomisations.
+
+    Raises ParameterError for an unknown path, a path that is named twice, or a range beyond the declared one.
+    """
+
+    def __init__(self, task: EnvironmentTask, randomisations: tuple[Randomisation, ...]) -> None:
+        leaves = list(tree.leaves(task))
+        self.nominal, self.randomisations = tree.flatten(task), randomisations
+        self.low, self.high = (np.array([leaf.declared.bounds[i] for leaf in leaves]) for i in (0, 1))
+        places = {leaf.path: i for i, leaf in enumerate(leaves)}
+        self.places = [np.array([_place(path, places) for path in r.paths], dtype=np.intp) for r in randomisations]
+        self.varied = np.concatenate([*self.places, np.empty(0, dtype=np.intp)])
+        self.dimension = sum(r.dimension for r in randomisations)
+        for index in np.flatnonzero(np.bincount(self.varied, minlength=1) > 1):
+            raise ParameterError(f"randomisation: '{leaves[index].path}' is varied twice; name it once.")
+        for r, at in zip(randomisations, self.places, strict=True):
+            if not isinstance(r, FitUncertainty):
+                self._check_limits(r, at, [leaf.path for leaf in leaves])
+
+    def _check_limits(self, r: Randomisation, at: npt.NDArray[np.intp], paths: list[str]) -> None:
+        for end in (0.0, 1.0):
+            values = r.values(self.nominal[at], np.full((1, r.dimension), end))[0]
+            for value, i in zip(values, at, strict=True):
+                if not self.low[i] <= value <= self.high[i]:
+                    raise ParameterError(
+                        f"randomisation: '{paths[i]}' would be {value:.4g}; allowed range: {self.low[i]:.4g} to "
+                        f"{self.high[i]:.4g}."
+                    )
+
+    def values(self, uniform: Array) -> Array:
+        """Parameters (R, P) from uniform numbers (R, D); a normal draw is limited to the declared range."""
+        table, first = np.repeat(self.nominal[None, :], len(uniform), axis=0), 0
+        for r, at in zip(self.randomisations, self.places, strict=True):
+            drawn = r.values(self.nominal[at], uniform[:, first : first + r.dimension])
+            table[:, at] = np.clip(drawn, self.low[at], self.high[at])
+            first += r.dimension
+        return table
+
+
+def _place(path: str, places: Mapping[str, int]) -> int:
+    for known in (path, path.replace("plant.muscle[0].", "plant.muscle.")):
+        if known in places:
+            return places[known]
+    raise ParameterError(
+        f"randomisation: the task has no parameter '{path}'.{suggestion(path, places)} Its paths are those of "
+        "airmuscle.core.tree.leaves(task)."
+    )

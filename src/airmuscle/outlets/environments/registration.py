@@ -1,0 +1,33 @@
+"""Registration of the environments with Gymnasium."""
+
+from __future__ import annotations
+
+import importlib.util
+
+from ...core.errors import InputError
+
+ENVIRONMENTS = ("Joint", "Lift", "Arm")
+"""Names of the registered environments; the identifiers are airmuscle/Joint-v0 and so on."""
+EPISODE_PERIODS = 500
+"""Periods after which an episode of a registered environment is truncated."""
+
+
+def register_environments() -> None:
+    """Register airmuscle/Joint-v0, airmuscle/Lift-v0 and airmuscle/Arm-v0 with Gymnasium, once.
+
+    `gymnasium.make("airmuscle/Joint-v0")` and `gymnasium.make_vec(..., num_envs=N)` then return them. Gymnasium 1.0
+    and later call this for no package by themselves. Raises InputError if Gymnasium is not installed.
+    """
+    if importlib.util.find_spec("gymnasium") is None:
+        raise InputError("learning environments need the package gymnasium. Install it: pip install airmuscle[sim]")
+    from gymnasium.envs import registration
+
+    for name in ENVIRONMENTS:
+        identifier = f"airmuscle/{name}-v0"
+        if identifier not in registration.registry:
+            registration.register(
+                identifier,
+                entry_point=f"airmuscle.outlets.environments.plant_env:make_{name.lower()}",
+                vector_entry_point=f"airmuscle.outlets.environments.plant_vector_env:make_{name.lower()}_vector",
+                max_episode_steps=EPISODE_PERIODS,
+            )

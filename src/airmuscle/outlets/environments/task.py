@@ -1,0 +1,115 @@
+"""EnvironmentTask (interface): a plant with actions, observations, a reward and an end, as one compiled system."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+import functools
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+from ...core import ops
+from ...core.field_types import check_field_types
+from ...core.ops import Value
+from ...core.system import System
+from ...core.variables import Input, StateVariable
+from ...physics.plant import Plant
+from .actuation import Action, actions_of, all_commands
+
+TIME = "time"
+"""The input that holds the time of an episode [s] at the end of the present period."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Observation:
+    """One observed quantity: name, unit, and the limits [unit] to which it is clipped."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    meaning: str = ""
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
+
+
+class EnvironmentTask(System):
+    """A plant with a task, whose outputs are the observations, the reward and whether an episode ends.
+
+        reward = exp(-e_1^2 - e_2^2 - ...) - w (a_1^2 + ... + a_m^2)/m
+
+    e_i control errors divided by their scale, a_j actions from -1 to 1, w weight of the effort. The reward is at most
+    1 per period; an error of one scale gives 0.37. An episode is terminated where `ends` holds.
+
+    Its parameters are those of the plant (`plant.mechanism.inertia`) and its own (`target_frequency`); a randomisation
+    may vary all of them. Written over `ops`, so that it is compiled together with the plant, also in lanes.
+    """
+
+    from_file: ClassVar[bool] = False
+
+    plant: Plant
+    effort_weight: float
+    period: float
+
+    @property
+    @abc.abstractmethod
+    def observations(self) -> tuple[Observation, ...]:
+        """The observed quantities, in order."""
+
+    @property
+    @abc.abstractmethod
+    def initial_ranges(self) -> Mapping[str, tuple[float, float]]:
+        """Ranges of the initial gauge pressure of every muscle ('left.pressure' [Pa]) and coordinate; speeds are 0."""
+
+    @abc.abstractmethod
+    def observe(self, state: Mapping[str, Value], outputs: Mapping[str, Value], time: Value) -> tuple[Value, ...]:
+        """The observations at a state, in the units of `observations`; `outputs` are those of the plant."""
+
+    @abc.abstractmethod
+    def errors(self, state: Mapping[str, Value], time: Value) -> tuple[Value, ...]:
+        """Control errors divided by their scale [1]."""
+
+    @abc.abstractmethod
+    def ends(self, state: Mapping[str, Value]) -> Value:
+        """Whether an episode ends at this state: a condition."""
+
+    @functools.cached_property
+    def actions(self) -> tuple[Action, ...]:
+        """The actions, in order; each is between -1 and 1."""
+        return actions_of(self.plant)
+
+    @property
+    def states(self) -> tuple[StateVariable, ...]:
+        """The states of the plant."""
+        return self.plant.states
+
+    @property
+    def state_lower_bounds(self) -> Sequence[float]:
+        """Those of the plant."""
+        return self.plant.state_lower_bounds
+
+    @property
+    def input_variables(self) -> tuple[Input, ...]:
+        """The actions, then the time."""
+        actions = (Input(f"action.{a.name}", "1", -1.0, 1.0, a.meaning) for a in self.actions)
+        return (*actions, Input(TIME, "s", 0.0, float("inf"), "time of the episode"))
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The names of the actions and of the time."""
+        return tuple(i.name for i in self.input_variables)
+
+    def rates(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> Mapping[str, Value]:
+        """The rates of the plant under the actions."""
+        return self.plant.rates(state, all_commands(self.actions, inputs))
+
+    def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
+        """The observations by name, clipped, then the reward, then 1 where the episode ends, else 0."""
+        time = inputs[TIME]
+        values = self.observe(state, self.plant.outputs(state, all_commands(self.actions, inputs)), time)
+        observed = {o.name: ops.clip(v, o.low, o.high) for o, v in zip(self.observations, values, strict=True)}
+        efforts = [inputs[f"action.{a.name}"] ** 2 for a in self.actions]
+        closeness = ops.exp(-sum(error**2 for error in self.errors(state, time)))
+        reward = closeness - self.effort_weight * sum(efforts) / len(efforts)
+        return {**observed, "reward": reward, "terminated": ops.where(self.ends(state), 1.0, 0.0)}

@@ -1,0 +1,157 @@
+"""Description of an FMU: the file modelDescription.xml of FMI 2.0 and 3.0."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from collections.abc import Mapping, Sequence
+from importlib import metadata
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+from ...engine.compile.partials import Place
+from ...engine.run.integrators import Rodas4
+from .fmi_units import add_units, has_unit
+from .fmi_variables import Variable, references_of
+from .printed_system import ExportedSystem
+from .provenance import LICENCE
+from .run_data import RunData
+
+_WORD = r"[A-Za-z_][A-Za-z0-9_]*(\[\d+\])?"
+_STRUCTURED = re.compile(rf"{_WORD}(\.{_WORD})*|der\({_WORD}(\.{_WORD})*\)")
+CATEGORIES = ("logStatusWarning", "logStatusError")
+"""Categories of messages: a validity range that was left, and a failure."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class FmuDescription:
+    """What modelDescription.xml states of an FMU.
+
+    name       identifier of the model
+    token      text that an importer passes on, so that description and binary belong together
+    places     places of the partial derivatives that are not zero
+    indicators  number of event indicators
+    """
+
+    name: str
+    title: str
+    token: str
+    system: ExportedSystem
+    run: RunData
+    variables: Sequence[Variable]
+    places: Sequence[Place]
+    indicators: int
+
+    def text(self, version: int) -> str:
+        """The file for FMI 2 or 3."""
+        root = (self._fmi2 if version == 2 else self._fmi3)()
+        indent(root)
+        return '<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, encoding="unicode") + "\n"
+
+    def _root(self, attributes: Mapping[str, str]) -> Element:
+        program = metadata.version("airmuscle")
+        structured = all(_STRUCTURED.fullmatch(v.name) for v in self.variables)
+        common = {
+            "modelName": self.title, "generationTool": f"airmuscle {program}", "license": " ".join(LICENCE),
+            "variableNamingConvention": "structured" if structured else "flat",
+        }  # fmt: skip
+        return Element("fmiModelDescription", {**attributes, **common})
+
+    def _experiment(self, root: Element) -> None:
+        times = self.run.times
+        tolerance = self.run.integrator.rtol if isinstance(self.run.integrator, Rodas4) else 1e-6
+        attributes = {"startTime": self.run.start, "stopTime": float(times[-1]), "tolerance": tolerance}
+        SubElement(root, "DefaultExperiment", {key: repr(float(x)) for key, x in attributes.items()})
+
+    def _categories(self, root: Element) -> None:
+        categories = SubElement(root, "LogCategories")
+        for name in CATEGORIES:
+            SubElement(categories, "Category", name=name)
+
+    def _fmi2(self) -> Element:
+        root = self._root({"fmiVersion": "2.0", "guid": self.token, "numberOfEventIndicators": str(self.indicators)})
+        can = {
+            "modelIdentifier": self.name, "canNotUseMemoryManagementFunctions": "true", "canGetAndSetFMUstate": "true",
+            "canSerializeFMUstate": "true", "providesDirectionalDerivative": "true",
+        }  # fmt: skip
+        stepping = {"canHandleVariableCommunicationStepSize": "true", "canInterpolateInputs": "true"}
+        for kind, more in (("ModelExchange", {}), ("CoSimulation", stepping)):
+            files = SubElement(SubElement(root, kind, {**can, **more}), "SourceFiles")
+            for file in ("fmi2.c", f"{self.name}.c"):
+                SubElement(files, "File", name=file)
+        add_units(root, [v.unit for v in self.variables])
+        self._categories(root)
+        self._experiment(root)
+        variables = SubElement(root, "ModelVariables")
+        for v in self.variables:
+            attributes = {"name": v.name, "valueReference": str(v.reference), **_kind(v)}
+            scalar = SubElement(variables, "ScalarVariable", attributes)
+            derivative = {} if v.derivative_of is None else {"derivative": str(v.derivative_of + 1)}
+            SubElement(scalar, "Real", {**_numbers(v), **derivative})
+        structure = SubElement(root, "ModelStructure")
+        groups = (("Outputs", self._outputs), ("Derivatives", self._rates), ("InitialUnknowns", self._initial_unknowns))
+        for group, references in groups:
+            parent = SubElement(structure, group) if references else structure
+            for reference in references:
+                given = self._dependencies(reference, 1) if group != "InitialUnknowns" else {}
+                SubElement(parent, "Unknown", {"index": str(reference + 1), **given})
+        return root
+
+    def _fmi3(self) -> Element:
+        root = self._root({"fmiVersion": "3.0", "instantiationToken": self.token})
+        can = {
+            "modelIdentifier": self.name, "canGetAndSetFMUState": "true", "canSerializeFMUState": "true",
+            "providesDirectionalDerivatives": "true", "providesAdjointDerivatives": "true",
+        }  # fmt: skip
+        SubElement(root, "ModelExchange", can)
+        SubElement(root, "CoSimulation", {**can, "canHandleVariableCommunicationStepSize": "true"})
+        add_units(root, [v.unit for v in self.variables])
+        self._categories(root)
+        self._experiment(root)
+        variables = SubElement(root, "ModelVariables")
+        for v in self.variables:
+            derivative = {} if v.derivative_of is None else {"derivative": str(v.derivative_of)}
+            attributes = {"name": v.name, "valueReference": str(v.reference), **_kind(v), **_numbers(v), **derivative}
+            SubElement(variables, "Float64", attributes)
+        structure = SubElement(root, "ModelStructure")
+        for element, references in (("Output", self._outputs), ("ContinuousStateDerivative", self._rates)):
+            for reference in references:
+                SubElement(structure, element, {"valueReference": str(reference), **self._dependencies(reference, 0)})
+        for reference in self._initial_unknowns:
+            SubElement(structure, "InitialUnknown", valueReference=str(reference))
+        for v in self.variables:
+            if v.is_indicator:
+                SubElement(structure, "EventIndicator", valueReference=str(v.reference))
+        return root
+
+    @property
+    def _outputs(self) -> list[int]:
+        return [v.reference for v in self.variables if v.causality == "output"]
+
+    @property
+    def _rates(self) -> list[int]:
+        return [v.reference for v in self.variables if v.derivative_of is not None]
+
+    @property
+    def _initial_unknowns(self) -> list[int]:
+        return [v.reference for v in self.variables if v.initial == "calculated"]
+
+    def _dependencies(self, reference: int, offset: int) -> dict[str, str]:
+        """The states and inputs on which an unknown depends; of a state, itself."""
+        if reference <= len(self.system.state_names):
+            return {"dependencies": str(reference + offset)}
+        pairs = [references_of(self.system, place) for place in self.places]
+        return {"dependencies": " ".join(str(k + offset) for k in sorted(b for a, b in pairs if a == reference))}
+
+
+def _kind(v: Variable) -> dict[str, str]:
+    """Attributes of a variable that state what it is."""
+    given = {"causality": v.causality, "variability": v.variability, "initial": v.initial, "description": v.description}
+    return {key: text for key, text in given.items() if text}
+
+
+def _numbers(v: Variable) -> dict[str, str]:
+    """Attributes of a variable that are numbers or units."""
+    numbers = {"min": v.minimum, "max": v.maximum, "nominal": v.nominal, "start": v.start}
+    attributes = {key: repr(float(x)) for key, x in numbers.items() if x is not None and math.isfinite(x)}
+    return ({"unit": v.unit} if has_unit(v.unit) else {}) | attributes

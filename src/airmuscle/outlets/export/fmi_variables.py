@@ -1,0 +1,126 @@
+"""Variables of an FMU: time, states, rates, inputs, outputs, parameters and the tolerance, with their value references.
+
+The value references follow each other in this order, as in the template `instance.h`; time is 0.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+from ...core.errors import ParameterError, printable
+from ...engine.compile.partials import Place
+from ...engine.run.integrators import Rodas4
+from ...recording.columns import quantity_of
+from .printed_system import ExportedSystem
+from .run_data import RunData
+
+PARAMETERS, TOLERANCE = "parameters", "relative_tolerance"
+"""Beginning of the names of parameters, and name of the tolerance."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Variable:
+    """A variable with the attributes that both versions of FMI have."""
+
+    name: str
+    reference: int
+    causality: str
+    variability: str = "continuous"
+    initial: str = ""
+    start: float | None = None
+    unit: str = ""
+    description: str = ""
+    minimum: float = -math.inf
+    maximum: float = math.inf
+    derivative_of: int | None = None
+    """The value reference of the state whose derivative the variable is."""
+    nominal: float | None = None
+    is_indicator: bool = False
+
+
+def make_variables(system: ExportedSystem, run: RunData, indicators: int = 0) -> list[Variable]:
+    """The variables of an FMU, by increasing value reference, with so many event indicators at the end.
+
+    Raises ParameterError for two variables of one name.
+    """
+    variables = [Variable("time", 0, "independent", unit="s", description="time")]
+    units, known = system.units, system.compiled.system
+
+    def add(name: str, causality: str, **attributes: object) -> None:
+        variables.append(Variable(name, len(variables), causality, **attributes))  # type: ignore[arg-type]
+
+    for state, start in zip(known.states, run.initial.tolist(), strict=True):
+        texts = {"unit": state.unit, "description": state.meaning}
+        add(state.name, "output", initial="exact", start=start, nominal=state.nominal, **texts)
+    for i, state in enumerate(known.states, 1):
+        unit = per_second(state.unit)
+        about = f"derivative of {state.name}"
+        add(f"der({state.name})", "local", initial="calculated", unit=unit, derivative_of=i, description=about)
+    for given, start in zip(known.input_variables, first_inputs(run), strict=True):
+        limits = {"minimum": given.minimum, "maximum": given.maximum}
+        add(given.name, "input", start=start, unit=given.unit, description=given.meaning, **limits)
+    for name in system.output_names:
+        known_quantity = quantity_of(name)
+        about = known_quantity.meaning if known_quantity else ""
+        add(name, "output", initial="calculated", unit=units[name], description=about)
+    for leaf in system.tunable:
+        low, high = leaf.declared.bounds
+        about = f"{leaf.declared.symbol}: {leaf.declared.meaning}"
+        add(
+            f"{PARAMETERS}.{leaf.path}", "parameter", variability="tunable", initial="exact", start=float(leaf.value),
+            minimum=low, maximum=high, unit=leaf.declared.unit, description=about,
+        )  # fmt: skip
+    if isinstance(run.integrator, Rodas4):
+        about = "relative tolerance of the integrator in Co-Simulation"
+        start = run.integrator.rtol
+        add(TOLERANCE, "parameter", variability="tunable", initial="exact", start=start, description=about)
+    for i in range(1, indicators + 1):
+        about = "changes its sign where the rates are not smooth"
+        add(f"event_indicator[{i}]", "local", is_indicator=True, description=about)
+    return _checked(variables)
+
+
+def per_second(unit: str) -> str:
+    """The unit of the derivative of a quantity by time."""
+    if unit in ("", "1"):
+        return "1/s"
+    above, slash, below = unit.partition("/")
+    if not slash:
+        return f"{unit}/s"
+    return f"{above}/s2" if below == "s" else f"{above}/({below.strip('()')} s)"
+
+
+def _stated(v: Variable) -> Variable:
+    """The variable with a unit that importers know, and a description that states gauge or absolute."""
+    name, about, unit = printable(v.name), printable(v.description), v.unit.replace("Pa(a)", "Pa")
+    kind = "absolute" if unit != v.unit else "gauge"
+    is_stated = any(word in about for word in ("gauge", "absolute"))
+    if unit == "Pa" and not is_stated and ("pressure" in f"{name} {about}" or kind == "absolute"):
+        about = f"{about or 'pressure'}, {kind}"
+    return dataclasses.replace(v, name=name, description=about, unit=unit)
+
+
+def first_inputs(run: RunData) -> list[float]:
+    """The inputs at the beginning of the run."""
+    values: list[float] = run.segments.values[0].tolist()
+    return values
+
+
+def references_of(system: ExportedSystem, place: Place) -> tuple[int, int]:
+    """The value references of the rate or output, and of the state or input, of a partial derivative."""
+    n, m = len(system.state_names), len(system.input_names)
+    row, column = place
+    unknown = 1 + n + row if row < n else 1 + 2 * n + m + row - n
+    return unknown, 1 + column if column < n else 1 + 2 * n + column - n
+
+
+def _checked(variables: list[Variable]) -> list[Variable]:
+    seen: set[str] = set()
+    for variable in variables:
+        if variable.name in seen:
+            raise ParameterError(
+                f"the FMU would have two variables '{variable.name}'; rename the muscle or signal of this name."
+            )
+        seen.add(variable.name)
+    return [_stated(v) for v in variables]

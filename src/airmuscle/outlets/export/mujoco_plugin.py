@@ -1,0 +1,271 @@
+"""MuJoCo engine plugins: a muscle with its valves as an actuator of a MuJoCo model, with its states in `act`."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+import math
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ...core.arrays import Array
+from ...core.errors import ParameterError
+from ...core.output_folder import atomic_folder
+from ...core.short_repr import ShortRepr
+from ...core.tree import leaves, with_parameters
+from ...core.variables import Input
+from ...engine.compile.program import compile_system
+from ...engine.run.integrators import Rodas4
+from ...physics.mechanism import ExternalLoad, HangingMass
+from ...physics.mechanism.external_load import SHORTENING, SHORTENING_SPEED
+from ...physics.plant import Plant, open_plant
+from .c_source import CSource
+from .c_text import c_integers, c_number, c_strings
+from .compiler import compile_library
+from .printed_system import export_system
+from .provenance import block_comment, provenance
+from .targets import program_name
+from .templates import filled
+from .write import checked_name
+
+OLDEST, BROKEN = (3, 17), ("4.0.0",)
+"""First version of MuJoCo whose plugin actuators have several states, and versions in which they do not work."""
+TOLERANCE = 1e-7
+"""Relative tolerance of the integration of the muscle within a step of MuJoCo; chosen."""
+REST_LENGTH = "rest_length"
+"""Attribute: the length of the transmission [m] at which the muscle has its resting length."""
+_LOADED: dict[str, str] = {}
+"""The plugins of this process by name, each with the digest of its library."""
+NOTE = (
+    "The actuator does not report where a run leaves the validity range of a characteristic or of another component. "
+    "Under Euler, implicit and implicitfast its own solver integrates the muscle within each step of MuJoCo; RK4 of "
+    "MuJoCo integrates it with MuJoCo's step, which does not resolve fast states."
+)
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class MuscleActuator(ShortRepr):
+    """A muscle with its valves that can be added to MuJoCo models.
+
+    plant    the muscle with its circuit, and shortening and speed as inputs
+    library  the shared library of the plugin; None where it was not built, which `remark` explains
+
+    The control opens the only input of the circuit, such as a spool, in its range; of a circuit with two inputs, such
+    as fill and discharge valve, a positive control opens the first, a negative one the second.
+    """
+
+    plant: Plant
+    name: str
+    source: Path
+    library: Path | None
+    remark: str
+    controls: tuple[Input, ...]
+
+    @property
+    def plugin_name(self) -> str:
+        """The name of the plugin in MJCF."""
+        return f"airmuscle.{self.name}"
+
+    @property
+    def control_range(self) -> tuple[float, float]:
+        """Lowest and highest control."""
+        if len(self.controls) == 2:
+            return -self.controls[1].maximum, self.controls[0].maximum
+        return (self.controls[0].minimum, self.controls[0].maximum) if self.controls else (0.0, 0.0)
+
+    def add_to(
+        self, spec: Any, *, name: str, tendon: str = "", joint: str = "", gear: float = 1.0,
+        rest_length: float | None = None, parameters: Mapping[str, float] | None = None,
+    ) -> Any:  # fmt: skip
+        """Add an actuator to a `mujoco.MjSpec`; returns its MjsActuator.
+
+        tendon, joint  the transmission, one of the two
+        gear           length of the transmission per length of the tendon, or per angle of the joint [m/rad]
+        rest_length    length of the transmission [m] at which the muscle has its resting length; that length by default
+        parameters     parameters of this actuator by path, such as {"muscle.force": 600.0}, in SI units
+
+        Raises ParameterError without a library, for an unsuitable MuJoCo, and for a wrong transmission or parameter.
+        """
+        mujoco = check_mujoco()
+        if self.library is None:
+            raise ParameterError(f"the plugin {self.plugin_name} was not built: {self.remark}.")
+        if bool(tendon) == bool(joint):
+            raise ParameterError("MuscleActuator: give either a tendon or a joint as transmission.")
+        config = {path: _text(path, value) for path, value in (parameters or {}).items()}
+        for path in config:
+            if path not in self.parameters:
+                raise ParameterError(
+                    f"MuscleActuator: there is no parameter '{path}'; there are {', '.join(self.parameters)}."
+                )
+        if rest_length is not None:
+            config[REST_LENGTH] = _text(REST_LENGTH, rest_length)
+        _load(self.plugin_name, self.library)
+        if self.plugin_name not in {p.plugin_name for p in spec.plugins}:
+            spec.activate_plugin(self.plugin_name)
+        instance = spec.add_plugin(name=f"{name}_plugin", plugin_name=self.plugin_name)
+        instance.config = config
+        actuator = spec.add_actuator(name=name, target=tendon or joint)
+        actuator.trntype = mujoco.mjtTrn.mjTRN_TENDON if tendon else mujoco.mjtTrn.mjTRN_JOINT
+        actuator.gear[0] = gear
+        actuator.dyntype, actuator.actdim = mujoco.mjtDyn.mjDYN_USER, len(self.plant.states) + 1
+        actuator.ctrlrange, actuator.ctrllimited = list(self.control_range), 1
+        actuator.plugin.name, actuator.plugin.plugin_name = instance.name, self.plugin_name
+        actuator.plugin.active = True
+        return actuator
+
+    def initialise(self, model: Any, data: Any, name: str, *, pressure: float = 0.0) -> Array:
+        """Set the states of an actuator to a gauge pressure [Pa] at its present length; returns them.
+
+        Parameters are those of the plant. Call it after the position was set. Raises ParameterError.
+        """
+        check_mujoco().mj_fwdPosition(model, data)
+        which = model.actuator(name).id
+        given = _configuration(model, int(model.actuator_plugin[which]), [*self.parameters, REST_LENGTH])
+        values = [float(given.get(path, value)) for path, value in self.parameters.items()]
+        plant = with_parameters(self.plant, values)
+        rest = float(given.get(REST_LENGTH, plant.muscles[0].geometry.resting_length))
+        shortening = rest - float(data.actuator_length[which])
+        state = open_plant(plant, (shortening,)).state_at(pressure=pressure)
+        first = int(model.actuator_actadr[which])
+        data.act[first : first + len(state) + 1] = [*state.values(), 0.0]
+        initial: Array = data.act[first : first + len(state)]
+        return initial
+
+    @functools.cached_property
+    def parameters(self) -> dict[str, float]:
+        """The parameters that an actuator can change, by path, with their values in the plant."""
+        return {leaf.path: float(leaf.value) for leaf in leaves(self.plant)}
+
+
+def write_mujoco_plugin(plant: Plant, folder: str | Path, *, name: str = "", muscle: str = "") -> MuscleActuator:
+    """Write a MuJoCo engine plugin for one muscle of a plant, and build it if MuJoCo and a C compiler are there.
+
+    plant   its load is left out: MuJoCo carries it
+    muscle  name of the muscle, if the plant has several, each with its own circuit
+
+    The folder contains the C sources `NAME_plugin.c`, `NAME.c` and `NAME.h`, and the shared library, which belongs to
+    the version of MuJoCo that it was built with. Raises ParameterError for a plant that cannot be exported, and
+    FileError.
+    """
+    part = open_plant(_single(plant, muscle))
+    program = checked_name(name) or program_name(part.muscles[0].name)
+    controls = tuple(i for i in part.input_variables if i.name not in (SHORTENING, SHORTENING_SPEED))
+    if len(controls) > 2 or (len(controls) == 2 and any(i.minimum != 0.0 for i in controls)):
+        raise ParameterError(
+            "an actuator of MuJoCo has one control; a circuit with a single input, or two valves that open from 0, "
+            f"can be exported, but the inputs are {', '.join(i.name for i in controls)}."
+        )
+    lines = provenance(f"Muscle {part.muscles[0].name} for MuJoCo", part, (), [NOTE])
+    files = _sources(part, program, controls, lines)
+    target = Path(folder)
+    library, remark = b"", ""
+    try:
+        library = _build(program, files)
+    except ParameterError as reason:
+        remark = str(reason)
+    with atomic_folder(target) as staging:
+        for source, text in files.items():
+            (staging / source).write_bytes(text)
+        if library:
+            (staging / f"lib{program}_plugin.so").write_bytes(library)
+    file = target / f"lib{program}_plugin.so" if library else None
+    return MuscleActuator(part, program, target / f"{program}_plugin.c", file, remark, controls)
+
+
+def check_mujoco() -> Any:
+    """The module mujoco. Raises ParameterError where it is missing, too old, or of a version that does not work."""
+    try:
+        import mujoco
+    except ImportError:
+        raise ParameterError("the package mujoco is not installed; install mujoco>=3.17,!=4.0.0") from None
+    version: str = mujoco.__version__
+    numbers = tuple(int(n) for n in re.findall(r"\d+", version)[:2])
+    if numbers < OLDEST or version in BROKEN:
+        raise ParameterError(
+            f"MuJoCo {version} is not supported, because its plugin actuators cannot have several states; install "
+            "mujoco>=3.17,!=4.0.0"
+        )
+    return mujoco
+
+
+def _single(plant: Plant, muscle: str) -> Plant:
+    """The plant with one of its muscles and the circuit of this muscle."""
+    names = [m.name for m in plant.muscles]
+    if len(names) == 1:
+        if muscle and muscle != names[0]:
+            raise ParameterError(f"there is no muscle '{muscle}'; the plant has {names[0]}.")
+        return plant
+    if len(plant.circuits) != len(names):
+        raise ParameterError(
+            f"the muscles {', '.join(names)} share the circuit {type(plant.circuits[0]).__name__} and cannot be "
+            "separate actuators of MuJoCo; give each muscle a circuit of its own."
+        )
+    if muscle not in names:
+        raise ParameterError(f"choose one of the muscles {', '.join(names)}; given: '{muscle}'.")
+    k = names.index(muscle)
+    return dataclasses.replace(plant, muscle=plant.muscles[k], circuit=plant.circuits[k], mechanism=ExternalLoad())
+
+
+def _sources(part: Plant, name: str, controls: Sequence[Input], lines: Sequence[str]) -> dict[str, bytes]:
+    """The C files by name: the muscle with a load whose mass and gravity the plugin sets, and the plugin."""
+    system = export_system(compile_system(dataclasses.replace(part, mechanism=HangingMass(1.0))))
+    paths, states = [leaf.path for leaf in system.tunable], list(system.state_names)
+    own = [leaf.path for leaf in leaves(part)]
+    places = [*(system.input_names.index(i.name) for i in controls), -1, -1]
+    constants = [
+        c_strings("static const char *const attributes[]", [*own, REST_LENGTH]),
+        c_integers("static const int places[]", [paths.index(path) for path in own]),
+        c_integers("static const int own_states[]", [states.index(state.name) for state in part.states]),
+        f"static const double rest_length = {c_number(part.muscles[0].geometry.resting_length)};\n",
+    ]
+    values = {
+        "provenance": block_comment(lines), "name": f"airmuscle.{name}", "file": name, "constants": "".join(constants),
+        "attributes": str(len(own) + 1), "first": str(places[0]), "second": str(places[1]),
+    }  # fmt: skip
+    texts = CSource(name, system, Rodas4(TOLERANCE), lines).files()
+    texts[f"{name}_plugin.c"] = filled("mujoco_plugin.c", values, name)
+    return {file: text.encode() for file, text in texts.items()}
+
+
+def _build(name: str, files: Mapping[str, bytes]) -> bytes:
+    """The shared library. Raises ParameterError without MuJoCo or a compiler."""
+    folder = Path(check_mujoco().__file__).parent
+    linked = [str(path) for path in sorted(folder.glob("libmujoco.*"))[:1]]
+    units = [file for file in files if file.endswith(".c")]
+    return compile_library(files, units, f"lib{name}_plugin.so", [f"-I{folder / 'include'}", *linked])
+
+
+def _text(name: str, value: float) -> str:
+    """A number as an attribute. Raises ParameterError if it is not finite."""
+    if not math.isfinite(value):
+        raise ParameterError(f"MuscleActuator: {name} is {value}; it must be finite.")
+    return repr(float(value))
+
+
+def _load(plugin: str, library: Path) -> None:
+    """Load a plugin once in a process. Raises ParameterError where another one has its name."""
+    digest = hashlib.sha256(library.read_bytes()).hexdigest()
+    if _LOADED.get(plugin) == digest:
+        return
+    mujoco = check_mujoco()
+    try:
+        if plugin not in _LOADED:
+            mujoco.mj_loadPluginLibrary(str(library))
+            _LOADED[plugin] = digest
+            return
+    except mujoco.FatalError as reason:
+        _LOADED.setdefault(plugin, f"refused: {reason}")
+    raise ParameterError(
+        f"the plugin {plugin} of this process is another one than {library}, and MuJoCo cannot replace it; write this "
+        "plugin with another name, or start a new process."
+    )
+
+
+def _configuration(model: Any, instance: int, attributes: Sequence[str]) -> dict[str, str]:
+    """The attributes of an instance of a plugin in a compiled model that are given there."""
+    raw: bytes = model.plugin_attr[int(model.plugin_attradr[instance]) :].tobytes()
+    values = raw.split(b"\0")[: len(attributes)]
+    return {name: value.decode() for name, value in zip(attributes, values, strict=True) if value}

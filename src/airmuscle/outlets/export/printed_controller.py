@@ -1,0 +1,237 @@
+"""Printed control law: a sample of it as a C99 function of its memory, and its replay by the printed operations."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ...core.arrays import Array
+from ...core.errors import ParameterError
+from ...core.tree import Leaf, leaves
+from ...engine.compile.functions import Printer
+from ...engine.compile.ir import emission
+from ...engine.compile.ir.emission import TargetLanguage
+from ...engine.compile.ir.instructions import Code, instructions
+from ...engine.compile.ir.interpreter import InterpretedBody
+from ...engine.compile.text.c import CLanguage
+from ...engine.loop.control_law import ControlLaw
+from ...engine.loop.control_loop import ControlLoop
+from ...engine.run import Problem
+from ...engine.run.compiled_law import trace_sample
+from ...engine.run.sampled_loop import SampledLoop
+from .c_text import c_array, c_number, c_strings, with_cmake
+from .identifiers import make_identifiers
+from .printed_system import find_leaf
+from .provenance import block_comment, provenance
+from .templates import filled
+
+SINGLE_TOLERANCE = 1e-4
+"""Part of its range by which a command in single precision may differ from that in double precision (chosen)."""
+
+ABOUT = {
+    "double": "/* Replay of a recorded run. The expected commands are those of the printed operations in IEEE 754 "
+    "double precision;\n   they are met bit by bit if products and sums are not fused (gcc, clang: -ffp-contract=off, "
+    "which -std=c99 implies for\n   gcc). */",
+    "float": "/* Replay of a recorded run in single precision. The expected commands are those of double precision. */",
+}
+"""Comment of the program that replays a run, by the type of numbers."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class PrintedController:
+    """A control law as expressions of measurement, set point, memory and tunable parameters."""
+
+    name: str
+    law: ControlLaw
+    inputs: dict[str, Any]
+    outputs: dict[str, Any]
+    ranges: Sequence[tuple[float, float]]
+    tunable: tuple[Leaf, ...]
+    provenance: Sequence[str]
+    number: str = "double"
+    """Type of all numbers in C, double or float."""
+
+    @property
+    def code(self) -> Code:
+        """The instructions of a sample."""
+        return instructions(list(self.inputs.values()), list(self.outputs.values()))
+
+    def source_files(self) -> dict[str, str]:
+        """Header and source, by file name."""
+        printer = Printer(CLanguage(self.number, f"{self.name}_"))
+        printer.add_code("sample", list(self.inputs), self.code, list(self.outputs))
+        law = self.law
+        counts = {
+            "memory": len(law.initial_memory), "measurements": len(law.measured_columns),
+            "setpoints": len(law.setpoints), "commands": len(law.inputs), "parameters": len(self.tunable),
+        }  # fmt: skip
+        places = {key: str(count) for key, count in counts.items()}
+        places |= {
+            "provenance": block_comment(self.provenance), "file": self.name, "enumerations": self._enumerations(),
+            "functions": printer.text[-1], "constants": self._constants(), "number": self.number,
+        }  # fmt: skip
+        return {
+            f"{self.name}.h": filled("controller.h", places, self.name),
+            f"{self.name}.c": filled("controller.c", places, self.name),
+        }
+
+    def sample_in(self, language: TargetLanguage) -> str:
+        """The function of a sample in another language; its arguments are measurement, set point, memory, parameters,
+        and the arrays of the command and of the later memory, which MATLAB returns."""
+        printer = Printer(language)
+        printer.add_code("sample", list(self.inputs), self.code, list(self.outputs))
+        return printer.text[-1]
+
+    def files(self, samples: ReplayedSamples) -> dict[str, str]:
+        """Header, source and the program that replays samples, by file name."""
+        upper, number = self.name.upper(), self.number
+        tables = (
+            c_array(f"static const {number} measured[SAMPLES][{upper}_MEASUREMENTS + 1]", samples.measured, 1, number),
+            c_array(f"static const {number} setpoints[SAMPLES][{upper}_SETPOINTS + 1]", samples.setpoints, 1, number),
+            c_array(f"static const double commands[SAMPLES][{upper}_COMMANDS + 1]", samples.commands, 1),
+        )
+        places = {
+            "provenance": block_comment(self.provenance), "file": self.name, "samples": str(len(samples.measured)),
+            "tables": "".join(tables), "number": number, "about": ABOUT[number],
+            "comparison": filled(f"replay_{'double' if number == 'double' else 'single'}.c", {
+                "tolerance": c_number(SINGLE_TOLERANCE),
+                "ranges": c_array(f"static const double ranges[{upper}_COMMANDS + 1]", self.ranges_of(samples), 1),
+            }, self.name),
+        }  # fmt: skip
+        return with_cmake(self.name, {**self.source_files(), "main.c": filled("replay.c", places, self.name)})
+
+    def ranges_of(self, samples: ReplayedSamples) -> Array:
+        """The width of the range of each command (c,); of one without limits its largest size in the run."""
+        largest = np.abs(samples.commands).max(axis=0, initial=0.0)
+        width = np.array([high - low for low, high in self.ranges], dtype=float)
+        return np.where(np.isfinite(width), width, np.where(largest > 0.0, largest, 1.0))
+
+    def _constants(self) -> str:
+        upper, number = self.name.upper(), self.number
+        memory = np.array([float(v) for v in self.law.initial_memory.values()])
+        defaults = np.array([leaf.value for leaf in self.tunable], dtype=float)
+        names = [leaf.path for leaf in self.tunable]
+        return "".join((
+            c_array(f"const {number} {self.name}_initial_memory[{upper}_MEMORY + 1]", memory, 1, number),
+            c_array(f"{number} {self.name}_parameters[{upper}_PARAMETERS + 1]", defaults, 1, number),
+            c_strings(f"const char *const {self.name}_parameter_names[{upper}_PARAMETERS + 1]", names),
+        ))  # fmt: skip
+
+    def _enumerations(self) -> str:
+        kinds = {
+            "MEMORY": tuple(self.law.initial_memory), "MEASUREMENT": self.law.measured_columns,
+            "SETPOINT": self.law.setpoints, "COMMAND": self.law.inputs,
+            "PARAMETER": tuple(leaf.path for leaf in self.tunable),
+        }  # fmt: skip
+        text = ""
+        for kind, names in kinds.items():
+            words = [f"{self.name.upper()}_{kind}_{word.upper()}" for word in make_identifiers(names)]
+            text += f"enum {{ {', '.join(f'{word} = {i}' for i, word in enumerate(words))} }};\n" if words else ""
+        return text
+
+    def replay(self, measured: Array, setpoints: Array, *, single: bool = False) -> ReplayedSamples:
+        """The commands to measurements (K, m) and set points (K, s), from the printed instructions themselves.
+
+        single  every number is rounded to single precision
+        """
+        memory: list[float] = [float(value) for value in self.law.initial_memory.values()]
+        parameters = [float(leaf.value) for leaf in self.tunable]
+        rows, names, code = [], list(self.inputs), self.code
+        for measurement, setpoint in zip(measured.tolist(), setpoints.tolist(), strict=True):
+            given = {"measurement": measurement, "setpoint": setpoint, "memory": memory, "parameters": parameters}
+            body = InterpretedBody(given, single)
+            values = emission.computed(body, code, names, {}, {})
+            for (output, index), value in values.items():
+                body.store(list(self.outputs)[output], index, value)
+            rows.append([body.stored["command", i] for i in range(len(self.law.inputs))])
+            memory = [body.stored["later", i] for i in range(len(memory))]
+        return ReplayedSamples(measured, setpoints, np.array(rows))
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ReplayedSamples:
+    """Measurements (K, m), set points (K, s) and commands (K, c) of a run."""
+
+    measured: Array
+    setpoints: Array
+    commands: Array
+
+
+def check_single_precision(printed: PrintedController, samples: ReplayedSamples, sample_time: float) -> None:
+    """Raise ParameterError where single precision changes a command of a run by more than SINGLE_TOLERANCE."""
+    single = printed.replay(samples.measured, samples.setpoints, single=True)
+    deviations = np.abs(single.commands - samples.commands) / printed.ranges_of(samples)
+    wrong = np.argwhere(~(deviations <= SINGLE_TOLERANCE))
+    if wrong.size:
+        k, i = map(int, wrong[0])
+        raise ParameterError(
+            f"{type(printed.law).__name__} in single precision: the command '{printed.law.inputs[i]}' differs by "
+            f"{deviations[k, i]:.2g} of its range from that in double precision, {k * sample_time:.4g} s after the "
+            f"start of the run; {SINGLE_TOLERANCE:g} is allowed. Export it in double precision."
+        )
+
+
+def check_control_law(problem: Problem) -> ControlLoop:
+    """The control loop of a problem. Raises ParameterError where its controller cannot be printed, by its name."""
+    loop = problem.input
+    if not isinstance(loop, ControlLoop):
+        raise ParameterError("the problem has no controller to export; its input is a signal. Give it a ControlLoop.")
+    if not isinstance(loop.controller, ControlLaw):
+        raise ParameterError(
+            f"{type(loop.controller).__name__} is a controller in Python and cannot be exported; derive it from "
+            "ControlLaw and write its step over airmuscle.core.ops."
+        )
+    return loop
+
+
+def print_controller(
+    prepared: SampledLoop,
+    name: str,
+    title: str = "",
+    tunable: Sequence[str] | None = (),
+    number: str = "double",
+    notes: Sequence[str] = (),
+) -> PrintedController:
+    """The control law of a prepared loop, with its sample time, ranges and fixed parameters as constants.
+
+    tunable  paths of the parameters that remain variables; None: all
+    notes    further lines of the comment at the beginning
+    """
+    import casadi
+
+    loop = prepared.loop
+    law = loop.controller
+    assert isinstance(law, ControlLaw)
+    sample, known = trace_sample(law), list(leaves(law))
+    paths = [leaf.path for leaf in known] if tunable is None else list(dict.fromkeys(tunable))
+    chosen = [find_leaf(law, known, path) for path in paths]
+    p = casadi.SX.sym("parameters", len(chosen))
+    parameters = [p[chosen.index(i)] if i in chosen else casadi.SX(leaf.value) for i, leaf in enumerate(known)]
+    low, high = ([prepared.ranges[n][k] for n in law.inputs] for k in (0, 1))
+    old = [sample.sample_time, sample.minimum, sample.maximum, sample.parameters]
+    values: list[list[Any]] = [[loop.sample_time], low, high, parameters]
+    new = [casadi.vertcat(casadi.SX(0, 1), *each) for each in values]
+    commands, later = casadi.substitute([sample.commands, sample.later], old, new)
+    limited = [_limited(commands[i], *prepared.ranges[n]) for i, n in enumerate(law.inputs)]
+    inputs = {"measurement": sample.measured, "setpoint": sample.setpoints, "memory": sample.memory, "parameters": p}
+    outputs = {"command": casadi.densify(casadi.vertcat(*limited)), "later": casadi.densify(later)}
+    about = [f"Sample time {c_number(loop.sample_time)} s; set points {', '.join(law.setpoints) or 'none'}; measured "
+             f"{', '.join(law.measured_columns)}; commanded {', '.join(law.inputs)}, limited to "
+             f"{', '.join(f'{a!r} to {b!r}' for a, b in zip(low, high, strict=True))}."]  # fmt: skip
+    if loop.drivers:
+        kinds = ", ".join(f"{key}: {value}" for key, value in loop.drivers.items())
+        about.append(f"Not part of this program: the drivers between commands and openings ({kinds}).")
+    lines = provenance(title or type(law).__name__, law, notes=[*about, *notes])
+    ranges = [prepared.ranges[n] for n in law.inputs]
+    return PrintedController(name, law, inputs, outputs, ranges, tuple(known[i] for i in chosen), lines, number)
+
+
+def _limited(command: Any, low: float, high: float) -> Any:
+    """A command within its range."""
+    import casadi
+
+    raised = casadi.if_else(command < low, low, command) if np.isfinite(low) else command
+    return casadi.if_else(raised > high, high, raised) if np.isfinite(high) else raised

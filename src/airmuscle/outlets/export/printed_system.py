@@ -1,0 +1,129 @@
+"""Printed system: the functions of a system in a language of text, with the names, units and defaults of its arrays."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ...core.arrays import Array
+from ...core.errors import ParameterError, suggestion
+from ...core.tree import Leaf, leaves
+from ...engine.compile.functions import ArraySizes, Extension, TracedSystem, implicit_module, rates_module
+from ...engine.compile.ir.emission import TargetLanguage
+from ...engine.compile.program import CompiledSystem
+from ...engine.state_units import column_units
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ExportedSystem:
+    """A system ready for printing: its expressions, of which some parameters are arguments and the others constants."""
+
+    compiled: CompiledSystem
+    traced: TracedSystem
+    tunable: tuple[Leaf, ...]
+    """The parameters that remain arguments, in the order of their vector."""
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """The states."""
+        return self.compiled.description.state_names
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """The inputs."""
+        return self.compiled.description.input_names
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """The outputs."""
+        return self.compiled.description.output_names
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """States, inputs and outputs."""
+        return self.compiled.description.column_names
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The units of all columns; empty where none is known."""
+        return column_units(self.compiled.system, self.output_names)
+
+    @property
+    def defaults(self) -> Array:
+        """The values of the tunable parameters."""
+        return np.array([leaf.value for leaf in self.tunable], dtype=float)
+
+    @property
+    def nominal(self) -> Array:
+        """The size of each state below which its relative error does not matter."""
+        return self.compiled.nominal
+
+    def printed(
+        self, language: TargetLanguage, *, implicit: bool = True, extend: Extension | None = None
+    ) -> tuple[str, ArraySizes]:
+        """The functions `prepare`, `rhs` and `outputs` of arrays; with `implicit` also those of a Rosenbrock step."""
+        module = implicit_module if implicit else rates_module
+        return module(self.traced, language, extend) if extend else module(self.traced, language)
+
+
+def export_system(compiled: CompiledSystem, tunable: Sequence[str] | None = None) -> ExportedSystem:
+    """A compiled system ready for printing.
+
+    tunable  paths of the parameters that can be changed in the printed program, such as `mechanism.mass`; all by
+             default. The others are constants of it, which makes it smaller.
+
+    Raises ParameterError for a path that is not a parameter of the system.
+    """
+    traced, known = compiled.program.traced, list(leaves(compiled.system))
+    if tunable is None:
+        return ExportedSystem(compiled, traced, tuple(known))
+    chosen = [find_leaf(compiled.system, known, path) for path in dict.fromkeys(tunable)]
+    import casadi
+
+    symbols = casadi.SX.sym("p", len(chosen))
+    values = [symbols[chosen.index(i)] if i in chosen else casadi.SX(known[i].value) for i in range(len(known))]
+    f, o = casadi.substitute([traced.f, traced.o], [traced.p], [casadi.vertcat(casadi.SX(0, 1), *values)])
+    f, o = casadi.cse([casadi.densify(f), casadi.densify(o)])
+    return ExportedSystem(compiled, dataclasses.replace(traced, p=symbols, f=f, o=o), tuple(known[i] for i in chosen))
+
+
+def acting_parameters(compiled: CompiledSystem) -> list[str]:
+    """The paths of the parameters on which a rate or an output depends."""
+    import casadi
+
+    traced = compiled.program.traced
+    paths = [leaf.path for leaf in leaves(compiled.system)]
+    acts = casadi.which_depends(casadi.vertcat(traced.f, traced.o), traced.p, 1, False) if paths else []
+    return [path for path, used in zip(paths, acts, strict=True) if used]
+
+
+def find_leaf(model: Any, known: Sequence[Leaf], path: str) -> int:
+    """The number of the parameter at a path. Raises ParameterError; for a part of the structure it says so."""
+    paths = [leaf.path for leaf in known]
+    if path in paths:
+        return paths.index(path)
+    if _is_structure(model, path):
+        raise ParameterError(
+            f"'{path}' is fixed when a program is printed, because it determines the equations and is not a number in "
+            f"them; tunable parameters are {', '.join(paths)}. Change it in the model, and export again."
+        )
+    raise ParameterError(
+        f"{type(model).__name__} has no parameter '{path}'; tunable parameters are {', '.join(paths)}."
+        f"{suggestion(path, paths)}"
+    )
+
+
+def _is_structure(model: Any, path: str) -> bool:
+    """Whether a path leads to a field of a model, or of a model inside it, that is not a parameter."""
+    part = model
+    for word in path.replace("[", ".").replace("]", "").split("."):
+        if isinstance(part, tuple) and word.isdecimal() and int(word) < len(part):
+            part = part[int(word)]
+        elif dataclasses.is_dataclass(part) and word in {f.name for f in dataclasses.fields(part)}:
+            part = getattr(part, word)
+        else:
+            return False
+    return True

@@ -1,0 +1,92 @@
+"""Solver of an exported program: the printed step of an integrator, called with the fields of the solver.
+
+The kernels of an integrator have functions `single_step` and `state_between`. Arguments are bound by their names; those
+that no field has are workspace.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Mapping
+from typing import Any
+
+from ...engine.compile.kernel_text.printer import KernelPrinter
+from ...engine.compile.kernel_text.types import TypedKernel
+from ...engine.run.integrators import ExplicitRungeKutta, Integrator, Rodas4
+from .run_data import tableau_arrays
+
+SHAPES: dict[str, tuple[str, ...]] = {
+    **dict.fromkeys(
+        (
+            "y", "yn", "x", "g", "f0", "ft", "k1", "k2", "k3", "k4", "k5", "k6", "d2", "d3", "absolute", "nominal",
+            "between",
+        ),
+        ("STATES",),
+    ),
+    **dict.fromkeys(("u", "w", "base"), ("INPUTS",)), **dict.fromkeys(("nodes", "weights"), ("STAGES",)),
+    "k": ("STAGES", "STATES"), "table": ("STAGES", "STAGES"), "jacobian": ("JACOBIAN",), "factors": ("FACTORS",),
+}  # fmt: skip
+"""Sizes of the arrays of the kernels of integrators."""
+TABLEAU = ("table", "weights", "nodes")
+"""Arguments that are the tableau of an explicit method."""
+STEP = {
+    "y": "x", "base": "u", "w": "w", "moving": "moving", "t": "t", "start": "start", "end": "end", "h": "h",
+    "relative": "rtol", "done": "done", "d2": "d2", "d3": "d3", "c": "c", "nominal": "nominal",
+    **dict(zip(TABLEAU, TABLEAU, strict=True)),
+}  # fmt: skip
+"""Fields of the solver for the arguments of `single_step`."""
+BETWEEN = {**STEP, "y": "x_before", "yn": "x", "t": "t_before", "h": "h_taken"}
+"""Fields of the solver for the arguments of `state_between`."""
+RESULTS = ("result", "reached", "taken", "following", "rejections")
+"""Results of `single_step`."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SolverText:
+    """The step of an integrator in a language.
+
+    fields   the text of each field of the solver that STEP and BETWEEN name
+    sizes    the text of each size in SHAPES
+    work     what stands before the names of arrays of the workspace
+    """
+
+    printer: KernelPrinter
+    integrator: Integrator
+    fields: Mapping[str, str]
+    sizes: Mapping[str, str]
+    work: str = ""
+
+    @functools.cached_property
+    def _kernels(self) -> dict[str, TypedKernel]:
+        return self.printer.typed(self.integrator.printed_step, ("single_step", "state_between"))
+
+    @property
+    def implicit(self) -> bool:
+        """Whether the step needs the Jacobian."""
+        return "jac" in self._kernels["single_step"].called
+
+    @property
+    def constants(self) -> dict[str, Any]:
+        """First step (0: to be found), distance within which a time belongs to a step, relative tolerance, and the
+        tableau that the step reads."""
+        own = self.integrator
+        if not isinstance(own, ExplicitRungeKutta):
+            return {"FIRST_STEP": 0.0, "CLOSE": 0.0, "RTOL": own.rtol if isinstance(own, Rodas4) else 0.0}
+        read = self._kernels["single_step"].arguments
+        tableau = {key.upper(): value for key, value in zip(TABLEAU, tableau_arrays(own), strict=True) if key in read}
+        return {"FIRST_STEP": own.step, "CLOSE": 1e-9 * own.step, "RTOL": 0.0, **tableau}
+
+    @property
+    def places(self) -> dict[str, str]:
+        """The printed functions, and their calls with their workspace, for a template."""
+        result = {"steps": self.printer.printed(self._kernels)}
+        for name, fields, results in (("single_step", STEP, RESULTS), ("state_between", BETWEEN, ())):
+            kernel = self._kernels[name]
+            given = {key: self.fields[field] for key, field in fields.items()}
+            own = [key for key in kernel.arguments if key in SHAPES and key not in {*given, "between"}]
+            work = {key: [self.sizes[size] for size in SHAPES[key]] for key in own}
+            result[f"{name}_work"] = self.printer.workspace(work)
+            given |= {key: f"{self.work}{key}" for key in own}
+            result[name] = self.printer.bound_call(kernel, given, results)
+        return result

@@ -1,0 +1,121 @@
+"""Writing of exported programs and laws into a folder; all files of an export appear, or none."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from ...core.errors import ParameterError, suggestion
+from ...core.output_folder import atomic_folder
+from ...engine.loop.control_loop import ControlLoop
+from ...engine.run import Problem
+from ...physics.muscle.characteristic import Characteristic
+from .exported_loop import CONTROLLER, export_loop
+from .identifiers import make_identifier
+from .law import print_law
+from .printed_system import export_system
+from .provenance import provenance
+from .run_data import check_open_loop, loop_data, run_data
+from .targets import C99, ExportedRun, Target, program_name
+
+NOTE = (
+    "The equations are those of the model. The program does not report where a run leaves the validity range of a "
+    "characteristic or of another component, as a simulation by airmuscle does."
+)
+"""What an exported program does not contain."""
+
+
+def write_program(
+    problem: Problem,
+    folder: str | Path,
+    target: Target = C99(),
+    *,
+    name: str = "",
+    title: str = "",
+    tunable: Sequence[str] | None = None,
+    columns: Sequence[str] = (),
+) -> tuple[Path, ...]:
+    """Write a system and its run as a program in another language; returns the paths of its files.
+
+    problem  a system with its input signals or, for these targets, a control loop; initial state, output times and
+             integrator
+    target   C99(), JavaScript() or Octave()
+    name     name of the files, and beginning of the names in them; by default the title
+    tunable  paths of the parameters that the program can change, those of a controller with `controller.` before them;
+             all by default, the others become constants
+    columns  states, inputs, outputs and columns of a controller that the run writes after time; all by default
+
+    The files depend on the arguments and the version of airmuscle alone. Raises ParameterError for what cannot be
+    exported, which it names, and FileError.
+    """
+    program = make_run(
+        problem, name=name, title=title, tunable=tunable, columns=columns, with_loop=target.has_loops
+    )  # fmt: skip
+    return write_files(target.run_files(program), folder)
+
+
+def make_run(
+    problem: Problem, *, name: str = "", title: str = "", tunable: Sequence[str] | None = None,
+    columns: Sequence[str] = (), notes: Sequence[str] = (NOTE,), with_loop: bool = False,
+) -> ExportedRun:  # fmt: skip
+    """A problem ready for any target, with its control loop if the target has one; else as for `write_program`."""
+    title = title or type(problem.system).__name__
+    name = checked_name(name) or program_name(title)
+    loop, plant_parameters = None, tunable
+    if with_loop and isinstance(problem.input, ControlLoop):
+        plant_parameters, of_controller = _divided(tunable)
+        loop = export_loop(problem, f"{name}_controller", title, of_controller)
+        run = loop_data(problem, loop.others, loop.prepared.times)
+    else:
+        check_open_loop(problem)
+        run = run_data(problem)
+    system = export_system(problem.compiled, plant_parameters)
+    known = (*system.columns, *(loop.added_columns if loop else ()))
+    for column in columns:
+        if column not in known:
+            raise ParameterError(
+                f"the run has no column '{column}'; there are {', '.join(known)}.{suggestion(column, known)}"
+            )
+    lines = provenance(title, problem.system, (run.integrator,), notes)
+    chosen = tuple(c for c in columns if c != "time") or known
+    return ExportedRun(name, system, run, lines, chosen, loop)
+
+
+def _divided(tunable: Sequence[str] | None) -> tuple[list[str] | None, list[str] | None]:
+    """The tunable parameters of the plant, and those of the controller without the beginning of their paths."""
+    if tunable is None:
+        return None, None
+    plant = [path for path in tunable if not path.startswith(CONTROLLER)]
+    return plant, [path.removeprefix(CONTROLLER) for path in tunable if path.startswith(CONTROLLER)]
+
+
+def write_law(
+    law: Characteristic, folder: str | Path, target: Target = C99(), *, name: str = "", title: str = ""
+) -> tuple[Path, ...]:
+    """Write a static characteristic with its slopes as a function in another language; the paths of its files.
+
+    A force law gives force [N], its derivative by pressure [N/Pa] and stiffness -dF/deps [N]; a law that is given as
+    contraction or pressure gives this and its two derivatives. Raises ParameterError for a law without closed form, and
+    FileError.
+    """
+    title = title or type(law).__name__
+    return write_files(target.law_files(print_law(law, checked_name(name) or program_name(title), title)), folder)
+
+
+def checked_name(name: str) -> str:
+    """A name given by the user. Raises ParameterError, with a name that is possible, if it is not an identifier."""
+    if name and make_identifier(name) != name:
+        raise ParameterError(
+            f"'{name[:80]}' cannot be the name of an exported program: it must consist of ASCII letters, digits and "
+            f"single underscores, begin with a letter, and be no keyword. Use '{make_identifier(name)}'."
+        )
+    return name
+
+
+def write_files(files: Mapping[str, str], folder: str | Path) -> tuple[Path, ...]:
+    """Write texts by file name into a folder, all or none; their paths. Raises FileError."""
+    target = Path(folder)
+    with atomic_folder(target) as staging:
+        for file, text in files.items():
+            (staging / file).write_bytes(text.encode("utf-8", "replace"))
+    return tuple(target / file for file in files)

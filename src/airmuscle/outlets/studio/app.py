@@ -1,0 +1,270 @@
+"""Application of the studio: the page, sheets of the library, and sheets of texts of users.
+
+The server computes no curve and no run: it sends printed programs, which the page evaluates.
+"""
+
+from __future__ import annotations
+
+import collections
+import json
+import threading
+from collections.abc import Callable, Mapping
+from importlib import metadata
+from typing import Any
+
+from ...core.errors import AirmuscleError
+from ...files.library.files import LAWS, list_laws, read_toml
+from .fit_routes import FitService
+from .fit_settings import FieldError
+from .joint_sheet import joint_names, sheet_of_joint
+from .page import self_contained_page, server_page, web_files
+from .requests import BadRequest, decoded, json_answer, limited_body
+from .security import Access, Application, cookie_name, given_token, secured
+from .size_sheet import size_sheet
+from .tasks import (
+    plant_names,
+    plant_title,
+    sheet_of_law,
+    sheet_of_law_text,
+    sheet_of_offered_plant,
+    sheet_of_scenario_text,
+)
+from .uploads import MAX_TEXT
+from .worker import LimitError, WorkerPool
+
+WORKERS = 5
+"""Number of worker processes for sheets, some of which are kept ready (chosen)."""
+LONG_WORKERS = 3
+"""The same for what may take long: measurement files, sizings and joints (chosen)."""
+TIME_LIMIT = 20.0
+"""Limit [s] of the computation of a sheet of a user (chosen)."""
+LIBRARY_LIMIT = 120.0
+"""The same of the library, and of a sizing (chosen: a joint with an elaborate law takes some seconds)."""
+MAX_SHEETS = 100
+"""Number of sheets that the server keeps (chosen)."""
+MAX_PAGE = 256 * 1024
+"""Largest size of a request for a self-contained page [bytes] (chosen)."""
+MAX_PAGE_SHEETS = 12
+"""Maximum number of muscles and plants in a self-contained page (chosen)."""
+LONG_TASKS = (sheet_of_joint, size_sheet)
+"""Tasks that leave the workers of the other sheets free."""
+
+
+class Sheets:
+    """The sheets that were requested last, by their identifier."""
+
+    def __init__(self, pool: WorkerPool, long_pool: WorkerPool) -> None:
+        self._pool, self._long_pool = pool, long_pool
+        self._kept: collections.OrderedDict[str, dict[str, Any]] = collections.OrderedDict()
+        self._of_library: dict[tuple[str, str], str] = {}
+        self._lock = threading.Lock()
+
+    def get(self, identifier: str) -> dict[str, Any] | None:
+        """The sheet of this identifier; None if it is no longer kept."""
+        with self._lock:
+            return self._kept.get(identifier)
+
+    def of_library(self, task: Callable[[str], dict[str, Any]], name: str) -> dict[str, Any]:
+        """The sheet that a task makes of a name of the library."""
+        key = (task.__name__, name)
+        known = self.get(self._of_library.get(key, ""))
+        if known is None:
+            known = self.of_text(task, name, LIBRARY_LIMIT)
+            self._of_library[key] = known["id"]
+        return known
+
+    def of_text(self, task: Callable[[str], dict[str, Any]], text: str, limit: float | None = None) -> dict[str, Any]:
+        """The sheet that a task makes of a text, within a limit of time [s], by default TIME_LIMIT."""
+        pool = self._long_pool if task in LONG_TASKS else self._pool
+        return self.keep(pool.call(task, text, limit=TIME_LIMIT if limit is None else limit))
+
+    def keep(self, sheet: dict[str, Any]) -> dict[str, Any]:
+        """The sheet, which is kept."""
+        with self._lock:
+            self._kept[sheet["id"]] = sheet
+            self._kept.move_to_end(sheet["id"])
+            while len(self._kept) > MAX_SHEETS:
+                self._kept.popitem(last=False)
+        return sheet
+
+
+def library_list() -> dict[str, Any]:
+    """Names and titles of the laws and plants that the page offers."""
+    laws = [{"name": name, **_texts(read_toml(LAWS / f"{name}.toml"))} for name in list_laws()]
+    plants = [{"name": name, **plant_title(name)} for name in plant_names()]
+    joints = [{"name": name, **plant_title(name)} for name in joint_names()]
+    return {"version": metadata.version("airmuscle"), "laws": laws, "plants": plants, "joints": joints}
+
+
+def _texts(tables: Mapping[str, Any]) -> dict[str, Any]:
+    return {"title": tables["title"], "provenance": tables["provenance"]}
+
+
+def create_app(
+    access: Access = Access(), pool: WorkerPool | None = None, opened: tuple[dict[str, Any], ...] = (),
+    fits: FitService | None = None, long_pool: WorkerPool | None = None,
+) -> Application:  # fmt: skip
+    """The ASGI application. `opened` are sheets with which the page begins. Raises ImportError without starlette.
+
+    `long_pool` computes joints and sizings, by default `pool`.
+    """
+    from starlette.applications import Starlette
+    from starlette.requests import ClientDisconnect
+    from starlette.routing import Route
+
+    pool = pool or WorkerPool(WORKERS)
+    sheets = Sheets(pool, long_pool or pool)
+    handlers = Handlers(sheets, access, opened)
+    routes = [
+        Route("/", handlers.page),
+        Route("/web/{name:path}", handlers.web),
+        Route("/program/{name}", handlers.program),
+        Route("/api/library", handlers.library),
+        Route("/api/law/{name}", handlers.law),
+        Route("/api/law", handlers.own_law, methods=["POST"]),
+        Route("/api/plant/{name}", handlers.plant),
+        Route("/api/plant", handlers.own_plant, methods=["POST"]),
+        Route("/api/joint/{name}", handlers.joint),
+        Route("/api/size", handlers.size, methods=["POST"]),
+        Route("/api/page", handlers.save_page, methods=["POST"]),
+        *(fits or FitService(pool)).routes(),
+    ]
+    errors: dict[Any, Any] = {
+        AirmuscleError: _refused, ClientDisconnect: _closed, 404: _missing, 405: _missing, 500: _failed,
+    }  # fmt: skip
+    return secured(Starlette(routes=routes, exception_handlers=errors), access)
+
+
+class Handlers:
+    """The functions that answer requests."""
+
+    def __init__(self, sheets: Sheets, access: Access, opened: tuple[dict[str, Any], ...]) -> None:
+        self._sheets, self._access, self._opened = sheets, access, opened
+        self._web, self._page, self._library = web_files(), server_page(), library_list()
+        for sheet in opened:
+            sheets.keep(sheet)
+
+    async def page(self, request: Any) -> Any:
+        """The page; a token in its address becomes a cookie, so that it does not stay in the address."""
+        from starlette.responses import HTMLResponse, RedirectResponse
+
+        if self._access.token and given_token(request.scope):
+            answer = RedirectResponse("/", status_code=303)
+            # "lax": a link to the page in a text opens it; requests that cost computation need their header as well
+            answer.set_cookie(cookie_name(request.scope), self._access.token, httponly=True, samesite="lax")
+            return answer
+        return HTMLResponse(self._page)
+
+    async def web(self, request: Any) -> Any:
+        """A file of the page."""
+        from starlette.responses import Response
+
+        kind, text = self._web.get(request.path_params["name"], ("", ""))
+        if not kind:
+            raise BadRequest("there is no such file.", 404)
+        return Response(text, media_type=kind)
+
+    async def program(self, request: Any) -> Any:
+        """The printed program of a sheet."""
+        from starlette.responses import Response
+
+        sheet = self._sheets.get(request.path_params["name"].removesuffix(".js"))
+        if sheet is None:
+            raise BadRequest("this program is no longer kept; reload the page.", 404)
+        return Response(sheet["script"], media_type="text/javascript")
+
+    async def library(self, request: Any) -> Any:
+        """Names of the library, and the sheets with which the page begins."""
+        return json_answer({**self._library, "opened": [_without_script(sheet) for sheet in self._opened]})
+
+    async def law(self, request: Any) -> Any:
+        """The sheet of a law of the library."""
+        name = request.path_params["name"]
+        if name not in list_laws():
+            raise BadRequest(f"the library has no muscle or law '{name[:80]}'.", 404)
+        return await self._computed(self._sheets.of_library, sheet_of_law, name)
+
+    async def own_law(self, request: Any) -> Any:
+        """The sheet of a text of a user."""
+        text = decoded(await limited_body(request, MAX_TEXT))
+        return await self._computed(self._sheets.of_text, sheet_of_law_text, text)
+
+    async def plant(self, request: Any) -> Any:
+        """The sheet of a plant that the page offers."""
+        name = request.path_params["name"]
+        if name not in plant_names():
+            raise BadRequest(f"there is no plant '{name[:80]}'.", 404)
+        return await self._computed(self._sheets.of_library, sheet_of_offered_plant, name)
+
+    async def own_plant(self, request: Any) -> Any:
+        """The sheet of a scenario of a user."""
+        text = decoded(await limited_body(request, MAX_TEXT))
+        return await self._computed(self._sheets.of_text, sheet_of_scenario_text, text)
+
+    async def joint(self, request: Any) -> Any:
+        """The sheet of a joint of the library."""
+        name = request.path_params["name"]
+        if name not in joint_names():
+            raise BadRequest(f"the library has no joint '{name[:80]}'.", 404)
+        return await self._computed(self._sheets.of_library, sheet_of_joint, name)
+
+    async def size(self, request: Any) -> Any:
+        """The sheet of a sizing."""
+        text = decoded(await limited_body(request, MAX_TEXT))
+        return await self._computed(self._sheets.of_text, size_sheet, text, LIBRARY_LIMIT)
+
+    async def _computed(self, function: Callable[..., dict[str, Any]], *arguments: Any) -> Any:
+        from starlette.concurrency import run_in_threadpool
+
+        return json_answer(_without_script(await run_in_threadpool(function, *arguments)))
+
+    async def save_page(self, request: Any) -> Any:
+        """One file of what is on the screen: the request names the sheets and the state of the page."""
+        from starlette.responses import Response
+
+        wanted = read_page_request(decoded(await limited_body(request, MAX_PAGE)))
+        named = [self._sheets.get(identifier) for identifier in wanted["sheets"]]
+        sheets = [sheet for sheet in named if sheet is not None]
+        if len(sheets) < len(named):
+            raise BadRequest("a program is no longer kept; reload the page.", 404)
+        return Response(self_contained_page(sheets, wanted["state"]), media_type="text/html")
+
+
+def read_page_request(text: str) -> dict[str, Any]:
+    """The identifiers of sheets and the state in a request for a page, without that of fits. Raises BadRequest."""
+    try:
+        wanted = json.loads(text)
+    except (ValueError, RecursionError):
+        raise BadRequest("the request is not JSON.") from None
+    if not isinstance(wanted, dict) or not isinstance(wanted.get("state"), dict):
+        raise BadRequest("the request must contain sheets and a state.")
+    names = wanted.get("sheets")
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise BadRequest("sheets must be a list of identifiers.")
+    if not 1 <= len(names) <= MAX_PAGE_SHEETS:
+        raise BadRequest(f"{len(names)} sheets are requested; allowed range: 1 to {MAX_PAGE_SHEETS}.")
+    return {"sheets": names, "state": {name: state for name, state in wanted["state"].items() if name != "fit"}}
+
+
+def _without_script(sheet: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in sheet.items() if key != "script"}
+
+
+async def _refused(request: Any, error: Exception) -> Any:
+    assert isinstance(error, AirmuscleError)
+    status = error.status if isinstance(error, BadRequest) else 503 if isinstance(error, LimitError) else 422
+    field = {"field": error.field} if isinstance(error, FieldError) else {}
+    return json_answer({"error": str(error.message), **field}, status)
+
+
+async def _missing(request: Any, error: Any) -> Any:
+    return json_answer({"error": "there is no such address."}, int(error.status_code))
+
+
+async def _closed(request: Any, error: Exception) -> Any:
+    """Nobody receives this answer: the tab was closed during its request."""
+    return json_answer({"error": "the connection was closed."}, 400)
+
+
+async def _failed(request: Any, error: Exception) -> Any:
+    return json_answer({"error": "the server failed; its terminal states the reason."}, 500)

@@ -1,0 +1,258 @@
+"""Reading of uploaded files: recordings, and every problem with the field of the page that it concerns."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import warnings
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import airmuscle as am
+
+from ...bench.readers.constants import parse_constant_name
+from ...bench.readers.interpret import interpret, resolve_headings, unit_conversion
+from ...bench.readers.mapping import apply_mapping
+from ...bench.readers.reader import check_bench, read_tables
+from ...bench.readers.specimens import split_specimens
+from ...bench.readers.table import RawTable
+from ...bench.segment import check_contents
+from ...bench.segment.outliers import Outlier, find_bench_outliers
+from ...core.errors import AirmuscleError, AirmuscleWarning, ColumnError
+from ...core.units import AMBIENT_PRESSURE, quantity
+from ...recording.heading import Heading, parse_heading
+from .fit_hints import as_field_error, in_page_words
+from .fit_settings import FieldError, FitSettings
+from .fit_uploads import FILES
+
+MAX_ROWS = 200_000
+"""Maximum number of rows of a file that are used; of a longer file every n-th one (chosen)."""
+MAX_COLUMNS = 400
+"""Maximum number of columns that are shown (chosen)."""
+NEEDED = ("pressure", "contraction", "force")
+"""Quantities of a static fit."""
+
+
+@dataclasses.dataclass(frozen=True)
+class FileColumn:
+    """A column of a file with its interpretation.
+
+    key      the heading, or the number of a column whose heading occurs several times
+    known    whether the quantity is a known one; the name is the whole heading otherwise
+    stated   unit in the file
+    """
+
+    key: str
+    heading: str
+    name: str
+    unit: str
+    stated: str
+    known: bool
+    used: bool
+
+
+@dataclasses.dataclass(eq=False)
+class ReadSet:
+    """The recordings of all files, complete and with the selected rows, the columns, and the problems."""
+
+    columns: dict[str, list[FileColumn]] = dataclasses.field(default_factory=dict)
+    """Columns by the name of the file."""
+    recordings: list[am.Recording] = dataclasses.field(default_factory=list)
+    files: list[str] = dataclasses.field(default_factory=list)
+    """The name of the file of each recording."""
+    problems: list[FieldError] = dataclasses.field(default_factory=list)
+    remarks: list[str] = dataclasses.field(default_factory=list)
+    outliers: Sequence[Sequence[Outlier]] = ()
+    """The suspected outliers of each recording that are left out."""
+
+    def complain(self, error: AirmuscleError, field: str = "") -> None:
+        """Add a problem, once."""
+        problem = as_field_error(error, field)
+        if all((problem.message, problem.field) != (each.message, each.field) for each in self.problems):
+            self.problems.append(problem)
+
+
+def read_set(folder: Path, settings: FitSettings) -> ReadSet:
+    """The recordings of the files of a set, as `recording.read` reads them with the same mapping."""
+    read = ReadSet()
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", AirmuscleWarning)
+        for path in sorted((folder / FILES).iterdir()):
+            _read_file(path, settings, read)
+        try:
+            check_bench(read.recordings)
+        except AirmuscleError as error:
+            read.complain(error, "columns")
+    read.remarks += dict.fromkeys(
+        in_page_words(each.message.args[0]) for each in caught if isinstance(each.message, Warning)
+    )
+    dropped = settings.texts["outliers"] == "drop"
+    read.outliers = find_bench_outliers(read.recordings) if dropped else [()] * len(read.recordings)
+    for recording, file in zip(read.recordings, read.files, strict=True):
+        _check_needed(recording, file, read)
+    if not read.problems and read.recordings:
+        try:
+            check_contents(read.recordings)
+        except AirmuscleError as error:
+            read.complain(error, "files")
+    return read
+
+
+def _read_file(path: Path, settings: FitSettings, read: ReadSet) -> None:
+    field = f"file:{path.name}"
+    try:
+        tables = _tables(path, settings)
+        constants = _constants(path, settings)
+    except AirmuscleError as error:
+        problem = as_field_error(error, field)
+        read.complain(FieldError(without_folder(problem.message, path.parent), problem.field))
+        return
+    for table in tables:
+        columns = list(_columns(table, settings))[:MAX_COLUMNS]
+        listed = read.columns.setdefault(path.name, [])
+        listed += [each for each in columns if all(each.key != other.key for other in listed)]
+        try:
+            mapped = apply_mapping(table, settings.mapping(_chosen(table, settings)))
+        except AirmuscleError as error:
+            read.complain(error, "columns")
+            continue
+        problems = list(_unit_problems(mapped, columns, constants))
+        for problem in problems:
+            read.complain(problem)
+        if problems:
+            continue
+        missing = settings.mapping({}).missing_values
+        try:
+            parts = [
+                interpret(part, units={}, constants=constants, time_base=_time_base(settings), missing=missing)
+                for part in split_specimens(mapped)
+            ]
+        except AirmuscleError as error:
+            read.complain(error, field)
+            continue
+        read.recordings += parts
+        read.files += [path.name] * len(parts)
+
+
+def without_folder(text: str, folder: Path) -> str:
+    """The text without the path of a folder, or its beginning, which a reader of another package may quote."""
+    path = str(folder)
+    text = text.replace(f"{path}{os.sep}", "")
+    first_directory = folder.parents[-2] if len(folder.parents) > 1 else folder
+    for length in range(len(path), len(f"{first_directory}{os.sep}"), -1):
+        text = text.replace(path[:length], "…")
+    return text
+
+
+def _time_base(settings: FitSettings) -> am.bench.TimeBase:
+    mapping = settings.mapping({})
+    return mapping.time_base if mapping.time else am.bench.RecordedTime(True)
+
+
+def _tables(path: Path, settings: FitSettings) -> tuple[RawTable, ...]:
+    """The tables of a file; columns without headings are named by their numbers."""
+    try:
+        return read_tables(path, settings.mapping(), am.bench.Decimation(MAX_ROWS))
+    except ColumnError as error:
+        if error.hint is None or error.hint.argument != "columns":
+            raise
+        return read_tables(path, settings.mapping({**settings.columns, "1": ""}), am.bench.Decimation(MAX_ROWS))
+
+
+def _constants(path: Path, settings: FitSettings) -> dict[str, float | str]:
+    """The constants of a file: those of its row precede those in its name and those of all files."""
+    try:
+        common = settings.mapping({}).constants_of(path)
+    except AirmuscleError as error:
+        raise as_field_error(error, "file_name") from None
+    return {**common, **settings.facts.get(path.name, {})}
+
+
+def _keys(table: RawTable) -> list[str]:
+    """The key of each column: its heading if it occurs once, otherwise its number."""
+    return [h if h and table.headings.count(h) == 1 else str(i) for i, h in enumerate(table.headings, 1)]
+
+
+def _chosen(table: RawTable, settings: FitSettings) -> dict[str, str]:
+    """The corrections of the columns that this table has."""
+    return {key: settings.columns[key] for key in _keys(table) if key in settings.columns}
+
+
+def _columns(table: RawTable, settings: FitSettings) -> Iterator[FileColumn]:
+    units = table.units or ("",) * len(table.headings)
+    for key, heading, unit_row in zip(_keys(table), table.headings, units, strict=False):
+        chosen = settings.columns.get(key)
+        name, stated, known = _name_and_unit(heading)
+        stated = unit_row or stated
+        if chosen:
+            name, unit, known = _name_and_unit(chosen)
+        else:
+            unit = ""
+        yield FileColumn(key, heading, name if known else heading, unit or stated, stated, known, chosen != "")
+
+
+def _name_and_unit(text: str) -> tuple[str, str, bool]:
+    """The quantity or constant of a heading, its unit, and whether it is a known one."""
+    constant = parse_constant_name(text)
+    if constant is not None:
+        return (*constant, True)
+    heading = parse_heading(text)
+    return heading.name, heading.unit or "", heading.known
+
+
+def _unit_problems(
+    table: RawTable, columns: Sequence[FileColumn], constants: dict[str, float | str]
+) -> Iterator[FieldError]:
+    """A problem for each column whose unit is missing or unknown, and for two columns of one quantity."""
+    ambient = constants.get("ambient")
+    pressure = quantity(ambient, "Pa", ambient=0.0) if ambient else AMBIENT_PRESSURE
+    used = [column for column in columns if column.used]
+    names = [column.name for column in used if column.known]
+    double = next((column for column in used if column.known and names.count(column.name) > 1), None)
+    if double is not None:
+        keys = " and ".join(f"'{column.key}'" for column in used if column.name == double.name)
+        yield FieldError(
+            f"{table.origin}: columns {keys} are both read as {double.name}. Select 'not used' for all but one.",
+            f"column:{double.key}",
+        )
+        return
+    try:
+        headings = resolve_headings(table, {})
+    except AirmuscleError as error:
+        yield as_field_error(error, "columns")
+        return
+    for column, heading in zip(used, headings, strict=False):
+        if not heading.known:
+            continue
+        try:
+            unit_conversion(table, heading, pressure)
+        except AirmuscleError as error:
+            yield FieldError(_unit_text(column, heading, error), f"column:{column.key}")
+
+
+def _unit_text(column: FileColumn, heading: Heading, error: AirmuscleError) -> str:
+    if heading.unit is None:
+        return f"the unit of '{column.key}' ({heading.name}) is not stated in the file; write it into the field Unit."
+    return in_page_words(error.message).partition(": ")[2] or str(error.message)
+
+
+def _check_needed(recording: am.Recording, file: str, read: ReadSet) -> None:
+    """Complain about each quantity that a static fit needs and the recording lacks."""
+    for name in NEEDED:
+        if name in recording:
+            continue
+        moved = next((each for each in ("length", "shortening") if each in recording.columns), "")
+        if name == "contraction" and moved:
+            text = f"{recording.origin}: the resting length is not known, which converts the {moved} to a contraction."
+            read.complain(
+                FieldError(f"{text} Write it into the field 'Resting length', such as 300 mm.", "resting_length")
+            )
+        elif name == "contraction":
+            text = (
+                f"{recording.origin}: there is neither a contraction nor a length. Select its column, which may "
+                "be a shortening or an elongation, or write the length at which the muscle was held into the row of "
+                "the file."
+            )
+            read.complain(FieldError(text, f"file:{file}"))
+        else:
+            read.complain(FieldError(f"{recording.origin}: no column is a {name}. Select its column.", "columns"))

@@ -1,0 +1,232 @@
+"""Settings of a fit in the page: interpretation of the files, selection of rows, and options of the comparison.
+
+An error names the field of the page that it concerns: `resting_length`, `column:p`, `file:run.csv`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import airmuscle as am
+
+from ...bench.readers.missing_values import parse_code
+from ...core.errors import AirmuscleError, InputError
+from ...core.units import quantity
+from ...files.library.files import list_laws
+
+MAX_RULES = 200
+"""Maximum number of selections of rows (chosen)."""
+MAX_CHOICES = 500
+"""Maximum number of corrected columns, or of files with facts of their own (chosen)."""
+TEXTS = (
+    "resting_length", "ambient", "displacement_zero", "file_name", "decimal", "delimiter", "sheet", "group", "time",
+    "skip_rows", "missing", "missing_codes", "outliers",
+)  # fmt: skip
+"""Fields with a text that applies to all files."""
+CONSTANTS = {"resting_length": "300 mm", "ambient": "98 kPa", "displacement_zero": "12 mm"}
+"""Those that are constants of the runs, with an example."""
+FILE_FACTS = ("resting_length", "length", "specimen")
+"""Facts that may be stated for one file."""
+COLUMN_CHOICES = (*am.recording.QUANTITIES, "resting_length", "ambient")
+"""Quantities of a column."""
+SPLITS: Mapping[str, am.bench.GroupSplit | None] = {
+    "": None,
+    "run": am.bench.RunSplit(),
+    "specimen": am.bench.SpecimenSplit(),
+    "contraction": am.bench.LevelSplit("contraction"),
+    "pressure": am.bench.LevelSplit("pressure"),
+    "block": am.bench.BlockSplit(),
+}
+"""Groups that are left out in turn; by default those that the data allow."""
+_UNITS = {"resting_length": "m", "ambient": "Pa", "displacement_zero": "m", "length": "m"}
+
+
+class FieldError(InputError):
+    """An input of the page that is not possible, with the field that it concerns."""
+
+    def __init__(self, message: str, field: str = "") -> None:
+        super().__init__(message)
+        self.field = field
+
+
+@dataclasses.dataclass(frozen=True)
+class Rule:
+    """Rows of some recordings that are left out, or the only ones that are kept.
+
+    recordings  origins of the recordings; all if empty
+    ranges      closed interval [SI] by column; a row is inside if all columns are
+    rows        first row and the row after the last, from 0, in place of ranges
+    keep        whether the rows inside are the only ones that are used
+    """
+
+    recordings: tuple[str, ...]
+    ranges: Mapping[str, tuple[float, float]]
+    rows: tuple[int, int] | None
+    keep: bool
+
+
+@dataclasses.dataclass(frozen=True)
+class FitSettings:
+    """What the user states about the files, which rows are used, and what is fitted.
+
+    columns  heading with quantity and unit by the heading in the file; an empty text excludes the column
+    facts    resting_length, length and specimen by the name of a file
+    """
+
+    texts: Mapping[str, str]
+    columns: Mapping[str, str]
+    facts: Mapping[str, Mapping[str, str]]
+    rules: tuple[Rule, ...]
+    entry: str
+    leave_out: str
+    hysteresis: bool
+
+    def mapping(self, columns: Mapping[str, str] | None = None) -> am.bench.ColumnMapping:
+        """The interpretation of all files, with these columns in place of all. Raises FieldError."""
+        texts: dict[str, Any] = {name: text for name, text in self.texts.items() if text}
+        constants = {name: texts.pop(name) for name in CONSTANTS if name in texts}
+        codes = texts.pop("missing_codes", "").replace(";", ",").split(",")
+        if "skip_rows" in texts:
+            texts["skip_rows"] = _line_count(texts["skip_rows"])
+        try:
+            chosen = self.columns if columns is None else columns
+            mapping = am.bench.ColumnMapping().with_overrides(
+                columns=chosen, constants=constants,
+                missing_codes=tuple(parse_code(each) for each in codes if each.strip()), **texts,
+            )  # fmt: skip
+            _ = mapping.text_format  # checks delimiter and decimal mark
+            return mapping
+        except AirmuscleError as error:
+            field = next((name for name in TEXTS if name.split("_")[0] in error.message[:40]), "columns")
+            raise FieldError(error.message, field) from None
+
+
+def read_settings(data: Any) -> FitSettings:
+    """The settings in a request of the page. Raises FieldError."""
+    if not isinstance(data, dict):
+        raise FieldError("the request must be a table of settings.")
+    texts = {name: _text(data.get(name, ""), name) for name in TEXTS}
+    facts = _table(data.get("files", {}), "files")
+    settings = FitSettings(
+        texts,
+        {key: _heading(key, value) for key, value in _table(data.get("columns", {}), "columns").items()},
+        {name: _facts(name, value) for name, value in facts.items()},
+        _rules(data.get("rules", [])),
+        _text(data.get("entry", ""), "entry"),
+        _text(data.get("leave_out", ""), "leave_out"),
+        data.get("hysteresis") is True,
+    )
+    _check(settings)
+    return settings
+
+
+def _check(settings: FitSettings) -> None:
+    for name in CONSTANTS:
+        if settings.texts[name]:
+            _check_quantity(settings.texts[name], name, name)
+    for file, facts in settings.facts.items():
+        for name in ("resting_length", "length"):
+            if facts.get(name):
+                _check_quantity(facts[name], name, f"file:{file}")
+    if settings.entry and settings.entry not in list_laws():
+        raise FieldError(f"the library has no muscle or law '{settings.entry}'.", "entry")
+    if settings.leave_out not in SPLITS:
+        raise FieldError(
+            f"'{settings.leave_out}' is no group; allowed: {', '.join(filter(None, SPLITS))}.", "leave_out"
+        )
+    settings.mapping()
+
+
+def _check_quantity(text: str, name: str, field: str) -> None:
+    words = name.replace("_", " ")
+    example = CONSTANTS.get(name, "300 mm")
+    try:
+        value = quantity(text, _UNITS[name], ambient=0.0, where=words)
+    except AirmuscleError as error:
+        raise FieldError(f"{error.message} Write a number with its unit, such as {example}.", field) from None
+    signed = name == "displacement_zero"
+    if not (math.isfinite(value) and (signed or value > 0)):
+        allowed = "finite" if signed else "positive"
+        raise FieldError(f"{words} is {text}; it must be {allowed}, such as {example}.", field)
+
+
+def _line_count(text: str) -> int:
+    if not (text.isdecimal() and len(text) < 8):
+        raise FieldError(
+            f"lines above the headings is {text}; it must be a whole number from 0, such as 7.", "skip_rows"
+        )
+    return int(text)
+
+
+def _text(value: Any, field: str, longest: int = 200) -> str:
+    if not isinstance(value, str) or len(value) > longest or not value.isprintable():
+        raise FieldError(f"{field.replace('_', ' ')} must be a text of at most {longest} printable characters.", field)
+    return value.strip()
+
+
+def _table(value: Any, field: str) -> dict[str, Any]:
+    if not isinstance(value, dict) or len(value) > MAX_CHOICES:
+        raise FieldError(f"{field} must be a table with at most {MAX_CHOICES} rows.", field)
+    return value
+
+
+def _heading(key: str, value: Any) -> str:
+    """The heading that a correction gives a column; empty for one that is not used."""
+    field = f"column:{key}"
+    if not isinstance(value, dict):
+        raise FieldError("a column needs a quantity and a unit.", field)
+    name, unit = _text(value.get("quantity", ""), field), _text(value.get("unit", ""), field, 40)
+    if not name:
+        return ""
+    if name not in COLUMN_CHOICES:
+        raise FieldError(f"'{name[:40]}' is no known quantity; allowed: {', '.join(COLUMN_CHOICES)}.", field)
+    return f"{name} [{unit}]" if unit else name
+
+
+def _facts(file: str, value: Any) -> dict[str, str]:
+    facts = _table(value, f"file:{file}")
+    unknown = [name for name in facts if name not in FILE_FACTS]
+    if unknown:
+        raise FieldError(
+            f"'{str(unknown[0])[:40]}' is no fact of a file; allowed: {', '.join(FILE_FACTS)}.", f"file:{file}"
+        )
+    return {name: text for name in FILE_FACTS if (text := _text(facts.get(name, ""), f"file:{file}"))}
+
+
+def _rules(value: Any) -> tuple[Rule, ...]:
+    if not isinstance(value, list) or len(value) > MAX_RULES:
+        raise FieldError(f"at most {MAX_RULES} selections of rows are possible; remove some.", "rules")
+    return tuple(map(_rule, value))
+
+
+def _rule(value: Any) -> Rule:
+    try:
+        recordings = tuple(_text(origin, "rules") for origin in value.get("recordings", []))
+        ranges = {_text(name, "rules"): _interval(each) for name, each in value.get("ranges", {}).items()}
+        rows = value.get("rows")
+        if rows is not None:
+            first, stop = rows
+            rows = (_index(first), _index(stop))
+        if rows is None and not ranges:
+            raise ValueError
+        return Rule(recordings, ranges, rows, value.get("keep") is True)
+    except (AttributeError, TypeError, ValueError):
+        raise FieldError(
+            "a selection of rows needs ranges of columns, or the first and the last row.", "rules"
+        ) from None
+
+
+def _interval(value: Any) -> tuple[float, float]:
+    low, high = (float(limit) for limit in value)
+    if not (math.isfinite(low) and math.isfinite(high) and low <= high):
+        raise ValueError
+    return low, high
+
+
+def _index(value: Any) -> int:
+    if not isinstance(value, int) or isinstance(value, bool) or value < 0:
+        raise ValueError
+    return value

@@ -1,0 +1,132 @@
+"""Sheet of uploaded files: columns, recordings with runs and findings, problems, and the points of the chart."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import airmuscle as am
+
+from ...bench.readers.constants import CONSTANT_QUANTITIES
+from ...bench.segment import Inspection, Run, inspect_all
+from ...bench.segment.outliers import Outlier, kept_rows
+from ...core.errors import AirmuscleError
+from ...recording.display_units import display_scale
+from .fit_hints import in_page_words
+from .fit_reading import ReadSet, read_set
+from .fit_selection import used_rows
+from .fit_settings import FieldError, FitSettings, Rule
+from .fit_uploads import FILES
+
+MAX_POINTS = 9000
+"""Maximum number of points of the chart; of more rows every n-th one is shown (chosen)."""
+MAX_LISTED = 60
+"""Maximum number of runs or findings of a recording that are listed (chosen)."""
+DIGITS = 7
+"""Significant digits of a point of the chart (chosen)."""
+SHOWN = ("time", "pressure", "contraction", "length", "force")
+
+
+def sheet_of_files(folder: str, settings: FitSettings) -> dict[str, Any]:
+    """What was understood of the files of a set; problems are part of the sheet, and no exception."""
+    read = read_set(Path(folder), settings)
+    names = sorted(path.name for path in (Path(folder) / FILES).iterdir())
+    used = _selected_rows(read, settings.rules)
+    inspections: Sequence[Inspection | None] = [None] * len(read.recordings)
+    try:
+        inspections = inspect_all(read.recordings) if read.recordings else ()
+    except AirmuscleError as error:
+        read.complain(error, "files")
+    step = max(1, math.ceil(sum(map(len, read.recordings)) / MAX_POINTS))
+    rows = zip(read.recordings, read.files, inspections, used, read.outliers, strict=True)
+    return {
+        "files": [{"name": name, "columns": [_column(each) for each in read.columns.get(name, [])]} for name in names],
+        "recordings": [_recording(*row, step) for row in rows],
+        "problems": [{"field": each.field, "text": str(each.message)} for each in read.problems],
+        "remarks": read.remarks,
+        "step": step,
+        "ready": bool(read.recordings) and not read.problems,
+    }
+
+
+def _selected_rows(read: ReadSet, rules: Sequence[Rule]) -> list[Any]:
+    """The used rows of each recording; all where a rule is not possible, which becomes a problem."""
+    used = []
+    for recording, outliers in zip(read.recordings, read.outliers, strict=True):
+        try:
+            used.append(used_rows(recording, rules, outliers))
+        except FieldError as error:
+            read.complain(error)
+            used.append(np.ones(len(recording), dtype=bool))
+    if used and not any(rows.any() for rows in used):
+        read.complain(FieldError("no row is left; remove a selection.", "rules"))
+    return used
+
+
+def _column(column: Any) -> dict[str, Any]:
+    factor, shown = display_scale(column.name) if column.known else (1.0, "")
+    return {
+        "key": column.key, "heading": column.heading, "quantity": column.name if column.known else "",
+        "unit": column.unit, "stated": column.stated, "used": column.used, "factor": factor, "shown_unit": shown,
+    }  # fmt: skip
+
+
+def _recording(
+    recording: am.Recording, file: str, inspection: Inspection | None, used: Any, outliers: Sequence[Outlier], step: int
+) -> dict[str, Any]:
+    columns = [name for name in SHOWN if name in recording]
+    return {
+        "origin": recording.origin,
+        "file": file,
+        "rows": len(recording),
+        "used": int(np.count_nonzero(used)),
+        "constants": {name: _constant(name, value) for name, value in recording.constants.items()},
+        "notes": [in_page_words(note) for note in recording.notes],
+        "ranges": {name: _range(name, recording) for name in recording if len(recording)},
+        **({} if inspection is None else _inspected(inspection)),
+        "left_out": [int(row) for row in np.flatnonzero(~kept_rows(recording, outliers)) if row % step == 0],
+        "points": {name: _rounded(recording[name][::step]) for name in columns},
+    }
+
+
+def _inspected(inspection: Inspection) -> dict[str, Any]:
+    sampling = inspection.sampling
+    return {
+        "runs": [_run(run) for run in inspection.runs[:MAX_LISTED]],
+        "run_count": len(inspection.runs),
+        "branches": len(inspection.branches),
+        "sampling": None if sampling is None else {"rate": sampling.rate, "duration": sampling.duration},
+        "outliers": len({each.row for each in inspection.outliers}),
+        "findings": [
+            {"text": in_page_words(each.text), "serious": each.serious} for each in inspection.findings[:MAX_LISTED]
+        ],
+    }
+
+
+def _run(run: Run) -> dict[str, Any]:
+    level = ""
+    if run.constant_column is not None and run.constant_value is not None:
+        factor, unit = display_scale(run.constant_column)
+        level = f"{run.constant_column} {run.constant_value * factor:.4g} {unit}"
+    return {
+        "kind": run.kind.name, "level": level, "swept": list(run.swept_columns),
+        "rows": [run.interval.start, run.interval.stop],
+    }  # fmt: skip
+
+
+def _constant(name: str, value: float | str) -> str:
+    factor, unit = display_scale(CONSTANT_QUANTITIES.get(name, ""))
+    return f"{value * factor:.5g} {unit}".strip() if isinstance(value, float | int) else str(value)
+
+
+def _range(name: str, recording: am.Recording) -> list[float]:
+    factor, _ = display_scale(name)
+    return [float(recording[name].min()) * factor, float(recording[name].max()) * factor]
+
+
+def _rounded(values: Iterable[float]) -> list[float]:
+    return [float(f"{value:.{DIGITS}g}") for value in values]

@@ -1,0 +1,161 @@
+"""Uploads of the tab Fit: sets of measurement files in a temporary folder, within limits of number and size.
+
+A set has a random identifier, which only the page that uploaded it knows; it is made when its first file was accepted.
+A file appears under its name when it is complete. The folder of a server that was killed is removed by the next one.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import secrets
+import shutil
+import tempfile
+import threading
+import time
+import unicodedata
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+
+from ...bench.readers.reader import EXTENSIONS
+from ...core.output_folder import is_running
+from .requests import BadRequest
+
+MAX_FILE = 32 * 10**6
+"""Largest size of a measurement file [bytes] (chosen)."""
+MAX_SET = 64 * 10**6
+"""Largest size of all files of a set [bytes] (chosen)."""
+MAX_FILES = 60
+"""Maximum number of files of a set (chosen)."""
+MAX_SETS = 40
+"""Maximum number of sets that the server keeps (chosen)."""
+MAX_IDLE = 600.0
+"""Time [s] without a request after which a set may be removed for the sake of another one (chosen); one without files
+may be removed at once."""
+MAX_NAME = 120
+"""Maximum length of the name of a file (chosen)."""
+FILES = "files"
+_PREFIX = "airmuscle-studio-"
+_IDENTIFIER = re.compile(r"[A-Za-z0-9_-]{22}")
+_FORBIDDEN = set('<>:"/\\|?*')
+
+
+def check_file_name(name: str) -> str:
+    """The name of an uploaded file in composed characters. Raises BadRequest for a path and for an unknown format."""
+    name = unicodedata.normalize("NFC", name)
+    shown = "".join(c if c.isprintable() else "?" for c in name)[:60]
+    if not name.isprintable() or _FORBIDDEN & set(name) or name != name.strip(" ") or name.startswith("."):
+        raise BadRequest(f"'{shown}' is no name of a file; rename it, without folders and special characters.")
+    if len(name.encode()) > MAX_NAME:
+        raise BadRequest(f"'{shown}…': the name of the file has more than {MAX_NAME} bytes; shorten it.")
+    if Path(name).suffix.lower() not in EXTENSIONS:
+        raise BadRequest(f"'{shown}' is of no supported format; supported extensions are {', '.join(EXTENSIONS)}.")
+    return name
+
+
+class UploadStore:
+    """The sets of files, each in a folder of its own."""
+
+    def __init__(self, parent: Path | None = None) -> None:
+        self._parent = parent
+        self._root: Path | None = None
+        self._used: dict[str, float] = {}
+        self._lock = threading.Lock()
+
+    def new_set(self, is_needed: Callable[[str], bool]) -> str:
+        """The identifier of a new set; idle ones that are not needed make room. Raises BadRequest if none is idle."""
+        with self._lock:
+            if len(self._used) >= MAX_SETS:
+                self._remove_idle(is_needed)
+            identifier = secrets.token_urlsafe(16)
+            self._files(identifier).mkdir(parents=True, mode=0o700)
+            self._used[identifier] = time.monotonic()
+        return identifier
+
+    def _remove_idle(self, is_needed: Callable[[str], bool]) -> None:
+        latest = time.monotonic() - MAX_IDLE
+        filled = {name: any(self._files(name).iterdir()) for name in self._used}
+        idle = [n for n, used in self._used.items() if (used < latest or not filled[n]) and not is_needed(n)]
+        if not idle:
+            raise BadRequest(f"the server keeps {MAX_SETS} sets of files, and all are in use; try again later.", 503)
+        oldest = min(idle, key=lambda name: (filled[name], self._used[name]))
+        shutil.rmtree(self._top() / oldest, ignore_errors=True)
+        del self._used[oldest]
+
+    def folder(self, identifier: str) -> Path:
+        """The folder of a set. Raises BadRequest if it is not kept."""
+        with self._lock:
+            if not _IDENTIFIER.fullmatch(identifier) or identifier not in self._used:
+                raise BadRequest("these files are no longer on the server; drop them again.", 404)
+            self._used[identifier] = time.monotonic()
+            return self._top() / identifier
+
+    def names(self, identifier: str) -> list[str]:
+        """The names of the files of a set, in order."""
+        return sorted(path.name for path in (self.folder(identifier) / FILES).iterdir())
+
+    async def add(
+        self, identifier: str, name: str, parts: AsyncIterator[bytes], is_needed: Callable[[str], bool]
+    ) -> str:
+        """Add a file, or replace the one of this name; the identifier of the set, of a new one if none is given.
+
+        Raises BadRequest beyond the limits; then there is no new set.
+        """
+        folder = self.folder(identifier) if identifier else None
+        others = [path for path in (folder / FILES).iterdir() if path.name != name] if folder else []
+        if len(others) >= MAX_FILES:
+            raise BadRequest(f"at most {MAX_FILES} files are fitted together; remove some.", 413)
+        allowed = MAX_SET - sum(path.stat().st_size for path in others)
+        unfinished = self._top() / f"{secrets.token_hex(8)}.part"
+        try:
+            await _write_parts(unfinished, name, parts, allowed)
+            identifier = identifier or self.new_set(is_needed)
+            unfinished.replace(self.folder(identifier) / FILES / name)
+        finally:
+            unfinished.unlink(missing_ok=True)
+        return identifier
+
+    def remove(self, identifier: str, name: str) -> None:
+        """Remove a file of a set."""
+        if name not in self.names(identifier):
+            raise BadRequest("this file is not on the server.", 404)
+        (self.folder(identifier) / FILES / name).unlink(missing_ok=True)
+
+    def stop(self) -> None:
+        """Remove all files."""
+        if self._root is not None:
+            shutil.rmtree(self._root, ignore_errors=True)
+
+    def _files(self, identifier: str) -> Path:
+        return self._top() / identifier / FILES
+
+    def _top(self) -> Path:
+        if self._root is None:
+            self._root = _new_root(self._parent)
+        return self._root
+
+
+async def _write_parts(path: Path, name: str, parts: AsyncIterator[bytes], allowed: int) -> None:
+    size = 0
+    with path.open("wb") as file:
+        async for part in parts:
+            size += len(part)
+            if size > MAX_FILE:
+                raise BadRequest(f"{name} is larger than {MAX_FILE // 10**6} MB; export fewer rows.", 413)
+            if size > allowed:
+                raise BadRequest(f"all files are larger than {MAX_SET // 10**6} MB; remove some.", 413)
+            file.write(part)
+    if not size:
+        raise BadRequest(f"{name} is empty.")
+
+
+def _new_root(parent: Path | None) -> Path:
+    """A folder that only this user can read; those of servers that were killed are removed."""
+    parent = Path(tempfile.gettempdir()) if parent is None else parent
+    for old in parent.glob(f"{_PREFIX}*"):
+        process = old.name.removeprefix(_PREFIX).partition("-")[0]
+        if process.isdecimal() and not old.is_symlink() and not is_running(int(process)):
+            with contextlib.suppress(OSError):
+                shutil.rmtree(old, ignore_errors=True)
+    return Path(tempfile.mkdtemp(prefix=f"{_PREFIX}{os.getpid()}-", dir=parent))

@@ -1,0 +1,192 @@
+"""Sheet of a plant: a scenario with its printed program, names, units and start, for a run in the page."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+import airmuscle as am
+
+from ...core import cite
+from ...core.errors import ParameterError
+from ...core.tree import Leaf, leaves
+from ...files.library.location import Location
+from ...files.library.write import part_toml, tables_toml
+from ...files.scenario.scenario import TABLES, Scenario, build_scenario, initial_pressure
+from ...recording.display_units import display_scale
+from ..export.write import make_run
+from .law_sheet import parameter_row, script_text
+from .toml_template import toml_template
+
+NAMES = (
+    "states", "inputs", "outputs", "run", "Solver", "prepare", "outputsOf", "SIZES",
+)  # fmt: skip
+"""What the page uses of a printed program."""
+MAX_DURATION = 1000.0
+"""Longest run in the page [s] (chosen)."""
+MAX_PARAMETERS = 120
+"""Maximum number of parameters with a slider (chosen)."""
+OUTLINE_CONTRACTIONS, OUTLINE_POINTS = 31, 25
+"""Grid of an outline (chosen)."""
+_EXPORT = re.compile(r"^export ", re.MULTILINE)
+_SOURCES = ("the file of the user", "chosen")
+
+
+def sheet_of_tables(
+    tables: Mapping[str, Any], location: Location, name: str, sources: Mapping[str, str], text: str = ""
+) -> dict[str, Any]:
+    """The sheet of the tables of a scenario. Raises ParameterError for a run that the page cannot carry out."""
+    scenario = build_scenario(tables, location)
+    if scenario.problem.duration > MAX_DURATION:
+        raise ParameterError(
+            f"{location}: the run lasts {scenario.problem.duration:g} s; allowed range in the page: up to "
+            f"{MAX_DURATION:g} s."
+        )
+    program = make_run(scenario.problem, name="plant", title=scenario.title)
+    module = am.outlets.JavaScript().run_files(program)["plant.mjs"]
+    plant = scenario.plant
+    sheet: dict[str, Any] = {
+        "plant": True,
+        "name": name,
+        "title": scenario.title,
+        "provenance": str(tables.get("provenance", _SOURCES[0])),
+        "note": str(tables.get("note", "")),
+        "warning": str(tables.get("warning", "")),
+        "start_equilibrium": initial_pressure(tables, location, scenario.plant) is not None,
+        "duration": scenario.problem.duration,
+        "values": program.system.defaults.tolist(),
+        "temperature_index": [leaf.path for leaf in leaves(plant)].index("ambient.temperature"),
+        "parameters": _parameter_rows(plant, sources),
+        "inputs": _input_rows(plant),
+        "columns": _column_rows(program.columns, program.system.units),
+        "muscles": [_muscle_row(plant, i) for i in range(len(plant.muscles))],
+        "mechanism": _mechanism_row(plant),
+        "references": [str(reference) for reference in cite(plant)],
+        "toml": _toml(scenario, tables),
+        "own_text": text,
+    }
+    sheet["id"] = hashlib.sha256((module + json.dumps(sheet)).encode()).hexdigest()[:32]
+    sheet["script"] = _script(sheet["id"], module)
+    return sheet
+
+
+def sheet_of_plant(tables: Mapping[str, Any], location: Location, name: str) -> dict[str, Any]:
+    """The sheet of the tables of a plant of the library, or of a file of the same form."""
+    scenario = {key: tables[key] for key in TABLES if key in tables}
+    sheet = sheet_of_tables(scenario, location, name, tables.get("sources", {}))
+    return {**sheet, **{key: str(tables.get(key, "")) for key in ("provenance", "note", "warning")}}
+
+
+def _script(identifier: str, module: str) -> str:
+    text = _EXPORT.sub("", module)
+    return script_text(identifier, text, NAMES)
+
+
+def _parameter_rows(plant: am.Plant, sources: Mapping[str, str]) -> list[dict[str, Any]]:
+    """The parameters of a plant by their paths, with the places of their values; tables of coefficients are left out.
+
+    A geometry that a muscle shares with its law is one parameter at two places.
+    """
+    known = list(leaves(plant))
+    places = {leaf.path: i for i, leaf in enumerate(known)}
+    rows = []
+    for i, leaf in enumerate(known):
+        own = leaf.path.replace(".contractile.geometry.", ".geometry.")
+        law = re.sub(r"^(muscle(?:\[\d+\])?)\.geometry\.", r"\1.contractile.geometry.", leaf.path)
+        twin = places.get(law) if law != leaf.path else None
+        if leaf.path.endswith("]") or any(part in leaf.path for part in ("validity_range", ".ratings.")):
+            continue
+        if twin is not None and known[twin].value == leaf.value:
+            continue
+        shared = [places[own]] if own != leaf.path and own in places and known[places[own]].value == leaf.value else []
+        rows.append({**parameter_row(leaf.path, leaf, _source(leaf, sources)), "places": [i, *shared]})
+    order = ("mechanism", "circuit", "ambient", "gas", "muscle", "")
+    rows.sort(key=lambda row: next(i for i, part in enumerate(order) if row["path"].startswith(part)))
+    return rows[:MAX_PARAMETERS]
+
+
+def _source(leaf: Leaf, sources: Mapping[str, str]) -> str:
+    """The source of a number: the longest path in [sources] that its path begins with."""
+    path = re.sub(r"\[\d+\]", "", leaf.path)
+    matching = [key for key in sources if path == key or path.startswith(f"{key}.")]
+    return sources[max(matching, key=len)] if matching else "the model or its entry"
+
+
+def _input_rows(plant: am.Plant) -> list[dict[str, Any]]:
+    return [
+        {
+            "name": variable.name,
+            "unit": "" if variable.unit == "1" else variable.unit,
+            "minimum": variable.minimum if np.isfinite(variable.minimum) else None,
+            "maximum": variable.maximum if np.isfinite(variable.maximum) else None,
+        }
+        for variable in plant.input_variables
+    ]
+
+
+def _column_rows(columns: Any, units: Mapping[str, str]) -> list[dict[str, Any]]:
+    rows = []
+    for name in columns:
+        factor, unit = display_scale(name)
+        if units[name] == "rad":
+            factor, unit = 180.0 / np.pi, "deg"
+        elif units[name] == "Pa":
+            factor, unit = 1e-3, "kPa"
+        elif not unit:
+            factor, unit = 1.0, units[name]
+        rows.append({"name": name, "factor": factor, "unit": "" if unit in ("1", "-") else unit})
+    return rows
+
+
+def _muscle_row(plant: am.Plant, index: int) -> dict[str, Any]:
+    muscle, prefix = plant.muscles[index], plant.prefixes[index]
+    paths = [leaf.path for leaf in leaves(plant)]
+    start = "muscle" if not isinstance(plant.muscle, tuple) else f"muscle[{index}]"
+    ends = (f"{start}.geometry.resting_length", f"{start}.contractile.geometry.resting_length")
+    length = next((paths.index(path) for path in ends if path in paths), None)
+    value = float(muscle.geometry.resting_length)
+    return {"name": muscle.name, "prefix": prefix, "length_index": length, "length": value,
+            "outline": _sampled_outline(muscle.geometry)}  # fmt: skip
+
+
+def _sampled_outline(geometry: am.geometry.Geometry) -> dict[str, Any]:
+    low, high = (float(limit) for limit in geometry.contraction_range)
+    grid = np.linspace(max(low, -0.05), min(high, 0.45), OUTLINE_CONTRACTIONS)
+    outlines = [geometry.outline(float(c), OUTLINE_POINTS) for c in grid]
+    rounded = [[np.round(values, 6).tolist() for values in pair] for pair in outlines]
+    return {"contractions": grid.tolist(), "axial": [a for a, _ in rounded], "radius": [r for _, r in rounded]}
+
+
+def _mechanism_row(plant: am.Plant) -> dict[str, Any]:
+    """The kind of the drawing, and the coordinates."""
+    mechanism: Any = plant.mechanism
+    while hasattr(mechanism, "inner"):
+        mechanism = mechanism.inner
+    count = len(plant.muscles)
+    kind = "muscles"
+    if isinstance(mechanism, am.physics.AntagonisticJoint) and count == 2:
+        kind = "joint"
+    elif isinstance(mechanism, am.HangingMass) and count == 1:
+        kind = "lift"
+    radius = getattr(mechanism, "radius", None)
+    return {
+        "model": type(plant.mechanism).__name__,
+        "kind": kind,
+        "coordinates": [c.name for c in plant.mechanism.coordinates],
+        "radius": float(radius) if isinstance(radius, float) else 0.04,
+    }
+
+
+def _toml(scenario: Scenario, tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Parts of the scenario file: the plant with places for its parameters, input and run as they are."""
+    plant = scenario.plant
+    return {
+        "plant": toml_template(lambda model: part_toml("plant", model), plant, sum(1 for _ in leaves(plant))),
+        "input": tables_toml({"input": tables.get("input", {})}),
+        "run": tables_toml({"run": tables["run"]}),
+    }

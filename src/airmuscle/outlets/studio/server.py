@@ -1,0 +1,139 @@
+"""Server of the studio: address, token and the loop of uvicorn."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import ipaddress
+import secrets
+import signal
+import socket
+import threading
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from ...core.errors import InputError
+from .app import LONG_WORKERS, WORKERS, create_app
+from .connections import limited_protocol
+from .fit_routes import FitService
+from .security import LOOPBACK, Access, is_loopback
+from .tasks import warm_up
+from .worker import SPARE, WorkerPool
+
+PACKAGES = ("starlette", "uvicorn")
+_OUTSIDE = "192.0.2.1"
+"""An address of another network, RFC 5737: its route names the address of this machine; nothing is sent to it."""
+
+
+def check_packages() -> None:
+    """Raise InputError with the install command if a package of the server is missing."""
+    missing = [name for name in PACKAGES if importlib.util.find_spec(name) is None]
+    if missing:
+        raise InputError(
+            f"the studio needs {' and '.join(missing)}. Install them: pip install starlette uvicorn. A page "
+            "without a server needs neither: airmuscle studio NAME --export page.html"
+        )
+
+
+def access_of(host: str) -> Access:
+    """The rules of access: a token for all, and the names of this machine alone if the server is reached only there.
+
+    Other users of this machine reach a loopback address as well, so it has a token too.
+    """
+    name = f"[{host}]" if ":" in host and not host.startswith("[") else host
+    return Access((*LOOPBACK, name.lower()) if is_loopback(host) else (), secrets.token_urlsafe(32))
+
+
+def warning_of(host: str) -> str:
+    """The remark that belongs to an address that other machines reach; empty for this machine alone."""
+    if is_loopback(host):
+        return ""
+    return "the connection is not encrypted; use it only in a network that you trust."
+
+
+def bound_socket(host: str, port: int) -> socket.socket:
+    """A socket that listens at an address. Raises InputError if that is not possible."""
+    if not 0 <= port <= 65535:
+        raise InputError(f"--port is {port}; allowed range: 0 to 65535.")
+    try:
+        family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        listening = socket.socket(family, kind, protocol)
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listening.bind(address)
+    except (OSError, UnicodeError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InputError(
+            f"{host[:80]}, port {port}: no server can be started there ({reason}). Choose another --port."
+        ) from None
+    return listening
+
+
+def address_of(listening: socket.socket, host: str, access: Access) -> str:
+    """The address of the page; with the token if there is one."""
+    port = listening.getsockname()[1]
+    host = reachable_host(host)
+    name = f"[{host}]" if ":" in host and not host.startswith("[") else host
+    return f"http://{name}:{port}/" + (f"?token={access.token}" if access.token else "")
+
+
+def reachable_host(host: str) -> str:
+    """The host; for the unspecified address, on which no page is opened, the address of this machine in its network."""
+    try:
+        address = ipaddress.ip_address(host.strip("[]"))
+    except ValueError:
+        return host
+    if not address.is_unspecified:
+        return host
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as route:
+        try:
+            route.connect((_OUTSIDE, 9))
+            return str(route.getsockname()[0])
+        except OSError:  # a machine without a network
+            return "127.0.0.1"
+
+
+@contextlib.contextmanager
+def ending_signals(end: Callable[[], None]) -> Iterator[None]:
+    """Within the block SIGTERM and SIGHUP, the end of a session, call `end`; the process is not ended at once."""
+    names = [name for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    if threading.current_thread() is not threading.main_thread():
+        names = []
+    before = {name: signal.signal(getattr(signal, name), lambda number, frame: end()) for name in names}
+    try:
+        yield
+    finally:
+        for name, handler in before.items():
+            signal.signal(getattr(signal, name), handler)
+
+
+def serve(host: str, port: int, opened: tuple[dict[str, Any], ...], started: Callable[[str], None]) -> None:
+    """Serve the page until the process is interrupted; `started` receives its address.
+
+    Raises InputError if a package is missing or the address cannot be used.
+    """
+    check_packages()
+    import uvicorn
+
+    access, listening = access_of(host), bound_socket(host, port)
+    pool, long_pool = WorkerPool(WORKERS, warm_up), WorkerPool(LONG_WORKERS, warm_up)
+    settings: dict[str, Any] = {
+        "log_level": "warning", "access_log": False, "http": limited_protocol(), "timeout_keep_alive": 5,
+        "server_header": False, "lifespan": "off", "ws": "none",
+    }  # fmt: skip
+    fits = FitService(long_pool)
+    server = uvicorn.Server(uvicorn.Config(create_app(access, pool, opened, fits, long_pool), **settings))
+
+    def end() -> None:
+        server.should_exit = server.force_exit = True
+
+    with ending_signals(end):
+        try:
+            pool.prepare(1 + SPARE)
+            listening.listen()  # a browser that is faster than the server waits instead of being refused
+            started(address_of(listening, host, access))
+            server.run(sockets=[listening])
+        finally:
+            fits.stop()
+            pool.stop()
+            long_pool.stop()
+            listening.close()

@@ -1,0 +1,81 @@
+"""Tasks of the studio: sheets of laws and plants from the library or from a text of a user."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from ...core.errors import ParameterError
+from ...files.library.entry_file import build_entry
+from ...files.library.files import PLANTS, is_path, list_plants, read_toml
+from ...files.library.law_file import describes_plant, describes_product, describes_valve, load_law
+from ...files.library.location import Location
+from ...files.library.plant_file import plant_tables
+from .law_sheet import law_sheet
+from .plant_sheet import sheet_of_plant, sheet_of_tables
+from .uploads import read_text_tables
+
+UPLOADED = Path("muscle.toml")
+"""The name of a text of a user in messages."""
+SCENARIOS = Path(__file__).with_name("plants")
+"""Folder of the plants that belong to the studio."""
+
+
+def plant_names() -> tuple[str, ...]:
+    """Names of the plants that the page offers: those of the studio, then those of the library."""
+    return (*sorted(path.stem for path in SCENARIOS.glob("*.toml")), *list_plants())
+
+
+def plant_title(name: str) -> dict[str, str]:
+    """Title and provenance of a plant that the page offers."""
+    own = SCENARIOS / f"{name}.toml"
+    tables = read_toml(own if own.exists() else PLANTS / f"{name}.toml")
+    return {"title": tables["title"], "provenance": tables.get("provenance", "chosen")}
+
+
+def sheet_of_offered_plant(name: str) -> dict[str, Any]:
+    """The sheet of a plant that the page offers, by its complete name."""
+    if name in list_plants():
+        return sheet_of_plant(*plant_tables(name), name)
+    path = SCENARIOS / f"{name}.toml"
+    return sheet_of_plant(read_toml(path), Location(path.name, "", SCENARIOS), name)
+
+
+def warm_up() -> None:
+    """Import what the sheets need, so that the first one is as fast as the next ones."""
+    sheet_of_law("tondu-lopez")
+    sheet_of_offered_plant("lift")
+
+
+def sheet_of_scenario_text(text: str) -> dict[str, Any]:
+    """The sheet of a scenario of a user."""
+    tables = read_text_tables(text)
+    if "plant" not in tables:
+        raise ParameterError("the text contains no [plant]; a scenario for airmuscle simulate is required.")
+    return sheet_of_tables(tables, Location("scenario.toml", "", Path()), "own scenario", {}, text)
+
+
+def sheet_of_any(name: str) -> dict[str, Any]:
+    """The sheet of a muscle, a law or a plant by its name, or of a muscle file or a scenario by its path."""
+    if name in plant_names():
+        return sheet_of_offered_plant(name)
+    path = Path(name)
+    tables = read_toml(path) if is_path(name) else {}
+    if "plant" in tables:
+        return sheet_of_tables(tables, Location(str(path), "", path.parent), path.stem, {}, path.read_text("utf-8-sig"))
+    sheet = law_sheet(load_law(name))
+    return {**sheet, "own_text": sheet["toml"]["unchanged"]} if is_path(name) else sheet
+
+
+def sheet_of_law(name: str) -> dict[str, Any]:
+    """The sheet of a muscle or a law, by its name in the library or by its path."""
+    return law_sheet(load_law(name))
+
+
+def sheet_of_law_text(text: str) -> dict[str, Any]:
+    """The sheet of a muscle file of a user. Raises ParameterError for another kind of file."""
+    tables = read_text_tables(text)
+    for kind, described in (("plant", describes_plant), ("valve", describes_valve), ("product", describes_product)):
+        if described(tables):
+            raise ParameterError(f"the text describes a {kind}; a muscle or a law is required.")
+    return {**law_sheet(build_entry(tables, "own muscle", UPLOADED, Path())), "own_text": text}

@@ -1,0 +1,84 @@
+"""Reproduction of the papers: computes their chapters and writes the report."""
+
+from __future__ import annotations
+
+import importlib
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, as_completed
+from pathlib import Path
+from typing import Any
+
+from ..core.output_folder import check_writable
+from ..core.processes import process_pool
+from ..files.library.files import complete_name
+from ..report.chapter import Chapter
+from ..report.write import with_rendered_figures, write_report
+
+PAPERS: dict[str, str] = {
+    "saga2007": "airmuscle.papers.saga2007",
+    "borzikova": "airmuscle.papers.borzikova",
+    "hosovsky": "airmuscle.papers.hosovsky",
+}
+"""The papers in the order of the report, each with the module whose function `chapter()` reproduces it."""
+
+TITLE = "Reproduction of three papers on pneumatic artificial muscles"
+
+Finished = Callable[[str, Chapter, float], Any]
+"""Function of a paper, its completed chapter and its computing time [s]."""
+
+
+def reproduce(
+    papers: Sequence[str] | None = None,
+    folder: Path | str = "report",
+    *,
+    workers: int = 1,
+    finished: Finished = lambda name, chapter, seconds: None,
+) -> Path:
+    """Reproduce the named papers, or all if None, and return the path of the report's page.
+
+    A unique beginning of a name is sufficient. `workers` is the number of processes. `finished` is called with each
+    completed chapter. If the computation is interrupted or a paper fails, the completed chapters are still written.
+    Raises UnknownNameError, FileError, and the exceptions of a chapter.
+    """
+    selected = select_papers(papers)
+    check_writable(folder)
+    completed: dict[str, Chapter] = {}
+    try:
+        with process_pool(min(workers, max(len(selected), 1)), one_thread_each=True, terminate=True) as pool:
+            for name, chapter, seconds in _chapters(selected, pool):
+                completed[name] = chapter
+                finished(name, chapter, seconds)
+    except BaseException:
+        if completed:
+            write_report([completed[n] for n in selected if n in completed], folder, title=f"{TITLE} (incomplete)")
+        raise
+    return write_report([completed[name] for name in selected], folder, title=TITLE)
+
+
+def _chapters(selected: Sequence[str], pool: Executor | None) -> Iterator[tuple[str, Chapter, float]]:
+    """Each paper with its chapter and its computing time, as they are completed."""
+    if pool is None:
+        for name in selected:
+            yield name, *_compute(PAPERS[name])
+        return
+    futures = {pool.submit(_compute_in_worker, PAPERS[name]): name for name in reversed(selected)}  # the longest first
+    for future in as_completed(futures):
+        yield futures[future], *future.result()
+
+
+def _compute(module: str) -> tuple[Chapter, float]:
+    start = time.perf_counter()
+    chapter = importlib.import_module(module).chapter()
+    return chapter, time.perf_counter() - start
+
+
+def _compute_in_worker(module: str) -> tuple[Chapter, float]:
+    chapter, seconds = _compute(module)
+    return with_rendered_figures(chapter), seconds
+
+
+def select_papers(papers: Sequence[str] | None) -> list[str]:
+    """Return the full names of the given papers in the order of the report, each once; all if none is given."""
+    requested = {complete_name(paper, PAPERS, "paper") for paper in papers or PAPERS}
+    return [name for name in PAPERS if name in requested]

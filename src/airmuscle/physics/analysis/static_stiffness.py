@@ -1,0 +1,130 @@
+"""Stiffness of a muscle and of its load at constant pressure and with closed valves."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from ...core import autodiff
+from ...core.ops import Value
+from ...core.short_repr import ShortRepr
+from ...engine.state import state_vector
+from ..muscle import ElasticSeriesElement, Muscle
+from ..plant.muscle_state import MuscleState
+from ..plant.plant import Plant
+from ..pneumatics.gas import NO_FLOW, Air, gauge_pressure
+
+
+class StiffnessPair(NamedTuple):
+    """Stiffness at constant pressure and with closed valves, in the unit of the containing field."""
+
+    constant_pressure: float
+    shut_valves: float
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class Stiffness(ShortRepr):
+    """Stiffnesses of a plant at one state.
+
+    muscles      of every muscle by name, -dF/deps [N]
+    per_metre    of every muscle by name, dF/dL [N/m]
+    coordinates  of every coordinate, -dQ/dq [N/m, N m/rad], including the change of the moment arms of the muscles,
+                 without the springs and weights of the mechanism
+    """
+
+    muscles: Mapping[str, StiffnessPair]
+    per_metre: Mapping[str, StiffnessPair]
+    coordinates: Mapping[str, StiffnessPair]
+
+
+def stiffness(plant: Plant, state: Mapping[str, float]) -> Stiffness:
+    """Both stiffnesses of a plant at a state: exact derivatives of its laws.
+
+        k_p = -dF/deps,   k_m = k_p - (dF/dp) (dp/deps),   dp/deps of the gas without flow and heat transfer
+                                                          (polytropic: -n p_abs/V dV/deps)
+
+    With closed valves, the pressure increases when a muscle is stretched, so that the muscle is stiffer. Isothermal and
+    polytropic gases follow their process; a FirstLawGas, the default, is evaluated as adiabatic, for a fast motion; use
+    Isothermal for a slow one. A series spring acts in series: 1/k = 1/k_inner + 1/k_SE. The states of friction, creep
+    and wall are constant. A slack muscle has zero stiffness. Raises ParameterError for an unknown or missing name and
+    for an impossible state, GeometryLimitError for a contraction beyond the limits of a geometry.
+    """
+    state_vector(plant, state)
+    plant.check_state(state)
+    ports = plant.muscle_states(state)
+    pairs = [_of_muscle(plant, muscle, port) for muscle, port in zip(plant.muscles, ports, strict=True)]
+    names = [m.name for m in plant.muscles]
+    lengths = [float(length) for length in plant.resting_lengths]
+    per_metre = [StiffnessPair(*(k / length for k in both)) for both, length in zip(pairs, lengths, strict=True)]
+    coordinates = {
+        c.name: StiffnessPair(*(_against(plant, state, ports, ks, c.name) for ks in zip(*pairs, strict=True)))
+        for c in plant.mechanism.coordinates
+    }
+    return Stiffness(
+        dict(zip(names, pairs, strict=True)), dict(zip(names, per_metre, strict=True)), coordinates
+    )  # fmt: skip
+
+
+def _of_muscle(plant: Plant, muscle: Muscle, port: MuscleState) -> StiffnessPair:
+    by_pressure, by_contraction = _slopes(muscle, port)
+    squeezed = float(enclosed_pressure_slope(plant, muscle, port.inner_contraction, port.volume, port.air, port.states))
+    inside = (0.0 - by_contraction, 0.0 - by_contraction - by_pressure * squeezed)
+    if not isinstance(muscle.series, ElasticSeriesElement):
+        return StiffnessPair(*inside)
+    length = float(muscle.geometry.resting_length)
+    stretch = (float(port.inner_contraction) - float(port.contraction)) * length
+    spring = muscle.series.tangent_stiffness(stretch) * length if stretch > 0.0 else 0.0
+    return StiffnessPair(*(k * spring / (k + spring) if spring else 0.0 for k in inside))
+
+
+def _slopes(muscle: Muscle, port: MuscleState) -> tuple[float, float]:
+    """dF/dp and dF/deps of the muscle without its series spring."""
+    at = [float(port.pressure), float(port.inner_contraction)]
+
+    def tension(x: Sequence[Value]) -> list[Value]:
+        return [muscle.tension(x[0], x[1])]
+
+    along = [autodiff.jvp(tension, at, direction)[0] for direction in ([1.0, 0.0], [0.0, 1.0])]
+    return float(along[0]), float(along[1])
+
+
+def enclosed_pressure_slope(
+    plant: Plant, muscle: Muscle, inner_contraction: Value, volume: Value, air: Air, states: Mapping[str, Value]
+) -> Value:
+    """dp/deps [Pa] of enclosed air: derivative of its pressure with respect to volume and gas states.
+
+    The values are numbers or symbols; `states` contains those of the gas.
+    """
+    content = {s.name: states[s.name] for s in plant.gas.states(volume, plant.ambient)}
+    names = list(content)
+    growth = muscle.geometry.volume_derivative(inner_contraction)
+    moved, still = (plant.gas.rates(content, air, NO_FLOW, rate, plant.ambient) for rate in (growth, 0.0))
+
+    def pressure(x: Sequence[Value]) -> list[Value]:
+        enclosed = plant.gas.air(dict(zip(names, x[1:], strict=True)), x[0], plant.ambient)
+        return [gauge_pressure(enclosed.pressure, plant.ambient)]
+
+    at = [volume, *content.values()]
+    along = [growth, *(moved[n] - still[n] for n in names)]
+    return autodiff.jvp(pressure, at, along)[0]
+
+
+def _against(
+    plant: Plant, state: Mapping[str, float], ports: Sequence[MuscleState], stiffnesses: Sequence[float], name: str
+) -> float:
+    """-dQ/dq of one coordinate, for tensions that decrease with contraction by these stiffnesses."""
+    mechanism, lengths = plant.mechanism, plant.resting_lengths
+    names = [c.name for c in mechanism.coordinates]
+
+    def pull(x: Sequence[Value]) -> list[Value]:
+        q = dict(zip(names, x, strict=True))
+        contractions = mechanism.contractions(q, lengths)
+        tensions = [
+            port.tension - k * (contraction - port.contraction)
+            for port, k, contraction in zip(ports, stiffnesses, contractions, strict=True)
+        ]
+        return [mechanism.generalised_forces(q, tensions, lengths)[name]]
+
+    at = [float(state[n]) for n in names]
+    return -float(autodiff.jvp(pull, at, [float(n == name) for n in names])[0])

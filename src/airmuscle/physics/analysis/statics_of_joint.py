@@ -1,0 +1,231 @@
+"""Statics of an antagonistic joint: pressures from angle, stiffness and load, and the inverse."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from ...core.arrays import Array
+from ...core.errors import ParameterError, SolveError
+from ...core.short_repr import ShortRepr
+from ...recording import Recording
+from ..plant.plant import Plant
+from ..pneumatics.gas import gauge_pressure
+from .joint_limits import LEVELS, stiffness_range, taut_branch
+from .joint_solutions import affine_candidates, are_balanced, balanced_angles, general_candidates
+from .joint_torque import TorqueFunction, TracedRow, check_joint, load_function, torque_functions
+
+RESULTS = ("torque", "stiffness", "tension", "shut_valves")
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class JointPoints(ShortRepr):
+    """Static states of a joint, arrays (N, S): S solutions for each of N points, NaN where there are fewer.
+
+    angle              joint angle [rad]
+    pressures          (N, S, 2) gauge pressures [Pa] of the first and the second muscle
+    tensions           (N, S, 2) tensions [N]
+    constant_pressure  stiffness -dQ/dtheta of the muscles at constant pressure [N m/rad]
+    shut_valves        the same with closed valves, at constant air mass [N m/rad]
+    cocontraction      part of the torques of the two muscles that cancels [N m]: the smaller of their magnitudes
+    stable             1 where the joint is stable at constant pressure, with its weights and springs, else 0
+    """
+
+    angle: Array
+    pressures: Array
+    tensions: Array
+    constant_pressure: Array
+    shut_valves: Array
+    cocontraction: Array
+    stable: Array
+
+    @property
+    def count(self) -> Array:
+        """Number of solutions of each point (N,)."""
+        return np.asarray(np.isfinite(self.angle).sum(axis=1))
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class JointStatics(ShortRepr):
+    """Statics of a plant with one angle and two muscles; made by `joint_statics`.
+
+    The muscles carry the load and the torque dV/dtheta of the weights, springs and end stops of the mechanism, friction
+    is relaxed. Stiffness is that of the muscles, as in `airmuscle.physics.stiffness`.
+    """
+
+    plant: Plant
+    pressure_range: tuple[float, float]
+    """Minimum and maximum gauge pressure [Pa] of both muscles."""
+    torques: tuple[TorqueFunction, ...]
+    unlimited: tuple[TorqueFunction, ...]
+    load: TracedRow
+
+    def pressures(self, angle: Any, stiffness: Any, load: Any = 0.0) -> JointPoints:
+        """All pressures that give an angle [rad] and a stiffness at constant pressure [N m/rad] under a load [N m].
+
+        The load is an external torque against the angle. The arguments are numbers or arrays (N,) that broadcast. Both
+        muscles are taut: a slack muscle determines no pressure. A point without a solution has only NaN; `explain`
+        states the reason. If the force laws are affine in the pressure there is at most one solution, in closed form;
+        otherwise the plane of pressures is searched in 32 x 32 cells, so that two solutions within one cell may count
+        as one, and refined by Newton's method to rounding. Raises ParameterError for values that are not finite.
+        """
+        angle, stiffness, load = _as_points("angle, stiffness and load", angle, stiffness, load)
+        torque = self.load(angle, names=("torque",))[0] + load
+        affine = all(function.affine for function in self.unlimited)
+        solve, functions = (affine_candidates, self.unlimited) if affine else (general_candidates, self.torques)
+        pairs = solve(functions, self.pressure_range, angle, torque, stiffness)
+        angles = np.broadcast_to(angle[:, None], pairs.shape[:2])
+        return self._points(angles, pairs, torque[:, None], stiffness[:, None])
+
+    def angles(self, pressures: tuple[Any, Any], load: Any = 0.0) -> JointPoints:
+        """All equilibria at gauge pressures [Pa] of both muscles under a load [N m], by ascending angle.
+
+        The arguments are numbers or arrays (N,) that broadcast. The angles of the mechanism at which both geometries
+        are defined are searched in 128 steps and refined by bisection to rounding.
+        """
+        first, second, load = _as_points("pressures and load", *pressures, load)
+        balanced = balanced_angles(self.torques, self.load, self.angle_range, (first, second), load)
+        both = np.stack([np.broadcast_to(p[:, None], balanced.shape) for p in (first, second)], axis=2)
+        return self._points(balanced, np.where(np.isnan(balanced)[..., None], np.nan, both))
+
+    def with_columns(self, recording: Recording) -> Recording:
+        """A recording of the plant with torque, stiffness, shut_valves_stiffness and cocontraction as further columns.
+
+        The torque is that of the recorded tensions, with damping and friction; the stiffnesses are those of the laws at
+        the recorded angle and pressures, friction relaxed. Raises ColumnError without angle, pressures and forces.
+        """
+        angle, muscles, torques = recording[self.plant.mechanism.coordinates[0].name], [], []
+        for prefix, function in zip(self.plant.prefixes, self.torques, strict=True):
+            stiffness, shut, arm = function(
+                angle, recording[f"{prefix}pressure"], "stiffness", "shut_valves", "moment_arm"
+            )
+            muscles.append((stiffness, shut))
+            torques.append(arm * recording[f"{prefix}force"])
+        constant, shut = (sum(values) for values in zip(*muscles, strict=True))
+        return recording.with_columns(
+            torque=torques[0] + torques[1],
+            stiffness=constant,
+            shut_valves_stiffness=shut,
+            cocontraction=np.minimum(np.abs(torques[0]), np.abs(torques[1])),
+        )
+
+    def check_reachable(self, angle: Any, stiffness: Any, load: Any = 0.0) -> JointPoints:
+        """The result of `pressures`. Raises SolveError, with what is reachable, for the first point without one."""
+        points = self.pressures(angle, stiffness, load)
+        values = _as_points("angle, stiffness and load", angle, stiffness, load)
+        for row in np.flatnonzero(points.count == 0):
+            raise SolveError(self.explain(*(float(v[row]) for v in values)))
+        return points
+
+    def torque_limits(self, angle: Any) -> tuple[Array, Array]:
+        """Minimum and maximum load [N m] that both muscles can carry at an angle [rad], arrays (N,)."""
+        (angle,) = _as_points("angle", angle)
+        levels = np.linspace(*self.pressure_range, LEVELS)
+        first, second = (function(angle[:, None], levels, "torque")[0] for function in self.torques)
+        weight = self.load(angle, names=("torque",))[0]
+        return (first.min(axis=1) + second.min(axis=1) - weight, first.max(axis=1) + second.max(axis=1) - weight)
+
+    def stiffness_limits(self, angle: Any, load: Any = 0.0) -> tuple[Array, Array]:
+        """Minimum and maximum stiffness at constant pressure [N m/rad] at an angle [rad] under a load [N m].
+
+        Arrays (N,); NaN where taut muscles cannot balance the load. Linear interpolation between 129 pressures of each
+        muscle; exact for laws that are affine in the pressure. An upper limit of the force of such a law is ignored.
+        """
+        angle, load = _as_points("angle and load", angle, load)
+        torque = self.load(angle, names=("torque",))[0] + load
+        functions = self.unlimited if all(f.affine for f in self.unlimited) else self.torques
+        levels = np.linspace(*self.pressure_range, LEVELS)
+        pairs = [taut_branch(function, angle, levels) for function in functions]
+        limits = np.array([stiffness_range(pairs, row, torque[row]) for row in range(angle.size)])
+        return limits[:, 0], limits[:, 1]
+
+    def explain(self, angle: float, stiffness: float, load: float = 0.0) -> str:
+        """Reason why no pressures give an angle and a stiffness under a load, with what is reachable."""
+        where = f"joint_statics: at an angle of {angle:.4g} rad under a load of {load:.4g} N m"
+        low, high = self.pressure_range
+        limits = f"at pressures of {low / 1e3:.4g} to {high / 1e3:.4g} kPa"
+        softest, stiffest = (float(v[0]) for v in self.stiffness_limits(angle, load))
+        if np.isnan(softest):
+            least, most = (float(v[0]) for v in self.torque_limits(angle))
+            return (
+                f"{where} no pressures balance the joint with two taut muscles; allowed range of the load {limits}: "
+                f"{least:.4g} to {most:.4g} N m. Choose another load, angle or supply pressure."
+            )
+        return (
+            f"{where} no pressures give a stiffness of {stiffness:.4g} N m/rad; allowed range {limits}: {softest:.4g} "
+            f"to {stiffest:.4g} N m/rad. Choose a stiffness in this range, or another supply pressure."
+        )
+
+    @property
+    def angle_range(self) -> tuple[float, float]:
+        """Angles [rad] between the limits of the mechanism at which both geometries and laws are defined."""
+        coordinate = self.plant.mechanism.coordinates[0]
+        grid = np.linspace(coordinate.lower_limit, coordinate.upper_limit, 2049)
+        contractions = self.plant.mechanism.contractions({coordinate.name: grid}, self.plant.resting_lengths)
+        inside = np.ones(grid.size, dtype=bool)
+        for muscle, contraction in zip(self.plant.muscles, contractions, strict=True):
+            for low, high in (muscle.geometry.contraction_range, muscle.contractile.contraction_range):
+                inside &= (contraction > low) & (contraction < high)
+        if not inside.any():
+            raise ParameterError(
+                "joint_statics: there is no angle at which both muscles are within their contraction ranges; change "
+                "the offset, the radius or the range of angles of the joint."
+            )
+        return float(grid[inside][0]), float(grid[inside][-1])
+
+    def _points(
+        self, angle: Array, pressures: Array, torque: Array | None = None, stiffness: Array | None = None
+    ) -> JointPoints:
+        """The states at angles (N, S) and pressures (N, S, 2); only those of this torque and stiffness if given."""
+        muscles = [f(angle, pressures[..., i], *RESULTS) for i, f in enumerate(self.torques)]
+        (q, k, tension, shut), (other_q, other_k, other_tension, other_shut) = muscles
+        with np.errstate(invalid="ignore"):
+            known = np.isfinite(angle) & np.isfinite(pressures).all(axis=2)
+            if torque is not None and stiffness is not None:
+                known &= are_balanced(muscles[0][:3], muscles[1][:3], torque, stiffness)
+            restoring = k + other_k + self.load(angle, names=("slope",))[0]
+            stable = np.where(restoring > 0.0, 1.0, 0.0)
+        cocontraction = np.minimum(np.abs(q), np.abs(other_q))
+        columns = (angle, k + other_k, shut + other_shut, cocontraction, stable)
+        angle, constant, shut, cocontraction, stable = (np.where(known, value, np.nan) for value in columns)
+        both, tensions = (
+            np.where(known[..., None], v, np.nan) for v in (pressures, np.stack([tension, other_tension], axis=2))
+        )
+        return JointPoints(angle, both, tensions, constant, shut, cocontraction, stable)
+
+
+def joint_statics(plant: Plant, pressure_range: tuple[float, float] | None = None) -> JointStatics:
+    """The statics of a joint with two muscles, with traced force laws.
+
+    `pressure_range` are the minimum and maximum gauge pressure [Pa]; by default 0 to the lowest pressure of the
+    supplies of the plant. Raises ParameterError for a plant that is not a joint with two muscles without series
+    springs, and for an empty pressure range.
+    """
+    check_joint(plant)
+    low, high = (0.0, _supply_pressure(plant)) if pressure_range is None else pressure_range
+    if not (np.isfinite([low, high]).all() and low < high):
+        raise ParameterError(
+            f"joint_statics: pressure_range is {low:g} to {high:g} Pa; the minimum must be less than the maximum. Give "
+            "gauge pressures, such as (0.0, 6e5)."
+        )
+    limited, unlimited = torque_functions(plant), torque_functions(plant, limited=False)
+    return JointStatics(plant, (float(low), float(high)), limited, unlimited, load_function(plant))
+
+
+def _supply_pressure(plant: Plant) -> float:
+    """Lowest gauge pressure [Pa] of the supplies at rest."""
+    supplies = [circuit.supply for circuit in plant.circuits]
+    airs = [supply.air(supply.steady_state(plant.ambient), plant.ambient) for supply in supplies]
+    return min(float(gauge_pressure(air.pressure, plant.ambient)) for air in airs)
+
+
+def _as_points(label: str, *values: Any) -> list[Array]:
+    try:
+        arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(value, dtype=float)) for value in values))
+    except (TypeError, ValueError):
+        raise ParameterError(f"joint_statics: {label} must be numbers or arrays (N,) of one length.") from None
+    if any(a.ndim != 1 or not np.isfinite(a).all() for a in arrays):
+        raise ParameterError(f"joint_statics: {label} must be finite numbers or arrays (N,) of one length.")
+    return list(arrays)

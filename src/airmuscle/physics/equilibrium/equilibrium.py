@@ -1,0 +1,183 @@
+"""Equilibria of a plant, and the stable equilibrium nearest to full length of each of many plants."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core.arrays import Array
+from ...core.errors import AirmuscleError, EquilibriumError
+from ...engine.compile.program import CompiledSystem, compile_system
+from .explanation import no_equilibrium
+from .multi_dof import equilibria_of_several_coordinates
+from .request import MuscleValues, air_of_each, complete_inputs
+from .single_dof import GRID_POINTS, equilibria_of_one_coordinate, grid
+from .stability import are_stable
+from .static_plant import StaticPlant
+from .statics import Rows, Statics
+
+TABLE_SIZE = 500_000
+"""Size of a table of states of several plants; a greater one takes memory and saves little time (measured)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Equilibrium:
+    """One equilibrium: its state, and whether it is stable for small displacements of the mechanism."""
+
+    state: dict[str, float]
+    stable: bool
+
+
+def find_equilibria(
+    plant: StaticPlant,
+    *,
+    pressure: MuscleValues = None,
+    air_mass: MuscleValues = None,
+    inputs: Mapping[str, float] | None = None,
+) -> tuple[Equilibrium, ...]:
+    """Static equilibria for given pressures or air masses of the muscles, sorted by ascending coordinates.
+
+    pressure   gauge pressure [Pa] of the muscle, a number for all or a tuple with one for each; also texts with a unit
+    air_mass   alternatively: mass of the air [kg] with closed valves; the gas law determines the pressure at the
+               temperature of the air at rest
+    inputs     0 by default, so that a latch is open
+
+    Walls, series springs, tubes and tanks are in steady state, friction and creep relaxed. `stable` follows from the
+    eigenvalues of the motion, without friction, at constant pressure or with enclosed air.
+
+    With one coordinate, the whole range of the muscles is searched; a pair of equilibria closer than 1/100 of the range
+    is found by the extremum of the force between them. With several, Newton's method starts from many points and may
+    miss an equilibrium to which none of them converges. Raises ParameterError or UnitError for invalid values,
+    GeometryLimitError if the mechanism fixes a muscle at a contraction beyond its limits, EquilibriumError if every
+    position is an equilibrium.
+    """
+    one = _statics(plant, pressure, air_mass, inputs)
+    rows, x = _balances(one)
+    if not rows.size and (len(one.plants.mechanism.coordinates) == 0 or _is_degenerate(one)):
+        raise no_equilibrium(one)
+    states, stable = _judged(one, rows, x)
+    return tuple(
+        Equilibrium(dict(zip(one.names, state.tolist(), strict=True)), bool(s))
+        for state, s in zip(states, stable, strict=True)
+    )
+
+
+def _is_degenerate(one: Statics) -> bool:
+    """Whether a plant with one coordinate is in equilibrium everywhere, or has no permitted position."""
+    if len(one.plants.mechanism.coordinates) != 1:
+        return False
+    x = grid(one)
+    return not one.accelerations(x[:, np.isfinite(x[0]), None]).any()
+
+
+def find_equilibrium(
+    plant: StaticPlant,
+    *,
+    pressure: MuscleValues = None,
+    air_mass: MuscleValues = None,
+    inputs: Mapping[str, float] | None = None,
+) -> dict[str, float]:
+    """The stable equilibrium whose muscles are nearest to full length; arguments are those of `find_equilibria`.
+
+    Nearest to full length is the smallest sum of squared contractions. Raises EquilibriumError, with the muscles and
+    their forces, if no stable equilibrium is found.
+    """
+    one = _statics(plant, pressure, air_mass, inputs)
+    state = _nearest(one)[0]
+    if not np.isfinite(state).all():
+        raise no_equilibrium(one)
+    return dict(zip(one.names, state.tolist(), strict=True))
+
+
+def equilibrium_at_ambient_pressure(plant: StaticPlant) -> dict[str, float]:
+    """The state of `find_equilibrium` at gauge pressure 0 and inputs 0."""
+    return find_equilibrium(plant, pressure=0.0)
+
+
+def equilibria_at_ambient_pressure(plant: StaticPlant, parameters: Array) -> Array:
+    """The states (N, n) of `find_equilibrium` at gauge pressure 0 and inputs 0, for plants of this structure with
+    parameters (N, P); NaN if none exists. Raises ParameterError where an input cannot be 0."""
+    inputs = np.array(list(complete_inputs(plant, None).values()), dtype=float)
+    return find_equilibrium_of_each(compile_system(plant), parameters, (0.0,) * len(plant.muscles), inputs)
+
+
+def find_equilibrium_of_each(
+    compiled: CompiledSystem, parameters: Array, pressures: tuple[float, ...], inputs: Array
+) -> Array:
+    """The states (N, n) of `find_equilibrium` for plants of one structure with parameters (N, P); NaN if none exists.
+
+    The gauge pressures [Pa] of the muscles and the inputs (m,) are the same for all; `compiled` is any of the plants.
+    """
+    size = len(compiled.description.state_names)
+    table, block = np.full((len(parameters), size), np.nan), max(1, TABLE_SIZE // (GRID_POINTS * size))
+    for begin in range(0, len(parameters), block):
+        part = slice(begin, begin + block)
+        table[part] = _each_nearest(compiled, parameters[part], pressures, inputs)
+    return table
+
+
+def _each_nearest(compiled: CompiledSystem, parameters: Array, pressures: tuple[float, ...], inputs: Array) -> Array:
+    try:
+        return _nearest(Statics.of_plants(compiled, parameters, pressures, inputs))
+    except (TypeError, ValueError, ArithmeticError, AirmuscleError):  # one of the plants is invalid
+        if len(parameters) == 1:
+            return np.full((1, len(compiled.description.state_names)), np.nan)
+    return np.vstack([_each_nearest(compiled, row[None], pressures, inputs) for row in parameters])
+
+
+def _statics(
+    plant: StaticPlant, pressure: MuscleValues, air_mass: MuscleValues, inputs: Mapping[str, float] | None
+) -> Statics:
+    """The checked arguments as a table of one plant."""
+    air = air_of_each(plant, pressure, air_mass)
+    values = np.array(list(complete_inputs(plant, inputs).values()), dtype=float)
+    compiled = compile_system(plant)
+    one = Statics.of_plants(compiled, compiled.parameters[None], air, values, pressure is None)
+    if not one.shut and not one.allowed().all():
+        plant.state_at(pressure=air)
+        raise EquilibriumError(f"{type(plant.mechanism).__name__}: the pressures {air} Pa are not allowed.")
+    return one
+
+
+def _balances(statics: Statics) -> tuple[Rows, Array]:
+    """The row of the plant and the coordinates (d,) of every equilibrium."""
+    count = len(statics.plants.mechanism.coordinates)
+    if count == 1:
+        return equilibria_of_one_coordinate(statics)
+    if count > 1:
+        return equilibria_of_several_coordinates(statics)
+    possible = np.isfinite(statics.states(np.empty((len(statics.parameters), 1, 0)))[:, 0]).all(axis=1)
+    rows = np.flatnonzero(possible)
+    return rows, np.empty((rows.size, 0))
+
+
+def _judged(statics: Statics, rows: Rows, x: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
+    """States (R, n) of plants at coordinates (R, d), and whether they are stable (R,)."""
+    if not rows.size:
+        return np.empty((0, len(statics.names))), np.empty(0, dtype=bool)
+    there = statics.of(rows)
+    states = there.states(x[:, None])[:, 0]
+    return states, are_stable(there.compiled, there.parameters, states, there.inputs, shut=there.shut)
+
+
+def _nearest(statics: Statics) -> Array:
+    """State (N, n) of the stable equilibrium nearest to full length of each plant; NaN if none exists."""
+    table = np.full((len(statics.parameters), len(statics.names)), np.nan)
+    rows = np.flatnonzero(statics.allowed())
+    if not rows.size:
+        return table
+    places, x = _balances(statics if rows.size == len(table) else statics.of(rows))
+    rows = rows[places]
+    if not rows.size:
+        return table
+    there = statics.of(rows)
+    states, stable = _judged(statics, rows, x)
+    contracted = there.contracted(x[:, None])[:, 0]
+    order = np.lexsort((contracted, rows))  # of several with equal contraction, the first
+    order = order[stable[order]]
+    first = np.diff(rows[order], prepend=-1) > 0
+    table[rows[order][first]] = states[order][first]
+    return table

@@ -1,0 +1,122 @@
+"""Mechanism (interface) in generalised coordinates: muscle contractions and equations of motion."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+from collections.abc import Mapping, Sequence
+
+from ...core import autodiff
+from ...core.ops import Value
+from ...core.variables import Input, StateVariable
+
+INFINITY = float("inf")
+
+
+@dataclasses.dataclass(frozen=True)
+class Coordinate:
+    """One generalised coordinate and the name of its speed.
+
+    `nominal` and `nominal_speed` are the scales of the absolute tolerances. `lower_limit` and `upper_limit` bound the
+    search for equilibria; they are not end stops.
+    """
+
+    name: str
+    speed: str
+    unit: str
+    nominal: float
+    nominal_speed: float
+    lower_limit: float = -INFINITY
+    upper_limit: float = INFINITY
+
+    @property
+    def acceleration(self) -> str:
+        """Name of the acceleration: the name of the speed with "acceleration" instead of "speed"."""
+        name = self.speed.replace("speed", "acceleration")
+        return name if name != self.speed else f"{self.name}.acceleration"
+
+    @property
+    def states(self) -> tuple[StateVariable, StateVariable]:
+        """The coordinate and its speed, as states of a plant."""
+        return (
+            StateVariable(self.name, self.unit, self.nominal, f"{self.name} of the load"),
+            StateVariable(self.speed, f"{self.unit}/s", self.nominal_speed, f"{self.speed} of the load"),
+        )
+
+
+class Mechanism(abc.ABC):
+    """Mechanical load of one or more muscles (interface).
+
+    Coordinates q and speeds v are mappings from the names in `coordinates` to values.
+    """
+
+    @property
+    @abc.abstractmethod
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        """Generalised coordinates, in order."""
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """Inputs of the mechanism."""
+        return ()
+
+    @property
+    def muscle_count(self) -> int | None:
+        """Number of muscles that act on the mechanism; None for any number."""
+        return None
+
+    @abc.abstractmethod
+    def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
+        """Contraction of each muscle at coordinates q, for resting lengths [m]."""
+
+    def contraction_speeds(
+        self, q: Mapping[str, Value], v: Mapping[str, Value], resting_lengths: Sequence[Value]
+    ) -> tuple[Value, ...]:
+        """Speed of shortening [m/s] of each muscle, the time derivative of `contractions` times the resting length."""
+        names = [c.name for c in self.coordinates]
+        if not names:
+            return tuple(0.0 for _ in resting_lengths)
+        rates = autodiff.jvp(
+            lambda x: self.contractions(dict(zip(names, x, strict=True)), resting_lengths),
+            [q[name] for name in names],
+            [v[c.speed] for c in self.coordinates],
+        )
+        return tuple(length * rate for length, rate in zip(resting_lengths, rates, strict=True))
+
+    def generalised_forces(
+        self, q: Mapping[str, Value], tensions: Sequence[Value], resting_lengths: Sequence[Value]
+    ) -> dict[str, Value]:
+        """Generalised force on each coordinate from the muscle tensions [N], by virtual work: J^T F.
+
+        J is the Jacobian of the muscle shortenings by the coordinates, from `contractions`. Units: [N] for a coordinate
+        in metres, [N m] for an angle.
+        """
+        names = [c.name for c in self.coordinates]
+        if not names:
+            return {}
+        forces = autodiff.vjp(
+            lambda x: self.contractions(dict(zip(names, x, strict=True)), resting_lengths),
+            [q[name] for name in names],
+            [tension * length for tension, length in zip(tensions, resting_lengths, strict=True)],
+        )
+        return dict(zip(names, forces, strict=True))
+
+    @abc.abstractmethod
+    def acceleration(
+        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
+    ) -> Mapping[str, Value]:
+        """Acceleration of each coordinate under the generalised muscle forces and the forces of the mechanism."""
+
+    def dissipated_power(
+        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
+    ) -> Value:
+        """Power [W] that leaves the mechanism through its dampers, end stops, drives and external loads."""
+        return 0.0
+
+    def potential_energy(self, q: Mapping[str, Value]) -> Value:
+        """Potential energy [J]."""
+        return 0.0
+
+    def kinetic_energy(self, q: Mapping[str, Value], v: Mapping[str, Value]) -> Value:
+        """Kinetic energy [J]."""
+        return 0.0

@@ -1,0 +1,223 @@
+"""Planar arm: links in series in a vertical plane, with muscles over one or several joints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from ...core import ops
+from ...core.constants import STANDARD_GRAVITY
+from ...core.declaration import check_structure, model, parameter
+from ...core.errors import ParameterError
+from ...core.ops import Value
+from .base import Coordinate, Mechanism
+from .pulley_profile import ConstantRadius, PulleyProfile
+from .spd_solve import solve_positive_definite
+
+Matrix = list[list[Value]]
+
+
+@model
+class ArmLink:
+    """Rigid link of an arm, with the joint at its upper end."""
+
+    length: float = parameter("m", "l", "distance of the joints at both ends", bounds=(1e-3, 100.0))
+    mass: float = parameter("kg", "m", "mass of the link", bounds=(1e-6, 1e5))
+    centre: float = parameter("m", "l_c", "distance of the centre of mass from the joint", bounds=(0.0, 100.0))
+    inertia: float = parameter(
+        "kg m^2", "I_c", "moment of inertia about the centre of mass", bounds=(0.0, 1e5), default=0.0
+    )
+    damping: float = parameter("N m s/rad", "b", "viscous friction of the joint", bounds=(0.0, 1e5), default=0.0)
+    min_angle: float = parameter(
+        "rad", "theta_min", "lower limit of the joint angle", bounds=(-10.0, 10.0), fitted=False, default=-ops.pi
+    )
+    max_angle: float = parameter(
+        "rad", "theta_max", "upper limit of the joint angle", bounds=(-10.0, 10.0), fitted=False, default=ops.pi
+    )
+
+    def check(self) -> None:
+        if not self.min_angle < self.max_angle:
+            raise ParameterError(
+                f"ArmLink: min_angle is {self.min_angle:g}; it must be less than max_angle, {self.max_angle:g}."
+            )
+        if not self.inertia + self.mass * self.centre**2 > 0.0:
+            raise ParameterError("ArmLink: the moment of inertia about the joint is zero; give centre or inertia.")
+
+
+@model
+class MuscleRoute:
+    """Route of a muscle over the joints of an arm: eps = eps_0 + sum_k r_k F_k(theta_k)/L0.
+
+    `joints` are the numbers of the joints that the muscle crosses, from 1; one for a monoarticular, two for a
+    biarticular muscle. r_k moment arm at joint angle 0, positive if the muscle increases the angle; F_k integral of the
+    pulley profile. `profiles` is empty for circular pulleys, otherwise it has one profile for each joint.
+    """
+
+    joints: tuple[int, ...]
+    radii: tuple[float, ...] = parameter("m", "r_k", "moment arm at each joint at angle 0", bounds=(-10.0, 10.0))
+    offset: float = parameter("1", "eps_0", "contraction with all joints at angle 0", bounds=(-0.5, 0.9), default=0.0)
+    profiles: tuple[PulleyProfile, ...] = ()
+
+    def check(self) -> None:
+        if not self.joints or len(set(self.joints)) < len(self.joints) or min(self.joints) < 1:
+            raise ParameterError(
+                f"MuscleRoute: joints is {self.joints}; it must contain different joint numbers, counted from 1."
+            )
+        if len(self.radii) != len(self.joints) or len(self.profiles) not in (0, len(self.joints)):
+            raise ParameterError(
+                f"MuscleRoute: {len(self.joints)} joints, {len(self.radii)} radii and {len(self.profiles)} profiles "
+                "are given; give one radius for each joint, and one profile for each or no profiles."
+            )
+
+    def shortening(self, angles: Sequence[Value]) -> Value:
+        """Shortening [m] of the muscle from all joints at angle 0, at the joint angles [rad] of the arm."""
+        profiles = self.profiles or (ConstantRadius(),) * len(self.joints)
+        parts = zip(self.joints, self.radii, profiles, strict=True)
+        return sum(radius * profile.integral(angles[joint - 1]) for joint, radius, profile in parts)
+
+
+@model
+class PlanarArm(Mechanism):
+    """Planar arm of n links: M(theta) theta'' + h(theta, theta') = J^T F - b theta', J from the muscle routes.
+
+        phi_i = theta_1 + ... + theta_i,   Q_i of the link angles = tau_i - tau_(i+1)
+        sum_j A_ij cos(phi_i - phi_j) phi_j'' + A_ij sin(phi_i - phi_j) phi_j'^2 = Q_i - g B_i sin phi_i
+
+    theta_i angle of joint i, the angle of link i relative to link i-1; phi_i angle of link i from the vertical, 0 where
+    it hangs downwards. A_ii = I_i + m_i l_ci^2 + M_i l_i^2 with the mass M_i beyond link i and, for i < j,
+    A_ij = l_i (m_j l_cj + M_j l_j); B_i = m_i l_ci + M_i l_i. The payload is a point mass at the tip. With gravity 0
+    the arm moves in a horizontal plane. Derivation: Lagrange's equations in the link angles, in which the kinetic
+    energy depends on differences of angles only.
+    """
+
+    links: tuple[ArmLink, ...]
+    routes: tuple[MuscleRoute, ...]
+    payload: float = parameter("kg", "m_p", "point mass at the tip", bounds=(0.0, 1e5), default=0.0)
+    gravity: float = parameter(
+        "m/s^2", "g", "acceleration of gravity", bounds=(0.0, 20.0), fitted=False, default=STANDARD_GRAVITY
+    )
+
+    def check(self) -> None:
+        check_structure(self)
+        if not self.links or not self.routes:
+            raise ParameterError(
+                f"PlanarArm: {len(self.links)} links and {len(self.routes)} routes are given; give one link for each "
+                "joint and one route for each muscle."
+            )
+        for number, route in enumerate(self.routes, start=1):
+            if max(route.joints) > len(self.links):
+                raise ParameterError(
+                    f"PlanarArm: route {number} crosses joint {max(route.joints)}; allowed range: 1 to "
+                    f"{len(self.links)}. Give another link, or another joint number."
+                )
+
+    @property
+    def muscle_count(self) -> int | None:
+        return len(self.routes)
+
+    @property
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        return tuple(
+            Coordinate(f"joint{i}.angle", f"joint{i}.angular_speed", "rad", 0.1, 1.0, link.min_angle, link.max_angle)
+            for i, link in enumerate(self.links, start=1)
+        )
+
+    def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
+        angles = self._angles(q)
+        return tuple(
+            route.offset + route.shortening(angles) / length
+            for route, length in zip(self.routes, resting_lengths, strict=True)
+        )
+
+    def mass_matrix(self, q: Mapping[str, Value]) -> Matrix:
+        """Mass matrix M [kg m^2] in the joint angles, n rows of n values; symmetric and positive definite."""
+        inner, count = self._link_matrix(self._link_angles(q)), len(self.links)
+        return [
+            [sum(inner[a][b] for a in range(i, count) for b in range(j, count)) for j in range(count)]
+            for i in range(count)
+        ]
+
+    def tip(self, q: Mapping[str, Value]) -> tuple[Value, Value]:
+        """Horizontal position and height [m] of the tip relative to the first joint."""
+        pairs = list(zip(self.links, self._link_angles(q), strict=True))
+        return (
+            sum(link.length * ops.sin(angle) for link, angle in pairs),
+            -sum(link.length * ops.cos(angle) for link, angle in pairs),
+        )
+
+    def acceleration(
+        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
+    ) -> Mapping[str, Value]:
+        angles, speeds = self._link_angles(q), self._link_speeds(v)
+        count, coupling, moments = len(angles), self._couplings(), self._mass_moments()
+        torques = [
+            forces[c.name] - link.damping * v[c.speed] for c, link in zip(self.coordinates, self.links, strict=True)
+        ]
+        right = []
+        for i in range(count):
+            centrifugal = sum(
+                coupling[i][j] * ops.sin(angles[i] - angles[j]) * speeds[j] ** 2 for j in range(count) if j != i
+            )
+            beyond = torques[i + 1] if i + 1 < count else 0.0
+            right.append(torques[i] - beyond - centrifugal - self.gravity * moments[i] * ops.sin(angles[i]))
+        links = solve_positive_definite(self._link_matrix(angles), right)
+        joints = [links[0], *(links[i] - links[i - 1] for i in range(1, count))]
+        return {c.name: value for c, value in zip(self.coordinates, joints, strict=True)}
+
+    def dissipated_power(
+        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
+    ) -> Value:
+        return sum(link.damping * v[c.speed] ** 2 for c, link in zip(self.coordinates, self.links, strict=True))
+
+    def potential_energy(self, q: Mapping[str, Value]) -> Value:
+        pairs = zip(self._mass_moments(), self._link_angles(q), strict=True)
+        return sum(self.gravity * moment * (1.0 - ops.cos(angle)) for moment, angle in pairs)
+
+    def kinetic_energy(self, q: Mapping[str, Value], v: Mapping[str, Value]) -> Value:
+        matrix, speeds = self._link_matrix(self._link_angles(q)), self._link_speeds(v)
+        count = range(len(speeds))
+        return 0.5 * sum(matrix[i][j] * speeds[i] * speeds[j] for i in count for j in count)
+
+    def _angles(self, q: Mapping[str, Value]) -> list[Value]:
+        return [q[c.name] for c in self.coordinates]
+
+    def _link_angles(self, q: Mapping[str, Value]) -> list[Value]:
+        return _running_sums(self._angles(q))
+
+    def _link_speeds(self, v: Mapping[str, Value]) -> list[Value]:
+        return _running_sums([v[c.speed] for c in self.coordinates])
+
+    def _masses_beyond(self) -> list[Value]:
+        """Mass [kg] beyond each link, with the payload."""
+        masses: list[Value] = [self.payload]
+        for link in reversed(self.links[1:]):
+            masses.append(masses[-1] + link.mass)
+        return masses[::-1]
+
+    def _mass_moments(self) -> list[Value]:
+        """B_i = m_i l_ci + M_i l_i [kg m]."""
+        pairs = zip(self.links, self._masses_beyond(), strict=True)
+        return [link.mass * link.centre + beyond * link.length for link, beyond in pairs]
+
+    def _couplings(self) -> Matrix:
+        """A_ij [kg m^2]."""
+        count, moments, beyond = range(len(self.links)), self._mass_moments(), self._masses_beyond()
+        matrix = [[self.links[min(i, j)].length * moments[max(i, j)] for j in count] for i in count]
+        for i, (link, mass) in enumerate(zip(self.links, beyond, strict=True)):
+            matrix[i][i] = link.inertia + link.mass * link.centre**2 + mass * link.length**2
+        return matrix
+
+    def _link_matrix(self, angles: Sequence[Value]) -> Matrix:
+        """A_ij cos(phi_i - phi_j) [kg m^2]."""
+        coupling, count = self._couplings(), range(len(angles))
+        return [
+            [coupling[i][j] * ops.cos(angles[i] - angles[j]) if i != j else coupling[i][i] for j in count]
+            for i in count
+        ]
+
+
+def _running_sums(values: Sequence[Value]) -> list[Value]:
+    total, sums = 0.0, []
+    for value in values:
+        total = total + value
+        sums.append(total)
+    return sums

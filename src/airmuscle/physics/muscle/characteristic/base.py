@@ -1,0 +1,216 @@
+"""Characteristic (interface): static relation between gauge pressure p [Pa], contraction eps [1] and tension F [N].
+
+A paper gives the relation solved for one of the three quantities. A model implements this direction; the classes here
+compute the other two by a bracketed root search, and exact slopes by the implicit function theorem. If there are
+several solutions, the one reached from rest is returned: the smallest contraction, pressure or force in equilibrium.
+"""
+
+from __future__ import annotations
+
+import abc
+from typing import Any, ClassVar, NamedTuple
+
+from ....core import autodiff
+from ....core.ops import Value
+from ....core.quantity_arguments import accept_quantities_in
+from ....core.reference import Reference
+from .solve import describe_range, find_first_root, warn_above_whole_length
+
+_UNITS = {
+    "force": ("Pa", "1"), "contraction": ("Pa", "N"), "pressure": ("1", "N"), "slopes": ("Pa", "1"),
+    "stiffness": ("Pa", "1"),
+}  # fmt: skip
+"""Units of the arguments of the methods."""
+MIN_PRESSURE = 1e-300
+"""Replaces a pressure of zero [Pa] as a divisor; no load then has a solution."""
+
+
+class Slopes(NamedTuple):
+    """Partial derivatives of the tension at a point of the surface."""
+
+    by_pressure: Value
+    """dF/dp at constant contraction [N/Pa]."""
+    by_contraction: Value
+    """dF/deps at constant pressure [N]; its negative is the stiffness per unit of contraction."""
+
+
+class Characteristic(abc.ABC):
+    """Static relation between gauge pressure [Pa], contraction [1] and tension [N]; pulling is positive.
+
+    Arguments are numbers, arrays or lists in SI units, or texts with a unit: `force("3 bar", "10 %")`.
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = ()
+    traceable: ClassVar[bool] = True
+    """Whether the model is in closed form over `ops`; otherwise a plant uses it through `as_force_law`."""
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        accept_quantities_in(cls, _UNITS, warn_above_whole_length)
+
+    @property
+    def pressure_range(self) -> tuple[float, float]:
+        """Minimum and maximum gauge pressure [Pa] of a solution."""
+        return (0.0, 1.0e6)
+
+    @property
+    def force_range(self) -> tuple[float, float]:
+        """Minimum and maximum tension [N] of a solution."""
+        return (0.0, 1.0e4)
+
+    @property
+    def contraction_range(self) -> tuple[float, float]:
+        """Minimum and maximum contraction [1] of a solution; geometric models restrict it."""
+        return (-0.05, 0.6)
+
+    @abc.abstractmethod
+    def force(self, pressure: Value, contraction: Value) -> Value:
+        """Tension [N] at gauge pressure [Pa] and contraction [1]; arrays broadcast. Raises SolveError."""
+
+    @abc.abstractmethod
+    def contraction(self, pressure: Value, force: Value) -> Value:
+        """Contraction [1] at gauge pressure [Pa] and tension [N]; arrays broadcast. Raises SolveError."""
+
+    @abc.abstractmethod
+    def pressure(self, contraction: Value, force: Value) -> Value:
+        """Gauge pressure [Pa] at contraction [1] and tension [N]; arrays broadcast. Raises SolveError."""
+
+    @abc.abstractmethod
+    def slopes(self, pressure: Value, contraction: Value) -> Slopes:
+        """Exact partial derivatives of the tension at gauge pressure [Pa] and contraction [1]; arrays broadcast."""
+
+    def stiffness(self, pressure: Value, contraction: Value) -> Value:
+        """Stiffness -dF/deps [N] at constant pressure; divide by the resting length for [N/m]."""
+        return 0.0 - self.slopes(pressure, contraction).by_contraction  # not -0 for a slack muscle
+
+    def _no_contraction_message(self, pressure: float, force: float) -> str:
+        low, high = self.contraction_range
+        limits = describe_range(100 * low, 100 * high, "%")
+        return (
+            f"{type(self).__name__}: no contraction in the range {limits} is in equilibrium with {force:.4g} N at "
+            f"{pressure / 1e3:.4g} kPa. "
+        )
+
+    def _no_pressure_message(self, contraction: float, force: float) -> str:
+        low, high = self.pressure_range
+        limits = describe_range(low / 1e3, high / 1e3, "kPa")
+        return (
+            f"{type(self).__name__}: no gauge pressure in the range {limits} gives {force:.4g} N at a contraction of "
+            f"{100 * contraction:.4g} %. "
+        )
+
+    def _no_force_message(self, pressure: float, contraction: float) -> str:
+        limits = describe_range(*self.force_range, "N")
+        return (
+            f"{type(self).__name__}: no force in the range {limits} gives a contraction of {100 * contraction:.4g} % "
+            f"at {pressure / 1e3:.4g} kPa. "
+        )
+
+
+accept_quantities_in(Characteristic, _UNITS, warn_above_whole_length)
+
+
+class ForceLaw(Characteristic):
+    """Characteristic given as F(p, eps)."""
+
+    def unclamped_force(self, pressure: Value, contraction: Value) -> Value:
+        """Tension [N] before any limit is applied; fits evaluate the residuals with it."""
+        return self.force(pressure, contraction)
+
+    def contraction(self, pressure: Value, force: Value) -> Value:
+        def residual(contraction: Value, p: Value, load: Value) -> Value:
+            return load - self.force(p, contraction)
+
+        def message(p: float, load: float, low: float, high: float) -> str:
+            return self._no_contraction_message(p, load) + _describe_force_limits(load - high, load - low)
+
+        return find_first_root(residual, self.contraction_range, (pressure, force), message)
+
+    def pressure(self, contraction: Value, force: Value) -> Value:
+        def residual(pressure: Value, c: Value, load: Value) -> Value:
+            return self.force(pressure, c) - load
+
+        def message(c: float, load: float, low: float, high: float) -> str:
+            return self._no_pressure_message(c, load) + _describe_force_limits(low + load, high + load)
+
+        return find_first_root(residual, self.pressure_range, (contraction, force), message)
+
+    def slopes(self, pressure: Value, contraction: Value) -> Slopes:
+        return Slopes(
+            autodiff.derivative(self, "force", pressure, contraction, wrt=0),
+            autodiff.derivative(self, "force", pressure, contraction, wrt=1),
+        )
+
+    def _contraction_limits_message(self, pressure: float, force: float) -> str:
+        """Message for a closed-form model whose tension decreases monotonically over the contraction range."""
+        ends = (float(self.force(pressure, end)) for end in self.contraction_range)
+        return self._no_contraction_message(pressure, force) + _describe_force_limits(*sorted(ends))
+
+    def _pressure_limits_message(self, contraction: float, force: float) -> str:
+        """Message for a closed-form model whose tension is monotone over the pressure range."""
+        ends = (float(self.force(end, contraction)) for end in self.pressure_range)
+        return self._no_pressure_message(contraction, force) + _describe_force_limits(*sorted(ends))
+
+
+def _describe_force_limits(low: float, high: float) -> str:
+    return f"Available force: {describe_range(low, high, 'N')}."
+
+
+class ContractionLaw(Characteristic):
+    """Characteristic given as eps(p, F)."""
+
+    def force(self, pressure: Value, contraction: Value) -> Value:
+        def residual(force: Value, p: Value, c: Value) -> Value:
+            return c - self.contraction(p, force)
+
+        def message(p: float, c: float, low: float, high: float) -> str:
+            limits = describe_range(100 * (c - high), 100 * (c - low), "%")
+            return f"{self._no_force_message(p, c)}Available contraction at this pressure: {limits}."
+
+        return find_first_root(residual, self.force_range, (pressure, contraction), message)
+
+    def pressure(self, contraction: Value, force: Value) -> Value:
+        def residual(pressure: Value, c: Value, load: Value) -> Value:
+            return self.contraction(pressure, load) - c
+
+        def message(c: float, load: float, low: float, high: float) -> str:
+            limits = describe_range(100 * (low + c), 100 * (high + c), "%")
+            return f"{self._no_pressure_message(c, load)}Available contraction at this load: {limits}."
+
+        return find_first_root(residual, self.pressure_range, (contraction, force), message)
+
+    def slopes(self, pressure: Value, contraction: Value) -> Slopes:
+        force = self.force(pressure, contraction)
+        by_pressure = autodiff.derivative(self, "contraction", pressure, force, wrt=0)
+        by_force = autodiff.derivative(self, "contraction", pressure, force, wrt=1)
+        return Slopes(-by_pressure / by_force, 1.0 / by_force)
+
+
+class PressureLaw(Characteristic):
+    """Characteristic given as p(eps, F)."""
+
+    def force(self, pressure: Value, contraction: Value) -> Value:
+        def residual(force: Value, p: Value, c: Value) -> Value:
+            return self.pressure(c, force) - p
+
+        def message(p: float, c: float, low: float, high: float) -> str:
+            limits = describe_range((low + p) / 1e3, (high + p) / 1e3, "kPa")
+            return f"{self._no_force_message(p, c)}Required pressure at this contraction: {limits}."
+
+        return find_first_root(residual, self.force_range, (pressure, contraction), message)
+
+    def contraction(self, pressure: Value, force: Value) -> Value:
+        def residual(contraction: Value, p: Value, load: Value) -> Value:
+            return self.pressure(contraction, load) - p
+
+        def message(p: float, load: float, low: float, high: float) -> str:
+            limits = describe_range((low + p) / 1e3, (high + p) / 1e3, "kPa")
+            return f"{self._no_contraction_message(p, load)}Required pressure at this load: {limits}."
+
+        return find_first_root(residual, self.contraction_range, (pressure, force), message)
+
+    def slopes(self, pressure: Value, contraction: Value) -> Slopes:
+        force = self.force(pressure, contraction)
+        by_contraction = autodiff.derivative(self, "pressure", contraction, force, wrt=0)
+        by_force = autodiff.derivative(self, "pressure", contraction, force, wrt=1)
+        return Slopes(1.0 / by_force, -by_contraction / by_force)

@@ -1,0 +1,77 @@
+"""Hunt 2017: pressure of a Festo muscle as a function of contraction, load and direction of motion."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from ....core import ops
+from ....core.declaration import model, parameter
+from ....core.errors import ParameterError
+from ....core.ops import Value
+from ....core.reference import Reference
+from .base import PressureLaw
+
+HUNT_2017 = Reference(
+    "hunt-2017",
+    "Hunt, A. J., Graber-Tilton, A., Quinn, R. D.",
+    "Modeling length effects of braided pneumatic actuators",
+    "ASME IDETC/CIE, Cleveland",
+    2017,
+    note="formula and coefficients of a 10 mm Festo muscle from a secondary source: two copies that agree",
+)
+
+_MAX_TANGENT_ARGUMENT = 1.5
+"""Upper limit of the argument of the tangent; it corresponds to 2.9 MPa, above the strength of any muscle."""
+_MIN_SPAN = 1e-6
+"""Lower limit of the contraction span, which the model does not restrict at high loads."""
+
+
+@model
+class Hunt2017(PressureLaw):
+    """Hunt's model: p = p_0 + p_1 tan(c_1 (eps/(eps_max - b F) - c_2)) + a F + h S.
+
+    eps: contraction; eps_max: contraction of the specimen at 620 kPa without load; F: tension; S: direction of motion,
+    +1 for shortening, -1 for lengthening, 0 for isometric. 2 h: pressure difference between the two branches. The
+    tangent is limited below its pole, at 2.9 MPa with the printed parameters.
+    Reference: Hunt, Graber-Tilton and Quinn (2017).
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (HUNT_2017,)
+    linear_in: ClassVar[tuple[str, ...]] = ("offset", "scale", "by_force")
+
+    max_contraction: float = parameter(
+        "1", "eps_max", "contraction of the specimen at 620 kPa without load", bounds=(0.01, 0.5), fitted=False
+    )
+    offset: float = parameter("Pa", "p_0", "pressure where the tangent is zero", default=254.3e3)
+    scale: float = parameter("Pa", "p_1", "scale of the tangent", bounds=(0.0, 1e7), default=192.0e3)
+    steepness: float = parameter("1", "c_1", "steepness of the tangent", bounds=(0.1, 2.8), default=2.0265)
+    centre: float = parameter(
+        "1", "c_2", "relative contraction where the tangent is zero", bounds=(0.0, 1.0), default=0.461
+    )
+    span_by_force: float = parameter(
+        "1/N", "b", "decrease of the maximum contraction with load", bounds=(0.0, 0.1), default=0.331e-3
+    )
+    by_force: float = parameter("Pa/N", "a", "increase of pressure with load", bounds=(0.0, 1e7), default=1.23e3)
+    half_gap: float = parameter(
+        "Pa",
+        "h",
+        "half of the pressure difference between the branches",
+        bounds=(0.0, 1e6),
+        fitted=False,
+        default=15.6e3,
+    )
+    direction: int = 0
+
+    def check(self) -> None:
+        if self.direction not in (-1, 0, 1):
+            raise ParameterError(
+                f"Hunt2017.direction is {self.direction!r}; it must be 1 (shortening), -1 (lengthening) or 0 "
+                "(isometric)."
+            )
+
+    def pressure(self, contraction: Value, force: Value) -> Value:
+        span = ops.maximum(self.max_contraction - self.span_by_force * force, _MIN_SPAN)
+        argument = ops.clip(
+            self.steepness * (contraction / span - self.centre), -_MAX_TANGENT_ARGUMENT, _MAX_TANGENT_ARGUMENT
+        )
+        return self.offset + self.scale * ops.tan(argument) + self.by_force * force + self.half_gap * self.direction

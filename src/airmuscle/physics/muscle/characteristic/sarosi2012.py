@@ -1,0 +1,44 @@
+"""Sárosi 2012: force of a fluidic muscle with six coefficients."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from ....core import ops
+from ....core.declaration import model, parameter
+from ....core.ops import Value
+from ....core.reference import Reference
+from .base import ForceLaw
+
+SAROSI_2012 = Reference(
+    "sarosi-2012",
+    "Sárosi, J.",
+    "New approximation algorithm for the force of fluidic muscles",
+    "7th IEEE International Symposium on Applied Computational Intelligence and Informatics",
+    2012,
+    note="and later papers of the author up to 2017; formula and coefficients from a secondary source",
+)
+
+
+@model
+class Sarosi2012(ForceLaw):
+    """Sárosi's model: F = (a_1 p + a_2) exp(a_3 eps) + a_4 eps p + a_5 p + a_6.
+
+    p: gauge pressure; eps: contraction. The papers print the coefficients for p in bar and eps in per cent; a library
+    file contains them with these units (`"-0.342 1/%"`), which are converted on reading. The model was fitted to
+    positive forces; at low pressure it becomes negative, so that it is used inside `Clamped`.
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (SAROSI_2012,)
+    linear_in: ClassVar[tuple[str, ...]] = ("a1", "a2", "a4", "a5", "a6")
+
+    a1: float = parameter("N/Pa", "a_1", "exponential term: increase with pressure")
+    a2: float = parameter("N", "a_2", "exponential term: value at zero pressure")
+    a3: float = parameter("1", "a_3", "exponential term: decay with contraction", bounds=(-1e3, 0.0))
+    a4: float = parameter("N/Pa", "a_4", "increase with the product of contraction and pressure")
+    a5: float = parameter("N/Pa", "a_5", "increase with pressure")
+    a6: float = parameter("N", "a_6", "force at zero pressure and large contraction")
+
+    def force(self, pressure: Value, contraction: Value) -> Value:
+        decaying = (self.a1 * pressure + self.a2) * ops.exp(self.a3 * contraction)
+        return decaying + self.a4 * contraction * pressure + self.a5 * pressure + self.a6

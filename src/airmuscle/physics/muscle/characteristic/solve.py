@@ -1,0 +1,141 @@
+"""Root search for the directions of a characteristic that are not in closed form."""
+
+from __future__ import annotations
+
+import contextlib
+import contextvars
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from ....core.errors import AirmuscleWarning, SolveError, TraceError
+
+INTERVALS = 256
+"""Intervals of the search grid; a pair of roots within 1/256 of the search range is not resolved."""
+
+_TOLERANCES = {"xatol": 0.0, "xrtol": 4 * float(np.finfo(float).eps), "fatol": 0.0, "frtol": 0.0}
+_UNSOLVED_AS_NAN = contextvars.ContextVar("unsolved_as_nan", default=False)
+
+
+@contextlib.contextmanager
+def unsolved_as_nan() -> Iterator[None]:
+    """Within this context, points without a solution are NaN in the results of the functions below, not an error."""
+    token = _UNSOLVED_AS_NAN.set(True)
+    try:
+        yield
+    finally:
+        _UNSOLVED_AS_NAN.reset(token)
+
+
+def check_numbers(*values: Any) -> None:
+    """Raise TraceError for values of a traced program: those within `jax.jit`, and symbols of CasADi."""
+    jax = sys.modules.get("jax")
+    for value in values:
+        if type(value).__module__.startswith("casadi") or (jax and isinstance(value, jax.core.Tracer)):
+            raise TraceError(
+                "this direction of the characteristic is not in closed form: its root search needs numbers, but "
+                f"{type(value).__name__} is a value of a traced program. Call it outside of jax.jit, or use a "
+                "direction that the characteristic gives in closed form."
+            )
+
+
+def as_arrays(*values: Any) -> tuple[Any, ...]:
+    """The values as arrays of numbers of one shape. Raises TraceError for traced values."""
+    check_numbers(*values)
+    return tuple(np.broadcast_arrays(*(np.asarray(v, dtype=float) for v in values)))
+
+
+def warn_above_whole_length(contraction: Any, owner: object) -> None:
+    """Issue an AirmuscleWarning for contractions [1] above 1: probably percentages. Traced values are not checked."""
+    if type(contraction).__module__.partition(".")[0] in ("casadi", "jax", "jaxlib"):
+        return
+    values = np.asarray(contraction, dtype=float)
+    largest = float(np.max(values, initial=0.0, where=~np.isnan(values)))
+    if largest > 1.0:
+        hint = f" Is it in per cent? As a ratio it is {largest / 100:g}." if largest <= 100.0 else ""
+        warnings.warn(
+            f"{type(owner).__name__}: a contraction of {largest:g} exceeds the whole length of the muscle; it is a "
+            f"ratio of lengths.{hint}",
+            AirmuscleWarning,
+            stacklevel=3,
+        )
+
+
+def describe_range(low: float, high: float, unit: str) -> str:
+    """Return a range as text with four significant digits; rounding residues become 0, missing limits a dash."""
+    if np.isnan(low) or np.isnan(high):
+        return "–"
+    size = max(abs(low), abs(high))
+    low, high = (0.0 if abs(limit) < 1e-9 * size else limit for limit in (low, high))
+    return f"{low:.4g} to {high:.4g} {unit}"
+
+
+def find_first_root(
+    function: Callable[[Any, Any, Any], Any],
+    bounds: tuple[float, float],
+    args: tuple[Any, Any],
+    message: Callable[[float, float, float, float], str],
+) -> Any:
+    """Return the smallest x within `bounds` at which `function(x, a, b)` changes from negative to zero or positive.
+
+    This is the branch reached from rest as x increases. `args` are the two other quantities a and b, scalars or arrays
+    that broadcast; the result has their shape. Raises SolveError for the first pair without a root, with the text of
+    `message(a, b, minimum, maximum)`, where minimum and maximum are the extreme values of `function` within `bounds`;
+    within `unsolved_as_nan()` such a pair gives NaN. Raises TraceError for traced values, which have no numbers.
+    """
+    from scipy.optimize import elementwise
+
+    first, second = as_arrays(*args)
+    a, b = first.reshape(-1), second.reshape(-1)
+    grid = np.linspace(*bounds, INTERVALS + 1)
+    with np.errstate(over="ignore", invalid="ignore"):  # a model may overflow far from its solutions
+        values = np.asarray(function(grid[:, None], a, b)) + np.zeros((grid.size, a.size))
+    rises = (values[:-1] < 0) & (values[1:] >= 0)
+    at_start = values[0] == 0
+    unsolved = ~(rises.any(axis=0) | at_start)
+    if unsolved.any() and not _UNSOLVED_AS_NAN.get():
+        first_unsolved = int(np.argmax(unsolved))
+        finite = values[~np.isnan(values[:, first_unsolved]), first_unsolved]
+        extremes = (float(finite.min()), float(finite.max())) if finite.size else (np.nan, np.nan)
+        raise SolveError(message(float(a[first_unsolved]), float(b[first_unsolved]), *extremes))
+    roots = np.where(unsolved, np.nan, bounds[0])
+    index = rises.argmax(axis=0)
+    plateau = np.take_along_axis(values, index[None, :] + 1, axis=0)[0] == 0
+    for subset, target in ((~plateau, function), (plateau, _sign_function(function))):
+        selected = subset & ~at_start & ~unsolved
+        if selected.any():
+            bracket = (grid[index[selected]], grid[index[selected] + 1])
+            with np.errstate(over="ignore", invalid="ignore"):
+                root = elementwise.find_root(
+                    target, bracket, args=(a[selected], b[selected]), tolerances=_TOLERANCES, maxiter=200
+                )
+            roots[selected] = root.x
+    return float(roots[0]) if first.ndim == 0 else roots.reshape(first.shape)
+
+
+def _sign_function(function: Callable[[Any, Any, Any], Any]) -> Callable[[Any, Any, Any], Any]:
+    """Return the sign of a function, so that the search finds the edge of a plateau at zero (a clamped force)."""
+    return lambda x, a, b: np.where(np.asarray(function(x, a, b)) >= 0, 1.0, -1.0)
+
+
+def check_solution(
+    solution: Any, bounds: tuple[float, float], args: tuple[Any, Any], message: Callable[[float, float], str]
+) -> Any:
+    """Return `solution`, the result of a closed form; raises SolveError(message(a, b)) if it is not within `bounds`.
+
+    `args` are the two other quantities a and b. Symbols and JAX arrays have no values and are not checked. Within
+    `unsolved_as_nan()` a solution outside is NaN.
+    """
+    if type(solution).__module__.partition(".")[0] in ("casadi", "jax", "jaxlib"):
+        return solution
+    values = np.asarray(solution, dtype=float)
+    outside = ~((values >= bounds[0]) & (values <= bounds[1]))
+    if outside.any() and _UNSOLVED_AS_NAN.get():
+        return np.where(outside, np.nan, values)
+    if outside.any():
+        first, second = (np.broadcast_to(np.asarray(v, dtype=float), values.shape)[outside].flat[0] for v in args)
+        raise SolveError(message(float(first), float(second)))
+    return solution

@@ -1,0 +1,73 @@
+"""Tondu and Lopez 2000: braided muscle with an end correction."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from ....core import ops
+from ....core.declaration import model, parameter
+from ....core.ops import Value
+from ....core.reference import Reference
+from ..geometry.braid import Braid
+from .base import MIN_PRESSURE, ForceLaw
+from .solve import check_solution
+
+TONDU_LOPEZ_2000 = Reference(
+    "tondu-lopez-2000",
+    "Tondu, B., Lopez, P.",
+    "Modeling and control of McKibben artificial muscle robot actuators",
+    "IEEE Control Systems Magazine 20(2):15-38",
+    2000,
+    "10.1109/37.833638",
+    "static model in its usual form, with a constant end correction",
+)
+
+
+@model
+class TonduLopez2000(ForceLaw):
+    """Braided muscle with end correction: F = pi r_0^2 p (a (1 - k eps)^2 - b).
+
+    a = 3/tan(alpha_0)^2, b = 1/sin(alpha_0)^2; r_0, alpha_0: radius and angle of the braid at rest; p: gauge pressure;
+    eps: contraction. The end correction k is greater than 1 because the tapered ends do not contract and the middle
+    contracts by k eps. k = 1 gives the model of Chou and Hannaford. The equation is solved in closed form for each
+    quantity. Reference: Tondu and Lopez (2000).
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (TONDU_LOPEZ_2000,)
+
+    geometry: Braid
+    end_correction: float = parameter(
+        "1", "k", "contraction of the middle relative to that of the whole muscle", bounds=(1.0, 3.0), default=1.0
+    )
+
+    @property
+    def contraction_range(self) -> tuple[float, float]:
+        """From straight threads in the middle to zero force."""
+        start, _ = self.geometry.contraction_range
+        zero_force = 1.0 - ops.sqrt(self._b / self._a)
+        return (start / self.end_correction, zero_force / self.end_correction)
+
+    def force(self, pressure: Value, contraction: Value) -> Value:
+        return pressure * self._effective_area(contraction)
+
+    def pressure(self, contraction: Value, force: Value) -> Value:
+        solution = force / self._effective_area(contraction)
+        return check_solution(solution, self.pressure_range, (contraction, force), self._pressure_limits_message)
+
+    def contraction(self, pressure: Value, force: Value) -> Value:
+        ratio = force / (ops.where(pressure == 0.0, MIN_PRESSURE, pressure) * ops.pi * self.geometry.radius**2)
+        solution = (1.0 - ops.sqrt((ratio + self._b) / self._a)) / self.end_correction
+        return check_solution(solution, self.contraction_range, (pressure, force), self._contraction_limits_message)
+
+    def _effective_area(self, contraction: Value) -> Value:
+        """Effective area F/p [m2]."""
+        middle = 1.0 - self.end_correction * contraction
+        return ops.pi * self.geometry.radius**2 * (self._a * middle**2 - self._b)
+
+    @property
+    def _a(self) -> Value:
+        return 3.0 / ops.tan(self.geometry.braid_angle) ** 2
+
+    @property
+    def _b(self) -> Value:
+        return 1.0 / ops.sin(self.geometry.braid_angle) ** 2

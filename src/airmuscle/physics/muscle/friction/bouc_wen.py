@@ -1,0 +1,84 @@
+"""Bouc-Wen hysteresis model in normalised form."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from ....core import ops
+from ....core.declaration import model, parameter
+from ....core.ops import Value
+from ....core.reference import Reference
+from ....core.variables import StateVariable
+from .base import Friction
+from .path import relative_deflection
+
+BOUC1967 = Reference(
+    key="bouc-1967",
+    authors="Bouc, R.",
+    title="Forced vibration of mechanical systems with hysteresis",
+    where="Proceedings of the Fourth Conference on Nonlinear Oscillation, Prague, 315",
+    year=1967,
+)
+WEN1976 = Reference(
+    key="wen-1976",
+    authors="Wen, Y.-K.",
+    title="Method for random vibration of hysteretic systems",
+    where="Journal of the Engineering Mechanics Division, ASCE, 102(2), 249-263",
+    year=1976,
+    note="the exponent n",
+)
+ISMAIL2009 = Reference(
+    key="ismail-2009",
+    authors="Ismail, M., Ikhouane, F., Rodellar, J.",
+    title="The hysteresis Bouc-Wen model, a survey",
+    where="Archives of Computational Methods in Engineering 16, 161-188",
+    year=2009,
+    doi="10.1007/s11831-009-9031-8",
+    note="normalised form, and the bounds sigma >= 1/2, n >= 1 within which it cannot create energy",
+)
+MIN_RELATIVE_DEFLECTION = 1e-12
+"""Lower bound of |w|, so that its powers are differentiable at zero (chosen)."""
+
+
+@model
+class BoucWen(Friction):
+    """Bouc-Wen model: dz/dt = v - sigma |v| |w|^(n-1) w + (sigma - 1) v |w|^n,  w = k z/F_C,  F = F_C w = k z.
+
+    z: deflection [m]; w: deflection relative to its limit [1]; k: initial stiffness; F_C: limit of the force;
+    n: sharpness of the transition; sigma: shape of unloading. The usual parameters A, beta, gamma are redundant; this
+    is the normalised form, rho = k/F_C. The elastic part of the Bouc-Wen model is the parallel spring of the muscle.
+    n = sigma = 1 gives the Dahl model; n to infinity gives a single slip element. Rate-independent; inner loops drift,
+    as in the Dahl model. Reference: Bouc (1967), Wen (1976); normalised form: Ismail, Ikhouane and Rodellar (2009).
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (BOUC1967, WEN1976, ISMAIL2009)
+
+    stiffness: float = parameter("N/m", "k", "initial stiffness", bounds=(1e-3, 1e9))
+    coulomb_force: float = parameter("N", "F_C", "friction force in steady sliding", bounds=(1e-6, 1e5))
+    sharpness: float = parameter("1", "n", "sharpness of the transition to sliding", bounds=(1.0, 20.0), default=1.0)
+    unloading: float = parameter("1", "sigma", "shape of unloading", bounds=(0.5, 20.0), default=0.5)
+
+    @property
+    def states(self) -> tuple[StateVariable, ...]:
+        return (StateVariable("bristle", "m", self.presliding_distance, "deflection of the bristle"),)
+
+    @property
+    def presliding_distance(self) -> float:
+        return self.coulomb_force / self.stiffness
+
+    def _deflection_rate(self, ratio: Value, speed: Value) -> Value:
+        """dz/dt [m/s] at the relative deflection w = `ratio`."""
+        power = ops.maximum(ops.absolute_value(ratio), MIN_RELATIVE_DEFLECTION) ** (self.sharpness - 1.0)
+        dissipative = self.unloading * ops.absolute_value(speed) * ratio
+        directional = (self.unloading - 1.0) * speed * ops.absolute_value(ratio)
+        return speed + power * (directional - dissipative)
+
+    def rates(self, bristles: Mapping[str, Value], speed: Value) -> dict[str, Value]:
+        return {"bristle": self._deflection_rate(bristles["bristle"] * self.stiffness / self.coulomb_force, speed)}
+
+    def force(self, bristles: Mapping[str, Value], speed: Value) -> Value:
+        return self.stiffness * bristles["bristle"]
+
+    def force_along(self, displacement: Any, time: Any = None) -> Any:
+        return self.coulomb_force * relative_deflection(self._deflection_rate, displacement, self.presliding_distance)

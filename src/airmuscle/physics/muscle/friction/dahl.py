@@ -1,0 +1,56 @@
+"""Dahl friction model: one bristle with gradual sliding."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from ....core import ops
+from ....core.declaration import model, parameter
+from ....core.ops import Value
+from ....core.reference import Reference
+from ....core.variables import StateVariable
+from .base import Friction
+from .path import deflection
+
+DAHL1968 = Reference(
+    key="dahl-1968",
+    authors="Dahl, P. R.",
+    title="A solid friction model",
+    where="The Aerospace Corporation, El Segundo, report TOR-0158(3107-18)-1",
+    year=1968,
+    note="dF/dx = sigma_0 (1 - (F/F_C) sgn v)^i; here with the exponent i = 1",
+)
+
+
+@model
+class Dahl(Friction):
+    """Dahl model: dz/dt = v - sigma_0 |v| z/F_C,  F = sigma_0 z.
+
+    z: deflection of the bristle [m]; v: speed [m/s]; sigma_0: stiffness of the bristle; F_C: Coulomb force. From the
+    relaxed state, F = F_C (1 - exp(-sigma_0 x/F_C)). Rate-independent; small inner loops do not close but drift.
+    Reference: Dahl (1968), with exponent 1.
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (DAHL1968,)
+
+    stiffness: float = parameter("N/m", "sigma_0", "stiffness of the bristle", bounds=(1e-3, 1e9))
+    coulomb_force: float = parameter("N", "F_C", "friction force in steady sliding", bounds=(1e-6, 1e5))
+
+    @property
+    def states(self) -> tuple[StateVariable, ...]:
+        return (StateVariable("bristle", "m", self.presliding_distance, "deflection of the bristle"),)
+
+    @property
+    def presliding_distance(self) -> float:
+        return self.coulomb_force / self.stiffness
+
+    def rates(self, bristles: Mapping[str, Value], speed: Value) -> dict[str, Value]:
+        ratio = self.stiffness * bristles["bristle"] / self.coulomb_force
+        return {"bristle": speed - ops.absolute_value(speed) * ratio}
+
+    def force(self, bristles: Mapping[str, Value], speed: Value) -> Value:
+        return self.stiffness * bristles["bristle"]
+
+    def force_along(self, displacement: Any, time: Any = None) -> Any:
+        return self.stiffness * deflection(displacement, self.presliding_distance)

@@ -1,0 +1,119 @@
+"""Maxwell-slip friction model: parallel springs, each sliding at its deflection limit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+from ....core import ops
+from ....core.declaration import model, parameter
+from ....core.errors import ParameterError
+from ....core.ops import Value
+from ....core.reference import Reference
+from ....core.variables import StateVariable
+from .base import Friction
+from .path import stop_operators
+
+IWAN1966 = Reference(
+    key="iwan-1966",
+    authors="Iwan, W. D.",
+    title="A distributed-element model for hysteresis and its steady-state dynamic response",
+    where="Journal of Applied Mechanics 33(4), 893-900",
+    year=1966,
+    doi="10.1115/1.3625199",
+    note="parallel spring elements with Coulomb sliders",
+)
+GOLDFARB_CELANOVIC1997 = Reference(
+    key="goldfarb-celanovic-1997",
+    authors="Goldfarb, M., Celanovic, N.",
+    title="Modeling piezoelectric stack actuators for control of micromanipulation",
+    where="IEEE Control Systems Magazine 17(3), 69-79",
+    year=1997,
+    doi="10.1109/37.588158",
+    note="the same elements for the hysteresis of a piezoelectric actuator",
+)
+VO_MINH2011 = Reference(
+    key="vo-minh-2011",
+    authors="Vo-Minh, T., Tjahjowidodo, T., Ramon, H., Van Brussel, H.",
+    title="A new approach to modeling hysteresis in a pneumatic artificial muscle using the Maxwell-slip model",
+    where="IEEE/ASME Transactions on Mechatronics 16(1), 177-186",
+    year=2011,
+    doi="10.1109/TMECH.2009.2038373",
+    note="the same elements for the hysteresis of a pneumatic artificial muscle; its parameter values are not used",
+)
+
+
+def element_rate(deflection: Value, limit: Value, transition: Value, speed: Value) -> Value:
+    """Deflection rate [m/s] of an element that slides at its limit [m], with a continuous onset of sliding.
+
+    d(delta)/dt = v (1 - s),  s = (|delta|/Delta - 1 + eta)/eta limited to 0..1 if v increases |delta|, else s = 0.
+    """
+    forward = (deflection / limit - 1.0 + transition) / transition
+    backward = (-deflection / limit - 1.0 + transition) / transition
+    sliding_forward = ops.maximum(speed, 0.0) * ops.clip(forward, 0.0, 1.0)
+    sliding_backward = ops.minimum(speed, 0.0) * ops.clip(backward, 0.0, 1.0)
+    return speed - sliding_forward - sliding_backward
+
+
+def check_equal_lengths(owner: str, stiffnesses: Sequence[Value], limits: Sequence[Value]) -> None:
+    """Raise ParameterError unless every element has a stiffness and a limit, and there is at least one element."""
+    if len(stiffnesses) != len(limits) or not limits:
+        raise ParameterError(
+            f"{owner}: {len(stiffnesses)} stiffnesses and {len(limits)} limits; give one stiffness and one limit per "
+            "element."
+        )
+
+
+@model
+class MaxwellSlip(Friction):
+    """Maxwell-slip model: F = Sum k_i delta_i,  d(delta_i)/dt = v, but 0 if |delta_i| = Delta_i and v increases it.
+
+    delta_i: deflection of element i [m]; k_i: stiffness; Delta_i: deflection limit; k_i Delta_i: Coulomb force of the
+    element. `force_along` is exact. In a plant, sliding begins gradually over the last fraction eta (`transition`) of
+    the deflection: d(delta)/dt = v (1 - s), where s increases linearly (chosen) from 0 at (1 - eta) Delta to 1 at
+    Delta. The deflection then differs from the exact one by at most eta Delta, and the friction remains passive.
+    All loops close, including inner loops, and each extremum erases the memory of smaller previous ones (Masing's
+    rules). Reference: Iwan (1966); Goldfarb and Celanovic (1997); for muscles Vo-Minh et al. (2011).
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (IWAN1966, GOLDFARB_CELANOVIC1997, VO_MINH2011)
+    linear_in: ClassVar[str | None] = "stiffnesses"
+
+    stiffnesses: tuple[float, ...] = parameter("N/m", "k_i", "stiffness of each element", bounds=(0.0, 1e9))
+    limits: tuple[float, ...] = parameter(
+        "m", "Delta_i", "deflection limit of each element", bounds=(1e-9, 10.0), fitted=False
+    )
+    transition: float = parameter(
+        "1", "eta", "fraction of the deflection over which sliding begins in a plant", bounds=(1e-4, 1.0),
+        fitted=False, default=0.05,
+    )  # fmt: skip
+
+    def check(self) -> None:
+        check_equal_lengths("MaxwellSlip", self.stiffnesses, self.limits)
+
+    @property
+    def states(self) -> tuple[StateVariable, ...]:
+        return tuple(
+            StateVariable(f"bristle{i}", "m", limit, f"deflection of element {i}")
+            for i, limit in enumerate(self.limits, 1)
+        )
+
+    @property
+    def presliding_distance(self) -> float:
+        return max(self.limits)
+
+    def rates(self, bristles: Mapping[str, Value], speed: Value) -> dict[str, Value]:
+        elements = enumerate(self.limits, 1)
+        return {
+            f"bristle{i}": element_rate(bristles[f"bristle{i}"], limit, self.transition, speed) for i, limit in elements
+        }
+
+    def force(self, bristles: Mapping[str, Value], speed: Value) -> Value:
+        return sum(k * bristles[f"bristle{i}"] for i, k in enumerate(self.stiffnesses, 1))
+
+    def element_deflections(self, displacement: Any) -> Any:
+        """Exact deflection [m] of every element along a displacement path [m], shape (N, elements)."""
+        return stop_operators(displacement, self.limits)
+
+    def force_along(self, displacement: Any, time: Any = None) -> Any:
+        return self.element_deflections(displacement) @ self.stiffnesses

@@ -1,0 +1,112 @@
+"""Modified Prandtl-Ishlinskii hysteresis model: stop operators, and dead zones for asymmetric loops."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from ....core import ops
+from ....core.declaration import model, parameter
+from ....core.errors import ParameterError
+from ....core.ops import Value
+from ....core.reference import Reference
+from ....core.variables import StateVariable
+from .base import Friction
+from .maxwell_slip import check_equal_lengths, element_rate
+from .path import stop_operators
+
+KUHNEN2003 = Reference(
+    key="kuhnen-2003",
+    authors="Kuhnen, K.",
+    title="Modeling, identification and compensation of complex hysteretic nonlinearities: a modified "
+    "Prandtl-Ishlinskii approach",
+    where="European Journal of Control 9(4), 407-418",
+    year=2003,
+    doi="10.3166/ejc.9.407-418",
+    note="dead-zone operators in series with a Prandtl-Ishlinskii operator, there composed of play operators",
+)
+AL_JANAIDEH2011 = Reference(
+    key="al-janaideh-2011",
+    authors="Al Janaideh, M., Rakheja, S., Su, C.-Y.",
+    title="An analytical generalized Prandtl-Ishlinskii model inversion for hysteresis compensation in "
+    "micropositioning control",
+    where="IEEE/ASME Transactions on Mechatronics 16(4), 734-744",
+    year=2011,
+    doi="10.1109/TMECH.2010.2052366",
+    note="asymmetric and saturating loops of actuators",
+)
+
+
+@model
+class PrandtlIshlinskii(Friction):
+    """Modified Prandtl-Ishlinskii model: F = S(Sum k_i E_ri[x]),  S(u) = u + Sum w_j S_dj(u).
+
+    E_r: stop operator, which follows x within the limits -r..r. S_d: dead zone, max(u - d, 0) for d > 0 and
+    min(u - d, 0) for d < 0. x: displacement [m]; k_i, r_i: stiffness and limit of each stop; d_j [N], w_j [1]:
+    threshold and weight of each dead zone. S must be increasing, otherwise friction would supply energy: on either
+    side, one plus the sum of the active weights must not be negative. Without dead zones the model is the Maxwell-slip
+    model. `force_along` is exact; in a plant a stop begins to slide over the last fraction eta of its deflection, as in
+    MaxwellSlip. Stop operators instead of Kuhnen's play operators give a force that saturates; the remainder
+    x - E_r[x] belongs to the parallel spring of the muscle. Reference: Kuhnen (2003); Al Janaideh et al. (2011).
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (KUHNEN2003, AL_JANAIDEH2011)
+
+    stiffnesses: tuple[float, ...] = parameter("N/m", "k_i", "stiffness of each stop", bounds=(0.0, 1e9))
+    limits: tuple[float, ...] = parameter(
+        "m", "r_i", "deflection limit of each stop", bounds=(1e-9, 10.0), fitted=False
+    )
+    thresholds: tuple[float, ...] = parameter(
+        "N", "d_j", "threshold force of each dead zone", bounds=(-1e5, 1e5), fitted=False, default=()
+    )
+    weights: tuple[float, ...] = parameter("1", "w_j", "weight of each dead zone", bounds=(-1.0, 100.0), default=())
+    transition: float = parameter(
+        "1", "eta", "fraction of the deflection over which sliding begins in a plant", bounds=(1e-4, 1.0),
+        fitted=False, default=0.05,
+    )  # fmt: skip
+
+    def check(self) -> None:
+        check_equal_lengths("PrandtlIshlinskii", self.stiffnesses, self.limits)
+        if len(self.thresholds) != len(self.weights) or 0.0 in self.thresholds:
+            raise ParameterError(
+                f"PrandtlIshlinskii: {len(self.thresholds)} thresholds and {len(self.weights)} weights; give one "
+                "threshold, other than 0, and one weight per dead zone."
+            )
+        for sign in (1.0, -1.0):
+            slope = 1.0
+            for threshold, weight in sorted(zip(self.thresholds, self.weights, strict=True), key=lambda z: abs(z[0])):
+                slope += weight if sign * threshold > 0 else 0.0
+                if slope < 0:
+                    raise ParameterError(
+                        f"PrandtlIshlinskii: with the weight {weight:g} at {threshold:g} N the force would decrease "
+                        "with deflection, and friction would supply energy. On either side of zero force, the sum of "
+                        "the weights must not be less than -1."
+                    )
+
+    @property
+    def states(self) -> tuple[StateVariable, ...]:
+        return tuple(
+            StateVariable(f"stop{i}", "m", limit, f"deflection of stop {i}") for i, limit in enumerate(self.limits, 1)
+        )
+
+    @property
+    def presliding_distance(self) -> float:
+        return max(self.limits)
+
+    def rates(self, bristles: Mapping[str, Value], speed: Value) -> dict[str, Value]:
+        elements = enumerate(self.limits, 1)
+        return {f"stop{i}": element_rate(bristles[f"stop{i}"], limit, self.transition, speed) for i, limit in elements}
+
+    def force(self, bristles: Mapping[str, Value], speed: Value) -> Value:
+        return self.apply_dead_zones(sum(k * bristles[f"stop{i}"] for i, k in enumerate(self.stiffnesses, 1)))
+
+    def apply_dead_zones(self, force: Value) -> Value:
+        """S(u): force [N] after the dead zones, from the force u [N] of the stops."""
+        total = force
+        for threshold, weight in zip(self.thresholds, self.weights, strict=True):
+            excess = force - threshold
+            total = total + weight * ops.where(threshold > 0, ops.maximum(excess, 0.0), ops.minimum(excess, 0.0))
+        return total
+
+    def force_along(self, displacement: Any, time: Any = None) -> Any:
+        return self.apply_dead_zones(stop_operators(displacement, self.limits) @ self.stiffnesses)

@@ -1,0 +1,85 @@
+"""Geometry (interface): enclosed volume and outline of a muscle as functions of contraction."""
+
+from __future__ import annotations
+
+import abc
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from ....core import autodiff
+from ....core.annotation import abridged
+from ....core.errors import GeometryLimitError, ParameterError
+from ....core.ops import Value
+from ....core.quantity_arguments import accept_quantities_in
+from ....core.reference import Reference
+
+
+def check_contraction_range(contraction: Value, limits: tuple[float, float], owner: str, remark: str = "") -> None:
+    """Raise GeometryLimitError if a contraction [1] is outside `limits`; symbols and JAX arrays are not checked.
+
+    `owner` names the model and `remark` extends the message.
+    """
+    if type(contraction).__module__.partition(".")[0] in ("casadi", "jax", "jaxlib"):
+        return
+    values = np.asarray(contraction, dtype=float)
+    outside = ~((values >= limits[0]) & (values <= limits[1]))
+    if outside.any():
+        raise GeometryLimitError(
+            f"{owner}: a contraction of {100 * values[outside].flat[0]:.4g} % is outside its range, "
+            f"{100 * limits[0]:.4g} to {100 * limits[1]:.4g} %{remark}."
+        )
+
+
+_UNITS = {"volume": ("1",), "volume_derivative": ("1",)}
+"""Units of the arguments of the methods."""
+
+
+def check_degree(owner: str, degree: object, least: int = 0) -> None:
+    """Raise ParameterError unless the degree of a polynomial is an integer of at least `least`."""
+    if isinstance(degree, bool) or not isinstance(degree, int) or degree < least:
+        raise ParameterError(f"{owner}: degree is {abridged(degree)}; it must be an integer, {least} or more.")
+
+
+class Geometry(abc.ABC):
+    """Volume [m3] and outline of a muscle; contraction is (L_0 - L)/L_0.
+
+    Every geometry declares `resting_length` L_0 [m]: the length between the fittings, unpressurised and unloaded.
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = ()
+    traceable: ClassVar[bool] = True
+    resting_length: float
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        accept_quantities_in(cls, _UNITS)
+
+    @property
+    @abc.abstractmethod
+    def contraction_range(self) -> tuple[float, float]:
+        """Minimum and maximum contraction [1] of this geometry."""
+
+    @abc.abstractmethod
+    def volume(self, contraction: Value) -> Value:
+        """Enclosed volume [m3] at a contraction [1], a scalar or an array; the result has the same shape."""
+
+    @abc.abstractmethod
+    def outline(self, contraction: float, points: int = 201) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        """Axial positions from the middle [m] and radii [m] at a contraction [1], each of shape (points,).
+
+        Raises GeometryLimitError if the contraction is outside `contraction_range`.
+        """
+
+    def volume_derivative(self, contraction: Value) -> Value:
+        """Exact derivative dV/deps [m3]; by virtual work, p (dV/deps)/L_0 is the tension of an ideal muscle."""
+        return autodiff.derivative(self, "volume", contraction)
+
+    def check_contraction(self, contraction: Value) -> None:
+        """Raise GeometryLimitError if a contraction [1] is outside `contraction_range`."""
+        values = np.asarray(contraction, dtype=float)
+        check_contraction_range(values, self.contraction_range, type(self).__name__)
+
+
+accept_quantities_in(Geometry, _UNITS)

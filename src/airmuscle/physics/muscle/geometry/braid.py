@@ -1,0 +1,65 @@
+"""Inextensible cylindrical braid of McKibben, Shadow and Festo fluidic muscles."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from ....core import ops
+from ....core.declaration import model, parameter
+from ....core.ops import Value
+from ....core.reference import Reference
+from .base import Geometry
+
+CHOU_HANNAFORD_1996 = Reference(
+    "chou-hannaford-1996",
+    "Chou, C.-P., Hannaford, B.",
+    "Measurement and modeling of McKibben pneumatic artificial muscles",
+    "IEEE Transactions on Robotics and Automation 12(1):90-102",
+    1996,
+    "10.1109/70.481753",
+    "V = b^3/(4 pi n^2) cos(theta) sin^2(theta)",
+)
+
+
+@model
+class Braid(Geometry):
+    """Cylindrical braid of inextensible threads of length b, each wound n times around the cylinder.
+
+        cos(theta) = (1 - eps) cos(theta_0),   r = r_0 sin(theta)/sin(theta_0),   V = pi r^2 L
+
+    theta: angle between threads and axis; r_0, theta_0: radius and angle at rest; L = L_0 (1 - eps): length. Identical
+    to the formula of Chou and Hannaford (1996) with b = L_0/cos(theta_0) and n = b sin(theta_0)/(2 pi r_0).
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (CHOU_HANNAFORD_1996,)
+
+    radius: float = parameter("m", "r_0", "radius of the braid at rest", bounds=(1e-4, 0.2))
+    braid_angle: float = parameter(
+        "rad", "theta_0", "angle between the threads and the axis at rest", bounds=(0.05, 1.5)
+    )
+    resting_length: float = parameter(
+        "m", "L_0", "length between the fittings, unpressurised and unloaded", bounds=(1e-3, 20.0), fitted=False
+    )
+
+    @property
+    def contraction_range(self) -> tuple[float, float]:
+        """From straight threads to zero length."""
+        return (1.0 - 1.0 / ops.cos(self.braid_angle), 1.0)
+
+    def volume(self, contraction: Value) -> Value:
+        stretch = 1.0 - contraction
+        sine_squared = 1.0 - (stretch * ops.cos(self.braid_angle)) ** 2
+        return ops.pi * self.radius**2 * self.resting_length * stretch * sine_squared / ops.sin(self.braid_angle) ** 2
+
+    def radius_at(self, contraction: Value) -> Value:
+        """Radius [m] of the cylinder at a contraction [1]."""
+        sine = ops.sqrt(1.0 - ((1.0 - contraction) * ops.cos(self.braid_angle)) ** 2)
+        return self.radius * sine / ops.sin(self.braid_angle)
+
+    def outline(self, contraction: float, points: int = 201) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        self.check_contraction(contraction)
+        half = self.resting_length * (1.0 - contraction) / 2
+        return np.linspace(-half, half, points), np.full(points, float(self.radius_at(contraction)))

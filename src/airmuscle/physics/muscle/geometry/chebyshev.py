@@ -1,0 +1,114 @@
+"""Chebyshev polynomial approximation of a geometry, with its approximation error."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from ....core import ops
+from ....core.declaration import model, parameter
+from ....core.errors import GeometryLimitError, ParameterError
+from ....core.ops import Value
+from .base import Geometry, check_degree
+
+_ERROR_POINTS = 1001
+"""Points at which the approximation error is evaluated; dense enough for the kinks in the slope of a table."""
+
+
+@model
+class ChebyshevGeometry(Geometry):
+    """Polynomial volume: V = Sum_k a_k T_k(x),   x = (2 eps - eps_low - eps_high)/(eps_high - eps_low).
+
+    T_k: Chebyshev polynomials, evaluated by Clenshaw's recurrence. Outside the validity range the volume is
+    extrapolated linearly. The outline is the cylinder of this volume; plot the approximated geometry instead.
+    `volume_error` and `derivative_error` are the maximum errors of V and dV/deps, as evaluated by `as_polynomial`.
+    """
+
+    coefficients: tuple[float, ...] = parameter("m3", "a_k", "coefficients of the Chebyshev polynomials", fitted=False)
+    min_contraction: float = parameter("1", "eps_low", "lower limit of the validity range in contraction", fitted=False)
+    max_contraction: float = parameter(
+        "1", "eps_high", "upper limit of the validity range in contraction", fitted=False
+    )
+    resting_length: float = parameter(
+        "m", "L_0", "length between the fittings, unpressurised and unloaded", bounds=(1e-3, 20.0), fitted=False
+    )
+    volume_error: float = parameter(
+        "m3", "dV", "maximum error of the volume in the validity range", fitted=False, default=0.0
+    )
+    derivative_error: float = parameter(
+        "m3", "dV'", "maximum error of dV/deps in the validity range", fitted=False, default=0.0
+    )
+
+    def check(self) -> None:
+        if len(self.coefficients) < 2:
+            raise ParameterError(
+                f"ChebyshevGeometry: {len(self.coefficients)} coefficients; at least two are required (degree 1)."
+            )
+        if not self.min_contraction < self.max_contraction < 1.0:
+            raise ParameterError(
+                f"ChebyshevGeometry: min_contraction {self.min_contraction:g} must be less than max_contraction "
+                f"{self.max_contraction:g}, and this less than 1, where the length is zero."
+            )
+
+    @property
+    def contraction_range(self) -> tuple[float, float]:
+        return (self.min_contraction, self.max_contraction)
+
+    def volume(self, contraction: Value) -> Value:
+        half = (self.max_contraction - self.min_contraction) / 2
+        x = (contraction - self.min_contraction) / half - 1.0
+        inner = ops.clip(x, -1.0, 1.0)
+        value, slope = self._clenshaw(inner)
+        return value + slope * (x - inner)
+
+    def _clenshaw(self, x: Value) -> tuple[Value, Value]:
+        """Polynomial and derivative with respect to x, from b_k = a_k + 2 x b_(k+1) - b_(k+2) and its derivative."""
+        b: Value = 0.0
+        b_next: Value = 0.0
+        d: Value = 0.0
+        d_next: Value = 0.0
+        for a in reversed(self.coefficients[1:]):
+            d, d_next = 2 * b + 2 * x * d - d_next, d
+            b, b_next = a + 2 * x * b - b_next, b
+        return self.coefficients[0] + x * b - b_next, b + x * d - d_next
+
+    def outline(self, contraction: float, points: int = 201) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+        self.check_contraction(contraction)
+        length = self.resting_length * (1.0 - contraction)
+        radius = float(np.sqrt(self.volume(contraction) / (np.pi * length)))
+        return np.linspace(-length / 2, length / 2, points), np.full(points, radius)
+
+
+def as_polynomial(
+    geometry: Geometry, degree: int = 16, contraction_range: tuple[float, float] | None = None
+) -> ChebyshevGeometry:
+    """Return a traceable geometry that interpolates `geometry` at the Chebyshev points of a contraction range [1].
+
+    The default range is that of the geometry. The errors are evaluated at 1001 points. If dV/deps is infinite at zero
+    contraction, as for straight fibres, the range must begin above zero, otherwise GeometryLimitError is raised, as it
+    is if the range exceeds that of the geometry. Raises ParameterError for a degree that is not a positive integer.
+    """
+    check_degree("as_polynomial", degree, 1)
+    low, high = contraction_range or geometry.contraction_range
+    geometry.check_contraction([low, high])
+    if low < high and not np.isfinite(geometry.volume_derivative(low)):
+        raise GeometryLimitError(
+            f"as_polynomial: dV/deps of {type(geometry).__name__} is infinite at a contraction of {100 * low:.4g} %. "
+            f"Give a contraction_range that begins above it, such as ({low + 0.01:g}, {high:g})."
+        )
+    middle, half = (low + high) / 2, (high - low) / 2
+    coefficients = np.polynomial.chebyshev.chebinterpolate(
+        lambda x: geometry.volume(_clip_to_range(middle + half * x, low, high)), degree
+    )
+    polynomial = ChebyshevGeometry(tuple(coefficients), low, high, geometry.resting_length)
+    points = np.linspace(low, high, _ERROR_POINTS)
+    errors = (
+        np.abs(polynomial.volume(points) - geometry.volume(points)).max(),
+        np.abs(polynomial.volume_derivative(points) - geometry.volume_derivative(points)).max(),
+    )
+    return ChebyshevGeometry(tuple(coefficients), low, high, geometry.resting_length, *(float(e) for e in errors))
+
+
+def _clip_to_range(contraction: npt.NDArray[np.float64], low: float, high: float) -> npt.NDArray[np.float64]:
+    """Clip samples that rounding has moved beyond the limits."""
+    return np.clip(contraction, low, high)

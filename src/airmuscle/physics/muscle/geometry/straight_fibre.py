@@ -1,0 +1,94 @@
+"""Tube reinforced by straight axial fibres, which bulges between its rings as it contracts."""
+
+from __future__ import annotations
+
+import abc
+
+import numpy as np
+
+from ....core.arrays import Array
+from ....core.declaration import model, parameter
+from ....core.errors import ParameterError
+from ....core.ops import Value
+from .base import Geometry, check_contraction_range
+from .circular_arc import CircularArc
+from .meridian import Meridian, Profile, Segment
+
+
+@model
+class FibreTube(Geometry):
+    """Straight inextensible fibres between rings of equal diameter: n rings form n + 1 equal segments in series.
+
+    Each segment has the fibre length l_0 = L_0/(n + 1) and the contraction of the whole muscle. The width of a ring is
+    neglected. Equal division by the rings is inferred; Saga et al. 2007 do not state it.
+    """
+
+    resting_length: float = parameter(
+        "m", "L_0", "length between the fittings, unpressurised and unloaded", bounds=(1e-3, 20.0), fitted=False
+    )
+    end_diameter: float = parameter("m", "d_0", "diameter at the ends and rings", bounds=(1e-4, 0.5), fitted=False)
+    rings: int = 0
+
+    def check(self) -> None:
+        if isinstance(self.rings, bool) or not isinstance(self.rings, int) or self.rings < 0:
+            raise ParameterError(f"{type(self).__name__}.rings is {self.rings!r}; it must be an integer, 0 or more.")
+
+    @property
+    def end_radius(self) -> Value:
+        """r_0 = d_0/2 [m]."""
+        return self.end_diameter / 2
+
+    @property
+    def segments(self) -> int:
+        """Number of segments n + 1 for n rings."""
+        return self.rings + 1
+
+    @property
+    def fibre_length(self) -> Value:
+        """Fibre length l_0 [m] of one segment."""
+        return self.resting_length / self.segments
+
+    @abc.abstractmethod
+    def segment(self, contraction: Value) -> Segment:
+        """Shape and integrals of one segment at a contraction [1]. Raises GeometryLimitError outside the range."""
+
+    @abc.abstractmethod
+    def profile(self, contraction: float, position: Array) -> Profile:
+        """Axial positions from the middle of a segment [m] and radii [m] at normalised positions from -1 to 1."""
+
+    def volume(self, contraction: Value) -> Value:
+        return self.segments * self.segment(contraction).volume
+
+    def outline(self, contraction: float, points: int = 201) -> Profile:
+        self.check_contraction(contraction)
+        coordinate = np.linspace(0.0, self.segments, points)
+        number = np.minimum(np.floor(coordinate), self.rings)
+        axial, radius = self.profile(contraction, 2 * (coordinate - number) - 1)
+        chord = self.fibre_length * (1.0 - contraction)
+        return axial + (number - self.rings / 2) * chord, radius
+
+
+@model
+class StraightFibre(FibreTube):
+    """Straight-fibre tube with an assumed meridian: CircularArc, Catenary, TrueArcParabola, or Parabola (Saga et al.).
+
+    The default is the circular arc: it preserves the fibre length and has the smallest error under virtual work.
+    """
+
+    meridian: Meridian = CircularArc()
+
+    @property
+    def contraction_range(self) -> tuple[float, float]:
+        """From straight fibres to the maximum contraction of the meridian."""
+        return (0.0, self.meridian.max_contraction)
+
+    def segment(self, contraction: Value) -> Segment:
+        check_contraction_range(contraction, self.contraction_range, "StraightFibre")
+        return self.meridian.segment(contraction, self.fibre_length, self.end_radius)
+
+    def volume_derivative(self, contraction: Value) -> Value:
+        check_contraction_range(contraction, self.contraction_range, "StraightFibre")
+        return super().volume_derivative(contraction)
+
+    def profile(self, contraction: float, position: Array) -> Profile:
+        return self.meridian.profile(contraction, self.fibre_length, self.end_radius, position)

@@ -1,0 +1,173 @@
+"""Isobars of a characteristic: tension over contraction at constant gauge pressures, and their chart."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...core import plotting
+from ...core.arrays import Array
+from ...core.display import chosen_scale, quantity_text
+from ...core.errors import PhysicsError
+from .characteristic.base import Characteristic, ContractionLaw
+from .characteristic.validity_range import ValidityRange
+
+MAX_FORCE_RATIO = 8.0
+"""Maximum of the force axis as a multiple of the median force, for laws that diverge (chosen)."""
+POINTS, COARSE_POINTS = 241, 61
+"""Points of an isobar; points for a law that is slow to evaluate, and for the search of the contraction range."""
+
+
+class WorkingPoint(NamedTuple):
+    """A working point: gauge pressure [Pa], contraction [1], tension [N]."""
+
+    pressure: float
+    contraction: float
+    force: float
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Isobars:
+    """Tensions, shape (P, N) [N], at gauge pressures (P,) [Pa] and contractions (N,) [1]; NaN where undefined."""
+
+    pressures: Array
+    contractions: Array
+    forces: Array
+
+
+def compute_isobars(
+    characteristic: Characteristic,
+    validity_range: ValidityRange | None = None,
+    point: WorkingPoint | None = None,
+    pressures: Array | None = None,
+) -> Isobars:
+    """Return isobars at the given pressures [Pa].
+
+    None stands for round pressures over the validity range, or over the law's pressure range if it has none.
+    """
+    if pressures is None:
+        pressures = _isobar_pressures(characteristic, validity_range, point)
+    low, high = _contraction_axis(characteristic, validity_range, point, pressures)
+    contractions = np.linspace(low, high, POINTS if characteristic.traceable else COARSE_POINTS)
+    forces = [forces_along(characteristic, float(pressure), contractions) for pressure in pressures]
+    return Isobars(pressures, contractions, np.array(forces))
+
+
+def draw_isobars(axes: Any, curves: Isobars, title: str) -> None:
+    """Draw isobars into Matplotlib axes, high pressures dark, with a legend to their right."""
+    from matplotlib import colormaps
+
+    (across, unit), (up, force_unit) = chosen_scale("1", 100.0, "%"), chosen_scale("N", 1.0, "N")
+    shades = colormaps["viridis"](np.linspace(0.0, 0.85, curves.pressures.size))[::-1]
+    for i in range(curves.pressures.size - 1, -1, -1):
+        if (curves.forces[i] > 0).any():
+            style = {"color": shades[i], "linestyle": plotting.DASHES[i % 5], "linewidth": 1.4}
+            label = quantity_text(curves.pressures[i], "Pa", "kPa")
+            axes.plot(across * curves.contractions, up * mask_slack(curves.forces[i]), label=label, **style)
+    axes.set(
+        xlabel=f"contraction [{'-' if unit == '1' else unit}]",
+        ylabel=f"force [{force_unit}]",
+        xlim=(across * curves.contractions[0], across * curves.contractions[-1]),
+        ylim=(0.0, 1.06 * up * force_axis_limit(curves)),
+    )
+    axes.set_title(title, fontsize=9)
+    plotting.legend_outside(axes, title="gauge pressure")
+
+
+def mask_slack(forces: Array) -> Array:
+    """Return the forces with NaN beyond the point where the muscle becomes slack, where a clamped law is zero."""
+    slack = np.flatnonzero(forces == 0.0)
+    after = np.arange(forces.size) > (slack[0] if slack.size else forces.size)
+    return np.where(after & (forces == 0.0), np.nan, forces)
+
+
+def force_axis_limit(curves: Isobars) -> float:
+    """The maximum of the force axis [N]: all curves unless a law diverges."""
+    pulling = curves.forces[curves.forces > 0]
+    limit = MAX_FORCE_RATIO * float(np.median(pulling)) if pulling.size else 1.0
+    return max(1e-9, min(limit, float(pulling.max(initial=0.0))))
+
+
+def _isobar_pressures(
+    characteristic: Characteristic, validity_range: ValidityRange | None, point: WorkingPoint | None
+) -> Array:
+    """Return round pressures [Pa] over the validity range.
+
+    Without one they extend to twice the pressure of the working point, or over the law's pressure range.
+    """
+    if validity_range is not None:
+        return _round_pressures(*validity_range.pressure)
+    low, high = characteristic.pressure_range
+    upper = 2.0 * point.pressure if point is not None and point.pressure > low else high
+    return _round_pressures(low, min(upper, high))
+
+
+def _round_pressures(low: float, high: float) -> Array:
+    """Return about seven round pressures from low to high, including the ends if they are round."""
+    from matplotlib.ticker import MaxNLocator
+
+    ticks = np.asarray(MaxNLocator(nbins=7, steps=[1, 2, 5, 10]).tick_values(low, high), dtype=float)
+    margin = 1e-9 * (high - low)
+    inside: Array = ticks[(ticks >= low - margin) & (ticks <= high + margin)]
+    return inside if inside.size > 1 else np.array([low, high])
+
+
+def _contraction_axis(
+    characteristic: Characteristic, validity_range: ValidityRange | None, point: WorkingPoint | None, pressures: Array
+) -> tuple[float, float]:
+    """Return the limits of the contraction axis [1].
+
+    They exceed the validity range by a tenth; without one they include all contractions with a positive force.
+    """
+    if validity_range is not None:
+        low, high = validity_range.contraction
+        low, high = low - 0.1 * (high - low), high + 0.1 * (high - low)
+    else:
+        low, high = characteristic.contraction_range
+        grid = np.linspace(low, high, COARSE_POINTS)
+        forces = np.array([forces_along(characteristic, float(pressure), grid) for pressure in pressures])
+        pulling = np.flatnonzero((np.nan_to_num(forces) > 0).any(axis=0))
+        if pulling.size:
+            low, high = float(grid[pulling[0]]), float(grid[min(pulling[-1] + 2, COARSE_POINTS - 1)])
+    lower_limit, upper_limit = characteristic.contraction_range
+    low, high = max(low, lower_limit), min(high, upper_limit)
+    return (min(low, point.contraction), max(high, point.contraction)) if point else (low, high)
+
+
+def forces_along(characteristic: Characteristic, pressure: float, contractions: Array) -> Array:
+    """The tension [N] along an isobar at a gauge pressure [Pa] and contractions (N,).
+
+    It is NaN where the law is undefined or the tension negative.
+    """
+    if isinstance(characteristic, ContractionLaw):
+        return _invert_contraction_law(characteristic, pressure, contractions)
+    forces = _evaluate_where_defined(lambda c: np.asarray(characteristic.force(pressure, c)) + 0.0 * c, contractions)
+    return np.where(np.isfinite(forces) & (forces >= 0), forces, np.nan)
+
+
+def _invert_contraction_law(characteristic: ContractionLaw, pressure: float, contractions: Array) -> Array:
+    """Return the tension of a contraction law along an isobar, by interpolation of its inverse without a search."""
+    forces = np.linspace(*characteristic.force_range, 4 * POINTS)
+    values = _evaluate_where_defined(lambda force: np.asarray(characteristic.contraction(pressure, force)), forces)
+    finite = np.isfinite(values)
+    values, forces = values[finite], forces[finite]
+    falling = np.append(True, np.diff(np.minimum.accumulate(values)) < 0)[: values.size]
+    if falling.sum() < 2:
+        return np.full(contractions.shape, np.nan)
+    inverse: Array = np.interp(contractions, values[falling][::-1], forces[falling][::-1], left=np.nan, right=np.nan)
+    return inverse
+
+
+def _evaluate_where_defined(law: Callable[[Array], Array], arguments: Array) -> Array:
+    """Return the values of a law, NaN where it raises PhysicsError; bisection isolates these arguments."""
+    try:
+        with np.errstate(all="ignore"):  # a law may be singular at the end of its range
+            return np.asarray(law(arguments), dtype=float)
+    except PhysicsError:
+        if arguments.size == 1:
+            return np.array([np.nan])
+    halves = np.array_split(arguments, [arguments.size // 2])
+    return np.concatenate([_evaluate_where_defined(law, half) for half in halves])

@@ -1,0 +1,224 @@
+"""Diagnostics of a plant: extrapolation, geometry limits, components beyond their validity, assumptions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core.arrays import Array
+from ...core.diagnostics import ColumnLimit, Columns, Diagnostic, DiagnosticCode
+from ...core.errors import ParameterError
+from ...core.ops import Value
+from ...core.variables import select_prefix
+from ..muscle import INNER_CONTRACTION, ElasticSeriesElement, Muscle
+from ..muscle.friction import NoFriction
+from ..pneumatics import Circuit
+
+MARGIN = 1e-3
+"""Fraction of the contraction range of a geometry within which a muscle is at its limit (chosen)."""
+_TOLERANCE = 1e-9
+"""Fraction of a range by which a column may exceed it through rounding."""
+_MEANINGS = {
+    DiagnosticCode.RATING: ("the range that its maker permits", "the muscle may be damaged there"),
+    DiagnosticCode.EXTRAPOLATION: ("the validity range of its characteristic", "values there are extrapolated"),
+    DiagnosticCode.FRICTION_EXTRAPOLATION: (
+        "the range of the data of its friction",
+        "the friction there is extrapolated",
+    ),
+    DiagnosticCode.GEOMETRY_LIMIT: ("the contraction range of its geometry", "such contractions are not physical"),
+}
+"""The range that a column has left, and what that means."""
+
+
+def friction(muscles: Sequence[Muscle]) -> Diagnostic:
+    """The friction of the muscles; also stated if there is none, which is the default."""
+    if all(isinstance(m.friction, NoFriction) for m in muscles):
+        text = "off"
+    elif len(muscles) == 1:
+        text = str(muscles[0].friction)
+    else:
+        parts = [f"{m.name} {'none' if isinstance(m.friction, NoFriction) else m.friction}" for m in muscles]
+        text = ", ".join(parts)
+    return Diagnostic(DiagnosticCode.MODEL, "friction", f"friction: {text}")
+
+
+def column_limits(muscles: Sequence[Muscle], prefixes: Sequence[str]) -> tuple[ColumnLimit, ...]:
+    """All limits of the columns of muscles: validity ranges of characteristics, ranges of the data of frictions, and
+    contraction ranges of geometries."""
+    return tuple(
+        ColumnLimit(muscle.name, *limit)
+        for prefix, muscle in zip(prefixes, muscles, strict=True)
+        for limit in _limits(muscle, prefix)
+    )
+
+
+def with_tolerance(limits: Sequence[ColumnLimit]) -> tuple[tuple[ColumnLimit, float, float], ...]:
+    """Each limit of a column, with the bounds that the column may reach through rounding."""
+    return tuple((limit, *_widened(*limit.bounds)) for limit in limits)
+
+
+def _widened(low: float, high: float) -> tuple[float, float]:
+    span = high - low if np.isfinite(high - low) else abs(high if np.isfinite(high) else low)
+    slack = _TOLERANCE * span
+    return low - slack, high + slack
+
+
+def extrapolation(limits: Sequence[tuple[ColumnLimit, float, float]], columns: Columns) -> list[Diagnostic]:
+    """Diagnostics of a run that left the validity range of a characteristic, the range of the data of a friction, or
+    the contraction range of a geometry; `limits` are those of `with_tolerance`."""
+    diagnostics: list[Diagnostic] = []
+    if not columns["time"].size:
+        return diagnostics
+    for limit, low, high in limits:
+        if limit.column in columns:
+            smallest, largest = columns.limits(limit.column)
+            if smallest < low or largest > high:
+                diagnostics.append(_excess(columns["time"], columns[limit.column], limit))
+    return diagnostics
+
+
+def _limits(muscle: Muscle, prefix: str) -> Iterator[tuple[DiagnosticCode, str, str, tuple[float, float]]]:
+    """The columns of a muscle that have limits: kind of the limit, column, quantity, lower and upper limit."""
+    for rated in muscle.ratings.ranges() if muscle.ratings else ():
+        if rated.quantity in ("force", "pressure", "contraction"):
+            yield DiagnosticCode.RATING, f"{prefix}{rated.quantity}", rated.quantity, (rated.low, rated.high)
+    stated = muscle.validity_range or getattr(muscle.contractile, "validity_range", None)
+    if stated is not None:
+        yield DiagnosticCode.EXTRAPOLATION, f"{prefix}pressure", "pressure", stated.pressure
+        yield DiagnosticCode.EXTRAPOLATION, f"{prefix}contraction", "contraction", stated.contraction
+    identified = muscle.friction.identified_range
+    if identified is not None:
+        yield DiagnosticCode.FRICTION_EXTRAPOLATION, f"{prefix}pressure", "pressure", identified.pressure
+        yield DiagnosticCode.FRICTION_EXTRAPOLATION, f"{prefix}shortening_speed", "speed", identified.speed
+    own = INNER_CONTRACTION if isinstance(muscle.series, ElasticSeriesElement) else "contraction"
+    yield DiagnosticCode.GEOMETRY_LIMIT, f"{prefix}{own}", own, muscle.geometry.contraction_range
+
+
+def _excess(time: Array, values: Array, limit: ColumnLimit) -> Diagnostic:
+    """The diagnostic of a column of pressure, speed or contraction that exceeds its limits."""
+    subject, code, _, quantity, (low, high) = limit
+    excess = np.maximum(low - values, values - high)
+    scale, unit = _shown_unit(quantity)
+    worst, rows = int(np.argmax(excess)), int(np.count_nonzero(excess > 0))
+    where, meaning = _MEANINGS[code]
+    text = (
+        f"{subject} was outside {where} in {quantity.replace('_', ' ')} ({_span(low / scale, high / scale)} "
+        f"{unit}) in {percent_of_rows(rows / values.size)} of the rows, by at most {excess[worst] / scale:.4g} {unit} "
+        f"at {time[worst]:.4g} s; {meaning}"
+    )
+    return Diagnostic(code, subject, text, rows)
+
+
+def percent_of_rows(share: float) -> str:
+    """A share of the rows that is not 0 as text, with one digit below one percent."""
+    return f"{100 * share:.0f} %" if share >= 0.01 else f"{100 * share:.1g} %"
+
+
+def describe_limit(limit: ColumnLimit) -> str:
+    """Text that says which range a column has left; without the values of a run."""
+    scale, unit = _shown_unit(limit.quantity)
+    where, meaning = _MEANINGS[limit.code]
+    low, high = limit.bounds
+    return (
+        f"{limit.subject}: outside {where} in {limit.quantity.replace('_', ' ')} ({_span(low / scale, high / scale)} "
+        f"{unit}); {meaning}"
+    )
+
+
+def _shown_unit(quantity: str) -> tuple[float, str]:
+    """Factor and name of the unit in which a quantity is shown."""
+    return {"pressure": (1e3, "kPa"), "speed": (1.0, "m/s"), "force": (1.0, "N")}.get(quantity, (0.01, "%"))
+
+
+def _span(low: float, high: float) -> str:
+    if np.isinf(high):
+        return f"at least {low:.4g}"
+    return f"{low:.4g} to {high:.4g}" if np.isfinite(low) else f"at most {high:.4g}"
+
+
+def rated_temperature(muscles: Sequence[Muscle], ambient_temperature: float) -> list[Diagnostic]:
+    """Diagnostics of muscles for which the maker does not permit this ambient temperature [K]."""
+    return [
+        Diagnostic(DiagnosticCode.RATING, muscle.name, f"{muscle.name}: {text}")
+        for muscle in muscles
+        if muscle.ratings
+        for text in muscle.ratings.excesses(temperature=ambient_temperature)
+    ]
+
+
+class Checks(NamedTuple):
+    """What the rows of a run are compared with: diagnostics that every run has, limits of columns as in
+    `with_tolerance`, and the circuits with a validity range, by the prefixes of their names."""
+
+    constant: list[Diagnostic]
+    limits: tuple[tuple[ColumnLimit, float, float], ...]
+    circuits: tuple[tuple[str, Circuit], ...]
+
+
+def components(remarks: Mapping[str, str]) -> list[Diagnostic]:
+    """Diagnostics of components that were beyond the validity of their model, by the prefixes of their names."""
+    named = {name.removesuffix("."): text for name, text in remarks.items()}
+    return [Diagnostic(DiagnosticCode.COMPONENT, name, f"{name}: {text}") for name, text in named.items()]
+
+
+class Enclosure(NamedTuple):
+    """A muscle with its contraction, the contraction of its contractile part, and its volume [m3]."""
+
+    muscle: Muscle
+    contraction: float
+    inner_contraction: float
+    volume: float
+
+
+def enclosures(
+    muscles: Sequence[Muscle], prefixes: Sequence[str], contractions: Sequence[float], state: Mapping[str, float]
+) -> list[Enclosure]:
+    """Contractions and volumes of all muscles at a state."""
+    result = []
+    for muscle, prefix, contraction in zip(muscles, prefixes, contractions, strict=True):
+        own = select_prefix(prefix, state)
+        inner = muscle.inner_contraction(contraction, own)
+        result.append(Enclosure(muscle, contraction, inner, muscle.volume(inner, own)))
+    return result
+
+
+def check_volumes(muscles: Sequence[Muscle], pressures: Sequence[float], volumes: Sequence[Value]) -> None:
+    """Raise ParameterError for a muscle whose volume [m3] at its gauge pressure [Pa] would not be positive."""
+    for muscle, pressure, volume in zip(muscles, pressures, volumes, strict=True):
+        if not volume > 0.0:
+            raise ParameterError(
+                f"Plant: the volume of {muscle.name} would be {volume:.4g} m3 at {pressure:.4g} Pa; its wall deforms "
+                "too far."
+            )
+
+
+def check_enclosures(given: Sequence[Enclosure]) -> None:
+    """Raise GeometryLimitError for an impossible contraction, ParameterError for a volume that is not positive."""
+    for muscle, contraction, inner, volume in given:
+        muscle.geometry.check_contraction(inner)
+        if not volume > 0.0:
+            raise ParameterError(
+                f"the initial state: the volume of {muscle.name} is {volume:.4g} m3 at a contraction of "
+                f"{100 * contraction:.2f} %; choose a contraction further within its range."
+            )
+
+
+def geometry_limit_hint(enclosure: Enclosure) -> str:
+    """Remedy for a muscle at a limit of its geometry; empty if it is not at a limit."""
+    muscle, inner = enclosure.muscle, float(enclosure.inner_contraction)
+    low, high = muscle.geometry.contraction_range
+    margin = MARGIN * (high - low)
+    if low + margin < inner < high - margin:
+        return ""
+    return (
+        f"{muscle.name} reached a contraction of {100 * inner:.2f} %, a limit of its geometry ({100 * low:.2f} % to "
+        f"{100 * high:.2f} %). Keep the load from moving it so far: wrap the mechanism in WithEndStops, or choose a "
+        "higher pressure or a smaller load."
+    )
+
+
+def first_hint(given: Sequence[Enclosure]) -> str:
+    """Remedy for the first muscle that is at a limit of its geometry; empty if none is."""
+    return next(filter(None, map(geometry_limit_hint, given)), "")

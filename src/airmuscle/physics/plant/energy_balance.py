@@ -1,0 +1,193 @@
+"""WithEnergyMeters: a plant with integrated powers of its components, for checks of its energy balances."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+from ...core.declaration import model
+from ...core.diagnostics import ColumnLimit, Columns, Diagnostic
+from ...core.ops import Value
+from ...core.system import System
+from ...core.variables import Input, StateVariable
+from ..muscle import ElasticSeriesElement, Muscle
+from ..muscle.friction import NoFriction
+from .evaluation import PlantEvaluation
+from .muscle_state import MuscleState
+from .plant import Plant
+
+_METERS = (
+    StateVariable("work_of_tension", "J", 1.0, "work of all tensions on the mechanism"),
+    StateVariable("work_of_air", "J", 1.0, "work of the air on its enclosures, against their absolute pressure"),
+    StateVariable("energy_of_flow", "J", 1.0, "energy that flowed into the muscles with the air"),
+    StateVariable("heat_to_air", "J", 1.0, "heat from the walls to the air in the muscles"),
+    StateVariable("damping_heat", "J", 1.0, "work dissipated by the dampers"),
+    StateVariable("work_of_contractile", "J", 1.0, "work of the contractile elements"),
+    StateVariable("element_work", "J", 1.0, "work done on springs, creep and end stops: dissipated, and stored"),
+    StateVariable("mechanism_loss", "J", 1.0, "work of the mechanism on dampers, stops, drives and external loads"),
+    StateVariable("air_supplied", "kg", 1e-3, "air mass that entered the plant"),
+    StateVariable("air_exhausted", "kg", 1e-3, "air mass that left the plant to the surroundings"),
+)
+_FRICTION = StateVariable("friction_work", "J", 1.0, "work done against friction: dissipated, and stored in bristles")
+
+
+@model
+class WithEnergyMeters(System):
+    """A plant with energy and mass meters as further states, and its energies and its air mass as outputs.
+
+    Four balances must close. Mechanical: kinetic + potential energy increase by `work_of_tension`, which includes the
+    contact force of an end stop, minus `mechanism_loss`, provided that a latch is operated at rest only; the energies
+    of an ExternalLoad are outside the plant, and the work on it is part of `mechanism_loss`. Muscle:
+    `work_of_contractile` is `work_of_tension` + `damping_heat` + `element_work` + `friction_work` (with friction),
+    provided that no muscle is slack. Air: `air_energy`, of the air in the muscles, increases by `energy_of_flow` +
+    `heat_to_air` minus `work_of_air`. Mass: `air_total`, of all air, increases by `air_supplied` minus
+    `air_exhausted`.
+    """
+
+    from_file: ClassVar[bool] = False
+
+    plant: Plant
+
+    @property
+    def meters(self) -> tuple[StateVariable, ...]:
+        """All meters."""
+        return (*_METERS, _FRICTION) if any(_has_friction(m) for m in self.plant.muscles) else _METERS
+
+    @property
+    def states(self) -> tuple[StateVariable, ...]:
+        """The plant's states, then the meters."""
+        return (*self.plant.states, *self.meters)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The plant's inputs."""
+        return self.plant.inputs
+
+    @property
+    def input_variables(self) -> tuple[Input, ...]:
+        """The plant's inputs."""
+        return self.plant.input_variables
+
+    @property
+    def output_units(self) -> Mapping[str, str]:
+        """The units of the plant's outputs, of energies [J] and of the air mass [kg]."""
+        energies = dict.fromkeys(("kinetic_energy", "potential_energy", "air_energy"), "J")
+        return {**self.plant.output_units, **energies, "air_total": "kg"}
+
+    @property
+    def state_lower_bounds(self) -> Sequence[float]:
+        """The bounds of the plant; meters have none."""
+        return [*self.plant.state_lower_bounds, *(-float("inf") for _ in self.meters)]
+
+    @property
+    def positive_outputs(self) -> Sequence[str]:
+        """The plant's volumes."""
+        return self.plant.positive_outputs
+
+    @property
+    def column_limits(self) -> Sequence[ColumnLimit]:
+        """The limits of the plant."""
+        return self.plant.column_limits
+
+    @property
+    def constants(self) -> Mapping[str, float | str]:
+        """The plant's constants."""
+        return self.plant.constants
+
+    def default_state(self) -> dict[str, float]:
+        """The default initial state of the plant with every meter at zero."""
+        return self.extend_state(self.plant.default_state())
+
+    def extend_state(self, state: Mapping[str, float]) -> dict[str, float]:
+        """A state of the plant with every meter at zero."""
+        return {**state, **{meter.name: 0.0 for meter in self.meters}}
+
+    def check_state(self, state: Mapping[str, float]) -> None:
+        """Raise the errors of the plant's `check_state`."""
+        self.plant.check_state(state)
+
+    def describe(self) -> tuple[Diagnostic, ...]:
+        """The assumptions of the plant."""
+        return self.plant.describe()
+
+    def diagnose(self, columns: Columns) -> list[Diagnostic]:
+        """The diagnostics of the plant."""
+        return self.plant.diagnose(columns)
+
+    def failure_hint(self, state: Mapping[str, float]) -> str:
+        """The remedy of the plant."""
+        return self.plant.failure_hint(state)
+
+    def rates(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
+        """The plant's rates, and the power that each meter integrates."""
+        return self._rates_of(self.plant.evaluate(state, inputs), state, inputs)
+
+    def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Any]:
+        """The plant's outputs; kinetic, potential and the muscles' air energy [J]; mass of all air [kg]."""
+        return self._outputs_of(self.plant.evaluate(state, inputs), state)
+
+    def rates_and_outputs(
+        self, state: Mapping[str, Value], inputs: Mapping[str, Value]
+    ) -> tuple[dict[str, Value], dict[str, Any]]:
+        """Both from one evaluation of the plant."""
+        at = self.plant.evaluate(state, inputs)
+        return self._rates_of(at, state, inputs), self._outputs_of(at, state)
+
+    def _rates_of(
+        self, at: PlantEvaluation, state: Mapping[str, Value], inputs: Mapping[str, Value]
+    ) -> dict[str, Value]:
+        plant = self.plant
+        powers: dict[str, Value] = dict.fromkeys((meter.name for meter in self.meters), 0.0)
+        for part, muscle, flow in zip(plant.muscles, at.muscles, at.flows, strict=True):
+            powers["work_of_tension"] += muscle.tension * muscle.speed
+            powers["work_of_air"] += muscle.air.pressure * muscle.volume_rate
+            powers["energy_of_flow"] += plant.gas.energy_flow(muscle.states, flow, muscle.volume, plant.ambient)
+            powers["heat_to_air"] += plant.gas.heat_flow(muscle.states, muscle.air, plant.ambient)
+            for name, power in _muscle_powers(part, muscle).items():
+                powers[name] += power
+        powers["mechanism_loss"] += plant.mechanism.dissipated_power(state, state, at.forces, inputs)
+        for circuit in at.circuits:
+            powers["air_supplied"] += circuit.drawn.mass
+            powers["air_exhausted"] += circuit.exhausted.mass
+        return {**plant.rates_of(at, state), **powers}
+
+    def _outputs_of(self, at: PlantEvaluation, state: Mapping[str, Value]) -> dict[str, Any]:
+        plant = self.plant
+        own = {s.name: state[s.name] for s in plant.states}
+        return {
+            **plant.outputs_of(at),
+            "kinetic_energy": plant.mechanism.kinetic_energy(state, state),
+            "potential_energy": plant.mechanism.potential_energy(state),
+            "air_energy": sum(self._available_energy(muscle) for muscle in at.muscles),
+            "air_total": total_air(own),
+        }
+
+    def _available_energy(self, muscle: MuscleState) -> Value:
+        return self.plant.gas.available_energy(muscle.states, muscle.volume, self.plant.ambient)
+
+
+def total_air(state: Mapping[str, Any]) -> Value:
+    """Mass of all air in a plant [kg]: that of its muscles, tubes and tanks."""
+    return sum(value for name, value in state.items() if name.endswith("air_mass"))
+
+
+def _has_friction(muscle: Muscle) -> bool:
+    return not isinstance(muscle.friction, NoFriction)
+
+
+def _muscle_powers(part: Muscle, muscle: MuscleState) -> dict[str, Value]:
+    """Power that the elements of a muscle deliver and absorb [W]."""
+    pressure, inner, speed = muscle.pressure, muscle.inner_contraction, muscle.inner_speed
+    length = part.geometry.resting_length
+    opposing = part.spring.force(pressure, inner, length) + part.stop.force(inner, speed, length)
+    if part.creep.states:
+        opposing = opposing + part.creep.force(muscle.states)
+    absorbed = opposing * speed
+    if isinstance(part.series, ElasticSeriesElement):
+        absorbed = absorbed + muscle.tension * (speed - muscle.speed)
+    powers = {
+        "work_of_contractile": part.contractile.force(pressure, inner) * speed,
+        "element_work": absorbed,
+        "damping_heat": part.damper.force(pressure, inner, speed) * speed,
+    }
+    return {**powers, "friction_work": muscle.friction * speed} if _has_friction(part) else powers

@@ -1,0 +1,295 @@
+"""Plant: muscles, the circuits that feed them, the mechanism that they act on, and the ambient air."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
+from typing import Any, ClassVar
+
+from ...core.declaration import model
+from ...core.diagnostics import ColumnLimit, Columns, Diagnostic, DiagnosticCode
+from ...core.errors import GeometryLimitError
+from ...core.ops import Value
+from ...core.variables import Input, StateVariable, add_prefix, select_prefix, with_prefix
+from ..equilibrium.equilibrium import equilibria_at_ambient_pressure, equilibrium_at_ambient_pressure
+from ..equilibrium.static_plant import StaticPlant
+from ..mechanism import Mechanism
+from ..muscle import Muscle
+from ..pneumatics import Circuit, CircuitFlows
+from ..pneumatics.gas import Air, Ambient, Gas
+from ..pneumatics.ports import key_by_muscle, key_by_port
+from ..pneumatics.wall_heat_transfer import DEFAULT_GAS
+from . import diagnostics
+from .display import PlantDisplay
+from .evaluation import PlantEvaluation
+from .muscle_state import MuscleState, air_states, muscle_outputs, muscle_state, states_of_muscle
+from .steady_state import fill_muscles, settle_muscles
+from .validation import as_quantity, check_free, check_parts, check_pressures, check_unique, convert_pressures
+
+_AIR_STATES = ("air_mass", "internal_energy")
+_ROUNDING = 1e-3
+"""Fraction of its nominal value by which an air mass may become negative within the tolerance (chosen)."""
+
+
+@model
+class Plant(PlantDisplay, StaticPlant):
+    """Ordinary differential equations of muscles, valves and load. Air mass [kg] is the state, pressure an output.
+
+    `muscle` is one or a tuple. `circuit` is a tuple with one for each muscle, or a single one that feeds them all.
+    With one muscle, names have no prefix (`air_mass`, `pressure`, `bristle`); with several, the muscle's name is the
+    prefix (`left.pressure`), also for a circuit in a tuple and for the tube of a muscle in a shared circuit.
+    """
+
+    checks_structure: ClassVar[bool] = True
+
+    muscle: Muscle | tuple[Muscle, ...]
+    circuit: Circuit | tuple[Circuit, ...]
+    mechanism: Mechanism
+    gas: Gas = DEFAULT_GAS
+    ambient: Ambient = Ambient()
+
+    def check(self) -> None:
+        check_parts(self.muscles, self.circuit, self.circuits, self.mechanism, self.gas, self.ambient)
+        convert_pressures(self)
+        check_unique([*(s.name for s in self.states), *self.inputs])
+
+    @functools.cached_property
+    def muscles(self) -> tuple[Muscle, ...]:
+        """The muscles, one or more."""
+        return self.muscle if isinstance(self.muscle, tuple) else (self.muscle,)
+
+    @functools.cached_property
+    def circuits(self) -> tuple[Circuit, ...]:
+        """The circuits: one for each muscle, or a single one for all."""
+        return self.circuit if isinstance(self.circuit, tuple) else (self.circuit,)
+
+    @functools.cached_property
+    def prefixes(self) -> tuple[str, ...]:
+        """Prefixes of the names of each muscle's quantities."""
+        return ("",) if len(self.muscles) == 1 else tuple(f"{m.name}." for m in self.muscles)
+
+    @property
+    def circuit_prefixes(self) -> tuple[str, ...]:
+        """Prefixes of the names of each circuit's quantities."""
+        return ("",) if self._shared else self.prefixes
+
+    @property
+    def _shared(self) -> bool:
+        return len(self.circuits) < len(self.muscles)
+
+    @property
+    def resting_lengths(self) -> list[Value]:
+        """Resting lengths of the muscles [m]."""
+        return [m.geometry.resting_length for m in self.muscles]
+
+    @functools.cached_property
+    def states(self) -> tuple[StateVariable, ...]:
+        """Air in the muscles, the mechanism's coordinates and speeds, then states of muscles and circuits."""
+        air, inner = [], []
+        for prefix, muscle in zip(self.prefixes, self.muscles, strict=True):
+            air += states_of_muscle(prefix, muscle, air_states(muscle, self.gas, self.ambient))
+            inner += states_of_muscle(prefix, muscle, muscle.states)
+        moving = [state for coordinate in self.mechanism.coordinates for state in coordinate.states]
+        own = [(prefix, s) for prefix, circuit in self._circuits() for s in circuit.states(self.ambient)]
+        circuits = [replace(s, name=name) for prefix, s in own for name in self._outside(prefix, {s.name: s})]
+        return (*air, *moving, *inner, *circuits)
+
+    @functools.cached_property
+    def input_variables(self) -> tuple[Input, ...]:
+        """Inputs of the circuits, then of the mechanism, with their ranges."""
+        return (*(i for p, c in self._circuits() for i in add_prefix(p, c.inputs)), *self.mechanism.inputs)
+
+    @functools.cached_property
+    def inputs(self) -> tuple[str, ...]:
+        """The names of all inputs."""
+        return tuple(i.name for i in self.input_variables)
+
+    @property
+    def output_units(self) -> Mapping[str, str]:
+        """Units of the accelerations."""
+        return {c.acceleration: f"{c.unit}/s^2" for c in self.mechanism.coordinates}
+
+    @property
+    def state_lower_bounds(self) -> Sequence[float]:
+        """Air masses and internal energies must not be negative, apart from rounding."""
+        return [-_ROUNDING * s.nominal if s.name.endswith(_AIR_STATES) else -float("inf") for s in self.states]
+
+    @property
+    def positive_outputs(self) -> Sequence[str]:
+        """The volumes."""
+        return [f"{prefix}volume" for prefix in self.prefixes]
+
+    @property
+    def constants(self) -> Mapping[str, float | str]:
+        """Ambient pressure [Pa]; with one muscle its resting length [m]."""
+        lengths = {"resting_length": self.resting_lengths[0]} if len(self.muscles) == 1 else {}
+        return {"ambient": self.ambient.pressure, **lengths}
+
+    default_state = equilibrium_at_ambient_pressure
+    default_states = equilibria_at_ambient_pressure
+
+    def affects_default_state(self, path: str) -> bool:
+        """Whether a parameter affects the equilibrium; those of a circuit without states do not."""
+        return not path.startswith("circuit") or any(circuit.states(self.ambient) for circuit in self.circuits)
+
+    def _circuits(self) -> Iterator[tuple[str, Circuit]]:
+        return zip(self.circuit_prefixes, self.circuits, strict=True)
+
+    def _by_circuit(self, airs: list[Air]) -> list[tuple[Air, ...]]:
+        return [tuple(airs)] if self._shared else [(air,) for air in airs]
+
+    def _outside(self, prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Values under a circuit's own names, by the plant's names."""
+        return key_by_muscle(self.prefixes, values) if self._shared else with_prefix(prefix, values)
+
+    def _within(self, prefix: str, values: Mapping[str, Value]) -> Mapping[str, Value]:
+        """Values under the plant's names, by a circuit's own names."""
+        return key_by_port(self.prefixes, values) if self._shared else select_prefix(prefix, values)
+
+    def muscle_states(
+        self, state: Mapping[str, Value], inputs: Mapping[str, Value] = MappingProxyType({})
+    ) -> tuple[MuscleState, ...]:
+        """Every muscle at a state; `inputs` are required if shortenings are inputs."""
+        place = {**inputs, **state}
+        contractions = self.mechanism.contractions(place, self.resting_lengths)
+        speeds = self.mechanism.contraction_speeds(place, place, self.resting_lengths)
+        return tuple(
+            muscle_state(m, select_prefix(prefix, state), contraction, speed, self.gas, self.ambient)
+            for m, prefix, contraction, speed in zip(self.muscles, self.prefixes, contractions, speeds, strict=True)
+        )
+
+    def circuit_flows(
+        self, muscles: tuple[MuscleState, ...], state: Mapping[str, Value], inputs: Mapping[str, Value]
+    ) -> tuple[CircuitFlows, ...]:
+        """Flows, rates and outputs of every circuit."""
+        airs = self._by_circuit([muscle.air for muscle in muscles])
+        return tuple(
+            circuit.compute_flows(air, self._within(prefix, state), select_prefix(prefix, inputs), self.ambient)
+            for (prefix, circuit), air in zip(self._circuits(), airs, strict=True)
+        )
+
+    def evaluate(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> PlantEvaluation:
+        """Muscles, circuits, forces and accelerations at a state."""
+        muscles = self.muscle_states(state, inputs)
+        forces = self.mechanism.generalised_forces(state, [m.tension for m in muscles], self.resting_lengths)
+        accelerations = self.mechanism.acceleration(state, state, forces, inputs)
+        return PlantEvaluation(muscles, self.circuit_flows(muscles, state, inputs), forces, accelerations)
+
+    def rates(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
+        """The time derivative of every state."""
+        return self.rates_of(self.evaluate(state, inputs), state)
+
+    def rates_of(self, at: PlantEvaluation, state: Mapping[str, Value]) -> dict[str, Value]:
+        """The rates from an evaluation at this state."""
+        rates: dict[str, Value] = {}
+        for muscle, prefix, flow in zip(at.muscles, self.prefixes, at.flows, strict=True):
+            growth = self.gas.rates(muscle.states, muscle.air, flow, muscle.volume_rate, self.ambient)
+            rates |= with_prefix(prefix, growth) | with_prefix(prefix, muscle.rates)
+        for c in self.mechanism.coordinates:
+            rates |= {c.name: state[c.speed], c.speed: at.accelerations[c.name]}
+        for (prefix, _), circuit in zip(self._circuits(), at.circuits, strict=True):
+            rates |= self._outside(prefix, circuit.rates)
+        return rates
+
+    def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
+        """Gauge pressure, contraction, tension, volume, mass flow and, where modelled, friction force, shortening speed
+        and temperature of every muscle; outputs of the circuits; accelerations."""
+        return self.outputs_of(self.evaluate(state, inputs))
+
+    def outputs_of(self, at: PlantEvaluation) -> dict[str, Value]:
+        """The outputs from an evaluation."""
+        outputs: dict[str, Value] = {}
+        for part, prefix, muscle, flow in zip(self.muscles, self.prefixes, at.muscles, at.flows, strict=True):
+            outputs |= with_prefix(prefix, muscle_outputs(part, muscle, flow.mass))
+        for (prefix, _), circuit in zip(self._circuits(), at.circuits, strict=True):
+            outputs |= self._outside(prefix, circuit.outputs)
+        return outputs | {c.acceleration: at.accelerations[c.name] for c in self.mechanism.coordinates}
+
+    def rates_and_outputs(
+        self, state: Mapping[str, Value], inputs: Mapping[str, Value]
+    ) -> tuple[dict[str, Value], dict[str, Value]]:
+        """Both from one evaluation."""
+        at = self.evaluate(state, inputs)
+        return self.rates_of(at, state), self.outputs_of(at)
+
+    def state_at(self, *, pressure: float | str | Sequence[float | str], **values: float | str) -> dict[str, float]:
+        """A state by the gauge pressure [Pa] of the muscle (or of each), and by states by name; also texts with a unit.
+
+        Coordinates and speeds that are not given are 0; walls, tubes, tanks and series springs are in steady state at
+        this pressure, bristles relaxed. Names with a dot are passed as `**{"left.bristle": 1e-4}`. Raises
+        ParameterError for a pressure below absolute zero, another number of pressures than muscles, an unknown name, or
+        a volume that is not positive; GeometryLimitError for an impossible contraction.
+        """
+        pressures = check_pressures(pressure, len(self.muscles), self.ambient)
+        muscles = zip(self.prefixes, self.muscles, strict=True)
+        air = {f"{p}{s.name}" for p, m in muscles for s in air_states(m, self.gas, self.ambient)}
+        units = {s.name: s.unit for s in self.states if s.name not in air}
+        check_free(values, list(units))
+        given = {n: as_quantity(f"Plant: the {n} of a state", v, units[n], self.ambient) for n, v in values.items()}
+        state: dict[str, Value] = {n: 0.0 for c in self.mechanism.coordinates for n in (c.name, c.speed)} | given
+        contractions = self.mechanism.contractions(state, self.resting_lengths)
+        for muscle, contraction in zip(self.muscles, contractions, strict=True):
+            muscle.geometry.check_contraction(contraction)
+        state, volumes = self.settle_muscles(pressures, state)
+        diagnostics.check_volumes(self.muscles, pressures, volumes)
+        state = self.fill_muscles(pressures, volumes, state)
+        return {s.name: float(state[s.name]) for s in self.states}
+
+    def settle_muscles(
+        self, pressures: Sequence[Value], state: Mapping[str, Value]
+    ) -> tuple[dict[str, Value], list[Value]]:
+        """As StaticPlant; nothing is checked, and values and parameters may be arrays that broadcast."""
+        contractions = self.mechanism.contractions(state, self.resting_lengths)
+        return settle_muscles(self.muscles, self.prefixes, contractions, pressures, state)
+
+    def fill_muscles(
+        self, pressures: Sequence[Value], volumes: Sequence[Value], state: Mapping[str, Value]
+    ) -> dict[str, Value]:
+        """`state` with air at these gauge pressures [Pa] in muscles of these volumes [m3], and circuits settled."""
+        content, airs = fill_muscles(self.gas, self.ambient, self.prefixes, pressures, volumes)
+        filled = {**state, **content}
+        for (prefix, circuit), air in zip(self._circuits(), self._by_circuit(airs), strict=True):
+            filled = {**self._outside(prefix, circuit.steady_state(air, self.ambient)), **filled}
+        return filled
+
+    def check_state(self, state: Mapping[str, float]) -> None:
+        """Raise GeometryLimitError for an impossible contraction, ParameterError for a volume that is not positive."""
+        diagnostics.check_enclosures(self._enclosures(state))
+
+    def _enclosures(self, state: Mapping[str, float]) -> list[diagnostics.Enclosure]:
+        contractions = self.mechanism.contractions(state, self.resting_lengths)
+        return diagnostics.enclosures(self.muscles, self.prefixes, contractions, state)
+
+    def describe(self) -> tuple[Diagnostic, ...]:
+        """The gas and the friction."""
+        gas = Diagnostic(DiagnosticCode.MODEL, "gas", f"gas: {str(self.gas).removesuffix('()')}")
+        return gas, diagnostics.friction(self.muscles)
+
+    def diagnose(self, columns: Columns) -> list[Diagnostic]:
+        """Extrapolation of characteristics, limits of geometries, components beyond the validity of their model."""
+        rated, limits, circuits = self._checks
+        remarks: dict[str, str] = {}
+        for prefix, circuit in circuits:
+            remarks |= self._outside(prefix, circuit.validity_warnings(self._within(prefix, columns), self.ambient))
+        return [*rated, *diagnostics.extrapolation(limits, columns), *diagnostics.components(remarks)]
+
+    @functools.cached_property
+    def _checks(self) -> diagnostics.Checks:
+        """What `diagnose` compares a run with."""
+        rated = diagnostics.rated_temperature(self.muscles, self.ambient.temperature)
+        circuits = tuple(each for each in self._circuits() if each[1].has_validity_range)
+        return diagnostics.Checks(rated, diagnostics.with_tolerance(self.column_limits), circuits)
+
+    @functools.cached_property
+    def column_limits(self) -> tuple[ColumnLimit, ...]:
+        """Validity ranges and ratings of the muscles, and the ranges of their geometries."""
+        return diagnostics.column_limits(self.muscles, self.prefixes)
+
+    def failure_hint(self, state: Mapping[str, float]) -> str:
+        """Remedy for the first muscle that is at, or beyond, a limit of its geometry."""
+        try:
+            return diagnostics.first_hint(self._enclosures(state))
+        except GeometryLimitError as error:
+            return str(error)

@@ -1,0 +1,140 @@
+"""Validation of the parts of a plant: types, numbers, names, closed-form laws."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...core.absolute_pressure import at_ambient
+from ...core.annotation import one_line
+from ...core.declaration import as_finite_float, check_structure, parameters
+from ...core.errors import ParameterError, TraceError
+from ...core.tree import with_ambient
+from ...core.units import check_above_vacuum, quantity
+from ..mechanism import Mechanism
+from ..muscle import Muscle
+from ..muscle.characteristic.validity_range import ValidityRange
+from ..pneumatics import Circuit
+from ..pneumatics.gas import Ambient, Gas
+from ..pneumatics.supply import check_not_shared
+
+
+def check_parts(
+    muscles: Sequence[Muscle], circuit: Any, circuits: Sequence[Circuit], mechanism: Mechanism, gas: Gas,
+    ambient: Ambient,
+) -> None:  # fmt: skip
+    """Raise ParameterError for parts that do not form a plant, TraceError for a law without closed form."""
+    parts: list[tuple[str, Any, type[Any]]] = [("mechanism", mechanism, Mechanism), ("gas", gas, Gas)]
+    parts += [("ambient", ambient, Ambient)]
+    parts += [("muscle", m, Muscle) for m in muscles] + [("circuit", c, Circuit) for c in circuits]
+    for field, part, kind in parts:
+        _check_kind(field, part, kind)
+    _check_closed_form(muscles)
+    for muscle in muscles:
+        _check_validity_limits(muscle.contractile)
+    check_structure((tuple(muscles), tuple(circuits), mechanism))
+    _check_counts(muscles, circuit, circuits, mechanism)
+
+
+def convert_pressures(plant: Any) -> None:
+    """Convert the pressures that parts of a plant state as absolute with its ambient air, then check supplies.
+
+    Raises ParameterError for a placeholder of a supply, and for a supply that cannot exist in the ambient air.
+    """
+    for name in ("muscle", "circuit", "mechanism"):
+        part = with_ambient(getattr(plant, name), plant.ambient.pressure)
+        if part is not getattr(plant, name):
+            object.__setattr__(plant, name, part)
+            plant.__dict__.pop(f"{name}s", None)  # derived from the part before
+    for each in plant.circuits:
+        check_not_shared(f"Plant: its {type(each).__name__}", each.supply)
+        each.supply.check_ambient(plant.ambient)
+
+
+def _check_validity_limits(characteristic: Any) -> None:
+    """Raise ParameterError if a limit of a law's validity range is beyond its bounds; a limit may be a column (N,)."""
+    for declared in parameters(ValidityRange):
+        limit = getattr(characteristic, declared.name, None)
+        if limit is None:
+            return
+        (low, high), smallest, largest = declared.bounds, float(np.min(limit)), float(np.max(limit))
+        if not low <= smallest <= largest <= high:
+            unit = "" if declared.unit == "1" else f" {declared.unit}"
+            raise ParameterError(
+                f"{type(characteristic).__name__}.{declared.name} ({declared.symbol}, {declared.meaning}) is "
+                f"{smallest if smallest < low else largest:g}{unit}; allowed range: {low:g} to {high:g}{unit}."
+            )
+
+
+def check_unique(names: Sequence[str]) -> None:
+    """Raise ParameterError if two states or inputs share a name."""
+    for name in (n for n in names if names.count(n) > 1):
+        raise ParameterError(f"Plant: two of its parts use the name '{name}'; rename one of them.")
+
+
+def _check_kind(field: str, part: Any, kind: type[Any]) -> None:
+    if isinstance(part, kind):
+        return
+    hint = " Put several into a tuple." if isinstance(part, list) else ""
+    hint = f" It has one: give its .{field}." if hasattr(part, field) else hint
+    raise ParameterError(f"Plant: its {field} must be a {kind.__name__}; it is {one_line(part)}.{hint}")
+
+
+def _check_closed_form(muscles: Sequence[Muscle]) -> None:
+    for muscle in muscles:
+        for part in (muscle.contractile, muscle.geometry):
+            if not part.traceable:
+                raise TraceError(
+                    f"{type(part).__name__} of {muscle.name} is not closed-form and cannot be part of a plant. Use "
+                    "as_force_law(law, validity_range) for a characteristic, as_polynomial(geometry) for a geometry."
+                )
+
+
+def _check_counts(muscles: Sequence[Muscle], circuit: Any, circuits: Sequence[Circuit], mechanism: Mechanism) -> None:
+    names = [m.name for m in muscles]
+    if not names:
+        raise ParameterError("Plant: it has no muscle; give one, or a tuple of them.")
+    ports = sum(c.port_count for c in circuits)
+    if ports != len(names):
+        raise ParameterError(f"Plant: its circuits feed {ports} muscles; {len(names)} are given.")
+    if mechanism.muscle_count not in (None, len(names)):
+        owner = type(mechanism).__name__
+        raise ParameterError(f"Plant: {owner} takes {mechanism.muscle_count} muscles; {len(names)} are given.")
+    if isinstance(circuit, tuple) and any(c.port_count != 1 for c in circuits):
+        raise ParameterError("Plant: give a circuit that feeds several muscles alone, not in a tuple.")
+    if len(set(names)) < len(names):
+        raise ParameterError(f"Plant: muscles need different names; they are {names}.")
+
+
+def check_free(values: Iterable[str], free: Sequence[str]) -> None:
+    """Raise ParameterError for a name that is not a state, or for a state of the air, which the pressure determines."""
+    for name in values:
+        if name not in free:
+            raise ParameterError(f"Plant: no coordinate '{name}'; there are {', '.join(free) or 'none'}.")
+
+
+def as_quantity(where: str, value: Any, unit: str, ambient: Ambient) -> float:
+    """A finite number in SI, also from a text with a unit; absolute pressures are converted with `ambient`.
+
+    Raises ParameterError or UnitError.
+    """
+    if isinstance(value, str):
+        return quantity(value, unit, ambient=ambient.pressure, where=where)
+    return as_finite_float(where, at_ambient(value, ambient.pressure))
+
+
+def check_pressures(pressure: float | str | Sequence[float | str], muscles: int, ambient: Ambient) -> list[float]:
+    """The gauge pressure [Pa] of each muscle, from one for all or one for each; also texts with a unit.
+
+    Raises UnitError, and ParameterError for a pressure that is not above absolute vacuum and for another number than of
+    muscles.
+    """
+    given = pressure if isinstance(pressure, tuple | list) else (pressure,) * muscles
+    pressures = [as_quantity("Plant: the pressure of a state", p, "Pa", ambient) for p in given]
+    if len(pressures) != muscles:
+        raise ParameterError(f"Plant: {len(pressures)} pressures are given for {muscles} muscles.")
+    for each in pressures:
+        check_above_vacuum(each, ambient.pressure)
+    return pressures

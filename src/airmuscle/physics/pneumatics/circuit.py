@@ -1,0 +1,90 @@
+"""Circuit (interface): the flows from an air supply through valves to the muscles."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+from ...core.ops import Value
+from ...core.reference import Reference
+from ...core.variables import Input, StateVariable, add_prefix, select_prefix, with_prefix
+from .gas import NO_FLOW, Air, Ambient, Flow
+from .supply import AirSource
+
+SUPPLY = "supply."
+"""Prefix of the state names of the supply."""
+
+
+@dataclasses.dataclass(frozen=True)
+class CircuitFlows:
+    """Flows, rates and outputs of a circuit at one instant.
+
+    `flows` are the flows into each muscle, `drawn` is the flow from the supply, `exhausted` the flow to the
+    surroundings, `rates` are the time derivatives of the circuit's states and `outputs` additional quantities by name.
+    """
+
+    flows: tuple[Flow, ...]
+    drawn: Flow = NO_FLOW
+    exhausted: Flow = NO_FLOW
+    rates: Mapping[str, Value] = dataclasses.field(default_factory=dict)
+    outputs: Mapping[str, Value] = dataclasses.field(default_factory=dict)
+
+
+class Circuit(abc.ABC):
+    """Pneumatic circuit of one or more muscles: inputs, states and the flows into the muscles (interface)."""
+
+    references: ClassVar[tuple[Reference, ...]] = ()
+    supply: AirSource
+
+    @property
+    def port_count(self) -> int:
+        """Number of muscles that the circuit feeds."""
+        return 1
+
+    @property
+    @abc.abstractmethod
+    def inputs(self) -> tuple[Input, ...]:
+        """Inputs of the circuit: valve openings, commands or set points."""
+
+    def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
+        """State variables without those of the supply."""
+        return ()
+
+    def own_steady_state(self, air_states: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
+        """Steady state without the supply, for zero inputs and the air states of the muscles."""
+        return {}
+
+    @abc.abstractmethod
+    def supplied_flow(
+        self, inlet: Air, air_states: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
+        ambient: Ambient,
+    ) -> CircuitFlows:  # fmt: skip
+        """Flows for the air state at the supply and the air states of the muscles; `rates` without the supply."""
+
+    def validity_warnings(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
+        """Warnings by prefix of the part where a run left the validity range; `columns` are arrays (N,) by name."""
+        return {}
+
+    @property
+    def has_validity_range(self) -> bool:
+        """Whether `validity_warnings` compares a run with a validity range; True where a class defines it."""
+        return type(self).validity_warnings is not Circuit.validity_warnings
+
+    def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
+        """State variables of circuit and supply."""
+        return (*self.own_states(ambient), *add_prefix(SUPPLY, self.supply.states(ambient)))
+
+    def steady_state(self, air_states: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
+        """Steady state of circuit and supply for zero inputs and the air states of the muscles."""
+        return {**self.own_steady_state(air_states, ambient), **with_prefix(SUPPLY, self.supply.steady_state(ambient))}
+
+    def compute_flows(
+        self, air_states: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value], ambient: Ambient
+    ) -> CircuitFlows:
+        """Flows and rates of circuit and supply; `drawn` is the flow from outside the plant."""
+        supply = select_prefix(SUPPLY, state)
+        flows = self.supplied_flow(self.supply.air(supply, ambient), air_states, state, inputs, ambient)
+        rates, inflow = self.supply.balance(supply, flows.drawn, ambient)
+        return dataclasses.replace(flows, rates={**flows.rates, **with_prefix(SUPPLY, rates)}, drawn=inflow)

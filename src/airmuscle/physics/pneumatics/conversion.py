@@ -1,0 +1,163 @@
+"""Conversion between the sonic conductance C and other flow figures of data sheets.
+
+The flow laws use C [m3/(s Pa)]. The functions of each pair are inverse to each other.
+
+    nominal flow    volume flow at the reference atmosphere of ISO 8778 from 6 to 5 bar gauge, ambient pressure 1 bar:
+                    Q = C p1 phi(p2/p1), p1 = 7 bar, p2 = 6 bar absolute; reproduces SMC's tables of C, b and Q exactly
+    Kv              m3/h of water at a pressure difference of 1 bar (IEC 60534). Kv corresponds to an area A by
+                    Q = A sqrt(2 dp/rho), and air near equal pressures flows through the same area:
+                    C rho0 sqrt(R T0) = A sqrt(1 - b)
+    Cv              US gallons per minute of water at 1 psi; Kv = 0.865 Cv (IEC 60534)
+    effective area  S of the loss-free nozzle with the same choked flow: C rho0 = S 0.6847/sqrt(R T0), which is the
+                    rule S [mm2] = 5.0 C [dm3/(s bar)] of JIS B 8390 and of the catalogues of CKD and SMC
+    diameter        of a round hole, S = c_d pi d^2/4 with its discharge coefficient c_d
+
+All conversions but that of the effective area need b. A data sheet with only Kv or the nominal flow does not state b;
+0.3 is a common assumption, which must be documented. Kv (measured with water) and Cv (with air at a drop of 0.1 bar)
+contain no information on choking: for SMC's valves, the printed Cv is 4 to 31 % above the value from the printed C and
+b. Use C and b where they are printed. Kv and Cv are numbers in the units of their definitions; all other values are SI.
+"""
+
+from __future__ import annotations
+
+from ...core import ops
+from ...core.errors import ParameterError
+from .gas import GAS_CONSTANT, HEAT_CAPACITY_RATIO, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, Ambient
+from .valve import Valve
+
+NOMINAL_UPSTREAM, NOMINAL_DOWNSTREAM = 7e5, 6e5
+"""Absolute pressures [Pa] of the nominal flow: 6 and 5 bar gauge at an ambient pressure of 1 bar."""
+KV_PER_CV = 0.865
+"""Kv [m3/h at 1 bar] of a valve with Cv = 1 [US gallons per minute at 1 psi]."""
+_NOZZLE_FACTOR: float = HEAT_CAPACITY_RATIO**0.5 * (2.0 / (HEAT_CAPACITY_RATIO + 1.0)) ** (
+    (HEAT_CAPACITY_RATIO + 1.0) / (2.0 * (HEAT_CAPACITY_RATIO - 1.0))
+)
+"""qm sqrt(R T)/(S p1) of loss-free choked flow, 0.6847."""
+_REFERENCE_SPEED: float = ops.sqrt(GAS_CONSTANT * REFERENCE_TEMPERATURE)
+"""sqrt(R T0) [m/s]."""
+_KV_AREA: float = 1.0 / 3600.0 / ops.sqrt(2.0 * 1e5 / 1000.0)
+"""Area [m2] of Kv = 1: 1 m3/h of water, 1000 kg/m3, at 1 bar."""
+
+
+def nominal_flow(conductance: float, critical_ratio: float) -> float:
+    """Nominal volume flow [m3/s] at the reference atmosphere, from 6 to 5 bar gauge. Raises ParameterError."""
+    return flow_at_reference(conductance, critical_ratio, NOMINAL_UPSTREAM, NOMINAL_DOWNSTREAM)
+
+
+def conductance_from_nominal_flow(volume_flow: float, critical_ratio: float) -> float:
+    """C [m3/(s Pa)] from the nominal flow [m3/s] at the reference atmosphere. Raises ParameterError."""
+    return conductance_from_flow(volume_flow, critical_ratio, NOMINAL_UPSTREAM, NOMINAL_DOWNSTREAM)
+
+
+def flow_at_reference(conductance: float, critical_ratio: float, upstream: float, downstream: float) -> float:
+    """Volume flow [m3/s] at the reference atmosphere between two absolute pressures [Pa], for air at 293.15 K.
+
+    Raises ParameterError for a value that is not positive and finite, or if `downstream` is not less than `upstream`.
+    """
+    _check_positive("conductance", conductance)
+    return conductance * _unit_flow(critical_ratio, upstream, downstream)
+
+
+def conductance_from_flow(volume_flow: float, critical_ratio: float, upstream: float, downstream: float) -> float:
+    """C [m3/(s Pa)] from a volume flow [m3/s] at the reference atmosphere between two absolute pressures [Pa].
+
+    Raises ParameterError.
+    """
+    _check_positive("volume_flow", volume_flow)
+    return volume_flow / _unit_flow(critical_ratio, upstream, downstream)
+
+
+def kv(conductance: float, critical_ratio: float) -> float:
+    """Kv [m3/h] from the sonic conductance. Raises ParameterError."""
+    _check_positive("conductance", conductance)
+    return conductance * REFERENCE_DENSITY * _REFERENCE_SPEED / (_KV_AREA * _near_equal_factor(critical_ratio))
+
+
+def conductance_from_kv(kv: float, critical_ratio: float) -> float:
+    """C [m3/(s Pa)] from Kv [m3/h]. Raises ParameterError."""
+    _check_positive("Kv", kv)
+    return kv * _KV_AREA * _near_equal_factor(critical_ratio) / (REFERENCE_DENSITY * _REFERENCE_SPEED)
+
+
+def cv(conductance: float, critical_ratio: float) -> float:
+    """Cv [US gallons per minute] from the sonic conductance. Raises ParameterError."""
+    return kv(conductance, critical_ratio) / KV_PER_CV
+
+
+def conductance_from_cv(cv: float, critical_ratio: float) -> float:
+    """C [m3/(s Pa)] from Cv [US gallons per minute]. Raises ParameterError."""
+    _check_positive("Cv", cv)
+    return conductance_from_kv(KV_PER_CV * cv, critical_ratio)
+
+
+def effective_area(conductance: float) -> float:
+    """Effective area S [m2] from the sonic conductance. Raises ParameterError."""
+    _check_positive("conductance", conductance)
+    return conductance * REFERENCE_DENSITY * _REFERENCE_SPEED / _NOZZLE_FACTOR
+
+
+def conductance_from_area(area: float) -> float:
+    """C [m3/(s Pa)] from the effective area S [m2]. Raises ParameterError."""
+    _check_positive("area", area)
+    return area * _NOZZLE_FACTOR / (REFERENCE_DENSITY * _REFERENCE_SPEED)
+
+
+def diameter(conductance: float, discharge_coefficient: float) -> float:
+    """Diameter [m] of the round hole with the same choked flow. Raises ParameterError."""
+    _check_discharge_coefficient(discharge_coefficient)
+    return float(ops.sqrt(effective_area(conductance) / discharge_coefficient * 4.0 / ops.pi))
+
+
+def conductance_from_diameter(diameter: float, discharge_coefficient: float) -> float:
+    """C [m3/(s Pa)] of a round hole from its diameter [m] and discharge coefficient. Raises ParameterError."""
+    _check_positive("diameter", diameter)
+    _check_discharge_coefficient(discharge_coefficient)
+    return conductance_from_area(discharge_coefficient * ops.pi / 4.0 * diameter**2)
+
+
+def leak_valve(
+    volume_flow: float, pressure: float, ambient: Ambient | None = None, critical_ratio: float = 0.3
+) -> Valve:
+    """Leak as a valve that is always open, from its flow at one gauge pressure.
+
+    `volume_flow` [m3/s at the reference atmosphere] is the leakage from `pressure` [Pa] gauge to the surroundings. At
+    other pressures the leak follows ISO 6358 with the given critical ratio (the default is chosen; that of a leak is
+    rarely known). Raises ParameterError, also if the pressure is not above ambient.
+    """
+    ambient = Ambient() if ambient is None else ambient
+    conductance = conductance_from_flow(volume_flow, critical_ratio, pressure + ambient.pressure, ambient.pressure)
+    return Valve(conductance, critical_ratio)
+
+
+def _unit_flow(critical_ratio: float, upstream: float, downstream: float) -> float:
+    """Volume flow [m3/s] at the reference atmosphere for C = 1, by the law of `Valve` including its laminar chord."""
+    _check_positive("upstream pressure", upstream)
+    _check_positive("downstream pressure", downstream)
+    if not downstream < upstream:
+        raise ParameterError(
+            f"the downstream pressure is {downstream:g} Pa; it must be less than the upstream pressure of {upstream:g} "
+            "Pa (both absolute)."
+        )
+    law = Valve(1e-8, _check_critical_ratio(critical_ratio))
+    return float(law.mass_flow(upstream, downstream, 1.0, REFERENCE_TEMPERATURE) / (REFERENCE_DENSITY * 1e-8))
+
+
+def _near_equal_factor(critical_ratio: float) -> float:
+    return float(ops.sqrt(1.0 - _check_critical_ratio(critical_ratio)))
+
+
+def _check_critical_ratio(critical_ratio: float) -> float:
+    return Valve(1e-8, critical_ratio).critical_ratio  # Valve declares the bounds
+
+
+def _check_positive(what: str, value: float) -> None:
+    if isinstance(value, bool) or not isinstance(value, float | int) or not 0.0 < value < float("inf"):
+        raise ParameterError(f"{what} is {value!r}; it must be a finite number greater than zero.")
+
+
+def _check_discharge_coefficient(value: float) -> None:
+    _check_positive("discharge coefficient", value)
+    if value > 1.0:
+        raise ParameterError(
+            f"discharge coefficient is {value:g}; it must be at most 1 (about 0.6 for a sharp-edged hole)."
+        )

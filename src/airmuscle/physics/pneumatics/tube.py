@@ -1,0 +1,113 @@
+"""Lumped tube between valve and muscle: volume and flow resistance, in one or more segments."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from ...core import ops
+from ...core.declaration import model, parameter
+from ...core.errors import ParameterError
+from ...core.ops import Value
+from ...core.reference import Reference
+from ...core.tree import unflatten
+from ...core.variables import StateVariable, add_prefix, select_prefix, with_prefix
+from .flow import orifice_flow
+from .gas import Air, Ambient, Flow, Gas, Isothermal
+from .orifice import Orifice
+from .tube_model import TubeModel
+from .valve import Valve
+
+ECKERSTEN = Reference(
+    "eckersten-1975",
+    "Eckersten, J.",
+    "Simplified flow calculations for pneumatic components",
+    "Atlas Copco, Stockholm; after P. Beater, Pneumatic Drives, Springer 2007",
+    1975,
+    note="conductance and critical ratio of a tube; secondary source, compared with Darcy's law in the tests",
+)
+_TEMPLATE_VALVE = Valve(1e-8, 0.3)
+
+
+@model
+class TubeOrifice(Orifice):
+    """Flow through a smooth tube including end losses, as an orifice after ISO 6358.
+
+        C = 0.029 D^2/sqrt(L/D^1.25 + 510),   b = 474 C/D^2
+
+    C sonic conductance [m3/(s Pa)], b critical pressure ratio, D inner diameter [m], L length [m]. The formula is
+    empirical; its constants hold for these units. Reference: Eckersten (1975), after Beater (2007).
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (ECKERSTEN,)
+
+    length: float = parameter("m", "L", "length of the tube", bounds=(1e-3, 200.0))
+    diameter: float = parameter("m", "D", "inner diameter of the tube", bounds=(5e-4, 0.1))
+
+    @property
+    def conductance(self) -> Value:
+        """Sonic conductance C [m3/(s Pa)]."""
+        return 0.029 * self.diameter**2 / ops.sqrt(self.length / self.diameter**1.25 + 510.0)
+
+    @property
+    def critical_ratio(self) -> Value:
+        """Critical pressure ratio b."""
+        return 474.0 * self.conductance / self.diameter**2
+
+    def mass_flow(self, upstream: Value, downstream: Value, opening: Value, temperature: Value) -> Value:
+        valve = unflatten(_TEMPLATE_VALVE, (self.conductance, self.critical_ratio, _TEMPLATE_VALVE.laminar_ratio))
+        return valve.mass_flow(upstream, downstream, opening, temperature)
+
+
+@model
+class Tube(TubeModel):
+    """Lumped tube: a volume with an orifice towards the muscle, divided into n segments in series.
+
+    `orifice` and `volume` describe the whole tube. Each of n segments has 1/n of the volume and sqrt(n) times the
+    conductance. This is exact for the flow law of a tube with friction, q^2 = C^2 (p_1^2 - p_2^2), which is a critical
+    ratio of 0, and for any critical ratio near equal pressures. The model has no inertia: a pressure step has an
+    immediate, though small, effect at the other end; `DistributedTube` describes delay and resonance. The valve feeds
+    the volume of the first segment.
+    """
+
+    orifice: Orifice
+    volume: float = parameter("m3", "V_t", "volume of the tube", bounds=(1e-9, 1e-2))
+    segment_count: int = 1
+    gas: Gas = Isothermal()
+
+    @classmethod
+    def from_dimensions(cls, length: float, diameter: float, segment_count: int = 1, gas: Gas = Isothermal()) -> Tube:
+        """Tube of a length and an inner diameter [m], with the flow of a `TubeOrifice`."""
+        return cls(TubeOrifice(length, diameter), ops.pi / 4.0 * diameter**2 * length, segment_count, gas)
+
+    def check(self) -> None:
+        check_segment_count("Tube", self.segment_count)
+
+    def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
+        segment = self.gas.states(self.volume / self.segment_count, ambient)
+        return tuple(state for prefix in self.prefixes for state in add_prefix(prefix, segment))
+
+    def steady_state(self, air: Air, ambient: Ambient) -> dict[str, Value]:
+        segment = self.gas.state_at(air.pressure, self.volume / self.segment_count, ambient)
+        return {name: value for prefix in self.prefixes for name, value in with_prefix(prefix, segment).items()}
+
+    def air_states(self, state: Mapping[str, Value], ambient: Ambient) -> tuple[Air, ...]:
+        segments = (select_prefix(prefix, state) for prefix in self.prefixes)
+        return tuple(self.gas.air(segment, self.volume / self.segment_count, ambient) for segment in segments)
+
+    def rates(
+        self, state: Mapping[str, Value], air_states: tuple[Air, ...], flow: Flow, muscle: Air, ambient: Ambient
+    ) -> tuple[dict[str, Value], Flow]:
+        rates: dict[str, Value] = {}
+        for prefix, air, downstream in zip(self.prefixes, air_states, (*air_states[1:], muscle), strict=True):
+            outflow = orifice_flow(self.orifice, air, downstream, self.segment_count**0.5)
+            segment = self.gas.rates(select_prefix(prefix, state), air, flow - outflow, 0.0, ambient)
+            rates |= with_prefix(prefix, segment)
+            flow = outflow
+        return rates, flow
+
+
+def check_segment_count(owner: str, segment_count: int) -> None:
+    """Raise ParameterError unless the number of segments of a tube is an integer from 1 to 200."""
+    if isinstance(segment_count, bool) or not (isinstance(segment_count, int) and 1 <= segment_count <= 200):
+        raise ParameterError(f"{owner}: segment_count is {segment_count!r}; give an integer from 1 to 200.")

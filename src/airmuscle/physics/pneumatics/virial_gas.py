@@ -1,0 +1,75 @@
+"""Real gas at ambient temperature: virial equation of state with the second coefficient."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from ...core import ops
+from ...core.declaration import model, parameter
+from ...core.ops import Value
+from ...core.reference import Reference
+from .gas import GAS_CONSTANT, Air, Ambient, BarotropicGas
+
+CIPM_2007 = Reference(
+    "cipm-2007",
+    "Picard, A., Davis, R. S., Gläser, M., Fujii, K.",
+    "Revised formula for the density of moist air (CIPM-2007)",
+    "Metrologia 45:149-155",
+    2008,
+    doi="10.1088/0026-1394/45/2/004",
+    note="compressibility of dry air, coefficients a_0 to a_2 after published programs; 15 to 27 °C, 60 to 110 kPa",
+)
+_COMPRESSIBILITY = (1.58123e-6, -2.9331e-8, 1.1043e-10)
+"""a_0 [K/Pa], a_1 [1/Pa] and a_2 [1/(K Pa)] of Z = 1 - p/T (a_0 + a_1 t + a_2 t^2) + ..., t in degrees Celsius."""
+
+
+def virial_coefficient_of_air(temperature: float) -> float:
+    """Second virial coefficient B [m3/kg] of dry air at a temperature [K]: B = -R (a_0 + a_1 t + a_2 t^2).
+
+    t temperature in degrees Celsius; a_0 to a_2 of the compressibility in CIPM-2007, fitted from 15 to 27 degrees
+    Celsius. At 20 degrees -2.98e-4 m3/kg or -8.64 cm3/mol; outside of 0 to 60 degrees it is an extrapolation.
+    """
+    celsius = temperature - 273.15
+    a_0, a_1, a_2 = _COMPRESSIBILITY
+    return -GAS_CONSTANT * (a_0 + a_1 * celsius + a_2 * celsius**2)
+
+
+@model
+class VirialGas(BarotropicGas):
+    """Isothermal real gas: p = rho R T_amb (1 + B rho), with the second virial coefficient B and rho = m/V.
+
+    B = 0 is the ideal gas. The default is that of dry air at 293.15 K; `virial_coefficient_of_air(T)` is that at
+    another ambient temperature. Reference: CIPM-2007 (Picard et al. 2008).
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (CIPM_2007,)
+
+    virial_coefficient: float = parameter(
+        "m3/kg", "B", "second virial coefficient of air", bounds=(-5e-3, 5e-3), fitted=False,
+        default=virial_coefficient_of_air(293.15),
+    )  # fmt: skip
+
+    def pressure(self, air_mass: Value, volume: Value, ambient: Ambient) -> Value:
+        density = air_mass / volume
+        return density * (GAS_CONSTANT * ambient.temperature) * (1.0 + self.virial_coefficient * density)
+
+    def air_mass(self, pressure: Value, volume: Value, ambient: Ambient) -> Value:
+        ideal = pressure / (GAS_CONSTANT * ambient.temperature)
+        return volume * self._density(ideal)
+
+    def _density(self, ideal: Value) -> Value:
+        """Density [kg/m3] at the pressure at which an ideal gas has the density `ideal`; the root near the latter."""
+        return 2.0 * ideal / (1.0 + ops.sqrt(1.0 + 4.0 * self.virial_coefficient * ideal))
+
+    def temperature(self, pressure: Value, air_mass: Value, volume: Value, ambient: Ambient) -> Value:
+        return ambient.temperature
+
+    def energy(self, air_mass: Value, volume: Value, ambient: Ambient) -> Value:
+        thermal = GAS_CONSTANT * ambient.temperature
+        density = air_mass / volume
+        return air_mass * thermal * (ops.log(density * thermal / ambient.pressure) - 1.0
+                                     + self.virial_coefficient * density)  # fmt: skip
+
+    def sound_speed(self, air: Air) -> Value:
+        density = self._density(air.pressure / (GAS_CONSTANT * air.temperature))
+        return ops.sqrt(GAS_CONSTANT * air.temperature * (1.0 + 2.0 * self.virial_coefficient * density))
