@@ -15,7 +15,8 @@ from .docstrings import docstring, to_markdown
 
 FACES = {
     "airmuscle": "The most used names",
-    "airmuscle.recording": "Recordings and files",
+    "airmuscle.recording": "Recordings",
+    "airmuscle.bench.readers": "Measurement files",
     "airmuscle.bench.segment": "Inspection of recordings",
     "airmuscle.bench.identify": "Static identification",
     "airmuscle.bench.identify.dynamic": "Dynamic identification",
@@ -28,12 +29,14 @@ FACES = {
     "airmuscle.physics.pneumatics": "Pneumatics",
     "airmuscle.physics.mechanism": "Mechanisms",
     "airmuscle.physics.plant": "Plant",
-    "airmuscle.control": "Control",
+    "airmuscle.control.laws": "Control laws",
+    "airmuscle.engine.loop": "Control loops",
     "airmuscle.engine.loop.inputs": "Input signals",
     "airmuscle.engine.loop.trajectory": "Trajectories",
     "airmuscle.engine.run": "Simulation",
     "airmuscle.engine.run.batch": "Batch simulation",
-    "airmuscle.control.estimation": "Analysis",
+    "airmuscle.control.estimation": "Estimators and predictive controllers",
+    "airmuscle.physics.analysis": "Analysis of a plant",
     "airmuscle.physics.equilibrium": "Equilibria",
     "airmuscle.files.library.scaling": "Scaling of muscles",
     "airmuscle.design.sizing": "Sizing",
@@ -70,7 +73,7 @@ def _names(module: str) -> list[str]:
 
 def overview(modules: list[str]) -> str:
     """The index of the packages."""
-    lines = [f"* [{FACES[name]}]({name}.md): `{name}`" for name in modules]
+    lines = [f"* [{FACES[name]}]({name}.md): `{room_of(name)}`" for name in modules]
     tree = "\n".join(modules)
     head = (
         "# Python interface\n\nFunctions and classes that users import, by package. Models, which files may name too, "
@@ -79,12 +82,17 @@ def overview(modules: list[str]) -> str:
     return "\n".join([head, *lines, "", f"```{{toctree}}\n:hidden:\n\n{tree}\n```", ""])
 
 
+def room_of(module: str) -> str:
+    """The face from which users import: the package airmuscle or one of its rooms."""
+    return ".".join(module.split(".")[:2])
+
+
 def face_page(module: str) -> str:
     """The page of one package."""
     face = importlib.import_module(module)
     things = [(name, getattr(face, name)) for name in _names(module)]
     summary = to_markdown((face.__doc__ or "").strip().split("\n\n")[0])
-    parts = [f"# {FACES[module]}\n", f"`{module}`: {summary}"]
+    parts = [f"# {FACES[module]}\n", f"`{room_of(module)}`: {summary}"]
     parts += [
         class_section(name, thing) if inspect.isclass(thing) else function_section(name, thing)
         for name, thing in things

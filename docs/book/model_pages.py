@@ -30,9 +30,10 @@ ROOMS = {
     "muscle": "Elements of a muscle",
     "pneumatics": "Air, valves, tubes and circuits",
     "mechanism": "Mechanisms",
-    "control": "Controllers, sensors and drivers",
+    "laws": "Controllers",
+    "loop": "Sensors, drivers and interfaces of controllers",
     "plant": "Plant",
-    "simulation": "Integrators",
+    "run": "Integrators",
 }
 """Packages of the models, in the order of the pages, with their titles."""
 DIRECTIONS = {"force": "tension", "contraction": "contraction", "pressure": "pressure"}
@@ -80,11 +81,19 @@ def first_sentence(cls: type[Any]) -> str:
     return markdown(text) if len(text) <= 120 or name is None else f"{markdown(name[0])}."
 
 
+def face_of(room: str) -> str:
+    """The face from which users import the models of a package: a room, or a collection of the muscle's parts."""
+    if room in ("characteristic", "geometry", "friction"):
+        return f"airmuscle.{room}"
+    package = next(package for package in PACKAGES if package.__name__.endswith(f".{room}"))
+    return package.__name__.rpartition(".")[0]
+
+
 def room_page(room: str, classes: list[type[Any]]) -> str:
     """The index of the models of a package."""
     rows = [(f"[{cls.__name__}]({cls.__name__}.md)", first_sentence(cls)) for cls in classes]
     tree = "\n".join(cls.__name__ for cls in classes)
-    head = f"# {ROOMS[room]}\n\nModels of `airmuscle.{room}`.\n"
+    head = f"# {ROOMS[room]}\n\nModels of `{face_of(room)}`.\n"
     return f"{head}\n{table(('model', 'definition'), rows)}\n```{{toctree}}\n:hidden:\n\n{tree}\n```\n"
 
 
@@ -94,7 +103,7 @@ def model_page(cls: type[Any], room: str, drawn: bool) -> str:
     name = cls.__name__
     sections = [
         f"# {name}\n",
-        f"`airmuscle.{room}.{name}` · [all {ROOMS[room][0].lower() + ROOMS[room][1:]}](index.md)\n",
+        f"`{face_of(room)}.{name}` · [all {ROOMS[room][0].lower() + ROOMS[room][1:]}](index.md)\n",
         to_markdown(docstring(cls), _letters(declared), omit_references=bool(_references(cls))),
         picture(cls) if drawn else "",
         parameter_section(declared),

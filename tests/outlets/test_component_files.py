@@ -115,6 +115,6 @@ def test_the_page_of_components_names_each_with_a_line():
     page = (Path(__file__).parents[2] / "docs" / "components.md").read_text(encoding="utf-8")
     parts = ("pneumatics", "muscle")
     modules = {n: model_class(n, "").__module__.split(".") for n in model_names()}
-    owned = ["HuntCrossley", *(n for n, m in modules.items() if m[1] in parts and len(m) == 3 and n != "Muscle")]
+    owned = ["HuntCrossley", *(n for n, m in modules.items() if m[2] in parts and len(m) == 4 and n != "Muscle")]
     assert len(owned) > 30
     assert [n for n in owned if f"`{n}`" not in page] == []

@@ -31,9 +31,9 @@ from airmuscle import (
 from airmuscle.control import PID
 from airmuscle.errors import AirmuscleError, AirmuscleWarning, ParameterError, UnitError
 from airmuscle.files import list_laws
-from airmuscle.physics import HangingMass, Supply, Tank, Valve, muscle
+from airmuscle.physics import HangingMass, Supply, Tank, Valve
 
-FACES = (characteristic, control, friction, geometry, mechanism, muscle, pneumatics)
+FACES = (characteristic, control, engine, friction, geometry, physics)
 MODELS = sorted(
     {
         thing
@@ -145,7 +145,7 @@ def settings() -> list[Any]:
         bench.Huber(1.0), bench.SoftL1(1.0), bench.LeastSquares(), bench.BlockSplit(),
         bench.LevelSplit("pressure"), bench.Censoring(), bench.StartTime(0.1),
         bench.InitialValue("pressure", 1.0), bench.PlantUncertainty({"muscle.damping": 1.0}),
-        bench.RecursiveFit(bench.BenchLimits(muscle.characteristic.ValidityRange(0.0, 6e5, 0.0, 0.25), 1e3)),
+        bench.RecursiveFit(bench.BenchLimits(characteristic.ValidityRange(0.0, 6e5, 0.0, 0.25), 1e3)),
         bench.BlockMeans(), bench.Decimation(), bench.RecordedTime(), bench.ColumnMapping(),
         recording.Recording({"time": [0.0, 1.0]}, "two rows"),
         outlets.ValueRange(("mass",), 0.0, 1.0), outlets.FactorRange(("mass",), 0.5, 2.0),

@@ -93,7 +93,11 @@ def public_functions() -> dict[str, Callable[..., Any]]:
                    for path in SOURCE.rglob("__init__.py") if path.parent != SOURCE)]  # fmt: skip
     names = [(face, name) for face in faces for name in getattr(face, "__all__", ())]
     things = {f"{face.__name__}.{name}".removeprefix("airmuscle."): getattr(face, name) for face, name in names}
-    return {name: thing for name, thing in things.items() if callable(thing)}
+    return {
+        name: thing
+        for name, thing in things.items()
+        if inspect.isroutine(thing) or (inspect.isclass(thing) and not issubclass(thing, BaseException))
+    }
 
 
 def test_there_is_a_hint_for_every_remedy_and_a_value_for_every_hint():
