@@ -37,7 +37,7 @@ def test_two_branches_are_named_with_their_distance_and_the_remedy():
     distance = re.search(r"two branches, ([\d.]+) N apart on average", note)
     assert distance is not None
     assert float(distance[1]) == pytest.approx(78.0, abs=3.0)
-    assert note.endswith("To identify the friction, use identify.hysteresis.fit_hysteresis.")
+    assert note.endswith("To identify the friction, use bench.fit_hysteresis.")
 
 
 def test_noise_and_misfit_are_no_branches():
