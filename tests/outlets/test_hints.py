@@ -93,6 +93,7 @@ def public_functions() -> dict[str, Callable[..., Any]]:
                    for path in SOURCE.rglob("__init__.py") if path.parent != SOURCE)]  # fmt: skip
     names = [(face, name) for face in faces for name in getattr(face, "__all__", ())]
     things = {f"{face.__name__}.{name}".removeprefix("airmuscle."): getattr(face, name) for face, name in names}
+    things |= {f"characteristic.{name}": getattr(am.characteristic, name) for name in am.characteristic.__all__}
     return {
         name: thing
         for name, thing in things.items()
@@ -238,7 +239,7 @@ RISE_AND_FALL = (0.0, 0.15, 0.0)
 CASES: dict[str, tuple[Callable[[Path], Path], Callable[[Path], Any], tuple[Any, ...], str, str]] = {
     "greatest degree of a surface": (
         points, lambda file: fit(law(9), read(file)), ("fit", *SURFACE, 9),
-        "use degree=5 of muscle.characteristic.ContractileSurface.blank.", "For the greatest degree that the levels determine, use --degree 5."),
+        "use degree=5 of characteristic.ContractileSurface.blank.", "For the greatest degree that the levels determine, use --degree 5."),
     "parameters fixed": (
         lambda path: points(path, 30), lambda file: fit(law(9), read(file)), ("fit", *SURFACE, 9),
         "use fixed=....", "To fix parameters, use --fix PARAMETER."),

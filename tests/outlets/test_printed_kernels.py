@@ -255,7 +255,9 @@ def run_javascript(folder):
 
 
 @pytest.mark.parametrize(
-    ("target", "run"), [(C99(), run_c), (JavaScript(), run_javascript), (Octave(), printed.run_octave)], ids=lambda each: getattr(each, "__name__", None)
+    ("target", "run"),
+    [(C99(), run_c), (JavaScript(), run_javascript), (Octave(), printed.run_octave)],
+    ids=lambda each: getattr(each, "__name__", None),
 )
 def test_a_new_integrator_in_the_kernels_is_in_every_outlet(target, run, tmp_path, monkeypatch):
     def read(module):

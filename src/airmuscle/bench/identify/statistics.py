@@ -158,9 +158,7 @@ def _degree_remedy(problem: FitProblem, degree: int) -> tuple[str, Hint | None]:
         "powers up to n need n + 1 levels. "
     )
     possible = 0 < degree < problem.law.degree
-    return text, Hint(
-        DEGREE_REMEDY, "degree", degree, "muscle.characteristic.ContractileSurface.blank"
-    ) if possible else None
+    return text, Hint(DEGREE_REMEDY, "degree", degree, "characteristic.ContractileSurface.blank") if possible else None
 
 
 def count_levels(values: Array) -> int:
