@@ -9,19 +9,16 @@ from __future__ import annotations
 
 import abc
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from ...core.declaration import INFINITY, model, parameter
 from ...core.errors import ParameterError
+from ..compile.kernel_text.source import plain_kernels
 from .piecewise_linear import Segment
 
-THRESHOLD = 0.5
-"""The coil of a solenoid carries current while its command is at least this (chosen)."""
 MAX_PERIODS = 10_000_000
 """Periods of a carrier in one run."""
-_ARRIVED = 1e-12
-"""An opening this close to its target has reached it: rounding makes no segment of its own."""
 
 
 class Driver(abc.ABC):
@@ -68,38 +65,16 @@ class SolenoidDriver(Driver):
     def init(self, start: float) -> SolenoidState:
         return SolenoidState(coil=0.0, pending=INFINITY, target=0.0, opening=0.0)
 
+    @property
+    def settings(self) -> tuple[float, ...]:
+        """The parameters, in the order of the kernel."""
+        return self.opening_delay, self.closing_delay, self.opening_ramp, self.closing_ramp
+
     def step(
         self, state: SolenoidState, command: Sequence[Segment], start: float
     ) -> tuple[list[Segment], SolenoidState]:
-        end = command[-1][0]
-        coil, pending, target, opening = state
-        openings: list[Segment] = []
-        edge = start
-        for instant, current in (*_switchings(command, start, coil), (INFINITY, coil)):
-            if pending < min(instant, end) and coil != target:  # the plunger responds before the coil switches again
-                opening = self._move(openings, edge, pending, target, opening)
-                edge, target = pending, coil
-            if instant == INFINITY:
-                break
-            coil = current
-            pending = instant + (self.opening_delay if current > 0 else self.closing_delay)
-        opening = self._move(openings, edge, end, target, opening)
-        return openings, SolenoidState(coil, pending if pending >= end else INFINITY, target, opening)
-
-    def _move(self, openings: list[Segment], begin: float, end: float, target: float, opening: float) -> float:
-        """Append the motion towards the target from `begin` to `end` and the rest after it; the opening at the end."""
-        if not begin < end:
-            return opening
-        ramp = self.opening_ramp if target > opening else self.closing_ramp
-        distance = abs(target - opening)
-        left = distance - ((end - begin) / ramp if ramp > 0 else INFINITY)
-        after = target if left <= _ARRIVED else target + math.copysign(left, opening - target)
-        arrival = min(begin + (ramp * distance if after == target else INFINITY), end)
-        if arrival > begin:
-            openings.append((arrival, opening, (after - opening) / (arrival - begin)))
-        if end > arrival:
-            openings.append((end, after, 0.0))
-        return after
+        openings, later = _driven("delayed_switch", self.settings, state, command, start, ({}, {}))
+        return openings, SolenoidState(*later)
 
 
 class PwmState(NamedTuple):
@@ -132,84 +107,33 @@ class PWM(Driver):
     def init(self, start: float) -> PwmState:
         return PwmState(origin=start, begun=0.0, pulse_end=-INFINITY)
 
-    def step(self, state: PwmState, command: Sequence[Segment], start: float) -> tuple[list[Segment], PwmState]:
-        end, period = command[-1][0], 1.0 / self.frequency
-        if state.origin + state.begun / self.frequency >= _last_begin(end):  # no period begins
-            return _rest_of_pulse(start, state.pulse_end, end), state
-        smallest = max(self.smallest_pulse, 1e-9 * period, 4 * math.ulp(end))
-        levels: list[tuple[float, float]] = []  # instant, level from then on
-        pulse_end, count = state.pulse_end, 0
-        _add_pulse(levels, start, pulse_end, end)
-        for begin, duty in _values_at(command, start, self._periods(state, start, end)):
-            width = period * min(max(duty, 0.0), 1.0)
-            pulse_end = -INFINITY if width < smallest else INFINITY if period - width < smallest else begin + width
-            if count == 0 and begin == start:
-                levels.clear()
-            _add_pulse(levels, begin, pulse_end, end)
-            count += 1
-        pulses = [(instant, level) for i, (instant, level) in enumerate(levels) if not i or level != levels[i - 1][1]]
-        ends = [*(instant for instant, _ in pulses[1:]), end]
-        later = PwmState(state.origin, state.begun + count, pulse_end)
-        return [(e, level, 0.0) for e, (_, level) in zip(ends, pulses, strict=True)], later
+    @property
+    def settings(self) -> tuple[float, ...]:
+        """The parameters, in the order of the kernel."""
+        return self.frequency, self.smallest_pulse
 
-    def _periods(self, state: PwmState, start: float, end: float) -> Iterator[float]:
-        """The starts [s] of the periods that begin before `end`."""
+    def step(self, state: PwmState, command: Sequence[Segment], start: float) -> tuple[list[Segment], PwmState]:
+        end = command[-1][0]
         count = (end - state.origin) * self.frequency - state.begun
         if count > MAX_PERIODS:
             raise ParameterError(
                 f"a carrier of {self.frequency:g} Hz has {count:.3g} periods in {end - start:g} s; {MAX_PERIODS} are "
                 "allowed. Simulate a shorter time, or the mean of the pulses."
             )
-        last = _last_begin(end)
-        for i in range(max(math.ceil(count) + 1, 0)):
-            begin = state.origin + (state.begun + i) / self.frequency
-            if begin < last:
-                yield max(begin, start)
+        ulp = math.ulp(end)
+        openings, later = _driven("pulse_width_modulation", self.settings, state, command, start, ulp)
+        return openings, PwmState(*later)
 
 
-def _last_begin(end: float) -> float:
-    """The instant [s] before which a period begins that belongs to a command until `end` [s].
-
-    One that begins where rounding alone keeps it before the end belongs to the command from there on.
-    """
-    return end - 4 * math.ulp(abs(end))
-
-
-def _rest_of_pulse(start: float, pulse_end: float, end: float) -> list[Segment]:
-    """The opening from `start` to `end` [s] in which no period begins."""
-    if not pulse_end > start:
-        return [(end, 0.0, 0.0)]
-    return [(pulse_end, 1.0, 0.0), (end, 0.0, 0.0)] if pulse_end < end else [(end, 1.0, 0.0)]
-
-
-def _add_pulse(levels: list[tuple[float, float]], begin: float, pulse_end: float, end: float) -> None:
-    """Append the level at `begin`, and the end of a pulse that ends before `end`."""
-    on = pulse_end > begin
-    levels.append((begin, 1.0 if on else 0.0))
-    if on and pulse_end < end:
-        levels.append((pulse_end, 0.0))
-
-
-def _values_at(command: Sequence[Segment], start: float, times: Iterator[float]) -> Iterator[tuple[float, float]]:
-    """Rising times [s] with the value of a command there; where two segments meet, that of the later one."""
-    k, last, begin = 0, len(command) - 1, start
-    for time in times:
-        while k < last and command[k][0] <= time:
-            begin = command[k][0]
-            k += 1
-        _, value, slope = command[k]
-        yield time, value + (time - begin) * slope
-
-
-def _switchings(command: Sequence[Segment], start: float, coil: float) -> Iterator[tuple[float, float]]:
-    """Instants [s] at which the current of a coil changes, and the new current; `coil` is the current before."""
-    begin = start
-    for end, value, slope in command:
-        first, last = value >= THRESHOLD, value + slope * (end - begin) >= THRESHOLD
-        if first != (coil > 0):
-            coil = float(first)
-            yield begin, coil
-        if last != first:
-            coil = float(last)
-            yield min(begin + (THRESHOLD - value) / slope, end), coil
-        begin = end
+def _driven(
+    kernel: str, settings: tuple[float, ...], state: tuple[float, ...], command: Sequence[Segment], start: float,
+    last: Any,
+) -> tuple[list[Segment], list[float]]:  # fmt: skip
+    """The opening and the state that a kernel makes of a command, with its `last` argument before the result."""
+    ends: dict[int, float] = {}
+    values: dict[int, float] = {}
+    slopes: dict[int, float] = {}
+    later, signal = [*state], list(zip(*command, strict=True))
+    function = plain_kernels("drivers")[kernel]
+    count = function(settings, state, later, signal, len(signal[0]), start, last, (ends, values, slopes))
+    return [(ends[i], values[i], slopes[i]) for i in range(count)], later

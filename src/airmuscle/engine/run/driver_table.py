@@ -53,7 +53,7 @@ class DriverTable:
                 check_command_range(name, inputs.column(names.index(name)), float(prepared.instants[0]))
         m = inputs.values.shape[1]
         self.kinds = np.array([(names.index(n), KINDS[type(d)]) for n, d in self._order], np.int64).reshape(-1, 2)
-        self.settings = _table([_settings(driver) for _, driver in self._order])
+        self.settings = _table([d.settings for _, d in self._order if isinstance(d, PWM | SolenoidDriver)])
         self.kept = _table([tuple(one) for name in chains for one in state.drivers[name]])
         self.states, self._first = self.kept.copy(), self.kept.copy()
         self.columns, self.scratch = np.empty((m, 3, capacity)), np.empty((2, 3, capacity))
@@ -74,13 +74,6 @@ class DriverTable:
 
 def _chains(loop: ControlLoop) -> dict[str, tuple[Driver, ...]]:
     return WithDrivers(loop.other_inputs, loop.drivers).chains
-
-
-def _settings(driver: Driver) -> tuple[float, ...]:
-    if isinstance(driver, PWM):
-        return driver.frequency, driver.smallest_pulse
-    assert isinstance(driver, SolenoidDriver)
-    return driver.opening_delay, driver.closing_delay, driver.opening_ramp, driver.closing_ramp
 
 
 def _table(rows: list[tuple[float, ...]]) -> Array:

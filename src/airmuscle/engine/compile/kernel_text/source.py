@@ -7,9 +7,11 @@ import dataclasses
 import functools
 import inspect
 import io
+import math
 import tokenize
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from importlib import resources
+from typing import Any
 
 import numpy as np
 
@@ -87,6 +89,45 @@ def _functions(text: str, file: str) -> dict[str, KernelSource]:
 def read_text(text: str, file: str) -> dict[str, KernelSource]:
     """The functions of the text of a module, by name; `file` is its name in messages."""
     return _functions(text, file)
+
+
+@functools.cache
+def plain_kernels(module: str) -> Mapping[str, Callable[..., Any]]:
+    """The functions of a module of `compile/kernels/` in plain Python, by name: for few numbers, without numba.
+
+    A table is a sequence of rows, which may be mappings from the column."""
+    path = resources.files(_PACKAGE).joinpath(f"{module}.py")
+    tree = _Plain().visit(ast.parse(path.read_text(encoding="utf-8")))
+    defined = read_kernels(module)
+    names: dict[str, Any] = {"np": math}
+    for source in defined.values():
+        names |= source.constants
+    exec(compile(ast.fix_missing_locations(tree), str(path), "exec"), names)
+    return {name: names[name] for name in defined}
+
+
+class _Plain(ast.NodeTransformer):
+    """Functions without decorators, constants known already, and elements of rows of tables."""
+
+    def visit_Module(self, node: ast.Module) -> ast.AST:
+        node.body = [self.visit(each) for each in node.body if isinstance(each, ast.FunctionDef)]
+        return node
+
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
+        node.decorator_list, node.returns = [], None
+        for argument in node.args.args:
+            argument.annotation = None
+        return self.generic_visit(node)
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
+        self.generic_visit(node)
+        if isinstance(node.slice, ast.Tuple):
+            *rows, last = node.slice.elts
+            table = node.value
+            for row in rows:
+                table = ast.copy_location(ast.Subscript(table, row, ast.Load()), node)
+            node.value, node.slice = table, last
+        return node
 
 
 def _constants(nodes: list[ast.stmt]) -> dict[str, float]:

@@ -1,8 +1,7 @@
 """Drivers of an input inside a kernel: pulse width modulation, and a switch with delays and ramps.
 
-They compute what `control.driver.PWM` and `control.driver.SolenoidDriver` compute, operation by operation, and are
-printed as such in exported programs. A signal is an array (3, capacity): end, value at the start, and slope of each
-segment; `count` of them are used.
+`control.driver.PWM` and `control.driver.SolenoidDriver` call them as plain Python, and exported programs print them. A
+signal is an array (3, capacity): end, value at the start, and slope of each segment; `count` of them are used.
 """
 
 from __future__ import annotations
@@ -13,9 +12,11 @@ import numpy as np
 
 from .parts import PART
 
-THRESHOLD = 0.5
 INFINITY = np.inf
+THRESHOLD = 0.5
+"""The coil of a solenoid carries current while its command is at least this (chosen)."""
 ARRIVED = 1e-12
+"""An opening this close to its target has reached it: rounding makes no segment of its own."""
 
 
 @PART
@@ -110,15 +111,16 @@ def find_switchings(signal: Any, count: Any, start: Any, coil: Any, events: Any)
 @PART
 def move_towards(target: Any, opening: Any, edge: Any, stop: Any, settings: Any, result: Any, segments: Any) -> Any:
     """Write the motion of the opening from `edge` to `stop`, and the rest after it; the opening, and the segments."""
-    ramp = settings[2] if target > opening else settings[3]
-    distance = abs(target - opening)
-    travel = (stop - edge) / ramp if ramp > 0.0 else INFINITY
-    left = distance - travel
-    after = target
-    if left > ARRIVED:
-        after = target + left if opening - target >= 0.0 else target - left
-    arrival = edge + ramp * distance if after == target else INFINITY
-    arrival = min(arrival, stop)
+    after, arrival = target, edge
+    if target != opening:
+        ramp = settings[2] if target > opening else settings[3]
+        distance = abs(target - opening)
+        travel = (stop - edge) / ramp if ramp > 0.0 else INFINITY
+        left = distance - travel
+        if left > ARRIVED:
+            after = target + left if opening - target >= 0.0 else target - left
+        arrival = edge + ramp * distance if after == target else stop
+        arrival = min(arrival, stop)
     if arrival > edge:
         result[0, segments], result[1, segments] = arrival, opening
         result[2, segments] = (after - opening) / (arrival - edge)
@@ -139,23 +141,20 @@ def delayed_switch(
     state     coil, pending instant, target, opening; `later` receives it at the end of the signal
     events    (3, capacity): workspace
     """
-    end = signal[0, count - 1]
-    coil, pending, target, opening = state[0], state[1], state[2], state[3]
+    end, coil, pending, target, opening = signal[0, count - 1], state[0], state[1], state[2], state[3]
     switchings = find_switchings(signal, count, start, coil, events)
     edge, segments = start, 0
-    for k in range(switchings + 2):
+    for k in range(switchings + 1):
         instant = events[0, k] if k < switchings else INFINITY
-        moves = pending < min(instant, end) and coil != target
-        stop = pending if moves else edge
-        if k == switchings + 1:
-            stop = end
-        if stop > edge:
-            opening, segments = move_towards(target, opening, edge, stop, settings, result, segments)
-        if moves and k <= switchings:
+        if coil != target and pending < instant and pending < end:
+            if pending > edge:
+                opening, segments = move_towards(target, opening, edge, pending, settings, result, segments)
             edge, target = pending, coil
         if k < switchings:
             coil = events[1, k]
             delay = settings[0] if coil > 0.0 else settings[1]
             pending = instant + delay
+    if end > edge:
+        opening, segments = move_towards(target, opening, edge, end, settings, result, segments)
     later[0], later[1], later[2], later[3] = coil, pending if pending >= end else INFINITY, target, opening
     return segments
