@@ -204,6 +204,8 @@ def test_a_folder_in_the_place_of_its_muscle_file_names_the_file(tmp_path: Path,
     (tmp_path / "fit" / "muscle.toml").touch()
     monkeypatch.chdir(tmp_path)
     assert_failed(airmuscle("show", "fit"), ".* 'fit' is a folder; write fit/muscle.toml")
+    assert_failed(airmuscle("predict", "fit", "x.csv"), "fit: is a folder; write fit/muscle.toml")
+    assert_failed(airmuscle("show", tmp_path), ".*is a folder; it contains neither muscle.toml nor scenario.toml")
     assert_failed(
         airmuscle("export", "dmsp-20-300", "--to", "c"), "dmsp-20-300: there is no such file, .* plants are arm-"
     )

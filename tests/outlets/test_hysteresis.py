@@ -186,6 +186,9 @@ def test_friction_that_grows_with_pressure_is_written_once_for_all_runs_and_runs
     result = airmuscle("hysteresis", *files, *LENGTH, "--muscle", MUSCLE, "--elements", 4, "--out", out)
     assert result.exit_code == 0, result.stderr
     assert "The data justify this friction for all runs." in result.stdout
+    listed = [line for line in result.stdout.splitlines() if "isobaric at" in line]
+    assert [line.split()[0] for line in listed] == [f"{pressure}.csv" for pressure in (3e5, 4e5, 5e5)]
+    assert len(result.stdout.splitlines()) < 40
     friction = load(out / "muscle.toml").friction
     assert friction.pressure_factor(3.5e5) == pytest.approx(1.125 / 1.5, abs=0.05)
     page = (out / "report.html").read_text(encoding="utf-8")

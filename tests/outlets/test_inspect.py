@@ -187,3 +187,16 @@ def test_an_unreadable_file_is_an_error_on_one_line(tmp_path: Path, monkeypatch,
     assert result.exit_code == code
     assert expected in result.stderr
     assert code == 2 or len(result.stderr.strip().splitlines()) == 1
+
+
+def test_many_files_have_one_line_each_and_each_finding_once(tmp_path: Path, monkeypatch):
+    for name in ("a", "b", "c"):
+        bench(tmp_path / f"{name}.csv", glitch=None if name == "c" else 95)
+    monkeypatch.setenv("COLUMNS", "160")
+    text = airmuscle("inspect", *sorted(tmp_path.glob("*.csv"))).stdout
+    lines = text.splitlines()
+    assert [line.split()[:2] for line in lines[2:5]] == [[f"{name}.csv", "400"] for name in "abc"]
+    assert [line.split()[3] for line in lines[2:5]] == ["1", "1", "0"]
+    assert text.count("saturates at its lower limit") == 1
+    assert "resting_length: 300 mm" in lines
+    assert len(lines) < 12

@@ -185,3 +185,15 @@ def test_an_equal_force_at_both_ends_is_one_number():
     assert result.exit_code == 0, result.output
     assert "392" in result.stdout
     assert "392 to 392" not in result.stdout
+
+
+@pytest.mark.parametrize("width", [90, 100])
+def test_no_heading_and_no_number_of_the_table_is_broken(monkeypatch, width):
+    monkeypatch.setenv("COLUMNS", str(width))
+    words = ["size", "--load", "20 kg", "--stroke", "40 mm", "--supply", "6 bar", "--max-length", "400 mm"]
+    lines = CliRunner().invoke(app, words).stdout.splitlines()
+    table = lines[1 : lines.index(next(line for line in lines if line.startswith("air:")))]
+    assert max(map(len, table)) <= width
+    head = " ".join(table[:2])
+    assert all(word in head.split() for word in ("length", "pressure", "contraction", "force", "reserve", "air"))
+    assert any(line.split()[-1] == "0.539" for line in table)

@@ -20,9 +20,9 @@ OPTIONAL_PARTS = ("spring", "damper", "friction", "wall", "series", "stop", "cre
 """Optional elements of a muscle, as fields of an entry and tables of its file."""
 
 MISSING_GEOMETRY = (
-    "a [geometry], from which a plant takes the enclosed volume. Give it to airmuscle fit or campaign with --braid "
-    "'radius=10 mm, angle=24.4 deg' and the resting length, or as a table [geometry] of the file or in [plant.muscle]. "
-    "It is measured by the outer diameter at rest and at full contraction, or by the fill of a held muscle"
+    "a [geometry], from which a plant takes the enclosed volume: give airmuscle fit or campaign --braid 'radius=10 mm, "
+    "angle=24.4 deg' (from the outer diameter at rest and at full contraction) and the resting length, or write the "
+    "table [geometry] in the file or in [plant.muscle]"
 )
 """Geometry that a law needs to be a muscle, and the ways to give and to measure it."""
 

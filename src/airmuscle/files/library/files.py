@@ -107,6 +107,9 @@ def read_toml(path: Path) -> dict[str, Any]:
     try:
         if "\0" not in str(path) and not path.exists():
             raise FileError(f"{path}: there is no such file.")
+        if path.is_dir():
+            rest = "; it contains neither muscle.toml nor scenario.toml, which a fit or a campaign writes."
+            raise FileError(f"{path}: is a folder{_file_in_folder(str(path)).partition(' is a folder')[2] or rest}")
         check_regular_file(path)
         return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:

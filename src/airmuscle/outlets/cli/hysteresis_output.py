@@ -13,9 +13,15 @@ from ...bench.identify.hysteresis.hysteresis_chapter import describe_row_counts
 from ...core import leaves
 from .terminal import echo, print_table
 
+MAX_TABLES = 2
+"""Maximum number of loops with a table of all laws; of more loops there is one line each (chosen)."""
+
 
 def print_loops(fits: Sequence[LoopFit]) -> None:
-    """Print the friction laws of each loop."""
+    """Print the friction laws of each loop, or of many loops the best law of each; the report contains all."""
+    if len(fits) > MAX_TABLES:
+        _print_many(fits)
+        return
     for fit in fits:
         echo(f"{fit.loop.recording.origin}: {fit.loop.description}. {describe_row_counts(fit.loop)}")
         rows = [
@@ -32,6 +38,23 @@ def print_loops(fits: Sequence[LoopFit]) -> None:
         for name, reason in fit.failed.items():
             echo(f"note: {name} was not fitted: {reason}")
         echo()
+
+
+def _print_many(fits: Sequence[LoopFit]) -> None:
+    rows = []
+    for fit in fits:
+        best = fit.recommended or min(fit.fits, key=lambda each: -each.aicc_reduction)
+        errors = f"{best.rmse_without_friction:.3g} to {best.rmse:.3g} N"
+        place = (fit.loop.recording.origin, fit.loop.description, str(int(fit.loop.fitted_rows.sum())))
+        rows.append((*place, type(best.friction).__name__, errors, "yes" if fit.recommended else "no"))
+    print_table(("run", "kind", "rows", "best law", "rms error", "justified"), rows, right=("rows",))
+    reasons: dict[str, list[str]] = {}
+    for fit in fits:
+        for name, reason in fit.failed.items():
+            reasons.setdefault(f"{name} was not fitted to {{}}: {reason}", []).append(fit.loop.recording.origin)
+    for text, origins in reasons.items():
+        echo(f"note: {text.format(origins[0] if len(origins) == 1 else f'{len(origins)} runs')}")
+    echo()
 
 
 def print_creep(creep: HeldCreep | None) -> None:
@@ -57,7 +80,8 @@ def print_joint(joint: Sequence[JointFit], not_joined: Sequence[str]) -> None:
     headers = ("model", "depends on pressure", "rms error", "difference in AICc", "runs that disagree", "justified")
     print_table(headers, rows, right=headers[3:5])
     best = preferred_fit(joint) or joint[0]
-    for sentence in (*map(str, best.agreement), *not_joined, str(best)):
+    shown = [run for run in best.agreement if run.disagrees or len(best.agreement) <= MAX_TABLES]
+    for sentence in (*map(str, shown), *not_joined, str(best)):
         echo(sentence)
     echo()
 

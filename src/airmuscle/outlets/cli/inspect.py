@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,7 +16,7 @@ from ...core.output_folder import atomic_folder
 from ...core.plotting import save
 from ...recording import Recording
 from ...recording.columns import quantity_of
-from .inspection_text import COLUMNS, column_rows, summary
+from .inspection_text import COLUMNS, FILES, column_rows, common_lines, file_row, summary
 from .options import Json, OptionalFolder
 from .progress import reading_progress
 from .reading_options import NO_OPTIONS, ReadingOptions, with_reading_options
@@ -54,8 +55,11 @@ def inspect(
     if json:
         print_json([_to_dict(each) for each in inspections])
         return
-    for each in inspections:
-        _print(each)
+    if len(inspections) > 1:
+        _print_many(inspections)
+    else:
+        for each in inspections:
+            _print(each)
     if out:
         echo(f"figures: {out}")
 
@@ -127,6 +131,14 @@ def _column_to_dict(recording: Recording, name: str) -> dict[str, Any]:
         "min": float(values.min()),
         "max": float(values.max()),
     }
+
+
+def _print_many(inspections: Sequence[Inspection]) -> None:
+    """One line for each file, then each finding once with its files; a single file is printed in full."""
+    print_table(FILES, map(file_row, inspections), right=FILES[1:-2])
+    for line in common_lines(inspections):
+        echo(line)
+    echo("Give one file for its columns, sensors, branches and outliers; --json prints all.")
 
 
 def _print(inspection: Inspection) -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from ...report.formatting import MISSING
 from .option_hints import in_options
 
 COLUMNS = ("column", "unit in file", "min", "max", "unit", "resolution", "noise", "saturated at")
+FILES = ("file", "rows", "rows per second", "outliers", "quantities", "runs")
 MAX_ITEMS = 8
 """Items of a list that are printed; JSON contains all."""
 
@@ -39,9 +41,7 @@ def column_rows(inspection: Inspection) -> Iterator[tuple[str, ...]]:
 
 def summary(inspection: Inspection) -> Iterator[str]:
     """Constants, sampling, runs, branches, plateaus, outliers, notes and findings, one line each."""
-    for name, value in inspection.recording.constants.items():
-        factor, unit = display_scale(CONSTANT_QUANTITIES.get(name, ""))
-        yield f"{name}: {value * factor:.4g} {unit}" if isinstance(value, float) and unit else f"{name}: {value}"
+    yield from _constants(inspection)
     if inspection.sampling:
         yield f"sampling: {_describe_sampling(inspection.sampling)}"
     yield f"runs: {_shorten([_describe_run(run) for run in inspection.runs])}"
@@ -57,10 +57,53 @@ def summary(inspection: Inspection) -> Iterator[str]:
     if inspection.outliers:
         outliers = _shorten(list(map(str, inspection.outliers)))
         yield f"suspected outliers: {len(inspection.outliers)}, not removed: {outliers}"
+    yield from _remarks(inspection)
+
+
+def _constants(inspection: Inspection) -> Iterator[str]:
+    for name, value in inspection.recording.constants.items():
+        factor, unit = display_scale(CONSTANT_QUANTITIES.get(name, ""))
+        yield f"{name}: {value * factor:.4g} {unit}" if isinstance(value, float) and unit else f"{name}: {value}"
+
+
+def _remarks(inspection: Inspection) -> Iterator[str]:
     yield from (f"note: {note}" for note in inspection.recording.notes)
     for finding in inspection.findings:
         label = "PROBLEM" if finding.serious else "note"
         yield f"{label}: {in_options(finding.text, 'inspect')}"
+
+
+def file_row(inspection: Inspection) -> tuple[str, ...]:
+    """The row of a file in the table of many files: its runs are the first and the number of the others."""
+    sampling, runs = inspection.sampling, inspection.runs
+    more = f" and {len(runs) - 1} more" if len(runs) > 1 else ""
+    return (
+        inspection.recording.origin,
+        str(len(inspection.recording)),
+        f"{sampling.rate:.4g}" if sampling else MISSING,
+        str(len(inspection.outliers)),
+        ", ".join(name for name in inspection.recording if name != "time"),
+        f"{_describe_run(runs[0]).partition(', rows')[0]}{more}" if runs else MISSING,
+    )
+
+
+def common_lines(inspections: Sequence[Inspection]) -> Iterator[str]:
+    """The constants of many files with their values, and each note or finding once, with the number of its files."""
+    constants: dict[str, list[str]] = {}
+    remarks: dict[str, list[tuple[str, str]]] = {}
+    for inspection in inspections:
+        for line in _constants(inspection):
+            constants.setdefault(line.partition(": ")[0], []).append(line.partition(": ")[2])
+        for remark in dict.fromkeys(_remarks(inspection)):
+            remarks.setdefault(re.sub(r"\d[\d.]*", "#", remark), []).append((remark, inspection.recording.origin))
+    for name, values in constants.items():
+        yield f"{name}: {_shorten(list(dict.fromkeys(values)))}"
+    for found in remarks.values():
+        (remark, origin), others = found[0], len(found) - 1
+        same = len({text for text, _ in found}) == 1
+        rest = f" and {others} more" if others else ""
+        which = f"{origin}{rest}" if same else f"{origin}; others with other numbers: {others}"
+        yield remark if same and len(found) == len(inspections) else f"{remark} ({which})"
 
 
 def _shorten(items: list[str]) -> str:

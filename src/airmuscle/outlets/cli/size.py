@@ -32,8 +32,8 @@ from .terminal import echo, print_json, print_table
 
 SCENARIO_FILE = "scenario.toml"
 FIRST = ("muscle", "number", "length [mm]", "radius [mm]")
-LAST = {"reserve [%]": "reserve [%]", "air a cycle [l (ANR)]": "air [l]", "efficiency [%]": "efficiency [%]"}
-"""Columns of the table on the terminal, before and after the ranges of the end points."""
+LAST = {"reserve [%]": "reserve [%]", "air a cycle [l (ANR)]": "air [l]"}
+"""Columns of the table on the terminal, before and after the ranges of the end points; the report has all."""
 RANGES = {"pressure [bar]": "pressure", "contraction [%]": "contraction", "force [N]": "force"}
 
 

@@ -16,6 +16,10 @@ from ...report.write import as_json
 
 WIDE = 160
 """Width [characters] of a table that is written to a file or to another program."""
+MAX_WORD = 14
+"""Length of a word that may be broken, such as a path [characters] (chosen)."""
+WIDE_GAP = 3
+"""Space between two columns of a table [characters]; one less where the table does not fit otherwise (chosen)."""
 
 
 def echo(text: str = "", *, err: bool = False) -> None:
@@ -35,15 +39,39 @@ def print_table(headers: Sequence[str], rows: Iterable[Sequence[Any]], *, right:
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, header_style="bold")
     scales = [heading_scale(header) for header in headers]  # the units chosen for display
-    for i, header in enumerate(headers):  # the first column is not wrapped, so that its names can be copied
-        justify: Any = "right" if header in right else "left"
-        table.add_column(without_markup(scales[i][1]), justify=justify, overflow="fold", no_wrap=i == 0)
-    for row in rows:
-        table.add_row(*(_cell(cell, factor) for cell, (factor, _) in zip(row, scales, strict=True)))
-    width = None if sys.stdout.isatty() or "COLUMNS" in os.environ else WIDE
-    Console(width=width, highlight=False, emoji=False).print(table)
+    cells = [[_cell(cell, factor) for cell, (factor, _) in zip(row, scales, strict=True)] for row in rows]
+    console = Console(
+        width=None if sys.stdout.isatty() or "COLUMNS" in os.environ else WIDE, highlight=False, emoji=False
+    )
+    headings = [without_markup(scale[1]) for scale in scales]
+    widths, gap = _column_widths(headings, cells, console.width)
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, header_style="bold",
+                  padding=(0, 1) if gap == WIDE_GAP else (0, 1, 0, 0))  # fmt: skip
+    for i, heading in enumerate(headings):  # the first column is not wrapped, so that its names can be copied
+        justify: Any = "right" if headers[i] in right else "left"
+        table.add_column(heading, justify=justify, overflow="fold", no_wrap=i == 0, width=widths[i])
+    for row in cells:
+        table.add_row(*row)
+    console.print(table)
+
+
+def _column_widths(headings: Sequence[str], cells: Sequence[Sequence[Any]], width: int) -> tuple[list[int | None], int]:
+    """The widths of the columns and the space between them, so that no word of a heading and no number is broken.
+
+    Widths are None where the table fits, or cannot fit.
+    """
+    columns = list(zip(headings, *([str(getattr(cell, "plain", cell)) for cell in row] for row in cells), strict=True))
+    widest, count = [max(map(len, column)) for column in columns], len(headings) - 1
+    least = [max((len(w) for text in column for w in text.split() if len(w) <= MAX_WORD), default=1)
+             for column in columns]  # fmt: skip
+    least[0] = widest[0]
+    gap = WIDE_GAP if sum(least) + WIDE_GAP * count <= width else WIDE_GAP - 1
+    if sum(widest) + WIDE_GAP * count <= width or sum(least) + gap * count > width:
+        return [None] * len(headings), WIDE_GAP
+    while sum(widest) + gap * count > width:
+        widest[max(range(1, len(widest)), key=lambda i: widest[i] - least[i])] -= 1
+    return list(widest), gap
 
 
 def _cell(cell: Any, factor: float) -> Any:

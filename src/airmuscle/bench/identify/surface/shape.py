@@ -28,6 +28,8 @@ from .monotonicity import MonotonicityRule, MonotonicityViolation, find_violatio
 _MIN_SLOPE = 1e-9
 """Minimum slope relative to the maximum force, on the validity range scaled to -1..1, so that rounding cannot change
 the sign; chosen."""
+LEAST_SHARE = 1e-3
+"""Share of the validity range below which a region that violates the shape of a fitted law is not named (chosen)."""
 FALLS_WITH_PRESSURE = MonotonicityRule("force falls with pressure", "force", 0, -1.0)
 RISES_WITH_CONTRACTION = MonotonicityRule("force rises with contraction", "force", 1, 1.0)
 
@@ -49,7 +51,8 @@ def shape_violations_of_fit(fit: Fit, *, points: int = 101) -> tuple[Monotonicit
     varies = all(low < high for low, high in fit.data_ranges.values())
     if not isinstance(law, ForceLaw) or not law.traceable or not varies:
         return ()
-    return find_shape_violations(law, fit.validity_range, points=points)
+    found = find_shape_violations(law, fit.validity_range, points=points)
+    return tuple(each for each in found if each.area_fraction >= LEAST_SHARE)
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
