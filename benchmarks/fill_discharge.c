@@ -30,7 +30,7 @@ INLINE double flow(const Muscle *p, double up, double down) {
   return up >= down ? q : -q;
 }
 
-INLINE double value(const double *a, double x, double q) {
+INLINE double surface_value(const double *a, double x, double q) {
   double r0 = a[0] + x * (a[1] + x * (a[2] + x * (a[3] + x * (a[4] + x * a[5]))));
   double r1 = a[6] + x * (a[7] + x * (a[8] + x * (a[9] + x * a[10])));
   double r2 = a[11] + x * (a[12] + x * (a[13] + x * a[14]));
@@ -41,7 +41,7 @@ INLINE double value(const double *a, double x, double q) {
 INLINE double surface(const Muscle *p, double x, double q) {
   const double *a = p->a;
 #ifdef SKIP
-  if (x >= -1.0 && x <= 1.0 && q >= -1.0 && q <= 1.0) return value(a, x, q);
+  if (x >= -1.0 && x <= 1.0 && q >= -1.0 && q <= 1.0) return surface_value(a, x, q);
 #endif
   double xi = smaller(larger(x, -1.0), 1.0), qi = smaller(larger(q, -1.0), 1.0);
   double r0 = a[0] + xi * (a[1] + xi * (a[2] + xi * (a[3] + xi * (a[4] + xi * a[5]))));
@@ -92,7 +92,7 @@ INLINE void rates(const Plant *p, const double *y, const double *u, double *k) {
   for (int j = 0; j < STATES; j++) x[j] = y[j] + h * (TERMS); \
   rates(p, x, u, k##i);
 
-INLINE void step(const Plant *p, double *y, const double *u, double h) {
+INLINE void plant_step(const Plant *p, double *y, const double *u, double h) {
   double x[STATES], k0[STATES];
   rates(p, y, u, k0);
   EXPLICIT_STAGES
@@ -109,7 +109,7 @@ void integrate(const Plant *plant, const double *start, int segments, const int 
     double u[2 * MUSCLES];
     for (int j = 0; j < 2 * MUSCLES; j++) u[j] = inputs[2 * MUSCLES * s + j];
     for (int done = 0; done < steps[s]; done += every) {
-      for (int i = 0; i < every; i++) step(&local, y, u, h);
+      for (int i = 0; i < every; i++) plant_step(&local, y, u, h);
       for (int j = 0; j < STATES; j++) *rows++ = y[j];
     }
   }

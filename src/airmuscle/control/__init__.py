@@ -1,5 +1,5 @@
 """Control: control laws, their compensators, state estimation and predictive controllers."""
 
-from .. import _attach_stub
+from ..core.stubs import attach_stub
 
-__getattr__, __dir__, __all__ = _attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

@@ -1,5 +1,5 @@
 """Design: parameter studies, sizing, tuning of controllers, and the benchmark of controllers."""
 
-from .. import _attach_stub
+from ..core.stubs import attach_stub
 
-__getattr__, __dir__, __all__ = _attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

@@ -1,5 +1,5 @@
 """Outlets: command line, page in the browser, exports in other languages, learning environments."""
 
-from .. import _attach_stub
+from ..core.stubs import attach_stub
 
-__getattr__, __dir__, __all__ = _attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

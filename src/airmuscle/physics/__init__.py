@@ -1,5 +1,5 @@
 """Physics: muscles, pneumatics, mechanisms, plants, their equilibria and linearisation."""
 
-from .. import _attach_stub
+from ..core.stubs import attach_stub
 
-__getattr__, __dir__, __all__ = _attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

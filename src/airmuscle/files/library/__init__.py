@@ -1,5 +1,5 @@
 """Library: parameter sets of muscles, laws, valves, plants and products as TOML files, with sources and checks."""
 
-from ... import _attach_stub
+from ...core.stubs import attach_stub
 
-__getattr__, __dir__, __all__ = _attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

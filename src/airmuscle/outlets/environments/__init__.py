@@ -3,6 +3,6 @@
 Each name is imported when it is first used, so that `register_environments` costs little.
 """
 
-from ... import _attach_stub
+from ...core.stubs import attach_stub
 
-__getattr__, __dir__, __all__ = _attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)
