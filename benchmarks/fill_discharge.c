@@ -100,7 +100,7 @@ INLINE void plant_step(const Plant *p, double *y, const double *u, double h) {
 }
 
 /* Writes a row every `every` steps; the steps of each segment must be a multiple of it. */
-void integrate(const Plant *plant, const double *start, int segments, const int *steps, const double *inputs, double h, int every,
+void run_plant(const Plant *plant, const double *start, int segments, const int *steps, const double *inputs, double h, int every,
          double *rows) {
   Plant local = *plant;
   double y[STATES];

@@ -77,10 +77,10 @@ def make_c_run(
     rows = np.empty((int(steps.sum()) * round(STEP * 1e6) // round(SPACING * 1e6) + 1, start.size))
     arguments = [plant.ctypes.data, start.ctypes.data, len(steps), steps.ctypes.data, inputs.ctypes.data]
     at = ctypes.c_void_p
-    library.integrate.argtypes = [at, at, ctypes.c_int, at, at, ctypes.c_double, ctypes.c_int, at]
+    library.run_plant.argtypes = [at, at, ctypes.c_int, at, at, ctypes.c_double, ctypes.c_int, at]
 
     def call(keep: Any = (plant, start, inputs, steps)) -> Array:
-        library.integrate(*arguments, STEP, round(SPACING / STEP), rows.ctypes.data)
+        library.run_plant(*arguments, STEP, round(SPACING / STEP), rows.ctypes.data)
         return rows
 
     return call
