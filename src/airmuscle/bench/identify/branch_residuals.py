@@ -15,6 +15,7 @@ from ...recording import Recording
 from ...recording.columns import QUANTITIES
 from ..segment import branch_directions, estimate_sensors, find_branches
 from ..segment.branches import branch_name
+from ..segment.remembered import remembered
 
 MIN_BRANCH_ROWS = 5
 """Minimum number of rows of a branch (chosen); the jump between two levels of a map is no branch."""
@@ -97,7 +98,7 @@ def _branch_differences(run: Recording, residuals: Array) -> Array:
 
 def _branch_bins(run: Recording) -> _BranchBins:
     known = np.isfinite(run["pressure"])
-    complete = run.rows(known)
+    complete = run if known.all() else run.rows(known)
     branches = tuple(each for each in find_branches(complete) if len(each.interval) >= MIN_BRANCH_ROWS)
     if len({branch.direction for branch in branches}) < 2:
         return _BranchBins(known, np.zeros(0), np.zeros(0, dtype=np.intp), "")
@@ -109,6 +110,15 @@ def _branch_bins(run: Recording) -> _BranchBins:
 
 def _sensor_deviation(runs: Sequence[Recording], quantity: str) -> float:
     """Standard deviation of one reading of the quantity [SI]; 0 where it cannot be estimated."""
-    columns = [run[quantity][np.isfinite(run[quantity])] for run in runs]
-    sensors = estimate_sensors([Recording({quantity: values}, "fit") for values in columns if values.size])
-    return sensors[quantity].std if quantity in sensors else 0.0
+    known = _deviations(runs)
+    if quantity not in known:
+        columns = [run[quantity][np.isfinite(run[quantity])] for run in runs]
+        sensors = estimate_sensors([Recording({quantity: values}, "fit") for values in columns if values.size])
+        known[quantity] = sensors[quantity].std if quantity in sensors else 0.0
+    return known[quantity]
+
+
+@remembered
+def _deviations(runs: Sequence[Recording]) -> dict[str, float]:
+    """The standard deviations of the sensors that are known, by quantity: a comparison asks for them for every law."""
+    return {}

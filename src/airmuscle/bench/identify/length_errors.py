@@ -111,14 +111,16 @@ def corrected_length(run: Recording, offset: float) -> Recording:
 
 
 def estimate_length_error(
-    model: Characteristic, recordings: Sequence[Recording], specimen: str, prior_std: float = PRIOR_STD
-) -> LengthError:
+    model: Characteristic, recordings: Sequence[Recording], specimen: str, prior_std: float = PRIOR_STD,
+    min_reduction: float = 0.0,
+) -> LengthError:  # fmt: skip
     """The error of the resting length of one specimen, estimated together with the parameters of a law.
 
     model       the law fitted to all recordings, as initial values; of a PooledLengthLaw its population law, because
                 effects of the specimens take up an error of their length
     specimen    name as SpecimenSplit gives it: the constant `specimen`, or the resting length in mm
     prior_std   standard deviation [m] of the normal prior of the error, whose mean is 0
+    min_reduction  reduction of the mean square residual below half of which, by its derivative, the search is ended
 
     Rows are correlated, so that the squares are divided by the ratio of rows to effective rows. Raises
     IdentificationError where the corrected data do not determine the law, ParameterError for an unknown specimen.
@@ -133,7 +135,10 @@ def estimate_length_error(
     for _ in range(_ITERATIONS):
         state = _State.at(model, recordings, members, offset)
         model = state.model
-        first = state.rmse if np.isnan(first) else first
+        if np.isnan(first):
+            first = state.rmse
+            if state.reachable_reduction < 0.5 * min_reduction:
+                break
         change = state.newton_step(offset, prior_std)
         offset = float(np.clip(offset + change, -0.2 * recorded, 0.2 * recorded))
         if abs(change) < 1e-3 * state.standard_error(prior_std):
@@ -156,9 +161,11 @@ def find_length_errors(model: Characteristic, recordings: Sequence[Recording]) -
         return ()
     try:
         separate = _separate_rmse(recordings, names)
-        if _rmse(model, recordings) <= MIN_MISFIT * separate:
+        rmse = _rmse(model, recordings)
+        if rmse <= MIN_MISFIT * separate:
             return ()
-        estimates = [estimate_length_error(model, recordings, name) for name in names]
+        least = MIN_EXPLAINED * (rmse**2 - separate**2)
+        estimates = [estimate_length_error(model, recordings, name, min_reduction=least) for name in names]
     except IdentificationError:
         return ()
     return tuple(sorted((e for e in estimates if e.explains(separate)), key=lambda e: abs(e.offset)))
@@ -209,6 +216,12 @@ class _State(NamedTuple):
         variance = float(residuals @ residuals) / max(residuals.size - matrix.shape[1], 1) / share
         rmse = float(np.sqrt(np.mean(residuals**2)))
         return cls(model, residuals, derivative - basis @ (basis.T @ derivative), variance, rmse)
+
+    @property
+    def reachable_reduction(self) -> float:
+        """The reduction of the mean square residual by the best correction, if the law is linear in it."""
+        curvature = max(float(self.derivative @ self.derivative), 1e-300)
+        return float(self.derivative @ self.residuals) ** 2 / curvature / self.residuals.size
 
     def newton_step(self, offset: float, prior_std: float) -> float:
         """The change of the offset [m] that minimises the squares and the prior."""

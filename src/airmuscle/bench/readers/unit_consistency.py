@@ -71,7 +71,9 @@ def _compare(name: str, first: Recording, second: Recording) -> None:
     comparable = name.rpartition(".")[2] in ("pressure", "length")
     if unit == other_unit and comparable and _ratio(size, other_size) >= SUSPICIOUS_RATIO:
         _warn(f"the {name} of {both} differs by a factor of {_ratio(size, other_size):.0f}. Check the units.")
-    references = {_pressure_reference(unit), _pressure_reference(other_unit)}
+    quantity = quantity_of(name)
+    is_pressure = quantity is not None and quantity.unit == "Pa"
+    references = {_pressure_reference(each) for each in (unit, other_unit) if is_pressure}
     if len(references) > 1 and "unspecified" in references:
         _warn(f"of {both}, only one states whether its {name} is gauge or absolute; the other is read as gauge.")
 
@@ -100,10 +102,7 @@ def _unit_offset(name: str, unit: str) -> float:
 
 def _pressure_reference(unit: str) -> str:
     """Whether a unit of pressure is gauge, absolute or unspecified."""
-    try:
-        change = conversion(unit, "Pa")
-    except UnitError:
-        return "no pressure"
+    change = conversion(unit, "Pa")
     return "unspecified" if change.assumed_gauge else "absolute" if change.offset else "gauge"
 
 

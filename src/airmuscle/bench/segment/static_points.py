@@ -10,6 +10,7 @@ import numpy.typing as npt
 from ...core.arrays import Array
 from ...recording.displacement import MOVED
 from ...recording.recording import Recording
+from .remembered import remembered
 
 LEVEL_WIDTHS = (0.02, 0.01, 0.005, 0.002)
 """Maximum widths of a level, as fractions of the range of the quantity, the first that separates levels (chosen)."""
@@ -37,6 +38,7 @@ class StaticPoints:
         return f"{self.pressure_level.size} static points at {pressures} pressures and {lengths} {self.moved}s"
 
 
+@remembered
 def find_static_points(recording: Recording) -> StaticPoints | None:
     """The levels of a recording without time whose rows are static points; None for any other recording.
 
@@ -60,12 +62,15 @@ def _levels(values: Array) -> npt.NDArray[np.int64] | None:
     if not span > 0:
         return None
     order = np.argsort(values, kind="stable")
+    ordered = values[order]
+    steps = np.diff(ordered)
     for width in LEVEL_WIDTHS:
-        numbers = np.empty(values.size, dtype=np.int64)
-        numbers[order] = np.concatenate([[0], np.cumsum(np.diff(values[order]) > width * span)])
-        count = int(numbers.max()) + 1
-        if count < MIN_LEVELS or values.size < MIN_ROWS * count:
+        starts = np.concatenate([[0], np.flatnonzero(steps > width * span) + 1])
+        if starts.size < MIN_LEVELS or values.size < MIN_ROWS * starts.size:
             continue
-        if max(float(np.ptp(values[numbers == k])) for k in range(count)) <= width * span:
+        ends = np.append(starts[1:], values.size)
+        if (ordered[ends - 1] - ordered[starts] <= width * span).all():
+            numbers = np.empty(values.size, dtype=np.int64)
+            numbers[order] = np.repeat(np.arange(starts.size), ends - starts)
             return numbers
     return None
