@@ -2,30 +2,83 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 from ...core.arrays import Array
 from ...core.hints import Hint, HintedText
+from .branch_residuals import branch_distance, branch_notes
 from .censoring import UNCENSORED, Censoring, default_censoring
+from .data_checks import Scatter
 from .fit_points import FitPoints
 from .loss import LeastSquares, Loss
-from .problem import FitProblem
-from .result import Fit
+from .problem import FORCE, FitProblem
+from .result import Fit, Remarks
 from .solver import LeastSquaresSolution
+from .specimen_effects import SpecimenEffects
 from .statistics import FitStatistics
 
+NO_EFFECT = 0.05
+"""Effective number of parameters of the specimen effects below which the specimens do not differ (chosen)."""
 ILL_CONDITIONED = 1e5
 """Condition number of the scaled design matrix above which a note is added (chosen): half of the digits are lost."""
 
 
-def misfit_notes(result: Fit, points: FitPoints) -> list[str]:
+@dataclasses.dataclass(frozen=True, eq=False)
+class Examination:
+    """The examination of the data of a fit, called with the fit; `own` are the notes that need no examination.
+
+    The branches that the residuals follow are those of `problem` with the quantity `modelled` at its rows; of a pooled
+    law they are those of its population.
+    """
+
+    points: FitPoints
+    problem: FitProblem
+    modelled: Array
+    own: tuple[str, ...]
+
+    def __call__(self, fit: Fit) -> Remarks:
+        checks, quantity = self.points.checks, self.problem.fitted_quantity
+        distance = self._branch_distance()
+        scatter = dataclasses.replace(checks.scatter, branches=distance) if quantity == FORCE else None
+        branches = branch_notes(self.points.recordings, distance, quantity.name, delayed=checks.delay is not None)
+        notes = (*checks.notes, *map(str, self.points.repeated), *self.own, *branches)
+        return Remarks((*notes, *_effect_notes(fit.effects), *_misfit_notes(fit, scatter, self.points)), scatter)
+
+    def _branch_distance(self) -> float:
+        """The distance of the residuals of opposite directions of motion [SI]; 0 where they do not differ."""
+        points, quantity = self.points, self.problem.fitted_quantity.name
+        residuals = np.full(len(points.joined), np.nan)
+        differences = self.modelled - self.problem.data[quantity]
+        residuals[~points.missing] = np.where(self.problem.censoring == 0, differences, np.nan)
+        ends = np.cumsum([len(run) for run in points.recordings])
+        return branch_distance(points.recordings, np.split(residuals, ends[:-1]), quantity)
+
+
+def _effect_notes(effects: SpecimenEffects | None) -> tuple[str, ...]:
+    """The remark on the number of parameters of the specimen effects."""
+    if effects is None:
+        return ()
+    count = len(effects.specimens)
+    if effects.degrees_of_freedom < NO_EFFECT:
+        return (f"Partial pooling of {count} specimens: the data show no difference between them.",)
+    return (
+        f"Partial pooling of {count} specimens: coefficients of the specimen effects with a standard "
+        f"deviation of {effects.deviation:.3g} N (restricted maximum likelihood) and {effects.degrees_of_freedom:.3g} "
+        f"effective parameters of {effects.coefficients.size}. The standard errors of the population parameters "
+        "contain this scatter.",
+    )
+
+
+def _misfit_notes(result: Fit, scatter: Scatter | None, points: FitPoints) -> list[str]:
     """A remark where the residuals in force exceed the scatter of the data."""
-    if result.scatter is None:
+    if scatter is None:
         return []
     knows_length = hasattr(result.model, "with_resting_length")
     lengths = {run.constants.get("resting_length") for run in points.recordings} - {None}
     count = 1 if knows_length else len(lengths)
-    return result.scatter.misfit_notes(result.rmse, result.data_ranges["force"][1], count)
+    return scatter.misfit_notes(result.rmse, result.data_ranges["force"][1], count)
 
 
 def weighting_notes(by_recording: Array | None, problem: FitProblem) -> list[str]:

@@ -28,8 +28,6 @@ from .solver import design_matrix
 from .specimen_effects import SpecimenEffects, Sums, predict_effects
 
 Rows = npt.NDArray[np.bool_]
-NO_EFFECT = 0.05
-"""Effective number of parameters of the specimen effects below which the specimens do not differ (chosen)."""
 DECAY_RANGE = 0.05
 """Force below zero of the population, as a fraction of the greatest measured force, at which the effects have decayed
 (chosen): where the population is far from pulling, no specimen pulls."""
@@ -214,19 +212,6 @@ def pool(law: PooledLengthLaw, population: Fit, points: FitPoints) -> Fit:
         correlation_index=correlation_index(target[measured], modelled[measured]),
         recording=data,
         effects=effects,
-        notes=(*population.notes, *_notes(effects)),
-    )
-
-
-def _notes(effects: SpecimenEffects) -> tuple[str, ...]:
-    count = len(effects.specimens)
-    if effects.degrees_of_freedom < NO_EFFECT:
-        return (f"Partial pooling of {count} specimens: the data show no difference between them.",)
-    return (
-        f"Partial pooling of {count} specimens: coefficients of the specimen effects with a standard deviation of "
-        f"{effects.deviation:.3g} N (restricted maximum likelihood) and {effects.degrees_of_freedom:.3g} effective "
-        f"parameters of {effects.coefficients.size}. The standard errors of the population parameters contain this "
-        "scatter.",
     )
 
 

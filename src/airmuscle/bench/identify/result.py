@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+import functools
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -51,6 +52,14 @@ class Estimate:
         return f"{2 * self.stderr:.3g}" if np.isfinite(self.stderr) else "unknown"
 
 
+@dataclasses.dataclass(frozen=True)
+class Remarks:
+    """Notes on a fit and its data, as sentences, and the scatter of the data."""
+
+    notes: tuple[str, ...]
+    scatter: Scatter | None
+
+
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Fit(NotebookDisplay):
     """A fitted characteristic with its data and statistics; `print` it, or `.plot()` it.
@@ -87,11 +96,31 @@ class Fit(NotebookDisplay):
     problem: FitProblem
     """The fitted problem, for refits: data, targets, weights and free parameters."""
     loss: Loss
-    notes: tuple[str, ...] = ()
-    scatter: Scatter | None = None
-    """Noise and repeatability of the measured force; None for laws that give contraction or pressure."""
+    remarks: Remarks | Callable[[Fit], Remarks]
+    """The remarks, or the examination of the data that gives them, which is made when they are first read."""
     effects: SpecimenEffects | None = None
     """The effects of the specimens on a PooledLengthLaw. Estimates and problem are those of its population law."""
+
+    @functools.cached_property
+    def _remarks(self) -> Remarks:
+        return self.remarks if isinstance(self.remarks, Remarks) else self.remarks(self)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "remarks": self._remarks}
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Remarks on the fit and its data, as sentences; the data are examined when they are first read."""
+        return self._remarks.notes
+
+    @property
+    def scatter(self) -> Scatter | None:
+        """Noise and repeatability of the measured force; None for laws that give contraction or pressure."""
+        return self._remarks.scatter
+
+    def with_notes(self, notes: Iterable[str]) -> Fit:
+        """The fit with other notes."""
+        return dataclasses.replace(self, remarks=Remarks(tuple(notes), self.scatter))
 
     @property
     def degrees_of_freedom(self) -> int:

@@ -13,16 +13,16 @@ from ...core.errors import IdentificationError
 from ...physics.muscle.characteristic import PooledLengthLaw
 from ...physics.muscle.characteristic.base import Characteristic
 from ...recording import Recording
-from .branch_residuals import branch_distance, branch_notes
+from ..checks.contractions import MAX_CONTRACTION
 from .censoring import Censoring
 from .correlation_index import correlation_index
 from .fit_arguments import check_arguments
-from .fit_notes import collect_notes, loss_scale_notes, misfit_notes, weighting_notes
+from .fit_notes import Examination, collect_notes, loss_scale_notes, weighting_notes
 from .fit_points import FitPoints
 from .gauss_newton import gauss_newton
 from .loss import LeastSquares, Loss
 from .pooling import check_poolable, pool, refit_pooled
-from .problem import FORCE, FitProblem, evaluate
+from .problem import FitProblem, evaluate
 from .result import Estimate, Fit
 from .row_errors import WorstPoint, rms_of_rows, row_errors
 from .slack_bounds import solve_bounded
@@ -72,15 +72,12 @@ def fit_to_points(
     fixed: Collection[str] = (),
 ) -> Fit:
     """As `fit`, for points whose sensors and runs are estimated once for several laws."""
+    if np.nanmax(points.joined["contraction"], initial=0.0) > MAX_CONTRACTION:
+        _ = points.checks  # raises ColumnError where no muscle is so short
     if not isinstance(characteristic, PooledLengthLaw):
-        result = _fit_law(characteristic, points, loss, censoring, sigma, fixed)
-    else:
-        check_poolable(characteristic, points)
-        result = pool(
-            characteristic, _fit_law(characteristic.population, points, loss, censoring, sigma, fixed), points
-        )
-    notes = (*points.checks.notes, *map(str, points.repeated), *result.notes, *misfit_notes(result, points))
-    return dataclasses.replace(result, notes=notes)
+        return _fit_law(characteristic, points, loss, censoring, sigma, fixed)
+    check_poolable(characteristic, points)
+    return pool(characteristic, _fit_law(characteristic.population, points, loss, censoring, sigma, fixed), points)
 
 
 def _fit_law(
@@ -94,14 +91,8 @@ def _fit_law(
     by_recording = None if sigma is not None else points.deviations(problem.fitted_quantity.name)
     notes = (*collect_notes(problem, statistics, loss, points.dropped), *weighting_notes(by_recording, problem))
     notes += loss_scale_notes(problem, solution, loss)
-    distance = _branch_distance(points, problem, solution)
-    notes += tuple(
-        branch_notes(points.recordings, distance, problem.fitted_quantity.name, delayed=points.checks.delay is not None)
-    )
-    result = _build_result(problem, solution, statistics, loss, points.dropped, notes)
-    if problem.fitted_quantity != FORCE:
-        return result
-    return dataclasses.replace(result, scatter=dataclasses.replace(points.checks.scatter, branches=distance))
+    examination = Examination(points, problem, solution.modelled, notes)
+    return _build_result(problem, solution, statistics, loss, points.dropped, examination)
 
 
 def refit(
@@ -135,7 +126,7 @@ def _build_result(
     statistics: FitStatistics,
     loss: Loss,
     dropped: int,
-    notes: tuple[str, ...],
+    examination: Examination,
 ) -> Fit:
     data, quantity = problem.data, problem.fitted_quantity.name
     model = tree.with_parameters(problem.law, problem.leaf_values(solution.values))
@@ -161,7 +152,7 @@ def _build_result(
         censoring=problem.censoring,
         problem=dataclasses.replace(problem, law=model, leaves=tuple(tree.leaves(model))),
         loss=loss,
-        notes=notes,
+        remarks=examination,
     )
 
 
@@ -181,13 +172,3 @@ def _build_estimates(
         Estimate(leaf.path, label, value, stderr, leaf.declared.unit, leaf.declared.meaning, on_bound)
         for leaf, label, value, stderr, on_bound in columns
     )
-
-
-def _branch_distance(points: FitPoints, problem: FitProblem, solution: LeastSquaresSolution) -> float:
-    """The distance of the residuals of opposite directions of motion [SI]; 0 where they do not differ."""
-    residuals = np.full(len(points.joined), np.nan)
-    quantity = problem.fitted_quantity.name
-    differences = solution.modelled - problem.data[quantity]
-    residuals[~points.missing] = np.where(problem.censoring == 0, differences, np.nan)
-    ends = np.cumsum([len(run) for run in points.recordings])
-    return branch_distance(points.recordings, np.split(residuals, ends[:-1]), quantity)

@@ -27,7 +27,7 @@ def print_results(lines: Sequence[str], out: Path) -> None:
 
 def with_option_names(result: Fit) -> Fit:
     """The fit whose notes name options of `airmuscle fit` instead of Python arguments."""
-    return dataclasses.replace(result, notes=tuple(in_options(note, "fit") for note in result.notes))
+    return result.with_notes(in_options(note, "fit") for note in result.notes)
 
 
 def fit_to_dict(result: Fit) -> dict[str, Any]:

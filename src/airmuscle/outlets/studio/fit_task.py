@@ -121,7 +121,7 @@ def _select(
 def _in_page_words(selection: LawSelection) -> LawSelection:
     """The selection whose reasons and notes name fields of the page."""
     best = selection.recommended
-    fit = dataclasses.replace(best.fit, notes=tuple(map(in_page_words, best.fit.notes)))
+    fit = best.fit.with_notes(map(in_page_words, best.fit.notes))
     comparisons = tuple(
         dataclasses.replace(
             each, excluded=tuple(dataclasses.replace(e, reason=in_page_words(e.reason)) for e in each.excluded)
