@@ -235,7 +235,7 @@ ARGUMENTS = {
     "rmse": "root mean square error",
     "rows_censored": "number of saturated rows",
     "rows_dropped": "number of omitted rows",
-    "scatter": "noise and repeatability of the measured force",
+    "remarks": "notes on a fit and scatter of its data, or the examination that gives them",
     "rubber": "relation between hoop stress and strain of the rubber",
     "rubber_integral": "path of integration of the hoop stress, axis or arc",
     "segment": "shape and integrals of one segment between two rings",

@@ -18,7 +18,7 @@ from typing import Any, Self
 
 from .annotation import abridged
 from .errors import AirmuscleError, FileError, UnitError
-from .units import conversion, known_factor
+from .units import conversion, known_factor, known_si_unit
 
 SI_UNITS = ("Pa", "m", "rad", "1", "N", "kg", "s", "m3", "m/s", "m/s^2", "rad/s", "rad/s^2", "kg/s", "m3/s",
             "m3/(s Pa)", "N/m", "N m", "N m/rad")  # fmt: skip
@@ -170,15 +170,8 @@ def _known(unit: str) -> tuple[str, float] | None:
     plain = unit.translate(_SUPERSCRIPTS)
     if plain in SI_UNITS:
         return plain, 1.0
-    factor = known_factor(plain, None)
-    return None if factor is None else next(((si, factor) for si in SI_UNITS if _converts(plain, si)), None)
-
-
-def _converts(unit: str, si_unit: str) -> bool:
-    try:
-        return conversion(unit, si_unit).offset == 0.0
-    except UnitError:
-        return False
+    si_unit = known_si_unit(plain)
+    return (si_unit, known_factor(plain)) if si_unit in SI_UNITS else None
 
 
 def _factors_by_si_unit(units: tuple[str, ...], where: str) -> dict[str, tuple[float, str]]:

@@ -74,6 +74,11 @@ def known_factor(unit: str, default: Any = math.nan) -> Any:
     return _FACTORS[unit][0] if unit in _FACTORS else default
 
 
+def known_si_unit(unit: str) -> str:
+    """SI unit of a common unit, empty if the unit is not among them."""
+    return _FACTORS[unit][1] if unit in _FACTORS else ""
+
+
 @dataclasses.dataclass(frozen=True)
 class UnitConversion:
     """Conversion to SI: `value * factor + offset`.

@@ -12,6 +12,9 @@ from ...core.arrays import Array
 
 Mask = npt.NDArray[np.bool_]
 
+_MAX_WINDOW_VALUES = 1_000_000
+"""Maximum number of values of the windows that are sorted at once, for the memory (chosen)."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Interval:
@@ -62,6 +65,15 @@ def running_median(values: Array, width: int) -> Array:
     """The centred moving median over `width` rows (an odd number); windows are shorter at both ends."""
     if width < 3 or len(values) < 3:
         return values
-    import pandas as pd
+    padded = np.pad(np.asarray(values, dtype=float), width // 2, constant_values=np.nan)
+    rows = max(1, _MAX_WINDOW_VALUES // width)
+    windows = np.lib.stride_tricks.sliding_window_view(padded, width)
+    return np.concatenate([_medians(windows[i : i + rows]) for i in range(0, len(values), rows)])
 
-    return np.asarray(pd.Series(values).rolling(width, center=True, min_periods=1).median(), dtype=float)
+
+def _medians(windows: Array) -> Array:
+    """The median of the finite values of each window (N, W); NaN where there is none."""
+    ordered = np.sort(windows, axis=1)  # NaN last
+    count = np.maximum(np.count_nonzero(~np.isnan(ordered), axis=1), 1)[:, None]
+    middle = np.take_along_axis(ordered, np.hstack([(count - 1) // 2, count // 2]), axis=1)
+    return np.asarray(np.where(middle[:, 0] == middle[:, 1], middle[:, 0], 0.5 * (middle[:, 0] + middle[:, 1])))
