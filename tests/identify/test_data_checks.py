@@ -6,6 +6,7 @@ The laboratories are those of tests/laboratories.py; each check has a variant th
 from __future__ import annotations
 
 import dataclasses
+import pickle
 import warnings
 from pathlib import Path
 
@@ -137,6 +138,26 @@ def test_a_length_in_cm_under_mm_is_refused(tmp_path):
         ColumnError, match=r"pulls at a contraction of 90 to 92\.4 %, but no pneumatic muscle pulls bey"
     ):
         read_all(tmp_path, changed(sweeps(), LENGTH, lambda length: length / 10.0))
+
+
+def test_a_fit_refuses_contractions_of_no_muscle(tmp_path):
+    runs = [run.with_columns(contraction=0.6 + run["contraction"]) for run in read_all(tmp_path, sweeps())]
+    with pytest.raises(ColumnError, match="no pneumatic muscle pulls beyond 55 %"):
+        fit(blank_surface(4, 1e4), runs)
+
+
+def test_the_data_of_a_fit_are_examined_when_its_notes_are_first_read(tmp_path, monkeypatch):
+    result = fitted(tmp_path, changed(ramps(), FORCE, lambda f: f + 40.0))
+    monkeypatch.setattr(DataChecks, "of", lambda runs: pytest.fail("examined"))
+    with pytest.raises(pytest.fail.Exception, match="examined"):
+        _ = result.notes
+    monkeypatch.undo()
+    sent = pickle.loads(pickle.dumps(result))
+    monkeypatch.setattr(DataChecks, "of", lambda runs: pytest.fail("examined"))
+    assert "40.2 N at zero pressure" in "".join(sent.notes)
+    assert sent.notes == result.notes
+    assert sent.scatter == result.scatter
+    assert sent.with_notes(["a remark"]).notes == ("a remark",)
 
 
 @pytest.mark.parametrize(("column", "code"), [(FORCE, -999.0), (FORCE, 9999.0), (PRESSURE, 9999.0)])

@@ -49,6 +49,13 @@ def test_an_error_of_a_recorded_length_is_estimated_with_its_standard_error():
     assert found.rmse_after < 0.8 * found.rmse_before
 
 
+def test_the_search_ends_where_no_correction_of_the_length_reduces_the_residuals_enough():
+    runs = rig(0.002)
+    ended = estimate_length_error(am.fit(LAW, runs).model, runs, "202 mm", min_reduction=1e6)
+    assert ended.offset == 0.0
+    assert ended.rmse_after == ended.rmse_before
+
+
 def test_a_strong_prior_keeps_the_recorded_length():
     runs = rig(0.002)
     model = am.fit(LAW, runs).model

@@ -34,6 +34,7 @@ from airmuscle.bench import (
     plateau_points,
     quasi_static_rows,
 )
+from airmuscle.bench.segment import interval
 from airmuscle.bench.segment.branches import branch_column_agreement
 from airmuscle.bench.segment.sensor import estimate_noise, estimate_resolution
 from airmuscle.errors import ColumnError
@@ -444,3 +445,13 @@ def test_any_recording_can_be_inspected(values: list[float], with_time: bool):
     seen = inspect(Recording(columns, "any"))
     assert sum(len(b.interval) for b in seen.branches) in (0, len(values))
     assert all(0 <= r.interval.start < r.interval.stop <= len(values) for r in seen.runs)
+
+
+@pytest.mark.parametrize("width", [3, 5, 41])
+def test_the_moving_median_leaves_out_missing_values_and_shortens_its_windows_at_the_ends(width, monkeypatch):
+    monkeypatch.setattr(interval, "_MAX_WINDOW_VALUES", 100)
+    values = np.random.default_rng(width).standard_normal(60).round(1)
+    values[[7, 20, 21, 22]] = np.nan
+    windows = [values[max(i - width // 2, 0) : i + width // 2 + 1] for i in range(60)]
+    expected = [np.median(w[np.isfinite(w)]) if np.isfinite(w).any() else np.nan for w in windows]
+    assert np.array_equal(interval.running_median(values, width), expected, equal_nan=True)

@@ -10,11 +10,11 @@ from ...core.arrays import Array
 from ...core.hints import Hint, HintedText
 from .branch_residuals import branch_distance, branch_notes
 from .censoring import UNCENSORED, Censoring, default_censoring
-from .data_checks import Scatter
+from .data_checks.scatter import Remarks, Scatter
 from .fit_points import FitPoints
 from .loss import LeastSquares, Loss
 from .problem import FORCE, FitProblem
-from .result import Fit, Remarks
+from .result import Fit
 from .solver import LeastSquaresSolution
 from .specimen_effects import SpecimenEffects
 from .statistics import FitStatistics

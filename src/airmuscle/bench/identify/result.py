@@ -19,7 +19,7 @@ from ...physics.muscle.characteristic.base import Characteristic
 from ...physics.muscle.characteristic.validity_range import ValidityRange
 from ...recording import Recording
 from .correlation_index import CorrelationIndex
-from .data_checks.scatter import Scatter
+from .data_checks.scatter import Remarks, Scatter
 from .loss import Loss
 from .parameter_covariance import ParameterCovariance
 from .plot import plot_fit
@@ -50,14 +50,6 @@ class Estimate:
         if self.on_bound:
             return "on bound"
         return f"{2 * self.stderr:.3g}" if np.isfinite(self.stderr) else "unknown"
-
-
-@dataclasses.dataclass(frozen=True)
-class Remarks:
-    """Notes on a fit and its data, as sentences, and the scatter of the data."""
-
-    notes: tuple[str, ...]
-    scatter: Scatter | None
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)

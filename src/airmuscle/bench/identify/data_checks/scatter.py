@@ -57,3 +57,11 @@ class Scatter:
             + (f"It is one law for {lengths} resting lengths. " if lengths > 1 else "")
             + "Compare other laws, and check the remarks on contradicting or suspicious data."
         ]
+
+
+@dataclasses.dataclass(frozen=True)
+class Remarks:
+    """Notes on a fit and its data, as sentences, and the scatter of the data."""
+
+    notes: tuple[str, ...]
+    scatter: Scatter | None
