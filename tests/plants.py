@@ -166,6 +166,15 @@ EXAMPLES = {
     "overlap": fed(physics.ProportionalValve(Supply(5e5), VALVE, OTHER, SPOOL, 0.2, 2), 2),
     "underlap": fed(physics.ProportionalValve(Supply(5e5), VALVE, OTHER, SPOOL, -0.2)),
     "regulator, leak": fed(physics.WithLeak(physics.ProportionalRegulator(Supply(5e5), VALVE, VALVE, SPOOL), OTHER)),
+    "two pressure regulators on a tank": fed(
+        physics.Manifold(
+            physics.Tank(Supply(7e5), OTHER, 1e-3, EnergyBalance(0.1)),
+            tuple(physics.PressureRegulator(physics.SharedSupply(), VALVE, OTHER, 1e5, 0.05, 0.2, 0.02, 1.0, 3e3, leak)
+                  for leak in (0.0, 0.05)),
+            ("one", "two"),
+        ),
+        2,
+    ),
     "manifold on tank and regulator": fed(
         physics.Manifold(
             physics.RegulatedSupply(physics.Tank(Supply(7e5), OTHER, 1e-3, EnergyBalance(0.1)), VALVE, 4e5),

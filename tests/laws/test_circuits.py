@@ -30,6 +30,7 @@ from airmuscle.physics import (
     Isothermal,
     Manifold,
     Plant,
+    PressureRegulator,
     ProportionalRegulator,
     ProportionalValve,
     RegulatedSupply,
@@ -83,6 +84,17 @@ CIRCUITS = {
     "regulator through a leaking tube": plant(
         WithLeak(WithTubes(ProportionalRegulator(tank(), VALVE, VALVE, SPOOL), tube()), NARROW)
     ),
+    "pressure regulators on one tank": plant(
+        Manifold(
+            tank(),
+            (
+                PressureRegulator(SharedSupply(), VALVE, NARROW, 1e5, 0.05, 0.2),
+                PressureRegulator(SharedSupply(), NARROW, VALVE, 5e4, 0.03, 0.1, leak=0.05),
+            ),
+            ("one", "two"),
+        ),
+        count=2,
+    ),
     "manifold": plant(
         Manifold(
             tank(),
@@ -97,7 +109,12 @@ CIRCUITS = {
     ),
 }
 
-LEAKING = {"proportional valve for two", "regulator through a leaking tube", "manifold"}
+LEAKING = {
+    "pressure regulators on one tank",
+    "proportional valve for two",
+    "regulator through a leaking tube",
+    "manifold",
+}
 
 
 def shaken(system, seed):

@@ -80,7 +80,7 @@ def assert_failed(result: Result, message: str) -> None:
 
 NAMES = (
     "reproduce", "list", "show", "cite", "solve", "inspect", "fit", "convert", "convert-data", "hysteresis",
-    "fit-dynamic", "campaign", "predict", "fit-volume", "plan", "bench", "size", "simulate", "sweep", "tune", "compare", "export",
+    "fit-dynamic", "fit-regulator", "campaign", "predict", "fit-volume", "plan", "bench", "size", "simulate", "sweep", "tune", "compare", "export",
     "studio", "schema",
 )  # fmt: skip
 

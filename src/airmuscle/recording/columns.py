@@ -28,6 +28,7 @@ QUANTITIES: dict[str, Quantity] = {
     "angle": Quantity("rad", "theta", "angle of a joint or lever, positive as its first muscle contracts"),
     "angular_speed": Quantity("rad/s", "omega", "angular speed of the joint or lever"),
     "angular_acceleration": Quantity("rad/s^2", "alpha", "angular acceleration of the joint or lever"),
+    "setpoint": Quantity("Pa", "p_set", "set gauge pressure of a regulator"),
     "volume": Quantity("m3", "V", "internal volume of the muscle"),
     "air_mass": Quantity("kg", "m_air", "mass of the air in the muscle"),
     "mass_flow": Quantity("kg/s", "qm", "mass flow into the muscle"),

@@ -50,6 +50,9 @@ COMMANDS = (
     CommandRow("convert-data", "convert_data", "convert_data", "Write measurement files as CSV, Parquet or HDF5."),
     CommandRow("hysteresis", "hysteresis", "hysteresis", "Fit friction models to hysteresis loops."),
     CommandRow("fit-dynamic", "fit_dynamic", "fit_dynamic", "Identify plant parameters from transient records."),
+    CommandRow(
+        "fit-regulator", "fit_regulator", "fit_regulator_command", "Identify a pressure regulator from its response."
+    ),
     CommandRow("campaign", "campaign", "campaign", "Identify a muscle from all files of a test rig."),
     CommandRow("predict", "predict", "predict", "Predict further records by an identified muscle or plant."),
     CommandRow("fit-volume", "fit_volume", "fit_volume_command", "Fit the volume of a muscle over its contraction."),

@@ -82,7 +82,8 @@ def valve_set(plant: am.Plant) -> ValveSet:
     names, circuit = [muscle.name for muscle in plant.muscles], plant.circuits[0]
     first, second = names
     kinds = {type(each) for each in plant.circuits}
-    if kinds == {am.physics.ProportionalRegulator} and isinstance(circuit, am.physics.ProportionalRegulator):
+    regulators = am.physics.ProportionalRegulator | am.physics.PressureRegulator
+    if len(kinds) == 1 and isinstance(circuit, regulators):
         pressures = (f"{first}.setpoint", f"{second}.setpoint")
         shift = OPENING * circuit.band
         offsets = {pressures[0]: shift, pressures[1]: -shift}
@@ -101,7 +102,7 @@ def valve_set(plant: am.Plant) -> ValveSet:
         return ValveSet(pressures, inner, True, offsets)
     raise ParameterError(
         f"the joint has valves of {', '.join(sorted(kind.__name__ for kind in kinds))}; the tab Joint controls "
-        "FillDischarge, ProportionalValve and ProportionalRegulator."
+        "FillDischarge, ProportionalValve, ProportionalRegulator and PressureRegulator."
     )
 
 

@@ -24,6 +24,7 @@ from .gas import (
 )
 from .manifold import Manifold, WithLeak
 from .orifice import Orifice
+from .pressure_regulator import PressureRegulator
 from .proportional import ProportionalRegulator, ProportionalValve, SecondOrderLag
 from .subsonic_index_valve import SubsonicIndexValve
 from .supply import AirSource, RegulatedSupply, SharedSupply, Supply, Tank
@@ -55,6 +56,7 @@ __all__ = [
     "Manifold",
     "Orifice",
     "Polytropic",
+    "PressureRegulator",
     "ProportionalRegulator",
     "ProportionalValve",
     "RegulatedSupply",

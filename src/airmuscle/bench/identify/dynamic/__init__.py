@@ -7,6 +7,7 @@ from .experiment import CommandInstants, Experiment, InitialValue, StartTime
 from .fit import fit_dynamic
 from .initial_conditions import InitialConditions
 from .record_ranking import RecordRanking, rank_records
+from .regulator_fit import RegulatorFit, fit_regulator
 from .result import DynamicFit
 from .sensing import locate_pressure_sensor
 
@@ -18,11 +19,13 @@ __all__ = [
     "InitialConditions",
     "InitialValue",
     "RecordRanking",
+    "RegulatorFit",
     "StartTime",
     "analyse_identifiability",
     "cross_predict",
     "describe_cross_predictions",
     "fit_dynamic",
+    "fit_regulator",
     "locate_pressure_sensor",
     "rank_records",
     "stated_ambient",

@@ -50,8 +50,9 @@ class DynamicFitProblem:
         return np.asarray((values - self.origins) / self.scales)
 
     def values(self, scaled: Array) -> Array:
-        """The values [SI] of scaled unknowns, shape (..., P)."""
-        return np.asarray(self.origins + scaled * self.scales)
+        """The values [SI] of scaled unknowns, within their bounds whatever the rounding, shape (..., P)."""
+        low, high = [u.low for u in self.unknowns], [u.high for u in self.unknowns]
+        return np.clip(self.origins + scaled * self.scales, low, high)
 
     @functools.cached_property
     def bounds(self) -> tuple[Array, Array]:

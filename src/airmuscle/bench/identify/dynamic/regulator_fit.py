@@ -1,0 +1,244 @@
+"""Identification of a PressureRegulator from records of its command and of the pressure that it gives."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...control.inputs import Schedule
+from ...core import tree
+from ...core.arrays import Array
+from ...core.errors import ColumnError, IdentificationError, ParameterError
+from ...core.short_repr import ShortRepr
+from ...mechanism import Isometric
+from ...muscle import Muscle
+from ...muscle.geometry import Vessel
+from ...plant import Plant
+from ...pneumatics import Isothermal, PressureRegulator, Supply, Valve
+from ...recording import Recording
+from .experiment import Experiment
+from .fit import fit_dynamic
+from .initial_conditions import InitialConditions
+from .result import DynamicFit
+
+SETTLED_AFTER = 0.8
+"""Time [s] after a change of the command from which a held pressure counts as settled (chosen)."""
+FIRST_SPREAD, SPREAD, PATIENCE, GAINED = 0.5, 0.2, 8, 0.999
+"""A search starts from the initial regulator times exp(N(0, FIRST_SPREAD^2)); its fit is repeated from the estimates
+times exp(N(0, SPREAD^2)), until PATIENCE repetitions in turn have not reduced the sum of squares below GAINED times the
+lowest one (chosen): reversals of the valve leave many local minima."""
+AT_NOISE = 1.1
+"""Residuals relative to the noise at which no further search is needed (chosen)."""
+MIN_RANGE = 5.0
+"""Minimum range of command and pressure in standard deviations of the noise (chosen)."""
+GAIN = 10.0
+"""Rate of the outlet pressure by the control error from which a search starts [1/s] (chosen)."""
+COMMANDS = {
+    "fill.conductance": "a step up of at least half the supply pressure",
+    "discharge.conductance": "a step down from near the supply pressure to zero",
+    "band": "steps of different sizes, 20 kPa to 100 kPa",
+    "pilot_time": "a sine of 2 to 4 Hz with an amplitude of 30 to 100 kPa",
+    "overlap": "steps that are reversed after 50 to 200 ms",
+    "dead_time": "a step, recorded with at least 200 rows a second",
+    "integral_rate": "a step held for 2 s with a leak or a small load of air",
+    "sensitivity": "steps of 5 to 10 kPa up and down after 1 s of rest",
+    "leak": "sines of 20 kPa at 1 to 8 Hz, which hardly cross the overlap",
+}
+"""The parameters of a regulator that are fitted, and the command that determines each."""
+LIMITS = {"sensitivity": (200.0, 2e4), "overlap": (0.02, 1.0), "pilot_time": (0.01, 0.3), "dead_time": (2e-3, 0.1)}
+"""Range of the search [SI] where it is narrower than that of the model (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class RegulatorFit(ShortRepr):
+    """A regulator identified from its records; `print` it.
+
+    `fit` is the dynamic fit of a vessel behind the regulator, `zeros` [Pa] the difference of settled pressure and
+    command that was subtracted from each record, `remarks` what the records excite too little, with the command that
+    would excite it.
+    """
+
+    fit: DynamicFit
+    zeros: tuple[float, ...]
+    remarks: tuple[str, ...]
+
+    @property
+    def zeros_from_residuals(self) -> tuple[float, ...]:
+        """The zeros corrected by the mean residuals, because a regulator may rest anywhere within its sensitivity."""
+        means = [float(np.mean(self.fit.residuals(i)["pressure"])) for i in range(len(self.zeros))]
+        return tuple(zero - mean for zero, mean in zip(self.zeros, means, strict=True))
+
+    @property
+    def plant(self) -> Plant:
+        """The vessel behind the regulator with the estimated parameters."""
+        plant = self.fit.plant()
+        assert isinstance(plant, Plant)
+        return plant
+
+    @property
+    def regulator(self) -> PressureRegulator:
+        """The regulator with the estimated parameters."""
+        circuit = self.plant.circuits[0]
+        assert isinstance(circuit, PressureRegulator)
+        return circuit
+
+    def __str__(self) -> str:
+        zeros = ", ".join(f"{zero / 1e3:+.2f}" for zero in self.zeros)
+        subtracted = f"settled pressure minus command, taken as the zero of the sensor: {zeros} kPa"
+        return "\n".join([str(self.fit), subtracted, *(f"too little excited: {remark}" for remark in self.remarks)])
+
+
+def fit_regulator(
+    recordings: Sequence[Recording],
+    *,
+    supply_pressure: float,
+    volume: float = 1e-4,
+    noise: float = 1e3,
+    initial: PressureRegulator | None = None,
+    free: Sequence[str] = tuple(COMMANDS),
+    starts: int = 8,
+    seed: int = 0,
+) -> RegulatorFit:
+    """Identify a regulator from recordings with the columns `setpoint` and `pressure` [Pa], by `fit_dynamic`.
+
+    supply_pressure  gauge pressure of the supply [Pa]
+    volume           air volume behind the regulator [m3]; a record determines only conductance over volume, so that an
+                     unknown volume may stay at its default (chosen)
+    noise            standard deviation of the pressure sensor [Pa]
+    initial          regulator from which the search starts, by default from the slopes of the records
+    free             the fitted parameters, of `COMMANDS`
+    starts, seed     greatest number of searches, and the seed of their initial guesses
+
+    A command holds its value until the next row. What the records do not determine is named with the command that
+    would. Raises ColumnError for a missing column, IdentificationError for a command or a pressure that does not vary,
+    ParameterError for an unknown parameter.
+    """
+    unknown = [name for name in free if name not in COMMANDS]
+    if unknown or not recordings:
+        raise ParameterError(
+            f"fit_regulator: {f'unknown parameter {unknown[0]!r}' if unknown else 'no recording is given'}; give "
+            f"recordings with setpoint and pressure, and parameters among {', '.join(COMMANDS)}."
+        )
+    for each in recordings:
+        _check_excitation(each, noise)
+    zeros = tuple(_settled_difference(each) for each in recordings)
+    circuit = initial or _initial_regulator(recordings, supply_pressure, volume)
+    plant = Plant(Muscle.ideal(Vessel(volume)), circuit, Isometric(0.0), Isothermal())
+    search = _Search(recordings, tuple(f"circuit.{name}" for name in free), noise)
+    rng, found = np.random.default_rng(seed), []
+    for start in range(starts):
+        deviations = rng.normal(0.0, FIRST_SPREAD * (start > 0), len(free))
+        with contextlib.suppress(IdentificationError):  # a guess that cannot be simulated
+            found.append(search.refined(search.fit(_perturbed(plant, search.paths, deviations), zeros), rng))
+            if found[-1].fit.residual_std < AT_NOISE:
+                break
+    if not found:
+        raise IdentificationError("fit_regulator: no initial guess can be simulated. Give an initial regulator.")
+    return min(found, key=lambda each: each.fit.costs[0])
+
+
+@dataclasses.dataclass(frozen=True)
+class _Search:
+    """What all fits of a search have in common."""
+
+    recordings: Sequence[Recording]
+    paths: tuple[str, ...]
+    noise: float
+
+    def fit(self, plant: Plant, zeros: tuple[float, ...]) -> RegulatorFit:
+        """The fit that starts from a plant."""
+        records = [_experiment(plant, each, zero) for each, zero in zip(self.recordings, zeros, strict=True)]
+        limits = {path: LIMITS[name] for path in self.paths if (name := path.removeprefix("circuit.")) in LIMITS}
+        fit = fit_dynamic(plant, records, free=self.paths, observed={"pressure": self.noise}, bounds=limits)
+        return RegulatorFit(fit, zeros, tuple(_remarks(fit)))
+
+    def refined(self, best: RegulatorFit, rng: np.random.Generator) -> RegulatorFit:
+        """The best of repetitions, the first of which only corrects the zeros of the sensors."""
+        failed, deviations = 0, np.zeros(len(self.paths))
+        while failed < PATIENCE:
+            attempt, failed = best, failed + 1
+            with contextlib.suppress(IdentificationError):
+                attempt = self.fit(_perturbed(best.plant, self.paths, deviations), best.zeros_from_residuals)
+            if attempt.fit.costs[0] < best.fit.costs[0]:
+                failed = 0 if attempt.fit.costs[0] < GAINED * best.fit.costs[0] else failed
+                best = attempt
+            deviations = rng.normal(0.0, SPREAD, len(self.paths))
+        return best
+
+
+def _perturbed(plant: Plant, paths: Sequence[str], deviations: Array) -> Plant:
+    """A plant with the parameters of these paths multiplied by exp(deviation), within their bounds."""
+    factors = dict(zip(paths, np.exp(deviations).tolist(), strict=True))
+    return tree.with_parameters(plant, [_scaled(leaf, factors.get(leaf.path, 1.0)) for leaf in tree.leaves(plant)])
+
+
+def _scaled(leaf: tree.Leaf, factor: float) -> float:
+    low, high = LIMITS.get(leaf.path.removeprefix("circuit."), leaf.declared.bounds)
+    return float(leaf.value) if factor == 1.0 else float(np.clip(leaf.value * factor, low, high))
+
+
+def _check_excitation(recording: Recording, noise: float) -> None:
+    for name in ("setpoint", "pressure"):
+        if name not in recording.columns:
+            raise ColumnError(
+                f"{recording.origin}: no column '{name}'; a regulator is identified from time, setpoint and pressure. "
+                f"It has {', '.join(recording.columns)}. Rename one with a mapping file."
+            )
+        if np.ptp(recording[name]) < MIN_RANGE * noise:
+            raise IdentificationError(
+                f"{recording.origin}: {name} varies by {np.ptp(recording[name]) / 1e3:.3g} kPa only, less than "
+                f"{MIN_RANGE:g} standard deviations of the noise ({noise / 1e3:g} kPa). Record steps up and down over "
+                "the range of use, some of them reversed after 50 to 200 ms."
+            )
+
+
+def _changes(recording: Recording) -> tuple[Array, Array]:
+    """Times [s] from the first row and values [Pa] at which the command changes, the first row included."""
+    time, setpoint = recording["time"] - recording["time"][0], recording["setpoint"]
+    rows = np.flatnonzero(np.concatenate([[True], np.diff(setpoint) != 0.0]))
+    return time[rows], setpoint[rows]
+
+
+def _settled_difference(recording: Recording) -> float:
+    """Median of pressure minus command [Pa] over the rows where the command has been held for long; 0 without any."""
+    time = recording["time"] - recording["time"][0]
+    at, _ = _changes(recording)
+    since = time - at[np.searchsorted(at, time, side="right") - 1]
+    rows = (since >= SETTLED_AFTER) & (recording["setpoint"] > 0.0)
+    return float(np.median((recording["pressure"] - recording["setpoint"])[rows])) if rows.any() else 0.0
+
+
+def _initial_regulator(recordings: Sequence[Recording], supply_pressure: float, volume: float) -> PressureRegulator:
+    """A regulator whose orifices give about the greatest slopes of the records; the rest is chosen."""
+    slopes = np.concatenate([np.gradient(r["pressure"], r["time"]) for r in recordings])
+    rise, fall = np.percentile(slopes, 99.5), -np.percentile(slopes, 0.5)
+    top = max(float(r["pressure"].max()) for r in recordings) + 1e5
+    fill = max(2.0 * volume * float(rise) / (1e5 * (supply_pressure + 1e5)), 1e-12)
+    discharge = max(2.0 * volume * float(fall) / (1e5 * top), 1e-12)
+    return PressureRegulator(
+        Supply(supply_pressure), Valve(fill, 0.2), Valve(discharge, 0.2), 2.0 * float(rise) / GAIN, 0.04, 0.2,
+        leak=1e-3, integral_rate=0.1,
+    )  # fmt: skip
+
+
+def _experiment(plant: Plant, recording: Recording, zero: float) -> Experiment:
+    times, values = _changes(recording)
+    command = Schedule({"setpoint": tuple(zip(times.tolist(), np.maximum(values, 0.0).tolist(), strict=True))})
+    pressure = recording["pressure"] - zero
+    shifted = Recording({**recording.columns, "pressure": pressure}, recording.origin)
+    level = max(float(recording["setpoint"][0]), 0.0)
+    guess = plant.state_at(pressure=level)
+    resting = tuple(name for name in guess if name.endswith("_position"))
+    known = {name: value for name, value in guess.items() if name not in (*resting, "air_mass")}
+    start = InitialConditions({"pressure": level, **known}, guess, resting)
+    return Experiment(shifted, command, start, float(recording["time"][0]))
+
+
+def _remarks(fit: DynamicFit) -> list[str]:
+    """What the records do not determine, each parameter once, with the command that determines it."""
+    weak = [name for each in fit.identifiability.undetermined for name, _ in each.shares]
+    weak += [estimate.name for estimate in fit.estimates if estimate.on_bound]
+    return [f"{name} is not determined; give {COMMANDS[name.removeprefix('circuit.')]}" for name in dict.fromkeys(weak)]
