@@ -1,6 +1,6 @@
 """Figure docs/images/regulator.png and the errors of docs/regulators.md: published responses of a regulator and models.
 
-Run python docs/make_regulator_figure.py. The published numbers are in library/data/smc-itv2050.toml.
+Run python docs/make_regulator_figure.py. The published numbers are in files/library/data/smc-itv2050.toml.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ import numpy as np
 import airmuscle as am
 from airmuscle.core.arrays import Array
 from airmuscle.core.plotting import DASHES, LINES, MARKERS, new_figure, save
-from airmuscle.library.files import DATA
-from airmuscle.simulation import RungeKutta4
+from airmuscle.engine import RungeKutta4
+from airmuscle.files.library.files import DATA
 
 PICTURE = Path(__file__).parent / "images" / "regulator.png"
 FACTS = tomllib.loads((DATA / "smc-itv2050.toml").read_text(encoding="utf-8"))

@@ -1,6 +1,6 @@
 """A pressure regulator passes steps after rest, and hardly a fast sine or a quick reversal of the same size.
 
-The published tables are in library/data/smc-itv2050.toml; `docs/make_regulator_figure.py` measures a model as the record
+The published tables are in files/library/data/smc-itv2050.toml; `docs/make_regulator_figure.py` measures a model as the record
 was measured, and docs/regulators.md states the errors that are claimed here.
 """
 
@@ -14,11 +14,10 @@ import numpy as np
 import pytest
 
 import airmuscle as am
+from airmuscle.engine import Rodas4
 from airmuscle.errors import ColumnError, IdentificationError, ParameterError
-from airmuscle.plant import WithEnergyMeters
-from airmuscle.pneumatics import Isothermal, Manifold, SharedSupply, Supply, Tank, Valve
+from airmuscle.physics import Isothermal, Manifold, SharedSupply, Supply, Tank, Valve, WithEnergyMeters
 from airmuscle.recording import Recording
-from airmuscle.simulation import Rodas4
 
 DOCS = Path(__file__).parents[2] / "docs"
 ITV = am.load("vessel-smc-itv2050").plant
@@ -125,7 +124,7 @@ def record(steps, noise=1e3, zero=-8e3):
 
 
 def test_a_record_with_reversals_determines_the_regulator():
-    fit = am.identify.fit_regulator([record(RECORD)], supply_pressure=0.578e6)
+    fit = am.bench.fit_regulator([record(RECORD)], supply_pressure=0.578e6)
     truth, found = ITV.circuit, fit.regulator
     assert fit.fit.rms("pressure") < 1.2e3
     assert found.pilot_time == pytest.approx(truth.pilot_time, rel=0.05)
@@ -136,7 +135,7 @@ def test_a_record_with_reversals_determines_the_regulator():
 
 
 def test_what_a_record_excites_too_little_is_named_with_the_command_that_would():
-    fit = am.identify.fit_regulator([record([(0.0, 3e5), (0.5, 3.2e5)])], supply_pressure=0.578e6)
+    fit = am.bench.fit_regulator([record([(0.0, 3e5), (0.5, 3.2e5)])], supply_pressure=0.578e6)
     assert any("circuit.discharge.conductance is not determined; give a step down" in each for each in fit.remarks)
     assert "too little excited: circuit.overlap" in str(fit)
 
@@ -151,9 +150,9 @@ def test_what_a_record_excites_too_little_is_named_with_the_command_that_would()
 )  # fmt: skip
 def test_a_record_without_excitation_is_refused(change, kind, message):
     with pytest.raises(kind, match=message):
-        am.identify.fit_regulator([change(record([(0.0, 3e5), (0.5, 3.2e5)]))], supply_pressure=6e5)
+        am.bench.fit_regulator([change(record([(0.0, 3e5), (0.5, 3.2e5)]))], supply_pressure=6e5)
 
 
 def test_an_unknown_parameter_is_named():
     with pytest.raises(ParameterError, match=r"unknown parameter 'gain'.*among fill\.conductance"):
-        am.identify.fit_regulator([record([(0.0, 3e5), (0.5, 3.2e5)])], supply_pressure=6e5, free=("gain",))
+        am.bench.fit_regulator([record([(0.0, 3e5), (0.5, 3.2e5)])], supply_pressure=6e5, free=("gain",))

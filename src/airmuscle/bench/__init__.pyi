@@ -61,11 +61,13 @@ from .identify.dynamic import Experiment as Experiment
 from .identify.dynamic import InitialConditions as InitialConditions
 from .identify.dynamic import InitialValue as InitialValue
 from .identify.dynamic import RecordRanking as RecordRanking
+from .identify.dynamic import RegulatorFit as RegulatorFit
 from .identify.dynamic import StartTime as StartTime
 from .identify.dynamic import analyse_identifiability as analyse_identifiability
 from .identify.dynamic import cross_predict as cross_predict
 from .identify.dynamic import describe_cross_predictions as describe_cross_predictions
 from .identify.dynamic import fit_dynamic as fit_dynamic
+from .identify.dynamic import fit_regulator as fit_regulator
 from .identify.dynamic import locate_pressure_sensor as locate_pressure_sensor
 from .identify.dynamic import rank_records as rank_records
 from .identify.dynamic import stated_ambient as stated_ambient

@@ -147,6 +147,7 @@ from .pneumatics import Isothermal as Isothermal
 from .pneumatics import Manifold as Manifold
 from .pneumatics import Orifice as Orifice
 from .pneumatics import Polytropic as Polytropic
+from .pneumatics import PressureRegulator as PressureRegulator
 from .pneumatics import ProportionalRegulator as ProportionalRegulator
 from .pneumatics import ProportionalValve as ProportionalValve
 from .pneumatics import RegulatedSupply as RegulatedSupply

@@ -6,7 +6,6 @@ from .censoring import UNCENSORED, Censoring
 from .confidence_bands import Band, confidence_band
 from .conversion import ModelConversion, convert
 from .cross_validation import BlockSplit, GroupSplit, LevelSplit, RunSplit, SpecimenSplit
-from .dynamic.regulator_fit import RegulatorFit, fit_regulator
 from .experiment_design import BenchLimits
 from .joint_selection import JointSelection, select_for_both
 from .length_errors import LengthError, estimate_length_error, find_length_errors
@@ -39,7 +38,6 @@ __all__ = [
     "ModelConversion",
     "ProfileLikelihood",
     "RecursiveFit",
-    "RegulatorFit",
     "RunSplit",
     "ShapeConstrainedFit",
     "SoftL1",
@@ -52,7 +50,6 @@ __all__ = [
     "find_length_errors",
     "find_shape_violations",
     "fit",
-    "fit_regulator",
     "fit_shape_constrained",
     "profile",
     "select_for_both",

@@ -9,15 +9,15 @@ from typing import Annotated, Any
 
 import typer
 
-from ..core.output_folder import atomic_folder, check_writable
-from ..core.units import quantity
-from ..identify.dynamic import RegulatorFit, fit_regulator
-from ..library.fitted_entry import list_files
-from ..library.write import part_toml, scenario_toml
-from ..recording import Recording
-from ..report.dynamic_chapter import dynamic_chapters
-from ..report.reading_chapter import reading_chapters
-from ..report.write import write_into
+from ...bench.identify.dynamic import RegulatorFit, fit_regulator
+from ...bench.identify.dynamic.dynamic_chapter import dynamic_chapters
+from ...bench.readers.reading_chapter import reading_chapters
+from ...core.output_folder import atomic_folder, check_writable
+from ...core.units import quantity
+from ...files.library.fitted_entry import list_files
+from ...files.library.write import part_toml, scenario_toml
+from ...recording import Recording
+from ...report.write import write_into
 from .bench_files import Files, read_recordings
 from .options import Folder, Json
 from .reading_options import NO_OPTIONS, ReadingOptions, with_reading_options

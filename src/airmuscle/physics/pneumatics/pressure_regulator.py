@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
-from ..core import ops
-from ..core.declaration import model, parameter
-from ..core.ops import Value
-from ..core.reference import Reference
-from ..core.variables import Input, StateVariable
+from ...core import ops
+from ...core.declaration import model, parameter
+from ...core.ops import Value
+from ...core.reference import Reference
+from ...core.variables import Input, StateVariable
 from .circuit import Circuit, CircuitFlows
 from .fill_discharge import ambient_air
 from .flow import orifice_flow

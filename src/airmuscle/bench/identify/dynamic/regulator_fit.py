@@ -8,17 +8,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...control.inputs import Schedule
-from ...core import tree
-from ...core.arrays import Array
-from ...core.errors import ColumnError, IdentificationError, ParameterError
-from ...core.short_repr import ShortRepr
-from ...mechanism import Isometric
-from ...muscle import Muscle
-from ...muscle.geometry import Vessel
-from ...plant import Plant
-from ...pneumatics import Isothermal, PressureRegulator, Supply, Valve
-from ...recording import Recording
+from ....core import tree
+from ....core.arrays import Array
+from ....core.errors import ColumnError, IdentificationError, ParameterError
+from ....core.short_repr import ShortRepr
+from ....engine.loop.inputs import Schedule
+from ....physics.mechanism import Isometric
+from ....physics.muscle import Muscle
+from ....physics.muscle.geometry import Vessel
+from ....physics.plant import Plant
+from ....physics.pneumatics import Isothermal, PressureRegulator, Supply, Valve
+from ....recording import Recording
 from .experiment import Experiment
 from .fit import fit_dynamic
 from .initial_conditions import InitialConditions
