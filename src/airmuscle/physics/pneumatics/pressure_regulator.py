@@ -37,7 +37,7 @@ class PressureRegulator(Circuit):
 
         delay      d_1' = 4 (p_c - d_1)/L,   d_i' = 4 (d_(i-1) - d_i)/L,  i = 2, 3, 4
         sensor     y' = (p - y)/T_f
-        error      e = d_4 - y,   i' = k_i e, held while |e + i| > B in the direction of the error
+        error      e = d_4 - y,   i' = k_i e a,   a = clip(2 - |e + i|/B, 0, 1) if e (e + i) > 0, otherwise 1
         pilot      v = clip((e + i)/B, -1, 1) + o clip(2 e/epsilon - 1, -1, 1)
                    w' = 2 (v - w)/T_p,   x' = 2 (w - x)/T_p
         fill       opening clip(x - o, 0, 1) + l clip((x + o)/(2 o), 0, 1)
@@ -115,13 +115,13 @@ class PressureRegulator(Circuit):
         rates = {f"delayed_setpoint{i}": (chain[i - 1] - chain[i]) / lag for i in range(1, DELAY_STAGES + 1)}
         error, sensed = chain[-1] - state["sensed_pressure"], state["sensed_pressure"]
         demand = (error + state["integral_error"]) / self.band
-        saturated = ops.both(ops.absolute_value(demand) > 1.0, demand * error > 0.0)
+        spare = ops.clip(2.0 - ops.absolute_value(demand), 0.0, 1.0)
         edge = self.overlap * ops.clip(2.0 * error / self.sensitivity - 1.0, -1.0, 1.0)
         target, stage = ops.clip(demand, -1.0, 1.0) + edge, self.pilot_time / 2.0
         return {
             **rates,
             "sensed_pressure": (pressure - sensed) / self.filter_time,
-            "integral_error": ops.where(saturated, 0.0, self.integral_rate * error),
+            "integral_error": self.integral_rate * error * ops.where(demand * error > 0.0, spare, 1.0),
             "pilot_position": (target - state["pilot_position"]) / stage,
             "valve_position": (state["pilot_position"] - state["valve_position"]) / stage,
         }
