@@ -169,7 +169,7 @@ EXAMPLES = {
     "two pressure regulators on a tank": fed(
         physics.Manifold(
             physics.Tank(Supply(7e5), OTHER, 1e-3, EnergyBalance(0.1)),
-            tuple(physics.PressureRegulator(physics.SharedSupply(), VALVE, OTHER, 1e5, 0.05, 0.2, 0.02, 1.0, 1e4, leak)
+            tuple(physics.PressureRegulator(physics.SharedSupply(), VALVE, OTHER, 8e5, 0.05, 0.2, 0.02, 1.0, 3e3, leak)
                   for leak in (0.0, 0.05)),
             ("one", "two"),
         ),
