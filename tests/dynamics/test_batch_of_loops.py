@@ -198,6 +198,19 @@ def test_gains_differ_also_where_drivers_are_called_from_python(way, monkeypatch
     assert not np.array_equal(*batch["pressure"])
 
 
+def test_a_driver_of_the_user_may_return_many_segments():
+    """More than the signals and the buffers of a run hold at first."""
+    quick, runs = PWM(4e4), []
+    for driver in (quick, OwnDriver(quick)):
+        switching = OnOffController("pressure", SPLIT, hysteresis=1e4)
+        runs.append(
+            alone(LIFT, ControlLoop(switching, 0.0125, STEPS, drivers={"fill": (driver, SolenoidDriver(1e-3))}))
+        )
+    first, second = runs
+    assert first.final_state == second.final_state
+    assert dict(first.control_state.drivers) == dict(second.control_state.drivers)
+
+
 def test_final_states_alone_need_no_rows():
     gains = np.array([4e-6, 2e-5])
     loop = ControlLoop(PI, 0.0125, STEPS)

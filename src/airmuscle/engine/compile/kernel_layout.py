@@ -32,4 +32,18 @@ class Progress(enum.IntEnum):
     FIRST_ROW = 8
     """The first segment and row of the present interval."""
     WAITING = 9
-    """1 while the commands of the present interval are awaited from a controller that is called from Python."""
+    """What is awaited from Python in the present interval: a member of `Waiting`."""
+    RESULT = 10
+    """The status of an integration that was awaited."""
+
+
+class Waiting(enum.IntEnum):
+    """What the kernel `sampled_loop` awaits from its caller where it paused."""
+
+    NOTHING = 0
+    COMMANDS = 1
+    """The commands of a controller that is called."""
+    DRIVERS = 2
+    """The signals of the inputs behind drivers that are called; the first of `kinds` is then negative."""
+    INTEGRATION = 3
+    """The end of an interval, where the integrator has no machine code; its address is then 0."""

@@ -107,33 +107,19 @@ class BoundIntegrator:
         held: Array = self._inputs[0]
         return held
 
-    def run_part(
-        self, begin: float, segments: tuple[int, int, int], count: int, times: int, rows: int, wanted: int
-    ) -> tuple[Status, int, float]:
-        """Go on from `self.state` at `begin` [s] through `count` segments: how it ended, rows reached, where.
-
-        Ends, values and slopes of the segments, times and rows are given by the addresses of their first numbers. Not
-        to be mixed with `run`.
-        """
+    def run_part(self) -> Status:
+        """Go on through the segments and rows in the slots, for a kernel that cannot call this one itself."""
+        a, b, c, d, e = self._slots
         if self._words is None:
-            self._kernel.point(self._first, segments, count)
-            self._kernel.point(self._first + 3, (times, rows), wanted)
-        else:
-            words, (a, b, c, d, e) = self._words, self._slots
-            words[a], words[b], words[c] = segments
-            words[a + 1] = words[b + 1] = words[c + 1] = count
-            words[d], words[e] = times, rows
-            words[d + 1] = words[e + 1] = wanted
-        clock, counts = self._clock_view, self._count_view
-        clock[0] = clock[2] = begin
-        clock[1] = 0.0
-        counts[0] = counts[1] = 0
-        before = counts[2]
+            slots = self.slots.tolist()
+            self._kernel.point(self._first, (slots[a], slots[b], slots[c]), slots[a + 1])
+            self._kernel.point(self._first + 3, (slots[d], slots[e]), slots[d + 1])
+        before = self._count_view[2]
         status = self._run()
         if status == _PAUSED:
             status = self._continue(status, before + MAX_STEPS)
             self._kernel.replace(self._budget, INTERRUPT_CHECK_STEPS)
-        return Status.DONE if status == 0 else Status(status), counts[1], clock[0]
+        return Status(status)
 
     @property
     def entry_address(self) -> int | None:

@@ -11,8 +11,7 @@ from ..loop.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop, Contro
 from ..loop.piecewise_linear import PiecewiseLinear
 from ..state_units import column_units
 from .bound_integrator import RawSolution
-from .called_run import CalledRun
-from .compiled_loop import CompiledLoop, CompiledRun, can_be_compiled
+from .compiled_loop import CompiledLoop, CompiledRun
 from .kept_loops import form_of, keep_run, kept_run
 from .problem import Problem
 from .rows import make_recording, recorded_rows, truncate_at_invalid_row
@@ -30,34 +29,29 @@ def solve_closed_loop(problem: Problem) -> Solution:
     """
     loop, form = problem.input, form_of(problem)
     control_state = problem.control_state or loop.init(problem.start_time)  # type: ignore[union-attr]
-    run: CompiledRun | CalledRun | None = kept_run(problem, form, control_state)
+    run = kept_run(problem, form, control_state)
     if run is None:
         run = start_run(problem, prepare_loop(problem, control_state), control_state)
     run.integrate()
     solution = _solution(problem, run)
-    if form is not None and isinstance(run, CompiledRun) and run.status == Status.DONE:
+    if form is not None and run.status == Status.DONE:
         keep_run(problem, form, run)
     return solution
 
 
-def start_run(problem: Problem, prepared: SampledLoop, control_state: ControlLoopState) -> CompiledRun | CalledRun:
-    """A run of the loop in one kernel where this implements the drivers, else one that calls them from Python."""
+def start_run(problem: Problem, prepared: SampledLoop, control_state: ControlLoopState) -> CompiledRun:
+    """A run of the loop in one kernel."""
     assert problem.integrator is not None
-    if can_be_compiled(prepared):
-        loop = CompiledLoop(problem.compiled, prepared)
-        run = CompiledRun(loop, problem.compiled, problem.integrator, problem.initial_vector, control_state)
-        if run.can_run:
-            return run
-    return CalledRun(problem, prepared, control_state)
+    loop = CompiledLoop(problem.compiled, prepared)
+    return CompiledRun(loop, problem.compiled, problem.integrator, problem.initial_vector, control_state)
 
 
-def _solution(problem: Problem, run: CompiledRun | CalledRun) -> Solution:
+def _solution(problem: Problem, run: CompiledRun) -> Solution:
     """The rows of all intervals as one solution."""
     compiled, loop, integrator = problem.compiled, problem.input, problem.integrator
     assert isinstance(loop, ControlLoop)
     segments, (times, states) = run.signal, run.rows
-    if isinstance(run, CompiledRun):  # the next run may be in the same arrays
-        times, states = times.copy(), states.copy()
+    times, states = times.copy(), states.copy()  # the next run may be in the same arrays
     begun = len(run.measured) > 0
     at, state = (run.stopped_at, run.bound.state.copy()) if begun else (run.time, run.state)
     raw = RawSolution(states, times.size, at, state, run.status, *run.bound.step_counts)
@@ -66,8 +60,7 @@ def _solution(problem: Problem, run: CompiledRun | CalledRun) -> Solution:
         segments = PiecewiseLinear(np.array([problem.end_time]), np.zeros(shape), np.zeros(shape))
     table = recorded_rows(compiled, states, times, segments, problem.start_time)
     raw, table = truncate_at_invalid_row(compiled, raw, table, times)
-    compiled_law = isinstance(run, CompiledRun) and run.loop.law is not None
-    way = "compiled with the plant" if compiled_law else "called from Python at each sample"
+    way = "compiled with the plant" if run.loop.law is not None else "called from Python at each sample"
     measured = [name for name in loop.controller.measured_columns if name in compiled.output_names]
     note = f"controlled by {loop.describe(column_units(problem.system, measured))}; {way}"
     remark = Diagnostic(DiagnosticCode.CONTROLLER, type(loop.controller).__name__, note)
@@ -83,7 +76,7 @@ def _solution(problem: Problem, run: CompiledRun | CalledRun) -> Solution:
     return Solution(problem, recording, raw.status, statistics, diagnostics, run.time, final, control_state)
 
 
-def _controller_columns(run: CompiledRun | CalledRun, times: Array) -> dict[str, Array]:
+def _controller_columns(run: CompiledRun, times: Array) -> dict[str, Array]:
     """Set points in time; measurements and commands of the last sample at every row."""
     prepared, controller, count = run.prepared, run.prepared.loop.controller, times.size
     at, setpoints = prepared.at(times) if prepared.loop.drivers else prepared.at_times  # drivers add rows

@@ -1,6 +1,7 @@
 """Control loop as one program: control law, drivers and plant from sample to sample without a return to Python.
 
-A controller that is no control law is called from Python; only then does the program pause at each sample.
+A controller that is no control law, and drivers that no kernel implements, are called from Python; only then does the
+program pause at each sample.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import numpy as np
 from ...core.arrays import Array, flat_view
 from ...core.status import Status
 from ..compile.cache import kernel
-from ..compile.kernel_layout import Progress
+from ..compile.kernel_layout import Progress, Waiting
 from ..compile.program import CompiledSystem
 from ..loop.control_law import ControlLaw
 from ..loop.control_loop import ControlLoopState
@@ -20,7 +21,7 @@ from ..loop.piecewise_linear import PiecewiseLinear
 from .bound_integrator import INTERRUPT_CHECK_STEPS, MAX_STEPS
 from .called_controller import CalledController
 from .compiled_law import compiled_sample, parameters_of
-from .driver_table import MAX_CAPACITY, DriverTable, are_known, greatest_capacity
+from .driver_table import DriverTable, are_called, greatest_capacity
 from .integrators import Integrator
 from .sampled_loop import SampledLoop
 
@@ -39,7 +40,9 @@ class CompiledLoop:
         self._function = compiled_sample(self.law) if self.law is not None else None
         self.sample_address = 0 if self._function is None else self._function.address
         self.parameters = parameters_of(self.law) if self.law is not None else np.zeros(1)
-        self.capacity = greatest_capacity(prepared) if loop.drivers else 0
+        self.called_drivers = bool(loop.drivers) and are_called(prepared)
+        pieces = int(np.diff(prepared.first_segments).max())
+        self.capacity = pieces if self.called_drivers else greatest_capacity(prepared) if loop.drivers else 0
         columns = (*known.state_names, *known.output_names)
         measured_at = np.array([columns.index(name) for name in controller.measured_columns], dtype=np.int64)
         commanded_at = np.array(prepared.commanded, dtype=np.int64)
@@ -60,14 +63,8 @@ class CompiledLoop:
         return [state.controller[name] for name in self.law.initial_memory] if self.law is not None else []
 
 
-def can_be_compiled(prepared: SampledLoop) -> bool:
-    """Whether all drivers of a loop are among those that kernels implement."""
-    loop = prepared.loop
-    return not loop.drivers or (are_known(loop) and greatest_capacity(prepared) <= MAX_CAPACITY)
-
-
 class CompiledRun:
-    """A run of a compiled loop; the results are those of `called_run.CalledRun`, with a control law to rounding errors.
+    """A run of a compiled loop; with a control law, the results are those of the same controller called to rounding.
 
     compiled       the plant, whose structure is that of the loop's plant
     initial_state  (n,)
@@ -83,11 +80,12 @@ class CompiledRun:
         self.bound = integrator.bind(compiled)
         self.bound.state[:] = initial_state
         self.status, self.stopped_at = Status.DONE, float(loop.edges[0])
-        self._drivers = DriverTable(loop.prepared, control_state, loop.capacity)
+        self._drivers = DriverTable(loop.prepared, control_state, loop.capacity, loop.called_drivers)
         self._make_arrays(compiled.sizes.states, compiled.sizes.inputs)
         self._parameters = loop.parameters.copy() if parameters is None else parameters
         arguments = self._arguments(compiled, self._parameters)
         self._first_buffer, self._budget = len(arguments) - 9, len(arguments) - 1
+        self._columns = next(i for i, each in enumerate(arguments) if each is self._drivers.columns)
         self._kernel = kernel.sampled_loop.bind(*arguments)
         self._controller = None if loop.law is not None else CalledController(loop.prepared)
         self._forget_samples()
@@ -127,11 +125,6 @@ class CompiledRun:
     def room(self) -> int:
         """Rows for which this run has arrays."""
         return len(self._rows)
-
-    @property
-    def can_run(self) -> bool:
-        """Whether the machine code of the integrator can be called by another kernel."""
-        return self.bound.entry_address is not None
 
     def _make_arrays(self, n: int, m: int) -> None:
         prepared, state = self.loop.prepared, self._begin_state
@@ -173,7 +166,7 @@ class CompiledRun:
             status = run()
             while status == _PAUSED:
                 if flags[_WAITING]:
-                    self._call_controller(flags[_INTERVAL])
+                    self._answer(flags[_WAITING], flags[_INTERVAL])
                 elif flags[Progress.FULL]:
                     self._extend()
                 elif self._takes_too_many_steps():
@@ -191,6 +184,26 @@ class CompiledRun:
         """No sample has been taken yet by a controller that is called."""
         self._memories, self._called_at = [self._begin_state.controller] * 2, -1
         self._views = flat_view(self._measured), flat_view(self._command)
+
+    def _answer(self, waiting: int, interval: int) -> None:
+        """Give the kernel what it awaits."""
+        if waiting == Waiting.COMMANDS:
+            self._call_controller(interval)
+        elif waiting == Waiting.DRIVERS:
+            self._call_drivers(interval)
+        else:  # the integrator has no machine code that a kernel could call
+            self.progress[Progress.RESULT] = self.bound.run_part().value
+
+    def _call_drivers(self, interval: int) -> None:
+        """Pass the signals of an interval through drivers of the user, and make room for what they return."""
+        prepared, progress, drivers = self.loop.prepared, self.progress, self._drivers
+        count = drivers.call(interval, float(self.loop.edges[interval]))
+        self._kernel.replace(self._columns, drivers.columns)
+        rows = count + int(prepared.first_rows[interval + 1] - prepared.first_rows[interval])
+        ends = self._segments[0]
+        while progress[Progress.SEGMENTS] + count > len(ends) or progress[Progress.ROWS] + rows > len(self._times):
+            self._extend()
+            ends = self._segments[0]
 
     def _call_controller(self, interval: int) -> None:
         """Take the sample of an interval: from the measurements of the kernel to its commands."""
@@ -220,7 +233,7 @@ class CompiledRun:
         if progress[Progress.RUNNING]:
             progress[Progress.SEGMENTS] = progress[Progress.FIRST_SEGMENT]
             progress[Progress.ROWS] = progress[Progress.FIRST_ROW]
-            progress[Progress.SAMPLES] = progress[Progress.INTERVAL]
+        progress[Progress.SAMPLES] = progress[Progress.INTERVAL]
         self.stopped_at, self.bound.state[:] = self.time, self._kept
 
     @property
@@ -269,7 +282,7 @@ class CompiledRun:
             measured=tuple(self._samples[done - 1].tolist()),
             commanded=tuple(self._commands[done - 1].tolist()),
             applied_inputs=tuple(self._kept_inputs.tolist()),
-            drivers=self._drivers.as_mapping(),
+            drivers=self._drivers.as_mapping(done),
         )
 
     def _controller_memory(self, done: int) -> Any:

@@ -12,7 +12,7 @@ from ...core.arrays import Array
 from ..compile.kernel_layout import DriverKind
 from ..loop.control_loop import ControlLoop, ControlLoopState
 from ..loop.driver import MAX_PERIODS, PWM, Driver, PwmState, SolenoidDriver, SolenoidState
-from ..loop.with_drivers import WithDrivers, check_command_range
+from ..loop.with_drivers import WithDrivers, apply_drivers, check_command_range
 from .sampled_loop import SampledLoop
 
 MAX_CAPACITY = 1_000_000
@@ -24,9 +24,10 @@ KINDS: dict[type, DriverKind] = {PWM: DriverKind.MODULATOR, SolenoidDriver: Driv
 _STATES: dict[type, Any] = {PWM: PwmState, SolenoidDriver: SolenoidState}
 
 
-def are_known(loop: ControlLoop) -> bool:
-    """Whether the kernel implements all drivers of a loop."""
-    return all(type(driver) in KINDS for chain in _chains(loop).values() for driver in chain)
+def are_called(prepared: SampledLoop) -> bool:
+    """Whether a driver of a loop must be called from Python, because the kernel does not implement it."""
+    known = all(type(driver) in KINDS for chain in _chains(prepared.loop).values() for driver in chain)
+    return not known or greatest_capacity(prepared) > MAX_CAPACITY
 
 
 def greatest_capacity(prepared: SampledLoop) -> int:
@@ -42,29 +43,59 @@ class DriverTable:
     kinds (D, 2)      index of the input, and DriverKind
     settings, states, kept (D, 4)   settings; states at the end of the present and of the last completed interval
     columns, scratch, counts, begins    workspace of the kernel
+    called  whether the drivers are called from Python, in the signals of the kernel
     """
 
-    def __init__(self, prepared: SampledLoop, state: ControlLoopState, capacity: int) -> None:
+    def __init__(
+        self, prepared: SampledLoop, state: ControlLoopState, capacity: int, called: bool = False
+    ) -> None:  # fmt: skip
         loop, inputs, names = prepared.loop, prepared.inputs, prepared.input_names
         chains = _chains(loop)
-        self._order = [(name, driver) for name, chain in chains.items() for driver in chain]
+        self.called, self._chains = called, chains
+        self._indices = {name: names.index(name) for name in chains}
+        self._order = [(name, driver) for name, chain in chains.items() for driver in chain if not called]
         for name in chains:
             if name not in loop.controller.inputs:
                 check_command_range(name, inputs.column(names.index(name)), float(prepared.instants[0]))
         m = inputs.values.shape[1]
         self.kinds = np.array([(names.index(n), KINDS[type(d)]) for n, d in self._order], np.int64).reshape(-1, 2)
+        if called:
+            self.kinds = np.array([(-1, -1)])
         self.settings = _table([d.settings for _, d in self._order if isinstance(d, PWM | SolenoidDriver)])
-        self.kept = _table([tuple(one) for name in chains for one in state.drivers[name]])
+        self.kept = _table([tuple(one) for name in chains for one in state.drivers[name] if not called])
         self.states, self._first = self.kept.copy(), self.kept.copy()
         self.columns, self.scratch = np.empty((m, 3, capacity)), np.empty((2, 3, capacity))
         self.counts, self.begins = np.zeros((2, m), dtype=np.int64), np.empty(m)
 
+        self._first_called = state.drivers
+        self.restart()
+
     def restart(self) -> None:
         """The states at the beginning of the loop."""
         self.states[:] = self.kept[:] = self._first
+        self._before = self._after = self._first_called
+        self._called_at = -1
 
-    def as_mapping(self) -> Mapping[str, tuple[Any, ...]]:
-        """The drivers' states at the end of the last completed interval, by input."""
+    def call(self, interval: int, begin: float) -> int:
+        """Replace the signals of an interval by those behind the drivers; how many segments they have together."""
+        counts = self.counts[0].tolist()
+        signals = [
+            list(zip(*self.columns[i, :, :count].tolist(), strict=True)) for i, count in enumerate(counts)
+        ]  # fmt: skip
+        self._before, self._called_at = self._after, interval
+        self._after = apply_drivers(self._chains, self._before, signals, self._indices, begin)
+        counts = list(map(len, signals))
+        if max(counts) > self.columns.shape[2]:
+            self.columns = np.empty((*self.columns.shape[:2], 2 * max(counts)))
+        for i, signal in enumerate(signals):
+            self.columns[i, :, : counts[i]] = np.array(signal).T
+        self.counts[0] = counts
+        return sum(counts)
+
+    def as_mapping(self, done: int) -> Mapping[str, tuple[Any, ...]]:
+        """The drivers' states at the end of the last of so many completed intervals, by input."""
+        if self.called:  # the last call may be that of an interval that was not completed
+            return self._after if done > self._called_at else self._before
         by_name: dict[str, tuple[Any, ...]] = {name: () for name, _ in self._order}
         for (name, driver), row in zip(self._order, self.kept.tolist(), strict=True):
             kind = _STATES[type(driver)]

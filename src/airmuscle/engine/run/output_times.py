@@ -97,20 +97,3 @@ def _merge_few(grid: Array, instants: Array, close: float) -> Array:
         row = max(row, high)
     parts.append(grid[row:])
     return np.concatenate(parts)
-
-
-def merge_few_output_times(grid: list[float], instants: list[float], duration: float) -> list[float]:
-    """The same for a few rows and instants, as lists; at least one instant."""
-    close = 1e-9 * duration
-    merged: list[float] = []
-    row, count = 0, len(grid)
-    for i, instant in enumerate(instants):
-        while row < count and grid[row] < instant - close:
-            merged.append(grid[row])
-            row += 1
-        if not i or instant > instants[i - 1]:
-            merged.append(instant)
-        while row < count and grid[row] <= instant + close:
-            row += 1
-    merged += grid[row:]
-    return merged

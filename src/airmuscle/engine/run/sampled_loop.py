@@ -5,14 +5,13 @@ from __future__ import annotations
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array, flat_view
+from ...core.arrays import Array
 from ...core.errors import ParameterError
-from ..compile.cache.kernel import evaluate
 from ..compile.program import CompiledSystem
 from ..loop.control_loop import ControlLoop, ControlLoopState
 from ..loop.inputs import InputSignal
@@ -39,8 +38,6 @@ class SampledLoop:
     first_rows       (K + 1,) the first output time of each interval
     input_names      of the plant
     ranges           minimum and maximum of every commanded input
-
-    The lists `edges`, `setpoints`, `segment_offsets` and `row_offsets` have the same numbers, for runs in Python.
     """
 
     loop: ControlLoop
@@ -57,27 +54,9 @@ class SampledLoop:
     ranges: Mapping[str, tuple[float, float]]
 
     @functools.cached_property
-    def edges(self) -> list[float]:
-        """The instants as numbers."""
-        numbers: list[float] = self.instants.tolist()
-        return numbers
-
-    @functools.cached_property
     def setpoints(self) -> list[list[float]]:
         """The set points as numbers."""
         numbers: list[list[float]] = self.setpoint_values.tolist()
-        return numbers
-
-    @functools.cached_property
-    def segment_offsets(self) -> list[int]:
-        """The first segments as numbers."""
-        numbers: list[int] = self.first_segments.tolist()
-        return numbers
-
-    @functools.cached_property
-    def row_offsets(self) -> list[int]:
-        """The first rows as numbers."""
-        numbers: list[int] = self.first_rows.tolist()
         return numbers
 
     @functools.cached_property
@@ -195,27 +174,3 @@ def _few_snapped(segments: PiecewiseLinear, edges: Array, close: float) -> Piece
             kept.append(row)
         last = moved
     return PiecewiseLinear(np.array(ends), segments.values[kept], segments.slopes[kept])
-
-
-def make_measurement(
-    compiled: CompiledSystem, loop: ControlLoop, state: Array
-) -> Callable[[Sequence[float]], list[float]]:
-    """A function of the inputs (m,) that returns the measured columns at the present contents of `state` (n,)."""
-    known, names, view = compiled.description, loop.controller.measured_columns, flat_view(state)
-    if all(name in known.state_names for name in names):
-        indices = [known.state_names.index(name) for name in names]
-        return lambda inputs: [view[i] for i in indices]
-    sizes = compiled.sizes
-    u, y = np.zeros((1, sizes.inputs)), np.empty((1, sizes.outputs))
-    run = evaluate.bind(compiled.address["outputs"], compiled.precomputed, state.reshape(1, -1), u, y)
-    columns = (*known.state_names, *known.output_names)
-    wanted = [columns.index(name) - sizes.states for name in names]
-    applied, outputs = flat_view(u), flat_view(y)
-
-    def measure(inputs: Sequence[float]) -> list[float]:
-        for i, value in enumerate(inputs):
-            applied[i] = value
-        run()
-        return [outputs[i] if i >= 0 else view[i] for i in wanted]
-
-    return measure

@@ -117,15 +117,11 @@ def merge_times(
 
 
 @PART
-def drive_inputs(
-    kinds: Any, settings: Any, kept_states: Any, states: Any, columns: Any, counts: Any, scratch: Any, begins: Any,
-    begin: Any, ulp: Any, ends: Any, values: Any, slopes: Any, first: Any, pieces: Any,
-    new_ends: Any, new_values: Any, new_slopes: Any, at_segment: Any,
-    grid: Any, grid_begin: Any, grid_end: Any, close: Any, times: Any, at_row: Any,
+def merge_inputs(
+    columns: Any, counts: Any, begins: Any, begin: Any, new_ends: Any, new_values: Any, new_slopes: Any,
+    at_segment: Any, grid: Any, grid_begin: Any, grid_end: Any, close: Any, times: Any, at_row: Any,
 ) -> Any:  # fmt: skip
-    """Pass an interval's segments through the drivers; the numbers of segments and of output times that result."""
-    load_columns(ends, values, slopes, first, pieces, columns, counts)
-    apply_drivers(kinds, settings, kept_states, states, columns, counts[0], scratch, begin, ulp)
+    """Merge the signals of an interval behind the drivers; the numbers of segments and of output times that result."""
     driven = merge_columns(columns, counts[0], counts[1], begins, begin, new_ends, new_values, new_slopes, at_segment)
     instants = driven if driven > 1 else 0
     wanted = merge_times(grid, grid_begin, grid_end, new_ends, at_segment, instants, close, times, at_row)

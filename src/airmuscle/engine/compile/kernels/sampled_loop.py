@@ -7,9 +7,9 @@ from typing import Any
 import numba
 
 from ....core.status import Status
-from ..kernel_layout import Progress
+from ..kernel_layout import Progress, Waiting
 from .calls import call_kernel, invoke, pointer
-from .driven_inputs import drive_inputs, is_full
+from .driven_inputs import apply_drivers, is_full, load_columns, merge_inputs
 from .parts import PART
 
 DONE, PAUSED, NOT_FINITE = Status.DONE.value, Status.PAUSED.value, Status.NOT_FINITE.value
@@ -17,7 +17,10 @@ NON_FINITE_COMMAND, BELOW_LIMIT = Status.NON_FINITE_COMMAND.value, Status.NEGATI
 LARGEST = 1.7976931348623157e308
 DRIVER_WIDTH = 4
 """Numbers of the settings and of the state of a driver."""
-INTERVAL, RUNNING, SEGMENTS, ROWS, SAMPLES, STEPS_BEFORE, FULL, FIRST_SEGMENT, FIRST_ROW, WAITING = map(int, Progress)
+INTERVAL, RUNNING, SEGMENTS, ROWS, SAMPLES, STEPS_BEFORE, FULL, FIRST_SEGMENT, FIRST_ROW, WAITING, RESULT = map(
+    int, Progress
+)
+NOTHING, COMMANDS, DRIVERS, INTEGRATION = map(int, Waiting)
 
 
 @PART
@@ -64,7 +67,7 @@ def take_sample(
 
     PAUSED where the controller is called from Python: its commands are limited when the kernel is called again.
     """
-    status, waited = DONE, progress[WAITING] == 1
+    status, waited = DONE, progress[WAITING] == COMMANDS
     if not waited:
         for i in range(memory.shape[1]):
             memory[1, i] = memory[0, i]
@@ -75,27 +78,46 @@ def take_sample(
                 pointer(measured), pointer(setpoint), pointer(memory[0]), pointer(low), pointer(high),
                 pointer(period), pointer(parameters), pointer(command), pointer(memory[1]),
             ))  # fmt: skip
-    progress[WAITING] = 0
+    progress[WAITING] = NOTHING
     if status == DONE and controlled:
         if sample != 0 or waited:
             status = limit_commands(command, low, high)
         else:
             status = PAUSED
-            progress[WAITING] = 1
+            progress[WAITING] = COMMANDS
     return status
 
 
 @PART
 def apply_sample(
-    k: Any, measured: Any, samples: Any, command: Any, commands: Any, commanded_at: Any, first: Any, values: Any
-) -> None:
+    k: Any, measured: Any, samples: Any, command: Any, commands: Any, commanded_at: Any, first: Any, values: Any,
+    progress: Any,
+) -> None:  # fmt: skip
     """Write the measurements and the commands of interval `k`, and the commands into its segments."""
+    progress[SAMPLES] = k + 1
     for i in range(measured.shape[0]):
         samples[k, i] = measured[i]
     for i in range(command.shape[0]):
         commands[k, i] = command[i]
         for row in range(first[k], first[k + 1]):
             values[row, commanded_at[i]] = command[i]
+
+
+@PART
+def drive_inputs(
+    kinds: Any, settings: Any, kept_states: Any, states: Any, columns: Any, counts: Any, scratch: Any, begin: Any,
+    ulp: Any, ends: Any, values: Any, slopes: Any, first: Any, pieces: Any, progress: Any,
+) -> Any:  # fmt: skip
+    """Pass an interval's segments through the drivers, if there are any; PAUSED where they are called from Python."""
+    status = DONE
+    if kinds.shape[0] > 0:
+        load_columns(ends, values, slopes, first, pieces, columns, counts)
+        if kinds[0, 0] >= 0:
+            apply_drivers(kinds, settings, kept_states, states, columns, counts[0], scratch, begin, ulp)
+        else:
+            status = PAUSED
+            progress[WAITING] = DRIVERS
+    return status
 
 
 @PART
@@ -114,6 +136,19 @@ def start_integrator(
     slots[places[4]] = pointer(rows[at_row:])
     slots[places[0] + 1] = slots[places[1] + 1] = slots[places[2] + 1] = pieces
     slots[places[3] + 1] = slots[places[4] + 1] = wanted
+
+
+@PART
+def call_integrator(integrate: Any, slots: Any, progress: Any) -> Any:
+    """Integrate the interval; its status, or PAUSED where it is integrated from Python, and then the status found."""
+    status = PAUSED
+    if integrate != 0:
+        status = call_kernel(integrate, pointer(slots))
+    elif progress[WAITING] == INTEGRATION:
+        progress[WAITING], status = NOTHING, progress[RESULT]
+    else:
+        progress[WAITING] = INTEGRATION
+    return status
 
 
 @PART
@@ -181,30 +216,31 @@ def sampled_loop(
         begin, end = edges[k], edges[k + 1]
         if progress[RUNNING] == 0:
             wanted = grid_row[k + 1] - grid_row[k]
-            progress[FULL] = 1 if driven and is_full(progress, columns, wanted, new_ends, times) else 0
-            if progress[FULL] == 1 or count[2] - steps_at_call >= budget:
-                return PAUSED
-            status = take_sample(
-                outputs, y, applied, c, o, measured_at, sample, setpoints[k], low, high, period, parameters,
-                k >= first_sample, memory, measured, command, progress,
-            )  # fmt: skip
-            if status != DONE:
-                return status
-            apply_sample(k, measured, samples, command, commands, commanded_at, first, values)
-            progress[SAMPLES] = k + 1
             at_segment, at_row, pieces = first[k], grid_row[k], first[k + 1] - first[k]
+            if progress[WAITING] != DRIVERS:
+                progress[FULL] = 1 if driven and is_full(progress, columns, wanted, new_ends, times) else 0
+                if progress[FULL] == 1 or count[2] - steps_at_call >= budget:
+                    return PAUSED
+                status = take_sample(
+                    outputs, y, applied, c, o, measured_at, sample, setpoints[k], low, high, period, parameters,
+                    k >= first_sample, memory, measured, command, progress)  # fmt: skip
+                if status == DONE:
+                    apply_sample(k, measured, samples, command, commands, commanded_at, first, values, progress)
+                    status = drive_inputs(
+                        kinds, settings, kept_states, states, columns, counts, scratch, begin, ulps[k + 1],
+                        ends, values, slopes, at_segment, pieces, progress)  # fmt: skip
+                if status != DONE:
+                    return status
+            progress[WAITING] = NOTHING
             if driven:
                 at_segment, at_row = progress[SEGMENTS], progress[ROWS]
-                pieces, wanted = drive_inputs(
-                    kinds, settings, kept_states, states, columns, counts, scratch, begins, begin, ulps[k + 1],
-                    ends, values, slopes, first[k], pieces, new_ends, new_values, new_slopes, at_segment,
-                    grid, grid_row[k], grid_row[k + 1], 1e-9 * period[0], times, at_row,
-                )  # fmt: skip
+                pieces, wanted = merge_inputs(
+                    columns, counts, begins, begin, new_ends, new_values, new_slopes, at_segment,
+                    grid, grid_row[k], grid_row[k + 1], 1e-9 * period[0], times, at_row)  # fmt: skip
             start_integrator(
                 slots, places, progress, clock, count, begin, at_segment, pieces, at_row, wanted,
-                new_ends, new_values, new_slopes, times, rows,
-            )  # fmt: skip
-        status = call_kernel(integrate, pointer(slots))
+                new_ends, new_values, new_slopes, times, rows)  # fmt: skip
+        status = call_integrator(integrate, slots, progress)
         progress[ROWS] = progress[FIRST_ROW] + count[1]
         if status != DONE:
             return status
@@ -212,6 +248,5 @@ def sampled_loop(
             return BELOW_LIMIT
         end_interval(
             progress, begin, end, new_ends, new_values, new_slopes, applied, kept_applied, y, kept, memory, states,
-            kept_states,
-        )  # fmt: skip
+            kept_states)  # fmt: skip
     return DONE

@@ -79,7 +79,7 @@ class BatchJob:
 
     def _run_loop(self, index: int, one: CompiledSystem, loops: LoopBatch) -> None:
         """Simulate a control loop and write its results."""
-        run = loops.run(index, self.variations, one, self.initial_states[index])
+        run = loops.run(index, one, self.initial_states[index])
         times, rows = run.rows
         if not isinstance(run, CompiledRun) or run.prepared.loop.drivers:  # there may be further rows
             at = np.searchsorted(times, self.times - 1e-9 * loops.template.duration)

@@ -18,8 +18,7 @@ from ...compile.program import CompiledSystem
 from ...loop.control_law import ControlLaw
 from ...loop.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop
 from ...loop.law_design import designed_loop
-from ..called_run import CalledRun
-from ..compiled_loop import CompiledLoop, CompiledRun, can_be_compiled
+from ..compiled_loop import CompiledLoop, CompiledRun
 from ..integrators import Integrator
 from ..problem import Problem
 from ..sampled_loop import SampledLoop, first_rows_of, prepare_loop
@@ -42,7 +41,7 @@ class LoopBatch:
     loops: tuple[ControlLoop, ...]
     laws: Variations | None
     times: Array
-    _prepared: dict[int, SampledLoop | CompiledLoop] = dataclasses.field(default_factory=dict)
+    _prepared: dict[int, CompiledLoop] = dataclasses.field(default_factory=dict)
     _preparing: Any = dataclasses.field(default_factory=threading.Lock)
     _idle: dict[int, list[CompiledRun]] = dataclasses.field(default_factory=dict)
     _at_rows: dict[int, tuple[npt.NDArray[np.intp], Array]] = dataclasses.field(default_factory=dict)
@@ -74,8 +73,7 @@ class LoopBatch:
 
     def prepared(self, loop: ControlLoop) -> SampledLoop:
         """A loop prepared for runs with rows at the times of the batch."""
-        ready = self._loop(loop)
-        return ready.prepared if isinstance(ready, CompiledLoop) else ready
+        return self._loop(loop).prepared
 
     def place_of(self, column: str) -> tuple[int, int]:
         """Whether a column that loops add is a set point (0), measurement (1) or command (2), and its number."""
@@ -91,25 +89,19 @@ class LoopBatch:
 
     def _rows_of(self, loop: ControlLoop, prepared: SampledLoop) -> tuple[npt.NDArray[np.intp], Array]:
         """The interval of each row (T,), and the set points (T, s) there."""
-        key = id(loop)  # one that is called is prepared anew for each run, with the same instants and set points
+        key = id(loop)
         if key not in self._at_rows:
             at = np.maximum(np.searchsorted(prepared.instants, self.times, side="right") - 1, 0)
             self._at_rows[key] = at, prepared.setpoint_signal.inputs_at(self.times, self.template.start_time)
         return self._at_rows[key]
 
-    def run(self, index: int, plants: Variations, compiled: CompiledSystem, state: Array) -> CompiledRun | CalledRun:
+    def run(self, index: int, compiled: CompiledSystem, state: Array) -> CompiledRun:
         """The loop of one plant, integrated from its initial state (n,)."""
-        loop = self.loop_of(index)
-        prepared = self._loop(loop)
-        if isinstance(prepared, CompiledLoop):
-            parameters = prepared.parameters.copy() if self.laws is None else self.laws.parameters(index)
-            run = self._compiled(prepared, compiled, state, parameters)
-            if run.can_run:
-                run.integrate()
-                return run
-        called = self._called(index, plants, loop, state)
-        called.integrate()
-        return called
+        loop = self._loop(self.loop_of(index))
+        parameters = loop.parameters.copy() if self.laws is None else self.laws.parameters(index)
+        run = self._compiled(loop, compiled, state, parameters)
+        run.integrate()
+        return run
 
     def _compiled(
         self, prepared: CompiledLoop, compiled: CompiledSystem, state: Array, parameters: Array
@@ -127,32 +119,17 @@ class LoopBatch:
         run.restart(compiled, state, parameters, loop.init(start) if prepared.law is None else None)
         return run
 
-    def release(self, run: CompiledRun | CalledRun) -> None:
+    def release(self, run: CompiledRun) -> None:
         """State that nothing of a run is needed any more; its arrays serve another one."""
-        if isinstance(run, CompiledRun):
-            self._idle[id(run.loop)].append(run)
+        self._idle[id(run.loop)].append(run)
 
-    def _called(self, index: int, plants: Variations, loop: ControlLoop, state: Array) -> CalledRun:
-        """A run that calls controller and drivers; a prepared loop is filled during a run, so each has its own."""
-        plant = plants.one(index)
-        if self.laws is not None:
-            law: Any = self.laws.one(index)
-            loop = dataclasses.replace(loop, controller=law)
-        names = [s.name for s in plant.states]
-        problem = dataclasses.replace(
-            self.template, system=plant, input=loop, initial_state=dict(zip(names, state.tolist(), strict=True))
-        )
-        start = loop.init(problem.start_time)
-        return CalledRun(problem, self._at_times(prepare_loop(problem, start)), start)
-
-    def _loop(self, loop: ControlLoop) -> SampledLoop | CompiledLoop:
+    def _loop(self, loop: ControlLoop) -> CompiledLoop:
         """A loop prepared for its runs, once for all plants that share it."""
         with self._preparing:
             if id(loop) not in self._prepared:
                 problem = dataclasses.replace(self.template, input=loop)
                 prepared = self._at_times(prepare_loop(problem, loop.init(problem.start_time)))
-                compile_it = can_be_compiled(prepared)
-                self._prepared[id(loop)] = CompiledLoop(problem.compiled, prepared) if compile_it else prepared
+                self._prepared[id(loop)] = CompiledLoop(problem.compiled, prepared)
         return self._prepared[id(loop)]
 
     def _at_times(self, prepared: SampledLoop) -> SampledLoop:
@@ -160,9 +137,7 @@ class LoopBatch:
         rows = first_rows_of(self.times, prepared.instants)
         return dataclasses.replace(prepared, times=self.times, first_rows=rows)
 
-    def columns(
-        self, index: int, wanted: Collection[str], run: CompiledRun | CalledRun, count: int
-    ) -> dict[str, Array]:
+    def columns(self, index: int, wanted: Collection[str], run: CompiledRun, count: int) -> dict[str, Array]:
         """The wanted ones of set points, measurements and commands at the first rows (R,) of one plant."""
         controller = self.loops[0].controller
         intervals, setpoints = self._rows_of(self.loop_of(index), run.prepared)
