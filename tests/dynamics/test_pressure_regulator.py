@@ -12,10 +12,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import airmuscle as am
 from airmuscle.engine import Rodas4
 from airmuscle.errors import ColumnError, IdentificationError, ParameterError
+from airmuscle.files import load_scenario
+from airmuscle.outlets.cli.app import app
 from airmuscle.physics import Isothermal, Manifold, SharedSupply, Supply, Tank, Valve, WithEnergyMeters
 from airmuscle.recording import Recording
 
@@ -151,6 +154,24 @@ def test_what_a_record_excites_too_little_is_named_with_the_command_that_would()
 def test_a_record_without_excitation_is_refused(change, kind, message):
     with pytest.raises(kind, match=message):
         am.bench.fit_regulator([change(record([(0.0, 3e5), (0.5, 3.2e5)]))], supply_pressure=6e5)
+
+
+def test_the_command_writes_a_regulator_that_a_scenario_takes(tmp_path):
+    made, out = record(RECORD[:11]), tmp_path / "out"
+    kilopascal = {
+        "time": made["time"],
+        "setpoint [kPa]": 1e-3 * made["setpoint"],
+        "pressure [kPa]": 1e-3 * made["pressure"],
+    }
+    am.write_csv(Recording(kilopascal, "bench"), tmp_path / "bench.csv")
+    given = [tmp_path / "bench.csv", "--supply", "5.78 bar", "--starts", "1", "--out", out]
+    done = CliRunner().invoke(app, ["fit-regulator", *map(str, given)])
+    assert done.exit_code == 0, done.output
+    assert "settled pressure minus command, taken as the zero of the sensor" in done.output
+    assert "PressureRegulator" in (out / "regulator.toml").read_text(encoding="utf-8")
+    plant = load_scenario(out / "scenario.toml").plant
+    assert plant.circuits[0].supply.pressure == pytest.approx(5.78e5)
+    assert (out / "report.html").exists()
 
 
 def test_an_unknown_parameter_is_named():

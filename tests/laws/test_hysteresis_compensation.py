@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
+import runpy
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -124,3 +126,27 @@ def test_an_input_that_the_law_does_not_command_is_refused():
 def test_paths_of_different_lengths_are_refused():
     with pytest.raises(ParameterError, match="must be finite arrays"):
         HysteresisOperator.fitted([0.0, 1.0], [0.0], (0.0,))
+
+
+EXAMPLE = runpy.run_path(str(Path(__file__).parents[2] / "examples" / "A12_noisy_hysteresis.py"))
+
+
+def test_elements_keep_their_direction_where_a_switch_by_the_rate_flips():
+    """The numbers of docs/hysteresis.md; without noise both turn at the three ends of the triangles."""
+    rng = np.random.default_rng(0)
+    clean, noisy = (EXAMPLE["comparison"](noise, rng) for noise in (0.0, 1.0))
+    assert clean == [pytest.approx(0.0375, abs=0.001), 0.0, pytest.approx(0.025, abs=0.02), 0.0]
+    assert noisy == [
+        pytest.approx(66, abs=2),
+        pytest.approx(133, abs=3),
+        pytest.approx(0.35, abs=0.2),
+        pytest.approx(7, abs=1),
+    ]
+    switched, slipping = EXAMPLE["held_flips"](rng)
+    assert switched == pytest.approx(24, abs=4)
+    assert slipping == 0.0
+
+
+def test_the_first_loop_is_wider_if_the_elements_begin_relaxed():
+    np.testing.assert_allclose(EXAMPLE["loop_widths"](), [80.0, 53.0, 53.0], atol=0.1)
+    np.testing.assert_allclose(EXAMPLE["loop_widths"](settled=True), [53.0, 53.0, 53.0], atol=0.1)
