@@ -502,7 +502,7 @@ def test_the_greatest_degree_of_a_surface_is_proposed(tmp_path):
     said = str(caught.value)
     assert re.search(r"cannot separate a\([^ ]+, a\([^)]+\), a\([^)]+\) and \d+ other parameters", said)
     assert "the coefficient of the powers i of the contraction and j of the pressure" in said
-    assert said.endswith("use degree=2 of muscle.characteristic.ContractileSurface.blank.")
+    assert said.endswith("use degree=2 of characteristic.ContractileSurface.blank.")
     assert fit(ContractileSurface.blank(2), loops(spike=False)).rank == 6
     am.write_csv(loops(spike=False), tmp_path / "loops.csv")
     result = airmuscle("fit", tmp_path / "loops.csv", "--characteristic", "ContractileSurface", "--out", tmp_path / "o")
