@@ -569,3 +569,17 @@ def test_the_tables_of_the_page_are_in_display_units_and_their_files_are_not(tmp
     assert ">value (SI)</th>" in usual
     files = [(tmp_path / name / "data" / "sizes.csv").read_bytes() for name in ("chosen", "usual")]
     assert files[0] == files[1]
+
+
+def test_a_meaning_that_all_coefficients_share_is_shown_once_and_its_file_keeps_it(tmp_path: Path):
+    columns = {"parameter": ["a", "b", "c"], "meaning": ["coefficients", "coefficients", "limit"]}
+    chapter = Chapter("paper", "t", "s", tables=(Table("t", "t", columns),))
+    write_report([chapter], tmp_path, date=DATE)
+    assert (tmp_path / "report.html").read_text(encoding="utf-8").count("coefficients") == 1
+    assert (tmp_path / "data" / "t.csv").read_text(encoding="utf-8").count("coefficients") == 2
+
+
+def test_wide_equations_and_texts_of_tables_scroll_in_their_boxes_on_a_phone(report: Path):
+    page = (report / "report.html").read_text(encoding="utf-8")
+    assert ".equation { overflow-x: auto; }" in page
+    assert ".scroll td:not(.right, .short) { min-width: 15rem; }" in page

@@ -155,11 +155,18 @@ def count_readings(statement: Statement) -> str:
 
 
 def displayed_columns(table: Table) -> dict[str, list[Any]]:
-    """The columns of a table for the page, in the units chosen for display; its file keeps the declared units."""
+    """The columns of a table for the page, in the units chosen for display; its file keeps the declared units.
+
+    A meaning that is that of the row above, such as the one of all coefficients of a polynomial, is shown once.
+    """
     columns: dict[str, list[Any]] = {}
     for header, values in table.columns.items():
         factor, shown = heading_scale(header)
         columns[shown] = [_times(value, factor) for value in np.atleast_1d(np.asarray(values, dtype=object))]
+    meanings = columns.get("meaning", [])
+    for i in range(len(meanings) - 1, 0, -1):
+        if meanings[i] == meanings[i - 1]:
+            meanings[i] = ""
     numbers = [name for name in columns if name in _VALUES]
     scales = [in_display_unit(1.0, unit) for unit in columns.get("unit", [])]
     if not numbers or all(factor == 1.0 for factor, _ in scales):

@@ -19,9 +19,9 @@ SMALL_CONTRACTION = 0.01
 NOISE_RANGE = 10.0
 """Range of a held contraction, in standard deviations of its noise (chosen)."""
 MAX_CONTRACTION = 0.55
-"""Greatest contraction at which a pneumatic muscle pulls: pleated muscles without membrane stretch reach 54 % at most
-(Daerden, Conception and realization of pleated pneumatic artificial muscles (1999)); braided ones at most
-1 - 1/(sqrt(3) cos(angle)), 42 % (Chou and Hannaford 1996)."""
+"""Greatest contraction at which a pneumatic muscle pulls: pleated muscles without membrane stretch reach at most
+2 (1 - E(1/2)/K(1/2)) = 54.3 %, that of a slender `PleatedTube` at zero force (Daerden and Lefeber 2001); braided ones
+at most 1 - 1/(sqrt(3) cos(angle)), 42 % (Chou and Hannaford 1996)."""
 PULLING = 0.05
 """Force of a row that pulls, as a fraction of the maximum force (chosen)."""
 PRESSURE_LEVELS = 6
