@@ -580,6 +580,6 @@ def test_a_meaning_that_all_coefficients_share_is_shown_once_and_its_file_keeps_
 
 
 def test_wide_equations_and_texts_of_tables_scroll_in_their_boxes_on_a_phone(report: Path):
-    page = (report / "report.html").read_text(encoding="utf-8")
+    page = report.read_text(encoding="utf-8")
     assert ".equation { overflow-x: auto; }" in page
     assert ".scroll td:not(.right, .short) { min-width: 15rem; }" in page
