@@ -47,7 +47,9 @@ def _shapes(inputs: str) -> dict[str, tuple[str, ...]]:
         "columns": (inputs, "3", "CAPACITY"), "scratch": ("2", "3", "CAPACITY"), "kinds": ("DRIVERS", "2"),
         **dict.fromkeys(("signal", "result", "events"), signal),
         **dict.fromkeys(("settings", "states", "later"), table),
-        **dict.fromkeys(("values", "slopes"), common),
+        **dict.fromkeys(("values", "slopes"), common), "setpoint": ("SETPOINTS",), "command": ("COMMANDS",),
+        **dict.fromkeys(("given_values", "given_slopes"), ("", f"{inputs} + 1")),
+        **dict.fromkeys(("setpoint_values", "setpoint_slopes"), ("", "SETPOINTS + 1")),
     }  # fmt: skip
 
 
@@ -68,8 +70,8 @@ def _constants(name: str, system: ExportedSystem, run: RunData, loop: ExportedLo
     for kind, signal, width in (("", others, f"{upper}_INPUTS"), ("setpoint_", setpoints, "SETPOINTS")):
         count = "PIECES" if kind else "SEGMENTS"
         text += c_array(f"static const double {kind}ends[{count}]", signal.ends)
-        text += c_array(f"static const double {kind}values[{count}][{width} + 1]", signal.values, 1)
-        text += c_array(f"static const double {kind}slopes[{count}][{width} + 1]", signal.slopes, 1)
+        text += c_array(f"static double {kind}values[{count}][{width} + 1]", signal.values, 1)
+        text += c_array(f"static double {kind}slopes[{count}][{width} + 1]", signal.slopes, 1)
     if len(loop.drivers.kinds):
         text += c_integers(
             "static int driver_kinds[DRIVERS][2]", [(int(i), int(kind)) for i, kind in loop.drivers.kinds]

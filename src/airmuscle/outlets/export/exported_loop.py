@@ -77,7 +77,12 @@ class ExportedLoop:
     @property
     def kernels(self) -> list[str]:
         """The kernels of `driven_inputs` that the program calls."""
-        return ["merge_columns", *(["apply_drivers"] if len(self.drivers.kinds) else [])]
+        return [
+            "setpoints_at",
+            "cut_segments",
+            "merge_columns",
+            *(["apply_drivers"] if len(self.drivers.kinds) else []),
+        ]
 
     @property
     def driver_states(self) -> Array:

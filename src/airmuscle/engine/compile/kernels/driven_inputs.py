@@ -34,6 +34,56 @@ def load_columns(ends: Any, values: Any, slopes: Any, first: Any, pieces: Any, c
 
 
 @PART
+def find_piece(ends: Any, last: Any, piece: Any, time: Any) -> Any:
+    """The number of the segment in which a time lies, from `piece` to `last`; where two meet, the later one."""
+    while piece < last and ends[piece] <= time:
+        piece += 1
+    return piece
+
+
+@PART
+def setpoints_at(
+    ends: Any, setpoint_values: Any, setpoint_slopes: Any, last: Any, start: Any, piece: Any, time: Any, setpoint: Any
+) -> Any:  # fmt: skip
+    """Write the set points at a time, of a signal that begins at `start`; the number of its segment."""
+    piece = find_piece(ends, last, piece, time)
+    begin = ends[piece - 1] if piece > 0 else start
+    for i in range(setpoint.shape[0]):
+        setpoint[i] = setpoint_values[piece, i] + (time - begin) * setpoint_slopes[piece, i]
+    return piece
+
+
+@PART
+def cut_segments(
+    ends: Any, given_values: Any, given_slopes: Any, last: Any, start: Any, piece: Any, begin: Any, end: Any,
+    command: Any, commanded: Any, columns: Any,
+) -> Any:  # fmt: skip
+    """Write the signals of the inputs from `begin` to `end`; commands are held.
+
+    Returns the number of the segment at the end, and how many segments each signal has.
+
+    An exported program calls it where a run of the library has cut the segments of all intervals before its start.
+    """
+    count, time = 0, begin
+    while time < end:
+        piece = find_piece(ends, last, piece, time)
+        origin = ends[piece - 1] if piece > 0 else start
+        following = end
+        if piece < last:
+            following = min(end, ends[piece])
+        for i in range(columns.shape[0]):
+            columns[i, 0, count] = following
+            columns[i, 1, count] = given_values[piece, i] + (time - origin) * given_slopes[piece, i]
+            columns[i, 2, count] = given_slopes[piece, i]
+        for j in range(command.shape[0]):
+            columns[commanded[j], 1, count] = command[j]
+            columns[commanded[j], 2, count] = 0.0
+        count += 1
+        time = following
+    return piece, count
+
+
+@PART
 def apply_drivers(
     kinds: Any, settings: Any, states: Any, later: Any, columns: Any, counts: Any, scratch: Any, start: Any, ulp: Any
 ) -> None:

@@ -27,7 +27,6 @@ static model_solver s;
 static double c[MODEL_PRECOMPUTED + 1], memory[MODEL_CONTROLLER_MEMORY + 1];
 static double measured[MEASUREMENTS + 1], setpoint[SETPOINTS + 1], command[COMMANDS + 1], applied[MODEL_INPUTS + 1];
 static int row, segment, piece;
-static double segment_start, piece_start;
 /* Each input between two samples: ends, values at the starts, and slopes of its segments. */
 static double signals[MODEL_INPUTS][3][CAPACITY];
 static int counts[MODEL_INPUTS];
@@ -40,11 +39,9 @@ static double instant_of(long sample)
   return sample == 0 ? start : sample < SAMPLES ? start + SAMPLE_TIME * (double)sample : finish;
 }
 
-static void setpoints_at(double time, double *result)
+static void setpoints_now(double time, double *result)
 {
-  int i;
-  while (piece < PIECES - 1 && setpoint_ends[piece] <= time) piece_start = setpoint_ends[piece++];
-  for (i = 0; i < SETPOINTS; i++) result[i] = setpoint_values[piece][i] + (time - piece_start) * setpoint_slopes[piece][i];
+  piece = setpoints_at(setpoint_ends, setpoint_values, setpoint_slopes, PIECES - 1, start, piece, time, result);
 }
 
 @valid@
@@ -54,7 +51,7 @@ static int write_row(FILE *out, double time, const double *x, const double *u)
   const double *const arrays[] = {x, u, o, r, measured, command};
   int i;
   model_outputs(x, u, c, o);
-  setpoints_at(time, r);
+  setpoints_now(time, r);
   fprintf(out, "%.17g", time);
   for (i = 0; i < COLUMNS; i++) fprintf(out, ",%.17g", arrays[columns[i][0]][columns[i][1]]);
   fputc('\n', out);
@@ -94,29 +91,14 @@ static int run_segment(FILE *out, double end, int instant, double margin, const 
 /* Measure, command, and give each input its segments until the next sample. */
 static int sample(double begin, double end)
 {
-  double o[MODEL_OUTPUTS + 1], time = begin;
+  double o[MODEL_OUTPUTS + 1];
   const double *const arrays[] = {s.x, o};
-  int i, k = 0;
+  int i, k;
   model_outputs(s.x, applied, c, o);
   for (i = 0; i < MEASUREMENTS; i++) measured[i] = arrays[measured_at[i][0]][measured_at[i][1]];
-  setpoints_at(begin, setpoint);
+  setpoints_now(begin, setpoint);
   if (model_controller_step(memory, measured, setpoint, command) != 0) return NOT_COMMANDED;
-  while (time < end) {
-    double following = end;
-    while (segment < SEGMENTS - 1 && ends[segment] <= time) segment_start = ends[segment++];
-    if (segment < SEGMENTS - 1) following = fmin(end, ends[segment]);
-    for (i = 0; i < MODEL_INPUTS; i++) {
-      signals[i][0][k] = following;
-      signals[i][1][k] = values[segment][i] + (time - segment_start) * slopes[segment][i];
-      signals[i][2][k] = slopes[segment][i];
-    }
-    for (i = 0; i < COMMANDS; i++) {
-      signals[commanded[i]][1][k] = command[i];
-      signals[commanded[i]][2][k] = 0.0;
-    }
-    k++;
-    time = following;
-  }
+  segment = cut_segments(ends, values, slopes, SEGMENTS - 1, start, segment, begin, end, command, commanded, signals, &k);
   for (i = 0; i < MODEL_INPUTS; i++) counts[i] = k;
 @apply_drivers@  return MODEL_DONE;
 }
@@ -145,7 +127,6 @@ static int run(FILE *out)
   model_begin(&s, start, initial);
   for (i = 0; i < MODEL_CONTROLLER_MEMORY; i++) memory[i] = model_controller_initial_memory[i];
   for (i = 0; i < MODEL_INPUTS; i++) applied[i] = values[0][i];
-  segment_start = piece_start = start;
   for (k = 0; k < SAMPLES && status == MODEL_DONE; k++) {
     status = sample(instant_of(k), instant_of(k + 1));
     if (status == MODEL_DONE) status = run_interval(out, instant_of(k), instant_of(k + 1));

@@ -8,14 +8,15 @@ function r = simulate(model, changes)
     run = changed(run, changes);
   end
   s = begin_run(model, run);
-  rows = struct('times', run.times(:), 'next', 1, 'count', 0, 'near', loop.near, 'setpoint', run.setpoint);
+  rows = struct('times', run.times(:), 'next', 1, 'count', 0, 'near', loop.near, 'setpoint', run.setpoint, 'piece', 0);
   rows.start = run.start;
   rows.measured = zeros(size(loop.measured_at, 1), 1);
   rows.command = zeros(numel(loop.commanded), 1);
   r.names = [{'time'}, model.states, model.inputs, model.output_names, loop.columns];
   rows.data = zeros(numel(rows.times), numel(r.names));
   memory = loop.initial_memory;
-  inputs = numel(model.inputs);
+  segment = 0;
+  signals = repmat({zeros(3, 0)}, 1, numel(model.inputs));
 @driver_arrays@  applied = run.values(1, :)';
   status = 0;
   r.samples = 0;
@@ -25,15 +26,16 @@ function r = simulate(model, changes)
     for j = 1:numel(rows.measured)
       rows.measured(j) = values{loop.measured_at(j, 1) + 1}(loop.measured_at(j, 2) + 1);
     end
-    wanted = setpoints_at(run.setpoint, start, run.start);
+    [wanted, rows.piece] = setpoints_now(run.setpoint, rows.piece, start, run.start);
     [rows.command, memory] = control_sample(rows.measured, wanted, memory, run.controller_parameters);
     if ~all(isfinite([rows.measured; rows.command]))
       status = 3;
       break
     end
     r.samples = r.samples + 1;
-    signals = segments_of(run, loop, start, finish, rows.command);
-    counts = size(signals{1}, 2) * ones(1, inputs);
+    [segment, count, signals] = cut_segments(run.ends, run.values, run.slopes, numel(run.ends) - 1, run.start, ...
+      segment, start, finish, rows.command, loop.commanded, signals);
+    counts = count * ones(1, numel(signals));
 @apply_drivers@    [s, rows, applied, status] = run_interval(s, rows, start, finish, signals, counts);
     if status ~= 0
       break
@@ -56,39 +58,9 @@ function time = instant(run, loop, k)
   end
 end
 
-function values = setpoints_at(signal, time, start)
-  piece = min(sum(signal.ends(:) <= time) + 1, numel(signal.ends));
-  if piece > 1
-    start = signal.ends(piece - 1);
-  end
-  values = signal.values(piece, :)' + (time - start) * signal.slopes(piece, :)';
-end
-
-% The segments of every input between two samples, with the rows end, value and slope: a command is held, others are
-% those of the run.
-function signals = segments_of(run, loop, start, finish, command)
-  signals = repmat({zeros(3, 0)}, 1, size(run.values, 2));
-  time = start;
-  while time < finish
-    k = min(sum(run.ends(:) <= time) + 1, numel(run.ends));
-    following = finish;
-    if k < numel(run.ends)
-      following = min(finish, run.ends(k));
-    end
-    from = run.start;
-    if k > 1
-      from = run.ends(k - 1);
-    end
-    for i = 1:numel(signals)
-      signals{i}(:, end + 1) = [following; run.values(k, i) + (time - from) * run.slopes(k, i); run.slopes(k, i)];
-    end
-    time = following;
-  end
-  for j = 1:numel(command)
-    i = loop.commanded(j) + 1;
-    signals{i}(2, :) = command(j);
-    signals{i}(3, :) = 0;
-  end
+function [values, piece] = setpoints_now(signal, piece, time, start)
+  [piece, values] = setpoints_at(signal.ends, signal.values, signal.slopes, numel(signal.ends) - 1, start, piece, ...
+    time, zeros(size(signal.values, 2), 1));
 end
 
 % From one sample to the next, in the common segments of all inputs.
@@ -143,7 +115,7 @@ end
 function rows = write_row(rows, time, s)
   x = state_at(s, time);
   u = inputs_at(s, time);
-  shown = setpoints_at(rows.setpoint, time, rows.start);
+  [shown, rows.piece] = setpoints_now(rows.setpoint, rows.piece, time, rows.start);
   rows.count = rows.count + 1;
   rows.data(rows.count, :) = [time; x; u; outputs(x, u, s.c); shown; rows.measured; rows.command]';
 end

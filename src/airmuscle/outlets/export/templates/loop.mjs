@@ -1,33 +1,3 @@
-/** The set points at a time. */
-const setpointsAt = (signal, time, start, result) => {
-  let piece = 0, begin = start;
-  while (piece < signal.ends.length - 1 && signal.ends[piece] <= time) begin = signal.ends[piece++];
-  for (let i = 0; i < result.length; i++)
-    result[i] = signal.values[piece][i] + (time - begin) * signal.slopes[piece][i];
-};
-
-/** The segments of every input from `begin` to `end`, in the rows end, value and slope of its signal: a command is held,
- * others are those of the run. Returns how many there are. */
-function loadSignals({ends, values, slopes}, begin, end, start, command, signals) {
-  let k = 0, count = 0, time = begin, segmentStart = start;
-  while (time < end) {
-    while (k < ends.length - 1 && ends[k] <= time) segmentStart = ends[k++];
-    const following = k < ends.length - 1 ? Math.min(end, ends[k]) : end;
-    signals.forEach((signal, i) => {
-      signal[0][count] = following;
-      signal[1][count] = values[k][i] + (time - segmentStart) * slopes[k][i];
-      signal[2][count] = slopes[k][i];
-    });
-    loop.commanded.forEach((i, j) => {
-      signals[i][1][count] = command[j];
-      signals[i][2][count] = 0;
-    });
-    count++;
-    time = following;
-  }
-  return count;
-}
-
 @kernels@
 /**
  * Run of the control loop. Every argument is optional: by default the exported run. `controllerParameters` are those of
@@ -55,13 +25,17 @@ export function simulate(changes = {}) {
   const at = [], begins = [], commonEnds = [], commonValues = [], commonSlopes = [];
 @driver_arrays@  prepare(numbers, c);
   const s = new Solver(c, start, initial);
-  let row = 0, result = status.done, samples = 0;
+  let row = 0, result = status.done, samples = 0, piece = 0, segment = 0;
+  const setpointsNow = (time, wanted) => {
+    const {ends, values, slopes} = setpoint;
+    piece = setpoints_at(ends, values, slopes, ends.length - 1, start, piece, time, wanted);
+  };
   const applied = Float64Array.from(segments.values[0]);
   const write = (time) => {
     s.stateAt(time, x);
     s.inputsAt(time, u);
     outputsOf(x, u, c, o);
-    setpointsAt(setpoint, time, start, shown);
+    setpointsNow(time, shown);
     [time, ...x, ...u, ...o, ...shown, ...measured, ...command].forEach((value, i) => columns[names[i]].push(value));
   };
   const runSegment = (end, instant, margin, values, slopes) => {
@@ -101,13 +75,17 @@ export function simulate(changes = {}) {
     const begin = instantOf(k), end = instantOf(k + 1);
     outputsOf(s.x, applied, c, o);
     loop.measuredAt.forEach(([kind, i], j) => (measured[j] = kind === 0 ? s.x[i] : o[i]));
-    setpointsAt(setpoint, begin, start, wanted);
+    setpointsNow(begin, wanted);
     control_sample(measured, wanted, memory, ofController, command, later);
     if (![...measured, ...command].every(Number.isFinite)) result = status.notFinite;
     else {
       memory.set(later);
       samples++;
-      counts.fill(loadSignals(segments, begin, end, start, command, signals));
+      const {ends, values, slopes} = segments, last = ends.length - 1;
+      let pieces;
+      [segment, pieces] = cut_segments(
+        ends, values, slopes, last, start, segment, begin, end, command, loop.commanded, signals);
+      counts.fill(pieces);
 @apply_drivers@      result = runInterval(begin, end);
     }
   }
