@@ -25,7 +25,7 @@ const lawOf = (key) => new airmuscle.PrintedLaw(sheet, sheet.controllers.find((r
 """
 FAST, SLOW_ONES = (
     ("joint-dmsp-20-regulators", "joint-dmsp-20-proportional"),
-    ("joint-dmsp-20-matrix", "joint-sam-30x290", "joint-straight-fibre"),
+    ("joint-dmsp-20-matrix", "joint-dmsp-20-itv2050", "joint-sam-30x290", "joint-straight-fibre"),
 )
 JOINTS = [*FAST, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW_ONES)]
 

@@ -27,6 +27,9 @@ MAX_SPEED = 20.0
 OPENING = 0.1
 """Opening of the valves at which the joint is linearised (chosen): at closed valves the derivatives are one-sided."""
 
+SLIGHT_OPENING = 0.01
+"""The same for pressure regulators, whose bands are as wide as their range (chosen)."""
+
 
 @dataclasses.dataclass(frozen=True)
 class Gain:
@@ -85,7 +88,7 @@ def valve_set(plant: am.Plant) -> ValveSet:
     regulators = am.physics.ProportionalRegulator | am.physics.PressureRegulator
     if len(kinds) == 1 and isinstance(circuit, regulators):
         pressures = (f"{first}.setpoint", f"{second}.setpoint")
-        shift = OPENING * circuit.band
+        shift = (OPENING if isinstance(circuit, am.physics.ProportionalRegulator) else SLIGHT_OPENING) * circuit.band
         offsets = {pressures[0]: shift, pressures[1]: -shift}
         highest = min(each.inputs[0].maximum for each in plant.circuits)
         return ValveSet(pressures, None, False, offsets, (shift, highest - shift))

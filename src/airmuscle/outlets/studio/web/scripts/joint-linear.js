@@ -62,7 +62,8 @@
       for (const [name, offset] of Object.entries(sheet.offsets)) {
         const i = sheet.inputs.findIndex((input) => input.name === name), prefix = name.slice(0, name.lastIndexOf(".") + 1);
         inputs[i] += offset;
-        for (const lagged of ["spool", "lagged_setpoint"]) { const at = program.states.indexOf(prefix + lagged); if (at >= 0) state[at] = inputs[i]; }
+        program.states.forEach((name, at) => { if (name.startsWith(prefix) && /\.(spool|lagged_setpoint|delayed_setpoint\d)$/.test(name)) state[at] = inputs[i]; });
+        for (const follower of ["pilot_position", "valve_position"]) { const at = program.states.indexOf(prefix + follower); if (at >= 0) { const { rates, A } = this.matrices(state, inputs); state[at] -= rates[at] / A[at][at]; } }
       }
       return { state, inputs };
     }

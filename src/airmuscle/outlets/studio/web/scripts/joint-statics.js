@@ -89,7 +89,7 @@
       sheet.muscles.forEach(({ prefix }, k) => {
         if (sheet.regulated) {
           u[sheet.inputs.findIndex((input) => input.name === `${prefix}setpoint`)] = wanted[k];
-          x[place(`${prefix}lagged_setpoint`)] = wanted[k];
+          program.states.forEach((name, i) => { if (name.startsWith(prefix) && /\.(lagged_setpoint|delayed_setpoint\d|sensed_pressure)$/.test(name)) x[i] = wanted[k]; });
         }
         const mass = place(`${prefix}air_mass`), pressure = program.outputs.indexOf(`${prefix}pressure`), value = (m) => { airmuscle.setAir(run, x, prefix, m); program.outputsOf(x, u, run.held, o); return o[pressure] - wanted[k]; };
         let m = x[mass];
