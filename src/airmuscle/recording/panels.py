@@ -19,7 +19,7 @@ ORDER = (
 MAX_TITLE_LINE = 16
 """Characters of a line of the title of a panel."""
 _OPENINGS = ("fill", "discharge", "exhaust", "opening")
-_PRESSURE_SETPOINTS = {"setpoint": "set point", "lagged_setpoint": "lagged set point", "delayed_setpoint4": "delayed set point"}
+_PRESSURE_SETPOINTS = {"setpoint": "set point", "lagged_setpoint": "lagged set point"}
 
 
 @dataclasses.dataclass(frozen=True)
