@@ -173,8 +173,13 @@ class MatlabKernels(KernelPrinter):
         return f"{self._left([*results, *changed])}{kernel.source.name}({values});"
 
     def workspace(self, arrays: Mapping[str, Sequence[str]]) -> str:
-        texts = [f"{name} = zeros({', '.join([*sizes, '1'][:2])});" for name, sizes in arrays.items()]
-        return "\n".join(" ".join(texts[i : i + 5]) for i in range(0, len(texts), 5))
+        first: dict[str, str] = {}  # of arrays of one size
+        texts = []
+        for name, sizes in arrays.items():
+            value = f"zeros({', '.join([*sizes, '1'][:2])})"
+            texts.append(f"{name} = {first.get(value, value)};")
+            first.setdefault(value, name)
+        return "\n".join(" ".join(texts[i : i + 6]) for i in range(0, len(texts), 6))
 
     def finish(self, values: Sequence[ast.expr], last: bool) -> list[str]:
         names = [] if self.kernel.returned_names else self._results(self.kernel)
