@@ -461,7 +461,7 @@ def test_a_loop_that_is_interrupted_can_be_taken_up():
 
 def test_a_loop_that_is_interrupted_within_a_piece_goes_on_from_the_sample_before(monkeypatch):
     integrate, run = BoundIntegrator.run_part, iter(range(100))
-    loop, plant = ControlLoop(VALVES, TICK, PRESSURE, drivers={"fill": PWM(30.0)}), lifting()
+    loop, plant = ControlLoop(VALVES, TICK, PRESSURE, drivers={"fill": PWM(200.0)}), lifting()
     monkeypatch.setattr(compiled_loop, "are_called", lambda prepared: True)
     monkeypatch.setattr(BoundIntegrator, "entry_address", property(lambda self: None))
     whole = solution(plant, loop, duration=1.0)
