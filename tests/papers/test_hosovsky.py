@@ -15,6 +15,7 @@ from airmuscle.papers import hosovsky_fill as filling
 from airmuscle.papers import hosovsky_joint as joining
 from airmuscle.papers import hosovsky_release as releasing
 from airmuscle.papers.hosovsky_plant import (
+    FILLING,
     MATRIX,
     MATRIX_BY_VOLUME,
     UnpublishedParameters,
@@ -24,7 +25,6 @@ from airmuscle.papers.hosovsky_plant import (
     surface,
     surface_fit,
 )
-from airmuscle.papers.hosovsky_schedule import FILLING
 from airmuscle.physics import (
     ClosedChamber,
     ContractileSurface,
@@ -63,8 +63,8 @@ def verdicts(claims):
 
 
 def test_the_printed_method_and_the_adaptive_one_agree(fill):
-    np.testing.assert_allclose(fill.printed_method["position"], fill.adaptive["position"], atol=1e-7, rtol=0)
-    np.testing.assert_allclose(fill.printed_method["pressure"], fill.adaptive["pressure"], atol=1.0, rtol=0)
+    np.testing.assert_allclose(fill.printed_method.recording["position"], fill.adaptive["position"], atol=1e-7, rtol=0)
+    np.testing.assert_allclose(fill.printed_method.recording["pressure"], fill.adaptive["pressure"], atol=1.0, rtol=0)
 
 
 def test_the_muscle_fills_to_the_supply_and_empties_to_the_surroundings(fill):
@@ -77,20 +77,20 @@ def test_the_muscle_fills_to_the_supply_and_empties_to_the_surroundings(fill):
 
 def test_a_higher_critical_ratio_changes_the_verdict_on_choking(fill):
     claim = r"the flow is choked until \(p_2/p_1 = b\): muscle pressure at which the mass flow begins to decrease"
-    assert verdicts(filling.claims(fill))[claim] == HOLDS
+    assert verdicts(hosovsky_claims.fill_claims(fill))[claim] == HOLDS
     other = filling.run_fill(NUMBERS, dataclasses.replace(MATRIX, critical_ratio=0.5))
-    assert verdicts(filling.claims(other))[claim] == DIFFERS
+    assert verdicts(hosovsky_claims.fill_claims(other))[claim] == DIFFERS
 
 
 def test_another_conductance_changes_the_verdict_on_its_usual_unit(fill):
     claim = "sonic conductance of the MATRIX valve in customary units"
     other = filling.run_fill(NUMBERS, dataclasses.replace(MATRIX, conductance=2.6167e-8))
-    assert verdicts(filling.claims(fill))[claim] == HOLDS
-    assert verdicts(filling.claims(other))[claim] == DIFFERS
+    assert verdicts(hosovsky_claims.fill_claims(fill))[claim] == HOLDS
+    assert verdicts(hosovsky_claims.fill_claims(other))[claim] == DIFFERS
 
 
 def test_what_has_no_printed_number_is_never_said_to_hold(fill):
-    assert [c.verdict for c in filling.claims(fill) if c.reproduced is None] == [NOT_TESTABLE]
+    assert [c.verdict for c in hosovsky_claims.fill_claims(fill) if c.reproduced is None] == [NOT_TESTABLE]
 
 
 def test_interchanged_pressures_change_the_verdicts_of_the_release():
@@ -286,7 +286,7 @@ def test_varied_together_the_chosen_values_break_the_claim_on_relative_damping(j
     assert max(alone) < releasing.MAX_DAMPING_DIFFERENCE < both
     assert both == pytest.approx(0.305, abs=5e-4)
     found = {claim.claim: claim for claim in joining.claims(joint)}
-    damping = found[releasing.TEXTS["relative damping"][0]]
+    damping = found[releasing.STATEMENTS["relative damping"].text]
     assert damping.verdict == DIFFERS
     assert 50.0 < damping.reproduced < 100.0
     assert f"{100 * joint.share('relative damping', 'Sobol set'):.3g} %" in damping.note

@@ -18,9 +18,9 @@ from airmuscle.core import autodiff, flatten, structure
 from airmuscle.errors import GeometryLimitError, ParameterError, SolveError
 from airmuscle.files import load
 from airmuscle.papers import saga2007_claims as claims
-from airmuscle.papers import saga2007_further_claims as further
 from airmuscle.papers import saga2007_joint as joining
 from airmuscle.papers import saga2007_pairs as pairs
+from airmuscle.papers import saga2007_values as values
 from airmuscle.papers.saga2007 import chapter
 from airmuscle.papers.saga2007_muscle import (
     DEFAULT,
@@ -30,7 +30,7 @@ from airmuscle.papers.saga2007_muscle import (
     interpretation,
     with_rings,
 )
-from airmuscle.papers.saga2007_previous import Ferraresi2001, previous_model_claims
+from airmuscle.papers.saga2007_previous import PREVIOUS_MODEL, Ferraresi2001
 from airmuscle.papers.saga2007_tables import virtual_work
 from airmuscle.physics import (
     AxialIntegral,
@@ -359,7 +359,7 @@ def test_the_previous_model_with_evenly_spread_fibres_is_the_pair_of_circle_and_
 
 
 def test_the_circle_of_the_previous_model_moves_with_pressure_at_a_load_and_not_at_a_contraction():
-    at_load, at_contraction = previous_model_claims()
+    at_load, at_contraction = PREVIOUS_MODEL.claims("")
     assert (at_load.verdict, at_contraction.verdict) == (HOLDS, DIFFERS)
     assert at_contraction.reproduced == pytest.approx(1.0, rel=1e-9)
     model = Ferraresi2001(LINE_A)
@@ -470,26 +470,30 @@ def verdict(claim):
     return claim.verdict
 
 
+def cases_of(row):
+    return claims.ROWS[row].claims(claims.PAPER)
+
+
 def test_the_combined_claim_holds_only_with_w_2_and_q_2():
     found = {
-        (w, q, name): verdict(claims.lifting_claim(interpretation(LINES[name], w, q), ""))
+        (w, q, name): verdict(claims.claim("lifting", interpretation(LINES[name], w, q)))
         for w in (1.0, 2.0)
         for q in (1.0, 2.0)
         for name in "AB"
     }
     assert {key for key, value in found.items() if value == HOLDS} == {(2.0, 2.0, "A"), (2.0, 2.0, "B")}
-    numbers = [claims.lifting_claim(interpretation(LINES[n], 2.0, 2.0), "").reproduced for n in "AB"]
+    numbers = [claims.claim("lifting", interpretation(LINES[n], 2.0, 2.0)).reproduced for n in "AB"]
     assert np.round(numbers, 1).tolist() == [41.2, 36.5]
 
 
 def test_a_contraction_below_a_thousandth_is_found_with_its_note():
-    claim = claims.lifting_claim(interpretation(LINE_A, 1.0, 1.0), "")
+    claim = claims.claim("lifting", interpretation(LINE_A, 1.0, 1.0))
     assert claim.reproduced == pytest.approx(0.0517, abs=5e-5)
     assert "200 N is reached" in claim.note
 
 
 def test_claim_5_is_not_testable_and_compared_with_the_exact_meridian_on_every_line():
-    assert [c.verdict for c in claims.accuracy_claims()] == [NOT_TESTABLE] * 3
+    assert [claims.claim(row).verdict for row in ("accurate", "deviates", "cause")] == [NOT_TESTABLE] * 3
     found = {c.case: c for c in claims.all_claims() if c.claim.startswith("5. Maximum pressure error up to 20 %")}
     errors = {case: round(c.reproduced, 1) for case, c in found.items()}
     assert errors["exact mechanics, line A, 100 N"] == 10.9
@@ -499,17 +503,17 @@ def test_claim_5_is_not_testable_and_compared_with_the_exact_meridian_on_every_l
 
 
 def test_200_newton_are_reached_as_a_maximum_of_its_own():
-    assert {c.verdict for c in further.largest_force_claims()} == {NOT_TESTABLE}  # at 0 % every law reaches any force
-    assert all(c.reproduced > 200.0 for c in further.largest_force_claims())
+    assert {c.verdict for c in cases_of("largest force")} == {NOT_TESTABLE}  # at 0 % every law reaches any force
+    assert all(c.reproduced > 200.0 for c in cases_of("largest force"))
     weak = replace(exact_mechanics(LINE_A), wall_thickness=0.0022)
-    assert further.tension(weak, 0.11e6, 0.01) < 200.0
+    assert values.tension(weak, 0.11e6, 0.01) < 200.0
 
 
 def test_the_tube_expands_by_300_per_cent_near_20_and_by_more_at_35_per_cent():
-    early, _, outline, exact = further.expansion_claims()
+    early, _, outline, exact = cases_of("expansion")
     assert early.reproduced == pytest.approx(100 * 1.5 * math.sqrt(24 * 0.2 * 0.8), rel=1e-12)
     assert early.verdict == HOLDS
-    assert {s.verdict for s in statements(further.expansion_claims())} == {DEPENDS}
+    assert {s.verdict for s in statements(cases_of("expansion"))} == {DEPENDS}
     assert outline.reproduced == pytest.approx(100 * 1.5 * math.sqrt(24 * 0.35 * 0.65), rel=1e-12)
     assert (round(outline.reproduced), outline.verdict, exact.verdict) == (350, DIFFERS, DIFFERS)
     assert exact.reproduced > outline.reproduced
@@ -517,7 +521,7 @@ def test_the_tube_expands_by_300_per_cent_near_20_and_by_more_at_35_per_cent():
 
 def test_a_ring_reduces_the_force_at_equal_pressure_and_contraction():
     """Without rubber the exact tension at 5 % is 1652.5 instead of 4863.3 mm2 times the pressure."""
-    found = further.ring_force_claims()
+    found = cases_of("ring force")
     equal = [claim for claim in found if claim.case.endswith("equal pressure")]
     assert (len(equal), len(found)) == (4, 8)
     assert all(claim.verdict == DIFFERS and claim.reproduced < 0.5 for claim in equal)
@@ -527,7 +531,7 @@ def test_a_ring_reduces_the_force_at_equal_pressure_and_contraction():
 
 
 def test_little_change_of_the_pressure_depends_on_load_and_model():
-    found = {c.case: c for c in further.small_pressure_claims()}
+    found = {c.case: c for c in cases_of("little change")}
     assert found[r"\(w = 2\), \(q = 1\), line B, 0 N"].verdict == HOLDS
     exact = found["exact meridian, line B, 0 N"]
     assert exact.reproduced == pytest.approx(100 * (0.155300 / 0.089496 - 1), abs=1e-2)
@@ -535,52 +539,52 @@ def test_little_change_of_the_pressure_depends_on_load_and_model():
 
 
 def test_a_thicker_wall_raises_the_pressure_for_a_small_contraction():
-    found = further.wall_claims()
+    found = cases_of("thick wall")
     assert {c.verdict for c in found} == {HOLDS}
     ratios = [c.reproduced for c in found]
     assert ratios == pytest.approx([1.5] * 4, rel=1e-5), "unloaded, the pressure is proportional to the wall"
 
 
 def test_the_wall_thins_as_incompressible_rubber_does():
-    thickness, *effects = further.thickness_claims()
+    thickness, *effects = *cases_of("thickness"), *cases_of("thinning")
     strain = 1.5 * math.sqrt(24 * 0.2 * 0.8)
     assert thickness.reproduced == pytest.approx(1 / (1 + strain), rel=1e-12)
     law = exact_mechanics(LINE_B)
     for contraction in (0.05, 0.2, 0.4):
-        plain = further.pressure_with_wall(law, contraction, 100.0, thinned=False)
+        plain = values.pressure_with_wall(law, contraction, 100.0, thinned=False)
         assert plain == pytest.approx(float(law.pressure(contraction, 100.0)), rel=1e-10)
     assert [round(c.reproduced) for c in effects] == [47, 42]
 
 
 def test_mechanics_caps_the_tension():
-    claim = claims.force_limit_claim()
+    claim = claims.claim("max tension")
     assert claim.reproduced == pytest.approx(88.9, abs=0.05)
     assert claim.verdict == DIFFERS
 
 
 def test_verdicts_change_with_the_fibre_sum_and_the_projection_factor():
     law = interpretation(LINE_B, 2.0, 2.0)
-    assert verdict(claims.lifting_claim(law, "")) == HOLDS
-    assert verdict(claims.lifting_claim(replace(law, fibre_sum=UserDefinedFibreSum(5.5)), "")) == DIFFERS
-    assert verdict(claims.lifting_claim(replace(law, projection_factor=1.0), "")) == DIFFERS
-    assert verdict(claims.initial_pressure_claims(DEFAULT, "")[0]) == HOLDS
-    assert verdict(claims.initial_pressure_claims(replace(DEFAULT, projection_factor=1.0), "")[0]) == DIFFERS
-    corrected = claims.accuracy_findings(replace(DEFAULT, projection_factor=1.0, slope_factor=2.0), "")[0]
-    assert (verdict(claims.accuracy_findings(DEFAULT, "")[0]), verdict(corrected)) == (DIFFERS, DIFFERS)
-    assert verdict(claims.accuracy_findings(exact_mechanics(LINE_A), "")[0]) == HOLDS
+    assert verdict(claims.claim("lifting", law)) == HOLDS
+    assert verdict(claims.claim("lifting", replace(law, fibre_sum=UserDefinedFibreSum(5.5)))) == DIFFERS
+    assert verdict(claims.claim("lifting", replace(law, projection_factor=1.0))) == DIFFERS
+    assert verdict(claims.claim("low start", DEFAULT)) == HOLDS
+    assert verdict(claims.claim("low start", replace(DEFAULT, projection_factor=1.0))) == DIFFERS
+    corrected = claims.claim("error below 20 %", replace(DEFAULT, projection_factor=1.0, slope_factor=2.0), 100.0)
+    assert (verdict(claims.claim("error below 20 %", DEFAULT, 100.0)), verdict(corrected)) == (DIFFERS, DIFFERS)
+    assert verdict(claims.claim("error below 20 %", exact_mechanics(LINE_A), 100.0)) == HOLDS
     even = replace(exact_mechanics(LINE_A), fibre_sum=UserDefinedFibreSum(8.0))
-    assert verdict(claims.accuracy_findings(even, "")[0]) == DIFFERS
+    assert verdict(claims.claim("error below 20 %", even, 100.0)) == DIFFERS
 
 
 def test_verdicts_change_with_the_rubber_line():
     for name, low, high in (("A", DIFFERS, HOLDS), ("B", HOLDS, DIFFERS)):
-        found = claims.initial_pressure_claims(interpretation(LINES[name], 2.0, 1.0), "")
-        assert [verdict(claim) for claim in found] == [low, high]
-    assert verdict(claims.ring_claim(DEFAULT, "", 0.0)) == DIFFERS
-    assert verdict(claims.ring_claim(DEFAULT, "", 100.0)) == HOLDS
-    assert verdict(claims.ring_claim(interpretation(LINE_A, 2.0, 1.0), "", 0.0)) == HOLDS
-    assert verdict(claims.feed_forward_claim(DEFAULT, "", 0.0)) == HOLDS
-    assert verdict(claims.feed_forward_claim(interpretation(LINE_A, 2.0, 1.0), "", 0.0)) == DIFFERS
+        law = interpretation(LINES[name], 2.0, 1.0)
+        assert [verdict(claims.claim(row, law)) for row in ("low start", "high start")] == [low, high]
+    assert verdict(claims.claim("rings contract less", DEFAULT, 0.0)) == DIFFERS
+    assert verdict(claims.claim("rings contract less", DEFAULT, 100.0)) == HOLDS
+    assert verdict(claims.claim("rings contract less", interpretation(LINE_A, 2.0, 1.0), 0.0)) == HOLDS
+    assert verdict(claims.claim("feed-forward", DEFAULT, 0.0)) == HOLDS
+    assert verdict(claims.claim("feed-forward", interpretation(LINE_A, 2.0, 1.0), 0.0)) == DIFFERS
 
 
 def test_rings_fail_unloaded_as_the_reference_says():
@@ -589,18 +593,21 @@ def test_rings_fail_unloaded_as_the_reference_says():
     assert np.round(found, 4).tolist() == [0.0369, 0.0333, 0.0322]
     for slope_factor, force in ((2.0, 76.0), (1.0, 37.0)):  # below these it fails at small contraction
         law = interpretation(LINE_B, 2.0, slope_factor)
-        assert [verdict(claims.ring_claim(law, "", force + step)) for step in (0.0, -1.0)] == [HOLDS, DIFFERS]
+        assert [verdict(claims.claim("rings contract less", law, force + step)) for step in (0.0, -1.0)] == [
+            HOLDS,
+            DIFFERS,
+        ]
 
 
 def test_figure_2_has_the_radii_of_the_reference():
-    assert "15.61, 19.23, 21.74, 23.64, 25.09 mm" in claims.outline_claim(DEFAULT).note
+    assert "15.61, 19.23, 21.74, 23.64, 25.09 mm" in claims.claim("outlines", DEFAULT).note
     wider = replace(DEFAULT, geometry=replace(DEFAULT.geometry, end_diameter=0.024))
-    assert verdict(claims.outline_claim(wider)) == DIFFERS
+    assert verdict(claims.claim("outlines", wider)) == DIFFERS
 
 
 def test_a_claim_without_a_number_is_never_held():
-    runaway = claims.strength_claims(interpretation(LINE_A, 2.0, 1.0), "", 0.0)
-    assert [verdict(claim) for claim in runaway] == [NOT_PRINTED]
+    runaway = interpretation(LINE_A, 2.0, 1.0)
+    assert [verdict(claims.claim(row, runaway, 0.0)) for row in ("strains", "tensions")] == [NOT_PRINTED] * 2
 
 
 def test_the_printed_fibre_sum_is_a_reading():
@@ -665,7 +672,7 @@ def test_an_angle_is_missing_only_where_both_pressures_are_below_those_of_a_taut
 
 
 def test_the_printed_model_leaves_both_muscles_slack_and_the_circular_one_is_accurate():
-    verdicts = {c.case: (c.reproduced, c.verdict) for c in joining.feed_forward_comparisons()}
+    verdicts = {c.case: (c.reproduced, c.verdict) for c in joining.FEED_FORWARD.claims("")}
     assert len(verdicts) == 6
     for line in ("A", "B"):
         assert verdicts[rf"printed, \(w = 2\), \(q = 1\), line {line}"] == (100.0, DIFFERS)

@@ -16,7 +16,7 @@ from . import hosovsky_effects as causing
 from . import hosovsky_fill as filling
 from . import hosovsky_joint as joining
 from . import hosovsky_release as releasing
-from .hosovsky_claims import gas_findings, measurement_claims, surface_claims
+from .hosovsky_claims import fill_claims, gas_findings, measurement_claims, surface_claims
 from .hosovsky_figures import hill_model, isobars, surface_in_space
 from .hosovsky_plant import (
     FORCE_MAPS,
@@ -78,7 +78,7 @@ def chapter(
         SUMMARY,
         claims=(
             *surface_claims(surface_fit()),
-            *filling.claims(fill, explanation),
+            *fill_claims(fill, explanation),
             *measurement_claims(),
             *releasing.claims(low, high, ranges),
             *joining.claims(joint),

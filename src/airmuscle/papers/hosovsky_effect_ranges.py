@@ -10,8 +10,7 @@ from typing import Any
 from ..report.chapter import Table
 from ..report.formatting import format_unit
 from .hosovsky_effects import PRINTED, SuspectedCauses, effect_of, fill_discharge_ratio, run_fill_of, substitutions
-from .hosovsky_plant import UnpublishedParameters
-from .hosovsky_schedule import FILLING
+from .hosovsky_plant import FILLING, UnpublishedParameters
 
 STRONGER = 1.2
 """Ratio above which filling is affected more than discharging, by at least a fifth (chosen)."""

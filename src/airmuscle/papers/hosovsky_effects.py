@@ -18,8 +18,18 @@ from ..core.arrays import Array
 from ..core.plotting import DASHES, LINES, new_figure
 from ..report.chapter import Plot, Table
 from ..report.formula import to_mathtext
-from .hosovsky_plant import MATRIX, MATRIX_BY_VOLUME, ChosenValue, UnpublishedParameters, hanging_load, plant
-from .hosovsky_schedule import DISCHARGING, DURATION, FILLING, SCHEDULE
+from .hosovsky_plant import (
+    DISCHARGING,
+    DURATION,
+    FILLING,
+    MATRIX,
+    MATRIX_BY_VOLUME,
+    SCHEDULE,
+    ChosenValue,
+    UnpublishedParameters,
+    hanging_load,
+    plant,
+)
 
 SPACING = 4e-3
 """Output step [s]."""

@@ -15,7 +15,7 @@ from ..design.study.distributions import Uniform
 from ..report.chapter import AtLeast, Claim, Table
 from ..report.formatting import format_quantity, format_unit
 from .hosovsky_plant import FORCE_MAPS, PAPER, UnpublishedParameters
-from .hosovsky_release import RELEASED_AT, STATEMENTS, TEXTS, Release, compare_releases, release
+from .hosovsky_release import RELEASED_AT, STATEMENTS, Release, agrees, compare_releases, release
 
 VARIED = ("stiffness", "damping", "length", "braid_angle", "low_pressure", "high_pressure")
 """The chosen values on which the quick release depends."""
@@ -57,12 +57,12 @@ class JointVariation:
 
     def share(self, key: str, design: str | None = None) -> float:
         """The share of the cases for which a statement holds [1]; a missing value does not hold."""
-        return float(np.mean([STATEMENTS[key].agrees(value) for value in self.values(key, design)]))
+        return float(np.mean([agrees(key, value) for value in self.values(key, design)]))
 
     def worst(self, key: str) -> JointCase:
         """The case that is nearest to a violation of a statement, or violates it most."""
         values = self.values(key)
-        margin = values if STATEMENTS[key].agrees(np.inf) else -values
+        margin = values if agrees(key, np.inf) else -values
         return self.cases[int(np.argmin(np.where(np.isnan(values), -np.inf, margin)))]
 
 
@@ -131,7 +131,7 @@ def joint_table(joint: JointVariation) -> Table:
 def claims(joint: JointVariation) -> tuple[Claim, ...]:
     """Return the share of the joint variations for which each claim on Fig. 4 holds, as a case of that claim."""
     result = []
-    for key in STATEMENTS:
+    for key, row in STATEMENTS.items():
         values, worst = joint.values(key), joint.worst(key)
         shares = "; ".join(
             f"{design} {100 * joint.share(key, design):.3g} %"
@@ -139,9 +139,9 @@ def claims(joint: JointVariation) -> tuple[Claim, ...]:
         )
         note = (
             f"Share of {len(joint.cases)} combinations of all chosen values for which it holds: {shares}. Values "
-            f"{np.nanmin(values):.3g} to {np.nanmax(values):.3g} {format_unit(TEXTS[key][1])}".rstrip()
+            f"{np.nanmin(values):.3g} to {np.nanmax(values):.3g} {format_unit(row.unit)}".rstrip()
             + f"; worst case: {worst.describe()} ({worst.design})."
         )
-        share = 100 * joint.share(key)
-        result.append(Claim(PAPER, TEXTS[key][0], AtLeast(100.0, derived=True), share, "%", note, CASE))
+        share = dataclasses.replace(row, printed=AtLeast(100.0, derived=True), unit="%")
+        result.append(share.claim(PAPER, CASE, 100 * joint.share(key), note))
     return tuple(result)

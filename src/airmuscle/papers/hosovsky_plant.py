@@ -31,6 +31,12 @@ SUPPLY_PRESSURE = 650e3 - 101_325.0
 """The step of 650 kPa, assumed to be absolute (inferred from the sensor range of 0 to 0.6 MPa); gauge [Pa]."""
 RELEASED_MASS = 30.0
 """Load of the quick release [kg], printed."""
+SCHEDULE = am.Schedule({"fill": ((5.0, 1.0), (15.0, 0.0)), "discharge": ((19.0, 1.0), (25.0, 0.0))})
+"""Schedule of Fig. 3, printed: the fill valve opens at 5 s and closes at 15 s, the discharge valve at 19 s and 25 s."""
+DURATION = 25.0
+"""Duration of the experiment of Fig. 3 [s]."""
+FILLING, DISCHARGING = (5.0, 15.0), (19.0, 25.0)
+"""Beginning and end of both phases of Fig. 3 [s]."""
 
 MATRIX_CATALOGUE = Reference(
     "matrix-821",

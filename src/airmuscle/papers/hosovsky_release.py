@@ -12,7 +12,7 @@ import numpy.typing as npt
 import airmuscle as am
 
 from ..core.plotting import DASHES, LINES, legend_below, new_figure
-from ..report.chapter import AtLeast, AtMost, Claim, Plot, PublishedValue, Table
+from ..report.chapter import AtLeast, AtMost, Claim, ClaimRow, Plot, Table
 from ..report.formatting import format_unit
 from .hosovsky_plant import FORCE_MAPS, PAPER, UnpublishedParameters, latched_load, plant
 
@@ -20,20 +20,24 @@ RELEASED_AT, DURATION = 0.5, 6.0
 SCHEDULE = am.Schedule({"latched": ((0.0, 1.0), (RELEASED_AT, 0.0))})
 MAX_DAMPING_DIFFERENCE = 0.30
 """Maximum relative difference of comparable damping, as a fraction of the larger value (chosen)."""
-STATEMENTS: Mapping[str, PublishedValue] = {
-    "acceleration": AtLeast(0.0, derived=True),
-    "contraction": AtLeast(0.0, derived=True),
-    "relative damping": AtMost(MAX_DAMPING_DIFFERENCE, chosen=True),
-    "absolute damping": AtMost(MAX_DAMPING_DIFFERENCE, chosen=True),
-}
+COMPARABLE = AtMost(MAX_DAMPING_DIFFERENCE, chosen=True)
+STATEMENTS: Mapping[str, ClaimRow] = {
+    "acceleration": ClaimRow("a higher initial pressure gives a higher initial acceleration: difference",
+        AtLeast(0.0, derived=True), "m/s2"),
+    "contraction": ClaimRow("a higher initial pressure gives a larger maximum contraction: difference",
+        AtLeast(0.0, derived=True), "%"),
+    "relative damping": ClaimRow("relative damping is comparable: relative difference of the damping ratios",
+        COMPARABLE, "1"),
+    "absolute damping": ClaimRow("absolute damping is comparable: relative difference of the decay rates",
+        COMPARABLE, "1"),
+}  # fmt: skip
 """The four statements of the paper on the quick release, each with its criterion."""
-TEXTS = {
-    "acceleration": ("a higher initial pressure gives a higher initial acceleration: difference", "m/s2"),
-    "contraction": ("a higher initial pressure gives a larger maximum contraction: difference", "%"),
-    "relative damping": ("relative damping is comparable: relative difference of the damping ratios", "1"),
-    "absolute damping": ("absolute damping is comparable: relative difference of the decay rates", "1"),
-}
-"""Text and unit of the value of each statement."""
+
+
+def agrees(key: str, value: float) -> bool:
+    """Return whether a value confirms a statement."""
+    criterion = STATEMENTS[key].printed
+    return criterion is not None and criterion.agrees(value)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -139,19 +143,15 @@ def range_table(parameters: UnpublishedParameters) -> Table:
 
 def claims(low: Release, high: Release, ranges: Table) -> tuple[Claim, ...]:
     """Return the claims on Fig. 4 for the nominal values; the notes give their ranges, each value varied alone."""
-    values = compare_releases(low, high)
-    columns = list(ranges.columns.values())[1:]
-    result = []
-    for (key, printed), column in zip(STATEMENTS.items(), columns, strict=True):
-        text, unit = TEXTS[key]
-        failing = [n for n, v in zip(ranges.columns["varied parameter"], column, strict=True) if not printed.agrees(v)]
+    values, varied, result = compare_releases(low, high), ranges.columns["varied parameter"], []
+    for (key, row), column in zip(STATEMENTS.items(), list(ranges.columns.values())[1:], strict=True):
+        failing = [name for name, value in zip(varied, column, strict=True) if not agrees(key, value)]
         outcome = "it holds" if not failing else f"it does not hold for {', '.join(failing)}; otherwise it holds"
         note = (
             f"Initial gauge pressures {low.pressure / 1e3:g} and {high.pressure / 1e3:g} kPa (chosen). Each chosen "
-            f"value varied alone over its range: {min(column):.3g} to {max(column):.3g} {format_unit(unit)}".rstrip()
-            + f"; {outcome}."
+            f"value varied alone over its range: {min(column):.3g} to {max(column):.3g} {format_unit(row.unit)}"
         )
-        result.append(Claim(PAPER, text, printed, values[key], unit, note, "nominal values"))
+        result.append(row.claim(PAPER, "nominal values", values[key], f"{note.rstrip()}; {outcome}."))
     return tuple(result)
 
 

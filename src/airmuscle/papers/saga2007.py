@@ -6,12 +6,19 @@ from ..physics.muscle.geometry.circular_arc import FERRARESI_2001
 from ..physics.muscle.geometry.meridian import SAGA_2007
 from ..physics.muscle.geometry.pleated import DAERDEN_LEFEBER_2001
 from ..report.chapter import Chapter
-from .saga2007_claims import ACCURACY_LIMIT, LOW_PRESSURE, all_claims
+from .saga2007_claims import (
+    ACCURACY_LIMIT,
+    FIRST_PERCENT,
+    HIGHER_PRESSURE,
+    LITTLE_CHANGE,
+    LOW_PRESSURE,
+    all_claims,
+)
 from .saga2007_figures import plots
-from .saga2007_further_claims import FIRST_PERCENT, HIGHER_PRESSURE, LITTLE_CHANGE, THICK_WALL
 from .saga2007_joint import LIMIT
 from .saga2007_muscle import PAPER
 from .saga2007_tables import tables
+from .saga2007_values import THICK_WALL
 
 SUMMARY = r"""The paper gives a closed-form model of a rubber tube with fibres along its axis. The printed equations are
 inconsistent in four places. The pressure force on the half shell is twice the integral of its own integrand (factor

@@ -12,7 +12,6 @@ from ..core.plotting import BLACK, DASHES, LINES, legend_outside, new_figure
 from ..physics.muscle.characteristic.saga2007 import RUBBER_TEST_STRAIN
 from ..report.chapter import Plot
 from ..report.formula import to_mathtext
-from .saga2007_claims import FIG_2
 from .saga2007_joint import feed_forward_figure
 from .saga2007_muscle import (
     DEFAULT,
@@ -26,6 +25,7 @@ from .saga2007_muscle import (
 from .saga2007_muscle import LINES as RUBBER
 from .saga2007_pairs import errors, ideal_errors
 from .saga2007_previous import previous_model_figure
+from .saga2007_values import FIG_2
 
 CONTRACTION = np.concatenate([np.geomspace(2e-4, 0.01, 25), np.linspace(0.012, 0.4, 110)])
 MPA = 1e-6

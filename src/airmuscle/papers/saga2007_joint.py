@@ -17,11 +17,10 @@ import airmuscle as am
 from ..core.arrays import Array
 from ..core.plotting import BLACK, DASHES, legend_outside, new_figure
 from ..core.plotting import LINES as COLOURS
-from ..report.chapter import AtMost, Claim, Kind, Plot, Table
+from ..report.chapter import AtMost, ClaimRow, Kind, Plot, Table
 from .saga2007_muscle import (
     LENGTH,
     LINES,
-    PAPER,
     circular_meridian,
     exact_mechanics,
     exact_meridian,
@@ -122,26 +121,21 @@ def max_angle_error(name: str, line: str) -> float:
     return float(max(errors[at], -refined.fun))
 
 
-def feed_forward_comparisons() -> tuple[Claim, ...]:
-    """Return the comparisons on claim 7: the greatest error of the angle with the paper's model and with others."""
-    note = (
-        f"Pulley radius {1e3 * RADIUS:g} mm, {100 * OFFSET:g} % contraction at angle 0, {TENSION:g} N in both muscles, "
-    )
-    note += f"angles to {np.degrees(ANGLES[-1]):g} degrees: chosen. The paper describes no control experiment."
-    text = "7. Feed-forward control of a pair of muscles, greatest error of all angles relative to the greatest angle"
-    claims = []
-    for line in LINES:
-        for name in models(LINES[line]):
-            if name == "exact meridian":
-                continue
-            error, slack = max_angle_error(name, line), ""
-            if np.isnan(error):
-                slack = " With the pressures of this model both muscles are slack: the joint is not moved, error 100 %."
-            largest = 100.0 * float(np.nan_to_num(error / ANGLES[-1], nan=1.0))
-            limit = AtMost(LIMIT, chosen=True)
-            case = f"{name}, line {line}"
-            claims.append(Claim(PAPER, text, limit, largest, "%", note + slack, case, kind=Kind.FINDING))
-    return tuple(claims)
+def relative_angle_error(name: str, line: str) -> tuple[float, str]:
+    """Return the greatest error of all angles relative to the greatest angle [%]; 100 % if the muscles are slack."""
+    error = max_angle_error(name, line)
+    slack = "With the pressures of this model both muscles are slack: the joint is not moved, error 100 %."
+    return 100.0 * float(np.nan_to_num(error / ANGLES[-1], nan=1.0)), slack if np.isnan(error) else ""
+
+
+FEED_FORWARD = ClaimRow(
+    "7. Feed-forward control of a pair of muscles, greatest error of all angles relative to the greatest angle",
+    AtMost(LIMIT, chosen=True), "%", relative_angle_error,
+    f"Pulley radius {1e3 * RADIUS:g} mm, {100 * OFFSET:g} % contraction at angle 0, {TENSION:g} N in both muscles, "
+    f"angles to {np.degrees(ANGLES[-1]):g} degrees: chosen. The paper describes no control experiment.",
+    {f"{name}, line {line}": (name, line) for line in LINES for name in models(LINES[line])
+     if name != "exact meridian"}, Kind.FINDING,
+)  # fmt: skip
 
 
 def feed_forward_table() -> Table:

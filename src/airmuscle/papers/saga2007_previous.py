@@ -12,9 +12,9 @@ import airmuscle as am
 
 from ..core.errors import ParameterError, SolveError
 from ..core.plotting import BLACK, DASHES, LINES, new_figure
-from ..report.chapter import AtLeast, Claim, Plot, Table
+from ..report.chapter import AtLeast, ClaimRow, Plot, Table
 from . import saga2007_pairs as pairs
-from .saga2007_muscle import DIAMETER, LENGTH, PAPER, PRESSURE, WALL, exact_meridian
+from .saga2007_muscle import DIAMETER, LENGTH, PRESSURE, WALL, exact_meridian
 from .saga2007_muscle import LINES as RUBBER
 
 FIBRES = 16
@@ -127,25 +127,36 @@ class Ferraresi2001:
         return float(brentq(lambda c: float(self.pressure(c, force)) - pressure, low, high, xtol=1e-14))
 
 
-def previous_model_claims() -> tuple[Claim, ...]:
-    """Return the claim of Fig. 1: centre and radius of the circle change with pressure."""
+def radii_at_load() -> tuple[float, str]:
+    """Return the ratio of the radii of the circle at the two pressures of Fig. 1 and one load [1]."""
     model = Ferraresi2001(RUBBER["A"])
     first, second = (float(model.circle(model.contraction(p, FIG_1_LOAD)).radius) for p in FIG_1)
-    loads = (50.0, 150.0)
+    note = f"{1e3 * first:.3g} and {1e3 * second:.3g} mm at {FIG_1[0] / 1e6:g} and {FIG_1[1] / 1e6:g} MPa."
+    return first / second, note
+
+
+def radii_at_contraction() -> tuple[float, str]:
+    """Return the ratio of the radii of the circle at two loads [N] and 10 % contraction [1]."""
+    model, loads = Ferraresi2001(RUBBER["A"]), (50.0, 150.0)
     held = [float(model.pressure(0.1, force)) for force in loads]
     radii = [float(model.circle(model.contraction(p, f)).radius) for p, f in zip(held, loads, strict=True)]
-    text = "Fig. 1: centre and radius of the circular meridian change with pressure: ratio of the radii"
-    bound = AtLeast(RADIUS_CHANGE, chosen=True)
-    at_load = f"{1e3 * first:.3g} and {1e3 * second:.3g} mm at {FIG_1[0] / 1e6:g} and {FIG_1[1] / 1e6:g} MPa."
-    at_contraction = (
+    return radii[0] / radii[1], (
         f"At 10 % contraction with {loads[0]:g} and {loads[1]:g} N, that is at {held[0] / 1e6:.3g} and "
         f"{held[1] / 1e6:.3g} MPa. The circle depends on the contraction only, by sin(φ)/φ = 1 − ε; the pressure of a "
         "wanted contraction and load is then explicit, also in this model."
     )
-    return (
-        Claim(PAPER, text, bound, first / second, "1", at_load, f"line A, constant load of {FIG_1_LOAD:g} N"),
-        Claim(PAPER, text, bound, radii[0] / radii[1], "1", at_contraction, "line A, constant contraction"),
-    )
+
+
+PREVIOUS_MODEL = ClaimRow(
+    "Fig. 1: centre and radius of the circular meridian change with pressure: ratio of the radii",
+    AtLeast(RADIUS_CHANGE, chosen=True),
+    "1",
+    lambda radii: radii(),
+    cases={
+        f"line A, constant load of {FIG_1_LOAD:g} N": (radii_at_load,),
+        "line A, constant contraction": (radii_at_contraction,),
+    },
+)
 
 
 def previous_model_table() -> Table:

@@ -12,7 +12,6 @@ from ..core import autodiff
 from ..physics.muscle.characteristic.saga2007 import RUBBER_TEST_STRAIN
 from ..report.chapter import Table
 from . import saga2007_pairs
-from .saga2007_claims import FIG_2
 from .saga2007_joint import feed_forward_table
 from .saga2007_muscle import (
     DEFAULT,
@@ -29,6 +28,7 @@ from .saga2007_muscle import (
     with_rings,
 )
 from .saga2007_previous import previous_model_table
+from .saga2007_values import FIG_2
 
 CONTRACTIONS = np.array([0.001, 0.01, 0.05, 0.10, 0.20, 0.35])
 

@@ -6,7 +6,7 @@ import abc
 import dataclasses
 import enum
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -146,6 +146,35 @@ class Claim:
             "verdict": self.verdict,
             "note": to_plain(self.note),
         }
+
+
+@dataclasses.dataclass(frozen=True)
+class ClaimRow:
+    """One row of a table of claims: statement, expected value, unit, function that reproduces the value, note, cases.
+
+    `reproduce` returns the value, or the value with a further sentence of the note; without it these are the arguments,
+    and without arguments no value can be computed. `cases` maps the name of each case to its arguments.
+    """
+
+    text: str
+    printed: PublishedValue | None
+    unit: str
+    reproduce: Callable[..., Any] | None = None
+    note: str = ""
+    cases: Mapping[str, tuple[Any, ...]] = dataclasses.field(default_factory=lambda: {"": ()})
+    kind: Kind = Kind.CLAIM
+    untestable: bool = False
+
+    def claim(self, paper: str, case: str, *arguments: Any) -> Claim:
+        """Return the claim of one paper in one case, evaluated for these arguments."""
+        found = self.reproduce(*arguments) if self.reproduce else arguments or None
+        value, reason = found if isinstance(found, tuple) else (found, "")
+        note = f"{self.note} {reason}".strip()
+        return Claim(paper, self.text, self.printed, value, self.unit, note, case, self.kind, self.untestable)
+
+    def claims(self, paper: str, *subject: Any) -> tuple[Claim, ...]:
+        """Return the claims of all cases; the function is given the subject before the arguments of the case."""
+        return tuple(self.claim(paper, case, *subject, *arguments) for case, arguments in self.cases.items())
 
 
 @dataclasses.dataclass(frozen=True)
