@@ -20,9 +20,9 @@ from airmuscle.core.annotation import conforms, type_hints
 from airmuscle.engine import SampledSignal, Schedule
 from airmuscle.engine.loop.control_loop import CombinedSignal
 from airmuscle.errors import AirmuscleError
-from airmuscle.files.library.models import model_names
+from airmuscle.files.library import model_names
 from airmuscle.physics import AirSource, Ambient, Circuit, ExternalLoad, Gas, Mechanism, Muscle, Plant, SharedSupply
-from airmuscle.physics.mechanism.external_load import SHORTENING, SHORTENING_SPEED
+from airmuscle.physics.mechanism import SHORTENING, SHORTENING_SPEED
 
 ATTEMPTS = 40
 """Compositions of one component that its constructor may refuse."""

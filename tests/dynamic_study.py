@@ -10,7 +10,7 @@ import numpy as np
 from typer.testing import CliRunner
 
 from airmuscle.files import load_scenario
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 
 VALVES = '["circuit.fill.conductance", "circuit.discharge.conductance"]'
 

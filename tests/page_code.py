@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 from typer.testing import CliRunner
 
 from airmuscle.errors import AirmuscleWarning
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 
 DOCS = Path(__file__).parents[1] / "docs"
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)

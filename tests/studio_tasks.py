@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from airmuscle.core.output_folder import atomic_folder
+from airmuscle.core import atomic_folder
 from airmuscle.errors import InputError
 from airmuscle.outlets.studio.fit_settings import FieldError
 

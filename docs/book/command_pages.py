@@ -10,7 +10,7 @@ from typing import Any
 
 import typer
 
-from airmuscle.outlets.cli.app import COMMANDS, app
+from airmuscle.outlets.cli import COMMANDS, app
 
 from .formulas_in_text import escape
 from .tables import table

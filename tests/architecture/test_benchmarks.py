@@ -24,7 +24,7 @@ from filling import runs
 
 from airmuscle.core import tree
 from airmuscle.engine import DormandPrince8, Rodas4, Schedule
-from airmuscle.engine.compile.program import compile_system
+from airmuscle.engine.compile import compile_system
 
 
 @pytest.mark.parametrize("states", [3, 6, 8, 10])

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import airmuscle
 from airmuscle.core import parameters
-from airmuscle.files.library.models import model_class, model_names
+from airmuscle.files.library import model_class, model_names
 from airmuscle.recording import QUANTITIES
 
 DOCS = Path(__file__).parents[2] / "docs"

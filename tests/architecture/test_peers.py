@@ -21,7 +21,7 @@ import rodas4
 from filling import lifting_run, runs
 
 from airmuscle.engine import DormandPrince8, Rodas4, RungeKutta4, Schedule
-from airmuscle.engine.compile.program import compile_system
+from airmuscle.engine.compile import compile_system
 from airmuscle.physics import Plant
 
 

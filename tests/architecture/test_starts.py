@@ -30,7 +30,7 @@ STARTS = {
         {*HEAVY, "airmuscle.bench.identify"},
     ),
     "airmuscle solve": (
-        "from airmuscle.outlets.cli.app import app\n"
+        "from airmuscle.outlets.cli import app\n"
         "app(['solve', 'chou-hannaford', '--pressure', '3 bar', '--force', '100 N'], standalone_mode=False)",
         (HEAVY | {"llvmlite", "airmuscle.bench.identify"}) - {"typer", "rich"},
     ),

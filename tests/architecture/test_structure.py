@@ -221,7 +221,7 @@ def own_imports_below_the_top(path: Path) -> list[ast.AST]:
 
 
 def test_own_imports_are_at_the_top_of_a_file():
-    """The command line imports the module of a command with importlib, from the table in cli/app.py."""
+    """The command line imports the module of a command with importlib, from the table in cli/commands.py."""
     assert {name_of(path) for path in FILES if own_imports_below_the_top(path)} == set()
 
 
@@ -230,7 +230,7 @@ def test_modules_are_imported_by_name_in_few_files_only():
     assert files <= {
         "core/stubs.py",  # names of the faces that are imported on use
         "__main__.py",  # the command line, within the handling of an interruption
-        "outlets/cli/app.py",  # the module of a command
+        "outlets/cli/commands.py",  # the module of a command
         "outlets/cli/entry_point.py",  # the command line, after SIGINT is handled
         "engine/compile/cache/kernel.py",  # kernels that are not in the cache
         "files/library/models.py",  # models named in TOML files

@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 
 import airmuscle as am
-from airmuscle.core import tree
-from airmuscle.core.absolute_pressure import AbsolutePressure, ambient_pressure
+from airmuscle.core import AbsolutePressure, ambient_pressure, tree
 from airmuscle.design import load_study
-from airmuscle.engine.loop.law_design import designed_loop
+from airmuscle.engine.loop import designed_loop
 from airmuscle.errors import ParameterError
 from airmuscle.files import load_scenario
 from airmuscle.physics import Ambient

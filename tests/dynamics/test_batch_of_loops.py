@@ -28,7 +28,7 @@ from airmuscle.engine import (
     simulate_batch,
     solve,
 )
-from airmuscle.engine.run.bound_integrator import BoundIntegrator
+from airmuscle.engine.run import BoundIntegrator
 from airmuscle.errors import ParameterError
 from airmuscle.physics import HangingMass, Plant
 

@@ -17,7 +17,7 @@ from airmuscle.design import Contender, StuckValve, compare_controllers, standar
 from airmuscle.design.control_benchmark.called_contender import Readings
 from airmuscle.design.control_benchmark.commissioning import identify_gains, tracking_error
 from airmuscle.design.control_benchmark.contenders import complete
-from airmuscle.design.tuning.case import with_gains
+from airmuscle.design.tuning import with_gains
 from airmuscle.engine import Measurement
 from airmuscle.errors import ParameterError
 

@@ -27,10 +27,9 @@ from airmuscle.engine import (
     simulate,
     solve,
 )
+from airmuscle.engine.compile import compile_system
 from airmuscle.engine.compile.cache.kernel import record
-from airmuscle.engine.compile.program import compile_system
-from airmuscle.engine.loop.driver import PwmState
-from airmuscle.engine.loop.piecewise_linear import merge_columns
+from airmuscle.engine.loop import PwmState, merge_columns
 from airmuscle.engine.run import output_times as rows_of_a_run
 from airmuscle.engine.run.output_times import merge_output_times
 from airmuscle.engine.run.rows import RowRecorder

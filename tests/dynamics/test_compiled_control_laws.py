@@ -28,7 +28,7 @@ from airmuscle.control import (
     WithFeedForward,
     design_lqg,
 )
-from airmuscle.core.diagnostics import DiagnosticCode
+from airmuscle.core import DiagnosticCode
 from airmuscle.engine import (
     ColumnSensor,
     ControlLoop,

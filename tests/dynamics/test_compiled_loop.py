@@ -20,8 +20,7 @@ from hypothesis import strategies as st
 
 from airmuscle import Status
 from airmuscle.control import PID, OnOffController
-from airmuscle.core import model, ops, parameter
-from airmuscle.core.diagnostics import DiagnosticCode
+from airmuscle.core import DiagnosticCode, model, ops, parameter
 from airmuscle.engine import (
     PWM,
     ControlLaw,

@@ -15,8 +15,8 @@ import pytest
 from plants import EXAMPLES, of
 
 from airmuscle.core import model, ops
-from airmuscle.engine.compile.program import compile_system
-from airmuscle.files.library.models import model_class, model_names
+from airmuscle.engine.compile import compile_system
+from airmuscle.files.library import model_class, model_names
 from airmuscle.physics import Damper, EndStop, HuntCrossley
 
 JUMP = 1e-6

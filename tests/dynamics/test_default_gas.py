@@ -13,7 +13,7 @@ from airmuscle.design import LiftRequirement, SizingConditions, size_muscles
 from airmuscle.files import list_plants
 from airmuscle.outlets.environments.default_tasks import arm_task, joint_task, lift_task
 from airmuscle.physics import Ambient, EnergyBalance, WallHeatTransfer
-from airmuscle.physics.pneumatics.wall_heat_transfer import DEFAULT_GAS
+from airmuscle.physics.pneumatics import DEFAULT_GAS
 
 VALVE = am.Valve(1e-8, 0.3)
 AMBIENT = Ambient()

@@ -29,7 +29,7 @@ from airmuscle.design.control_benchmark.designed_controllers import joint_design
 from airmuscle.design.control_benchmark.motion_dynamics import angular_acceleration
 from airmuscle.design.control_benchmark.plots import line_style, marker_style
 from airmuscle.engine import ControlLoop, Measurement, Schedule, simulate
-from airmuscle.engine.run.compiled_law import LawSample
+from airmuscle.engine.run import LawSample
 from airmuscle.errors import ParameterError
 from airmuscle.physics import find_equilibrium
 

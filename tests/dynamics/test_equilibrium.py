@@ -14,7 +14,7 @@ from widths import widened
 
 from airmuscle.core import ops
 from airmuscle.engine import ZERO_INPUT, Schedule, simulate
-from airmuscle.engine.compile.program import compile_system
+from airmuscle.engine.compile import compile_system
 from airmuscle.errors import EquilibriumError, GeometryLimitError, ParameterError, UnitError
 from airmuscle.physics import (
     AntagonisticJoint,

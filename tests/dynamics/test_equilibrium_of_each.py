@@ -13,7 +13,7 @@ from plants import BRAID, EXAMPLES, TWO_VALVES, of, pulled
 
 from airmuscle.core import ops, tree
 from airmuscle.engine import ZERO_INPUT, RungeKutta4, simulate_batch
-from airmuscle.engine.compile.program import compile_system
+from airmuscle.engine.compile import compile_system
 from airmuscle.errors import AirmuscleError, EquilibriumError, ParameterError
 from airmuscle.physics import (
     Ambient,

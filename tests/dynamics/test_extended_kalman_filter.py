@@ -14,8 +14,7 @@ from control_plants import LIFT
 import airmuscle as am
 from airmuscle.control import ExtendedKalmanFilter, StateEstimate, consistency_band, normalised_error_squared
 from airmuscle.engine import RungeKutta4, Stepper, advance
-from airmuscle.engine.compile.jacobians import derivatives
-from airmuscle.engine.compile.program import compile_system
+from airmuscle.engine.compile import compile_system, derivatives
 from airmuscle.errors import ParameterError, SolveError
 
 H = 5e-3

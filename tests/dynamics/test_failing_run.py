@@ -10,7 +10,7 @@ from joints import chosen_muscle
 from widths import widened
 
 from airmuscle import Status
-from airmuscle.core.diagnostics import Columns, DiagnosticCode
+from airmuscle.core import Columns, DiagnosticCode
 from airmuscle.engine import (
     PiecewiseLinear,
     Problem,
@@ -22,7 +22,7 @@ from airmuscle.engine import (
     simulate_batch,
     solve,
 )
-from airmuscle.engine.compile.program import compile_system
+from airmuscle.engine.compile import compile_system
 from airmuscle.engine.run import bound_integrator
 from airmuscle.engine.state import state_vector
 from airmuscle.errors import AirmuscleError, SimulationError

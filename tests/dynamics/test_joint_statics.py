@@ -36,7 +36,7 @@ from airmuscle.physics import (
     plot_reachable_region,
     stiffness,
 )
-from airmuscle.physics.muscle.characteristic.contractile_surface import exponents
+from airmuscle.physics.muscle.characteristic import exponents
 
 DMSP = am.load("dmsp-20-300").muscle
 BRAID = am.geometry.Braid(0.01, 0.4363, 0.3)

@@ -19,15 +19,14 @@ from filling import lifting_run
 from numba.core import ir
 
 from airmuscle.engine import DormandPrince8, Rodas4, Schedule, simulate
+from airmuscle.engine.compile import Function, compile_system
 from airmuscle.engine.compile.cache import kernel as kernels
 from airmuscle.engine.compile.cache import module
 from airmuscle.engine.compile.cache import store as kept
 from airmuscle.engine.compile.cache.inlining import shallow_scope_copies
 from airmuscle.engine.compile.cache.kernel import BoundKernel, Kernel
 from airmuscle.engine.compile.cache.object_code import build
-from airmuscle.engine.compile.function import Function
 from airmuscle.engine.compile.llvm.jit import object_code
-from airmuscle.engine.compile.program import compile_system
 from airmuscle.errors import AirmuscleWarning
 
 CASE = lifting_run(1)

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from airmuscle.core import StateVariable, System, model, ops, parameter
 from airmuscle.engine import ZERO_INPUT, DormandPrince8, Rodas4, RungeKutta4, SampledSignal, Schedule, advance, simulate
-from airmuscle.engine.compile.program import compile_system
+from airmuscle.engine.compile import compile_system
 from airmuscle.errors import SimulationError
 from airmuscle.physics import FillDischarge, HangingMass, Plant, Polytropic, Supply, Valve
 

@@ -10,7 +10,7 @@ import casadi
 import numpy as np
 import pytest
 
-from airmuscle.engine.compile.functions import Printer
+from airmuscle.engine.compile import Printer
 from airmuscle.engine.compile.ir.instructions import Operation
 from airmuscle.engine.compile.llvm import emit, vector_math
 from airmuscle.engine.compile.llvm.jit import jit_compile

@@ -16,7 +16,7 @@ from airmuscle.control import PID, WithFeedForward, WithSetpointDelay
 from airmuscle.core import model, parameter
 from airmuscle.design import LoopCase, tune
 from airmuscle.engine import ControlLaw, ControlLoop, LawDesign, RungeKutta4, SplitRange, simulate, simulate_batch
-from airmuscle.engine.loop.law_design import designed_loop, with_designed_laws
+from airmuscle.engine.loop import designed_loop, with_designed_laws
 from airmuscle.errors import ParameterError
 
 H, BAR = 0.01, 1e5

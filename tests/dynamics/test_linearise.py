@@ -9,7 +9,7 @@ import pytest
 from joints import chosen_muscle, joint, joint_start
 
 from airmuscle.engine import Problem, Rodas4, Schedule, simulate, solve
-from airmuscle.engine.compile.program import compile_system
+from airmuscle.engine.compile import compile_system
 from airmuscle.errors import AirmuscleError, ParameterError
 from airmuscle.physics import (
     AntagonisticJoint,

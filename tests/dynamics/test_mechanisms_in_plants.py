@@ -12,7 +12,7 @@ from joints import HEAT_CAPACITY, chosen_muscle, joint, joint_start
 from widths import widened
 
 from airmuscle.engine import ZERO_INPUT, Rodas4, SampledSignal, Schedule, simulate, spline_trajectory
-from airmuscle.engine.compile.program import compile_system
+from airmuscle.engine.compile import compile_system
 from airmuscle.errors import ParameterError
 from airmuscle.physics import (
     GAS_CONSTANT,

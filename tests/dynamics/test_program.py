@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airmuscle.core import StateVariable, System, autodiff, model, ops, parameter
-from airmuscle.engine.compile.program import compile_system
+from airmuscle.engine.compile import compile_system
 from airmuscle.errors import ParameterError, TraceError
 
 FORMULAS = {

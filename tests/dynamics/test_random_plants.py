@@ -16,7 +16,7 @@ import pytest
 from composer import STOCK, Composer, models_in
 
 from airmuscle import Status
-from airmuscle.core.diagnostics import DiagnosticCode
+from airmuscle.core import DiagnosticCode
 from airmuscle.engine import Problem, Rodas4, solve
 from airmuscle.errors import AirmuscleError, ParameterError
 from airmuscle.physics import (

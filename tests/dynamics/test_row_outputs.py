@@ -12,8 +12,8 @@ from plants import EXAMPLES
 from widths import widened
 
 from airmuscle.engine import PiecewiseLinear
+from airmuscle.engine.compile import compile_system
 from airmuscle.engine.compile.functions_simd import ROWS
-from airmuscle.engine.compile.program import compile_system
 from airmuscle.engine.run.rows import RowRecorder
 from airmuscle.physics import HangingMass
 

@@ -14,7 +14,7 @@ from filling import hanging, runs
 
 from airmuscle.core import StateVariable, System, model, ops, parameter, tree
 from airmuscle.engine import Rodas4, RungeKutta4, SampledSignal, Schedule, WithSensitivities, sensitivity
-from airmuscle.engine.compile.program import compile_system
+from airmuscle.engine.compile import compile_system
 from airmuscle.errors import ParameterError
 
 PATHS = (

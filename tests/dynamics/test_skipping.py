@@ -17,11 +17,11 @@ from filling import hanging
 
 from airmuscle.core import StateVariable, System, model, ops, parameter
 from airmuscle.engine import RungeKutta4, Schedule, simulate_batch
+from airmuscle.engine.compile import Program, compile_system
 from airmuscle.engine.compile.ir import emission
 from airmuscle.engine.compile.ir.branches import COMMANDED, STEADY, VARYING, skipping
 from airmuscle.engine.compile.ir.instructions import Code, Instruction, Operand, Operation
 from airmuscle.engine.compile.ir.scheduling import ConditionalBlock
-from airmuscle.engine.compile.program import Program, compile_system
 from airmuscle.physics import FillDischarge, Plant, Supply, ThreePositionValve, Valve
 
 BINARY = (

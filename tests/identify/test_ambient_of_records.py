@@ -12,7 +12,7 @@ from airmuscle.bench import Campaign, LeftOutStage, RowReader, classify_records,
 from airmuscle.bench.identify.campaign.fill_stage import fit_fill_stage
 from airmuscle.errors import ColumnError, ParameterError, UnitError
 from airmuscle.files import load_dynamic_fit, load_plant_model, load_scenario
-from airmuscle.files.scenario.campaign import campaign_scenarios
+from airmuscle.files.scenario import campaign_scenarios
 from airmuscle.physics import Ambient
 from airmuscle.recording import Recording
 

@@ -37,7 +37,7 @@ from airmuscle.bench.identify.cross_validation import ALWAYS_FITTED, default_spl
 from airmuscle.bench.identify.force_evaluation import evaluate_force
 from airmuscle.bench.identify.recommendation import excess_error, recommend
 from airmuscle.errors import IdentificationError, ParameterError
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 from airmuscle.outlets.cli.fit_options import parse_split
 from airmuscle.physics import Braid, ContractileSurface, Hunt2017, InverseLength, LogarithmicLength, TonduLopez2000
 from airmuscle.recording import Recording

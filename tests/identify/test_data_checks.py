@@ -38,7 +38,7 @@ from airmuscle.bench.identify.campaign.static_stage import fit_static_stage
 from airmuscle.bench.identify.candidates import blank_surface
 from airmuscle.bench.identify.data_checks import DataChecks
 from airmuscle.errors import AirmuscleWarning, ColumnError
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 from airmuscle.physics import CreepElements, NoFriction
 from airmuscle.recording import Recording
 

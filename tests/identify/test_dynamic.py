@@ -21,10 +21,10 @@ from airmuscle.bench import (
     fit_dynamic,
     locate_pressure_sensor,
 )
-from airmuscle.bench.identify.dynamic.profile import DynamicProfile
+from airmuscle.bench.identify.dynamic import DynamicProfile
 from airmuscle.core import tree
 from airmuscle.engine import Schedule, simulate
-from airmuscle.engine.run.bound_integrator import BoundIntegrator
+from airmuscle.engine.run import BoundIntegrator
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.physics import (
     Dahl,

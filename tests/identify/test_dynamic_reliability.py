@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import Estimate, Experiment, InitialConditions, fit_dynamic
-from airmuscle.bench.identify.dynamic.dynamic_chapter import dynamic_chapters
+from airmuscle.bench.identify.dynamic import dynamic_chapters
 from airmuscle.bench.identify.dynamic.reliability import (
     describe_bounds,
     describe_flatness,

@@ -24,7 +24,7 @@ from airmuscle.core import autodiff
 from airmuscle.errors import IdentificationError
 from airmuscle.papers.borzikova_surfaces import sample
 from airmuscle.physics import BorzikovaExponential
-from airmuscle.physics.muscle.characteristic.borzikova import SAM_30X290
+from airmuscle.physics.muscle.characteristic import SAM_30X290
 from airmuscle.recording import Recording
 
 CURVES = sample(SAM_30X290)

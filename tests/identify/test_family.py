@@ -16,8 +16,8 @@ from airmuscle.bench import Candidate, SpecimenSplit, compare, fit, standard_can
 from airmuscle.bench.identify.candidates import blank_surface
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.files import Entry, to_toml
+from airmuscle.files.library import Location
 from airmuscle.files.library.build import build
-from airmuscle.files.library.location import Location
 from airmuscle.physics import (
     Braid,
     ContractileSurface,

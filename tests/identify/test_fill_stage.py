@@ -14,7 +14,7 @@ from widths import widened
 
 from airmuscle import load
 from airmuscle.bench import Experiment, FillStage, InitialConditions, classify_records, fit_dynamic, stated_ambient
-from airmuscle.bench.identify.campaign.campaign_stages import stage_result
+from airmuscle.bench.identify.campaign import stage_result
 from airmuscle.bench.identify.campaign.fill_stage import fit_fill_stage
 from airmuscle.bench.identify.campaign.release_stage import fit_release_stage
 from airmuscle.bench.identify.campaign.volume import volume_change

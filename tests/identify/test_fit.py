@@ -47,8 +47,7 @@ from airmuscle.physics import (
     StraightFibre,
     TonduLopez2000,
 )
-from airmuscle.physics.muscle.characteristic.contractile_surface import exponents
-from airmuscle.physics.muscle.characteristic.saga2007 import LINE_A
+from airmuscle.physics.muscle.characteristic import LINE_A, exponents
 from airmuscle.recording import Recording
 
 DATA = Path(airmuscle.__file__).parent / "files" / "library" / "data"

@@ -17,7 +17,7 @@ from airmuscle.bench.identify.dynamic.candidate_records import candidate_records
 from airmuscle.engine import Schedule, simulate
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.files import load
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 from airmuscle.physics import EnergyBalance, FillDischarge, Isometric, Muscle, Plant, Polytropic, Supply, Valve, Vessel
 from airmuscle.recording import Recording
 

@@ -20,7 +20,7 @@ from airmuscle.bench.identify.experiment_design import (
     optimal_design,
 )
 from airmuscle.errors import IdentificationError, ParameterError
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 from airmuscle.physics import Braid, TonduLopez2000, ValidityRange
 from airmuscle.recording import Recording
 

@@ -27,7 +27,7 @@ from airmuscle.bench.identify.equation_section import equation_section
 from airmuscle.bench.identify.specimen_effects import Sums, predict_effects
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.files import Entry, load, save
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 from airmuscle.outlets.cli.fit_options import parse_split
 from airmuscle.physics import ContractileSurface, LogarithmicLength, PooledLengthLaw
 from airmuscle.recording import Recording

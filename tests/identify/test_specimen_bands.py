@@ -15,7 +15,7 @@ from airmuscle.bench import fit, standard_candidates
 from airmuscle.bench.identify.left_out import degrees_of_freedom, leverages, t_quantile
 from airmuscle.bench.identify.specimen_errors import SpecimenErrors, specimen_errors, specimens_of
 from airmuscle.files import Entry, save
-from airmuscle.files.library.entry_prediction import predict_with_entry
+from airmuscle.files.library import predict_with_entry
 from airmuscle.files.library.fitted_entry import fitted_entry
 from airmuscle.physics import ContractileSurface
 from airmuscle.recording import Recording

@@ -20,7 +20,7 @@ from airmuscle.bench.identify.bootstrapping import RELIABLE_GROUPS
 from airmuscle.bench.identify.candidates import blank_surface
 from airmuscle.bench.identify.parameter_covariance import NORMAL_QUANTILE, _degrees_of_freedom
 from airmuscle.bench.identify.uncertainty_chapter import Uncertainty, uncertainty_chapter
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 from airmuscle.physics import Braid, TonduLopez2000
 from airmuscle.recording import Recording
 

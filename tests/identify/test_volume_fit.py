@@ -12,9 +12,9 @@ from typer.testing import CliRunner
 from airmuscle.bench.identify.volume_fit import VolumePoints, fit_volume, volume_points
 from airmuscle.errors import ColumnError, IdentificationError
 from airmuscle.files import load
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 from airmuscle.physics import Braid, ChebyshevGeometry, ValidityRange, VirtualWork
-from airmuscle.physics.muscle.characteristic.energy_defect import maxwell_defect
+from airmuscle.physics.muscle.characteristic import maxwell_defect
 from airmuscle.recording import Recording
 
 BRAID = Braid(0.01, 0.43, 0.2)

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from airmuscle.bench import estimate_sensors, fit, write_csv
 from airmuscle.bench.identify.weights import sensor_deviations
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 from airmuscle.physics import Braid, ContractileSurface, TonduLopez2000
 from airmuscle.recording import Recording
 

@@ -14,7 +14,7 @@ from airmuscle.errors import GeometryLimitError, ParameterError, SolveError
 from airmuscle.files import load
 from airmuscle.papers.borzikova_surfaces import sample
 from airmuscle.physics import BorzikovaDirect, BorzikovaExponential
-from airmuscle.physics.muscle.characteristic.borzikova import SAM_30X290
+from airmuscle.physics.muscle.characteristic import SAM_30X290
 
 # Coefficients of the exponent that the three printed curves determine, by Lagrange interpolation in F;
 # rows by power of p in bar, columns by power of F in N. Ten decimals were computed apart from this program.

@@ -47,7 +47,7 @@ from airmuscle.physics import (
     WithTubes,
     orifice_flow,
 )
-from airmuscle.physics.pneumatics.gas import NO_FLOW
+from airmuscle.physics.pneumatics import NO_FLOW
 
 AMBIENT = Ambient()
 VALVE, WIDE, NARROW = Valve(1e-8, 0.4), Valve(5e-8, 0.4), Valve(2e-9, 0.3)

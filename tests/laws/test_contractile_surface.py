@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from airmuscle.errors import ParameterError
 from airmuscle.physics import ContractileSurface
-from airmuscle.physics.muscle.characteristic.contractile_surface import exponents
+from airmuscle.physics.muscle.characteristic import exponents
 
 BOX = (50e3, 650e3), (0.0, 0.25)
 

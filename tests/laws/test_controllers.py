@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from airmuscle.control import PID, OnOffController
 from airmuscle.core import cite, leaves
 from airmuscle.engine import Measurement, SplitRange
-from airmuscle.engine.loop.controller import relative_unit
+from airmuscle.engine.loop import relative_unit
 from airmuscle.errors import ParameterError
 
 WIDE = {"fill": (-math.inf, math.inf)}

@@ -45,7 +45,7 @@ from airmuscle.physics import (
     VirtualWork,
     as_force_law,
 )
-from airmuscle.physics.muscle.characteristic.borzikova import SAM_30X290
+from airmuscle.physics.muscle.characteristic import SAM_30X290
 from airmuscle.physics.muscle.characteristic.energy_defect import maxwell_defect, virtual_work_defect
 from airmuscle.physics.muscle.geometry.chebyshev import as_polynomial
 

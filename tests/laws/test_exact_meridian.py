@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from airmuscle.core import autodiff
 from airmuscle.errors import GeometryLimitError, ParameterError, SolveError
 from airmuscle.physics import Catenary, CircleVirtualWork, ExactMeridian, PleatedTube, RubberLine, StraightFibre
-from airmuscle.physics.muscle.characteristic.saga2007 import LINE_A, LINE_B
+from airmuscle.physics.muscle.characteristic import LINE_A, LINE_B
 
 L0, D0, WALL = 0.072, 0.012, 0.002
 CONTRACTIONS = np.array([0.01, 0.05, 0.10, 0.20, 0.30, 0.40])

@@ -17,7 +17,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
 
 import airmuscle as am
-from airmuscle.core.constants import STANDARD_GRAVITY
+from airmuscle.core import STANDARD_GRAVITY
 from airmuscle.design import (
     JointRequirement,
     LiftRequirement,
@@ -32,7 +32,7 @@ from airmuscle.design import (
     scenario_text,
     size_muscles,
 )
-from airmuscle.design.sizing.sizing_chapter import choice_row
+from airmuscle.design.sizing import choice_row
 from airmuscle.design.sizing.static_muscle import static_muscle
 from airmuscle.design.sizing.valve_sizing import air_path
 from airmuscle.errors import AirmuscleError, ParameterError, SolveError

@@ -17,7 +17,7 @@ import airmuscle as am
 from airmuscle.control import AngleAndStiffness, StaticFeedForward, StaticInverse
 from airmuscle.core import autodiff
 from airmuscle.errors import ParameterError
-from airmuscle.files.library.files import LAWS as LAW_FILES
+from airmuscle.files.library import LAWS as LAW_FILES
 from airmuscle.physics import CubicSpring, EndStop, ForceLaw, HuntCrossley, SeriesSpring, ValidityRange, as_force_law
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from airmuscle.core.atomic_output import atomic_file
-from airmuscle.files.library.write import write_text
+from airmuscle.core import atomic_file
+from airmuscle.files.library import write_text
 
 
 def test_a_file_is_unchanged_and_nothing_is_left_if_writing_fails(tmp_path: Path):

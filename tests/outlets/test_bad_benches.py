@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from airmuscle.bench import UNCENSORED, fit, read, write_csv
 from airmuscle.files import load
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 from airmuscle.physics import Braid, ContractileSurface, TonduLopez2000
 from airmuscle.recording import Recording
 

@@ -19,16 +19,14 @@ from typer.testing import CliRunner
 from widths import SAME_LAW, widened
 
 from airmuscle import advance, load, load_data, read_csv, simulate
-from airmuscle.core import model, parameter
-from airmuscle.core.output_folder import atomic_folder, check_writable
-from airmuscle.core.units import ABSOLUTE
+from airmuscle.core import ABSOLUTE, atomic_folder, check_writable, model, parameter
 from airmuscle.engine import SampledSignal, Schedule
 from airmuscle.engine.compile.cache.kernel import BoundKernel, fixed_step
 from airmuscle.engine.run import bound_integrator
 from airmuscle.errors import FileError, ParameterError, SolveError, UnitError
 from airmuscle.files import list_laws
-from airmuscle.files.library.files import read_toml
-from airmuscle.outlets.cli.app import app
+from airmuscle.files.library import read_toml
+from airmuscle.outlets.cli import app
 from airmuscle.physics import FillDischarge, HangingMass, Plant, Supply, Valve, find_equilibrium
 from airmuscle.units import conversion, quantity
 

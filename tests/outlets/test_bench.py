@@ -18,7 +18,7 @@ from airmuscle.bench import RowReader, follow_lines, read_csv
 from airmuscle.bench.readers.follow import MAX_UNREADABLE
 from airmuscle.errors import ColumnError, FileError
 from airmuscle.files import load
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 
 RIG = ("--max-pressure", "6 bar", "--max-force", "1.5 kN")
 

@@ -18,8 +18,8 @@ from typer.testing import CliRunner
 from airmuscle.bench import read
 from airmuscle.errors import ParameterError
 from airmuscle.files import load, load_scenario
-from airmuscle.files.library.uncertainty import ParameterUncertainty
-from airmuscle.outlets.cli.app import app
+from airmuscle.files.library import ParameterUncertainty
+from airmuscle.outlets.cli import app
 
 pytestmark = pytest.mark.slow  # the whole campaign takes a minute
 

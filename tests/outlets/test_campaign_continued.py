@@ -16,7 +16,7 @@ from made_campaign import write_campaign
 from typer.testing import CliRunner
 
 from airmuscle.bench import LeftOutStage
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 from airmuscle.outlets.cli.campaign_stages import KeptStages
 from airmuscle.recording import Recording
 

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from airmuscle import Recording, load, load_data, write_csv
 from airmuscle.files import load_scenario
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 from airmuscle.physics import Braid
 
 

@@ -26,11 +26,10 @@ from widths import SAME_LAW, widened
 
 import airmuscle as airmuscle_package
 from airmuscle.bench import read_csv
-from airmuscle.core import Reference
-from airmuscle.core.errors import printable
+from airmuscle.core import Reference, printable
 from airmuscle.errors import UnknownNameError
 from airmuscle.files import list_laws, list_plants, list_products, list_valves, load
-from airmuscle.outlets.cli.app import COMMANDS, app
+from airmuscle.outlets.cli import COMMANDS, app
 from airmuscle.outlets.cli.cite import as_bibtex
 from airmuscle.outlets.cli.terminal import print_json, print_table
 from airmuscle.papers import run
@@ -105,7 +104,7 @@ def test_every_command_has_its_summary_and_examples_in_its_help(row):
 @pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["list"]])
 def test_a_command_module_is_imported_only_when_it_is_called(arguments: list[str]):
     modules = [row.module for row in COMMANDS if row.name not in arguments]
-    code = f"from airmuscle.outlets.cli.app import app; app({arguments!r}, standalone_mode=False); import sys; print(*sys.modules)"
+    code = f"from airmuscle.outlets.cli import app; app({arguments!r}, standalone_mode=False); import sys; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr
     assert not {f"airmuscle.outlets.cli.{name}" for name in modules} & set(done.stdout.splitlines()[-1].split())
@@ -569,7 +568,7 @@ def test_a_process_ends_with_the_documented_exit_codes():
 
 
 def test_list_starts_without_what_it_does_not_need():
-    code = "import sys; from airmuscle.outlets.cli.app import app; app(['list', '--json'], standalone_mode=False)"
+    code = "import sys; from airmuscle.outlets.cli import app; app(['list', '--json'], standalone_mode=False)"
     done = subprocess.run(
         [sys.executable, "-c", f"{code}; print(*sys.modules)"], capture_output=True, text=True, timeout=60
     )
@@ -629,7 +628,9 @@ main()
     ("module", "kind"),
     [
         pytest.param(module, kind, marks=[] if (i - k) % 4 == 0 else pytest.mark.slow)
-        for i, module in enumerate(("typer", "airmuscle.outlets.cli.app", "airmuscle.outlets.cli.solve", "rich.table"))
+        for i, module in enumerate(
+            ("typer", "airmuscle.outlets.cli.commands", "airmuscle.outlets.cli.solve", "rich.table")
+        )
         for k, kind in enumerate(("module", "extension", "exception discarded", "discarded by a destructor"))
     ],
 )

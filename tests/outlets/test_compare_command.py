@@ -7,7 +7,7 @@ import json
 import pytest
 from typer.testing import CliRunner
 
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 
 FAST = ["compare", "--controller", "PID", "--task", "step", "--budget", "0"]
 

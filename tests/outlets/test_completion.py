@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 import airmuscle as am
 from airmuscle.errors import UnknownNameError
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 from airmuscle.outlets.cli.completion import SHELLS, complete_data, complete_entry, complete_plant
 
 

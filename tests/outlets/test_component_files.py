@@ -14,11 +14,7 @@ from widths import widened
 
 from airmuscle.errors import ParameterError
 from airmuscle.files import load_scenario
-from airmuscle.files.library import write
-from airmuscle.files.library.files import read_toml
-from airmuscle.files.library.location import Location
-from airmuscle.files.library.models import model_class, model_names
-from airmuscle.files.library.plant_file import build_plant
+from airmuscle.files.library import Location, build_plant, model_class, model_names, read_toml, write
 
 
 def text_of(plant):

@@ -35,7 +35,7 @@ from airmuscle.engine import (
 from airmuscle.errors import AirmuscleError, ColumnError, ParameterError, UnitError, UnknownNameError
 from airmuscle.files import load_scenario, run_chapter, scenario_schema
 from airmuscle.files.scenario.simulation_chapter import describe_input
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "pressure_loop.toml"
@@ -259,7 +259,7 @@ def test_a_column_that_a_set_point_follows_is_there(tmp_path: Path):
 
 
 def test_a_record_has_no_controller(tmp_path: Path):
-    from airmuscle.files.library.location import Location
+    from airmuscle.files.library import Location
     from airmuscle.files.scenario.inputs import build_input_signal
 
     with pytest.raises(

@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from airmuscle.files import load
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 
 MUSCLE = "dmsp-20-300"
 

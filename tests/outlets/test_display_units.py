@@ -25,7 +25,7 @@ from airmuscle.core.display import (
 from airmuscle.core.plotting import new_figure, rendered
 from airmuscle.design import process_pool
 from airmuscle.errors import FileError, UnitError
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 from airmuscle.units import display
 
 

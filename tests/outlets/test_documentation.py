@@ -21,9 +21,9 @@ from book.sources import COPIED, index, site_text
 
 import airmuscle
 from airmuscle.core import parameters
-from airmuscle.files.library.models import model_class, model_names
-from airmuscle.outlets.cli.app import COMMANDS, app
-from airmuscle.report.formula import to_display_mathml
+from airmuscle.files.library import model_class, model_names
+from airmuscle.outlets.cli import COMMANDS, app
+from airmuscle.report import to_display_mathml
 
 FORMULA = re.compile(r"```\{math\}\n(.*?)\n```|\{math\}`([^`]+)`", re.DOTALL)
 

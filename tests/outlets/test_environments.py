@@ -15,9 +15,9 @@ import pytest
 from control_plants import JOINT, LIFT
 
 from airmuscle.engine import Double, RungeKutta4, Single, Stepper
-from airmuscle.engine.run.batch.stepper import BatchStepper
+from airmuscle.engine.run.batch import BatchStepper
 from airmuscle.errors import ParameterError
-from airmuscle.files.library.uncertainty import ParameterUncertainty
+from airmuscle.files.library import ParameterUncertainty
 from airmuscle.outlets import (
     FactorRange,
     FitUncertainty,

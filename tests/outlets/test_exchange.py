@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 from airmuscle.bench import Decimation, from_pandas, read, read_csv, to_xarray, write, write_csv
 from airmuscle.bench.readers import large_csv
 from airmuscle.errors import ColumnError, FileError, ParameterError
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 from airmuscle.recording import Recording
 
 pd = pytest.importorskip("pandas", reason="needs the package pandas")

@@ -25,8 +25,8 @@ from airmuscle.engine import DormandPrince8, Problem, Rodas4, RungeKutta4, Sampl
 from airmuscle.errors import AirmuscleWarning, FileError, ParameterError
 from airmuscle.files import list_laws, load_law
 from airmuscle.outlets import C99, JavaScript, Octave, make_identifiers, write_fmu, write_law, write_program
-from airmuscle.outlets.cli.app import app
-from airmuscle.outlets.export.building import build_and_run
+from airmuscle.outlets.cli import app
+from airmuscle.outlets.export import build_and_run
 from airmuscle.outlets.export.identifiers import LONGEST, RESERVED
 from airmuscle.physics import HangingMass, Tabulated
 

@@ -37,10 +37,10 @@ from airmuscle.engine import (
     WithSensors,
     solve,
 )
-from airmuscle.engine.run.sampled_loop import prepare_loop
+from airmuscle.engine.run import prepare_loop
 from airmuscle.errors import FileError, ParameterError
 from airmuscle.outlets import write_controller
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 from airmuscle.outlets.export.microcontroller import COMPILER, EMULATOR, PROCESSORS, run_in_emulator
 from airmuscle.outlets.export.printed_controller import print_controller
 

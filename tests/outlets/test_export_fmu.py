@@ -29,7 +29,7 @@ from airmuscle.control import PID
 from airmuscle.engine import ControlLoop, Problem, Rodas4, RungeKutta4, Schedule, solve
 from airmuscle.errors import FileError, ParameterError
 from airmuscle.outlets import write_fmu
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 from airmuscle.outlets.export import compiler
 from airmuscle.outlets.export.fmi_units import BASE, base_powers
 from airmuscle.physics import ValidityRange

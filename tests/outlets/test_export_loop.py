@@ -30,7 +30,7 @@ from airmuscle.engine import (
 )
 from airmuscle.errors import ParameterError
 from airmuscle.outlets import C99, JavaScript, Octave, write_program
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 
 STEP = Schedule({"pressure": ((0.0, 1e5), (0.1, 3e5))})
 RAMP = SampledSignal({"pressure": ((0.0, 1e5), (0.087, 2.1e5), (0.2, 1.4e5))})

@@ -19,10 +19,10 @@ from typer.testing import CliRunner
 
 from airmuscle.control import PID
 from airmuscle.engine import ControlLoop, Problem, Schedule
-from airmuscle.engine.compile.program import compile_system
+from airmuscle.engine.compile import compile_system
 from airmuscle.errors import ParameterError
 from airmuscle.outlets import write_modelica
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 
 
 def package(name, folder, **options):

@@ -22,7 +22,7 @@ from widths import widened
 from airmuscle.engine import Problem, Rodas4, RungeKutta4, Schedule, solve
 from airmuscle.errors import ParameterError
 from airmuscle.outlets import write_mujoco_plugin
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 from airmuscle.outlets.export import compiler, mujoco_plugin
 from airmuscle.physics import AntagonisticJoint, FillDischarge, Supply, Valve, find_equilibrium
 

@@ -20,7 +20,7 @@ from airmuscle.engine import Problem, RungeKutta4, Schedule
 from airmuscle.errors import ParameterError
 from airmuscle.files import load_law
 from airmuscle.outlets import C99, write_fmu, write_law
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 from airmuscle.outlets.export import platforms
 from airmuscle.outlets.export.compiler import run_command
 from airmuscle.outlets.export.platforms import PLATFORMS, find_cross_compiler, find_platform, this_platform

@@ -16,7 +16,7 @@ import airmuscle as am
 from airmuscle.bench import InitialConditions, write_csv
 from airmuscle.errors import EquilibriumError, ParameterError
 from airmuscle.files import load_dynamic_fit, load_scenario
-from airmuscle.files.library.location import Location
+from airmuscle.files.library import Location
 from airmuscle.files.scenario.initial_state import build_initial_conditions
 from airmuscle.physics import HangingMass
 from airmuscle.recording import Recording

@@ -15,7 +15,7 @@ from airmuscle.bench.identify.candidates import blank_surface
 from airmuscle.errors import ParameterError, UnknownNameError
 from airmuscle.files import load, save
 from airmuscle.files.library.length_scaling import scale_to_length
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 from airmuscle.physics import Braid, EffectiveLength, MartensBoblan2017
 
 MUSCLE = "dmsp-20-300"

@@ -28,7 +28,7 @@ from airmuscle.bench.identify.band_plot import band_plot
 from airmuscle.bench.identify.candidates import blank_surface
 from airmuscle.bench.identify.levels import levels_of
 from airmuscle.files import load
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 from airmuscle.physics import ContractileSurface, Sarosi2012, ValidityRange
 from airmuscle.recording import Recording
 

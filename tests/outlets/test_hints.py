@@ -39,11 +39,10 @@ from airmuscle.bench import (
     write_csv,
 )
 from airmuscle.bench.identify.candidates import blank_surface
-from airmuscle.core.diagnostics import Diagnostic, DiagnosticCode
-from airmuscle.core.hints import Hint, HintedText
+from airmuscle.core import Diagnostic, DiagnosticCode, Hint, HintedText
 from airmuscle.errors import ColumnError, SimulationError
-from airmuscle.files.library.location import located_errors
-from airmuscle.outlets.cli.app import COMMANDS, app
+from airmuscle.files.library import located_errors
+from airmuscle.outlets.cli import COMMANDS, app
 from airmuscle.outlets.cli.option_hints import INSTRUCTIONS, in_options
 from airmuscle.physics import Sarosi2012
 from airmuscle.recording import Recording

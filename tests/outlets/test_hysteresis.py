@@ -26,12 +26,11 @@ from airmuscle.bench import (
     write_csv,
 )
 from airmuscle.bench.identify.campaign.creep_stage import creep_force
-from airmuscle.bench.identify.hysteresis.hysteresis_chapter import hysteresis_chapters
+from airmuscle.bench.identify.hysteresis import hysteresis_chapters
 from airmuscle.bench.identify.hysteresis.plot import plot_loops
 from airmuscle.files import load, load_scenario, save
-from airmuscle.files.library.location import Location
-from airmuscle.files.library.plant_file import build_muscle
-from airmuscle.outlets.cli.app import app
+from airmuscle.files.library import Location, build_muscle
+from airmuscle.outlets.cli import app
 from airmuscle.physics import CreepElements, MaxwellSlip
 from airmuscle.recording import Recording
 

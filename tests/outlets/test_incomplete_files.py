@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from airmuscle.bench import ColumnMapping, NoTime, UniformTime, find_runs, inspect, read
 from airmuscle.bench.readers.file_name import FileNamePattern
 from airmuscle.errors import AirmuscleError, ColumnError
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 from airmuscle.recording import Recording
 
 RATE, ROWS = 530.0, 1061

@@ -15,7 +15,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from airmuscle.bench import inspect, read
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 
 ROWS = 400
 

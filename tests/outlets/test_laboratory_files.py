@@ -30,11 +30,11 @@ from airmuscle.bench import (
     fit,
     read,
 )
-from airmuscle.bench.readers.mapping import mapping_of_tables
-from airmuscle.core.constants import STANDARD_GRAVITY
+from airmuscle.bench.readers import mapping_of_tables
+from airmuscle.core import STANDARD_GRAVITY
 from airmuscle.errors import ColumnError, FileError, IdentificationError, ParameterError
 from airmuscle.files import load_dynamic_fit
-from airmuscle.outlets.cli.app import COMMANDS, app
+from airmuscle.outlets.cli import COMMANDS, app
 from airmuscle.physics import ContractileSurface
 from airmuscle.recording import Recording
 from airmuscle.recording.row_notes import row_notes

@@ -16,10 +16,7 @@ from airmuscle.bench import fit
 from airmuscle.core import cite
 from airmuscle.errors import AirmuscleError, AirmuscleWarning, FileError, ParameterError, UnitError, UnknownNameError
 from airmuscle.files import Entry
-from airmuscle.files.library import catalogue, files, write
-from airmuscle.files.library.location import Location
-from airmuscle.files.library.models import model_class, model_names
-from airmuscle.files.library.plant_file import build_muscle
+from airmuscle.files.library import Location, build_muscle, catalogue, files, model_class, model_names, write
 from airmuscle.physics import (
     BoucWen,
     Braid,

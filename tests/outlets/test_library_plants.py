@@ -14,8 +14,8 @@ from typer.testing import CliRunner
 import airmuscle as am
 from airmuscle.errors import ParameterError, UnknownNameError
 from airmuscle.files import PlantEntry, list_plants, load_law, load_scenario
-from airmuscle.files.library.files import PLANTS
-from airmuscle.outlets.cli.app import app
+from airmuscle.files.library import PLANTS
+from airmuscle.outlets.cli import app
 
 pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
 each = pytest.mark.parametrize("name", list_plants())

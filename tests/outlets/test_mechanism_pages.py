@@ -11,9 +11,8 @@ import pytest
 
 from airmuscle.engine import sensitivity
 from airmuscle.files import list_plants
+from airmuscle.files.library import Location, model_names
 from airmuscle.files.library.build import build
-from airmuscle.files.library.location import Location
-from airmuscle.files.library.models import model_names
 from airmuscle.physics import AntagonisticJoint, JointWithEndStops, Mechanism, mechanism
 
 DOCS = Path(__file__).parents[2] / "docs"

@@ -54,7 +54,7 @@ from airmuscle.engine import (
 )
 from airmuscle.errors import AirmuscleError, ParameterError, UnitError, UnknownNameError
 from airmuscle.files import Scenario, load_scenario, save_scenario, scenario_text
-from airmuscle.files.library.models import model_class, model_names
+from airmuscle.files.library import model_class, model_names
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "joint_cascade.toml"
 TEXT = EXAMPLE.read_text(encoding="utf-8")

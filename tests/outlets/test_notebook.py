@@ -14,13 +14,12 @@ import numpy as np
 import pytest
 
 import airmuscle as am
-from airmuscle.core.axes import given_axes
+from airmuscle.core import given_axes, new_figure
 from airmuscle.core.notebook import MAX_NOTES, MAX_ROWS, Card, NotebookDisplay, render_card
-from airmuscle.core.plotting import new_figure
 from airmuscle.core.short_repr import MAX_LINES, ShortRepr
 from airmuscle.errors import ParameterError
 from airmuscle.physics import ContractileSurface
-from airmuscle.physics.muscle.display import parameter_rows
+from airmuscle.physics.muscle import parameter_rows
 from airmuscle.recording.panels import panels_of
 
 MAX_BYTES = 200_000

@@ -15,12 +15,10 @@ import plants
 import printed
 import pytest
 
-from airmuscle.engine.compile import functions
+from airmuscle.engine.compile import compile_system, derivatives, functions
 from airmuscle.engine.compile.ir.instructions import Operation
 from airmuscle.engine.compile.ir.interpreter import InterpretedBody
-from airmuscle.engine.compile.jacobians import derivatives
 from airmuscle.engine.compile.llvm.jit import jit_compile
-from airmuscle.engine.compile.program import compile_system
 from airmuscle.engine.compile.text.c import CLanguage
 from airmuscle.engine.compile.text.javascript import JavaScriptLanguage
 from airmuscle.engine.compile.text.matlab import DEFINITION, MatlabLanguage

@@ -14,10 +14,9 @@ from airmuscle import simulate
 from airmuscle.engine import Schedule
 from airmuscle.errors import ParameterError, UnknownNameError
 from airmuscle.files import entries_of_product, list_laws, list_products, load, load_law
-from airmuscle.files.library.scaling import scale_entry
+from airmuscle.files.library import ParameterUncertainty, scale_entry, without_parts
 from airmuscle.files.library.stated_band import StatedBand
-from airmuscle.files.library.uncertainty import ParameterUncertainty, without_parts
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 from airmuscle.physics import CreepElements, LinearSpring, Ratings
 
 DMSP_20 = "dmsp-20-300"

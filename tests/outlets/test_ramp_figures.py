@@ -21,11 +21,11 @@ from airmuscle.bench.identify.levels import is_pressure_ramp, levels_of
 from airmuscle.bench.identify.ramp_plot import ramp_plot
 from airmuscle.core.plotting import MAX_VECTOR_MARKERS, new_figure, rendered, save
 from airmuscle.files import Entry
-from airmuscle.files.library.fitted_entry import list_files
-from airmuscle.outlets.cli.app import app
+from airmuscle.files.library import list_files
+from airmuscle.outlets.cli import app
 from airmuscle.physics import ContractileSurface
+from airmuscle.physics.muscle import compute_isobars
 from airmuscle.physics.muscle.isobar_plot import isobar_plot
-from airmuscle.physics.muscle.isobars import compute_isobars
 from airmuscle.recording import Recording
 
 pytestmark = pytest.mark.drawn

@@ -23,16 +23,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle.core import Reference, plotting
-from airmuscle.core.output_folder import atomic_folder, check_writable
+from airmuscle.core import Reference, atomic_folder, check_writable, plotting
 from airmuscle.errors import FileError, SolveError, UnknownNameError
 from airmuscle.papers import run
-from airmuscle.report import AtLeast, AtMost, Chapter, Claim, Equal, Kind, Plot, Table, write_report
+from airmuscle.report import (
+    AtLeast,
+    AtMost,
+    Chapter,
+    Claim,
+    Equal,
+    Kind,
+    Plot,
+    Table,
+    as_json,
+    to_mathtext,
+    to_plain,
+    write_report,
+)
 from airmuscle.report.chapter import statements
 from airmuscle.report.formatting import MARKS, MEANINGS, count_verdicts, format_number, format_published
-from airmuscle.report.formula import to_mathtext, to_plain
 from airmuscle.report.html import MAX_SVG_BYTES, render_cell, render_header
-from airmuscle.report.write import as_json
 from airmuscle.units import display
 
 pytestmark = pytest.mark.drawn

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from airmuscle.bench import read
 from airmuscle.errors import FileError
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 
 
 @pytest.fixture

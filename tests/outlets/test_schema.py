@@ -18,11 +18,9 @@ from typer.testing import CliRunner
 from airmuscle.core import parameters
 from airmuscle.errors import AirmuscleError
 from airmuscle.files import list_laws, list_plants, load, load_scenario, muscle_schema, scenario_schema, to_toml
-from airmuscle.files.library.entry_file import build_entry
-from airmuscle.files.library.files import PLANTS
-from airmuscle.files.library.models import model_class
-from airmuscle.files.scenario.scenario import TABLES
-from airmuscle.outlets.cli.app import app
+from airmuscle.files.library import PLANTS, build_entry, model_class
+from airmuscle.files.scenario import TABLES
+from airmuscle.outlets.cli import app
 
 ROOT = Path(__file__).parents[2]
 LIBRARY = sorted((ROOT / "src" / "airmuscle" / "files" / "library").glob("*.toml"))

@@ -15,7 +15,7 @@ import airmuscle as am
 from airmuscle.design import JointRequirement, LiftRequirement, SizingConditions, choose, scenario_text
 from airmuscle.design.sizing.scenario import MOVING, RESTING
 from airmuscle.files import load_scenario
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 
 LIFT = ("size", "--load", "20 kg", "--stroke", "40 mm", "--supply", "6 bar")
 ONE = ("--muscle", "dmsp-20-300", "--max-count", "1")

@@ -10,8 +10,8 @@ import pytest
 
 import airmuscle as am
 from airmuscle.files import to_toml
-from airmuscle.files.library.location import Location
-from airmuscle.files.scenario.scenario import build_scenario
+from airmuscle.files.library import Location
+from airmuscle.files.scenario import build_scenario
 
 pytest.importorskip("starlette", reason="needs starlette")
 pytest.importorskip("playwright.sync_api", reason="needs the package playwright")

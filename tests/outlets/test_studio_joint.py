@@ -11,8 +11,8 @@ from studio_pages import run_script, scripts
 from airmuscle.core import with_parameters
 from airmuscle.design import STANDARD_TASKS
 from airmuscle.engine import ControlLoop, Problem, SampledSignal, Schedule, solve
-from airmuscle.files.library.plant_file import plant_tables
-from airmuscle.files.scenario.scenario import build_scenario
+from airmuscle.files.library import plant_tables
+from airmuscle.files.scenario import build_scenario
 from airmuscle.outlets.studio.joint_laws import joint_controllers, statics_within_valves
 from airmuscle.outlets.studio.joint_sheet import joint_tables, sheet_of_joint
 from airmuscle.physics import linearise

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from airmuscle.design import LiftRequirement, SizingConditions, size_muscles
-from airmuscle.files.library.location import Location
-from airmuscle.files.library.plant_file import plant_tables
-from airmuscle.files.scenario.scenario import build_scenario
+from airmuscle.files.library import Location, plant_tables
+from airmuscle.files.scenario import build_scenario
 from airmuscle.outlets import export_page
 from airmuscle.physics import joint_statics
 

@@ -18,11 +18,11 @@ import airmuscle as am
 from airmuscle.core import flatten, leaves, with_parameters
 from airmuscle.errors import FileError, ParameterError, PhysicsError, TraceError
 from airmuscle.files import list_laws, list_plants, to_toml
+from airmuscle.files.library import Location
 from airmuscle.files.library.build import build
-from airmuscle.files.library.location import Location
-from airmuscle.files.scenario.scenario import build_scenario
+from airmuscle.files.scenario import build_scenario
 from airmuscle.outlets import export_page
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 from airmuscle.outlets.studio.law_sheet import law_sheet
 from airmuscle.outlets.studio.tasks import plant_names, sheet_of_any, sheet_of_scenario_text
 from airmuscle.outlets.studio.toml_template import fill_template
@@ -200,8 +200,7 @@ def test_a_run_of_the_page_is_that_of_the_library(name, tmp_path):
 
 
 def scenario_of(name):
-    from airmuscle.files.library.files import read_toml
-    from airmuscle.files.library.plant_file import plant_tables
+    from airmuscle.files.library import plant_tables, read_toml
     from airmuscle.outlets.studio.tasks import SCENARIOS
 
     if name in list_plants():

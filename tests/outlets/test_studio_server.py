@@ -21,7 +21,7 @@ pytest.importorskip("starlette", reason="needs starlette")
 from airmuscle import load
 from airmuscle.errors import InputError, ParameterError
 from airmuscle.files import to_toml
-from airmuscle.files.library.location import Location
+from airmuscle.files.library import Location
 from airmuscle.outlets.studio import app as studio_app
 from airmuscle.outlets.studio import single_file
 from airmuscle.outlets.studio.app import MAX_PAGE, create_app

@@ -36,9 +36,9 @@ from airmuscle.design.study.metrics import METRICS
 from airmuscle.engine import simulate, solve
 from airmuscle.errors import AirmuscleError, ColumnError, FileError, InputError, SimulationError
 from airmuscle.files import load_scenario
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 from airmuscle.outlets.cli.interruption import check_interrupted, deferred_sigint
-from airmuscle.report.write import save_table
+from airmuscle.report import save_table
 
 ROOT = Path(__file__).parents[2]
 SCENARIO = f"""

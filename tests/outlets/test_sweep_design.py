@@ -28,7 +28,7 @@ from airmuscle.design.study.distributions import (
 )
 from airmuscle.design.study.fields import read_difference
 from airmuscle.errors import ParameterError
-from airmuscle.files.library.location import Location
+from airmuscle.files.library import Location
 
 numbers = st.floats(-1e6, 1e6)
 widths = st.floats(1e-3, 1e6)

@@ -18,8 +18,8 @@ from typer.testing import CliRunner
 from airmuscle.design import Perturbations, load_scenario_loop, tune
 from airmuscle.errors import AirmuscleError, FileError, ParameterError
 from airmuscle.files import load_scenario
+from airmuscle.outlets.cli import app
 from airmuscle.outlets.cli import tune as command
-from airmuscle.outlets.cli.app import app
 
 MUSCLE = f"""{MUSCLE_FILE}
 [damper]

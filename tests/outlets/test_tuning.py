@@ -31,7 +31,7 @@ from airmuscle.design import (
 )
 from airmuscle.engine import ColumnSensor, ControlLaw, ControlLoop, Schedule, WithSensors
 from airmuscle.errors import ColumnError, ParameterError, SimulationError
-from airmuscle.files.library.uncertainty import ParameterUncertainty
+from airmuscle.files.library import ParameterUncertainty
 from airmuscle.physics import HangingMass, Isometric, Plant, ProportionalRegulator, SecondOrderLag, Supply, Valve
 
 STEPS = Schedule({"pressure": ((0, 1e5), (0.1, 2e5))})

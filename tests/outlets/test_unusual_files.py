@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from airmuscle.bench import inspect, read
 from airmuscle.errors import FileError
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 
 HEAD = "time [s],pressure [kPa],force [N]\n"
 ROWS = "".join(f"{i},{100 + i},{50 + i}\n" for i in range(9))

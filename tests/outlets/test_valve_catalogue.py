@@ -29,9 +29,9 @@ from airmuscle.files import (
     load_scenario,
     load_valve,
 )
+from airmuscle.files.library import Location
 from airmuscle.files.library.build import build
-from airmuscle.files.library.location import Location
-from airmuscle.outlets.cli.app import app
+from airmuscle.outlets.cli import app
 from airmuscle.papers.hosovsky_plant import MATRIX
 from airmuscle.physics import CheckValve, Valve, in_series
 

@@ -26,9 +26,8 @@ from airmuscle.papers.borzikova_surfaces import (
     surfaces,
     with_a02,
 )
-from airmuscle.physics.muscle.characteristic.borzikova import SAM_30X290
-from airmuscle.report import Kind
-from airmuscle.report.chapter import DIFFERS, HOLDS, NOT_TESTABLE
+from airmuscle.physics.muscle.characteristic import SAM_30X290
+from airmuscle.report import DIFFERS, HOLDS, NOT_TESTABLE, Kind
 
 CURVES = SAM_30X290
 

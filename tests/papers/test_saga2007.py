@@ -43,7 +43,7 @@ from airmuscle.physics import (
     UniformFibreSum,
     UserDefinedFibreSum,
 )
-from airmuscle.physics.muscle.characteristic.saga2007 import LINE_A, LINE_B
+from airmuscle.physics.muscle.characteristic import LINE_A, LINE_B
 from airmuscle.report import Kind
 from airmuscle.report.chapter import DEPENDS, DIFFERS, HOLDS, NOT_PRINTED, NOT_TESTABLE, statements
 

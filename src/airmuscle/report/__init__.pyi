@@ -1,3 +1,6 @@
+from .chapter import DIFFERS as DIFFERS
+from .chapter import HOLDS as HOLDS
+from .chapter import NOT_TESTABLE as NOT_TESTABLE
 from .chapter import AtLeast as AtLeast
 from .chapter import AtMost as AtMost
 from .chapter import Chapter as Chapter
@@ -9,4 +12,9 @@ from .chapter import Plot as Plot
 from .chapter import PublishedValue as PublishedValue
 from .chapter import Statement as Statement
 from .chapter import Table as Table
+from .formula import to_display_mathml as to_display_mathml
+from .formula import to_mathtext as to_mathtext
+from .formula import to_plain as to_plain
+from .write import as_json as as_json
+from .write import save_table as save_table
 from .write import write_report as write_report

@@ -1,34 +1,5 @@
 """Readers and writers of measurement files, and the treatment of missing values."""
 
-from .csv_reader import read_csv
-from .csv_writer import write_csv
-from .data_frames import from_pandas, to_xarray
-from .downsampling import BlockMeans, Decimation
-from .follow import RowReader, follow_lines
-from .mapping import ColumnMapping
-from .missing_values import DropMissing, InterpolateMissing, MissingValues, RefuseMissing
-from .reader import read
-from .time_base import NoTime, RecordedTime, TimeBase, UniformTime
-from .writer import write
+from ...core.stubs import attach_stub
 
-__all__ = [
-    "BlockMeans",
-    "ColumnMapping",
-    "Decimation",
-    "DropMissing",
-    "InterpolateMissing",
-    "MissingValues",
-    "NoTime",
-    "RecordedTime",
-    "RefuseMissing",
-    "RowReader",
-    "TimeBase",
-    "UniformTime",
-    "follow_lines",
-    "from_pandas",
-    "read",
-    "read_csv",
-    "to_xarray",
-    "write",
-    "write_csv",
-]
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

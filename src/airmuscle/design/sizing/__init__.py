@@ -19,6 +19,7 @@ from .choice import (
 from .requirement import JointRequirement, LiftRequirement, SizingConditions
 from .scenario import scenario_text
 from .search import SizingResult, catalogue, choose, size_muscles
+from .sizing_chapter import choice_row
 from .static_muscle import EndPoint, StaticMuscle
 from .valve_sizing import discharge_valve, fill_valve
 
@@ -40,6 +41,7 @@ __all__ = [
     "by_length",
     "by_reserve",
     "catalogue",
+    "choice_row",
     "choose",
     "discharge_valve",
     "fill_valve",

@@ -18,7 +18,7 @@ tracking index of a run (`RootMeanSquareError` by default) and the objective ove
 objects; an objective may also be any function from `CaseMetrics` to the values (E,) of E sets of gains.
 """
 
-from .case import LoopCase
+from .case import LoopCase, with_gains
 from .objective import CaseMetrics, RobustObjective
 from .optimisation import tune
 from .perturbations import Perturbations, PerturbedFamily, perturbed_family
@@ -66,4 +66,5 @@ __all__ = [
     "step_experiment",
     "tune",
     "ultimate_point",
+    "with_gains",
 ]

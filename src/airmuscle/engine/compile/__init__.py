@@ -1,14 +1,8 @@
 """From a system over `ops` to machine code: trace, differentiate, print, compile. Nothing here solves anything.
 
-`program.prepared` holds the way in; it is not imported here, because it brings CasADi, which a description of a
-system does not need.
+Its names are imported on use, because compiling brings CasADi, which a description of a system does not need.
 """
 
-from ...core.system import SensitivitySystem, System
-from ...core.variables import StateVariable
+from ...core.stubs import attach_stub
 
-__all__ = [
-    "SensitivitySystem",
-    "StateVariable",
-    "System",
-]
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

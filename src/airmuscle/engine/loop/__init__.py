@@ -2,11 +2,11 @@
 
 from .control_law import ControlLaw
 from .control_loop import ControlLoop, ControlLoopState
-from .controller import Controller, Measurement
-from .driver import PWM, Driver, SolenoidDriver
+from .controller import Controller, Measurement, relative_unit
+from .driver import PWM, Driver, PwmState, SolenoidDriver
 from .inputs import ZERO_INPUT, InputSignal, Periodic, SampledSignal, Schedule
-from .law_design import LawDesign
-from .piecewise_linear import PiecewiseLinear
+from .law_design import LawDesign, designed_loop, with_designed_laws
+from .piecewise_linear import PiecewiseLinear, merge_columns
 from .sensors import ColumnSensor, WithSensors
 from .sigma_delta import SigmaDelta
 from .siso import SisoController
@@ -28,6 +28,7 @@ __all__ = [
     "Measurement",
     "Periodic",
     "PiecewiseLinear",
+    "PwmState",
     "SampledSignal",
     "Schedule",
     "SigmaDelta",
@@ -37,5 +38,9 @@ __all__ = [
     "Trajectory",
     "WithDrivers",
     "WithSensors",
+    "designed_loop",
+    "merge_columns",
+    "relative_unit",
     "spline_trajectory",
+    "with_designed_laws",
 ]

@@ -1,19 +1,24 @@
 """Runs: problems and their solutions, integrators, open and closed loop, forward sensitivities."""
 
+from .bound_integrator import BoundIntegrator
+from .compiled_law import LawSample
 from .integrators import DormandPrince8, ExplicitRungeKutta, Integrator, Rodas4, RungeKutta4
 from .jax_loop import loop_in_jax
 from .law_with_sensitivities import LawWithSensitivities
 from .loop_sensitivities import LoopWithSensitivities, TrackingSensitivity, differentiate_loop, tracking_sensitivity
 from .problem import Problem
 from .run import advance, simulate, solve
+from .sampled_loop import prepare_loop
 from .solution import Solution, Statistics
 from .stepper import Snapshot, Stepper
 from .with_sensitivities import WithSensitivities, sensitivity
 
 __all__ = [
+    "BoundIntegrator",
     "DormandPrince8",
     "ExplicitRungeKutta",
     "Integrator",
+    "LawSample",
     "LawWithSensitivities",
     "LoopWithSensitivities",
     "Problem",
@@ -28,6 +33,7 @@ __all__ = [
     "advance",
     "differentiate_loop",
     "loop_in_jax",
+    "prepare_loop",
     "sensitivity",
     "simulate",
     "solve",

@@ -1,8 +1,11 @@
+from .campaign import campaign_scenarios as campaign_scenarios
 from .identification import DynamicFitSetup as DynamicFitSetup
 from .identification import load_dynamic_fit as load_dynamic_fit
 from .prediction import PlantModel as PlantModel
 from .prediction import load_plant_model as load_plant_model
+from .scenario import TABLES as TABLES
 from .scenario import Scenario as Scenario
+from .scenario import build_scenario as build_scenario
 from .scenario import load_scenario as load_scenario
 from .schema import muscle_schema as muscle_schema
 from .schema import scenario_schema as scenario_schema

@@ -1,7 +1,5 @@
 """The command line `airmuscle`."""
 
-from .entry_point import main
+from ...core.stubs import attach_stub
 
-__all__ = [
-    "main",
-]
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

@@ -19,7 +19,7 @@ def main() -> None:
         os.environ.setdefault(name, "1")
     try:
         with deferred_sigint():
-            app = importlib.import_module(".app", __package__).app
+            app = importlib.import_module(".commands", __package__).app
             check_interrupted()
             app(prog_name="airmuscle")
     except KeyboardInterrupt:

@@ -1,5 +1,6 @@
 """Export of plants, laws and controllers as source text of other languages, as FMUs, and as MuJoCo plugins."""
 
+from .building import build_and_run
 from .controller import PRECISIONS, write_controller
 from .fmu import WrittenFmu, write_fmu
 from .identifiers import make_identifiers
@@ -16,6 +17,7 @@ __all__ = [
     "Octave",
     "Target",
     "WrittenFmu",
+    "build_and_run",
     "make_identifiers",
     "write_controller",
     "write_fmu",

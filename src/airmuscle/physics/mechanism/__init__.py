@@ -4,7 +4,7 @@ from .antagonistic_joint import AntagonisticJoint
 from .base import Coordinate, Mechanism
 from .contact import HuntCrossley
 from .end_stops import JointWithEndStops, WithEndStops
-from .external_load import ExternalLoad
+from .external_load import SHORTENING, SHORTENING_SPEED, ExternalLoad
 from .external_torque import JointWithExternalTorque
 from .hanging_mass import HangingMass
 from .isometric import Isometric
@@ -22,6 +22,8 @@ from .spring_load import SpringLoad
 from .wrapper import MechanismWrapper
 
 __all__ = [
+    "SHORTENING",
+    "SHORTENING_SPEED",
     "AntagonisticJoint",
     "ArmLink",
     "ConstantRadius",

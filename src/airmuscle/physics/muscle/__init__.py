@@ -2,6 +2,8 @@
 
 from .creep import CreepElements
 from .damper import Damper, DirectionalDamper, LinearDamper, PressureDamper
+from .display import parameter_rows
+from .isobars import compute_isobars
 from .muscle import INNER_CONTRACTION, Muscle
 from .ratings import RatedRange, Ratings
 from .reynolds2003 import Reynolds2003Damper, Reynolds2003Spring
@@ -40,4 +42,6 @@ __all__ = [
     "SwellingWall",
     "ViscoelasticWall",
     "Wall",
+    "compute_isobars",
+    "parameter_rows",
 ]

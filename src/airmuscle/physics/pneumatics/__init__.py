@@ -9,6 +9,7 @@ from .fill_discharge import ClosedChamber, FillDischarge, ThreePositionValve, am
 from .flow import orifice_flow
 from .gas import (
     GAS_CONSTANT,
+    NO_FLOW,
     REFERENCE_DENSITY,
     REFERENCE_TEMPERATURE,
     Air,
@@ -32,11 +33,13 @@ from .tube import Tube, TubeOrifice
 from .tube_model import TubeModel
 from .valve import Valve
 from .virial_gas import VirialGas, virial_coefficient_of_air
-from .wall_heat_transfer import WallHeatTransfer
+from .wall_heat_transfer import DEFAULT_GAS, WallHeatTransfer
 from .with_tubes import WithTubes
 
 __all__ = [
+    "DEFAULT_GAS",
     "GAS_CONSTANT",
+    "NO_FLOW",
     "REFERENCE_DENSITY",
     "REFERENCE_TEMPERATURE",
     "Air",

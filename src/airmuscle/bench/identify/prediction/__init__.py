@@ -1,7 +1,5 @@
 """Prediction of further records by an identified law or plant, with the stated 95 % band."""
 
-from .dynamic import PlantUncertainty, predict_dynamic
-from .result import QuantityPrediction, RecordPrediction
-from .static import predict_static
+from ....core.stubs import attach_stub
 
-__all__ = ["PlantUncertainty", "QuantityPrediction", "RecordPrediction", "predict_dynamic", "predict_static"]
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

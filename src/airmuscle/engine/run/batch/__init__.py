@@ -3,9 +3,11 @@
 from .precision import Double, Precision, Single
 from .run import simulate_batch
 from .solution import BatchSolution
+from .stepper import BatchStepper
 
 __all__ = [
     "BatchSolution",
+    "BatchStepper",
     "Double",
     "Precision",
     "Single",

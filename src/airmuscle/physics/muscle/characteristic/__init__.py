@@ -1,12 +1,13 @@
 """Static characteristics: relations between gauge pressure, contraction and tension; one class per paper."""
 
 from .base import Characteristic, ContractionLaw, ForceLaw, PressureLaw
-from .borzikova import BorzikovaDirect, BorzikovaExponential
+from .borzikova import SAM_30X290, BorzikovaDirect, BorzikovaExponential
 from .chou_hannaford1996 import ChouHannaford1996
 from .circle_virtual_work import CircleVirtualWork
 from .clamped import Clamped
-from .contractile_surface import ContractileSurface
+from .contractile_surface import ContractileSurface, exponents
 from .effective_length import EffectiveLength
+from .energy_defect import maxwell_defect
 from .exact_meridian import ExactMeridian
 from .hunt2017 import Hunt2017
 from .length_family import InverseLength, LogarithmicLength
@@ -15,7 +16,7 @@ from .polynomial_surrogate import PolynomialSurrogate, as_force_law
 from .pooled_length_law import PooledLengthLaw
 from .reynolds2003 import Reynolds2003
 from .rubber import ArcIntegral, AxialIntegral, RubberLine
-from .saga2007 import Saga2007
+from .saga2007 import LINE_A, LINE_B, Saga2007
 from .sarosi2012 import Sarosi2012
 from .serres2009 import Serres2009
 from .tabulated import Tabulated
@@ -24,6 +25,9 @@ from .validity_range import ValidityRange
 from .virtual_work import VirtualWork
 
 __all__ = [
+    "LINE_A",
+    "LINE_B",
+    "SAM_30X290",
     "ArcIntegral",
     "AxialIntegral",
     "BorzikovaDirect",
@@ -54,4 +58,6 @@ __all__ = [
     "ValidityRange",
     "VirtualWork",
     "as_force_law",
+    "exponents",
+    "maxwell_defect",
 ]

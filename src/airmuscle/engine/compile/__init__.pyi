@@ -1,0 +1,8 @@
+from ...core.system import SensitivitySystem as SensitivitySystem
+from ...core.system import System as System
+from ...core.variables import StateVariable as StateVariable
+from .function import Function as Function
+from .functions import Printer as Printer
+from .jacobians import derivatives as derivatives
+from .program import Program as Program
+from .program import compile_system as compile_system
