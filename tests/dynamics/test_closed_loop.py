@@ -38,8 +38,7 @@ from airmuscle.engine import (
     solve,
 )
 from airmuscle.engine.compile.program import Description
-from airmuscle.engine.run import compiled_loop
-from airmuscle.engine.run.bound_integrator import BoundIntegrator
+from airmuscle.engine.run import BoundIntegrator, compiled_loop
 from airmuscle.errors import ParameterError, SimulationError
 from airmuscle.physics import (
     FillDischarge,

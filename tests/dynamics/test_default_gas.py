@@ -85,6 +85,7 @@ def test_a_larger_muscle_cools_more_slowly_in_proportion_to_its_diameter():
 def test_all_runs_that_state_no_gas_have_one_default():
     assert vessel(1e-4).gas is DEFAULT_GAS
     assert WallHeatTransfer(25.0) == DEFAULT_GAS
-    plants = [am.load(name).plant for name in list_plants()]
+    vessels = {"vessel-smc-itv2050"}  # rigid, and stated to be isothermal
+    plants = [am.load(name).plant for name in list_plants() if name not in vessels]
     plants += [task[0].plant for task in (joint_task(), lift_task(), arm_task())]
     assert {plant.gas for plant in plants} == {DEFAULT_GAS}

@@ -12,13 +12,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from airmuscle.outlets.cli.app import app
 from typer.testing import CliRunner
 
 import airmuscle as am
 from airmuscle.engine import Rodas4
 from airmuscle.errors import ColumnError, IdentificationError, ParameterError
 from airmuscle.files import load_scenario
+from airmuscle.outlets.cli import app
 from airmuscle.physics import Isothermal, Manifold, SharedSupply, Supply, Tank, Valve, WithEnergyMeters
 from airmuscle.recording import Recording
 

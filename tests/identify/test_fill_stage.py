@@ -13,7 +13,15 @@ import pytest
 from widths import widened
 
 from airmuscle import load
-from airmuscle.bench import Experiment, FillStage, InitialConditions, classify_records, fit_dynamic, stated_ambient
+from airmuscle.bench import (
+    Experiment,
+    FillStage,
+    InitialConditions,
+    RecordKind,
+    classify_records,
+    fit_dynamic,
+    stated_ambient,
+)
 from airmuscle.bench.identify.campaign import stage_result
 from airmuscle.bench.identify.campaign.fill_stage import fit_fill_stage
 from airmuscle.bench.identify.campaign.release_stage import fit_release_stage
@@ -194,10 +202,18 @@ def test_what_a_record_does_not_state_is_that_of_the_default():
     assert stated_ambient(warm, Ambient(9e4)) == Ambient(9e4, 300.0)
 
 
-def test_a_partial_discharge_that_is_no_detected_step_is_reported_as_a_misfit():
+def test_a_partial_discharge_is_left_out_by_name_and_the_fill_before_it_is_used():
     partial = {"fill": ((0.5, 1.0), (3.2, 0.0)), "discharge": ((3.2, 1.0), (3.3, 0.0))}
-    stage = stage_of([record(c, partial, i) for i, c in enumerate(CONTRACTIONS[:2])])
-    assert [len(each.steps) for each in stage.records] == [1, 1]
+    fill, left_out = classify_records([record(CONTRACTIONS[0], partial, 0)])
+    assert (fill.kind, len(fill.steps)) == (RecordKind.FILL, 1)
+    assert left_out.kind is RecordKind.UNUSED
+    assert "1 of 2 pressure steps at a held length end between" in left_out.reason
+
+
+def test_records_that_the_model_does_not_follow_are_reported_as_a_misfit():
+    """The valve closes to a third while the muscle fills; the model has one conductance."""
+    throttled = {"fill": ((0.5, 1.0), (0.7, 0.3), (3.2, 0.0)), "discharge": ((3.2, 1.0),)}
+    stage = stage_of([record(c, throttled, i) for i, c in enumerate(CONTRACTIONS[:2])])
     assert "times the noise of the pressure sensor" in stage.misfit
     assert stage.misfit in stage.verdict
     assert stage.misfit in stage_result(stage)

@@ -50,7 +50,7 @@ def test_another_shell_is_refused_with_those_that_are_supported():
 
 
 def test_commands_options_and_names_of_the_library_are_completed(monkeypatch: pytest.MonkeyPatch):
-    assert {"fit", "fit-dynamic", "fit-volume"} == set(completed("airmuscle fit", monkeypatch))
+    assert {"fit", "fit-dynamic", "fit-regulator", "fit-volume"} == set(completed("airmuscle fit", monkeypatch))
     assert "--pressure" in completed("airmuscle solve --pre", monkeypatch)
     assert completed("airmuscle show matr", monkeypatch) == ["matrix-821"]
     assert completed("airmuscle simulate arm", monkeypatch) == ["arm-lilly-quesada"]
@@ -81,7 +81,7 @@ def test_everything_that_is_listed_can_be_loaded_in_upper_case():
         ("dsmp-20-300", "Did you mean 'dmsp-20-300'"),
         ("sy5000", "Did you mean 'smc-sy5000'"),
         ("the lilly arm", "Did you mean 'arm-lilly-quesada'"),
-        ("zzz", r"tondu-lopez\.$"),
+        ("zzz", r"vessel-smc-itv2050\.$"),
     ],
 )
 def test_near_misses_are_suggested(name: str, said: str):

@@ -44,7 +44,7 @@ HEADINGS = "Zeit;Druck (rel.);Kraft;Weg;Bemerkung"
 UNITS = "s;bar;N;mm;"
 ROWS = ("0,00;2,0;120,5;0,0;Start", "0,05;2,0;118,2;0,5;", "0,10;2,1;116,0;1,0;Öl", "0,15;2,0;113,9;1,5;")
 SHORTENING = {"Weg": "shortening [mm]"}
-READING = ("inspect", "fit", "hysteresis", "campaign", "fit-volume", "predict", "convert-data")
+READING = ("inspect", "fit", "hysteresis", "campaign", "fit-volume", "predict", "convert-data", "fit-regulator")
 OPTIONS = (
     "--resting-length", "--ambient", "--unit", "--mapping", "--column", "--constant", "--file-name", "--time",
     "--displacement-zero", "--skip-rows", "--missing", "--missing-code", "--outliers", "--delimiter", "--decimal",

@@ -14,7 +14,6 @@ from .cross_validation import LevelSplit as LevelSplit
 from .cross_validation import RunSplit as RunSplit
 from .cross_validation import SpecimenSplit as SpecimenSplit
 from .experiment_design import BenchLimits as BenchLimits
-from .experiment_design import PlannedRun as PlannedRun
 from .joint_selection import JointSelection as JointSelection
 from .joint_selection import select_for_both as select_for_both
 from .length_errors import LengthError as LengthError

@@ -10,7 +10,6 @@ from .experiment import InitialValue as InitialValue
 from .experiment import StartTime as StartTime
 from .fit import fit_dynamic as fit_dynamic
 from .initial_conditions import InitialConditions as InitialConditions
-from .profile import DynamicProfile as DynamicProfile
 from .record_ranking import RecordRanking as RecordRanking
 from .record_ranking import rank_records as rank_records
 from .regulator_fit import RegulatorFit as RegulatorFit
