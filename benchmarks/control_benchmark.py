@@ -22,7 +22,7 @@ from control_page import FORWARD, ON_OFF, page
 
 from airmuscle.design import (
     BenchmarkJoint,
-    compare_controllers,
+    benchmark_controllers,
     find_tasks,
     inverse_dynamics,
     learn,
@@ -71,7 +71,7 @@ def measure_part(kind: str, name: str, budget: int, seed: int) -> dict[str, Any]
     """The results of one contender, and for feed-forward and PID those of learning."""
     joint, started = JOINTS[kind](), time.process_time()
     (contender,) = (each for each in standard_contenders(joint) if each.name == name)
-    result = compare_controllers(joint, [contender], budget=budget, seed=seed)
+    result = benchmark_controllers(joint, [contender], budget=budget, seed=seed)
     found = _plain(result)
     if kind == "proportional" and name == FORWARD:
         curve = learn(joint, result.contenders[0], find_tasks(("sine 2 Hz",))[0], trials=31, seed=seed)

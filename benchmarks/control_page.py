@@ -252,8 +252,8 @@ def page(results: Mapping[str, Any]) -> str:
         "# Results of the control benchmark", "",
         f"Results of `benchmarks/control_benchmark.py --budget {results['budget']} --seed {results['seed']}` on "
         f"{datetime.date.today()}, Python {platform.python_version()}. All figures are simulations. "
-        "[Comparison of controllers](../docs/compare.md) describes joint, truth, tasks and metrics; their numbers are "
-        "chosen.", "", f"{HISTORY} {cost(results)}", "",
+        "[Comparison of controllers](../docs/benchmark.md) describes joint, truth, tasks and metrics; their numbers "
+        "are chosen.", "", f"{HISTORY} {cost(results)}", "",
         "## Targets", "",
         f"Valves: {data['valve']}; for on/off valves: {switched['valve']}. rms errors of the last two periods.", "",
         *target_rows(results),

@@ -29,7 +29,7 @@ REASON = (
     "import of NumPy (0.1 s), declaration of the models (0.1 s), import of CasADi and LLVM, compilation of the plant "
     "(0.15 s)"
 )
-SOLVE = ["solve", "chou-hannaford", "--pressure", "3 bar", "--force", "100 N"]
+EVALUATE = ["evaluate", "chou-hannaford", "--pressure", "3 bar", "--force", "100 N"]
 
 
 def program() -> list[str]:
@@ -51,7 +51,7 @@ def section(rounds: int = 7, cold_rounds: int = 3) -> Section:
         "import airmuscle": lambda: run_python(["-c", "import airmuscle"]),
         "import airmuscle, simulate 25 s, warm": lambda: run_python(["-c", SIMULATE]),
         "airmuscle list": lambda: run_python([*program(), "list"]),
-        f"airmuscle {' '.join(SOLVE)}": lambda: run_python([*program(), *SOLVE]),
+        f"airmuscle {' '.join(EVALUATE)}": lambda: run_python([*program(), *EVALUATE]),
     }
     times = time_variants(variants, rounds)
     times |= time_variants({"import airmuscle, simulate 25 s, cold": simulate_cold}, cold_rounds)
@@ -59,7 +59,7 @@ def section(rounds: int = 7, cold_rounds: int = 3) -> Section:
     targets = (
         Target("first result, library, warm", library, 0.7, "s", reason=REASON),
         Target("first result, `airmuscle list`", listing, 1.0, "s"),
-        Target("first result, `airmuscle solve`", solving, 1.0, "s"),
+        Target("first result, `airmuscle evaluate`", solving, 1.0, "s"),
         Target("first result, library, cold", compiling, 5.0, "s"),
     )
     rows = tuple((name, format_time(t.median), format_time(t.minimum)) for name, t in times.items())

@@ -4,7 +4,7 @@ python examples/A10_own_controller.py        writes own_controller.png to the wo
 
 A controller is a class with two members: `initial_memory`, the values that it keeps from one sample to the next, and
 `step`, its commands. It is tuned as the controllers of the package are, for perturbed models, and judged on a plant
-that is not its model. The small budget makes the example fast; `airmuscle compare` uses more.
+that is not its model. The small budget makes the example fast; `airmuscle benchmark` uses more.
 """
 
 from typing import ClassVar
@@ -12,7 +12,7 @@ from typing import ClassVar
 from airmuscle.core import model, ops, parameter, plotting
 from airmuscle.design import (
     Contender,
-    compare_controllers,
+    benchmark_controllers,
     find_tasks,
     proportional_joint,
     run_plot,
@@ -62,7 +62,7 @@ mine = Contender(
 joint = proportional_joint()
 others = [each for each in standard_contenders(joint) if each.name == "feed-forward + PID"]
 tasks = find_tasks(("sine 1 Hz",))
-result = compare_controllers(joint, (*others, mine), tasks, budget=112, seed=1)
+result = benchmark_controllers(joint, (*others, mine), tasks, budget=112, seed=1)
 
 print(f"valves: {joint.valve}")
 for name, score in result.scores().items():

@@ -29,9 +29,9 @@ STARTS = {
         SIMULATION.replace("METHOD", "am.RungeKutta4(1e-3)"),
         {*HEAVY, "airmuscle.bench.identify"},
     ),
-    "airmuscle solve": (
+    "airmuscle evaluate": (
         "from airmuscle.outlets.cli import app\n"
-        "app(['solve', 'chou-hannaford', '--pressure', '3 bar', '--force', '100 N'], standalone_mode=False)",
+        "app(['evaluate', 'chou-hannaford', '--pressure', '3 bar', '--force', '100 N'], standalone_mode=False)",
         (HEAVY | {"llvmlite", "airmuscle.bench.identify"}) - {"typer", "rich"},
     ),
 }

@@ -13,7 +13,7 @@ import pytest
 from benchmark_contender import JOINT, MINE, SHORT
 from called_controller import Called
 
-from airmuscle.design import Contender, StuckValve, compare_controllers, standard_contenders
+from airmuscle.design import Contender, StuckValve, benchmark_controllers, standard_contenders
 from airmuscle.design.control_benchmark.called_contender import Readings
 from airmuscle.design.control_benchmark.commissioning import identify_gains, tracking_error
 from airmuscle.design.control_benchmark.contenders import complete
@@ -25,13 +25,13 @@ from airmuscle.errors import ParameterError
 def test_a_controller_that_is_called_meets_the_same_sensors_and_the_same_actuation():
     """The same law, called from Python at each sample: the same run, also with a valve that sticks."""
     called = Contender("called", Called(MINE.law))
-    again = compare_controllers(JOINT, [called], [SHORT], budget=10)
+    again = benchmark_controllers(JOINT, [called], [SHORT], budget=10)
     assert again.contenders[0].tuning is None
     found = again.metric("called", "short sine", "rmse")
-    mine = compare_controllers(JOINT, [MINE], [SHORT], budget=0)
+    mine = benchmark_controllers(JOINT, [MINE], [SHORT], budget=0)
     assert found == pytest.approx(mine.metric("mine", "short sine", "rmse"), rel=1e-3)
     stuck = replace(SHORT, name="stuck", stuck=StuckValve("left.discharge", 0.4, 0.1))
-    record = compare_controllers(JOINT, [called], [stuck], budget=0).runs["called", "stuck"].recording
+    record = benchmark_controllers(JOINT, [called], [stuck], budget=0).runs["called", "stuck"].recording
     assert np.unique(record["left.discharge"][record["time"] > 0.401]) == pytest.approx([0.1])
     with pytest.raises(
         ParameterError, match=r"Called has no declared parameter 'gain' to be tuned; there are inner\.gain"

@@ -25,7 +25,7 @@ from airmuscle.design import (
     StepMotion,
     StuckValve,
     SumOfMotions,
-    compare_controllers,
+    benchmark_controllers,
     find_tasks,
     learn,
     on_off_joint,
@@ -50,7 +50,7 @@ def chosen(*names):
 @pytest.fixture(scope="module")
 def result():
     contenders = (*chosen("PID", "feed-forward + PID"), MINE)
-    return compare_controllers(JOINT, contenders, (SHORT, STEP), budget=0)
+    return benchmark_controllers(JOINT, contenders, (SHORT, STEP), budget=0)
 
 
 # The truth
@@ -203,14 +203,14 @@ def test_the_score_is_the_geometric_mean_of_the_ratios(result):
 
 
 def test_equal_seeds_give_equal_runs_and_other_seeds_other_noise(result):
-    again, other = (compare_controllers(JOINT, [MINE], [SHORT], budget=0, seed=seed) for seed in (1, 2))
+    again, other = (benchmark_controllers(JOINT, [MINE], [SHORT], budget=0, seed=seed) for seed in (1, 2))
     assert again.runs["mine", "short sine"].metrics == result.runs["mine", "short sine"].metrics
     assert other.runs["mine", "short sine"].metrics != result.runs["mine", "short sine"].metrics
 
 
 def test_tuning_uses_the_family_and_improves_the_objective():
     narrow = replace(JOINT, family={"nominal": JOINT.model})
-    found = compare_controllers(narrow, [MINE], [SHORT], budget=32)
+    found = benchmark_controllers(narrow, [MINE], [SHORT], budget=32)
     (tuned,) = found.contenders
     assert tuned.tuning.simulated_loops <= 32
     assert tuned.tuning.objective <= tuned.tuning.present_objective
@@ -221,7 +221,7 @@ def test_tuning_uses_the_family_and_improves_the_objective():
 
 def test_a_stuck_valve_ignores_its_command():
     task = replace(SHORT, name="stuck", stuck=StuckValve("left.discharge", 0.4, 0.1))
-    record = compare_controllers(JOINT, [MINE], [task], budget=0).runs["mine", "stuck"].recording
+    record = benchmark_controllers(JOINT, [MINE], [task], budget=0).runs["mine", "stuck"].recording
     opening, time = record["left.discharge"], record["time"]
     assert np.unique(opening[time > 0.401]) == pytest.approx([0.1])
     assert np.unique(opening[time < 0.399]).size > 10
@@ -230,7 +230,7 @@ def test_a_stuck_valve_ignores_its_command():
 def test_a_torque_disturbs_the_joint():
     torque = ((0.0, 0.0), (0.2, 0.0), (0.21, 3.0))
     task = ControlTask("push", MinimumJerkMotion(1e-9, 0.0, 0.1), 0.6, begin=0.3, event=0.2, torque=torque)
-    run = compare_controllers(JOINT, [MINE], [task], budget=0).runs["mine", "push"]
+    run = benchmark_controllers(JOINT, [MINE], [task], budget=0).runs["mine", "push"]
     assert run.recording["angle"][-1] > 1 * DEGREE
     assert math.isnan(run.metrics.overshoot)
 
@@ -249,9 +249,9 @@ def test_learning_reduces_the_error_from_trial_to_trial(result):
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: compare_controllers(JOINT, [], [SHORT]), "there is no contender"),
-        (lambda: compare_controllers(JOINT, [MINE, MINE], [SHORT]), "two contenders are named 'mine'"),
-        (lambda: compare_controllers(JOINT, [MINE], []), "there is no task"),
+        (lambda: benchmark_controllers(JOINT, [], [SHORT]), "there is no contender"),
+        (lambda: benchmark_controllers(JOINT, [MINE, MINE], [SHORT]), "two contenders are named 'mine'"),
+        (lambda: benchmark_controllers(JOINT, [MINE], []), "there is no task"),
         (lambda: Contender("mine", 3), "its law is a int"),
         (lambda: find_tasks(("sine 1Hz",)), "no task 'sine 1Hz'.*Did you mean 'sine 1 Hz'"),
         (lambda: ControlTask("t", SHORT.motion, math.nan), "duration is nan"),
@@ -276,7 +276,7 @@ def test_impossible_benchmarks_are_rejected(call, message):
 def test_a_law_that_does_not_suit_the_joint_is_rejected(change, message):
     law = model(type("Other", (AngleLaw,), {"__annotations__": {}, **change}))(2e5)
     with pytest.raises(ParameterError, match=message):
-        compare_controllers(JOINT, [Contender("other", law)], [SHORT], budget=0)
+        benchmark_controllers(JOINT, [Contender("other", law)], [SHORT], budget=0)
 
 
 def test_learning_needs_a_feed_forward_signal(result):

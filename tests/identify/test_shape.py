@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from airmuscle.bench import convert, find_shape_violations, fit, fit_shape_constrained
+from airmuscle.bench import approximate, find_shape_violations, fit, fit_shape_constrained
 from airmuscle.bench.identify.candidates import blank_surface
 from airmuscle.bench.identify.surface.shape import FALLS_WITH_PRESSURE, RISES_WITH_CONTRACTION, shape_constraints
 from airmuscle.errors import IdentificationError, SolveError
@@ -96,13 +96,13 @@ def test_the_place_of_a_break_is_named():
 
 def test_a_conversion_finds_the_same_law_in_another_form():
     """F = p (A eps^2 + B eps + C) is a surface of degree three, exactly."""
-    found = convert(MUSCLE, blank_surface(3), BOX)
+    found = approximate(MUSCLE, blank_surface(3), BOX)
     assert found.rmse < 1e-9
-    assert convert(found.model, TonduLopez2000(Braid(0.012, 0.4, 0.3), 1.0), BOX).rmse < 1e-6
+    assert approximate(found.model, TonduLopez2000(Braid(0.012, 0.4, 0.3), 1.0), BOX).rmse < 1e-6
 
 
 def test_a_conversion_says_how_far_it_is_off():
-    found = convert(MUSCLE, blank_surface(1), BOX)
+    found = approximate(MUSCLE, blank_surface(1), BOX)
     grid = np.meshgrid(np.linspace(*BOX.pressure, 300), np.linspace(*BOX.contraction, 300))
     difference = found.model.force(*grid) - MUSCLE.force(*grid)
     assert np.abs(found.max_error) == pytest.approx(np.abs(difference).max(), rel=0.02)
@@ -114,4 +114,4 @@ def test_a_conversion_says_how_far_it_is_off():
     assert found.model.force(*at) - MUSCLE.force(*at) == pytest.approx(found.max_error, rel=1e-9)
     assert f"{found.max_error:.4g} N" in str(found)
     with pytest.raises(SolveError, match="gives no positive force on the validity range"):
-        convert(MUSCLE, blank_surface(1), ValidityRange(1e5, 6e5, 0.5, 0.55))
+        approximate(MUSCLE, blank_surface(1), ValidityRange(1e5, 6e5, 0.5, 0.55))

@@ -175,7 +175,7 @@ def test_a_data_set_is_known_by_a_unique_beginning_and_brings_its_units(tmp_path
     ],
 )  # fmt: skip
 def test_a_request_that_no_muscle_can_meet(tmp_path: Path, given: tuple[str, ...], message: str):
-    said = refused(tmp_path, "solve", MUSCLE, *given, "--out", tmp_path / "chart")
+    said = refused(tmp_path, "evaluate", MUSCLE, *given, "--out", tmp_path / "chart")
     assert re.search(message, said), said
 
 
@@ -189,7 +189,7 @@ def test_every_entry_answers_or_refuses_in_one_line(name: str):
         ("--force=1e9 N", "--contraction=0.1"),
     )
     for given in (*beyond, ("--pressure=3 bar", "--contraction=0.95"), ("--pressure=9 MPa", "--force=100 N")):
-        result = CliRunner().invoke(app, ["solve", name, *given, "--json"])
+        result = CliRunner().invoke(app, ["evaluate", name, *given, "--json"])
         assert isinstance(result.exception, SystemExit | None), given
         others = [line for line in result.stderr.splitlines() if not line.startswith("warning: ")]
         assert len(others) == result.exit_code, others
@@ -208,7 +208,7 @@ def test_without_pressure_a_closed_form_bears_no_load(name: str):
 
 
 def test_an_answer_that_no_muscle_can_be_is_refused(tmp_path: Path):
-    said = refused(tmp_path, "solve", "borzikova-direct-repaired", "--pressure=9 MPa", "--force=100 N")
+    said = refused(tmp_path, "evaluate", "borzikova-direct-repaired", "--pressure=9 MPa", "--force=100 N")
     assert re.search(
         r"the solution 9000 kPa, 328\.\d+ %, 100 N is not physical.*nearer to the validity range of the", said
     )

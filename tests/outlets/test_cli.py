@@ -78,8 +78,8 @@ def assert_failed(result: Result, message: str) -> None:
 # Help and usage
 
 NAMES = (
-    "reproduce", "list", "show", "cite", "solve", "inspect", "fit", "convert", "convert-data", "hysteresis",
-    "fit-dynamic", "fit-regulator", "campaign", "predict", "fit-volume", "plan", "bench", "size", "simulate", "sweep", "tune", "compare", "export",
+    "reproduce", "list", "show", "cite", "evaluate", "inspect", "fit", "approximate", "convert", "hysteresis",
+    "fit-dynamic", "fit-regulator", "campaign", "predict", "fit-volume", "plan", "fit-live", "size", "simulate", "study", "tune", "benchmark", "export",
     "studio", "schema",
 )  # fmt: skip
 
@@ -111,17 +111,17 @@ def test_a_command_module_is_imported_only_when_it_is_called(arguments: list[str
 
 
 def test_an_unknown_command_names_the_nearest_one():
-    assert "No such command 'sovle'. Did you mean 'solve'?" in airmuscle("sovle").stderr
+    assert "No such command 'evalute'. Did you mean 'evaluate'?" in airmuscle("evalute").stderr
 
 
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("sovle",),
-        ("solve",),
-        ("solve", MUSCLE, "--presure", "3 bar"),
-        ("solve", MUSCLE, "--pressure", "3 bar"),
-        ("solve", MUSCLE, "--pressure", "3 bar", "--force", "1 N", "--contraction", "0.1"),
+        ("evalute",),
+        ("evaluate",),
+        ("evaluate", MUSCLE, "--presure", "3 bar"),
+        ("evaluate", MUSCLE, "--pressure", "3 bar"),
+        ("evaluate", MUSCLE, "--pressure", "3 bar", "--force", "1 N", "--contraction", "0.1"),
         ("fit", "bench.csv"),
         ("fit", "bench.csv", "--characteristic", "ContractileSurface", "--unit", "bar"),
         ("fit", "bench.csv", "--characteristic", "ContractileSurface", "--degree", "0"),
@@ -238,7 +238,7 @@ def test_any_two_give_the_third(wanted: str):
         "force": f"{point['force'] / 1e3!r} kN",
     }
     given = [f"--{name}={text}" for name, text in texts.items() if name != wanted]
-    solved = json.loads(airmuscle("solve", MUSCLE, *given, "--json").output)
+    solved = json.loads(airmuscle("evaluate", MUSCLE, *given, "--json").output)
     assert solved["solved"] == wanted
     assert {name: solved[name] for name in point} == pytest.approx(point, rel=1e-9)
     assert solved["inside_validity_range"] is True
@@ -247,20 +247,22 @@ def test_any_two_give_the_third(wanted: str):
 
 def test_plain_bar_is_gauge_and_bara_is_absolute():
     gauge, absolute = (
-        json.loads(airmuscle("solve", MUSCLE, "--pressure", text, "--contraction", "0.1", "--json").output)["pressure"]
+        json.loads(airmuscle("evaluate", MUSCLE, "--pressure", text, "--contraction", "0.1", "--json").output)[
+            "pressure"
+        ]
         for text in ("3 bar", "3 bara")
     )
     assert (gauge, absolute) == (3e5, 3e5 - 101_325.0)
     assert re.search(
-        r"pressure +300 kPa +gauge", airmuscle("solve", MUSCLE, "--pressure=3 bar", "--contraction=.1").output
+        r"pressure +300 kPa +gauge", airmuscle("evaluate", MUSCLE, "--pressure=3 bar", "--contraction=.1").output
     )
 
 
 def test_the_chart_and_its_data_stand_in_the_folder(tmp_path: Path):
-    text = airmuscle("solve", MUSCLE, "--pressure=3.00125 bar", "--contraction=.1").output
+    text = airmuscle("evaluate", MUSCLE, "--pressure=3.00125 bar", "--contraction=.1").output
     assert "300.125 kPa" in text
     assert re.search(r"force +\d{3}(\.\d)? N +solved", text), text
-    result = airmuscle("solve", MUSCLE, "--pressure=3 bar", "--force=100 N", "--out", tmp_path / "chart")
+    result = airmuscle("evaluate", MUSCLE, "--pressure=3 bar", "--force=100 N", "--out", tmp_path / "chart")
     assert result.exit_code == 0
     assert sorted(path.name for path in (tmp_path / "chart").iterdir()) == ["isobars.csv", "isobars.png"]
     assert (tmp_path / "chart" / "isobars.png").read_bytes().startswith(b"\x89PNG")
@@ -286,7 +288,7 @@ def test_every_entry_has_a_chart(tmp_path: Path, name: str):
         else entry.characteristic.contraction(pressure, 100.0)
     )
     given = (f"--pressure={pressure} Pa", f"--contraction={contraction!r}")
-    result = airmuscle("solve", name, *given, "--out", tmp_path)
+    result = airmuscle("evaluate", name, *given, "--out", tmp_path)
     assert result.exit_code == 0, result.stderr
     with (tmp_path / "isobars.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
@@ -298,7 +300,7 @@ def test_every_entry_has_a_chart(tmp_path: Path, name: str):
 
 def test_a_point_outside_the_data_is_a_warning():
     inside, outside = (
-        airmuscle("solve", "tondu-lopez", f"--pressure={p} kPa", "--contraction=0.1", "--json") for p in (300, 750)
+        airmuscle("evaluate", "tondu-lopez", f"--pressure={p} kPa", "--contraction=0.1", "--json") for p in (300, 750)
     )
     assert inside.stderr == ""
     assert re.match(r"warning: the operating point is outside the validity range .*50 to 600 kPa", outside.stderr)
@@ -318,7 +320,7 @@ def test_a_point_outside_the_data_is_a_warning():
     ],
 )
 def test_a_request_without_an_answer_says_why_and_writes_nothing(tmp_path: Path, given: tuple[str, ...], message: str):
-    assert_failed(airmuscle("solve", MUSCLE, *given, "--out", tmp_path / "chart"), message)
+    assert_failed(airmuscle("evaluate", MUSCLE, *given, "--out", tmp_path / "chart"), message)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -351,7 +353,7 @@ def test_fit_finds_the_muscle_that_made_the_data_and_writes_it(tmp_path: Path):
     assert entry.validity_range.pressure == pytest.approx((1e5, 5e5))
     written = {p.relative_to(tmp_path / "fit").as_posix() for p in (tmp_path / "fit").rglob("*") if p.is_file()}
     assert {"report.html", "muscle.toml", "figures/isobars.svg", "figures/errors.png", "data/rows.csv"} <= written
-    solved = airmuscle("solve", tmp_path / "fit" / "muscle.toml", "--pressure=3 bar", "--contraction=0.1", "--json")
+    solved = airmuscle("evaluate", tmp_path / "fit" / "muscle.toml", "--pressure=3 bar", "--contraction=0.1", "--json")
     assert json.loads(solved.stdout)["force"] == pytest.approx(float(known.force(3e5, 0.1)))
 
 
@@ -555,16 +557,16 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path):
 
 
 def test_a_process_ends_with_the_documented_exit_codes():
-    well = shell("solve", MUSCLE, "--pressure", "3 bar", "--force", "100 N", "--json")
+    well = shell("evaluate", MUSCLE, "--pressure", "3 bar", "--force", "100 N", "--json")
     assert (well.returncode, well.stderr) == (0, "")
     assert json.loads(well.stdout)["solved"] == "contraction"
     failed = shell("show", "no-such-muscle")
     assert (failed.returncode, failed.stdout) == (1, "")
     assert failed.stderr.startswith("error: no library entry 'no-such-muscle'")
     assert "Traceback" not in failed.stderr
-    wrong = shell("solve")
+    wrong = shell("evaluate")
     assert wrong.returncode == 2
-    assert "Usage: airmuscle solve" in wrong.stderr
+    assert "Usage: airmuscle evaluate" in wrong.stderr
 
 
 def test_list_starts_without_what_it_does_not_need():
@@ -618,7 +620,7 @@ class SlowFinder(importlib.abc.MetaPathFinder):
 MODULE, KIND = sys.argv[1:]
 sys.meta_path.insert(0, SlowFinder())
 signal.signal(signal.SIGINT, signal.default_int_handler)  # it is ignored where the tests run in the background
-sys.argv[1:] = ["solve", "dmsp-20", "--pressure", "3 bar", "--force", "100 N"]
+sys.argv[1:] = ["evaluate", "dmsp-20", "--pressure", "3 bar", "--force", "100 N"]
 main()
 """
 
@@ -629,7 +631,7 @@ main()
     [
         pytest.param(module, kind, marks=[] if (i - k) % 4 == 0 else pytest.mark.slow)
         for i, module in enumerate(
-            ("typer", "airmuscle.outlets.cli.commands", "airmuscle.outlets.cli.solve", "rich.table")
+            ("typer", "airmuscle.outlets.cli.commands", "airmuscle.outlets.cli.evaluate", "rich.table")
         )
         for k, kind in enumerate(("module", "extension", "exception discarded", "discarded by a destructor"))
     ],
@@ -684,7 +686,7 @@ def assert_printable(text: str) -> None:
 @pytest.mark.parametrize(
     ("command", "suffix"),
     [("fit --characteristic ContractileSurface", "csv"), ("inspect", "csv"), ("inspect", "txt"), ("hysteresis", "tdms"),
-     ("show", "toml"), ("simulate", "toml"), ("sweep", "toml"), ("tune", "toml"), ("fit-dynamic", "toml")],
+     ("show", "toml"), ("simulate", "toml"), ("study", "toml"), ("tune", "toml"), ("fit-dynamic", "toml")],
 )  # fmt: skip
 @pytest.mark.parametrize(
     "content", [bytes(range(256)) * 8, b"\x1b[2J\x07 = \x1b]0;title\x07\n" * 20], ids=["all", "escapes"]

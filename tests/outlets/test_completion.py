@@ -50,8 +50,10 @@ def test_another_shell_is_refused_with_those_that_are_supported():
 
 
 def test_commands_options_and_names_of_the_library_are_completed(monkeypatch: pytest.MonkeyPatch):
-    assert {"fit", "fit-dynamic", "fit-regulator", "fit-volume"} == set(completed("airmuscle fit", monkeypatch))
-    assert "--pressure" in completed("airmuscle solve --pre", monkeypatch)
+    assert {"fit", "fit-dynamic", "fit-live", "fit-regulator", "fit-volume"} == set(
+        completed("airmuscle fit", monkeypatch)
+    )
+    assert "--pressure" in completed("airmuscle evaluate --pre", monkeypatch)
     assert completed("airmuscle show matr", monkeypatch) == ["matrix-821"]
     assert completed("airmuscle simulate arm", monkeypatch) == ["arm-lilly-quesada"]
     assert {"dmsp-20-300", "joint-dmsp-20-matrix"} <= set(completed("airmuscle predict ", monkeypatch))

@@ -442,7 +442,7 @@ def test_a_study_varies_the_numbers_of_a_controller(tmp_path: Path):
     found = [study.scenario(i) for i in range(4)]
     assert [s.problem.input.controller.gain for s in found] == pytest.approx([5e-6, 5e-6, 2e-5, 2e-5])
     assert [s.problem.input.setpoint.changes["pressure"][1][1] for s in found] == [1.5e5, 2e5, 1.5e5, 2e5]
-    done = CliRunner().invoke(app, ["sweep", str(tmp_path / "study.toml"), "--out", str(tmp_path / "out")])
+    done = CliRunner().invoke(app, ["study", str(tmp_path / "study.toml"), "--out", str(tmp_path / "out")])
     assert done.exit_code == 0, done.output
     (tmp_path / "study.toml").write_text(STUDY.replace("controller.gain", "controller.gian"), encoding="utf-8")
     with pytest.raises(AirmuscleError, match=r"input.controller.gian.*Did you mean 'input.controller.gain'"):

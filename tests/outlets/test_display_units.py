@@ -190,7 +190,7 @@ def test_the_axes_of_a_report_have_round_numbers_in_the_chosen_unit():
 
 def test_tables_of_the_command_line_are_in_the_chosen_units_and_json_in_si():
     display("bar", "mm")
-    point = ["solve", "dmsp-20-300", "--pressure", "300 kPa", "--force", "100 N"]
+    point = ["evaluate", "dmsp-20-300", "--pressure", "300 kPa", "--force", "100 N"]
     shown = CliRunner().invoke(app, point).stdout
     assert "3 bar" in shown
     assert "kPa" not in shown

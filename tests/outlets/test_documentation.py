@@ -175,10 +175,10 @@ def test_arguments_of_a_function_become_a_list():
 
 
 def test_indented_formulas_of_a_page_are_rendered_and_commands_are_not():
-    page = "Text\n\n    m x'' = F - m g,   F = k x\n\nText\n\n    airmuscle solve dmsp-20-300 --force = 3\n\nText\n"
+    page = "Text\n\n    m x'' = F - m g,   F = k x\n\nText\n\n    airmuscle evaluate dmsp-20-300 --force = 3\n\nText\n"
     text = site_text(page)
     assert text.count("```{math}") == 1
-    assert "    airmuscle solve" in text
+    assert "    airmuscle evaluate" in text
 
 
 def test_links_of_the_site_stay_within_it():

@@ -133,28 +133,28 @@ def airmuscle(*arguments):
 def test_the_command_converts_one_file_and_several(tmp_path):
     for k in range(2):
         write_csv(RUN, tmp_path / f"run{k}.csv")
-    done = airmuscle("convert-data", tmp_path / "run0.csv", tmp_path / "out.parquet")
+    done = airmuscle("convert", tmp_path / "run0.csv", tmp_path / "out.parquet")
     assert done.exit_code == 0, done.output
     assert "5 rows of time, pressure" in done.output
-    done = airmuscle("convert-data", tmp_path / "run*.csv", tmp_path / "all.h5", "--json")
+    done = airmuscle("convert", tmp_path / "run*.csv", tmp_path / "all.h5", "--json")
     assert done.exit_code == 0, done.output
     assert sorted(p.name for p in tmp_path.glob("all*")) == ["all_001.h5", "all_002.h5"]
-    done = airmuscle("convert-data", tmp_path / "run0.csv", tmp_path / "plain.csv", "--plain")
+    done = airmuscle("convert", tmp_path / "run0.csv", tmp_path / "plain.csv", "--plain")
     assert done.exit_code == 0, done.output
     assert (tmp_path / "plain.csv").read_text().startswith("time [s],")
-    assert airmuscle("convert-data", tmp_path / "run0.csv", tmp_path / "a.h5", "--plain").exit_code == 2
-    assert airmuscle("convert-data", tmp_path / "run0.csv", tmp_path / "a.xyz").exit_code == 1
+    assert airmuscle("convert", tmp_path / "run0.csv", tmp_path / "a.h5", "--plain").exit_code == 2
+    assert airmuscle("convert", tmp_path / "run0.csv", tmp_path / "a.xyz").exit_code == 1
     (tmp_path / "rounded.csv").write_text("time [s],length [mm]\n" + "".join(f"{i // 2},{290 - i}\n" for i in range(9)))
-    done = airmuscle("convert-data", tmp_path / "rounded.csv", tmp_path / "bare.csv")
+    done = airmuscle("convert", tmp_path / "rounded.csv", tmp_path / "bare.csv")
     assert "For stamps that the logger rounded, use --time uniform." in done.stderr
     options = ("--time", "uniform", "--resting-length", "300 mm")
-    done = airmuscle("convert-data", tmp_path / "rounded.csv", tmp_path / "bare.csv", *options)
+    done = airmuscle("convert", tmp_path / "rounded.csv", tmp_path / "bare.csv", *options)
     assert done.exit_code == 0, done.output
     (recording,) = read(tmp_path / "bare.csv")
     assert recording["time"][1] == 0.5
     assert recording["contraction"][0] == pytest.approx(1 / 30)
     before = (tmp_path / "run0.csv").read_bytes()
-    done = airmuscle("convert-data", tmp_path / "run0.csv", tmp_path / "run0.csv")
+    done = airmuscle("convert", tmp_path / "run0.csv", tmp_path / "run0.csv")
     assert "run0.csv: is a file to be converted and would be lost" in done.stderr
     assert (tmp_path / "run0.csv").read_bytes() == before
 
@@ -162,7 +162,7 @@ def test_the_command_converts_one_file_and_several(tmp_path):
 # Rows
 
 
-def test_convert_data_keeps_all_rows_unless_fewer_are_asked_for(tmp_path, monkeypatch):
+def test_convert_keeps_all_rows_unless_fewer_are_asked_for(tmp_path, monkeypatch):
     """A long file, which `read` reduces: with limits that are a thousandth of the usual ones."""
     monkeypatch.setattr(large_csv, "LARGE_FILE_BYTES", 20_000)
     monkeypatch.setitem(read.__kwdefaults__, "downsampling", Decimation(2000))
@@ -170,10 +170,10 @@ def test_convert_data_keeps_all_rows_unless_fewer_are_asked_for(tmp_path, monkey
     rows = "\n".join(f"{k / 1000},{k % 700}" for k in range(6500))
     path.write_text(f"time [s],pressure [kPa]\n{rows}\n")
     assert len(read(path)[0]) == 1625
-    done = airmuscle("convert-data", path, tmp_path / "all.csv")
+    done = airmuscle("convert", path, tmp_path / "all.csv")
     assert done.exit_code == 0, done.output
     assert len(read_csv(tmp_path / "all.csv")) == 6500
-    done = airmuscle("convert-data", path, tmp_path / "few.csv", "--max-rows", 1000)
+    done = airmuscle("convert", path, tmp_path / "few.csv", "--max-rows", 1000)
     assert "note: The file has 6500 rows; one in 7 is kept as measured, 929 in total" in " ".join(done.output.split())
     assert len(read_csv(tmp_path / "few.csv")) == 929
 

@@ -153,7 +153,7 @@ TEXT = HintedText("a: ", HintedText("no unit.", Hint("To state it", "units", {"f
 def test_a_text_with_hints_is_a_string_that_keeps_them(same: Callable[[HintedText], HintedText]):
     assert TEXT == "a: no unit. To state it, use units={'force': ...}.\nb: wrong."
     assert in_options(same(TEXT), "fit") == "a: no unit. To state it, use --unit 'force=...'.\nb: wrong."
-    assert in_options(same(TEXT), "solve") == in_options(same(TEXT), None) == "a: no unit.\nb: wrong."
+    assert in_options(same(TEXT), "evaluate") == in_options(same(TEXT), None) == "a: no unit.\nb: wrong."
     assert json.loads(json.dumps(TEXT)) == str(TEXT)
 
 

@@ -111,7 +111,7 @@ def test_the_code_on_studies_runs(tmp_path, monkeypatch, capsys):
     (tmp_path / "fill_discharge.toml").write_bytes((examples / "fill_discharge.toml").read_bytes())
     text = (examples / "valve_study.toml").read_text(encoding="utf-8")
     (tmp_path / "study.toml").write_text(text.replace("count = 64", "count = 2"), encoding="utf-8")
-    found = run("sweep.md")
+    found = run("study.md")
     assert not found["result"].failed.size
     assert (tmp_path / "out" / "chunks").exists()
     assert re.match(r"0\.\d+ ", capsys.readouterr().out)

@@ -44,7 +44,7 @@ HEADINGS = "Zeit;Druck (rel.);Kraft;Weg;Bemerkung"
 UNITS = "s;bar;N;mm;"
 ROWS = ("0,00;2,0;120,5;0,0;Start", "0,05;2,0;118,2;0,5;", "0,10;2,1;116,0;1,0;Öl", "0,15;2,0;113,9;1,5;")
 SHORTENING = {"Weg": "shortening [mm]"}
-READING = ("inspect", "fit", "hysteresis", "campaign", "fit-volume", "predict", "convert-data", "fit-regulator")
+READING = ("inspect", "fit", "hysteresis", "campaign", "fit-volume", "predict", "convert", "fit-regulator")
 OPTIONS = (
     "--resting-length", "--ambient", "--unit", "--mapping", "--column", "--constant", "--file-name", "--time",
     "--displacement-zero", "--skip-rows", "--missing", "--missing-code", "--outliers", "--delimiter", "--decimal",
@@ -379,7 +379,7 @@ def test_every_command_that_reads_has_every_option(command: str):
 
 def test_the_commands_that_name_columns_are_those_with_all_options_and_the_follower_of_a_stream():
     naming = {row.name for row in COMMANDS if "--column" in airmuscle(row.name, "--help").output}
-    assert naming == {*READING, "bench"}
+    assert naming == {*READING, "fit-live"}
 
 
 def test_a_stream_has_lines_above_its_headings_and_a_displacement():
@@ -421,7 +421,7 @@ def test_reports_name_the_rows_that_were_left_out(tmp_path, command: str):
     assert said in (tmp_path / "out" / "report.html").read_text()
 
 
-@pytest.mark.parametrize("arguments", [("inspect",), ("convert-data", "out.csv"), ("fit", "--compare")])
+@pytest.mark.parametrize("arguments", [("inspect",), ("convert", "out.csv"), ("fit", "--compare")])
 @pytest.mark.parametrize("bad", [("--missing", "fill"), ("--outliers", "maybe"), ("--skip-rows", "-1")])
 def test_an_unknown_treatment_is_refused_by_every_command(tmp_path, arguments: tuple[str, ...], bad: tuple[str, str]):
     command, *more = arguments
@@ -430,11 +430,11 @@ def test_an_unknown_treatment_is_refused_by_every_command(tmp_path, arguments: t
     assert not isinstance(result.exception, ValueError)
 
 
-def test_inspect_and_convert_data_say_what_they_left_out(tmp_path):
+def test_inspect_and_convert_say_what_they_left_out(tmp_path):
     path = ramp(tmp_path)
     (shown,) = json.loads(airmuscle("inspect", path, "--outliers", "drop", "--json").stdout)
     assert shown["rows"] == 399
-    converted = airmuscle("convert-data", path, tmp_path / "plain.csv", "--plain", "--outliers", "drop")
+    converted = airmuscle("convert", path, tmp_path / "plain.csv", "--plain", "--outliers", "drop")
     assert "note: ramp.csv: rows left out as suspected outliers: 1 of 400" in " ".join(converted.stderr.split())
 
 

@@ -55,18 +55,18 @@ def test_the_laws_of_a_product_have_its_ratings_and_sources():
     ],
 )  # fmt: skip
 def test_what_is_neither_permitted_nor_measured_is_refused(name: str, given: tuple[str, ...], message: str):
-    result = airmuscle("solve", name, *given)
+    result = airmuscle("evaluate", name, *given)
     assert result.exit_code == 1
     assert "error: beyond the values that the maker permits, and not measured" in result.stderr
     assert message in result.stderr
 
 
 def test_a_measured_point_beyond_the_permitted_pressure_gives_a_warning():
-    result = airmuscle("solve", DMSP_20, "--pressure", "650 kPa", "--contraction", "10 %", "--json")
+    result = airmuscle("evaluate", DMSP_20, "--pressure", "650 kPa", "--contraction", "10 %", "--json")
     assert result.exit_code == 0
     assert "warning: beyond the values that the maker permits: the pressure 650 kPa" in result.stderr
     assert json.loads(result.stdout)["permitted"] is False
-    inside = airmuscle("solve", DMSP_20, "--pressure", "3 bar", "--contraction", "10 %", "--json")
+    inside = airmuscle("evaluate", DMSP_20, "--pressure", "3 bar", "--contraction", "10 %", "--json")
     assert inside.stderr == ""
     assert json.loads(inside.stdout)["permitted"] is True
 
@@ -213,7 +213,7 @@ def test_a_size_that_cannot_be_is_refused(name: str, size: dict[str, str], messa
 def test_solve_scales_and_shows_the_stroke_of_the_length():
     solved = json.loads(
         airmuscle(
-            "solve", DMSP_20, "--resting-length", "200 mm", "--pressure", "3 bar", "--contraction", "10 %", "--json"
+            "evaluate", DMSP_20, "--resting-length", "200 mm", "--pressure", "3 bar", "--contraction", "10 %", "--json"
         ).stdout
     )
     assert solved["resting_length"] == pytest.approx(0.2)

@@ -39,7 +39,7 @@ def commands():
 
 @pytest.mark.parametrize(
     "command",
-    [pytest.param(each, marks=[pytest.mark.slow] * (" sweep " in each)) for each in commands()],
+    [pytest.param(each, marks=[pytest.mark.slow] * (" study " in each)) for each in commands()],
     ids=lambda words: words,
 )
 def test_the_commands_run(command, tmp_path, monkeypatch):

@@ -110,7 +110,7 @@ def test_a_note_proposes_the_mapping_of_a_field_with_the_unit_of_its_message(sta
 
 
 def test_the_command_converts_a_bag_of_standard_messages(standard_messages, tmp_path):
-    done = CliRunner().invoke(app, ["convert-data", str(standard_messages), str(tmp_path / "run.csv")])
+    done = CliRunner().invoke(app, ["convert", str(standard_messages), str(tmp_path / "run.csv")])
     assert done.exit_code == 0, done.output
     assert read(tmp_path / "run.csv")[0]["acc.y"].tolist() == [2.0] * 5
 
@@ -127,7 +127,7 @@ def test_the_command_converts_a_bag(bag, tmp_path):
     """As the guide states, here to CSV: the same columns, rows and numbers."""
     target, mapping = tmp_path / "run.csv", tmp_path / "rig.toml"
     mapping.write_text('[columns]\n"pressure" = "pressure [Pa]"\n')
-    done = CliRunner().invoke(app, ["convert-data", str(bag), str(target), "--mapping", str(mapping)])
+    done = CliRunner().invoke(app, ["convert", str(bag), str(target), "--mapping", str(mapping)])
     assert done.exit_code == 0, done.output
     (run,), (written,) = read(bag, mapping=mapping), read(target)
     assert list(written) == list(run)
@@ -136,7 +136,7 @@ def test_the_command_converts_a_bag(bag, tmp_path):
 
 
 def test_a_quantity_without_unit_is_refused_with_the_option_that_states_it(bag, tmp_path):
-    done = CliRunner().invoke(app, ["convert-data", str(bag), str(tmp_path / "run.csv")])
+    done = CliRunner().invoke(app, ["convert", str(bag), str(tmp_path / "run.csv")])
     assert done.exit_code == 1
     assert "To state the unit, use --unit 'pressure=...'." in " ".join(done.output.split())
     assert not (tmp_path / "run.csv").exists()

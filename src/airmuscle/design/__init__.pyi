@@ -15,7 +15,7 @@ from .control_benchmark import SumOfMotions as SumOfMotions
 from .control_benchmark import TrackingMetrics as TrackingMetrics
 from .control_benchmark import TunedContender as TunedContender
 from .control_benchmark import benchmark_chapter as benchmark_chapter
-from .control_benchmark import compare_controllers as compare_controllers
+from .control_benchmark import benchmark_controllers as benchmark_controllers
 from .control_benchmark import error_plot as error_plot
 from .control_benchmark import find_tasks as find_tasks
 from .control_benchmark import inverse_dynamics as inverse_dynamics

@@ -1,3 +1,5 @@
+from .approximation import ModelApproximation as ModelApproximation
+from .approximation import approximate as approximate
 from .bootstrapping import Bootstrap as Bootstrap
 from .bootstrapping import bootstrap as bootstrap
 from .candidates import Candidate as Candidate
@@ -6,8 +8,6 @@ from .censoring import UNCENSORED as UNCENSORED
 from .censoring import Censoring as Censoring
 from .confidence_bands import Band as Band
 from .confidence_bands import confidence_band as confidence_band
-from .conversion import ModelConversion as ModelConversion
-from .conversion import convert as convert
 from .cross_validation import BlockSplit as BlockSplit
 from .cross_validation import GroupSplit as GroupSplit
 from .cross_validation import LevelSplit as LevelSplit

@@ -2,11 +2,11 @@
 
 joint = proportional_joint()
 contenders = (*standard_contenders(joint), Contender("mine", MyLaw(gain=1e5), {"gain": (1e4, 1e6)}))
-result = compare_controllers(joint, contenders, seed=1)
+result = benchmark_controllers(joint, contenders, seed=1)
 result.scores(), result.metric("mine", "sine 1 Hz", "rmse")
 """
 
-from .benchmark import BenchmarkResult, BenchmarkRun, TunedContender, compare_controllers, ranking
+from .benchmark import BenchmarkResult, BenchmarkRun, TunedContender, benchmark_controllers, ranking
 from .chapter import benchmark_chapter, write_benchmark
 from .contender_of_scenario import scenario_contender
 from .contenders import Contender, standard_contenders
@@ -36,7 +36,7 @@ __all__ = [
     "TrackingMetrics",
     "TunedContender",
     "benchmark_chapter",
-    "compare_controllers",
+    "benchmark_controllers",
     "error_plot",
     "find_tasks",
     "inverse_dynamics",

@@ -96,7 +96,7 @@ def ranking(errors: Mapping[str, Sequence[float]]) -> dict[str, float]:
     return dict(sorted(zip(errors, scores, strict=True), key=lambda item: item[1]))
 
 
-def compare_controllers(
+def benchmark_controllers(
     joint: BenchmarkJoint,
     contenders: Sequence[Contender],
     tasks: Sequence[ControlTask] = STANDARD_TASKS,
@@ -185,6 +185,6 @@ def run_task(joint: BenchmarkJoint, contender: TunedContender, task: ControlTask
 
 def _check_names(kind: str, names: Sequence[str]) -> None:
     if not names:
-        raise ParameterError(f"compare_controllers: there is no {kind}; give at least one.")
+        raise ParameterError(f"benchmark_controllers: there is no {kind}; give at least one.")
     if twice := [name for name in names if names.count(name) > 1]:
-        raise ParameterError(f"compare_controllers: two {kind}s are named '{twice[0]}'; give each its own name.")
+        raise ParameterError(f"benchmark_controllers: two {kind}s are named '{twice[0]}'; give each its own name.")

@@ -43,7 +43,7 @@ def benchmark_chapter(result: BenchmarkResult, curves: Sequence[LearningCurve] =
     tables += [learning_table(curves)] if curves else []
     tables += [failures] if (failures := failure_table(result)) else []
     return Chapter(
-        paper="compare",
+        paper="benchmark",
         title=f"Control of an antagonistic joint with {result.joint.name}",
         summary="\n\n".join(_summary(result)),
         tables=tuple(tables),

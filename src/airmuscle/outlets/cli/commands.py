@@ -43,11 +43,11 @@ COMMANDS = (
     CommandRow("list", "list", "list_entries", "List muscles, laws, valves, plants, products and data sets."),
     CommandRow("show", "show", "show", "Show parameters, sources and checks of a library entry."),
     CommandRow("cite", "cite", "cite", "Print the references of a library entry."),
-    CommandRow("solve", "solve", "solve", "Solve for pressure, contraction or force, given the other two."),
+    CommandRow("evaluate", "evaluate", "evaluate", "Evaluate a law for two of pressure, contraction and force."),
     CommandRow("inspect", "inspect", "inspect", "Inspect measurement files: columns, runs, sampling, outliers."),
     CommandRow("fit", "fit", "fit", "Fit a characteristic to measured points, or compare several."),
-    CommandRow("convert", "convert", "convert", "Approximate one characteristic by another."),
-    CommandRow("convert-data", "convert_data", "convert_data", "Write measurement files as CSV, Parquet or HDF5."),
+    CommandRow("approximate", "approximate", "approximate", "Approximate one characteristic by another."),
+    CommandRow("convert", "convert", "convert", "Write measurement files as CSV, Parquet or HDF5."),
     CommandRow("hysteresis", "hysteresis", "hysteresis", "Fit friction models to hysteresis loops."),
     CommandRow("fit-dynamic", "fit_dynamic", "fit_dynamic", "Identify plant parameters from transient records."),
     CommandRow(
@@ -57,12 +57,12 @@ COMMANDS = (
     CommandRow("predict", "predict", "predict", "Predict further records by an identified muscle or plant."),
     CommandRow("fit-volume", "fit_volume", "fit_volume_command", "Fit the volume of a muscle over its contraction."),
     CommandRow("plan", "plan", "plan", "Design the most informative experiments."),
-    CommandRow("bench", "bench", "bench", "Fit a surface while rows arrive; name the next point."),
+    CommandRow("fit-live", "fit_live", "fit_live", "Fit a surface while rows arrive; name the next point."),
     CommandRow("size", "size", "size", "Size muscles of the catalogue for a lift or a joint."),
     CommandRow("simulate", "simulate", "simulate", "Simulate the plant of a scenario file."),
-    CommandRow("sweep", "sweep", "sweep", "Run a parameter study of a scenario."),
+    CommandRow("study", "study", "study", "Run a parameter study of a scenario."),
     CommandRow("tune", "tune", "tune", "Tune the controller of a scenario for a family of plants."),
-    CommandRow("compare", "compare", "compare", "Compare controllers of an antagonistic joint on common tasks."),
+    CommandRow("benchmark", "benchmark", "benchmark", "Benchmark controllers of a joint on common tasks."),
     CommandRow("export", "export", "export", "Export to C, JavaScript, MATLAB, FMU, MuJoCo or Modelica."),
     CommandRow("studio", "studio", "studio", "Show muscles and plants in the browser."),
     CommandRow("schema", "schema", "schema", "Print the JSON schema of scenario or muscle files."),
@@ -191,7 +191,7 @@ def airmuscle(
     \b
     Examples:
       airmuscle reproduce --out report
-      airmuscle solve dmsp-20-300 --pressure "3 bar" --force "100 N" --out chart
+      airmuscle evaluate dmsp-20-300 --pressure "3 bar" --force "100 N" --out chart
       airmuscle fit bench.csv --characteristic ContractileSurface --resting-length "300 mm" --out fit
       airmuscle simulate scenario.toml --out run
     """

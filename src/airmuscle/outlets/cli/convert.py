@@ -1,161 +1,85 @@
-"""`airmuscle convert`: approximation of one characteristic by another, with the remaining error."""
+"""`airmuscle convert`: measurement files or recordings in another file format."""
 
 from __future__ import annotations
 
-import dataclasses
-import itertools
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-import numpy as np
 import typer
 
-from ...bench.identify import ModelConversion
-from ...bench.identify import convert as convert_model
-from ...bench.identify.conversion import GRID_POINTS, sample_on_grid
-from ...core import leaves
-from ...core.errors import ParameterError
-from ...core.units import quantity
-from ...files.library.entry import Entry
-from ...files.library.initial_law import find_initial_law
-from ...files.library.law_file import load_law
-from ...files.library.write import save
-from ...physics.muscle.characteristic import ValidityRange
-from ...physics.muscle.characteristic.validity_range import validity_range_of
-from .completion import complete_law
-from .options import Json, Name
-from .terminal import echo, percent, print_json, print_table
+from ...bench.readers import Decimation, read, write
+from ...bench.readers.csv_writer import write_csv
+from ...bench.readers.reader import find_files
+from ...bench.readers.writer import EXTENSIONS
+from ...core.errors import FileError
+from ...recording import Recording
+from .bench_files import print_row_notes
+from .options import Json
+from .reading_options import NO_OPTIONS, ReadingOptions, with_reading_options
+from .terminal import echo, print_json
 
-BANDS = 6
-"""Pressure intervals of the validity range for which errors are printed."""
-LIMIT_UNITS = {"min_pressure": "Pa", "max_pressure": "Pa", "min_contraction": "1", "max_contraction": "1"}
+EVERY_ROW = 2**62
+"""A number of rows that no file has."""
 
-Model = Annotated[
-    str,
-    typer.Argument(
-        metavar="MODEL",
-        help="The other model: ContractileSurface, Sarosi2012, or a library entry of it.",
-        autocompletion=complete_law,
-    ),
+Source = Annotated[str, typer.Argument(metavar="FILE", help="A file, folder or glob pattern, as for inspect.")]
+Target = Annotated[Path, typer.Argument(metavar="TARGET", help=f"The file to write: {', '.join(EXTENSIONS)}.")]
+MaxRows = Annotated[
+    int | None,
+    typer.Option("--max-rows", min=1, metavar="N", help="Keep every n-th row, N at most; default: all rows."),
 ]
-Out = Annotated[
-    Path | None, typer.Option("--out", metavar="FILE", help="Muscle file to write, with the other characteristic.")
-]
-Limit = Annotated[
-    str | None, typer.Option(metavar="QUANTITY", help="Limit of the validity range; default: that of the muscle.")
-]
+Plain = Annotated[bool, typer.Option("--plain", help="CSV without comments, as pandas and spreadsheets expect it.")]
 
 
+@with_reading_options
 def convert(
-    name: Name,
-    model: Model,
-    out: Out = None,
-    min_pressure: Limit = None,
-    max_pressure: Limit = None,
-    min_contraction: Limit = None,
-    max_contraction: Limit = None,
-    degree: Annotated[int, typer.Option(min=1, max=9, metavar="N", help="Total degree of a ContractileSurface.")] = 5,
-    json: Json = False,
-) -> None:
-    """Approximate one characteristic by another.
+    source: Source, target: Target, plain: Plain = False, max_rows: MaxRows = None,
+    reading: ReadingOptions = NO_OPTIONS, json: Json = False,
+) -> None:  # fmt: skip
+    """Write measurement files as CSV, Parquet or HDF5.
 
     \b
-    The error is the difference in force, where the original force is positive, over the validity range of the muscle
-    or the range given by the options. With --out, FILE is the muscle with the other characteristic; its other parts
-    are unchanged.
+    Values are in SI units, and all rows are kept. One recording becomes TARGET; several become files with a number
+    before the extension.
 
     \b
     Examples:
-      airmuscle convert dmsp-20-300 ContractileSurface --degree 5 --out surface.toml
-      airmuscle convert fit/muscle.toml Sarosi2012 --max-pressure "5 bar"
+      airmuscle convert bench.tdms bench.parquet
+      airmuscle convert "runs/*.csv" runs.h5 --mapping rig.toml
+      airmuscle convert logger.csv run.parquet --time uniform --resting-length "300 mm"
+      airmuscle convert run/recording.csv plain.csv --plain
     """
-    entry = load_law(name)
-    limits = (min_pressure, max_pressure, min_contraction, max_contraction)
-    validity_range = _validity_range(entry, dict(zip(LIMIT_UNITS, limits, strict=True)))
-    grid = sample_on_grid(entry.characteristic, validity_range, GRID_POINTS)
-    length = getattr(entry.geometry, "resting_length", None)
-    data = grid if length is None else grid.with_constants(resting_length=length)
-    initial = find_initial_law(model, [data], degree, "MODEL")
-    conversion = convert_model(entry.characteristic, initial.entry.characteristic, validity_range)
-    if out is not None:
-        save(_converted_entry(entry, conversion, validity_range), out)
+    if plain and target.suffix.lower() != ".csv":
+        raise typer.BadParameter("--plain belongs to a target that ends in .csv.")
+    if target.suffix.lower() not in EXTENSIONS:
+        raise FileError(f"{target}: the extension must be one of {', '.join(EXTENSIONS)}.")
+    rows = Decimation(max_rows or EVERY_ROW)
+    recordings = read(source, mapping=reading.column_mapping(), units=reading.units, downsampling=rows)
+    print_row_notes(recordings)
+    paths = [_path(target, i, len(recordings)) for i in range(len(recordings))]
+    _check_no_source(paths, source)
+    for recording, path in zip(recordings, paths, strict=True):
+        _write(recording, path, plain)
     if json:
-        print_json(_to_dict(conversion, validity_range))
+        print_json({"files": [{"file": str(p), "rows": len(r)} for r, p in zip(recordings, paths, strict=True)]})
         return
-    _print(entry, conversion, validity_range)
-    if out is not None:
-        echo(f"muscle: {out}")
+    for recording, path in zip(recordings, paths, strict=True):
+        echo(f"file: {path}: {len(recording)} rows of {', '.join(recording)}")
 
 
-def _validity_range(entry: Entry, texts: dict[str, str | None]) -> ValidityRange:
-    """The validity range of the muscle, with limits replaced by those of the options."""
-    default = validity_range_of(entry.characteristic, entry.validity_range)
-    limits: dict[str, float] = {} if default is None else {name: getattr(default, name) for name in LIMIT_UNITS}
-    for name, text in texts.items():
-        if text is not None:
-            limits[name] = quantity(text, LIMIT_UNITS[name], where=_option(name))
-    missing = [_option(name) for name in LIMIT_UNITS if name not in limits]
-    if missing:
-        raise ParameterError(f"{entry.name} has no validity range for the conversion; give {', '.join(missing)}.")
-    return ValidityRange(**limits)
+def _check_no_source(targets: list[Path], source: str) -> None:
+    """Raise FileError if a file to be written is one of those that were read."""
+    sources = {path.resolve() for path in find_files(source)}
+    for target in targets:
+        if target.resolve() in sources:
+            raise FileError(f"{target}: is a file to be converted and would be lost. Choose another target.")
 
 
-def _option(name: str) -> str:
-    return f"--{name.replace('_', '-')}"
+def _path(target: Path, number: int, count: int) -> Path:
+    return target if count == 1 else target.with_name(f"{target.stem}_{number + 1:03d}{target.suffix}")
 
 
-def _converted_entry(entry: Entry, conversion: ModelConversion, validity_range: ValidityRange) -> Entry:
-    """The muscle with the other characteristic, without the checks of the original one."""
-    title = f"{type(conversion.model).__name__} in place of {type(entry.characteristic).__name__}: {entry.title}"
-    note = f"Converted from {entry.name}: {conversion}. {entry.note}".strip()
-    return dataclasses.replace(
-        entry,
-        name="muscle",
-        title=title,
-        provenance="fitted",
-        note=note,
-        characteristic=conversion.model,
-        validity_range=validity_range,
-        checks=(),
-    )
-
-
-def _errors_by_pressure(conversion: ModelConversion, validity_range: ValidityRange) -> list[dict[str, float]]:
-    """Errors [N] in intervals of pressure."""
-    points = conversion.check_points
-    rows = []
-    for low, high in itertools.pairwise(np.linspace(*validity_range.pressure, BANDS + 1)):
-        inside = (points["pressure"] >= low) & (points["pressure"] <= high)
-        if inside.any():
-            error, force = points["error"][inside], points["force"][inside]
-            rows.append({"min_pressure": float(low), "max_pressure": float(high),
-                         "rms": float(np.sqrt(np.mean(error**2))), "max": float(np.abs(error).max()),
-                         "max_force": float(force.max())})  # fmt: skip
-    return rows
-
-
-def _to_dict(conversion: ModelConversion, validity_range: ValidityRange) -> dict[str, Any]:
-    """A conversion as plain data, all numbers SI."""
-    return {
-        "model": type(conversion.model).__name__,
-        "parameters": {leaf.path: leaf.value for leaf in leaves(conversion.model)},
-        "validity_range": dataclasses.asdict(validity_range),
-        "rms": conversion.rmse,
-        "max": conversion.max_error,
-        "max_at": {"pressure": conversion.max_error_pressure, "contraction": conversion.max_error_contraction},
-        "by_pressure": _errors_by_pressure(conversion, validity_range),
-    }
-
-
-def _print(entry: Entry, conversion: ModelConversion, validity_range: ValidityRange) -> None:
-    (p0, p1), (c0, c1) = validity_range.pressure, validity_range.contraction
-    echo(f"{entry.name}, {type(entry.characteristic).__name__}, over {p0 / 1e3:.4g} to {p1 / 1e3:.4g} kPa and "
-         f"{percent(c0)} to {percent(c1)}")  # fmt: skip
-    echo(f"{conversion}\n")
-    rows = [
-        (f"{row['min_pressure'] / 1e3:.4g} to {row['max_pressure'] / 1e3:.4g}",
-         *(f"{row[key]:.4g}" for key in ("rms", "max", "max_force")))
-        for row in _errors_by_pressure(conversion, validity_range)
-    ]  # fmt: skip
-    headers = ("pressure [kPa]", "rms error [N]", "maximum error [N]", "maximum force [N]")
-    print_table(headers, rows, right=headers[1:])
+def _write(recording: Recording, path: Path, plain: bool) -> None:
+    if plain:
+        write_csv(recording, path, comments=False)
+    else:
+        write(recording, path)

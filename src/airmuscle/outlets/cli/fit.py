@@ -154,7 +154,7 @@ def fit(
       airmuscle fit runs/*.xlsx --mapping rig.toml --compare --leave-out run
       airmuscle fit muscles/*.csv --mapping rig.toml --compare --purpose both --length-error "20 cm"
       airmuscle fit log_held*.csv --file-name "held{length [mm]}mm" --time uniform --resting-length "200 mm" --compare
-      airmuscle solve fit/muscle.toml --pressure "3 bar" --force "100 N"
+      airmuscle evaluate fit/muscle.toml --pressure "3 bar" --force "100 N"
     """
     if characteristic is None and not compare:
         raise typer.BadParameter("give the characteristic to fit with --characteristic, or rank all with --compare")

@@ -103,7 +103,7 @@ INSTRUCTIONS: Mapping[str, Mapping[str, Instruction]] = {
     },
     "campaign": _FILES,
     "predict": _FILES,
-    "convert-data": _FILES,
+    "convert": _FILES,
     "plan": {"fixed": _fix},
     "fit-dynamic": {**_RECORDS, "free": lambda hint: f"write free = {json.dumps(list(hint.value))} under [fit]"},
 }

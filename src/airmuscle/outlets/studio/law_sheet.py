@@ -95,7 +95,7 @@ def _in_closed_form(entry: Entry) -> tuple[am.characteristic.Characteristic, dic
     if limits is None:
         raise TraceError(
             f"{entry.name}: {type(law).__name__} has no closed form and no validity range, on which it could be "
-            "approximated. Add [validity_range] to its file, or see airmuscle convert."
+            "approximated. Add [validity_range] to its file, or see airmuscle approximate."
         )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

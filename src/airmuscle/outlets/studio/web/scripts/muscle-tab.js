@@ -225,7 +225,7 @@
     const rows = [element("p", {}, element("strong", {}, sheet.title)), element("p", {}, `${sheet.law}: ${sheet.formula} Numbers: ${sheet.provenance}.`)];
     if (sheet.warning) rows.push(element("p.message", {}, sheet.warning));
     const near = sheet.approximation;
-    if (near) rows.push(element("p.message", {}, `${sheet.law} has no closed form. The page shows a polynomial of degree ${near.degree} on its validity range; estimated maximum error ${airmuscle.shortText(near.max_error)} N, root mean square error ${airmuscle.shortText(near.rms_error)} N. airmuscle solve ${sheet.name} gives the exact values.`));
+    if (near) rows.push(element("p.message", {}, `${sheet.law} has no closed form. The page shows a polynomial of degree ${near.degree} on its validity range; estimated maximum error ${airmuscle.shortText(near.max_error)} N, root mean square error ${airmuscle.shortText(near.rms_error)} N. airmuscle evaluate ${sheet.name} gives the exact values.`));
     if (sheet.note) rows.push(element("p.soft", {}, sheet.note));
     rows.push(element("ul", {}, ...sheet.references.map((text) => element("li", {}, text))));
     return rows;

@@ -106,7 +106,7 @@ def command(folder: Path, *options: str) -> list[str]:
         sys.executable,
         "-m",
         "airmuscle",
-        "sweep",
+        "study",
         str(folder / "study.toml"),
         "--out",
         str(folder / "out"),
@@ -194,7 +194,7 @@ def test_workers_exit_within_a_second_when_their_parent_is_killed(folder: Path):
 
 
 def test_only_a_resumed_study_is_reported_as_resumed(folder: Path):
-    arguments = ["sweep", str(folder / "study.toml"), "--out", str(folder / "out"), "--workers", "1"]
+    arguments = ["study", str(folder / "study.toml"), "--out", str(folder / "out"), "--workers", "1"]
     first, second = (CliRunner().invoke(app, arguments) for _ in range(2))
     assert "resuming" not in first.stderr
     assert "resuming: 22 of 22 runs are already saved" in second.stderr
@@ -503,7 +503,7 @@ def test_an_unexpected_exception_fails_only_its_own_run(folder: Path, monkeypatc
 def test_a_study_in_which_all_runs_fail_is_an_error(folder: Path):
     edited(folder, "[design]", '"input.fill[0][1]" = [2]\n[design]')
     done = CliRunner().invoke(
-        app, ["sweep", str(folder / "study.toml"), "--out", str(folder / "out"), "--workers", "1"]
+        app, ["study", str(folder / "study.toml"), "--out", str(folder / "out"), "--workers", "1"]
     )
     assert done.exit_code == 1
     assert "all 22 runs failed; reason of the first: " in done.stderr
@@ -561,7 +561,7 @@ def test_the_example_runs(tmp_path: Path):
 
 
 def test_the_study_in_the_documentation_is_valid(tmp_path: Path):
-    page = (ROOT / "docs" / "sweep.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "study.md").read_text(encoding="utf-8")
     blocks = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
     shutil.copy(ROOT / "examples" / "fill_discharge.toml", tmp_path)
     (tmp_path / "study.toml").write_text(blocks[0], encoding="utf-8")
@@ -620,7 +620,7 @@ def test_the_report_shows_design_statistics_and_figures(folder: Path):
 
 def test_the_command_names_its_report_last(folder: Path):
     out = str(folder / "out")
-    done = CliRunner().invoke(app, ["sweep", str(folder / "study.toml"), "--out", out, "--workers", "1"])
+    done = CliRunner().invoke(app, ["study", str(folder / "study.toml"), "--out", out, "--workers", "1"])
     assert done.exit_code == 0, done.output
     assert done.stdout.splitlines()[-1] == f"report: {out}/report.html"
     assert "Two valves: 22 runs, MonteCarlo(count=22, seed=3)" in done.stdout
@@ -709,7 +709,7 @@ def test_invalid_executors_and_folders_are_rejected(folder: Path):
     with pytest.raises(FileError, match="cannot be written to"):
         run_study(load_study(folder / "study.toml"), folder / "file")
     study = str(folder / "study.toml")
-    both = CliRunner().invoke(app, ["sweep", study, "--workers", "2", "--dask", "tcp://localhost:1"])
+    both = CliRunner().invoke(app, ["study", study, "--workers", "2", "--dask", "tcp://localhost:1"])
     assert both.exit_code == 1
     assert "--workers and --dask exclude each other" in both.stderr
 

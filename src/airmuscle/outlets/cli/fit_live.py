@@ -1,4 +1,4 @@
-"""`airmuscle bench`: identification while a measurement runs."""
+"""`airmuscle fit-live`: identification while a measurement runs."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from .terminal import echo, percent
 QUANTITIES = ("pressure", "contraction", "force")
 
 
-def bench(
+def fit_live(
     follow: Annotated[
         str, typer.Option("--follow", metavar="FILE", help="Growing file, pipe or serial port; '-' for standard input.")
     ],
@@ -61,8 +61,8 @@ def bench(
 
     \b
     Examples:
-      airmuscle bench --follow log.csv --max-pressure "6 bar" --max-force "1 kN" --out live
-      cat /dev/ttyUSB0 | airmuscle bench --follow - --column "1=pressure [kPa]" --column "2=contraction [%]"
+      airmuscle fit-live --follow log.csv --max-pressure "6 bar" --max-force "1 kN" --out live
+      cat /dev/ttyUSB0 | airmuscle fit-live --follow - --column "1=pressure [kPa]" --column "2=contraction [%]"
       --column "3=force [N]" --max-pressure "6 bar" --max-force "1 kN"
     """
     pressures = [quantity(text, "Pa", where="pressure limits") for text in (min_pressure, max_pressure)]

@@ -1,4 +1,4 @@
-"""Conversion of one characteristic into another: least-squares approximation and its error."""
+"""Approximation of one characteristic by another in least squares, and its error."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ GRID_POINTS = 24
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class ModelConversion(ShortRepr):
+class ModelApproximation(ShortRepr):
     """The fitted target model, and its error in force over the validity range."""
 
     model: Characteristic
@@ -43,7 +43,9 @@ class ModelConversion(ShortRepr):
         )
 
 
-def convert(characteristic: Characteristic, other: Characteristic, validity_range: ValidityRange) -> ModelConversion:
+def approximate(
+    characteristic: Characteristic, other: Characteristic, validity_range: ValidityRange
+) -> ModelApproximation:
     """Approximate `characteristic` by the model of `other` on a validity range, by least squares in force.
 
     `other` gives the structure and the initial values, as in `fit`. Only points where `characteristic` gives a positive
@@ -66,7 +68,7 @@ def convert(characteristic: Characteristic, other: Characteristic, validity_rang
             "smaller validity range."
         )
     worst = int(np.argmax(np.abs(difference)))
-    return ModelConversion(
+    return ModelApproximation(
         model, float(np.sqrt(np.mean(difference**2))), float(difference[worst]),
         float(check_points["pressure"][worst]), float(check_points["contraction"][worst]),
         check_points.with_columns(error=difference),

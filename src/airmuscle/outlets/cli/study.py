@@ -1,4 +1,4 @@
-"""`airmuscle sweep`: parameter study of a scenario."""
+"""`airmuscle study`: parameter study of a scenario."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from .options import Folder, Json
 from .terminal import echo, print_json, print_table
 
 
-def sweep(
-    study: Annotated[
+def study(
+    file: Annotated[
         Path,
         typer.Argument(metavar="STUDY.toml", help="A file with scenario, [vary], [design] and [metrics]."),
     ],
@@ -46,13 +46,13 @@ def sweep(
 
     \b
     Examples:
-      airmuscle sweep examples/valve_study.toml --out study
-      airmuscle sweep study.toml --workers 8
-      airmuscle sweep study.toml --dask tcp://head-node:8786
+      airmuscle study examples/valve_study.toml --out study
+      airmuscle study study.toml --workers 8
+      airmuscle study study.toml --dask tcp://head-node:8786
     """
     if workers is not None and dask is not None:
         raise InputError("--workers and --dask exclude each other: a Dask cluster has its own workers.")
-    result = _run(load_study(study), out, workers, dask)
+    result = _run(load_study(file), out, workers, dask)
     page = write_study(result, out)
     if json:
         print_json(_to_dict(result))

@@ -1,4 +1,4 @@
-"""`airmuscle solve`: pressure, contraction or force of a muscle, given the other two."""
+"""`airmuscle evaluate`: pressure, contraction or force of a muscle, given the other two."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ Contraction = Annotated[str | None, typer.Option(metavar="QUANTITY", help="Contr
 Force = Annotated[str | None, typer.Option(metavar="QUANTITY", help="Tension with unit: '100 N', '0.1 kN'.")]
 
 
-def solve(
+def evaluate(
     name: Name,
     pressure: Pressure = None,
     contraction: Contraction = None,
@@ -49,7 +49,7 @@ def solve(
     out: OptionalFolder = None,
     json: Json = False,
 ) -> None:
-    """Solve for pressure, contraction or force, given the other two.
+    """Evaluate a law for two of pressure, contraction and force.
 
     \b
     If several solutions exist, the result is the one reached from the state of rest.
@@ -58,10 +58,10 @@ def solve(
 
     \b
     Examples:
-      airmuscle solve dmsp-20-300 --pressure "3 bar" --force "100 N"
-      airmuscle solve dmsp-20-300 --contraction "12 %" --force "100 N" --out chart
-      airmuscle solve tondu-lopez --diameter "30 mm" --resting-length "200 mm" --pressure "3 bar" --force "100 N"
-      airmuscle solve my/muscle.toml --pressure "400 kPa" --contraction 0.1 --json
+      airmuscle evaluate dmsp-20-300 --pressure "3 bar" --force "100 N"
+      airmuscle evaluate dmsp-20-300 --contraction "12 %" --force "100 N" --out chart
+      airmuscle evaluate tondu-lopez --diameter "30 mm" --resting-length "200 mm" --pressure "3 bar" --force "100 N"
+      airmuscle evaluate my/muscle.toml --pressure "400 kPa" --contraction 0.1 --json
     """
     texts = {"pressure": pressure, "contraction": contraction, "force": force}
     missing = [name for name, text in texts.items() if text is None]

@@ -36,7 +36,7 @@ def replay(count: int = 6000, decimal: str = ".") -> str:
 
 
 def bench(*arguments: str, **options):
-    return CliRunner().invoke(app, ["bench", *arguments], **options)
+    return CliRunner().invoke(app, ["fit-live", *arguments], **options)
 
 
 def test_rows_as_they_come_are_those_of_the_complete_file(tmp_path: Path):

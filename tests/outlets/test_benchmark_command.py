@@ -1,4 +1,4 @@
-"""`airmuscle compare`: table and report of a benchmark, and one line for what is impossible."""
+"""`airmuscle benchmark`: table and report of a benchmark, and one line for what is impossible."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from airmuscle.outlets.cli import app
 
-FAST = ["compare", "--controller", "PID", "--task", "step", "--budget", "0"]
+FAST = ["benchmark", "--controller", "PID", "--task", "step", "--budget", "0"]
 
 
 def run(*arguments):
@@ -17,20 +17,20 @@ def run(*arguments):
 
 
 def test_a_benchmark_writes_its_report_tables_and_figures(tmp_path):
-    result = run(*FAST, "--out", str(tmp_path / "compare"))
+    result = run(*FAST, "--out", str(tmp_path / "benchmark"))
     assert result.exit_code == 0, result.output
     assert "PID" in result.stdout
-    names = {path.relative_to(tmp_path / "compare").as_posix() for path in (tmp_path / "compare").rglob("*.*")}
+    names = {path.relative_to(tmp_path / "benchmark").as_posix() for path in (tmp_path / "benchmark").rglob("*.*")}
     tables = {f"data/{name}.csv" for name in ("ranking", "rmse", "max_error", "metrics")}
     assert {"report.html", "figures/errors.png", "figures/runs.png", *tables} <= names
     assert "data/gains.csv" not in names, "nothing was tuned"
-    page = (tmp_path / "compare" / "report.html").read_text(encoding="utf-8")
+    page = (tmp_path / "benchmark" / "report.html").read_text(encoding="utf-8")
     for text in ("LuGre", "12-bit encoder", "1e-08 m3/(s Pa)", "weight x 2"):
         assert text in page, text
 
 
 def test_json_contains_every_metric_of_every_run(tmp_path):
-    result = run(*FAST, "--json", "--out", str(tmp_path / "compare"))
+    result = run(*FAST, "--json", "--out", str(tmp_path / "benchmark"))
     content = json.loads(result.stdout)
     assert content["scores"] == {"PID": 1.0}
     (row,) = content["runs"]
@@ -51,8 +51,8 @@ def test_json_contains_every_metric_of_every_run(tmp_path):
     ],
 )
 def test_an_impossible_benchmark_is_rejected_in_one_line(arguments, message, tmp_path):
-    result = run("compare", *arguments, "--out", str(tmp_path / "compare"))
+    result = run("benchmark", *arguments, "--out", str(tmp_path / "benchmark"))
     assert result.exit_code == 1
     assert message in result.stderr
     assert result.stderr.count("\n") == 1
-    assert not (tmp_path / "compare").exists()
+    assert not (tmp_path / "benchmark").exists()

@@ -1,4 +1,4 @@
-"""`airmuscle convert` brings one law near another, and the error it prints is the one between the two files.
+"""`airmuscle approximate` brings one law near another, and the error it prints is the one between the two files.
 
 A law that holds the other gives it back; a validity range that is not known is asked for; other parts of the muscle stay.
 """
@@ -22,7 +22,9 @@ def airmuscle(*arguments):
 
 
 def test_the_printed_error_is_that_between_the_two_files(tmp_path):
-    result = airmuscle("convert", MUSCLE, "ContractileSurface", "--degree", 3, "--out", tmp_path / "m.toml", "--json")
+    result = airmuscle(
+        "approximate", MUSCLE, "ContractileSurface", "--degree", 3, "--out", tmp_path / "m.toml", "--json"
+    )
     assert result.exit_code == 0, result.stderr
     said = json.loads(result.stdout)
     first, second = load(MUSCLE), load(tmp_path / "m.toml")
@@ -43,8 +45,8 @@ def test_the_printed_error_is_that_between_the_two_files(tmp_path):
 
 
 def test_a_law_that_holds_the_other_gives_it_back(tmp_path):
-    airmuscle("convert", "chou-hannaford", "ContractileSurface", "--degree", 3, "--out", tmp_path / "surface.toml")
-    result = airmuscle("convert", tmp_path / "surface.toml", "ChouHannaford1996", "--json")
+    airmuscle("approximate", "chou-hannaford", "ContractileSurface", "--degree", 3, "--out", tmp_path / "surface.toml")
+    result = airmuscle("approximate", tmp_path / "surface.toml", "ChouHannaford1996", "--json")
     said = json.loads(result.stdout)
     assert said["rms"] < 1e-6
     before = load("chou-hannaford").characteristic
@@ -52,10 +54,10 @@ def test_a_law_that_holds_the_other_gives_it_back(tmp_path):
 
 
 def test_a_stated_end_takes_the_place_of_the_muscles(tmp_path):
-    wide = json.loads(airmuscle("convert", MUSCLE, "Sarosi2012", "--json").stdout)
+    wide = json.loads(airmuscle("approximate", MUSCLE, "Sarosi2012", "--json").stdout)
     narrow = json.loads(
         airmuscle(
-            "convert", MUSCLE, "Sarosi2012", "--min-pressure", "3 bar", "--max-contraction", "15 %", "--json"
+            "approximate", MUSCLE, "Sarosi2012", "--min-pressure", "3 bar", "--max-contraction", "15 %", "--json"
         ).stdout
     )
     assert narrow["validity_range"]["min_pressure"] == 3e5
@@ -64,7 +66,7 @@ def test_a_stated_end_takes_the_place_of_the_muscles(tmp_path):
 
 
 def test_the_table_is_printed(tmp_path):
-    said = airmuscle("convert", MUSCLE, "ContractileSurface", "--degree", 2, "--out", tmp_path / "m.toml").stdout
+    said = airmuscle("approximate", MUSCLE, "ContractileSurface", "--degree", 2, "--out", tmp_path / "m.toml").stdout
     assert "MartensBoblan2017, over 35 to 675 kPa and 1.333 % to 26 %" in said
     assert "pressure [kPa]" in said
     assert "maximum error [N]" in said
@@ -76,7 +78,7 @@ def test_the_table_is_printed(tmp_path):
     [
         (
             ("borzikova-exponential", "ContractileSurface"),
-            "has no validity range for the conversion; give --min-pressure, ",
+            "has no validity range for the approximation; give --min-pressure, ",
         ),
         ((MUSCLE, "ContractileSurfac"), "no muscle or law 'ContractileSurfac'"),
         ((MUSCLE, "Saga2007"), "MODEL: Saga2007 needs initial values"),
@@ -93,7 +95,7 @@ def test_the_table_is_printed(tmp_path):
     ],
 )
 def test_what_cannot_be_converted_is_refused(arguments, message, tmp_path):
-    result = airmuscle("convert", *arguments, "--out", tmp_path / "m.toml")
+    result = airmuscle("approximate", *arguments, "--out", tmp_path / "m.toml")
     assert result.exit_code == 1
     assert message in result.stderr
     assert not list(tmp_path.iterdir())

@@ -1,4 +1,4 @@
-"""`airmuscle compare`: control benchmark of an antagonistic joint."""
+"""`airmuscle benchmark`: control benchmark of an antagonistic joint."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ...design.control_benchmark import (
     BenchmarkResult,
     Contender,
     LearningCurve,
-    compare_controllers,
+    benchmark_controllers,
     learn,
     on_off_joint,
     proportional_joint,
@@ -50,7 +50,7 @@ Seed = Annotated[
 ]  # fmt: skip
 
 
-def compare(
+def benchmark(
     valves: Annotated[Valves, typer.Option(help="Valves of the joint.")] = Valves.PROPORTIONAL,
     controller: Annotated[
         list[str] | None,
@@ -68,10 +68,10 @@ def compare(
     trials: Annotated[
         int, typer.Option(min=0, max=1000, metavar="N", help="Trials of iterative learning at 2 Hz; 0: none.")
     ] = 0,
-    out: Folder = Path("compare"),
+    out: Folder = Path("benchmark"),
     json: Json = False,
 ) -> None:
-    """Compare controllers of an antagonistic joint on common tasks.
+    """Benchmark controllers of a joint on common tasks.
 
     \b
     Every controller is tuned by the same optimiser and budget for perturbed models, and judged on a plant of another
@@ -80,17 +80,17 @@ def compare(
 
     \b
     Examples:
-      airmuscle compare --out compare
-      airmuscle compare --controller PID --controller "feed-forward + PID" --task "sine 1 Hz" --trials 10
-      airmuscle compare --valves on-off --budget 2000
-      airmuscle compare --controller PID --controller examples/joint_cascade.toml
+      airmuscle benchmark --out benchmark
+      airmuscle benchmark --controller PID --controller "feed-forward + PID" --task "sine 1 Hz" --trials 10
+      airmuscle benchmark --valves on-off --budget 2000
+      airmuscle benchmark --controller PID --controller examples/joint_cascade.toml
     """
     joint = proportional_joint() if valves is Valves.PROPORTIONAL else on_off_joint()
     contenders, tasks = _contenders(joint, controller or []), find_tasks(tuple(task or ()))
     if trials and (trials < 2 or LEARNED not in [each.name for each in contenders]):
         raise InputError(f"--trials needs at least 2 trials and the controller '{LEARNED}'.")
     with _progress() as show:
-        result = compare_controllers(joint, contenders, tasks, budget=budget, seed=seed, progress=show)
+        result = benchmark_controllers(joint, contenders, tasks, budget=budget, seed=seed, progress=show)
     curves = _learned(result, trials, seed) if trials else []
     page = write_benchmark(result, out, curves)
     if json:
