@@ -51,7 +51,7 @@ equals = "50 N"
 tolerance = "0.001 N"
 source = "the formula, by hand"
 """
-VALVE = """from .orifice import Orifice
+VALVE = """from .valve import Orifice
 
 
 @model

@@ -14,7 +14,7 @@ import pytest
 
 from airmuscle.physics import Braid, Ratings, SwellingWall, TabulatedGeometry, Vessel
 from airmuscle.physics.muscle.geometry.chebyshev import as_polynomial
-from airmuscle.physics.muscle.series_equilibrium import find_largest_nonnegative
+from airmuscle.physics.muscle.series import find_largest_nonnegative
 
 BRAID = Braid(0.01, 0.4363, 0.2)
 POLYNOMIAL = as_polynomial(BRAID, 4, (-0.05, 0.3))

@@ -11,7 +11,7 @@ from joints import chosen_muscle
 
 from airmuscle.core import autodiff, tree
 from airmuscle.physics import CubicSpring, EndStop, HuntCrossley, LinearSpring, SeriesSpring, VirtualWork
-from airmuscle.physics.muscle.series_equilibrium import find_largest_nonnegative
+from airmuscle.physics.muscle.series import find_largest_nonnegative
 
 STOP = EndStop(0.1, HuntCrossley(1e9, 0.5))
 

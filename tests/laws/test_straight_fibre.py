@@ -25,7 +25,7 @@ from airmuscle.physics import (
     UniformFibreSum,
     UserDefinedFibreSum,
 )
-from airmuscle.physics.muscle.geometry.stumpff import stumpff
+from airmuscle.physics.muscle.geometry.meridian import stumpff
 
 L0, D0 = 0.072, 0.012
 CIRCLE, CATENARY, TRUE_ARC, PARABOLA = CircularArc(), Catenary(), TrueArcParabola(), Parabola()

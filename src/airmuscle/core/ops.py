@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Mapping
 from types import ModuleType
 from typing import Any
 
@@ -17,6 +18,8 @@ from .errors import ParameterError
 
 Value = Any
 """A float, a NumPy array, a CasADi symbol or a JAX array."""
+Values = Mapping[str, Value]
+"""Values by name, such as states, inputs, coordinates or forces."""
 
 pi = math.pi
 _PLAIN = frozenset({float, int, bool})

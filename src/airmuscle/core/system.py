@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from .arrays import Array
 from .diagnostics import ColumnLimit, Columns, Diagnostic
-from .ops import Value
+from .ops import Values
 from .variables import Input, StateVariable
 
 
@@ -29,16 +29,14 @@ class System(abc.ABC):
         """The names of the inputs, each piecewise linear in time."""
 
     @abc.abstractmethod
-    def rates(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> Mapping[str, Value]:
+    def rates(self, state: Values, inputs: Values) -> Values:
         """The time derivative of every state."""
 
     @abc.abstractmethod
-    def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> Mapping[str, Value]:
+    def outputs(self, state: Values, inputs: Values) -> Values:
         """Output quantities at a state."""
 
-    def rates_and_outputs(
-        self, state: Mapping[str, Value], inputs: Mapping[str, Value]
-    ) -> tuple[Mapping[str, Value], Mapping[str, Value]]:
+    def rates_and_outputs(self, state: Values, inputs: Values) -> tuple[Values, Values]:
         """The rates and the outputs; a system in which they share quantities computes these once."""
         return self.rates(state, inputs), self.outputs(state, inputs)
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ..physics.muscle.geometry.circular_arc import FERRARESI_2001
 from ..physics.muscle.geometry.meridian import SAGA_2007
+from ..physics.muscle.geometry.meridian_shapes import FERRARESI_2001
 from ..physics.muscle.geometry.pleated import DAERDEN_LEFEBER_2001
 from ..report.chapter import Chapter
 from .saga2007_claims import (

@@ -26,7 +26,7 @@ from typing import Any
 from ...core.declaration import check_field, parameters
 from ...core.errors import ParameterError
 from ...core.units import ABSOLUTE
-from ...physics.pneumatics.orifice import Orifice
+from ...physics.pneumatics.valve import Orifice
 from .entry import Check, issue_warning
 from .fields import accepts, check_required, describe_type, item_type, read_parameter
 from .files import VALVES, complete_name, is_path, list_valves, read_toml

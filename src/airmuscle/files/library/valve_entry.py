@@ -8,7 +8,7 @@ from ...core.declaration import model, parameter
 from ...core.errors import UnknownNameError, suggestion
 from ...core.reference import Reference
 from ...physics.pneumatics.gas import REFERENCE_DENSITY, REFERENCE_TEMPERATURE
-from ...physics.pneumatics.orifice import Orifice
+from ...physics.pneumatics.valve import Orifice
 from .entry import Check
 from .entry_display import EntryDisplay
 

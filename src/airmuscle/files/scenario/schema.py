@@ -22,7 +22,7 @@ from ...engine.loop.driver import Driver
 from ...engine.run.integrators import Integrator
 from ...physics.muscle import Muscle
 from ...physics.plant.plant import Plant
-from ...physics.pneumatics.orifice import Orifice
+from ...physics.pneumatics.valve import Orifice
 from ..library import entry_file, plant_file, stated_band, uncertainty
 from ..library.build import TEXT_KEYS
 from ..library.models import model_class, model_names

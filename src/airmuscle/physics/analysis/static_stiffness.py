@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from ...core import autodiff
-from ...core.ops import Value
+from ...core.ops import Value, Values
 from ...core.short_repr import ShortRepr
 from ...engine.state import state_vector
 from ..muscle import ElasticSeriesElement, Muscle
@@ -90,7 +90,7 @@ def _slopes(muscle: Muscle, port: MuscleState) -> tuple[float, float]:
 
 
 def enclosed_pressure_slope(
-    plant: Plant, muscle: Muscle, inner_contraction: Value, volume: Value, air: Air, states: Mapping[str, Value]
+    plant: Plant, muscle: Muscle, inner_contraction: Value, volume: Value, air: Air, states: Values
 ) -> Value:
     """dp/deps [Pa] of enclosed air: derivative of its pressure with respect to volume and gas states.
 

@@ -13,9 +13,17 @@ from ...core.short_repr import ShortRepr
 from ...recording import Recording
 from ..plant.plant import Plant
 from ..pneumatics.gas import gauge_pressure
-from .joint_limits import LEVELS, stiffness_range, taut_branch
 from .joint_solutions import affine_candidates, are_balanced, balanced_angles, general_candidates
-from .joint_torque import TorqueFunction, TracedRow, check_joint, load_function, torque_functions
+from .joint_torque import (
+    LEVELS,
+    TorqueFunction,
+    TracedRow,
+    check_joint,
+    load_function,
+    stiffness_range,
+    taut_branch,
+    torque_functions,
+)
 
 RESULTS = ("torque", "stiffness", "tension", "shut_valves")
 

@@ -7,8 +7,8 @@ import numpy as np
 from ...core.arrays import Array
 from ...core.errors import EquilibriumError, GeometryLimitError, PhysicsError
 from .multi_dof import starts
-from .shut_air import MAX_PRESSURE
 from .single_dof import grid
+from .static_plant import MAX_PRESSURE
 from .statics import Statics
 
 

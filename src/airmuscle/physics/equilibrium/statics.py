@@ -17,8 +17,7 @@ from ...engine.compile.cache.kernel import evaluate_rates
 from ...engine.compile.program import CompiledSystem
 from ..muscle import Muscle
 from ..pneumatics.gas import absolute_pressure
-from .shut_air import shut_air_pressure
-from .static_plant import StaticPlant
+from .static_plant import StaticPlant, shut_air_pressure
 
 Rows = npt.NDArray[np.intp]
 LOWEST_CONTRACTION = -0.5

@@ -2,24 +2,14 @@
 
 from .antagonistic_joint import AntagonisticJoint
 from .base import Coordinate, Mechanism
-from .contact import HuntCrossley
-from .end_stops import JointWithEndStops, WithEndStops
+from .end_stops import HuntCrossley, JointWithEndStops, WithEndStops
 from .external_load import SHORTENING, SHORTENING_SPEED, ExternalLoad
-from .external_torque import JointWithExternalTorque
-from .hanging_mass import HangingMass
-from .isometric import Isometric
-from .isotonic import Isotonic
-from .joint_friction import JointWithFriction
-from .latch import WithLatch
 from .lever import Lever
+from .loads import HangingMass, Isometric, Isotonic, PrescribedMotion, Pulley, SpringLoad
 from .muscles_in_series import MusclesInSeries
-from .offsets import WithOffsets
 from .planar_arm import ArmLink, MuscleRoute, PlanarArm
-from .prescribed_motion import PrescribedMotion
-from .pulley import Pulley
 from .pulley_profile import ConstantRadius, CrankProfile, PolynomialProfile, PulleyProfile
-from .spring_load import SpringLoad
-from .wrapper import MechanismWrapper
+from .wrapper import JointWithExternalTorque, JointWithFriction, MechanismWrapper, WithLatch, WithOffsets
 
 __all__ = [
     "SHORTENING",

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from ...core import ops
 from ...core.declaration import check_structure, model, parameter
 from ...core.errors import ParameterError
-from ...core.ops import Value
+from ...core.ops import Value, Values
 from .base import Coordinate, Mechanism
 from .pulley_profile import ConstantRadius, PulleyProfile, check_profile
 
@@ -62,7 +62,7 @@ class AntagonisticJoint(Mechanism):
     def coordinates(self) -> tuple[Coordinate, ...]:
         return (Coordinate("angle", "angular_speed", "rad", 0.1, 1.0, self.min_angle, self.max_angle),)
 
-    def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
+    def contractions(self, q: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         angle, (first, second) = q["angle"], resting_lengths
         return (
             self.offset + self.radius * self.profile.integral(angle) / first,
@@ -74,24 +74,20 @@ class AntagonisticJoint(Mechanism):
         return self.radius * self.profile.ratio(angle), -self.radius * self.profile.ratio(-angle)
 
     def generalised_forces(
-        self, q: Mapping[str, Value], tensions: Sequence[Value], resting_lengths: Sequence[Value]
+        self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]
     ) -> dict[str, Value]:
         first, second = (self.profile.ratio(angle) for angle in (q["angle"], -q["angle"]))
         return {"angle": self.radius * (first * tensions[0] - second * tensions[1])}
 
-    def acceleration(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
-    ) -> Mapping[str, Value]:
+    def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
         weight = self.weight_torque * ops.sin(q["angle"] + self.weight_angle)
         return {"angle": (forces["angle"] - (weight + self.damping * v["angular_speed"])) / self.inertia}
 
-    def dissipated_power(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
-    ) -> Value:
+    def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
         return self.damping * v["angular_speed"] ** 2
 
-    def potential_energy(self, q: Mapping[str, Value]) -> Value:
+    def potential_energy(self, q: Values) -> Value:
         return self.weight_torque * (1.0 - ops.cos(q["angle"] + self.weight_angle))
 
-    def kinetic_energy(self, q: Mapping[str, Value], v: Mapping[str, Value]) -> Value:
+    def kinetic_energy(self, q: Values, v: Values) -> Value:
         return 0.5 * self.inertia * v["angular_speed"] ** 2

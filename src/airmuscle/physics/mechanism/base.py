@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from ...core import autodiff
-from ...core.ops import Value
+from ...core.ops import Value, Values
 from ...core.variables import Input, StateVariable
 
 INFINITY = float("inf")
@@ -66,12 +66,10 @@ class Mechanism(abc.ABC):
         return None
 
     @abc.abstractmethod
-    def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
+    def contractions(self, q: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         """Contraction of each muscle at coordinates q, for resting lengths [m]."""
 
-    def contraction_speeds(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], resting_lengths: Sequence[Value]
-    ) -> tuple[Value, ...]:
+    def contraction_speeds(self, q: Values, v: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         """Speed of shortening [m/s] of each muscle, the time derivative of `contractions` times the resting length."""
         names = [c.name for c in self.coordinates]
         if not names:
@@ -84,7 +82,7 @@ class Mechanism(abc.ABC):
         return tuple(length * rate for length, rate in zip(resting_lengths, rates, strict=True))
 
     def generalised_forces(
-        self, q: Mapping[str, Value], tensions: Sequence[Value], resting_lengths: Sequence[Value]
+        self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]
     ) -> dict[str, Value]:
         """Generalised force on each coordinate from the muscle tensions [N], by virtual work: J^T F.
 
@@ -102,21 +100,38 @@ class Mechanism(abc.ABC):
         return dict(zip(names, forces, strict=True))
 
     @abc.abstractmethod
-    def acceleration(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
-    ) -> Mapping[str, Value]:
+    def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
         """Acceleration of each coordinate under the generalised muscle forces and the forces of the mechanism."""
 
-    def dissipated_power(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
-    ) -> Value:
+    def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
         """Power [W] that leaves the mechanism through its dampers, end stops, drives and external loads."""
         return 0.0
 
-    def potential_energy(self, q: Mapping[str, Value]) -> Value:
+    def potential_energy(self, q: Values) -> Value:
         """Potential energy [J]."""
         return 0.0
 
-    def kinetic_energy(self, q: Mapping[str, Value], v: Mapping[str, Value]) -> Value:
+    def kinetic_energy(self, q: Values, v: Values) -> Value:
         """Kinetic energy [J]."""
         return 0.0
+
+
+class Translation(Mechanism, abc.ABC):
+    """One coordinate: the position y [m], which is the shortening of the muscles from their resting length."""
+
+    mass: float
+
+    @property
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        return (Coordinate("position", "speed", "m", 0.01, 0.1),)
+
+    def contractions(self, q: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
+        return tuple(q["position"] / length for length in resting_lengths)
+
+    def generalised_forces(
+        self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]
+    ) -> dict[str, Value]:
+        return {"position": sum(tensions, 0.0)}
+
+    def kinetic_energy(self, q: Values, v: Values) -> Value:
+        return 0.5 * self.mass * v["speed"] ** 2

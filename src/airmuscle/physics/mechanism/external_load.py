@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from ...core.declaration import model, parameter
 from ...core.errors import ParameterError
-from ...core.ops import Value
+from ...core.ops import Value, Values
 from ...core.variables import Input
 from .base import Coordinate, Mechanism
 
@@ -61,32 +61,26 @@ class ExternalLoad(Mechanism):
             )
         )
 
-    def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
+    def contractions(self, q: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         given = self.shortenings or (0.0,) * len(resting_lengths)
         return tuple(
             q.get(f"{prefix}{SHORTENING}", default) / length
             for prefix, default, length in zip(self._prefixes, given, resting_lengths, strict=True)
         )
 
-    def contraction_speeds(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], resting_lengths: Sequence[Value]
-    ) -> tuple[Value, ...]:
+    def contraction_speeds(self, q: Values, v: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         return tuple(v.get(f"{prefix}{SHORTENING_SPEED}", 0.0) for prefix in self._prefixes)
 
     def generalised_forces(
-        self, q: Mapping[str, Value], tensions: Sequence[Value], resting_lengths: Sequence[Value]
+        self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]
     ) -> dict[str, Value]:
         """Tension [N] of each muscle, by the name of its shortening."""
         return {f"{prefix}{SHORTENING}": tension for prefix, tension in zip(self._prefixes, tensions, strict=True)}
 
-    def acceleration(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
-    ) -> Mapping[str, Value]:
+    def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
         return {}
 
-    def dissipated_power(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
-    ) -> Value:
+    def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
         """Power [W] that the load outside receives: the sum of tension times shortening speed."""
         speeds = self.contraction_speeds({}, inputs, ())
         pulls = (forces[f"{prefix}{SHORTENING}"] for prefix in self._prefixes)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from ...core import ops
 from ...core.constants import STANDARD_GRAVITY
 from ...core.declaration import model, parameter
 from ...core.errors import ParameterError
-from ...core.ops import Value
+from ...core.ops import Value, Values
 from .base import Coordinate, Mechanism
 
 
@@ -54,7 +54,7 @@ class Lever(Mechanism):
     def coordinates(self) -> tuple[Coordinate, ...]:
         return (Coordinate("angle", "angular_speed", "rad", 0.05, 1.0, -0.5 * ops.pi, 0.5 * ops.pi),)
 
-    def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
+    def contractions(self, q: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         horizontal, vertical = ops.cos(q["angle"]) - 1.0, ops.sin(q["angle"])
         offsets = self.offsets or (0.0,) * len(self.arms)
         contractions = []
@@ -66,19 +66,15 @@ class Lever(Mechanism):
     def _total_inertia(self) -> Value:
         return self.inertia + self.mass * self.load_arm**2
 
-    def acceleration(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
-    ) -> Mapping[str, Value]:
+    def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
         weight = self.mass * self.gravity * self.load_arm * ops.cos(q["angle"])
         return {"angle": (forces["angle"] - weight - self.damping * v["angular_speed"]) / self._total_inertia()}
 
-    def dissipated_power(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
-    ) -> Value:
+    def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
         return self.damping * v["angular_speed"] ** 2
 
-    def potential_energy(self, q: Mapping[str, Value]) -> Value:
+    def potential_energy(self, q: Values) -> Value:
         return self.mass * self.gravity * self.load_arm * ops.sin(q["angle"])
 
-    def kinetic_energy(self, q: Mapping[str, Value], v: Mapping[str, Value]) -> Value:
+    def kinetic_energy(self, q: Values, v: Values) -> Value:
         return 0.5 * self._total_inertia() * v["angular_speed"] ** 2

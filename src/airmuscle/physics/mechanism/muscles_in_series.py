@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from ...core.constants import STANDARD_GRAVITY
 from ...core.declaration import check_structure, model, parameter
 from ...core.errors import ParameterError
-from ...core.ops import Value
+from ...core.ops import Value, Values
 from .base import Coordinate, Mechanism
 from .wrapper import MechanismWrapper
 
@@ -57,44 +57,38 @@ class MusclesInSeries(MechanismWrapper):
     def coordinates(self) -> tuple[Coordinate, ...]:
         return (*self.nodes, *self.inner.coordinates)
 
-    def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
+    def contractions(self, q: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         total = sum(resting_lengths)
         (last,) = self.inner.contractions(q, [total])
         positions = [0.0, *(q[node.name] for node in self.nodes), total * last]
         return tuple((positions[i + 1] - positions[i]) / length for i, length in enumerate(resting_lengths))
 
-    def contraction_speeds(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], resting_lengths: Sequence[Value]
-    ) -> tuple[Value, ...]:
+    def contraction_speeds(self, q: Values, v: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         speeds = [0.0, *(v[node.speed] for node in self.nodes)]
         speeds += self.inner.contraction_speeds(q, v, [sum(resting_lengths)])
         return tuple(after - before for before, after in itertools.pairwise(speeds))
 
     def generalised_forces(
-        self, q: Mapping[str, Value], tensions: Sequence[Value], resting_lengths: Sequence[Value]
+        self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]
     ) -> dict[str, Value]:
         nodes = {node.name: tensions[i] - tensions[i + 1] for i, node in enumerate(self.nodes)}
         return {**nodes, **self.inner.generalised_forces(q, tensions[-1:], [sum(resting_lengths)])}
 
-    def acceleration(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
-    ) -> Mapping[str, Value]:
+    def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
         nodes = {
             node.name: (forces[node.name] - self.damping * v[node.speed]) / mass - self.gravity
             for node, mass in zip(self.nodes, self.node_masses, strict=True)
         }
         return {**nodes, **self.inner.acceleration(q, v, forces, inputs)}
 
-    def dissipated_power(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
-    ) -> Value:
+    def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
         nodes = sum(self.damping * v[node.speed] ** 2 for node in self.nodes)
         return nodes + self.inner.dissipated_power(q, v, forces, inputs)
 
-    def potential_energy(self, q: Mapping[str, Value]) -> Value:
+    def potential_energy(self, q: Values) -> Value:
         mass_moment = sum(mass * q[node.name] for node, mass in zip(self.nodes, self.node_masses, strict=True))
         return self.gravity * mass_moment + self.inner.potential_energy(q)
 
-    def kinetic_energy(self, q: Mapping[str, Value], v: Mapping[str, Value]) -> Value:
+    def kinetic_energy(self, q: Values, v: Values) -> Value:
         nodes = sum(0.5 * mass * v[node.speed] ** 2 for node, mass in zip(self.nodes, self.node_masses, strict=True))
         return nodes + self.inner.kinetic_energy(q, v)

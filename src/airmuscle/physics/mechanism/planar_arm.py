@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from ...core import ops
 from ...core.constants import STANDARD_GRAVITY
 from ...core.declaration import check_structure, model, parameter
 from ...core.errors import ParameterError
-from ...core.ops import Value
+from ...core.ops import Value, Values
 from .base import Coordinate, Mechanism
 from .pulley_profile import ConstantRadius, PulleyProfile
-from .spd_solve import solve_positive_definite
 
 Matrix = list[list[Value]]
 
@@ -121,14 +120,14 @@ class PlanarArm(Mechanism):
             for i, link in enumerate(self.links, start=1)
         )
 
-    def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
+    def contractions(self, q: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         angles = self._angles(q)
         return tuple(
             route.offset + route.shortening(angles) / length
             for route, length in zip(self.routes, resting_lengths, strict=True)
         )
 
-    def mass_matrix(self, q: Mapping[str, Value]) -> Matrix:
+    def mass_matrix(self, q: Values) -> Matrix:
         """Mass matrix M [kg m^2] in the joint angles, n rows of n values; symmetric and positive definite."""
         inner, count = self._link_matrix(self._link_angles(q)), len(self.links)
         return [
@@ -136,7 +135,7 @@ class PlanarArm(Mechanism):
             for i in range(count)
         ]
 
-    def tip(self, q: Mapping[str, Value]) -> tuple[Value, Value]:
+    def tip(self, q: Values) -> tuple[Value, Value]:
         """Horizontal position and height [m] of the tip relative to the first joint."""
         pairs = list(zip(self.links, self._link_angles(q), strict=True))
         return (
@@ -144,9 +143,7 @@ class PlanarArm(Mechanism):
             -sum(link.length * ops.cos(angle) for link, angle in pairs),
         )
 
-    def acceleration(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
-    ) -> Mapping[str, Value]:
+    def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
         angles, speeds = self._link_angles(q), self._link_speeds(v)
         count, coupling, moments = len(angles), self._couplings(), self._mass_moments()
         torques = [
@@ -163,27 +160,25 @@ class PlanarArm(Mechanism):
         joints = [links[0], *(links[i] - links[i - 1] for i in range(1, count))]
         return {c.name: value for c, value in zip(self.coordinates, joints, strict=True)}
 
-    def dissipated_power(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
-    ) -> Value:
+    def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
         return sum(link.damping * v[c.speed] ** 2 for c, link in zip(self.coordinates, self.links, strict=True))
 
-    def potential_energy(self, q: Mapping[str, Value]) -> Value:
+    def potential_energy(self, q: Values) -> Value:
         pairs = zip(self._mass_moments(), self._link_angles(q), strict=True)
         return sum(self.gravity * moment * (1.0 - ops.cos(angle)) for moment, angle in pairs)
 
-    def kinetic_energy(self, q: Mapping[str, Value], v: Mapping[str, Value]) -> Value:
+    def kinetic_energy(self, q: Values, v: Values) -> Value:
         matrix, speeds = self._link_matrix(self._link_angles(q)), self._link_speeds(v)
         count = range(len(speeds))
         return 0.5 * sum(matrix[i][j] * speeds[i] * speeds[j] for i in count for j in count)
 
-    def _angles(self, q: Mapping[str, Value]) -> list[Value]:
+    def _angles(self, q: Values) -> list[Value]:
         return [q[c.name] for c in self.coordinates]
 
-    def _link_angles(self, q: Mapping[str, Value]) -> list[Value]:
+    def _link_angles(self, q: Values) -> list[Value]:
         return _running_sums(self._angles(q))
 
-    def _link_speeds(self, v: Mapping[str, Value]) -> list[Value]:
+    def _link_speeds(self, v: Values) -> list[Value]:
         return _running_sums([v[c.speed] for c in self.coordinates])
 
     def _masses_beyond(self) -> list[Value]:
@@ -221,3 +216,25 @@ def _running_sums(values: Sequence[Value]) -> list[Value]:
         total = total + value
         sums.append(total)
     return sums
+
+
+def solve_positive_definite(matrix: Sequence[Sequence[Value]], right: Sequence[Value]) -> list[Value]:
+    """Return x of A x = b by the factorisation A = L D L^T without pivoting; A is symmetric and positive definite.
+
+    The values may be numbers, arrays or symbols.
+    """
+    count = len(right)
+    lower: list[list[Value]] = [[0.0] * count for _ in range(count)]
+    diagonal: list[Value] = []
+    for j in range(count):
+        diagonal.append(matrix[j][j] - sum(lower[j][k] ** 2 * diagonal[k] for k in range(j)))
+        for i in range(j + 1, count):
+            known = sum(lower[i][k] * lower[j][k] * diagonal[k] for k in range(j))
+            lower[i][j] = (matrix[i][j] - known) / diagonal[j]
+    y: list[Value] = []
+    for i in range(count):
+        y.append(right[i] - sum(lower[i][k] * y[k] for k in range(i)))
+    x = [value / pivot for value, pivot in zip(y, diagonal, strict=True)]
+    for i in reversed(range(count)):
+        x[i] = x[i] - sum(lower[k][i] * x[k] for k in range(i + 1, count))
+    return x

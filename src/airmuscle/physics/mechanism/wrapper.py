@@ -1,10 +1,13 @@
-"""MechanismWrapper: base class of wrappers of a mechanism."""
+"""Wrappers of a mechanism: latch, contraction offsets, friction of a joint, torque from outside."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
-from ...core.ops import Value
+from ...core import ops
+from ...core.declaration import check_structure, model, parameter
+from ...core.errors import ParameterError
+from ...core.ops import Value, Values
 from ...core.variables import Input
 from .base import Coordinate, Mechanism
 
@@ -26,31 +29,159 @@ class MechanismWrapper(Mechanism):
     def muscle_count(self) -> int | None:
         return self.inner.muscle_count
 
-    def contractions(self, q: Mapping[str, Value], resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
+    def contractions(self, q: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         return self.inner.contractions(q, resting_lengths)
 
-    def contraction_speeds(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], resting_lengths: Sequence[Value]
-    ) -> tuple[Value, ...]:
+    def contraction_speeds(self, q: Values, v: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         return self.inner.contraction_speeds(q, v, resting_lengths)
 
     def generalised_forces(
-        self, q: Mapping[str, Value], tensions: Sequence[Value], resting_lengths: Sequence[Value]
+        self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]
     ) -> dict[str, Value]:
         return self.inner.generalised_forces(q, tensions, resting_lengths)
 
-    def acceleration(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
-    ) -> Mapping[str, Value]:
+    def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
         return self.inner.acceleration(q, v, forces, inputs)
 
-    def dissipated_power(
-        self, q: Mapping[str, Value], v: Mapping[str, Value], forces: Mapping[str, Value], inputs: Mapping[str, Value]
-    ) -> Value:
+    def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
         return self.inner.dissipated_power(q, v, forces, inputs)
 
-    def potential_energy(self, q: Mapping[str, Value]) -> Value:
+    def potential_energy(self, q: Values) -> Value:
         return self.inner.potential_energy(q)
 
-    def kinetic_energy(self, q: Mapping[str, Value], v: Mapping[str, Value]) -> Value:
+    def kinetic_energy(self, q: Values, v: Values) -> Value:
         return self.inner.kinetic_energy(q, v)
+
+
+@model
+class WithLatch(MechanismWrapper):
+    """Mechanism with a latch: while the input `latched` is 1, all accelerations are 0; at 0 the mechanism is free.
+
+    The latch carries the unbalanced forces. Start the simulation at rest and switch the input in a single step.
+    """
+
+    inner: Mechanism
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        return (Input("latched", meaning="1 latched, 0 released"), *self.inner.inputs)
+
+    def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
+        free = self.inner.acceleration(q, v, forces, inputs)
+        return {name: (1.0 - inputs["latched"]) * value for name, value in free.items()}
+
+
+@model
+class WithOffsets(MechanismWrapper):
+    """Contraction offsets: eps_i = eps_0i + eps_i,inner; a negative offset is a pre-stretch."""
+
+    inner: Mechanism
+    offsets: tuple[float, ...] = parameter("1", "eps_0i", "contraction offset of each muscle", bounds=(-0.5, 0.9))
+
+    def check(self) -> None:
+        if self.inner.muscle_count not in (None, len(self.offsets)):
+            raise ParameterError(
+                f"WithOffsets: {type(self.inner).__name__} takes {self.inner.muscle_count} muscles; "
+                f"{len(self.offsets)} offsets are given. Give one for each muscle."
+            )
+
+    @property
+    def muscle_count(self) -> int | None:
+        return len(self.offsets)
+
+    def contractions(self, q: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
+        inner = self.inner.contractions(q, resting_lengths)
+        return tuple(offset + contraction for offset, contraction in zip(self.offsets, inner, strict=True))
+
+
+@model
+class JointWithFriction(MechanismWrapper):
+    """Regularised Coulomb friction of a joint: Q_f = -T_c w/sqrt(w^2 + w_0^2).
+
+    w angular speed, T_c friction torque, w_0 regularising speed: above about 3 w_0 the torque is within 5 % of T_c. The
+    friction torque is zero at rest, so that a joint under load creeps with a speed below w_0 instead of sticking;
+    equilibria are those without friction. Viscous friction is a parameter of the inner mechanism.
+    """
+
+    inner: Mechanism
+    friction_torque: float = parameter("N m", "T_c", "friction torque", bounds=(0.0, 1e4))
+    regularising_speed: float = parameter(
+        "rad/s", "w_0", "regularising speed", bounds=(1e-6, 10.0), fitted=False, default=0.01
+    )
+    coordinate: str = ""
+    """Name of the angle with friction; required if several coordinates are angles."""
+
+    def check(self) -> None:
+        check_structure(self)
+        angles = [c.name for c in self.inner.coordinates if c.unit == "rad"]
+        owner = type(self.inner).__name__
+        if not angles:
+            raise ParameterError(f"JointWithFriction: {owner} has no angle; use another mechanism.")
+        if self.coordinate and self.coordinate not in angles:
+            raise ParameterError(
+                f"JointWithFriction: its coordinate is '{self.coordinate}'; allowed are the angles of {owner}: "
+                f"{', '.join(angles)}."
+            )
+        if not self.coordinate and len(angles) > 1:
+            raise ParameterError(
+                f"JointWithFriction: {owner} has {len(angles)} angles; set coordinate to the one with friction: "
+                f"{' or '.join(angles)}."
+            )
+
+    @property
+    def angle(self) -> Coordinate:
+        """Angle on which the friction acts."""
+        return next(c for c in self.inner.coordinates if c.unit == "rad" and self.coordinate in ("", c.name))
+
+    def friction(self, angular_speed: Value) -> Value:
+        """Generalised friction force [N m] at an angular speed [rad/s]."""
+        return -self.friction_torque * angular_speed / ops.sqrt(angular_speed**2 + self.regularising_speed**2)
+
+    def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
+        return self.inner.acceleration(q, v, self._with_friction(v, forces), inputs)
+
+    def _with_friction(self, v: Values, forces: Values) -> Values:
+        name = self.angle.name
+        return {**forces, name: forces[name] + self.friction(v[self.angle.speed])}
+
+    def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
+        speed = v[self.angle.speed]
+        inner = self.inner.dissipated_power(q, v, self._with_friction(v, forces), inputs)
+        return inner - self.friction(speed) * speed
+
+
+@model
+class JointWithExternalTorque(MechanismWrapper):
+    """M theta'' = Q + tau_e: the input `external_torque` tau_e adds to the torque Q of the muscles on a joint.
+
+    It is a load that is picked up, a push, or the torque of a test bench; positive in the direction of the angle. Its
+    power is part of the power that leaves the mechanism. The mechanism has one coordinate, an angle.
+    """
+
+    inner: Mechanism
+
+    def check(self) -> None:
+        check_structure(self)
+        coordinates = self.inner.coordinates
+        if len(coordinates) != 1 or coordinates[0].unit != "rad":
+            names = ", ".join(f"{c.name} [{c.unit}]" for c in coordinates) or "none"
+            raise ParameterError(
+                f"JointWithExternalTorque: the coordinates of {type(self.inner).__name__} are {names}; it needs a "
+                "mechanism with one angle, such as AntagonisticJoint."
+            )
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        torque = Input("external_torque", "N m", -1e4, 1e4, "torque on the joint from outside")
+        return (torque, *self.inner.inputs)
+
+    def _with_torque(self, forces: Values, inputs: Values) -> dict[str, Value]:
+        name = self.inner.coordinates[0].name
+        return {**forces, name: forces[name] + inputs["external_torque"]}
+
+    def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
+        return self.inner.acceleration(q, v, self._with_torque(forces, inputs), inputs)
+
+    def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
+        inner = self.inner.dissipated_power(q, v, self._with_torque(forces, inputs), inputs)
+        return inner - inputs["external_torque"] * v[self.inner.coordinates[0].speed]

@@ -1,16 +1,25 @@
 """Hill-type muscle model: contractile element, parallel and series elements, wall, end stop."""
 
-from .creep import CreepElements
-from .damper import Damper, DirectionalDamper, LinearDamper, PressureDamper
+from .characteristic.reynolds2003 import Reynolds2003Damper, Reynolds2003Spring
+from .characteristic.serres2009 import Serres2009Damper, Serres2009Spring
 from .display import parameter_rows
 from .isobars import compute_isobars
 from .muscle import INNER_CONTRACTION, Muscle
+from .passive_elements import (
+    CreepElements,
+    CubicSpring,
+    Damper,
+    DirectionalDamper,
+    EndStop,
+    LinearDamper,
+    LinearSpring,
+    NoStop,
+    PressureDamper,
+    Spring,
+    Stop,
+)
 from .ratings import RatedRange, Ratings
-from .reynolds2003 import Reynolds2003Damper, Reynolds2003Spring
 from .series import CubicSeriesSpring, ElasticSeriesElement, RigidSeriesElement, SeriesElement, SeriesSpring
-from .serres2009 import Serres2009Damper, Serres2009Spring
-from .spring import CubicSpring, LinearSpring, Spring
-from .stop import EndStop, NoStop, Stop
 from .wall import RigidWall, SwellingWall, ViscoelasticWall, Wall
 
 __all__ = [

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple
 
@@ -12,28 +11,23 @@ from ...core.annotation import abridged
 from ...core.declaration import model
 from ...core.errors import AirmuscleWarning, ParameterError
 from ...core.notebook import Card, NotebookDisplay
-from ...core.ops import Value
+from ...core.ops import Value, Values
 from ...core.quantity_arguments import accept_quantities_in
 from ...core.reference import Reference
 from ...core.variables import StateVariable
-from .characteristic.base import Characteristic, ForceLaw
-from .characteristic.clamped import Clamped
+from .characteristic.base import Characteristic, Clamped, ForceLaw
 from .characteristic.contractile_surface import HOSOVSKY_HILL
 from .characteristic.validity_range import ValidityRange
 from .characteristic.virtual_work import VirtualWork
-from .creep import CreepElements
-from .damper import Damper, LinearDamper
 from .display import component_rows, plot_isobars
 from .friction.base import Friction, NoFriction
 from .geometry.base import Geometry
+from .passive_elements import CreepElements, Damper, LinearDamper, LinearSpring, NoStop, Spring, Stop
 from .ratings import Ratings
-from .series import ElasticSeriesElement, RigidSeriesElement, SeriesElement
-from .series_equilibrium import solve_inner_contraction, without_derivative
-from .spring import LinearSpring, Spring
-from .stop import NoStop, Stop
+from .series import ElasticSeriesElement, RigidSeriesElement, SeriesElement, solve_inner_contraction, without_derivative
 from .wall import RigidWall, Wall
 
-RELAXED: Mapping[str, Value] = MappingProxyType({})
+RELAXED: Values = MappingProxyType({})
 """Relaxed state of a muscle: every state that is not given is 0."""
 INNER_CONTRACTION = "inner_contraction"
 """Name of the state of a muscle with a series spring: the contraction of its contractile element."""
@@ -183,18 +177,18 @@ class Muscle(NotebookDisplay):
         stretch = (inner_contraction - contraction) * self.geometry.resting_length
         return self.static_force(pressure, inner_contraction) - self.series.force(stretch)
 
-    def inner_contraction(self, contraction: Value, state: Mapping[str, Value] = RELAXED) -> Value:
+    def inner_contraction(self, contraction: Value, state: Values = RELAXED) -> Value:
         """Contraction of the contractile element for a contraction of the muscle between its fittings."""
         return state[INNER_CONTRACTION] if isinstance(self.series, ElasticSeriesElement) else contraction
 
-    def volume(self, inner_contraction: Value, state: Mapping[str, Value] = RELAXED) -> Value:
+    def volume(self, inner_contraction: Value, state: Values = RELAXED) -> Value:
         """Enclosed volume [m3] at a contraction of the contractile element."""
         enclosed = self.geometry.volume(inner_contraction)
         return enclosed + self.wall.volume(state) if self.wall.states else enclosed
 
     def compute_force(
         self, pressure: Value, inner_contraction: Value, contraction: Value, speed: Value,
-        state: Mapping[str, Value] = RELAXED,
+        state: Values = RELAXED,
     ) -> MuscleForce:  # fmt: skip
         """Tension, friction and inner speed at a gauge pressure [Pa] and a speed of shortening [m/s].
 
@@ -214,7 +208,7 @@ class Muscle(NotebookDisplay):
             inner_speed = ops.minimum(inner_speed, stopped_speed)
         return MuscleForce(tension, self.friction_force(pressure, inner_speed, state), inner_speed)
 
-    def rates(self, state: Mapping[str, Value], pressure: Value, inner_speed: Value) -> dict[str, Value]:
+    def rates(self, state: Values, pressure: Value, inner_speed: Value) -> dict[str, Value]:
         """Time derivatives of the states at a gauge pressure [Pa] and an inner speed of shortening [m/s]."""
         rates = self.friction.rates(self._bristle_state(state), inner_speed)
         rates |= self.creep.rates(state, inner_speed)
@@ -223,9 +217,7 @@ class Muscle(NotebookDisplay):
             rates[INNER_CONTRACTION] = inner_speed / self.geometry.resting_length
         return rates
 
-    def tension(
-        self, pressure: Value, contraction: Value, speed: Value = 0.0, state: Mapping[str, Value] = RELAXED
-    ) -> Value:
+    def tension(self, pressure: Value, contraction: Value, speed: Value = 0.0, state: Values = RELAXED) -> Value:
         """Tension [N] at gauge pressure [Pa], contraction and speed of shortening [m/s], without a series spring."""
         taut = ops.maximum(self.unclamped_tension(pressure, contraction, speed, state), 0.0)
         if isinstance(self.stop, NoStop):
@@ -233,7 +225,7 @@ class Muscle(NotebookDisplay):
         return taut - self.stop.force(contraction, speed, self.geometry.resting_length)
 
     def unclamped_tension(
-        self, pressure: Value, contraction: Value, speed: Value = 0.0, state: Mapping[str, Value] = RELAXED
+        self, pressure: Value, contraction: Value, speed: Value = 0.0, state: Values = RELAXED
     ) -> Value:
         """Sum of the forces of all elements but the end stop [N]; where it is negative, the muscle is slack."""
         total = (
@@ -249,11 +241,11 @@ class Muscle(NotebookDisplay):
         elements = self.unclamped_tension(pressure, contraction)
         return elements - self.stop.force(contraction, 0.0, self.geometry.resting_length)
 
-    def friction_force(self, pressure: Value, speed: Value, state: Mapping[str, Value] = RELAXED) -> Value:
+    def friction_force(self, pressure: Value, speed: Value, state: Values = RELAXED) -> Value:
         """Friction force against shortening [N] at a gauge pressure [Pa] and a speed of shortening [m/s]."""
         return self.friction.pressure_factor(pressure) * self.friction.force(self._bristle_state(state), speed)
 
-    def _bristle_state(self, state: Mapping[str, Value]) -> dict[str, Value]:
+    def _bristle_state(self, state: Values) -> dict[str, Value]:
         return {s.name: state.get(s.name, 0.0) for s in self.friction.states}
 
     def _relaxed_creep(self) -> dict[str, Value]:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import abc
-from collections.abc import Mapping
 
 from ...core import ops
 from ...core.declaration import model, parameter
-from ...core.ops import Value
+from ...core.ops import Value, Values
 from ...core.variables import StateVariable
 
 
@@ -23,11 +22,11 @@ class Wall:
         """Steady state at a gauge pressure [Pa]."""
         return {}
 
-    def volume(self, state: Mapping[str, Value]) -> Value:
+    def volume(self, state: Values) -> Value:
         """Added volume [m3]."""
         return 0.0
 
-    def rates(self, state: Mapping[str, Value], pressure: Value) -> dict[str, Value]:
+    def rates(self, state: Values, pressure: Value) -> dict[str, Value]:
         """Time derivatives of the states at a gauge pressure [Pa]."""
         return {}
 
@@ -53,10 +52,10 @@ class _FirstOrderWall(Wall):
     def steady_state(self, pressure: Value) -> dict[str, Value]:
         return {"wall_volume": self.steady_volume(pressure)}
 
-    def volume(self, state: Mapping[str, Value]) -> Value:
+    def volume(self, state: Values) -> Value:
         return state["wall_volume"]
 
-    def rates(self, state: Mapping[str, Value], pressure: Value) -> dict[str, Value]:
+    def rates(self, state: Values, pressure: Value) -> dict[str, Value]:
         return {"wall_volume": (self.steady_volume(pressure) - state["wall_volume"]) / self.time_constant}
 
 

@@ -12,7 +12,7 @@ from ...core.arrays import Array
 from ...core.errors import ParameterError
 from ...core.variables import select_prefix
 from ..mechanism import AntagonisticJoint, Mechanism
-from ..mechanism.translation import Translation
+from ..mechanism.base import Translation
 from ..mechanism.wrapper import MechanismWrapper
 from ..muscle.geometry import Geometry
 

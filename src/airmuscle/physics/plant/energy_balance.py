@@ -7,13 +7,12 @@ from typing import Any, ClassVar
 
 from ...core.declaration import model
 from ...core.diagnostics import ColumnLimit, Columns, Diagnostic
-from ...core.ops import Value
+from ...core.ops import Value, Values
 from ...core.system import System
 from ...core.variables import Input, StateVariable
 from ..muscle import ElasticSeriesElement, Muscle
 from ..muscle.friction import NoFriction
-from .evaluation import PlantEvaluation
-from .muscle_state import MuscleState
+from .muscle_state import MuscleState, PlantEvaluation
 from .plant import Plant
 
 _METERS = (
@@ -118,24 +117,20 @@ class WithEnergyMeters(System):
         """The remedy of the plant."""
         return self.plant.failure_hint(state)
 
-    def rates(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
+    def rates(self, state: Values, inputs: Values) -> dict[str, Value]:
         """The plant's rates, and the power that each meter integrates."""
         return self._rates_of(self.plant.evaluate(state, inputs), state, inputs)
 
-    def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Any]:
+    def outputs(self, state: Values, inputs: Values) -> dict[str, Any]:
         """The plant's outputs; kinetic, potential and the muscles' air energy [J]; mass of all air [kg]."""
         return self._outputs_of(self.plant.evaluate(state, inputs), state)
 
-    def rates_and_outputs(
-        self, state: Mapping[str, Value], inputs: Mapping[str, Value]
-    ) -> tuple[dict[str, Value], dict[str, Any]]:
+    def rates_and_outputs(self, state: Values, inputs: Values) -> tuple[dict[str, Value], dict[str, Any]]:
         """Both from one evaluation of the plant."""
         at = self.plant.evaluate(state, inputs)
         return self._rates_of(at, state, inputs), self._outputs_of(at, state)
 
-    def _rates_of(
-        self, at: PlantEvaluation, state: Mapping[str, Value], inputs: Mapping[str, Value]
-    ) -> dict[str, Value]:
+    def _rates_of(self, at: PlantEvaluation, state: Values, inputs: Values) -> dict[str, Value]:
         plant = self.plant
         powers: dict[str, Value] = dict.fromkeys((meter.name for meter in self.meters), 0.0)
         for part, muscle, flow in zip(plant.muscles, at.muscles, at.flows, strict=True):
@@ -151,7 +146,7 @@ class WithEnergyMeters(System):
             powers["air_exhausted"] += circuit.exhausted.mass
         return {**plant.rates_of(at, state), **powers}
 
-    def _outputs_of(self, at: PlantEvaluation, state: Mapping[str, Value]) -> dict[str, Any]:
+    def _outputs_of(self, at: PlantEvaluation, state: Values) -> dict[str, Any]:
         plant = self.plant
         own = {s.name: state[s.name] for s in plant.states}
         return {

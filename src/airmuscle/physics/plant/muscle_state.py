@@ -1,15 +1,16 @@
-"""MuscleState: the pneumatic and mechanical state of a muscle at one instant."""
+"""State of the muscles of a plant: one instant, steady state, evaluation of the whole plant."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
 from typing import NamedTuple
 
-from ...core.ops import Value
-from ...core.variables import StateVariable
+from ...core.ops import Value, Values
+from ...core.variables import StateVariable, select_prefix, with_prefix
 from ..muscle import Muscle
 from ..muscle.friction import NoFriction
-from ..pneumatics.gas import Air, Ambient, Gas, gauge_pressure
+from ..pneumatics import CircuitFlows
+from ..pneumatics.gas import Air, Ambient, Flow, Gas, absolute_pressure, gauge_pressure
 
 _TYPICAL_CONTRACTION = 0.05
 """Contraction whose muscle volume defines the nominal value of the air mass (chosen)."""
@@ -32,12 +33,12 @@ class MuscleState(NamedTuple):
     inner_contraction: Value
     inner_speed: Value
     volume_rate: Value
-    states: Mapping[str, Value]
-    rates: Mapping[str, Value]
+    states: Values
+    rates: Values
 
 
 def muscle_state(
-    muscle: Muscle, state: Mapping[str, Value], contraction: Value, speed: Value, gas: Gas, ambient: Ambient
+    muscle: Muscle, state: Values, contraction: Value, speed: Value, gas: Gas, ambient: Ambient
 ) -> MuscleState:
     """A muscle with its own state and that of its air, at a contraction and a shortening speed of its fittings."""
     inner = muscle.inner_contraction(contraction, state)
@@ -77,3 +78,43 @@ def states_of_muscle(prefix: str, muscle: Muscle, states: tuple[StateVariable, .
 def air_states(muscle: Muscle, gas: Gas, ambient: Ambient) -> tuple[StateVariable, ...]:
     """States of the air in a muscle, by their own names."""
     return gas.states(muscle.geometry.volume(_TYPICAL_CONTRACTION), ambient)
+
+
+def settle_muscles(
+    muscles: Sequence[Muscle], prefixes: Sequence[str], contractions: Sequence[Value], pressures: Sequence[Value],
+    state: Values,
+) -> tuple[dict[str, Value], list[Value]]:  # fmt: skip
+    """`state` with the muscles' own states, in steady state unless they are given, and the volume [m3] of each."""
+    settled, volumes = dict(state), []
+    for muscle, prefix, pressure, contraction in zip(muscles, prefixes, pressures, contractions, strict=True):
+        own = {**muscle.steady_state(pressure, contraction), **select_prefix(prefix, state)}
+        volumes.append(muscle.volume(muscle.inner_contraction(contraction, own), own))
+        settled = {**with_prefix(prefix, own), **settled}
+    return settled, volumes
+
+
+def fill_muscles(
+    gas: Gas, ambient: Ambient, prefixes: Sequence[str], pressures: Sequence[Value], volumes: Sequence[Value]
+) -> tuple[dict[str, Value], list[Air]]:
+    """The states of the air at gauge pressures [Pa] in volumes [m3], and the air itself."""
+    filled: dict[str, Value] = {}
+    airs = []
+    for prefix, pressure, volume in zip(prefixes, pressures, volumes, strict=True):
+        content = gas.state_at(absolute_pressure(pressure, ambient), volume, ambient)
+        airs.append(gas.air(content, volume, ambient))
+        filled |= with_prefix(prefix, content)
+    return filled, airs
+
+
+class PlantEvaluation(NamedTuple):
+    """Muscles and circuits of a plant at one instant; forces [N] or [N m] and accelerations by coordinate."""
+
+    muscles: tuple[MuscleState, ...]
+    circuits: tuple[CircuitFlows, ...]
+    forces: Values
+    accelerations: Values
+
+    @property
+    def flows(self) -> list[Flow]:
+        """The flow into every muscle."""
+        return [flow for circuit in self.circuits for flow in circuit.flows]

@@ -11,21 +11,28 @@ from typing import Any, ClassVar
 from ...core.declaration import model
 from ...core.diagnostics import ColumnLimit, Columns, Diagnostic, DiagnosticCode
 from ...core.errors import GeometryLimitError
-from ...core.ops import Value
+from ...core.ops import Value, Values
 from ...core.variables import Input, StateVariable, add_prefix, select_prefix, with_prefix
 from ..equilibrium.equilibrium import equilibria_at_ambient_pressure, equilibrium_at_ambient_pressure
 from ..equilibrium.static_plant import StaticPlant
 from ..mechanism import Mechanism
 from ..muscle import Muscle
 from ..pneumatics import Circuit, CircuitFlows
+from ..pneumatics.circuit import key_by_muscle, key_by_port
 from ..pneumatics.gas import Air, Ambient, Gas
-from ..pneumatics.ports import key_by_muscle, key_by_port
-from ..pneumatics.wall_heat_transfer import DEFAULT_GAS
+from ..pneumatics.virial_gas import DEFAULT_GAS
 from . import diagnostics
 from .display import PlantDisplay
-from .evaluation import PlantEvaluation
-from .muscle_state import MuscleState, air_states, muscle_outputs, muscle_state, states_of_muscle
-from .steady_state import fill_muscles, settle_muscles
+from .muscle_state import (
+    MuscleState,
+    PlantEvaluation,
+    air_states,
+    fill_muscles,
+    muscle_outputs,
+    muscle_state,
+    settle_muscles,
+    states_of_muscle,
+)
 from .validation import as_quantity, check_free, check_parts, check_pressures, check_unique, convert_pressures
 
 _AIR_STATES = ("air_mass", "internal_energy")
@@ -144,13 +151,11 @@ class Plant(PlantDisplay, StaticPlant):
         """Values under a circuit's own names, by the plant's names."""
         return key_by_muscle(self.prefixes, values) if self._shared else with_prefix(prefix, values)
 
-    def _within(self, prefix: str, values: Mapping[str, Value]) -> Mapping[str, Value]:
+    def _within(self, prefix: str, values: Values) -> Values:
         """Values under the plant's names, by a circuit's own names."""
         return key_by_port(self.prefixes, values) if self._shared else select_prefix(prefix, values)
 
-    def muscle_states(
-        self, state: Mapping[str, Value], inputs: Mapping[str, Value] = MappingProxyType({})
-    ) -> tuple[MuscleState, ...]:
+    def muscle_states(self, state: Values, inputs: Values = MappingProxyType({})) -> tuple[MuscleState, ...]:
         """Every muscle at a state; `inputs` are required if shortenings are inputs."""
         place = {**inputs, **state}
         contractions = self.mechanism.contractions(place, self.resting_lengths)
@@ -161,7 +166,7 @@ class Plant(PlantDisplay, StaticPlant):
         )
 
     def circuit_flows(
-        self, muscles: tuple[MuscleState, ...], state: Mapping[str, Value], inputs: Mapping[str, Value]
+        self, muscles: tuple[MuscleState, ...], state: Values, inputs: Values
     ) -> tuple[CircuitFlows, ...]:
         """Flows, rates and outputs of every circuit."""
         airs = self._by_circuit([muscle.air for muscle in muscles])
@@ -170,18 +175,18 @@ class Plant(PlantDisplay, StaticPlant):
             for (prefix, circuit), air in zip(self._circuits(), airs, strict=True)
         )
 
-    def evaluate(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> PlantEvaluation:
+    def evaluate(self, state: Values, inputs: Values) -> PlantEvaluation:
         """Muscles, circuits, forces and accelerations at a state."""
         muscles = self.muscle_states(state, inputs)
         forces = self.mechanism.generalised_forces(state, [m.tension for m in muscles], self.resting_lengths)
         accelerations = self.mechanism.acceleration(state, state, forces, inputs)
         return PlantEvaluation(muscles, self.circuit_flows(muscles, state, inputs), forces, accelerations)
 
-    def rates(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
+    def rates(self, state: Values, inputs: Values) -> dict[str, Value]:
         """The time derivative of every state."""
         return self.rates_of(self.evaluate(state, inputs), state)
 
-    def rates_of(self, at: PlantEvaluation, state: Mapping[str, Value]) -> dict[str, Value]:
+    def rates_of(self, at: PlantEvaluation, state: Values) -> dict[str, Value]:
         """The rates from an evaluation at this state."""
         rates: dict[str, Value] = {}
         for muscle, prefix, flow in zip(at.muscles, self.prefixes, at.flows, strict=True):
@@ -193,7 +198,7 @@ class Plant(PlantDisplay, StaticPlant):
             rates |= self._outside(prefix, circuit.rates)
         return rates
 
-    def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
+    def outputs(self, state: Values, inputs: Values) -> dict[str, Value]:
         """Gauge pressure, contraction, tension, volume, mass flow and, where modelled, friction force, shortening speed
         and temperature of every muscle; outputs of the circuits; accelerations."""
         return self.outputs_of(self.evaluate(state, inputs))
@@ -207,9 +212,7 @@ class Plant(PlantDisplay, StaticPlant):
             outputs |= self._outside(prefix, circuit.outputs)
         return outputs | {c.acceleration: at.accelerations[c.name] for c in self.mechanism.coordinates}
 
-    def rates_and_outputs(
-        self, state: Mapping[str, Value], inputs: Mapping[str, Value]
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
+    def rates_and_outputs(self, state: Values, inputs: Values) -> tuple[dict[str, Value], dict[str, Value]]:
         """Both from one evaluation."""
         at = self.evaluate(state, inputs)
         return self.rates_of(at, state), self.outputs_of(at)
@@ -237,16 +240,12 @@ class Plant(PlantDisplay, StaticPlant):
         state = self.fill_muscles(pressures, volumes, state)
         return {s.name: float(state[s.name]) for s in self.states}
 
-    def settle_muscles(
-        self, pressures: Sequence[Value], state: Mapping[str, Value]
-    ) -> tuple[dict[str, Value], list[Value]]:
+    def settle_muscles(self, pressures: Sequence[Value], state: Values) -> tuple[dict[str, Value], list[Value]]:
         """As StaticPlant; nothing is checked, and values and parameters may be arrays that broadcast."""
         contractions = self.mechanism.contractions(state, self.resting_lengths)
         return settle_muscles(self.muscles, self.prefixes, contractions, pressures, state)
 
-    def fill_muscles(
-        self, pressures: Sequence[Value], volumes: Sequence[Value], state: Mapping[str, Value]
-    ) -> dict[str, Value]:
+    def fill_muscles(self, pressures: Sequence[Value], volumes: Sequence[Value], state: Values) -> dict[str, Value]:
         """`state` with air at these gauge pressures [Pa] in muscles of these volumes [m3], and circuits settled."""
         content, airs = fill_muscles(self.gas, self.ambient, self.prefixes, pressures, volumes)
         filled = {**state, **content}

@@ -1,12 +1,10 @@
 """Pneumatic circuits: air supplies, valves and tubes between supply and muscle."""
 
 from . import conversion
-from .check_valve import CheckValve
 from .circuit import Circuit, CircuitFlows
 from .combination import in_parallel, in_series
 from .distributed_tube import DistributedTube
 from .fill_discharge import ClosedChamber, FillDischarge, ThreePositionValve, ambient_air
-from .flow import orifice_flow
 from .gas import (
     GAS_CONSTANT,
     NO_FLOW,
@@ -24,17 +22,12 @@ from .gas import (
     gauge_pressure,
 )
 from .manifold import Manifold, WithLeak
-from .orifice import Orifice
 from .pressure_regulator import PressureRegulator
 from .proportional import ProportionalRegulator, ProportionalValve, SecondOrderLag
-from .subsonic_index_valve import SubsonicIndexValve
 from .supply import AirSource, RegulatedSupply, SharedSupply, Supply, Tank
-from .tube import Tube, TubeOrifice
-from .tube_model import TubeModel
-from .valve import Valve
-from .virial_gas import VirialGas, virial_coefficient_of_air
-from .wall_heat_transfer import DEFAULT_GAS, WallHeatTransfer
-from .with_tubes import WithTubes
+from .tube import Tube, TubeModel, TubeOrifice, WithTubes
+from .valve import CheckValve, Orifice, SubsonicIndexValve, Valve, orifice_flow
+from .virial_gas import DEFAULT_GAS, VirialGas, WallHeatTransfer, virial_coefficient_of_air
 
 __all__ = [
     "DEFAULT_GAS",

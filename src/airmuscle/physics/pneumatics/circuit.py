@@ -1,18 +1,19 @@
-"""Circuit (interface): the flows from an air supply through valves to the muscles."""
+"""Circuit (interface): the flows from an air supply through valves to the muscles; names of ports."""
 
 from __future__ import annotations
 
 import abc
 import dataclasses
-from collections.abc import Mapping
-from typing import Any, ClassVar
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, TypeVar
 
-from ...core.ops import Value
+from ...core.ops import Value, Values
 from ...core.reference import Reference
 from ...core.variables import Input, StateVariable, add_prefix, select_prefix, with_prefix
 from .gas import NO_FLOW, Air, Ambient, Flow
 from .supply import AirSource
 
+T = TypeVar("T")
 SUPPLY = "supply."
 """Prefix of the state names of the supply."""
 
@@ -28,8 +29,8 @@ class CircuitFlows:
     flows: tuple[Flow, ...]
     drawn: Flow = NO_FLOW
     exhausted: Flow = NO_FLOW
-    rates: Mapping[str, Value] = dataclasses.field(default_factory=dict)
-    outputs: Mapping[str, Value] = dataclasses.field(default_factory=dict)
+    rates: Values = dataclasses.field(default_factory=dict)
+    outputs: Values = dataclasses.field(default_factory=dict)
 
 
 class Circuit(abc.ABC):
@@ -58,7 +59,7 @@ class Circuit(abc.ABC):
 
     @abc.abstractmethod
     def supplied_flow(
-        self, inlet: Air, air_states: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
+        self, inlet: Air, air_states: tuple[Air, ...], state: Values, inputs: Values,
         ambient: Ambient,
     ) -> CircuitFlows:  # fmt: skip
         """Flows for the air state at the supply and the air states of the muscles; `rates` without the supply."""
@@ -81,10 +82,56 @@ class Circuit(abc.ABC):
         return {**self.own_steady_state(air_states, ambient), **with_prefix(SUPPLY, self.supply.steady_state(ambient))}
 
     def compute_flows(
-        self, air_states: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value], ambient: Ambient
+        self, air_states: tuple[Air, ...], state: Values, inputs: Values, ambient: Ambient
     ) -> CircuitFlows:
         """Flows and rates of circuit and supply; `drawn` is the flow from outside the plant."""
         supply = select_prefix(SUPPLY, state)
         flows = self.supplied_flow(self.supply.air(supply, ambient), air_states, state, inputs, ambient)
         rates, inflow = self.supply.balance(supply, flows.drawn, ambient)
         return dataclasses.replace(flows, rates={**flows.rates, **with_prefix(SUPPLY, rates)}, drawn=inflow)
+
+
+class CircuitWrapper(Circuit, abc.ABC):
+    """Wrapper between a circuit and its muscles; supply, ports and inputs are those of the inner circuit."""
+
+    circuit: Circuit
+
+    @property
+    def supply(self) -> AirSource:  # type: ignore[override]  # forwarded, not stored
+        return self.circuit.supply
+
+    @property
+    def port_count(self) -> int:
+        return self.circuit.port_count
+
+    def validity_warnings(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
+        return self.circuit.validity_warnings(columns, ambient)
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        return self.circuit.inputs
+
+
+def port_prefix(number: int) -> str:
+    """Prefix of the names that belong to a port, counted from 1, of a circuit with several ports."""
+    return f"port{number}."
+
+
+def key_by_muscle(prefixes: Sequence[str], values: Mapping[str, T]) -> dict[str, T]:
+    """The values of a circuit, with the prefix of port i replaced by that of muscle i."""
+    return {_replace_port_prefix(name, prefixes): value for name, value in values.items()}
+
+
+def key_by_port(prefixes: Sequence[str], values: Mapping[str, T]) -> dict[str, T]:
+    """The values of a plant; those with the prefix of muscle i are repeated with the prefix of port i."""
+    keyed = dict(values)
+    for number, prefix in enumerate(prefixes, 1):
+        keyed |= {port_prefix(number) + n.removeprefix(prefix): v for n, v in values.items() if n.startswith(prefix)}
+    return keyed
+
+
+def _replace_port_prefix(name: str, prefixes: Sequence[str]) -> str:
+    for number, prefix in enumerate(prefixes, 1):
+        if name.startswith(port_prefix(number)):
+            return prefix + name.removeprefix(port_prefix(number))
+    return name

@@ -7,12 +7,11 @@ from typing import Any, ClassVar
 
 from ...core import ops
 from ...core.declaration import model, parameter
-from ...core.ops import Value
+from ...core.ops import Value, Values
 from ...core.reference import Reference
 from ...core.variables import StateVariable, add_prefix, select_prefix, with_prefix
 from .gas import GAS_CONSTANT, SPECIFIC_HEAT_CONSTANT_PRESSURE, Air, Ambient, Flow, Gas, Isothermal
-from .tube import check_segment_count
-from .tube_model import TubeModel
+from .tube import TubeModel, check_segment_count
 
 BLASIUS1913 = Reference(
     "blasius-1913",
@@ -83,12 +82,12 @@ class DistributedTube(TubeModel):
         segment = {**self.gas.state_at(air.pressure, self.segment_volume, ambient), "flow": 0.0}
         return {name: value for prefix in self.prefixes for name, value in with_prefix(prefix, segment).items()}
 
-    def air_states(self, state: Mapping[str, Value], ambient: Ambient) -> tuple[Air, ...]:
+    def air_states(self, state: Values, ambient: Ambient) -> tuple[Air, ...]:
         segments = (select_prefix(prefix, state) for prefix in self.prefixes)
         return tuple(self.gas.air(segment, self.segment_volume, ambient) for segment in segments)
 
     def rates(
-        self, state: Mapping[str, Value], air_states: tuple[Air, ...], flow: Flow, muscle: Air, ambient: Ambient
+        self, state: Values, air_states: tuple[Air, ...], flow: Flow, muscle: Air, ambient: Ambient
     ) -> tuple[dict[str, Value], Flow]:
         rates: dict[str, Value] = {}
         for prefix, air, downstream in zip(self.prefixes, air_states, (*air_states[1:], muscle), strict=True):

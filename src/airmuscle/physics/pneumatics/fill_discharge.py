@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from ...core import ops
 from ...core.declaration import model
-from ...core.ops import Value
+from ...core.ops import Values
 from ...core.variables import Input
 from .circuit import Circuit, CircuitFlows
-from .flow import orifice_flow
 from .gas import NO_FLOW, Air, Ambient
-from .orifice import Orifice
 from .supply import AirSource, Supply
+from .valve import Orifice, orifice_flow
 
 
 def ambient_air(ambient: Ambient) -> Air:
@@ -33,7 +30,7 @@ class FillDischarge(Circuit):
         return (Input("fill"), Input("discharge"))
 
     def supplied_flow(
-        self, inlet: Air, air_states: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
+        self, inlet: Air, air_states: tuple[Air, ...], state: Values, inputs: Values,
         ambient: Ambient,
     ) -> CircuitFlows:  # fmt: skip
         inflow = orifice_flow(self.fill, inlet, air_states[0], inputs["fill"])
@@ -54,7 +51,7 @@ class ThreePositionValve(Circuit):
         return (Input("valve", "1", -1.0, 1.0, "1 fill, 0 closed, -1 discharge"),)
 
     def supplied_flow(
-        self, inlet: Air, air_states: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
+        self, inlet: Air, air_states: tuple[Air, ...], state: Values, inputs: Values,
         ambient: Ambient,
     ) -> CircuitFlows:  # fmt: skip
         position = inputs["valve"]
@@ -74,7 +71,7 @@ class ClosedChamber(Circuit):
         return ()
 
     def supplied_flow(
-        self, inlet: Air, air_states: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
+        self, inlet: Air, air_states: tuple[Air, ...], state: Values, inputs: Values,
         ambient: Ambient,
     ) -> CircuitFlows:  # fmt: skip
         return CircuitFlows((NO_FLOW,))

@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-from collections.abc import Mapping
 from typing import ClassVar, NamedTuple
 
 from ...core import autodiff, ops
 from ...core.declaration import model, parameter
-from ...core.ops import Value
+from ...core.ops import Value, Values
 from ...core.reference import Reference
 from ...core.units import ABSOLUTE, AMBIENT_PRESSURE
 from ...core.variables import StateVariable
@@ -104,7 +103,7 @@ class Gas(abc.ABC):
         """State variables of a chamber, `air_mass` first; the volume [m3] sets their nominal values."""
 
     @abc.abstractmethod
-    def air(self, state: Mapping[str, Value], volume: Value, ambient: Ambient) -> Air:
+    def air(self, state: Values, volume: Value, ambient: Ambient) -> Air:
         """Air state of a chamber with a volume [m3]."""
 
     @abc.abstractmethod
@@ -112,24 +111,22 @@ class Gas(abc.ABC):
         """State of a chamber with a volume [m3] at rest at an absolute pressure [Pa] and ambient temperature."""
 
     @abc.abstractmethod
-    def rates(
-        self, state: Mapping[str, Value], air: Air, flow: Flow, volume_rate: Value, ambient: Ambient
-    ) -> dict[str, Value]:
+    def rates(self, state: Values, air: Air, flow: Flow, volume_rate: Value, ambient: Ambient) -> dict[str, Value]:
         """Time derivatives of the states for an inflow and a rate of change of the volume [m3/s]."""
 
     @abc.abstractmethod
-    def available_energy(self, state: Mapping[str, Value], volume: Value, ambient: Ambient) -> Value:
+    def available_energy(self, state: Values, volume: Value, ambient: Ambient) -> Value:
         """Available energy [J]; its derivative with respect to volume along the process is minus the pressure."""
 
     @abc.abstractmethod
-    def energy_flow(self, state: Mapping[str, Value], flow: Flow, volume: Value, ambient: Ambient) -> Value:
+    def energy_flow(self, state: Values, flow: Flow, volume: Value, ambient: Ambient) -> Value:
         """Power [W] that enters with the flow."""
 
     @abc.abstractmethod
     def sound_speed(self, air: Air) -> Value:
         """Speed of sound [m/s]: sqrt(dp/drho) along the process."""
 
-    def heat_flow(self, state: Mapping[str, Value], air: Air, ambient: Ambient) -> Value:
+    def heat_flow(self, state: Values, air: Air, ambient: Ambient) -> Value:
         """Heat flow [W] from the wall to the air; 0 for a gas model without heat transfer."""
         return 0.0
 
@@ -157,22 +154,20 @@ class BarotropicGas(Gas):
         nominal = self.air_mass(ambient.pressure, volume, ambient)
         return (StateVariable("air_mass", "kg", nominal, "air mass"),)
 
-    def air(self, state: Mapping[str, Value], volume: Value, ambient: Ambient) -> Air:
+    def air(self, state: Values, volume: Value, ambient: Ambient) -> Air:
         pressure = self.pressure(state["air_mass"], volume, ambient)
         return Air(pressure, self.temperature(pressure, state["air_mass"], volume, ambient))
 
     def state_at(self, pressure: Value, volume: Value, ambient: Ambient) -> dict[str, Value]:
         return {"air_mass": self.air_mass(pressure, volume, ambient)}
 
-    def rates(
-        self, state: Mapping[str, Value], air: Air, flow: Flow, volume_rate: Value, ambient: Ambient
-    ) -> dict[str, Value]:
+    def rates(self, state: Values, air: Air, flow: Flow, volume_rate: Value, ambient: Ambient) -> dict[str, Value]:
         return {"air_mass": flow.mass}
 
-    def available_energy(self, state: Mapping[str, Value], volume: Value, ambient: Ambient) -> Value:
+    def available_energy(self, state: Values, volume: Value, ambient: Ambient) -> Value:
         return self.energy(state["air_mass"], volume, ambient)
 
-    def energy_flow(self, state: Mapping[str, Value], flow: Flow, volume: Value, ambient: Ambient) -> Value:
+    def energy_flow(self, state: Values, flow: Flow, volume: Value, ambient: Ambient) -> Value:
         per_mass = autodiff.jvp(lambda x: [self.energy(x[0], volume, ambient)], [state["air_mass"]], [1.0])
         return per_mass[0] * flow.mass
 
@@ -243,7 +238,7 @@ class FirstLawGas(Gas):
             StateVariable("internal_energy", "J", rest["internal_energy"], "internal energy of the air"),
         )
 
-    def air(self, state: Mapping[str, Value], volume: Value, ambient: Ambient) -> Air:
+    def air(self, state: Values, volume: Value, ambient: Ambient) -> Air:
         energy = state["internal_energy"]
         temperature = energy / (state["air_mass"] * SPECIFIC_HEAT_CONSTANT_VOLUME)
         return Air((HEAT_CAPACITY_RATIO - 1.0) * energy / volume, temperature)
@@ -254,16 +249,14 @@ class FirstLawGas(Gas):
             "internal_energy": pressure * volume / (HEAT_CAPACITY_RATIO - 1.0),
         }
 
-    def rates(
-        self, state: Mapping[str, Value], air: Air, flow: Flow, volume_rate: Value, ambient: Ambient
-    ) -> dict[str, Value]:
+    def rates(self, state: Values, air: Air, flow: Flow, volume_rate: Value, ambient: Ambient) -> dict[str, Value]:
         energy = flow.enthalpy - air.pressure * volume_rate + self.heat_flow(state, air, ambient)
         return {"air_mass": flow.mass, "internal_energy": energy}
 
-    def available_energy(self, state: Mapping[str, Value], volume: Value, ambient: Ambient) -> Value:
+    def available_energy(self, state: Values, volume: Value, ambient: Ambient) -> Value:
         return state["internal_energy"]
 
-    def energy_flow(self, state: Mapping[str, Value], flow: Flow, volume: Value, ambient: Ambient) -> Value:
+    def energy_flow(self, state: Values, flow: Flow, volume: Value, ambient: Ambient) -> Value:
         return flow.enthalpy
 
     def sound_speed(self, air: Air) -> Value:
@@ -280,5 +273,5 @@ class EnergyBalance(FirstLawGas):
 
     heat_transfer: float = parameter("W/K", "hA", "heat transfer coefficient times wall area", bounds=(0.0, 1e5))
 
-    def heat_flow(self, state: Mapping[str, Value], air: Air, ambient: Ambient) -> Value:
+    def heat_flow(self, state: Values, air: Air, ambient: Ambient) -> Value:
         return self.heat_transfer * (ambient.temperature - air.temperature)

@@ -8,15 +8,13 @@ from typing import Any
 
 from ...core.declaration import check_structure, model
 from ...core.errors import ParameterError
-from ...core.ops import Value
+from ...core.ops import Value, Values
 from ...core.variables import Input, StateVariable, add_prefix, select_prefix, with_prefix
-from .circuit import SUPPLY, Circuit, CircuitFlows
+from .circuit import SUPPLY, Circuit, CircuitFlows, CircuitWrapper
 from .fill_discharge import ambient_air
-from .flow import orifice_flow
 from .gas import Air, Ambient
-from .orifice import Orifice
 from .supply import AirSource, SharedSupply
-from .wrapper import CircuitWrapper
+from .valve import Orifice, orifice_flow
 
 
 @model
@@ -33,7 +31,7 @@ class WithLeak(CircuitWrapper):
         return self.circuit.own_steady_state(air_states, ambient)
 
     def supplied_flow(
-        self, inlet: Air, air_states: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
+        self, inlet: Air, air_states: tuple[Air, ...], state: Values, inputs: Values,
         ambient: Ambient,
     ) -> CircuitFlows:  # fmt: skip
         inner = self.circuit.supplied_flow(inlet, air_states, state, inputs, ambient)
@@ -107,7 +105,7 @@ class Manifold(Circuit):
         return warnings
 
     def supplied_flow(
-        self, inlet: Air, air_states: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
+        self, inlet: Air, air_states: tuple[Air, ...], state: Values, inputs: Values,
         ambient: Ambient,
     ) -> CircuitFlows:  # fmt: skip
         total = CircuitFlows(())

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 from ...core import ops
 from ...core.declaration import model, parameter
-from ...core.ops import Value
+from ...core.ops import Value, Values
 from ...core.reference import Reference
 from ...core.variables import Input, StateVariable
 from .circuit import Circuit, CircuitFlows
 from .fill_discharge import ambient_air
-from .flow import orifice_flow
 from .gas import Air, Ambient, gauge_pressure
-from .orifice import Orifice
 from .supply import AirSource
-from .valve import ISO6358
+from .valve import ISO6358, Orifice, orifice_flow
 
 DELAY_STAGES = 4
 """Number of equal lags that make up the dead time (chosen): 10 to 90 % of a step take 1.2 times the dead time."""
@@ -99,7 +96,7 @@ class PressureRegulator(Circuit):
         return ops.clip(position - self.overlap, 0.0, 1.0) + leakage
 
     def supplied_flow(
-        self, inlet: Air, air_states: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
+        self, inlet: Air, air_states: tuple[Air, ...], state: Values, inputs: Values,
         ambient: Ambient,
     ) -> CircuitFlows:  # fmt: skip
         (air,) = air_states
@@ -109,7 +106,7 @@ class PressureRegulator(Circuit):
         rates = self._rates(state, inputs["setpoint"], gauge_pressure(air.pressure, ambient))
         return CircuitFlows((inflow - outflow,), inflow, outflow, rates)
 
-    def _rates(self, state: Mapping[str, Value], setpoint: Value, pressure: Value) -> dict[str, Value]:
+    def _rates(self, state: Values, setpoint: Value, pressure: Value) -> dict[str, Value]:
         chain = [setpoint, *(state[f"delayed_setpoint{i}"] for i in range(1, DELAY_STAGES + 1))]
         lag = self.dead_time / DELAY_STAGES
         rates = {f"delayed_setpoint{i}": (chain[i - 1] - chain[i]) / lag for i in range(1, DELAY_STAGES + 1)}

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from ...core import ops
 from ...core.declaration import model, parameter
 from ...core.errors import ParameterError
-from ...core.ops import Value
+from ...core.ops import Value, Values
 from ...core.variables import Input, StateVariable
 from .circuit import Circuit, CircuitFlows
 from .fill_discharge import ambient_air
-from .flow import orifice_flow, proportional_opening
 from .gas import NO_FLOW, Air, Ambient, absolute_pressure, gauge_pressure
-from .orifice import Orifice
 from .supply import AirSource
+from .valve import Orifice, orifice_flow, proportional_opening
 
 
 @model
@@ -73,7 +70,7 @@ class ProportionalValve(Circuit):
         return proportional_opening(position - self.overlap, 1.0 - self.overlap)
 
     def supplied_flow(
-        self, inlet: Air, air_states: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
+        self, inlet: Air, air_states: tuple[Air, ...], state: Values, inputs: Values,
         ambient: Ambient,
     ) -> CircuitFlows:  # fmt: skip
         spool, flows, drawn, exhausted = state["spool"], [], NO_FLOW, NO_FLOW
@@ -118,7 +115,7 @@ class ProportionalRegulator(Circuit):
         return {"lagged_setpoint": gauge_pressure(air_states[0].pressure, ambient), "lagged_setpoint_rate": 0.0}
 
     def supplied_flow(
-        self, inlet: Air, air_states: tuple[Air, ...], state: Mapping[str, Value], inputs: Mapping[str, Value],
+        self, inlet: Air, air_states: tuple[Air, ...], state: Values, inputs: Values,
         ambient: Ambient,
     ) -> CircuitFlows:  # fmt: skip
         (air,) = air_states

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import abc
-from collections.abc import Mapping
 
 from ...core import ops
 from ...core.declaration import model, parameter
 from ...core.errors import ParameterError
-from ...core.ops import Value
+from ...core.ops import Value, Values
 from ...core.variables import StateVariable, add_prefix, select_prefix, with_prefix
-from .flow import orifice_flow, proportional_opening
 from .gas import Air, Ambient, Flow, Gas, Isothermal, absolute_pressure, gauge_pressure
-from .orifice import Orifice
+from .valve import Orifice, orifice_flow, proportional_opening
 
 
 class AirSource(abc.ABC):
@@ -27,10 +25,10 @@ class AirSource(abc.ABC):
         return {}
 
     @abc.abstractmethod
-    def air(self, state: Mapping[str, Value], ambient: Ambient) -> Air:
+    def air(self, state: Values, ambient: Ambient) -> Air:
         """Air state at the outlet."""
 
-    def balance(self, state: Mapping[str, Value], drawn: Flow, ambient: Ambient) -> tuple[dict[str, Value], Flow]:
+    def balance(self, state: Values, drawn: Flow, ambient: Ambient) -> tuple[dict[str, Value], Flow]:
         """Time derivatives of the states for a drawn flow, and the flow into the supply from outside the plant."""
         return {}, drawn
 
@@ -48,7 +46,7 @@ class Supply(AirSource):
 
     pressure: float = parameter("Pa", "p_s", "gauge pressure of the supply", bounds=(-1e5, 5e6), plausible=1e3)
 
-    def air(self, state: Mapping[str, Value], ambient: Ambient) -> Air:
+    def air(self, state: Values, ambient: Ambient) -> Air:
         return Air(absolute_pressure(self.pressure, ambient), ambient.temperature)
 
     def check_ambient(self, ambient: Ambient) -> None:
@@ -66,7 +64,7 @@ class Supply(AirSource):
 class SharedSupply(AirSource):
     """Placeholder for the supply of a branch in a `Manifold`, which feeds all its branches from one supply."""
 
-    def air(self, state: Mapping[str, Value], ambient: Ambient) -> Air:
+    def air(self, state: Values, ambient: Ambient) -> Air:
         raise ParameterError("SharedSupply() is a placeholder for the supply of a Manifold; it contains no air.")
 
 
@@ -96,10 +94,10 @@ class SuppliedVolume(AirSource):
     def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         return (*self.gas.states(self.volume, ambient), *add_prefix("supply.", self.supply.states(ambient)))
 
-    def air(self, state: Mapping[str, Value], ambient: Ambient) -> Air:
+    def air(self, state: Values, ambient: Ambient) -> Air:
         return self.gas.air(state, self.volume, ambient)
 
-    def balance(self, state: Mapping[str, Value], drawn: Flow, ambient: Ambient) -> tuple[dict[str, Value], Flow]:
+    def balance(self, state: Values, drawn: Flow, ambient: Ambient) -> tuple[dict[str, Value], Flow]:
         upstream, air = select_prefix("supply.", state), self.air(state, ambient)
         feed_flow = self.feed_flow(self.supply.air(upstream, ambient), air, ambient)
         upstream_rates, inflow = self.supply.balance(upstream, feed_flow, ambient)

@@ -1,22 +1,58 @@
-"""Lumped tube between valve and muscle: volume and flow resistance, in one or more segments."""
+"""Tubes between valve and muscle: interface, lumped tube in one or more segments, circuit with tubes."""
 
 from __future__ import annotations
 
+import abc
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from ...core import ops
 from ...core.declaration import model, parameter
 from ...core.errors import ParameterError
-from ...core.ops import Value
+from ...core.ops import Value, Values
 from ...core.reference import Reference
 from ...core.tree import unflatten
 from ...core.variables import StateVariable, add_prefix, select_prefix, with_prefix
-from .flow import orifice_flow
-from .gas import Air, Ambient, Flow, Gas, Isothermal
-from .orifice import Orifice
-from .tube_model import TubeModel
-from .valve import Valve
+from .circuit import Circuit, CircuitFlows, CircuitWrapper, port_prefix
+from .gas import Air, Ambient, Flow, Gas, Isothermal, gauge_pressure
+from .valve import Orifice, Valve, orifice_flow
+
+
+class TubeModel(abc.ABC):
+    """Tube between valve and muscle (interface). States are mappings from the names in `states` to values."""
+
+    references: ClassVar[tuple[Reference, ...]] = ()
+    segment_count: int
+
+    @property
+    def prefixes(self) -> tuple[str, ...]:
+        """Prefixes of the state names of each segment, from valve to muscle."""
+        if self.segment_count == 1:
+            return ("tube.",)
+        return tuple(f"tube{i}." for i in range(1, self.segment_count + 1))
+
+    @abc.abstractmethod
+    def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
+        """State variables of all segments."""
+
+    @abc.abstractmethod
+    def steady_state(self, air: Air, ambient: Ambient) -> dict[str, Value]:
+        """Steady state without flow at the pressure of the air in the muscle."""
+
+    @abc.abstractmethod
+    def air_states(self, state: Values, ambient: Ambient) -> tuple[Air, ...]:
+        """Air state of each segment, from valve to muscle."""
+
+    @abc.abstractmethod
+    def rates(
+        self, state: Values, air_states: tuple[Air, ...], flow: Flow, muscle: Air, ambient: Ambient
+    ) -> tuple[dict[str, Value], Flow]:
+        """Time derivatives of the states for a flow from the valve, and the flow into the muscle."""
+
+    def validity_warnings(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
+        """Warnings by segment prefix where a run left the validity range; `columns` are arrays (N,) by name."""
+        return {}
+
 
 ECKERSTEN = Reference(
     "eckersten-1975",
@@ -91,12 +127,12 @@ class Tube(TubeModel):
         segment = self.gas.state_at(air.pressure, self.volume / self.segment_count, ambient)
         return {name: value for prefix in self.prefixes for name, value in with_prefix(prefix, segment).items()}
 
-    def air_states(self, state: Mapping[str, Value], ambient: Ambient) -> tuple[Air, ...]:
+    def air_states(self, state: Values, ambient: Ambient) -> tuple[Air, ...]:
         segments = (select_prefix(prefix, state) for prefix in self.prefixes)
         return tuple(self.gas.air(segment, self.volume / self.segment_count, ambient) for segment in segments)
 
     def rates(
-        self, state: Mapping[str, Value], air_states: tuple[Air, ...], flow: Flow, muscle: Air, ambient: Ambient
+        self, state: Values, air_states: tuple[Air, ...], flow: Flow, muscle: Air, ambient: Ambient
     ) -> tuple[dict[str, Value], Flow]:
         rates: dict[str, Value] = {}
         for prefix, air, downstream in zip(self.prefixes, air_states, (*air_states[1:], muscle), strict=True):
@@ -111,3 +147,55 @@ def check_segment_count(owner: str, segment_count: int) -> None:
     """Raise ParameterError unless the number of segments of a tube is an integer from 1 to 200."""
     if isinstance(segment_count, bool) or not (isinstance(segment_count, int) and 1 <= segment_count <= 200):
         raise ParameterError(f"{owner}: segment_count is {segment_count!r}; give an integer from 1 to 200.")
+
+
+@model
+class WithTubes(CircuitWrapper):
+    """Circuit with a tube between its valves and each of its muscles.
+
+    The output `tube.pressure` is the pressure in the tube; with several segments, `tube1.pressure`, ... are numbered
+    from the valve. If one circuit feeds several muscles, a plant prefixes each tube with the name of its muscle, as in
+    `left.tube.pressure`.
+    """
+
+    circuit: Circuit
+    tube: TubeModel
+
+    @property
+    def prefixes(self) -> tuple[str, ...]:
+        """Prefixes of the names of each muscle's tube."""
+        return ("",) if self.port_count == 1 else tuple(port_prefix(i) for i in range(1, self.port_count + 1))
+
+    def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
+        tube = self.tube.states(ambient)
+        return (*self.circuit.own_states(ambient), *(s for prefix in self.prefixes for s in add_prefix(prefix, tube)))
+
+    def own_steady_state(self, air_states: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
+        state = self.circuit.own_steady_state(air_states, ambient)
+        for prefix, air in zip(self.prefixes, air_states, strict=True):
+            state |= with_prefix(prefix, self.tube.steady_state(air, ambient))
+        return state
+
+    def validity_warnings(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
+        warnings = self.circuit.validity_warnings(columns, ambient)
+        for prefix in self.prefixes:
+            warnings |= with_prefix(prefix, self.tube.validity_warnings(select_prefix(prefix, columns), ambient))
+        return warnings
+
+    def supplied_flow(
+        self, inlet: Air, air_states: tuple[Air, ...], state: Values, inputs: Values,
+        ambient: Ambient,
+    ) -> CircuitFlows:  # fmt: skip
+        tubes = [select_prefix(prefix, state) for prefix in self.prefixes]
+        in_tubes = [self.tube.air_states(tube, ambient) for tube in tubes]
+        inner = self.circuit.supplied_flow(inlet, tuple(segments[0] for segments in in_tubes), state, inputs, ambient)
+        rates, outputs, flows = dict(inner.rates), dict(inner.outputs), []
+        for prefix, tube, segments, inflow, air in zip(
+            self.prefixes, tubes, in_tubes, inner.flows, air_states, strict=True
+        ):
+            tube_rates, outflow = self.tube.rates(tube, segments, inflow, air, ambient)
+            rates |= with_prefix(prefix, tube_rates)
+            for segment, in_segment in zip(self.tube.prefixes, segments, strict=True):
+                outputs[f"{prefix}{segment}pressure"] = gauge_pressure(in_segment.pressure, ambient)
+            flows.append(outflow)
+        return CircuitFlows(tuple(flows), inner.drawn, inner.exhausted, rates, outputs)

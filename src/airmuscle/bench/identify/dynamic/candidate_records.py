@@ -16,7 +16,7 @@ from ....physics.muscle.geometry import Vessel
 from ....physics.plant.plant import Plant
 from ....physics.pneumatics import FillDischarge, Valve
 from ....physics.pneumatics.gas import EnergyBalance
-from ....physics.pneumatics.wall_heat_transfer import WallHeatTransfer
+from ....physics.pneumatics.virial_gas import WallHeatTransfer
 from ....recording import Recording
 from .experiment import Experiment
 from .initial_conditions import InitialConditions

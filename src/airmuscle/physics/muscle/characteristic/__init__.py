@@ -1,10 +1,8 @@
 """Static characteristics: relations between gauge pressure, contraction and tension; one class per paper."""
 
-from .base import Characteristic, ContractionLaw, ForceLaw, PressureLaw
+from .base import Characteristic, Clamped, ContractionLaw, ForceLaw, PressureLaw
 from .borzikova import SAM_30X290, BorzikovaDirect, BorzikovaExponential
 from .chou_hannaford1996 import ChouHannaford1996
-from .circle_virtual_work import CircleVirtualWork
-from .clamped import Clamped
 from .contractile_surface import ContractileSurface, exponents
 from .effective_length import EffectiveLength
 from .energy_defect import maxwell_defect
@@ -22,7 +20,7 @@ from .serres2009 import Serres2009
 from .tabulated import Tabulated
 from .tondu_lopez2000 import TonduLopez2000
 from .validity_range import ValidityRange
-from .virtual_work import VirtualWork
+from .virtual_work import CircleVirtualWork, VirtualWork
 
 __all__ = [
     "LINE_A",

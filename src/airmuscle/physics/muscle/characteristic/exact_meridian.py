@@ -10,10 +10,9 @@ from ....core.declaration import model, parameter
 from ....core.ops import Value
 from ....core.reference import Reference
 from ..geometry.base import check_contraction_range
-from ..geometry.circular_arc import CircularArc
-from ..geometry.meridian import SAGA_2007, Profile
+from ..geometry.meridian import SAGA_2007, Profile, graded_quadrature
+from ..geometry.meridian_shapes import CircularArc
 from ..geometry.pleated import DAERDEN_LEFEBER_2001, PleatedTube, unwrap_scalar
-from ..geometry.quadrature import graded_quadrature
 from .base import PressureLaw, Slopes
 from .rubber import RubberLine
 from .solve import as_arrays, check_solution, find_first_root

@@ -13,10 +13,9 @@ from ....core.errors import ParameterError
 from ....core.ops import Value
 from ....core.reference import Reference
 from ..geometry.base import check_contraction_range
-from ..geometry.fibre_sum import FibreSum, HalfShellFibreSum
 from ..geometry.meridian import SAGA_2007
-from ..geometry.parabola import Parabola
-from ..geometry.straight_fibre import StraightFibre
+from ..geometry.meridian_shapes import Parabola
+from ..geometry.straight_fibre import FibreSum, HalfShellFibreSum, StraightFibre
 from .base import PressureLaw
 from .rubber import AxialIntegral, RubberIntegral, RubberLine
 from .solve import check_solution, describe_range, find_first_root

@@ -1,17 +1,23 @@
-"""Ideal muscle of any geometry by the principle of virtual work, without wall stiffness or friction."""
+"""Laws of virtual work: force from the volume of a geometry, also with the rubber of a circular meridian."""
 
 from __future__ import annotations
 
-from typing import ClassVar
+import functools
+from typing import ClassVar, NamedTuple
 
-from ....core.declaration import model
-from ....core.errors import TraceError
+from ....core import ops
+from ....core.declaration import model, parameter
+from ....core.errors import ParameterError, TraceError
 from ....core.ops import Value
 from ....core.reference import Reference
-from ..geometry.base import Geometry
+from ..geometry.base import Geometry, check_contraction_range
 from ..geometry.braid import CHOU_HANNAFORD_1996
+from ..geometry.meridian import SAGA_2007
+from ..geometry.meridian_shapes import FERRARESI_2001, CircularArc
+from ..geometry.straight_fibre import StraightFibre
 from .base import ForceLaw, Slopes
-from .solve import check_solution
+from .rubber import RubberLine
+from .solve import check_solution, find_first_root
 
 
 @model
@@ -50,3 +56,118 @@ class VirtualWork(ForceLaw):
                 "is not available. Replace it by airmuscle.physics.muscle.geometry.chebyshev.as_polynomial(geometry)."
             )
         return super().slopes(pressure, contraction)
+
+
+_MIN_ANGLE = 1e-200
+"""Lower bound of the angle in a denominator, which avoids a division by zero for straight fibres."""
+
+
+class _WorkTerms(NamedTuple):
+    """Work per contraction, multiplied by psi to be finite at zero contraction."""
+
+    area: Value
+    """psi (dV/deps)/l_0 [m2]."""
+    rubber: Value
+    """psi (dU/deps)/l_0 [N]."""
+    angle: Value
+    """psi [rad]."""
+
+
+@model
+class CircleVirtualWork(ForceLaw):
+    """Straight-fibre muscle with a circular meridian, by virtual work.
+
+        F = (p dV/deps - dU/deps)/l_0,   U = 2 pi t [alpha Q/(2 r_0) + beta G],   sin(psi)/psi = 1 - eps
+
+    Per segment of fibre length l_0: V volume, G = Int (r - r_0) ds, Q = Int (r - r_0)^2 ds of the circular arc with
+    half angle psi, all in closed form; alpha, beta: slope and intercept of the rubber line; t: wall thickness; r_0: end
+    radius. Volume and force follow from one potential, so that a simulation conserves energy. Compared with the exact
+    meridian, the pressure differs by less than 0.7 % from 100 N up to 30 % contraction, and by -1 % to 6.3 % without
+    load. The meridian is from Ferraresi et al. 2001, the rubber from Saga et al. 2007; the force balance is from
+    neither.
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (FERRARESI_2001, SAGA_2007)
+
+    geometry: StraightFibre
+    rubber: RubberLine
+    wall_thickness: float = parameter("m", "t", "thickness of the wall at rest", bounds=(0.0, 0.1))
+
+    def check(self) -> None:
+        if not isinstance(self.geometry.meridian, CircularArc):
+            raise ParameterError(
+                f"CircleVirtualWork requires a circular meridian; its geometry has a "
+                f"{type(self.geometry.meridian).__name__}. Use StraightFibre(..., meridian=CircularArc())."
+            )
+
+    @property
+    def contraction_range(self) -> tuple[float, float]:
+        """From zero to the maximum volume, where the pressure required for a load becomes infinite."""
+        return (0.0, _contraction_of_max_volume(self.geometry) * (1.0 - 1e-9))
+
+    @property
+    def threshold_pressure(self) -> float:
+        """Gauge pressure [Pa] at which contraction starts, independent of the load: t beta/r_0."""
+        return float(self.wall_thickness * self.rubber.intercept / self.geometry.end_radius)
+
+    def force(self, pressure: Value, contraction: Value) -> Value:
+        """Tension [N]; negative beyond the maximum volume, unbounded at zero contraction (straight fibres)."""
+        self._check_contraction(contraction, self.geometry.contraction_range)
+        work = self._work_terms(contraction)
+        return (pressure * work.area - work.rubber) / ops.maximum(work.angle, _MIN_ANGLE)
+
+    def pressure(self, contraction: Value, force: Value) -> Value:
+        self._check_contraction(contraction, self.contraction_range)
+        solution = self._pressure(contraction, force)
+        return check_solution(solution, self.pressure_range, (contraction, force), self._no_pressure_message)
+
+    def contraction(self, pressure: Value, force: Value) -> Value:
+        def residual(contraction: Value, p: Value, load: Value) -> Value:
+            return self._pressure(contraction, load) - p
+
+        def message(p: float, load: float, low: float, high: float) -> str:
+            required = f"Required pressure at this load: {(low + p) / 1e3:.4g} kPa or more."
+            return self._no_contraction_message(p, load) + required
+
+        above_threshold = (self.threshold_pressure, float("inf"))
+        check_solution(pressure + 0.0 * force, above_threshold, (pressure, force), self._below_threshold_message)
+        return find_first_root(residual, self.contraction_range, (pressure, force), message)
+
+    def _pressure(self, contraction: Value, force: Value) -> Value:
+        """Equilibrium pressure [Pa], without a check of its range."""
+        work = self._work_terms(contraction)
+        return (force * work.angle + work.rubber) / work.area
+
+    def _work_terms(self, contraction: Value) -> _WorkTerms:
+        tube = self.geometry
+        arc = CircularArc()
+        angle_squared = arc.angle_squared(contraction)
+        derivatives = arc.derivatives_times_angle(angle_squared, tube.fibre_length, tube.end_radius)
+        energy = self.rubber.energy(derivatives.arc_excess, derivatives.arc_excess_squared, tube.end_radius)
+        return _WorkTerms(
+            derivatives.volume / tube.fibre_length,
+            self.wall_thickness * energy / tube.fibre_length,
+            ops.sqrt(angle_squared),
+        )
+
+    def _check_contraction(self, contraction: Value, limits: tuple[float, float]) -> None:
+        """Raise GeometryLimitError if a contraction is outside `limits`, unless the model is being traced."""
+        if not ops.is_symbol(self.wall_thickness):
+            check_contraction_range(contraction, limits, "CircleVirtualWork")
+
+    def _below_threshold_message(self, pressure: float, force: float) -> str:
+        return (
+            f"CircleVirtualWork: {pressure / 1e3:.4g} kPa is below the threshold pressure of "
+            f"{self.threshold_pressure / 1e3:.4g} kPa, at which contraction starts."
+        )
+
+
+@functools.lru_cache(maxsize=256)
+def _contraction_of_max_volume(tube: StraightFibre) -> float:
+    """Contraction of maximum volume, by bisection of dV/deps, or the upper limit of the geometry."""
+    low, high = tube.contraction_range
+    while (middle := (low + high) / 2) not in (low, high):
+        arc = CircularArc()
+        derivatives = arc.derivatives_times_angle(arc.angle_squared(middle), tube.fibre_length, tube.end_radius)
+        low, high = (middle, high) if derivatives.volume > 0 else (low, middle)
+    return high

@@ -3,11 +3,10 @@
 from .base import Friction, NoFriction
 from .bouc_wen import BoucWen
 from .dahl import Dahl
-from .identified import IdentifiedFriction
 from .lugre import LuGre
 from .maxwell_slip import MaxwellSlip
 from .prandtl_ishlinskii import PrandtlIshlinskii
-from .pressure_scaled import PressureScaledFriction
+from .wrapper import IdentifiedFriction, PressureScaledFriction
 
 __all__ = [
     "BoucWen",

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import abc
-from collections.abc import Mapping
 from typing import Any, ClassVar, NamedTuple
 
 from ....core.declaration import model
-from ....core.ops import Value
+from ....core.ops import Value, Values
 from ....core.reference import Reference
 from ....core.variables import StateVariable
 
@@ -40,11 +39,11 @@ class Friction(abc.ABC):
         """The bristle deflections; all are zero in the relaxed state."""
 
     @abc.abstractmethod
-    def rates(self, bristles: Mapping[str, Value], speed: Value) -> dict[str, Value]:
+    def rates(self, bristles: Values, speed: Value) -> dict[str, Value]:
         """Time derivative of every bristle deflection at a speed [m/s]."""
 
     @abc.abstractmethod
-    def force(self, bristles: Mapping[str, Value], speed: Value) -> Value:
+    def force(self, bristles: Values, speed: Value) -> Value:
         """Friction force [N] at a speed [m/s]."""
 
     @abc.abstractmethod
@@ -82,10 +81,10 @@ class NoFriction(Friction):
     def states(self) -> tuple[StateVariable, ...]:
         return ()
 
-    def rates(self, bristles: Mapping[str, Value], speed: Value) -> dict[str, Value]:
+    def rates(self, bristles: Values, speed: Value) -> dict[str, Value]:
         return {}
 
-    def force(self, bristles: Mapping[str, Value], speed: Value) -> Value:
+    def force(self, bristles: Values, speed: Value) -> Value:
         return 0.0
 
     def force_along(self, displacement: Any, time: Any = None) -> Any:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from ....core import ops
 from ....core.declaration import model, parameter
-from ....core.ops import Value
+from ....core.ops import Value, Values
 from ....core.reference import Reference
 from ....core.variables import StateVariable
 from .base import Friction
@@ -74,10 +73,10 @@ class BoucWen(Friction):
         directional = (self.unloading - 1.0) * speed * ops.absolute_value(ratio)
         return speed + power * (directional - dissipative)
 
-    def rates(self, bristles: Mapping[str, Value], speed: Value) -> dict[str, Value]:
+    def rates(self, bristles: Values, speed: Value) -> dict[str, Value]:
         return {"bristle": self._deflection_rate(bristles["bristle"] * self.stiffness / self.coulomb_force, speed)}
 
-    def force(self, bristles: Mapping[str, Value], speed: Value) -> Value:
+    def force(self, bristles: Values, speed: Value) -> Value:
         return self.stiffness * bristles["bristle"]
 
     def force_along(self, displacement: Any, time: Any = None) -> Any:

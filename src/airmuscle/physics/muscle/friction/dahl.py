@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from ....core import ops
 from ....core.declaration import model, parameter
-from ....core.ops import Value
+from ....core.ops import Value, Values
 from ....core.reference import Reference
 from ....core.variables import StateVariable
 from .base import Friction
@@ -45,11 +44,11 @@ class Dahl(Friction):
     def presliding_distance(self) -> float:
         return self.coulomb_force / self.stiffness
 
-    def rates(self, bristles: Mapping[str, Value], speed: Value) -> dict[str, Value]:
+    def rates(self, bristles: Values, speed: Value) -> dict[str, Value]:
         ratio = self.stiffness * bristles["bristle"] / self.coulomb_force
         return {"bristle": speed - ops.absolute_value(speed) * ratio}
 
-    def force(self, bristles: Mapping[str, Value], speed: Value) -> Value:
+    def force(self, bristles: Values, speed: Value) -> Value:
         return self.stiffness * bristles["bristle"]
 
     def force_along(self, displacement: Any, time: Any = None) -> Any:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from ....core import ops
 from ....core.declaration import model, parameter
-from ....core.ops import Value
+from ....core.ops import Value, Values
 from ....core.reference import Reference
 from ....core.variables import StateVariable
 from .base import Friction
@@ -61,11 +60,11 @@ class LuGre(Friction):
         """Magnitude g(v) of the bristle force in steady sliding [N]."""
         return self.coulomb_force + self.stribeck_force * ops.exp(-((speed / self.stribeck_speed) ** 2))
 
-    def rates(self, bristles: Mapping[str, Value], speed: Value) -> dict[str, Value]:
+    def rates(self, bristles: Values, speed: Value) -> dict[str, Value]:
         ratio = self.stiffness * bristles["bristle"] / self.sliding_force(speed)
         return {"bristle": speed - ops.absolute_value(speed) * ratio}
 
-    def force(self, bristles: Mapping[str, Value], speed: Value) -> Value:
+    def force(self, bristles: Values, speed: Value) -> Value:
         rate = self.rates(bristles, speed)["bristle"]
         return self.stiffness * bristles["bristle"] + self.bristle_damping * rate + self.damping * speed
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
 from ....core import ops
 from ....core.declaration import model, parameter
 from ....core.errors import ParameterError
-from ....core.ops import Value
+from ....core.ops import Value, Values
 from ....core.reference import Reference
 from ....core.variables import StateVariable
 from .base import Friction
@@ -102,13 +102,13 @@ class MaxwellSlip(Friction):
     def presliding_distance(self) -> float:
         return max(self.limits)
 
-    def rates(self, bristles: Mapping[str, Value], speed: Value) -> dict[str, Value]:
+    def rates(self, bristles: Values, speed: Value) -> dict[str, Value]:
         elements = enumerate(self.limits, 1)
         return {
             f"bristle{i}": element_rate(bristles[f"bristle{i}"], limit, self.transition, speed) for i, limit in elements
         }
 
-    def force(self, bristles: Mapping[str, Value], speed: Value) -> Value:
+    def force(self, bristles: Values, speed: Value) -> Value:
         return sum(k * bristles[f"bristle{i}"] for i, k in enumerate(self.stiffnesses, 1))
 
     def element_deflections(self, displacement: Any) -> Any:

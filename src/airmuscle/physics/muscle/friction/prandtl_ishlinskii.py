@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from ....core import ops
 from ....core.declaration import model, parameter
 from ....core.errors import ParameterError
-from ....core.ops import Value
+from ....core.ops import Value, Values
 from ....core.reference import Reference
 from ....core.variables import StateVariable
 from .base import Friction
@@ -93,11 +92,11 @@ class PrandtlIshlinskii(Friction):
     def presliding_distance(self) -> float:
         return max(self.limits)
 
-    def rates(self, bristles: Mapping[str, Value], speed: Value) -> dict[str, Value]:
+    def rates(self, bristles: Values, speed: Value) -> dict[str, Value]:
         elements = enumerate(self.limits, 1)
         return {f"stop{i}": element_rate(bristles[f"stop{i}"], limit, self.transition, speed) for i, limit in elements}
 
-    def force(self, bristles: Mapping[str, Value], speed: Value) -> Value:
+    def force(self, bristles: Values, speed: Value) -> Value:
         return self.apply_dead_zones(sum(k * bristles[f"stop{i}"] for i, k in enumerate(self.stiffnesses, 1)))
 
     def apply_dead_zones(self, force: Value) -> Value:

@@ -2,15 +2,11 @@
 
 from .base import Geometry
 from .braid import Braid
-from .catenary import Catenary
 from .chebyshev import ChebyshevGeometry
-from .circular_arc import CircularArc
-from .fibre_sum import HalfShellFibreSum, PrintedFibreSum, UniformFibreSum, UserDefinedFibreSum
-from .parabola import Parabola, TrueArcParabola
+from .meridian_shapes import Catenary, CircularArc, Parabola, TrueArcParabola
 from .pleated import PleatedTube
-from .straight_fibre import StraightFibre
-from .tabulated import TabulatedGeometry
-from .vessel import Vessel
+from .straight_fibre import HalfShellFibreSum, PrintedFibreSum, StraightFibre, UniformFibreSum, UserDefinedFibreSum
+from .tabulated import TabulatedGeometry, Vessel
 
 __all__ = [
     "Braid",

@@ -1,9 +1,14 @@
-"""Meridian (interface): assumed outline of one segment between two rings, and its integrals."""
+"""Meridian (interface): outline of one segment between two rings, its integrals, and functions for these."""
 
 from __future__ import annotations
 
 import abc
+import functools
+import math
+from collections.abc import Sequence
 from typing import ClassVar, NamedTuple
+
+import numpy as np
 
 from ....core import ops
 from ....core.arrays import Array
@@ -78,3 +83,48 @@ class Meridian(abc.ABC):
 def segment_volume(end_radius: Value, length: Value, excess: Value, excess_squared: Value) -> Value:
     """pi Int r^2 dx from Int (r - r_0) dx and Int (r - r_0)^2 dx."""
     return ops.pi * (end_radius**2 * length + 2 * end_radius * excess + excess_squared)
+
+
+TERMS = 18
+"""Number of terms; the first omitted term is below 1e-18 of the sum for |w| <= 45, the range of the meridians."""
+
+_COEFFICIENTS = tuple(tuple(1.0 / math.factorial(m + 2 * n) for n in range(TERMS)) for m in range(6))
+
+
+def power_series(coefficients: Sequence[float], w: Value) -> Value:
+    """Sum of coefficients[n] w^n by Horner's method."""
+    total: Value = coefficients[-1]
+    for a in reversed(coefficients[:-1]):
+        total = total * w + a
+    return total
+
+
+def stumpff(order: int, w: Value) -> Value:
+    """Stumpff function S_m(w) = Sum_n w^n / (m + 2 n)! of an order m from 0 to 5.
+
+    S_0 = cosh u, S_1 = sinh(u)/u, S_2 = (cosh u - 1)/u^2, S_3 = (sinh u - u)/u^3 with w = u^2, and accordingly for cos
+    and sin with w = -psi^2, without the cancellation of sines and cosines in the formulas of a flat arc.
+    """
+    return power_series(_COEFFICIENTS[order], w)
+
+
+def double_angle_term(w: Value) -> Value:
+    """(u (cosh 2u + 2) - (3/2) sinh 2u)/u^5 with w = u^2, or with cos and sin of psi for w = -psi^2; 8/15 at zero."""
+    return 16 * (stumpff(4, 4 * w) - 3 * stumpff(5, 4 * w))
+
+
+def triple_angle_term(w: Value) -> Value:
+    """(sinh(3u)/6 + (3/2) sinh u - 2 u cosh u)/u^5, or with cos and sin of psi for w = -psi^2; 4/15 at zero."""
+    return 40.5 * stumpff(5, 9 * w) + 1.5 * stumpff(5, w) - 2 * stumpff(4, w)
+
+
+@functools.cache
+def graded_quadrature(nodes: int) -> tuple[Array, Array]:
+    """Nodes v and weights, shape (nodes,) each, for integrals over 0 <= v <= 1 with a factor like 1/sqrt(1 - v).
+
+    The nodes are Gauss points y in v = y (2 - y), so that 1 - v = (1 - y)^2 removes the singularity at v = 1. The
+    integral is sum(weights f(nodes)).
+    """
+    points, weights = np.polynomial.legendre.leggauss(nodes)
+    y = (points + 1) / 2
+    return y * (2 - y), weights * (1 - y)

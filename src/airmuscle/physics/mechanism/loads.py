@@ -1,0 +1,157 @@
+"""Loads of muscles that act in parallel on one point: masses, springs, constant forces, prescribed motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ...core.constants import STANDARD_GRAVITY
+from ...core.declaration import model, parameter
+from ...core.ops import Value, Values
+from ...core.variables import Input
+from .base import Coordinate, Mechanism, Translation
+
+
+@model
+class Isometric(Mechanism):
+    """Isometric load: constant contraction eps; the mechanism has no degree of freedom."""
+
+    contraction: float = parameter("1", "eps", "contraction at which the muscle is fixed", bounds=(-0.2, 0.9))
+
+    @property
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        return ()
+
+    def contractions(self, q: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
+        return tuple(self.contraction for _ in resting_lengths)
+
+    def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
+        return {}
+
+
+@model
+class Isotonic(Translation):
+    """Isotonic load: m y'' = F - F_c - d y', with y from the position at the resting length of the muscle.
+
+    F_c constant force, m moving mass without weight, d damping. The smaller the mass, the closer the tension is to F_c.
+    All muscles act on the same point in parallel.
+    """
+
+    force: float = parameter("N", "F_c", "constant force against the muscles", bounds=(0.0, 1e6))
+    mass: float = parameter("kg", "m", "moving mass, without weight", bounds=(1e-4, 1e5))
+    damping: float = parameter("N s/m", "d", "damping coefficient of the load", bounds=(0.0, 1e6), default=0.0)
+
+    def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
+        return {"position": (forces["position"] - self.force - self.damping * v["speed"]) / self.mass}
+
+    def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
+        return self.damping * v["speed"] ** 2
+
+    def potential_energy(self, q: Values) -> Value:
+        return self.force * q["position"]
+
+
+@model
+class HangingMass(Translation):
+    """Hanging mass: m y'' = F - m g, with y upwards from the position at the resting length of the muscle."""
+
+    mass: float = parameter("kg", "m", "mass of the load", bounds=(1e-4, 1e5))
+    gravity: float = parameter(
+        "m/s^2", "g", "acceleration of gravity", bounds=(0.0, 20.0), fitted=False, default=STANDARD_GRAVITY
+    )
+
+    def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
+        return {"position": forces["position"] / self.mass - self.gravity}
+
+    def potential_energy(self, q: Values) -> Value:
+        return self.mass * self.gravity * q["position"]
+
+
+@model
+class SpringLoad(Translation):
+    """Spring load: m y'' = F - F_0 - k y - d y', with y from the position at the resting length of the muscle.
+
+    m mass, k stiffness, d damping coefficient, F_0 preload at y = 0, which may include a weight m g. All muscles act on
+    the same point in parallel.
+    """
+
+    mass: float = parameter("kg", "m", "mass of the load", bounds=(1e-4, 1e5))
+    stiffness: float = parameter("N/m", "k", "stiffness of the spring", bounds=(0.0, 1e8))
+    damping: float = parameter("N s/m", "d", "damping coefficient of the load", bounds=(0.0, 1e6), default=0.0)
+    preload: float = parameter("N", "F_0", "preload at position 0", bounds=(-1e6, 1e6), default=0.0)
+
+    def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
+        resistance = self.preload + self.stiffness * q["position"] + self.damping * v["speed"]
+        return {"position": (forces["position"] - resistance) / self.mass}
+
+    def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
+        return self.damping * v["speed"] ** 2
+
+    def potential_energy(self, q: Values) -> Value:
+        return (self.preload + 0.5 * self.stiffness * q["position"]) * q["position"]
+
+
+@model
+class Pulley(Translation):
+    """Stepped pulley: (J/r^2 + i^2 m) y'' = F - i m g - d y', with y from the position at the muscle's resting length.
+
+    r radius of the drum on the muscle side, i r radius of the drum on the load side, so that the mass m is lifted by
+    i y; J inertia of the pulley, d viscous friction of the bearing, referred to the muscle. i = 1 only redirects the
+    rope; i = 1/2 also describes a block and tackle with half the load. All muscles act on the same point in parallel.
+    """
+
+    radius: float = parameter("m", "r", "radius of the drum on the muscle side", bounds=(1e-4, 10.0))
+    mass: float = parameter("kg", "m", "mass of the load", bounds=(1e-4, 1e5))
+    ratio: float = parameter("1", "i", "load displacement per muscle displacement", bounds=(1e-3, 1e3), default=1.0)
+    inertia: float = parameter("kg m^2", "J", "moment of inertia of the pulley", bounds=(0.0, 1e4), default=0.0)
+    damping: float = parameter("N s/m", "d", "viscous friction of the bearing", bounds=(0.0, 1e6), default=0.0)
+    gravity: float = parameter(
+        "m/s^2", "g", "acceleration of gravity", bounds=(0.0, 20.0), fitted=False, default=STANDARD_GRAVITY
+    )
+
+    def _inertial_mass(self) -> Value:
+        return self.inertia / self.radius**2 + self.ratio**2 * self.mass
+
+    def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
+        resistance = self.ratio * self.mass * self.gravity + self.damping * v["speed"]
+        return {"position": (forces["position"] - resistance) / self._inertial_mass()}
+
+    def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
+        return self.damping * v["speed"] ** 2
+
+    def potential_energy(self, q: Values) -> Value:
+        return self.mass * self.gravity * self.ratio * q["position"]
+
+    def kinetic_energy(self, q: Values, v: Values) -> Value:
+        return 0.5 * self._inertial_mass() * v["speed"] ** 2
+
+
+@model
+class PrescribedMotion(Mechanism):
+    """Prescribed motion: y'' = a(t), independent of the muscle forces; the drive absorbs the power F y'.
+
+    y position relative to that at the resting length of the muscle, a the input. Input signals may be piecewise linear,
+    so that y follows a cubic spline exactly: `airmuscle.engine.spline_trajectory` returns the acceleration
+    signal and the initial state.
+    """
+
+    @property
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        return (Coordinate("position", "speed", "m", 0.01, 0.1),)
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        return (Input("prescribed_acceleration", "m/s^2", -1e5, 1e5, "acceleration prescribed by the drive"),)
+
+    def contractions(self, q: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
+        return tuple(q["position"] / length for length in resting_lengths)
+
+    def generalised_forces(
+        self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]
+    ) -> dict[str, Value]:
+        return {"position": sum(tensions, 0.0)}
+
+    def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
+        return {"position": inputs["prescribed_acceleration"]}
+
+    def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
+        return forces["position"] * v["speed"]
