@@ -6,6 +6,7 @@ import contextlib
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -31,6 +32,8 @@ def address():
 @pytest.fixture(scope="module")
 def browser():
     with playwright.sync_playwright() as p:
+        if CHROMIUM is None and not Path(p.chromium.executable_path).exists():
+            pytest.skip("needs chromium")
         running = p.chromium.launch(executable_path=CHROMIUM, args=OPTIONS)
         yield running
         running.close()

@@ -16,8 +16,9 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 LOCKS = {name: (ROOT / name).read_text(encoding="utf-8") for name in ("requirements.lock", "requirements-dev.lock")}
-DOCS_LOCK = (ROOT / "requirements-docs.lock").read_text(encoding="utf-8")
-both = pytest.mark.parametrize("lock", [*LOCKS.values(), DOCS_LOCK], ids=[*LOCKS, "requirements-docs.lock"])
+ADDED = ("docs", "tools")
+ADDED_LOCKS = {f"requirements-{name}.lock": (ROOT / f"requirements-{name}.lock").read_text("utf-8") for name in ADDED}
+every = pytest.mark.parametrize("lock", [*LOCKS.values(), *ADDED_LOCKS.values()], ids=[*LOCKS, *ADDED_LOCKS])
 
 
 # The lock
@@ -28,13 +29,13 @@ def requirements(lock: str) -> list[str]:
     return re.split(r"(?<!\\)\n", lock.strip())
 
 
-@both
+@every
 def test_the_lock_contains_no_address(lock: str):
     assert not re.search(r"://|^\s*-(-index|-extra|-find|-trusted|i|f)\b|@ ", lock, re.MULTILINE)
     assert [path.name for path in ROOT.iterdir() if re.fullmatch(r"uv\.lock|pylock.*\.toml", path.name)] == []
 
 
-@both
+@every
 def test_every_requirement_is_pinned_and_hashed(lock: str):
     for entry in requirements(lock):
         assert re.match(r"[a-z0-9-]+==\S+ ", entry), entry
@@ -55,9 +56,10 @@ def test_the_program_is_installed_without_the_packages_of_the_checks():
     assert not {"pytest", "mypy", "ruff", "hypothesis", "dask"} & {entry.split("==")[0] for entry in program}
 
 
-def test_the_packages_of_the_site_do_not_change_those_of_the_program():
+@pytest.mark.parametrize("added", ADDED_LOCKS.values(), ids=ADDED_LOCKS)
+def test_added_packages_do_not_change_those_of_the_program(added: str):
     others = dict(pinned for lock in LOCKS.values() for pinned in pins(lock))
-    changed = {name for name, version in pins(DOCS_LOCK) if others.get(name, version) != version}
+    changed = {name for name, version in pins(added) if others.get(name, version) != version}
     assert changed == set()
 
 
@@ -84,7 +86,7 @@ def checkout(tmp_path: Path) -> Path:
     """A copy of `run` and of the files that it reads, with an environment that appears complete."""
     folder = tmp_path / "a folder with spaces"
     (folder / ".venv" / "bin").mkdir(parents=True)
-    for name in ("run", "pyproject.toml", "requirements-docs.lock", *LOCKS):
+    for name in ("run", "pyproject.toml", *ADDED_LOCKS, *LOCKS):
         (folder / name).write_bytes((ROOT / name).read_bytes())
     (folder / ".venv" / "bin" / "python").symlink_to(sys.executable)
     (folder / ".venv" / "airmuscle.stamp").write_bytes(b"".join(load_run(folder).stamp()))
@@ -162,14 +164,15 @@ def test_an_installation_uses_the_locks_that_the_command_needs(
 
 
 @needs_posix
-def test_the_site_adds_its_packages_once_and_keeps_the_stamp_of_the_program(
-    checkout: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("name", ADDED)
+def test_further_packages_are_added_once_and_keep_the_stamp_of_the_program(
+    checkout: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ):
     run, called = load_run(checkout), []
     monkeypatch.setattr(subprocess, "call", lambda command, **settings: called.append(command[-1]))
-    assert run.install_docs() is None
-    assert run.install_docs() is None
-    assert [Path(name).name for name in called] == ["requirements-docs.lock"]
+    assert run.install_added(name) is None
+    assert run.install_added(name) is None
+    assert [Path(lock).name for lock in called] == [f"requirements-{name}.lock"]
     assert run.installed(everything=True)
 
 

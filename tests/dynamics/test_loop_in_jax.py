@@ -29,6 +29,7 @@ from airmuscle.errors import AirmuscleError, ParameterError
 
 jax = pytest.importorskip("jax", reason="the package jax is not installed (extra jax)")
 jax.config.update("jax_enable_x64", True)
+pytestmark = pytest.mark.tool
 jnp = jax.numpy
 STEP, H, DURATION = 1e-3, 5e-3, 0.3
 OUTER = PID("position", "pressure", 4e6, 0.3, 0.02, initial_output=1e5)

@@ -67,6 +67,7 @@ def test_an_operation_means_the_same_everywhere(name, x, y):
     np.testing.assert_allclose(printed, [expected, -expected], rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.tool
 @pytest.mark.parametrize("name", FORMULAS)
 def test_jax_arrays_are_accepted(name):
     jax = pytest.importorskip("jax")

@@ -173,6 +173,7 @@ def test_a_traced_model_gives_the_values_of_numpy(name: str):
     np.testing.assert_allclose(traced, getattr(law, own)(*there.given(own)), rtol=1e-12)
 
 
+@pytest.mark.tool
 @every_entry
 def test_jax_gives_the_values_of_numpy(name: str):
     jax: Any = pytest.importorskip("jax")

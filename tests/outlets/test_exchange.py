@@ -56,6 +56,7 @@ def test_what_is_no_frame_of_measurements_is_refused(frame, error, message):
         from_pandas(frame)
 
 
+@pytest.mark.tool
 def test_xarray_has_units_and_constants():
     pytest.importorskip("xarray", reason="needs the package xarray")
     found = to_xarray(RUN)

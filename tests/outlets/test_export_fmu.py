@@ -34,6 +34,7 @@ from airmuscle.outlets.export import compiler
 from airmuscle.outlets.export.fmi_units import BASE, base_powers
 from airmuscle.physics import ValidityRange
 
+pytestmark = pytest.mark.tool
 JUMPS = ((0.0, 0.0), (0.1, 0.5), (0.3, 0.1), (0.4, 0.4))
 SOME = ("dmsp-20-300", "overlap")
 PORTS = "load in another program"

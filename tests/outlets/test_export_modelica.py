@@ -72,6 +72,7 @@ def test_its_text_declares_what_it_uses(name, tmp_path):
     assert sorted(words) == sorted(re.findall(r"^ *end (\w+);", text, flags=re.MULTILINE))
 
 
+@pytest.mark.tool
 @pytest.mark.parametrize("name", ["dmsp-20-300", "overlap", "closed"])
 def test_rumoca_resolves_and_flattens_the_package(name, tmp_path):
     rumoca = pytest.importorskip("rumoca", reason="needs the package rumoca")
@@ -81,6 +82,7 @@ def test_rumoca_resolves_and_flattens_the_package(name, tmp_path):
     assert len(model.inputs) == len(plant.inputs)
 
 
+@pytest.mark.tool
 @pytest.mark.parametrize("name", ["dmsp-20-300", "overlap", "closed"])
 def test_pymoca_parses_the_package(name, tmp_path):
     parser = pytest.importorskip("pymoca.parser", reason="needs the package pymoca")

@@ -26,6 +26,7 @@ from airmuscle.outlets.cli import app
 from airmuscle.outlets.export import compiler, mujoco_plugin
 from airmuscle.physics import AntagonisticJoint, FillDischarge, Supply, Valve, find_equilibrium
 
+pytestmark = pytest.mark.tool
 VALVE = Valve(2.6167e-9, 0.433)
 PLANT = replace(plants.EXAMPLES["dmsp-20-300"], circuit=FillDischarge(Supply(5.5e5), VALVE, VALVE))
 SCHEDULE = Schedule({"fill": ((0.0, 0.0), (0.1, 1.0), (0.4, 0.0)), "discharge": ((0.0, 0.0), (0.5, 1.0), (0.6, 0.0))})

@@ -40,6 +40,7 @@ from airmuscle.physics import (
 
 jax = pytest.importorskip("jax")
 jax.config.update("jax_enable_x64", True)
+pytestmark = pytest.mark.tool
 jnp = jax.numpy
 
 VALVE = Valve(2.6e-9, 0.43)

@@ -96,6 +96,7 @@ def test_an_object_beside_vectors_is_a_note_and_no_column(tmp_path):
     assert "Not read: T is a MATLAB table." in table.notes[-1]
 
 
+@pytest.mark.tool
 @pytest.mark.parametrize("version", ["v7", "v7.3"])
 def test_tables_are_read_with_their_units(tmp_path, version):
     matio = pytest.importorskip("matio", reason="mat-io is not installed")

@@ -12,6 +12,8 @@ from airmuscle.bench import read
 from airmuscle.errors import FileError
 from airmuscle.outlets.cli import app
 
+pytestmark = pytest.mark.tool
+
 
 @pytest.fixture
 def bag(tmp_path):

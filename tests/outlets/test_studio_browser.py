@@ -15,12 +15,11 @@ from airmuscle.files.scenario import build_scenario
 
 pytest.importorskip("starlette", reason="needs starlette")
 pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
-from studio_browser import CHROMIUM, WAIT, address, browser, opened
+from studio_browser import WAIT, address, browser, opened
 
 __all__ = ["address", "browser"]
 pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(CHROMIUM is None, reason="needs chromium"),
+    pytest.mark.tool,
     pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning"),
 ]
 

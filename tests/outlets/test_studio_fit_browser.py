@@ -13,10 +13,10 @@ import airmuscle as am
 
 pytest.importorskip("starlette", reason="needs starlette")
 pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
-from studio_browser import CHROMIUM, WAIT, address, browser, opened
+from studio_browser import WAIT, address, browser, opened
 
 __all__ = ["address", "browser"]
-pytestmark = [pytest.mark.slow, pytest.mark.skipif(CHROMIUM is None, reason="needs chromium")]
+pytestmark = pytest.mark.tool
 FIT = 600_000
 """Limit [ms] of a fit on a machine that is occupied."""
 DROP = """([name, content]) => {

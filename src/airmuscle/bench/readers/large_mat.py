@@ -18,6 +18,8 @@ from .pieces import Reduction, check_reduced_lengths, read_reduced
 MAX_CELLS = 10_000
 """Maximum number of texts of a cell array that is read, as names of columns (chosen)."""
 _HDF5_BEGINNING = b"MATLAB 7.3"
+_HDF5, _USER_BLOCK = b"\x89HDF\r\n\x1a\n", 512
+"""Signature of HDF5, and its place behind the header of MATLAB, whose text other programs write differently."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -47,7 +49,8 @@ class _Slices:
 def is_version_7_3(path: Path) -> bool:
     """Whether a MAT file is of version 7.3, which is HDF5."""
     with path.open("rb") as beginning:
-        return beginning.read(len(_HDF5_BEGINNING)) == _HDF5_BEGINNING
+        head = beginning.read(_USER_BLOCK + len(_HDF5))
+    return head.startswith(_HDF5_BEGINNING) or head[_USER_BLOCK:] == _HDF5
 
 
 def read_large_mat(path: Path, pymatreader: Any, downsampling: Downsampling) -> LargeContents | None:
