@@ -17,7 +17,7 @@ import airmuscle as am
 from airmuscle.core import ops
 from airmuscle.core.declaration import model, parameter
 from airmuscle.core.ops import Value
-from airmuscle.core.variables import Input, StateVariable
+from airmuscle.core.system import Input, StateVariable
 from airmuscle.engine.compile.program import CompiledSystem, compile_system
 
 RTOL = 1e-6

@@ -12,8 +12,7 @@ from typing import Any
 import airmuscle as am
 from airmuscle.core import ops
 from airmuscle.core.declaration import model, parameter
-from airmuscle.core.system import System
-from airmuscle.core.variables import StateVariable
+from airmuscle.core.system import StateVariable, System
 
 HEAT_CAPACITY = am.physics.GAS_CONSTANT / 0.4
 """Specific heat of air at constant volume [J/(kg K)], for a heat capacity ratio of 1.4."""

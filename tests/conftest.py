@@ -25,7 +25,8 @@ from unittest import mock
 import pytest
 from hypothesis import settings
 
-from airmuscle.core import plotting, processes
+from airmuscle.core import plotting
+from airmuscle.engine import processes
 from airmuscle.engine.compile.cache import kernel, object_code
 from airmuscle.engine.compile.cache.store import load, save
 

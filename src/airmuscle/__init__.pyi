@@ -20,8 +20,8 @@ from .control import PID as PID
 from .core import Reference as Reference
 from .core import System as System
 from .core import cite as cite
+from .core.diagnostics import Status as Status
 from .core.errors import AirmuscleError as AirmuscleError
-from .core.status import Status as Status
 from .engine import ControlLoop as ControlLoop
 from .engine import DormandPrince8 as DormandPrince8
 from .engine import Problem as Problem

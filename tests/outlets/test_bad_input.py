@@ -451,7 +451,7 @@ def test_an_interrupted_simulation_keeps_what_it_has(tmp_path: Path, monkeypatch
 
 def test_what_a_killed_process_has_left_is_removed_by_the_next_one(tmp_path: Path):
     code = (
-        "import os, signal, sys; from airmuscle.core.output_folder import atomic_folder\n"
+        "import os, signal, sys; from airmuscle.core.atomic_output import atomic_folder\n"
         "with atomic_folder(sys.argv[1]) as folder:\n    (folder / 'a.csv').touch(); os.kill(os.getpid(), signal.SIGKILL)"
     )
     subprocess.run([sys.executable, "-c", code, str(tmp_path)], check=False)

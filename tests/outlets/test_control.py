@@ -19,6 +19,7 @@ import pytest
 from scenario_files import writer_of
 from typer.testing import CliRunner
 
+import airmuscle
 from airmuscle.control import PID, OnOffController
 from airmuscle.design import load_study
 from airmuscle.engine import (
@@ -449,7 +450,12 @@ def test_a_study_varies_the_numbers_of_a_controller(tmp_path: Path):
         load_study(tmp_path / "study.toml")
 
 
-def test_a_study_depends_on_the_controllers_program():
-    from airmuscle.core.fingerprint import EXCLUDED_PACKAGES
+def test_a_fingerprint_leaves_out_rooms_that_exist_and_no_controllers():
+    """A study depends on the program of its controllers, the stages of a campaign on none."""
+    from airmuscle.core.fingerprint import EXCLUDED_ROOMS
+    from airmuscle.outlets.cli.campaign_stages import OMITTED_ROOMS
 
-    assert "control" not in EXCLUDED_PACKAGES
+    rooms = {path.parent.name for path in Path(airmuscle.__file__).parent.glob("*/__init__.py")}
+    assert {*EXCLUDED_ROOMS, *OMITTED_ROOMS} <= rooms
+    assert not {"core", "engine", "physics", "control", "files", "design"} & set(EXCLUDED_ROOMS)
+    assert not {"core", "engine", "physics", "recording", "bench"} & set(OMITTED_ROOMS)

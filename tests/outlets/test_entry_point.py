@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from airmuscle.core import processes
+from airmuscle.engine import processes
 from airmuscle.outlets.cli import entry_point
 
 

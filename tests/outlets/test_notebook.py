@@ -15,11 +15,11 @@ import pytest
 
 import airmuscle as am
 from airmuscle.core import given_axes, new_figure
-from airmuscle.core.notebook import MAX_NOTES, MAX_ROWS, Card, NotebookDisplay, render_card
 from airmuscle.core.short_repr import MAX_LINES, ShortRepr
 from airmuscle.errors import ParameterError
 from airmuscle.physics import ContractileSurface
 from airmuscle.physics.muscle import parameter_rows
+from airmuscle.recording.notebook import MAX_NOTES, MAX_ROWS, Card, NotebookDisplay, render_card
 from airmuscle.recording.panels import panels_of
 
 MAX_BYTES = 200_000

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from contextvars import ContextVar
 from typing import Any
 
+from .errors import ParameterError
+
 STANDARD_ATMOSPHERE = 101_325.0
 """Ambient pressure [Pa] where none is stated."""
 
@@ -51,3 +53,12 @@ def ambient_pressure(pressure: float) -> Iterator[None]:
         yield
     finally:
         _ambient.reset(token)
+
+
+def check_above_vacuum(pressure: float, ambient_pressure: float = STANDARD_ATMOSPHERE) -> None:
+    """Raise ParameterError for a gauge pressure [Pa] at or below absolute vacuum."""
+    if not pressure > -ambient_pressure:
+        raise ParameterError(
+            f"a gauge pressure of {pressure / 1e3:.6g} kPa is not above absolute vacuum "
+            f"({-ambient_pressure / 1e3:.6g} kPa gauge). Check the unit."
+        )

@@ -1,9 +1,15 @@
-"""Array type: NumPy arrays of double-precision floats."""
+"""Arrays of double-precision floats, and traced functions evaluated on whole arrays.
+
+CasADi evaluates a function point by point, which takes about 10 us each. NumPy needs a few microseconds per
+instruction for all points together. Instructions that the required outputs do not need are left out.
+"""
 
 from __future__ import annotations
 
+import functools
 import math
-from typing import Any
+from collections.abc import Callable, Collection, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -34,3 +40,131 @@ def flat_view(array: npt.NDArray[Any]) -> Any:
     """A view of a C-contiguous array whose items are read and written as plain numbers, faster than those of NumPy."""
     items: Any = array.reshape(-1)
     return memoryview(items)
+
+
+MIN_POINTS = 50
+"""Points below which CasADi itself is faster (chosen)."""
+
+
+class _Step(NamedTuple):
+    operation: Callable[..., Any]
+    target: int
+    sources: tuple[int, ...]
+    released: tuple[int, ...] = ()
+    """Registers that no later step reads, and that are no output: their memory is used again while it is cached."""
+
+
+class ArrayProgram(NamedTuple):
+    """The instructions for some non-zeros of one output of a traced function."""
+
+    size: int
+    """Number of registers."""
+    constants: tuple[tuple[int, float], ...]
+    """Register and value."""
+    inputs: tuple[tuple[int, int, int], ...]
+    """Register, argument and element."""
+    steps: tuple[_Step, ...]
+    outputs: tuple[tuple[int, int], ...]
+    """Column and register."""
+
+    def columns(self, arguments: Sequence[Array], parameters: Sequence[float], count: int) -> Array:
+        """The required columns of the output at N points, shape (N, count); columns without an instruction are 0."""
+        registers: list[Any] = [0.0] * self.size
+        for register, value in self.constants:
+            registers[register] = value
+        for register, argument, element in self.inputs:
+            registers[register] = arguments[argument] if argument < len(arguments) else parameters[element]
+        with np.errstate(all="ignore"):
+            for operation, target, sources, released in self.steps:
+                registers[target] = operation(*[registers[i] for i in sources])
+                for register in released:
+                    registers[register] = None
+        result = np.zeros((count, arguments[0].size))
+        for column, register in self.outputs:
+            result[column] = registers[register]
+        return result.T
+
+
+def make_program(function: Any, output: int, columns: Sequence[int]) -> ArrayProgram | None:
+    """The instructions for these columns of one output (a row) of a CasADi function; None where NumPy lacks one.
+
+    Column number k of the program is the k-th of `columns`.
+    """
+    nonzeros = function.sparsity_out(output).get_col()
+    wanted = {k: columns.index(column) for k, column in enumerate(nonzeros) if column in columns}
+    program = _read(function, output, wanted)
+    return None if program is None else _without_unused(program)
+
+
+def _read(function: Any, output: int, wanted: dict[int, int]) -> ArrayProgram | None:
+    """All instructions, with a new register for every result."""
+    import casadi
+
+    operations, current = _operations(), dict[int, int]()
+    constants, inputs, steps, outputs = [], [], [], []
+    for k in range(function.n_instructions()):
+        code, target, source = (
+            function.instruction_id(k),
+            function.instruction_output(k),
+            function.instruction_input(k),
+        )
+        if code == casadi.OP_OUTPUT:
+            if target[0] == output and target[1] in wanted:
+                outputs.append((wanted[target[1]], current[source[0]]))
+            continue
+        if code == casadi.OP_CONST:
+            constants.append((k, float(function.instruction_constant(k))))
+        elif code == casadi.OP_INPUT:
+            inputs.append((k, int(source[0]), int(source[1])))
+        elif code in operations:
+            steps.append(_Step(operations[code], k, tuple(current[i] for i in source)))
+        else:
+            return None
+        current[target[0]] = k
+    return ArrayProgram(function.n_instructions(), tuple(constants), tuple(inputs), tuple(steps), tuple(outputs))
+
+
+def _without_unused(program: ArrayProgram) -> ArrayProgram:
+    used = {register for _, register in program.outputs}
+    steps = []
+    for step in reversed(program.steps):
+        if step.target in used:
+            steps.append(step._replace(released=tuple(set(step.sources) - used)))
+            used.update(step.sources)
+    return program._replace(
+        constants=_of(used, program.constants), inputs=_of(used, program.inputs), steps=tuple(reversed(steps))
+    )
+
+
+def _of(used: Collection[int], entries: tuple[Any, ...]) -> tuple[Any, ...]:
+    return tuple(entry for entry in entries if entry[0] in used)
+
+
+def _if_else_zero(condition: Any, x: Any) -> Any:
+    """`x` where the condition holds, else 0; one number where it holds nowhere, as in most extrapolation terms."""
+    holds = np.not_equal(condition, 0.0)
+    if holds.all():
+        return x
+    return np.where(holds, x, 0.0) if holds.any() else 0.0
+
+
+@functools.cache
+def _operations() -> dict[int, Callable[..., Any]]:
+    """NumPy functions by CasADi's number of the operation."""
+    import casadi
+
+    named: dict[str, Callable[..., Any]] = {
+        "ASSIGN": lambda x: x, "ADD": np.add, "SUB": np.subtract, "MUL": np.multiply, "DIV": np.divide,
+        "NEG": np.negative, "SQ": lambda x: x * x, "TWICE": lambda x: x + x, "INV": lambda x: np.divide(1.0, x),
+        "SQRT": np.sqrt, "FABS": np.abs, "SIGN": np.sign, "FLOOR": np.floor, "POW": np.power, "CONSTPOW": np.power,
+        "EXP": np.exp,
+        "LOG": np.log, "LOG1P": np.log1p, "EXPM1": np.expm1, "SIN": np.sin, "COS": np.cos, "TAN": np.tan,
+        "ASIN": np.arcsin, "ACOS": np.arccos, "ATAN": np.arctan, "SINH": np.sinh, "COSH": np.cosh, "TANH": np.tanh,
+        "ASINH": np.arcsinh, "FMIN": np.fmin, "FMAX": np.fmax,
+        "LT": lambda a, b: np.less(a, b) * 1.0, "LE": lambda a, b: np.less_equal(a, b) * 1.0,
+        "EQ": lambda a, b: np.equal(a, b) * 1.0, "NE": lambda a, b: np.not_equal(a, b) * 1.0,
+        "NOT": lambda a: np.equal(a, 0.0) * 1.0, "AND": lambda a, b: np.logical_and(a, b) * 1.0,
+        "OR": lambda a, b: np.logical_or(a, b) * 1.0,
+        "IF_ELSE_ZERO": _if_else_zero,
+    }  # fmt: skip
+    return {getattr(casadi, f"OP_{name}"): operation for name, operation in named.items()}

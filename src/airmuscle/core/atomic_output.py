@@ -1,12 +1,18 @@
-"""Atomic output of a single file: it is complete or unchanged, whatever happens while it is written."""
+"""Atomic output: a file, or the files of a folder, appear completely or not at all."""
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
+import shutil
+import socket
+import tempfile
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+
+from .errors import FileError
 
 _MAX_NAME = 100
 """Number of characters of the name of a file that its temporary file has (chosen); file systems limit names to 255."""
@@ -26,3 +32,118 @@ def atomic_file(path: Path) -> Iterator[Path]:
     finally:
         with contextlib.suppress(OSError):  # renamed, or never created
             temporary.unlink()
+
+
+_UNFINISHED = f".unfinished-{socket.gethostname().replace('/', '')}-"
+"""Beginning of the name of a temporary folder, with the machine, because folders may be shared; a process follows."""
+FULL = (errno.ENOSPC, errno.EDQUOT)
+"""Numbers of the errors of a full disk and of an exhausted quota."""
+REMEDY_WHERE_FULL = "Free space there, or specify another folder."
+
+
+@contextlib.contextmanager
+def atomic_folder(folder: Path | str) -> Iterator[Path]:
+    """Yield an empty temporary folder whose files are moved into `folder` when the block ends without an exception.
+
+    If the block raises, or the files cannot be written, `folder` remains unchanged, or is not created. Files of the
+    same name are replaced, other files are kept. What a killed process has left in `folder` is removed. Raises
+    FileError.
+    """
+    target = Path(folder)
+    with _raise_file_errors(target):
+        created = _missing_folders(target)
+    try:
+        with _raise_file_errors(target):
+            target.mkdir(parents=True, exist_ok=True)
+            _remove_abandoned(target)
+            staging = Path(tempfile.mkdtemp(prefix=f"{_UNFINISHED}{os.getpid()}-", dir=target))
+        try:
+            with _raise_where_full(target):
+                yield staging
+            with _raise_file_errors(target):
+                _move_files(staging, target)
+        finally:
+            shutil.rmtree(staging, ignore_errors=True)
+    except BaseException:
+        _remove_empty_folders(created)
+        raise
+
+
+def _remove_abandoned(target: Path) -> None:
+    """Remove the temporary folders of processes of this machine that were killed."""
+    for folder in target.glob(f"{_UNFINISHED}*"):
+        process = folder.name.removeprefix(_UNFINISHED).partition("-")[0]
+        if process.isdecimal() and not folder.is_symlink() and not is_running(int(process)):
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def is_running(process: int) -> bool:
+    """Whether a process of this number exists; true where this cannot be determined."""
+    if not hasattr(os, "getuid"):  # on Windows, os.kill would end the process
+        return True
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):  # the process of another user
+        return True
+    return True
+
+
+def check_writable(folder: Path | str) -> None:
+    """Raise FileError before a long computation if `atomic_folder` cannot write to `folder`; leaves no files."""
+    target = Path(folder)
+    with _raise_file_errors(target):
+        created = _missing_folders(target)
+    try:
+        with atomic_folder(target):
+            return
+    finally:
+        _remove_empty_folders(created)
+
+
+@contextlib.contextmanager
+def _raise_file_errors(target: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        at = f" ({error.filename})" if error.filename and Path(error.filename) != target else ""
+        remedy = REMEDY_WHERE_FULL if error.errno in FULL else "Specify a folder with write permission."
+        raise FileError(f"{target}: cannot be written to: {error.strerror or error}{at}. {remedy}") from error
+
+
+@contextlib.contextmanager
+def _raise_where_full(target: Path) -> Iterator[None]:
+    """Raise FileError where there is no space for a file; other errors are those of the block."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in FULL:
+            raise
+        raise FileError(f"{target}: cannot be written to: {error.strerror}. {REMEDY_WHERE_FULL}") from error
+
+
+def _missing_folders(folder: Path) -> list[Path]:
+    """Return the folders that `mkdir(parents=True)` would create, innermost first."""
+    return [path for path in (folder, *folder.parents) if not path.exists()]
+
+
+def _remove_empty_folders(folders: list[Path]) -> None:
+    for folder in folders:
+        with contextlib.suppress(OSError):  # not created, or no longer empty
+            folder.rmdir()
+
+
+def _move_files(staging: Path, target: Path) -> None:
+    """Move all files into `target`; every folder is created before the first file is moved."""
+    files = sorted(path for path in staging.rglob("*") if path.is_file())
+    moves = [(path, target / path.relative_to(staging)) for path in files]
+    for _, destination in moves:
+        if destination.is_dir():
+            raise IsADirectoryError(21, "a folder of this name exists", str(destination))
+        if destination.parent.exists() and not destination.parent.is_dir():
+            raise NotADirectoryError(20, "a file of this name exists", str(destination.parent))
+    for _, destination in moves:
+        destination.parent.mkdir(parents=True, exist_ok=True)
+    for path, destination in moves:
+        os.replace(path, destination)

@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from . import ops, tree
+from .arrays import MIN_POINTS, make_program
 from .errors import TraceError
-from .vectorised import MIN_POINTS, make_program
 
 _traced_functions: dict[Any, Any] = {}
 

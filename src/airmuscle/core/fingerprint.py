@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 PACKAGE_ROOT = Path(__file__).parents[1]
-EXCLUDED_PACKAGES = ("cli", "studio", "export", "report", "reproduce", "sizing", "environments", "identify")
-"""Parts of the program that do not affect a simulation."""
+EXCLUDED_ROOMS = ("outlets", "papers", "report")
+"""Rooms of the program that do not affect a simulation."""
 NUMERICAL_PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "casadi")
 
 
@@ -44,10 +44,10 @@ def _to_json(value: Any) -> Any:
 
 
 @functools.cache
-def program_fingerprint(excluded: tuple[str, ...] = EXCLUDED_PACKAGES) -> str:
+def program_fingerprint(excluded: tuple[str, ...] = EXCLUDED_ROOMS) -> str:
     """The fingerprint of the program: its version, its source files, and the versions of the numerical packages.
 
-    excluded  packages of the program that do not affect the results; by default those of a simulation
+    excluded  rooms of the program that do not affect the results; by default those of a simulation
     """
     files = [p for p in sorted(PACKAGE_ROOT.rglob("*.py")) if p.relative_to(PACKAGE_ROOT).parts[0] not in excluded]
     contents = [(p.relative_to(PACKAGE_ROOT).as_posix(), hashlib.sha256(p.read_bytes()).hexdigest()) for p in files]

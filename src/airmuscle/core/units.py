@@ -17,8 +17,10 @@ from typing import Any
 
 from .absolute_pressure import STANDARD_ATMOSPHERE, AbsolutePressure, ambient_of_texts
 from .annotation import abridged
-from .errors import ParameterError, UnitError
+from .errors import UnitError
 
+STANDARD_GRAVITY = 9.80665
+"""Standard acceleration of gravity [m/s2] (ISO 80000-3)."""
 AMBIENT_PRESSURE = STANDARD_ATMOSPHERE
 """Standard atmosphere [Pa], subtracted from an absolute pressure unless another ambient pressure is given."""
 
@@ -289,12 +291,3 @@ def _suggest_unit(unit: str, target: str) -> str:
     if not matches or unit in _FACTORS or by_lower_case[matches[0]] == unit:
         return ""
     return f" Did you mean '{by_lower_case[matches[0]]}'?"
-
-
-def check_above_vacuum(pressure: float, ambient_pressure: float = AMBIENT_PRESSURE) -> None:
-    """Raise ParameterError for a gauge pressure [Pa] at or below absolute vacuum."""
-    if not pressure > -ambient_pressure:
-        raise ParameterError(
-            f"a gauge pressure of {pressure / 1e3:.6g} kPa is not above absolute vacuum "
-            f"({-ambient_pressure / 1e3:.6g} kPa gauge). Check the unit."
-        )

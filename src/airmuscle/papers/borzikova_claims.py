@@ -11,7 +11,7 @@ import airmuscle as am
 from ..bench.identify.surface.basis import Chebyshev, LoadRange, conditioning
 from ..bench.identify.surface.exponential import SurfaceFit, SurfaceProblem, fit_linearised, fit_nonlinear
 from ..core.arrays import Array
-from ..core.constants import STANDARD_GRAVITY
+from ..core.units import STANDARD_GRAVITY
 from ..physics.muscle.characteristic.borzikova import SAM_30X290, PlaneCurves
 from ..report.chapter import AtLeast, Claim, ClaimRow, Equal, Kind
 from ..report.formatting import format_number, typographic

@@ -9,8 +9,8 @@ from concurrent.futures import Executor, as_completed
 from pathlib import Path
 from typing import Any
 
-from ..core.output_folder import check_writable
-from ..core.processes import process_pool
+from ..core.atomic_output import check_writable
+from ..engine.processes import process_pool
 from ..files.library.files import complete_name
 from ..report.chapter import Chapter
 from ..report.write import with_rendered_figures, write_report

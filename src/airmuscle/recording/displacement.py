@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ..core.hints import Hint, HintedText
+from ..core.errors import Hint, HintedText
 
 MOVED = ("contraction", "length", "shortening", "position")
 """Columns of the motion of the muscle end; the first one of a recording is used."""

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..core.arrays import Array
-from ..core.axes import given_axes
 from ..core.display import chosen_scale
-from ..core.plotting import BLACK, DASHES, LINES, legend_outside, new_figure
+from ..core.plotting import BLACK, DASHES, LINES, given_axes, legend_outside, new_figure
 from .display_units import display_scale
 from .panels import Curve, Panel, panels_of
 

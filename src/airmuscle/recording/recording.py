@@ -9,17 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.annotation import one_line
+from ..core.annotation import check_field_types, one_line
 from ..core.arrays import Array
-from ..core.errors import ColumnError, ParameterError, suggestion
-from ..core.field_types import check_field_types
-from ..core.hints import HintedText
-from ..core.notebook import Card, NotebookDisplay
+from ..core.errors import ColumnError, HintedText, ParameterError, suggestion
 from ..core.reference import Reference
 from ..core.units import conversion
 from .columns import quantity_of
 from .displacement import ZERO_NOT_STATED
 from .heading import split_unit
+from .notebook import Card, NotebookDisplay
 from .plot import plot_columns
 from .recording_card import recording_card
 

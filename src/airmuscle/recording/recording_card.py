@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..core.arrays import Array
-from ..core.notebook import Card
 from .display_units import display_scale
+from .notebook import Card
 from .plot import plot_columns
 
 MAX_PANELS = 4

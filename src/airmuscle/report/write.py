@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from ..core import plotting
+from ..core.atomic_output import atomic_folder
 from ..core.errors import FileError
-from ..core.output_folder import atomic_folder
 from .chapter import Chapter, Table
 from .formatting import table_rows
 from .formula import to_plain

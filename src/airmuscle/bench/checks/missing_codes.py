@@ -9,10 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.arrays import Array
-from ...core.constants import STANDARD_GRAVITY
-from ...core.errors import UnitError
-from ...core.hints import Hint, HintedText
-from ...core.units import conversion
+from ...core.errors import Hint, HintedText, UnitError
+from ...core.units import STANDARD_GRAVITY, conversion
 from ...recording.columns import quantity_of
 from ...recording.recording import Recording
 from ..readers.missing_values import DropMissing

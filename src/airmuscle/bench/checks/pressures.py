@@ -6,8 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ...core.errors import UnitError
-from ...core.hints import Hint, HintedText
+from ...core.errors import Hint, HintedText, UnitError
 from ...core.units import AMBIENT_PRESSURE, conversion
 from ...recording.recording import Recording
 from .bench_rows import BenchRows, file_list, limits, pressure_lines, recordings_with

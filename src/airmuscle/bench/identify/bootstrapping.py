@@ -11,8 +11,7 @@ import numpy.typing as npt
 
 from ...core import tree
 from ...core.arrays import Array
-from ...core.errors import IdentificationError
-from ...core.hints import Hint
+from ...core.errors import Hint, IdentificationError
 from ...core.short_repr import ShortRepr
 from ...physics.muscle.characteristic.base import Characteristic
 from ...recording import Recording

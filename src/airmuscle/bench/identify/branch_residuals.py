@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.arrays import Array
-from ...core.hints import Hint, HintedText
+from ...core.errors import Hint, HintedText
 from ...recording import Recording
 from ...recording.columns import QUANTITIES
 from ..segment import branch_directions, estimate_sensors, find_branches

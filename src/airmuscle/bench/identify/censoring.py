@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ...core.field_types import check_field_types
+from ...core.annotation import check_field_types
 from ...physics.muscle.characteristic.base import Characteristic, ForceLaw
 from ...recording import Recording
 from ..segment import estimate_sensors

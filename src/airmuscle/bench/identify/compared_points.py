@@ -12,8 +12,7 @@ import numpy.typing as npt
 
 from ...core import tree
 from ...core.arrays import Array
-from ...core.errors import AirmuscleError, IdentificationError
-from ...core.hints import HintedText
+from ...core.errors import AirmuscleError, HintedText, IdentificationError
 from ...physics.muscle.characteristic import PooledLengthLaw
 from ...physics.muscle.characteristic.base import Characteristic
 from ...recording import Recording

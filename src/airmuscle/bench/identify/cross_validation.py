@@ -14,10 +14,9 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from ...core.annotation import check_field_types
 from ...core.display import level_text
-from ...core.errors import IdentificationError, ParameterError
-from ...core.field_types import check_field_types
-from ...core.hints import Hint, HintedText
+from ...core.errors import Hint, HintedText, IdentificationError, ParameterError
 from ...recording import Recording
 
 Labels = npt.NDArray[np.str_]

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from ...core.arrays import Array
-from ...core.hints import Hint, HintedText
+from ...core.errors import Hint, HintedText
 from .branch_residuals import branch_distance, branch_notes
 from .censoring import UNCENSORED, Censoring, default_censoring
 from .data_checks.scatter import Remarks, Scatter

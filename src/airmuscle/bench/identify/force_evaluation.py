@@ -8,8 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.arrays import Array
-from ...core.errors import IdentificationError, SolveError
-from ...core.hints import HintedText
+from ...core.errors import HintedText, IdentificationError, SolveError
 from ...physics.muscle.characteristic.base import ContractionLaw, ForceLaw
 
 FORCE_GRID_POINTS = 801

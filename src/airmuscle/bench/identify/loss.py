@@ -7,9 +7,9 @@ import dataclasses
 
 import numpy as np
 
+from ...core.annotation import check_field_types
 from ...core.arrays import Array
 from ...core.errors import ParameterError
-from ...core.field_types import check_field_types
 
 ROBUST_LIMIT = 6.0
 """Limit of the residuals in the errors of a robust fit, in robust standard deviations (chosen)."""

@@ -7,8 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from ...core.errors import IdentificationError
-from ...core.hints import HintedText
+from ...core.errors import HintedText, IdentificationError
 from ...core.short_repr import ShortRepr
 from ...recording import Recording
 from .candidate_scores import ExcludedModel, RankedModel, Score, points_of_splits

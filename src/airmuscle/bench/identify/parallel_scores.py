@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, as_completed
 
 from ...core import tree
-from ...core.processes import check_running, process_pool
+from ...engine.processes import check_running, process_pool
 from ...physics.muscle.characteristic import PooledLengthLaw
 from .candidate_scores import MAX_EXCESS, RankedModel, Score, score_candidate
 from .candidates import Candidate

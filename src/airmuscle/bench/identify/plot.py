@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.arrays import Array
-from ...core.axes import given_axes
-from ...core.plotting import BLACK, BLUE, RED, new_figure
+from ...core.plotting import BLACK, BLUE, RED, given_axes, new_figure
 from ...recording.display_units import display_scale
 
 MANY_POINTS = 1000

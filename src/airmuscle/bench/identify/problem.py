@@ -12,8 +12,7 @@ import numpy.typing as npt
 
 from ...core import autodiff, tree
 from ...core.arrays import Array, as_slice
-from ...core.errors import IdentificationError, ParameterError, suggestion
-from ...core.hints import Hint
+from ...core.errors import Hint, IdentificationError, ParameterError, suggestion
 from ...core.tree import Leaf
 from ...physics.muscle.characteristic import PooledLengthLaw
 from ...physics.muscle.characteristic.base import Characteristic, ContractionLaw, ForceLaw, PressureLaw

@@ -15,10 +15,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.annotation import abridged
+from ...core.annotation import abridged, check_field_types
 from ...core.arrays import Array
 from ...core.errors import IdentificationError, ParameterError
-from ...core.field_types import check_field_types
 from ...core.short_repr import ShortRepr
 from ...physics.muscle.characteristic import ContractileSurface
 from ...physics.muscle.characteristic.contractile_surface import exponents

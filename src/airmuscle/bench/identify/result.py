@@ -13,11 +13,11 @@ import numpy.typing as npt
 from ...core.arrays import Array
 from ...core.display import contraction_text, in_display_unit, quantity_text
 from ...core.errors import ParameterError, suggestion
-from ...core.listed_names import continues_list
-from ...core.notebook import Card, NotebookDisplay
+from ...core.tree import continues_list
 from ...physics.muscle.characteristic.base import Characteristic
 from ...physics.muscle.characteristic.validity_range import ValidityRange
 from ...recording import Recording
+from ...recording.notebook import Card, NotebookDisplay
 from .correlation_index import CorrelationIndex
 from .data_checks.scatter import Remarks, Scatter
 from .loss import Loss

@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core.arrays import Array
-from ...core.errors import IdentificationError
-from ...core.hints import Hint
+from ...core.errors import Hint, IdentificationError
 from ...core.tree import Leaf
 from .censored_least_squares import is_determined_without_censored, solve_censored_least_squares
 from .gauss_newton import gauss_newton

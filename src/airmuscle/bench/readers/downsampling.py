@@ -9,8 +9,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from ...core.annotation import check_field_types
 from ...core.errors import ParameterError
-from ...core.field_types import check_field_types
 from ...recording.row_notes import RowNote
 from .table import Cells, RawTable
 

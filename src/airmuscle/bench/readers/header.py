@@ -7,8 +7,7 @@ import json
 import re
 from collections.abc import Iterable, Sequence
 
-from ...core.errors import ColumnError, UnitError
-from ...core.hints import Hint
+from ...core.errors import ColumnError, Hint, UnitError
 from ...core.units import conversion
 from ...recording.heading import parse_heading
 from .constants import parse_constant_name

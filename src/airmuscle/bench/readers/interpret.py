@@ -12,10 +12,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...core.arrays import Array
-from ...core.constants import STANDARD_GRAVITY
-from ...core.errors import ColumnError, UnitError, suggestion
-from ...core.hints import Hint, HintedText
-from ...core.units import AMBIENT_PRESSURE, UnitConversion, conversion, quantity
+from ...core.errors import ColumnError, Hint, HintedText, UnitError, suggestion
+from ...core.units import AMBIENT_PRESSURE, STANDARD_GRAVITY, UnitConversion, conversion, quantity
 from ...recording.columns import QUANTITIES
 from ...recording.displacement import displacement_columns, proposal
 from ...recording.heading import UNIT_SPELLINGS, Heading, find_quantity_name, parse_heading

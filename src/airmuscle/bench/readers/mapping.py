@@ -30,8 +30,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from ...core.annotation import check_field_types
 from ...core.errors import ColumnError, FileError, ParameterError, suggestion
-from ...core.field_types import check_field_types
 from ...recording.columns import QUANTITIES
 from ...recording.heading import parse_heading
 from .constants import parse_constant_name

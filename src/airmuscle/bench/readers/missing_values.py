@@ -10,10 +10,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import numpy.typing as npt
 
+from ...core.annotation import check_field_types
 from ...core.arrays import Array
-from ...core.errors import ColumnError
-from ...core.field_types import check_field_types
-from ...core.hints import Hint, HintedText
+from ...core.errors import ColumnError, Hint, HintedText
 from ...recording.heading import Heading
 from ...recording.row_notes import RowNote, list_rows
 from .clock import seconds_from_clock

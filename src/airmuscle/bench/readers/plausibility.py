@@ -7,8 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...core.arrays import Array
-from ...core.errors import ColumnError
-from ...core.hints import Hint, HintedText
+from ...core.errors import ColumnError, Hint, HintedText
 from ..checks.missing_codes import code_of
 from .missing_values import DropMissing
 from .table import RawTable

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...core.errors import ColumnError, FileError
-from ...core.hints import Hint
+from ...core.errors import ColumnError, FileError, Hint
 from ...recording.row_notes import list_rows
 from .file_kind import check_text_file
 from .header import COMMA_NUMBER, POINT_NUMBER

@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.errors import ColumnError, FileError, suggestion
-from ...core.hints import Hint
+from ...core.errors import ColumnError, FileError, Hint, suggestion
 from ...recording.heading import parse_heading
 from .channels import Channel, merge_channels
 from .downsampling import Decimation, Downsampling

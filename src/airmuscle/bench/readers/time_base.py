@@ -10,10 +10,9 @@ import dataclasses
 
 import numpy as np
 
+from ...core.annotation import check_field_types
 from ...core.arrays import Array
-from ...core.errors import ColumnError
-from ...core.field_types import check_field_types
-from ...core.hints import Hint, HintedText
+from ...core.errors import ColumnError, Hint, HintedText
 from .table import RawTable
 
 MAX_DEVIATION = 5.0

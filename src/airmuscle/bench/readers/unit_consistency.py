@@ -11,10 +11,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ...core.constants import STANDARD_GRAVITY
-from ...core.errors import AirmuscleWarning, UnitError
-from ...core.hints import Hint
-from ...core.units import conversion
+from ...core.errors import AirmuscleWarning, Hint, UnitError
+from ...core.units import STANDARD_GRAVITY, conversion
 from ...recording.columns import quantity_of
 from ...recording.recording import Recording
 

@@ -7,8 +7,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from ...core.errors import ColumnError
-from ...core.hints import Hint, HintedText
+from ...core.errors import ColumnError, Hint, HintedText
 from ...recording.columns import quantity_of
 from ...recording.displacement import ZERO_NOT_STATED
 from ...recording.recording import Recording

@@ -9,12 +9,12 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from ...core.annotation import check_field_types
 from ...core.arrays import Array
+from ...core.diagnostics import Status
 from ...core.errors import ParameterError, SolveError
-from ...core.field_types import check_field_types
 from ...core.reference import Reference
 from ...core.short_repr import ShortRepr
-from ...core.status import Status
 from ...engine.compile.augmented_rates import augmented_rates
 from ...engine.compile.cache.kernel import Kernel
 from ...engine.compile.program import compile_system

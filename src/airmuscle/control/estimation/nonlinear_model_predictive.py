@@ -8,9 +8,9 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from ...core.annotation import check_field_types
 from ...core.arrays import Array
 from ...core.errors import ParameterError
-from ...core.field_types import check_field_types
 from ...core.reference import Reference
 from ...core.short_repr import ShortRepr
 from ...engine.compile.program import compile_system

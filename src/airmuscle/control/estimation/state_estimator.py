@@ -10,11 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core import tree
+from ...core.annotation import check_field_types
 from ...core.arrays import Array
+from ...core.diagnostics import Status
 from ...core.errors import ParameterError, SolveError
-from ...core.field_types import check_field_types
 from ...core.short_repr import ShortRepr
-from ...core.status import Status
 from ...core.system import System
 from ...engine.compile.augmented_rates import AugmentedRates, augmented_rates, states_and_outputs
 from ...engine.compile.cache.kernel import evaluate

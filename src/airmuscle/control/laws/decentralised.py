@@ -9,7 +9,7 @@ from ...core.declaration import model
 from ...core.errors import ParameterError
 from ...core.ops import Value
 from ...core.reference import Reference
-from ...core.variables import select_prefix, united, with_prefix
+from ...core.system import select_prefix, united, with_prefix
 from ...engine.loop.control_law import ControlLaw
 from ...engine.loop.controller import Measurement
 

@@ -11,8 +11,8 @@ from ...core.declaration import Parameter, model, parameter
 from ...core.errors import ParameterError
 from ...core.ops import Value
 from ...core.reference import Reference
+from ...core.system import united
 from ...core.tree import leaves, unflatten
-from ...core.variables import united
 from ...engine.loop.control_law import ControlLaw
 from ...engine.loop.controller import Measurement
 from ...engine.loop.enclosing_law import EnclosingLaw

@@ -20,9 +20,8 @@ from ...control.laws.setpoint_lead import SetpointLead
 from ...control.laws.sliding_mode import SlidingMode
 from ...control.laws.super_twisting import SuperTwisting
 from ...control.laws.with_feed_forward import WithFeedForward
-from ...core.annotation import one_line
+from ...core.annotation import check_field_types, one_line
 from ...core.errors import ParameterError
-from ...core.field_types import check_field_types
 from ...core.tree import leaves
 from ...engine.loop.control_law import ControlLaw
 from ...engine.loop.controller import Controller

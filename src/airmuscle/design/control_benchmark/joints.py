@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+from ...core.annotation import check_field_types
 from ...core.errors import ParameterError
-from ...core.field_types import check_field_types
 from ...core.short_repr import ShortRepr
 from ...engine.loop.driver import Driver, SolenoidDriver
 from ...engine.loop.sensors import ColumnSensor

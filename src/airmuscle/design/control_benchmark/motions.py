@@ -8,9 +8,9 @@ import math
 
 import numpy as np
 
+from ...core.annotation import check_field_types
 from ...core.arrays import Array
 from ...core.errors import ParameterError
-from ...core.field_types import check_field_types
 
 
 @dataclasses.dataclass(frozen=True)

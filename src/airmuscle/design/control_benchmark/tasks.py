@@ -5,8 +5,8 @@ from __future__ import annotations
 import dataclasses
 import math
 
+from ...core.annotation import check_field_types
 from ...core.errors import ParameterError, suggestion
-from ...core.field_types import check_field_types
 from .motions import JointMotion, MinimumJerkMotion, RampMotion, SineMotion, StepMotion, SumOfMotions
 
 DEGREE = math.pi / 180.0

@@ -7,9 +7,9 @@ import math
 from typing import Any, ClassVar
 
 from ...core.arrays import Array
-from ...core.constants import STANDARD_GRAVITY
 from ...core.declaration import model, parameter
 from ...core.errors import ParameterError
+from ...core.units import STANDARD_GRAVITY
 from ...physics.pneumatics.gas import Ambient
 
 MAX_COUNT = 20

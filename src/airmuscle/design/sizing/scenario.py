@@ -10,8 +10,8 @@ import dataclasses
 import math
 from typing import Any
 
-from ...core.constants import STANDARD_GRAVITY
 from ...core.errors import SolveError
+from ...core.units import STANDARD_GRAVITY
 from ...files.library.write import scenario_toml
 from ...physics.mechanism import AntagonisticJoint, HangingMass, Isotonic, Mechanism, SpringLoad
 from ...physics.muscle import LinearDamper, Muscle

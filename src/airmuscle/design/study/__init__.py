@@ -1,6 +1,6 @@
 """Studies of a scenario: designs of experiments, metrics and sensitivities; tuning of a controller's gains."""
 
-from ...core.processes import process_pool
+from ...engine.processes import process_pool
 from .executors import dask_cluster
 from .result import StudyResult
 from .run import run_study

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...core.output_folder import atomic_folder
+from ...core.atomic_output import atomic_folder
 from ...core.reference import cite
 from ...report.chapter import Chapter, Table
 from ...report.write import save_table, write_into

@@ -19,7 +19,7 @@ from ...core.arrays import Array
 from ...core.atomic_output import atomic_file
 from ...core.errors import FileError
 from ...core.fingerprint import fingerprint, program_fingerprint
-from ...core.processes import check_running
+from ...engine.processes import check_running
 from ...files.scenario.scenario import Scenario
 from ...recording import Recording
 from .scenario_runs import RUN_ERRORS, failure_reason, simulate_all

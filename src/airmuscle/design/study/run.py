@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ...core.atomic_output import check_writable
 from ...core.errors import FileError, SimulationError
-from ...core.output_folder import check_writable
 from .chunk import Chunk, chunk_file_name, metric_times, read_chunk, register_study, run_chunk, write_chunk
 from .result import StudyResult
 from .scenario_runs import simulate_all

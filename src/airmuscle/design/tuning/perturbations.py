@@ -10,9 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.annotation import abridged
+from ...core.annotation import abridged, check_field_types
 from ...core.errors import AirmuscleError, ParameterError
-from ...core.field_types import check_field_types
 from ...core.tree import Leaf, leaves, with_parameters
 from ...engine.loop.control_law import ControlLaw
 from ...engine.loop.control_loop import ControlLoop

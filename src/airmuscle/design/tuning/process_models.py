@@ -9,9 +9,9 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from ...core.annotation import check_field_types
 from ...core.arrays import Array
 from ...core.errors import ParameterError
-from ...core.field_types import check_field_types
 from ...core.reference import Reference
 from .waveform import waveform_amplitude
 

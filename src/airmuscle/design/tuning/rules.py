@@ -6,8 +6,8 @@ import dataclasses
 import math
 from typing import ClassVar
 
+from ...core.annotation import check_field_types
 from ...core.errors import ParameterError
-from ...core.field_types import check_field_types
 from ...core.reference import Reference
 from .process_models import FirstOrderDeadTime, IntegratorDeadTime, ProcessModel
 

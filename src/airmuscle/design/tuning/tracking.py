@@ -10,9 +10,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from ...core.annotation import check_field_types
 from ...core.arrays import Array
 from ...core.errors import ParameterError, suggestion
-from ...core.field_types import check_field_types
 from ...core.reference import Reference
 from ...engine.loop.control_loop import SETPOINT
 

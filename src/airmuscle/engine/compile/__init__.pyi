@@ -1,6 +1,6 @@
 from ...core.system import SensitivitySystem as SensitivitySystem
+from ...core.system import StateVariable as StateVariable
 from ...core.system import System as System
-from ...core.variables import StateVariable as StateVariable
 from .function import Function as Function
 from .functions import Printer as Printer
 from .jacobians import derivatives as derivatives

@@ -13,7 +13,7 @@ from ...core.declaration import Parameter, model, parameter
 from ...core.errors import ParameterError
 from ...core.ops import Value
 from ...core.reference import Reference
-from ...core.variables import select_prefix, with_prefix
+from ...core.system import select_prefix, with_prefix
 from .control_law import ControlLaw
 from .controller import Measurement, SignalRelated
 from .enclosing_law import EnclosingLaw

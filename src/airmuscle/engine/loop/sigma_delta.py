@@ -9,7 +9,7 @@ from ...core import ops
 from ...core.declaration import model, parameter
 from ...core.ops import Value
 from ...core.reference import Reference
-from ...core.variables import select_prefix, with_prefix
+from ...core.system import select_prefix, with_prefix
 from .control_law import ControlLaw
 from .controller import Measurement
 from .enclosing_law import EnclosingLaw

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.arrays import Array
-from ...core.diagnostics import Diagnostic, DiagnosticCode
-from ...core.status import Status
+from ...core.diagnostics import Diagnostic, DiagnosticCode, Status
 from ..loop.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop, ControlLoopState
 from ..loop.piecewise_linear import PiecewiseLinear
 from ..state_units import column_units

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...core.arrays import Array, flat_view
-from ...core.status import Status
+from ...core.diagnostics import Status
 from ..compile.cache import kernel
 from ..compile.kernel_layout import Progress, Waiting
 from ..compile.program import CompiledSystem

@@ -9,9 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core.arrays import Array
-from ...core.diagnostics import Columns, Diagnostic, DiagnosticCode
+from ...core.diagnostics import Columns, Diagnostic, DiagnosticCode, Status
 from ...core.reference import Reference
-from ...core.status import Status
 from ...recording import Recording
 from ..compile.cache.kernel import record
 from ..compile.program import CompiledSystem

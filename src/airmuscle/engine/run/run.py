@@ -13,8 +13,8 @@ import numpy.typing as npt
 from ...core.annotation import one_line
 from ...core.arrays import NUMBERS
 from ...core.declaration import as_float
+from ...core.diagnostics import Status
 from ...core.errors import ParameterError, SimulationError
-from ...core.status import Status
 from ...core.system import System
 from ...recording import Recording
 from ..compile.program import CompiledSystem, compile_system

@@ -6,12 +6,11 @@ import dataclasses
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ...core.diagnostics import Diagnostic
+from ...core.diagnostics import Diagnostic, Status
 from ...core.errors import SimulationError
-from ...core.notebook import Card, NotebookDisplay
 from ...core.reference import Reference
-from ...core.status import Status
 from ...recording import Recording
+from ...recording.notebook import Card, NotebookDisplay
 from ...recording.plot import plot_columns
 from ...recording.recording_card import recording_card
 from ..loop.control_loop import ControlLoopState

@@ -12,9 +12,8 @@ import numpy.typing as npt
 from ...core import tree
 from ...core.annotation import one_line
 from ...core.arrays import Array
-from ...core.diagnostics import ColumnLimit, DiagnosticCode
+from ...core.diagnostics import ColumnLimit, DiagnosticCode, Status
 from ...core.errors import ParameterError, SimulationError, suggestion
-from ...core.status import Status
 from ...core.system import System
 from ..compile.cache.kernel import begin_step, end_step
 from ..compile.program import CompiledSystem, compile_system

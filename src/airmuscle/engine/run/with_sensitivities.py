@@ -9,8 +9,7 @@ from ...core import autodiff, ops, tree
 from ...core.declaration import model, parameter
 from ...core.errors import ParameterError, suggestion
 from ...core.ops import Value
-from ...core.system import SensitivitySystem, System
-from ...core.variables import Input, StateVariable
+from ...core.system import Input, SensitivitySystem, StateVariable, System
 
 TOLERANCE_FACTOR = 10.0
 """How much more a derivative times its scale may err than the state. Chosen: without any control derivatives are lost

@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ...core.axes import relabel_in_display_units
-from ...core.notebook import Card, NotebookDisplay
-from ...core.plotting import LINES, new_figure
+from ...core.plotting import LINES, new_figure, relabel_in_display_units
 from ...core.reference import cite
 from ...physics.muscle.display import PARAMETERS, parameter_rows, plot_isobars
+from ...recording.notebook import Card, NotebookDisplay
 
 PARTS = ("characteristic", "geometry", "spring", "damper", "friction", "wall", "series", "stop", "creep", "valve",
          "exhaust", "switching_times")  # fmt: skip

@@ -14,8 +14,7 @@ from ...bench.identify.prediction import RecordPrediction, predict_static
 from ...bench.identify.prediction.fitted_range import length_notes
 from ...bench.identify.problem import fitted_quantity_of
 from ...bench.readers.plausibility import CONTRACTION_RANGE
-from ...core.errors import ColumnError, ParameterError
-from ...core.hints import Hint
+from ...core.errors import ColumnError, Hint, ParameterError
 from ...physics.muscle.characteristic.base import ForceLaw
 from ...physics.muscle.muscle import LENGTH_TOLERANCE
 from ...recording import Recording

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ...bench.identify import standard_candidates
-from ...core.errors import ParameterError, UnknownNameError, suggestion
-from ...core.hints import HintedText
+from ...core.errors import HintedText, ParameterError, UnknownNameError, suggestion
 from ...physics.muscle.characteristic.base import Characteristic
 from ...recording import Recording
 from .entry import Entry

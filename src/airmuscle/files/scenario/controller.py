@@ -24,7 +24,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from ...core.errors import ParameterError
-from ...core.variables import Input
+from ...core.system import Input
 from ...engine.loop.control_loop import ControlLoop
 from ...engine.loop.controller import Controller
 from ...engine.loop.inputs import InputSignal

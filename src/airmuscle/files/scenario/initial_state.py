@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...bench.identify.dynamic import InitialConditions
-from ...core.errors import EquilibriumError, ParameterError
-from ...core.hints import HintedText
+from ...core.errors import EquilibriumError, HintedText, ParameterError
 from ...physics.equilibrium import find_equilibrium
 from ...physics.plant.plant import Plant
 from ...recording import Recording

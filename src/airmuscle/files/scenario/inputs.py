@@ -17,7 +17,7 @@ from typing import Any
 
 from ...bench.readers import read_csv
 from ...core.errors import ColumnError, ParameterError
-from ...core.variables import Input
+from ...core.system import Input
 from ...engine.loop.driver import Driver, SolenoidDriver
 from ...engine.loop.inputs import NO_INPUT, InputSignal, Periodic, SampledSignal, Schedule, check_input_names
 from ...engine.loop.with_drivers import WithDrivers

@@ -15,8 +15,8 @@ from ...bench.identify.campaign.campaign_chapters import UnreadFile, ValidationR
 from ...bench.readers import ColumnMapping
 from ...bench.readers.reader import complete_bench, find_files, read_file
 from ...bench.readers.reading_chapter import reading_chapters
+from ...core.atomic_output import atomic_folder, check_writable
 from ...core.errors import AirmuscleError, ColumnError, FileError, IdentificationError
-from ...core.output_folder import atomic_folder, check_writable
 from ...files.library.campaign_entry import campaign_entry
 from ...files.library.entry import Entry
 from ...files.library.initial_law import resting_lengths

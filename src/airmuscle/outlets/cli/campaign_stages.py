@@ -15,13 +15,13 @@ from pathlib import Path
 from typing import Any
 
 from ...core.atomic_output import atomic_file
-from ...core.cache_folder import cache_folder, read_private
 from ...core.fingerprint import fingerprint, program_fingerprint
+from ...engine.compile.cache.store import cache_folder, read_private
 from ...physics.muscle.geometry import Geometry
 from ...recording import Recording
 
-OMITTED_PACKAGES = ("cli", "export", "report", "reproduce", "studio", "environments", "sizing", "control")
-"""Parts of the program that do not affect the stages of a campaign."""
+OMITTED_ROOMS = ("outlets", "papers", "report", "design", "files", "control")
+"""Rooms of the program that do not affect the stages of a campaign."""
 MAX_AGE = 30 * 86400.0
 """Age from which the stages of a campaign that was never continued are removed [s] (chosen)."""
 _HASH = hashlib.sha256().digest_size
@@ -32,7 +32,7 @@ class KeptStages:
 
     def __init__(self, recordings: Sequence[Recording], geometry: Geometry | None) -> None:
         data = [[each.origin, dict(each.columns), dict(each.constants)] for each in recordings]
-        self._key = fingerprint(data, geometry, program_fingerprint(OMITTED_PACKAGES))[:32]
+        self._key = fingerprint(data, geometry, program_fingerprint(OMITTED_ROOMS))[:32]
         self._folder = cache_folder()
         _remove_old(self._folder)
 

@@ -10,11 +10,12 @@ from typing import Annotated, Any
 import typer
 
 from ...core import leaves
+from ...core.absolute_pressure import check_above_vacuum
+from ...core.atomic_output import atomic_folder
 from ...core.display import quantity_text
 from ...core.errors import AirmuscleWarning, GeometryLimitError, PhysicsError, RatingError, SolveError
-from ...core.output_folder import atomic_folder
 from ...core.plotting import save
-from ...core.units import check_above_vacuum, quantity
+from ...core.units import quantity
 from ...files.library.entry import Entry
 from ...files.library.law_file import load_law
 from ...files.library.scaling import scale_entry

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ...core.output_folder import check_writable
+from ...core.atomic_output import check_writable
 from ...files.library.law_file import load_law
 from ...files.scenario.scenario import load_scenario
 from ..export import (

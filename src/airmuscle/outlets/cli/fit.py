@@ -11,7 +11,7 @@ from ...bench.identify import UNCENSORED
 from ...bench.identify import fit as fit_model
 from ...bench.identify.problem import fitted_quantity_of
 from ...bench.identify.specimen_errors import odd_specimen_notes, specimen_errors
-from ...core.output_folder import check_writable
+from ...core.atomic_output import check_writable
 from ...files.library.fitted_entry import fitted_entry, missing_geometry
 from ...files.library.initial_law import find_initial_law
 from ...recording import Recording

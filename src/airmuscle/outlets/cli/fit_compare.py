@@ -13,8 +13,8 @@ from ...bench.identify import Candidate, Comparison, standard_candidates
 from ...bench.identify.compare_chapter import compare_chapters
 from ...bench.identify.law_selection import LawSelection, select_law
 from ...bench.identify.specimen_errors import odd_specimen_notes, ranked_specimen_errors
-from ...core.output_folder import check_writable
-from ...core.processes import available_cores
+from ...core.atomic_output import check_writable
+from ...engine.processes import available_cores
 from ...files.library.entry import Entry
 from ...files.library.fitted_entry import fitted_entry, left_out_ratio, missing_geometry
 from ...files.library.initial_law import InitialLaw, find_initial_law, resting_lengths

@@ -13,7 +13,7 @@ from ...bench.identify.dynamic import CrossPrediction, DynamicFit, describe_cros
 from ...bench.identify.dynamic.dynamic_chapter import dynamic_chapters
 from ...bench.identify.dynamic.profile import DynamicProfile
 from ...bench.segment import inspect
-from ...core.output_folder import atomic_folder, check_writable
+from ...core.atomic_output import atomic_folder, check_writable
 from ...files.scenario.identification import DynamicFitSetup, load_dynamic_fit
 from ...recording.row_notes import row_notes
 from ...report.write import write_into

@@ -12,9 +12,9 @@ import typer
 from ...bench.identify.experiment_design import BenchLimits
 from ...bench.identify.recursive_fit import RecursiveFit
 from ...bench.readers.follow import RowReader, follow_lines
+from ...core.atomic_output import atomic_folder, check_writable
 from ...core.display import quantity_text
 from ...core.errors import ColumnError, IdentificationError
-from ...core.output_folder import atomic_folder, check_writable
 from ...core.units import quantity
 from ...files.library.entry import Entry
 from ...files.library.write import save

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ...bench.identify import Fit
-from ...core.output_folder import atomic_folder
+from ...core.atomic_output import atomic_folder
 from ...files.library.entry import Entry
 from ...files.library.fit_files import write_fit
 from ...recording import Recording

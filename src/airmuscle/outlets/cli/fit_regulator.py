@@ -12,7 +12,7 @@ import typer
 from ...bench.identify.dynamic import RegulatorFit, fit_regulator
 from ...bench.identify.dynamic.dynamic_chapter import dynamic_chapters
 from ...bench.readers.reading_chapter import reading_chapters
-from ...core.output_folder import atomic_folder, check_writable
+from ...core.atomic_output import atomic_folder, check_writable
 from ...core.units import quantity
 from ...files.library.fitted_entry import list_files
 from ...files.library.write import part_toml, scenario_toml

@@ -12,9 +12,9 @@ import typer
 from ...bench.identify.volume_chapter import volume_chapter
 from ...bench.identify.volume_fit import VolumeFit, fit_volume, volume_points
 from ...bench.readers.reading_chapter import reading_chapters
+from ...core.atomic_output import atomic_folder, check_writable
 from ...core.declaration import parameters
 from ...core.errors import ParameterError, PhysicsError
-from ...core.output_folder import atomic_folder, check_writable
 from ...core.units import quantity
 from ...files.library.entry import Entry
 from ...files.library.fitted_entry import list_files

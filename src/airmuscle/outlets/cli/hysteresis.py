@@ -15,7 +15,7 @@ from ...bench.identify.hysteresis import JointFit, LoopFit, find_loops, fit_join
 from ...bench.identify.hysteresis.hysteresis_chapter import hysteresis_chapters
 from ...bench.identify.hysteresis.selection import SelectedFriction, select_friction
 from ...bench.readers.reading_chapter import reading_chapters
-from ...core.output_folder import atomic_folder, check_writable
+from ...core.atomic_output import atomic_folder, check_writable
 from ...files.library.entry import Entry
 from ...files.library.law_file import load_law
 from ...files.library.uncertainty import without_parts

@@ -12,7 +12,7 @@ import typer
 
 from ...bench.readers import ColumnMapping, read
 from ...bench.segment import Inspection, Sampling, inspect_all
-from ...core.output_folder import atomic_folder
+from ...core.atomic_output import atomic_folder
 from ...core.plotting import save
 from ...recording import Recording
 from ...recording.columns import quantity_of

@@ -9,8 +9,8 @@ import typer
 
 from ...bench.identify.experiment_design import BenchLimits, ExperimentPlan, PlannedRun, optimal_design
 from ...bench.readers import write_csv
+from ...core.atomic_output import atomic_folder, check_writable
 from ...core.display import quantity_text
-from ...core.output_folder import atomic_folder, check_writable
 from ...core.units import quantity
 from ...files.library.files import is_path, read_toml
 from ...files.library.law_file import load_law

@@ -10,7 +10,7 @@ from typing import Any
 import typer
 
 from ...bench.identify.dynamic import RecordRanking, rank_records
-from ...core.output_folder import atomic_folder, check_writable
+from ...core.atomic_output import atomic_folder, check_writable
 from ...files.scenario.identification import load_dynamic_fit
 from ...report.chapter import Chapter, Table
 from ...report.write import save_table, write_into

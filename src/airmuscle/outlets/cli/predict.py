@@ -12,8 +12,8 @@ from ...bench.identify.dynamic import StartTime
 from ...bench.identify.prediction import RecordPrediction
 from ...bench.identify.prediction.prediction_chapter import band_sources, describe_band, prediction_chapters, with_unit
 from ...bench.readers.reading_chapter import reading_chapters
+from ...core.atomic_output import atomic_folder, check_writable
 from ...core.errors import FileError
-from ...core.output_folder import atomic_folder, check_writable
 from ...core.units import quantity
 from ...files.library.entry_prediction import predict_with_entry
 from ...files.library.files import is_path, list_plants, read_toml

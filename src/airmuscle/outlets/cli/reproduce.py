@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ...core.errors import AirmuscleError
-from ...core.processes import available_cores
+from ...engine.processes import available_cores
 from ...papers.run import reproduce as reproduce_papers
 from ...papers.run import select_papers
 from ...report.chapter import DEPENDS, DIFFERS, HOLDS, NOT_PRINTED, NOT_TESTABLE, Chapter, Claim, Kind

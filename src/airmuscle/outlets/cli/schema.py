@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ...core.output_folder import atomic_folder
+from ...core.atomic_output import atomic_folder
 from ...files.scenario.schema import muscle_schema, scenario_schema
 from ...report.write import as_json
 from .terminal import echo, print_json

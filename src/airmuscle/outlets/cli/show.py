@@ -7,7 +7,7 @@ from typing import Any
 
 from ...core import cite, leaves
 from ...core.display import in_display_unit
-from ...core.listed_names import continues_list
+from ...core.tree import continues_list
 from ...files.library.catalogue import load
 from ...files.library.entry import Entry
 from ...files.library.files import entries_of_product

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from ...bench.readers import write_csv
+from ...core.atomic_output import atomic_folder, check_writable
 from ...core.errors import SimulationError
-from ...core.output_folder import atomic_folder, check_writable
 from ...files.scenario.scenario import Scenario, load_scenario
 from ...files.scenario.simulation_chapter import run_chapter
 from ...recording import Recording

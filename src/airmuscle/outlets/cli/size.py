@@ -8,8 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
+from ...core.atomic_output import atomic_folder, check_writable
 from ...core.errors import AirmuscleError, UnitError
-from ...core.output_folder import atomic_folder, check_writable
 from ...core.units import quantity
 from ...design.sizing import (
     SORT_KEYS,

@@ -12,10 +12,10 @@ from typing import Annotated, Any
 import typer
 
 from ...core.errors import AirmuscleError, InputError, SimulationError
-from ...core.processes import available_cores, process_pool
 from ...design.study import Study, StudyResult, dask_cluster, load_study, run_study
 from ...design.study.chapter import failure_table, sensitivity_table, write_study
 from ...design.study.run import count_finished_runs
+from ...engine.processes import available_cores, process_pool
 from ...report.chapter import Table
 from ...report.formatting import format_number, table_rows
 from .interruption import check_interrupted

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ...core.output_folder import atomic_folder, check_writable
+from ...core.atomic_output import atomic_folder, check_writable
 from ...core.tree import leaves
 from ...design.tuning import (
     Perturbations,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from ...core import ops
 from ...core.errors import ParameterError
 from ...core.ops import Value
-from ...core.variables import Input
+from ...core.system import Input
 from ...physics.plant import Plant
 
 _FILL, _DISCHARGE = "fill", "discharge"

@@ -12,10 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import tree
-from ...core.annotation import abridged, one_line
+from ...core.annotation import abridged, check_field_types, one_line
 from ...core.arrays import Array
 from ...core.errors import ParameterError, suggestion
-from ...core.field_types import check_field_types
 from ...core.short_repr import ShortRepr
 from ...files.library.uncertainty import ParameterUncertainty
 from .task import EnvironmentTask

@@ -9,10 +9,9 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from ...core import ops
-from ...core.field_types import check_field_types
+from ...core.annotation import check_field_types
 from ...core.ops import Value
-from ...core.system import System
-from ...core.variables import Input, StateVariable
+from ...core.system import Input, StateVariable, System
 from ...physics.plant import Plant
 from .actuation import Action, actions_of, all_commands
 

@@ -11,8 +11,8 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from ...core.atomic_output import atomic_folder
 from ...core.errors import ParameterError
-from ...core.output_folder import atomic_folder
 from ...engine.compile.event_indicators import EventIndicators, event_indicators
 from ...engine.compile.functions import Printer
 from ...engine.compile.partials import Partials, partials

@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from ...core.output_folder import atomic_folder
+from ...core.atomic_output import atomic_folder
 from ...engine.run import Problem
 from .c_source import CSource
 from .fmi_variables import first_inputs

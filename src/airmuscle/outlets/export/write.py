@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from ...core.atomic_output import atomic_folder
 from ...core.errors import ParameterError, suggestion
-from ...core.output_folder import atomic_folder
 from ...engine.loop.control_loop import ControlLoop
 from ...engine.run import Problem
 from ...physics.muscle.characteristic import Characteristic

@@ -6,8 +6,7 @@ from collections.abc import Callable, Mapping
 
 import airmuscle as am
 
-from ...core.errors import AirmuscleError
-from ...core.hints import Hint, HintedText
+from ...core.errors import AirmuscleError, Hint, HintedText
 from .fit_settings import FieldError
 
 

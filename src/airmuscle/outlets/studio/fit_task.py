@@ -25,8 +25,8 @@ from ...bench.identify.hysteresis.selection import select_friction
 from ...bench.identify.law_selection import LawSelection, select_law
 from ...bench.identify.specimen_errors import odd_specimen_notes, ranked_specimen_errors
 from ...bench.segment import check_contents, motion_direction
+from ...core.atomic_output import atomic_folder
 from ...core.errors import AirmuscleError, AirmuscleWarning
-from ...core.output_folder import atomic_folder
 from ...files.library.entry import Entry
 from ...files.library.fit_files import write_fit
 from ...files.library.fitted_entry import fitted_entry, left_out_ratio, missing_geometry

@@ -19,7 +19,7 @@ from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
 from ...bench.readers.reader import EXTENSIONS
-from ...core.output_folder import is_running
+from ...core.atomic_output import is_running
 from .requests import BadRequest
 
 MAX_FILE = 32 * 10**6

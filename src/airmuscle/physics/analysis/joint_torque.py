@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ...core.arrays import Array
+from ...core.arrays import Array, ArrayProgram, make_program
 from ...core.errors import ParameterError
 from ...core.ops import Value, Values
-from ...core.vectorised import ArrayProgram, make_program
 from ...engine.compile.lanes_function import LanesFunction
 from ..muscle import ElasticSeriesElement, Muscle
 from ..plant.plant import Plant

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from ...core import autodiff
 from ...core.ops import Value, Values
-from ...core.variables import Input, StateVariable
+from ...core.system import Input, StateVariable
 
 INFINITY = float("inf")
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from ...core.declaration import model, parameter
 from ...core.errors import ParameterError
 from ...core.ops import Value, Values
-from ...core.variables import Input
+from ...core.system import Input
 from .base import Coordinate, Mechanism
 
 SHORTENING, SHORTENING_SPEED = "shortening", "shortening_speed"

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...core.constants import STANDARD_GRAVITY
 from ...core.declaration import model, parameter
 from ...core.ops import Value, Values
-from ...core.variables import Input
+from ...core.system import Input
+from ...core.units import STANDARD_GRAVITY
 from .base import Coordinate, Mechanism, Translation
 
 

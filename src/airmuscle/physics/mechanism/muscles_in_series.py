@@ -5,10 +5,10 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 
-from ...core.constants import STANDARD_GRAVITY
 from ...core.declaration import check_structure, model, parameter
 from ...core.errors import ParameterError
 from ...core.ops import Value, Values
+from ...core.units import STANDARD_GRAVITY
 from .base import Coordinate, Mechanism
 from .wrapper import MechanismWrapper
 

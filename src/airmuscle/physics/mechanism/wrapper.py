@@ -8,7 +8,7 @@ from ...core import ops
 from ...core.declaration import check_structure, model, parameter
 from ...core.errors import ParameterError
 from ...core.ops import Value, Values
-from ...core.variables import Input
+from ...core.system import Input
 from .base import Coordinate, Mechanism
 
 

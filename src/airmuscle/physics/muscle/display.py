@@ -10,11 +10,9 @@ from typing import Any
 import numpy as np
 
 from ...core.arrays import Array
-from ...core.axes import given_axes
 from ...core.display import contraction_text, in_display_unit, quantity_text
-from ...core.listed_names import continues_list
-from ...core.plotting import new_figure
-from ...core.tree import leaves
+from ...core.plotting import given_axes, new_figure
+from ...core.tree import continues_list, leaves
 from .characteristic.base import Characteristic
 from .characteristic.validity_range import ValidityRange, validity_range_of
 from .isobars import compute_isobars, draw_isobars

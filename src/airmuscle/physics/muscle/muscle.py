@@ -10,11 +10,10 @@ from ...core import autodiff, ops
 from ...core.annotation import abridged
 from ...core.declaration import model
 from ...core.errors import AirmuscleWarning, ParameterError
-from ...core.notebook import Card, NotebookDisplay
 from ...core.ops import Value, Values
-from ...core.quantity_arguments import accept_quantities_in
 from ...core.reference import Reference
-from ...core.variables import StateVariable
+from ...core.system import StateVariable
+from ...recording.notebook import Card, NotebookDisplay
 from .characteristic.base import Characteristic, Clamped, ForceLaw
 from .characteristic.contractile_surface import HOSOVSKY_HILL
 from .characteristic.validity_range import ValidityRange
@@ -23,6 +22,7 @@ from .display import component_rows, plot_isobars
 from .friction.base import Friction, NoFriction
 from .geometry.base import Geometry
 from .passive_elements import CreepElements, Damper, LinearDamper, LinearSpring, NoStop, Spring, Stop
+from .quantity_arguments import accept_quantities_in
 from .ratings import Ratings
 from .series import ElasticSeriesElement, RigidSeriesElement, SeriesElement, solve_inner_contraction, without_derivative
 from .wall import RigidWall, Wall

@@ -8,7 +8,7 @@ from ...core import ops
 from ...core.declaration import model, parameter
 from ...core.errors import ParameterError
 from ...core.ops import Value, Values
-from ...core.variables import StateVariable
+from ...core.system import StateVariable
 from ..mechanism.end_stops import HuntCrossley
 
 

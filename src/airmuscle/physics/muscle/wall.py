@@ -7,7 +7,7 @@ import abc
 from ...core import ops
 from ...core.declaration import model, parameter
 from ...core.ops import Value, Values
-from ...core.variables import StateVariable
+from ...core.system import StateVariable
 
 
 class Wall:

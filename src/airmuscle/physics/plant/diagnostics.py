@@ -11,7 +11,7 @@ from ...core.arrays import Array
 from ...core.diagnostics import ColumnLimit, Columns, Diagnostic, DiagnosticCode
 from ...core.errors import ParameterError
 from ...core.ops import Value
-from ...core.variables import select_prefix
+from ...core.system import select_prefix
 from ..muscle import INNER_CONTRACTION, ElasticSeriesElement, Muscle
 from ..muscle.friction import NoFriction
 from ..pneumatics import Circuit

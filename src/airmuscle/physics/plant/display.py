@@ -13,9 +13,9 @@ import numpy as np
 from ...core.declaration import as_finite_float
 from ...core.display import quantity_text
 from ...core.errors import ColumnError, FileError, ParameterError
-from ...core.notebook import Card, NotebookDisplay
 from ...core.plotting import BLACK, LINES, new_figure
 from ...recording import Recording
+from ...recording.notebook import Card, NotebookDisplay
 from ..muscle.display import plot_isobars
 from .drawing import Row, Scene, scene_of
 

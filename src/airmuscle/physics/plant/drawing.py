@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core.arrays import Array
 from ...core.errors import ParameterError
-from ...core.variables import select_prefix
+from ...core.system import select_prefix
 from ..mechanism import AntagonisticJoint, Mechanism
 from ..mechanism.base import Translation
 from ..mechanism.wrapper import MechanismWrapper

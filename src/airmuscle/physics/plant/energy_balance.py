@@ -8,8 +8,7 @@ from typing import Any, ClassVar
 from ...core.declaration import model
 from ...core.diagnostics import ColumnLimit, Columns, Diagnostic
 from ...core.ops import Value, Values
-from ...core.system import System
-from ...core.variables import Input, StateVariable
+from ...core.system import Input, StateVariable, System
 from ..muscle import ElasticSeriesElement, Muscle
 from ..muscle.friction import NoFriction
 from .muscle_state import MuscleState, PlantEvaluation

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ...core.ops import Value, Values
-from ...core.variables import StateVariable, select_prefix, with_prefix
+from ...core.system import StateVariable, select_prefix, with_prefix
 from ..muscle import Muscle
 from ..muscle.friction import NoFriction
 from ..pneumatics import CircuitFlows

@@ -12,7 +12,7 @@ from ...core.declaration import model
 from ...core.diagnostics import ColumnLimit, Columns, Diagnostic, DiagnosticCode
 from ...core.errors import GeometryLimitError
 from ...core.ops import Value, Values
-from ...core.variables import Input, StateVariable, add_prefix, select_prefix, with_prefix
+from ...core.system import Input, StateVariable, add_prefix, select_prefix, with_prefix
 from ..equilibrium.equilibrium import equilibria_at_ambient_pressure, equilibrium_at_ambient_pressure
 from ..equilibrium.static_plant import StaticPlant
 from ..mechanism import Mechanism

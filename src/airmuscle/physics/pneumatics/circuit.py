@@ -9,7 +9,7 @@ from typing import Any, ClassVar, TypeVar
 
 from ...core.ops import Value, Values
 from ...core.reference import Reference
-from ...core.variables import Input, StateVariable, add_prefix, select_prefix, with_prefix
+from ...core.system import Input, StateVariable, add_prefix, select_prefix, with_prefix
 from .gas import NO_FLOW, Air, Ambient, Flow
 from .supply import AirSource
 

@@ -9,7 +9,7 @@ from ...core import ops
 from ...core.declaration import model, parameter
 from ...core.ops import Value, Values
 from ...core.reference import Reference
-from ...core.variables import StateVariable, add_prefix, select_prefix, with_prefix
+from ...core.system import StateVariable, add_prefix, select_prefix, with_prefix
 from .gas import GAS_CONSTANT, SPECIFIC_HEAT_CONSTANT_PRESSURE, Air, Ambient, Flow, Gas, Isothermal
 from .tube import TubeModel, check_segment_count
 

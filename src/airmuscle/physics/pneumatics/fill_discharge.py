@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...core import ops
 from ...core.declaration import model
 from ...core.ops import Values
-from ...core.variables import Input
+from ...core.system import Input
 from .circuit import Circuit, CircuitFlows
 from .gas import NO_FLOW, Air, Ambient
 from .supply import AirSource, Supply

@@ -14,8 +14,8 @@ from ...core import autodiff, ops
 from ...core.declaration import model, parameter
 from ...core.ops import Value, Values
 from ...core.reference import Reference
+from ...core.system import StateVariable
 from ...core.units import ABSOLUTE, AMBIENT_PRESSURE
-from ...core.variables import StateVariable
 
 GAS_CONSTANT = 287.05
 """Specific gas constant of dry air [J/(kg K)]."""

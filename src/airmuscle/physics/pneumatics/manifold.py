@@ -9,7 +9,7 @@ from typing import Any
 from ...core.declaration import check_structure, model
 from ...core.errors import ParameterError
 from ...core.ops import Value, Values
-from ...core.variables import Input, StateVariable, add_prefix, select_prefix, with_prefix
+from ...core.system import Input, StateVariable, add_prefix, select_prefix, with_prefix
 from .circuit import SUPPLY, Circuit, CircuitFlows, CircuitWrapper
 from .fill_discharge import ambient_air
 from .gas import Air, Ambient

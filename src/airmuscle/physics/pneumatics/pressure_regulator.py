@@ -8,7 +8,7 @@ from ...core import ops
 from ...core.declaration import model, parameter
 from ...core.ops import Value, Values
 from ...core.reference import Reference
-from ...core.variables import Input, StateVariable
+from ...core.system import Input, StateVariable
 from .circuit import Circuit, CircuitFlows
 from .fill_discharge import ambient_air
 from .gas import Air, Ambient, gauge_pressure

@@ -6,7 +6,7 @@ from ...core import ops
 from ...core.declaration import model, parameter
 from ...core.errors import ParameterError
 from ...core.ops import Value, Values
-from ...core.variables import Input, StateVariable
+from ...core.system import Input, StateVariable
 from .circuit import Circuit, CircuitFlows
 from .fill_discharge import ambient_air
 from .gas import NO_FLOW, Air, Ambient, absolute_pressure, gauge_pressure

@@ -11,8 +11,8 @@ from ...core.declaration import model, parameter
 from ...core.errors import ParameterError
 from ...core.ops import Value, Values
 from ...core.reference import Reference
+from ...core.system import StateVariable, add_prefix, select_prefix, with_prefix
 from ...core.tree import unflatten
-from ...core.variables import StateVariable, add_prefix, select_prefix, with_prefix
 from .circuit import Circuit, CircuitFlows, CircuitWrapper, port_prefix
 from .gas import Air, Ambient, Flow, Gas, Isothermal, gauge_pressure
 from .valve import Orifice, Valve, orifice_flow

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ....core.constants import STANDARD_GRAVITY
 from ....core.errors import AirmuscleError
 from ....core.short_repr import ShortRepr
+from ....core.units import STANDARD_GRAVITY
 from ....engine.loop.inputs import Schedule
 from ....physics.mechanism import HangingMass, WithLatch
 from ....physics.muscle import LinearDamper, Muscle

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ....core.hints import Hint, HintedText
+from ....core.errors import Hint, HintedText
 from ....core.units import AMBIENT_PRESSURE
 from ...checks.bench_rows import file_list
 from .matched_rows import Block, MatchedRuns, Matches

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ....core.hints import Hint, HintedText
+from ....core.errors import Hint, HintedText
 from ....recording import Recording
 from ...segment import Outlier, estimate_sensors, find_outliers
 from ..loss import Huber

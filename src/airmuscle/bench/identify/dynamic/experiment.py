@@ -8,9 +8,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ....core import tree
-from ....core.errors import ParameterError, suggestion
-from ....core.field_types import check_field_types
-from ....core.hints import Hint
+from ....core.annotation import check_field_types
+from ....core.errors import Hint, ParameterError, suggestion
 from ....core.short_repr import ShortRepr
 from ....engine.compile import System
 from ....engine.loop.inputs import InputSignal, Schedule, check_input_signal

@@ -10,8 +10,8 @@ import numpy as np
 
 from ....core import autodiff, tree
 from ....core.arrays import Array
+from ....core.diagnostics import Status
 from ....core.errors import IdentificationError, ParameterError, suggestion
-from ....core.status import Status
 from ....core.system import System
 from ....engine.compile.cache.kernel import newton
 from ....engine.compile.function import Function

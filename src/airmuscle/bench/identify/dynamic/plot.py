@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from ....core.axes import given_axes
-from ....core.plotting import BLACK, RED, legend_outside, new_figure
+from ....core.plotting import BLACK, RED, given_axes, legend_outside, new_figure
 from ....recording import Recording
 from ....recording.display_units import display_scale
 

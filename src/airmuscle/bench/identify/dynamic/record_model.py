@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from ....core import tree
 from ....core.arrays import Array
+from ....core.diagnostics import Status
 from ....core.errors import IdentificationError, ParameterError
-from ....core.status import Status
 from ....core.system import System
 from ....engine.compile.cache.kernel import evaluate
 from ....engine.compile.program import CompiledSystem, compile_system

@@ -10,10 +10,10 @@ import numpy as np
 from ....core import tree
 from ....core.arrays import Array
 from ....core.errors import ParameterError, suggestion
-from ....core.notebook import Card, NotebookDisplay
 from ....engine.compile import System
 from ....recording import Recording
 from ....recording.display_units import displayed
+from ....recording.notebook import Card, NotebookDisplay
 from ..identifiability import Identifiability
 from ..result import Estimate, estimate_rows, estimate_table
 from .experiment import Unknown

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ....core.axes import given_axes, relabel_in_display_units
-from ....core.plotting import LINES, legend_below, new_figure
+from ....core.plotting import LINES, given_axes, legend_below, new_figure, relabel_in_display_units
 from ....physics.muscle.friction import Friction
 from .agreement import RunAgreement
 

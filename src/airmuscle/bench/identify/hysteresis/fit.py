@@ -10,8 +10,7 @@ import numpy.typing as npt
 
 from ....core.arrays import Array
 from ....core.declaration import model, parameter
-from ....core.errors import IdentificationError
-from ....core.hints import Hint
+from ....core.errors import Hint, IdentificationError
 from ....physics.muscle.characteristic.base import Characteristic
 from ....physics.muscle.friction import BoucWen, Dahl, Friction, LuGre, MaxwellSlip, PrandtlIshlinskii
 from ....recording import Recording

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ....core.notebook import Card, NotebookDisplay
 from ....core.tree import Leaf, leaves
 from ....physics.muscle.friction import Friction, PressureScaledFriction
+from ....recording.notebook import Card, NotebookDisplay
 from ..identifiability import UndeterminedCombination
 from ..model_evidence import format_p_value
 from .agreement import RunAgreement

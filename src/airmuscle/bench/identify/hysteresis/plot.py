@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from ....core.arrays import Array
-from ....core.axes import given_axes, relabel_in_display_units
-from ....core.plotting import DASHES, LINES, legend_below, new_figure
+from ....core.plotting import DASHES, LINES, given_axes, legend_below, new_figure, relabel_in_display_units
 from ....physics.muscle.friction import Friction
 from .axis import MILLIMETRES, Axis
 from .series import LoopSeries

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from ....core.arrays import Array
-from ....core.notebook import Card, NotebookDisplay
 from ....core.tree import leaves
 from ....physics.muscle.friction import Friction
+from ....recording.notebook import Card, NotebookDisplay
 from ..identifiability import UndeterminedCombination
 from ..model_evidence import aicc, effective_sample_size, f_test_p_value, format_p_value
 from . import branches

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ....core.annotation import check_field_types
 from ....core.arrays import Array
 from ....core.errors import IdentificationError, ParameterError
-from ....core.field_types import check_field_types
 from ....core.short_repr import ShortRepr
 from ....engine.compile import System
 from ....engine.run.integrators import Integrator, Rodas4

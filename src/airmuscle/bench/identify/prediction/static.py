@@ -8,8 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ....core.arrays import Array
-from ....core.errors import ColumnError
-from ....core.hints import Hint
+from ....core.errors import ColumnError, Hint
 from ....physics.muscle import CreepElements
 from ....physics.muscle.characteristic.base import Characteristic, ForceLaw
 from ....physics.muscle.characteristic.validity_range import ValidityRange

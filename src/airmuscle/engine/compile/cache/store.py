@@ -12,11 +12,14 @@ import hashlib
 import importlib.util
 import os
 import pathlib
+import stat
+import warnings
 from collections.abc import Sequence
 
 from ....core.atomic_output import atomic_file
-from ....core.cache_folder import cache_folder, read_private, warn_not_stored
+from ....core.errors import AirmuscleWarning
 
+_POSIX = hasattr(os, "getuid")
 _PACKAGE = pathlib.Path(__file__).parents[1]
 _SOURCES = [path for room in ("kernels", "cache", "llvm") for path in sorted((_PACKAGE / room).glob("*.py"))]
 MAX_FILES = 4000
@@ -24,6 +27,55 @@ MAX_FILES = 4000
 not used for the longest time. Fewer than a program uses in turn would be stored in vain: each would go before it is
 used again."""
 _HASH = hashlib.sha256().digest_size
+
+
+def cache_folder() -> pathlib.Path | None:
+    """The private cache folder, created if it is missing; None, with one warning, if there is none.
+
+    It is `AIRMUSCLE_CACHE_DIR`, or else `airmuscle/kernels` in the user's cache folder. It must belong to the user, and
+    nobody else may write to it, because what is in it is executed; otherwise it is not used.
+    """
+    try:
+        folder = _chosen_folder()
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        state = folder.stat()
+    except (OSError, RuntimeError) as error:  # RuntimeError: the user has no home folder
+        warn_not_stored(f"there is no cache folder ({error})")
+        return None
+    if _POSIX and (state.st_uid != os.getuid() or state.st_mode & (stat.S_IWGRP | stat.S_IWOTH)):
+        warn_not_stored(f"other users may write to {folder}")
+        return None
+    return folder
+
+
+def _chosen_folder() -> pathlib.Path:
+    if named := os.environ.get("AIRMUSCLE_CACHE_DIR"):
+        return pathlib.Path(named)
+    import platformdirs
+
+    return pathlib.Path(platformdirs.user_cache_dir("airmuscle", appauthor=False)) / "kernels"
+
+
+def read_private(path: pathlib.Path) -> bytes | None:
+    """The contents of a regular file that belongs to the user and that nobody else may write to."""
+    try:
+        with open(os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)), "rb") as file:
+            state = os.fstat(file.fileno())
+            private = not _POSIX or (state.st_uid == os.getuid() and not state.st_mode & (stat.S_IWGRP | stat.S_IWOTH))
+            return file.read() if private and stat.S_ISREG(state.st_mode) else None
+    except OSError:
+        return None
+
+
+@functools.cache
+def warn_not_stored(reason: str) -> None:
+    """Warn that compiled kernels are not stored."""
+    warnings.warn(
+        f"compiled kernels are not stored: {reason}. Every process compiles them anew, which takes some seconds. "
+        "Name a private folder in the environment variable AIRMUSCLE_CACHE_DIR.",
+        AirmuscleWarning,
+        stacklevel=2,
+    )
 
 
 def load(name: str, kinds: Sequence[str]) -> bytes | None:

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from ....core.diagnostics import Status
 from ....core.errors import TraceError
-from ....core.status import Status
 from .. import kernel_layout
 
 _PACKAGE = __package__.rpartition(".")[0] + ".kernels"

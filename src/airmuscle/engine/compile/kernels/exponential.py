@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ....core.status import Status
+from ....core.diagnostics import Status
 from .calls import invoke, pointer
 from .matrices import add_product
 from .parts import PART

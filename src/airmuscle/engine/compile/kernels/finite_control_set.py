@@ -6,7 +6,7 @@ from typing import Any
 
 import numba
 
-from ....core.status import Status
+from ....core.diagnostics import Status
 from .calls import invoke, pointer
 from .exponential import exponential_step
 from .parts import PART

@@ -12,7 +12,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from ....core.status import Status
+from ....core.diagnostics import Status
 from .calls import invoke, pointer
 from .parts import CONTRACTED_PART
 from .segments import set_inputs, write_present

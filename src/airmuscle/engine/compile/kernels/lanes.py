@@ -13,7 +13,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from ....core.status import Status
+from ....core.diagnostics import Status
 from .calls import invoke, pointer
 from .parts import PART
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import sqrt
 from typing import Any
 
-from ....core.status import Status
+from ....core.diagnostics import Status
 from .parts import PART
 
 DONE, SINGULAR = Status.DONE.value, Status.SINGULAR.value

@@ -6,7 +6,7 @@ from typing import Any
 
 import numba
 
-from ....core.status import Status
+from ....core.diagnostics import Status
 from .parts import CONTRACTED_PART
 from .rodas4_step import interpolate, prepare_dense_output, take_step
 from .segments import write_present

@@ -11,7 +11,7 @@ from __future__ import annotations
 from math import sqrt
 from typing import Any
 
-from ....core.status import Status
+from ....core.diagnostics import Status
 from .calls import invoke, pointer
 from .parts import CONTRACTED_PART
 from .segments import set_inputs

@@ -6,7 +6,7 @@ from typing import Any
 
 import numba
 
-from ....core.status import Status
+from ....core.diagnostics import Status
 from ..kernel_layout import Progress, Waiting
 from .calls import call_kernel, invoke, pointer
 from .driven_inputs import apply_drivers, is_full, load_columns, merge_inputs

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ....core.arrays import Array
-from ....core.status import Status
+from ....core.diagnostics import Status
 from ...compile.program import CompiledSystem
 from ...loop.piecewise_linear import PiecewiseLinear
 from ..bound_integrator import RawSolution

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ....core.diagnostics import Status
 from ....core.errors import ParameterError
-from ....core.status import Status
 from ...compile.cache.kernel import lanes
 from ..integrators import ExplicitRungeKutta
 from .job import BatchJob

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from ....core import tree
 from ....core.arrays import Array
-from ....core.status import Status
+from ....core.diagnostics import Status
 from ...compile.cache.kernel import loop_lanes
 from ...loop.control_law import ControlLaw
 from ..compiled_law import parameters_of, sample_in_lanes

@@ -11,8 +11,8 @@ import numpy.typing as npt
 from ....core.annotation import one_line
 from ....core.arrays import Array
 from ....core.declaration import as_float
+from ....core.diagnostics import Status
 from ....core.errors import ParameterError, suggestion
-from ....core.status import Status
 from ....core.system import System
 from ...compile.program import CompiledSystem, compile_system
 from ...loop.control_loop import ControlLoop

@@ -10,10 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ....core.arrays import Array
-from ....core.diagnostics import Columns
+from ....core.diagnostics import Columns, Status
 from ....core.errors import ColumnError, suggestion
 from ....core.reference import Reference, cite
-from ....core.status import Status
 from ....core.system import System
 from ....recording import Recording
 from ..integrators import Integrator

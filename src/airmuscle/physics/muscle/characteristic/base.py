@@ -14,8 +14,8 @@ from ....core import autodiff, ops
 from ....core.declaration import model, parameter
 from ....core.errors import ParameterError
 from ....core.ops import Value
-from ....core.quantity_arguments import accept_quantities_in
 from ....core.reference import Reference
+from ..quantity_arguments import accept_quantities_in
 from .solve import describe_range, find_first_root, warn_above_whole_length
 
 _UNITS = {

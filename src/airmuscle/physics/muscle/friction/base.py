@@ -8,7 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 from ....core.declaration import model
 from ....core.ops import Value, Values
 from ....core.reference import Reference
-from ....core.variables import StateVariable
+from ....core.system import StateVariable
 
 
 class IdentifiedRange(NamedTuple):

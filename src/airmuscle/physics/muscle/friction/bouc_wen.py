@@ -8,7 +8,7 @@ from ....core import ops
 from ....core.declaration import model, parameter
 from ....core.ops import Value, Values
 from ....core.reference import Reference
-from ....core.variables import StateVariable
+from ....core.system import StateVariable
 from .base import Friction
 from .path import relative_deflection
 

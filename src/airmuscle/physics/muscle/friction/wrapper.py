@@ -9,7 +9,7 @@ from ....core.declaration import model, parameter
 from ....core.errors import ParameterError
 from ....core.ops import Value, Values
 from ....core.reference import Reference
-from ....core.variables import StateVariable
+from ....core.system import StateVariable
 from .base import Friction, IdentifiedRange
 
 

@@ -12,8 +12,8 @@ from ....core import autodiff
 from ....core.annotation import abridged
 from ....core.errors import GeometryLimitError, ParameterError
 from ....core.ops import Value
-from ....core.quantity_arguments import accept_quantities_in
 from ....core.reference import Reference
+from ..quantity_arguments import accept_quantities_in
 
 
 def check_contraction_range(contraction: Value, limits: tuple[float, float], owner: str, remark: str = "") -> None:

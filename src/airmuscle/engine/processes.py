@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from typing import Any
 
-from .display import current_units, display
-from .errors import InputError
+from ..core.display import current_units, display
+from ..core.errors import InputError
 
 _stop_event: Any = None
 _BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")

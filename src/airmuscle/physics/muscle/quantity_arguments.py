@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from .annotation import one_line
-from .arrays import NUMBERS
-from .errors import ParameterError
-from .units import quantity
+from ...core.annotation import one_line
+from ...core.arrays import NUMBERS
+from ...core.errors import ParameterError
+from ...core.units import quantity
 
 _ARRAY, _DOUBLE = np.ndarray, np.dtype(np.float64)
 _EXAMPLES = {"Pa": "'3 bar'", "N": "'200 N'", "1": "'10 %'"}

@@ -9,9 +9,9 @@ import html
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from .errors import AirmuscleError
-from .plotting import rendered
-from .short_repr import ShortRepr
+from ..core.errors import AirmuscleError
+from ..core.plotting import rendered
+from ..core.short_repr import ShortRepr
 
 MAX_ROWS = 14
 """Maximum number of rows of a table."""

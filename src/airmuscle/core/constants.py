@@ -1,6 +1,0 @@
-"""Physical constants."""
-
-from __future__ import annotations
-
-STANDARD_GRAVITY = 9.80665
-"""Standard acceleration of gravity [m/s2] (ISO 80000-3)."""
