@@ -64,7 +64,7 @@ class {name}(Orifice):
         return opening * self.slope * (upstream - downstream)
 """
 FRICTION = """from {root}core import ops
-from {root}core.variables import StateVariable
+from {root}core.system import StateVariable
 from .base import Friction
 from .path import deflection
 

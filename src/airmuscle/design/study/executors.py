@@ -1,6 +1,6 @@
 """Executors of a study beyond local processes: a Dask cluster.
 
-An executor has the interface of `concurrent.futures`; local processes are those of `core.processes`.
+An executor has the interface of `concurrent.futures`; local processes are those of `engine.processes`.
 """
 
 from __future__ import annotations
