@@ -30,7 +30,7 @@ from airmuscle.outlets.studio.fit_task import run_fit
 from airmuscle.outlets.studio.fit_uploads import UploadStore, check_file_name
 from airmuscle.outlets.studio.page import self_contained_page
 from airmuscle.outlets.studio.requests import BadRequest
-from airmuscle.outlets.studio.worker import Worker
+from airmuscle.outlets.studio.worker import LimitedWorker
 
 LAW = am.load("dmsp-20-300").characteristic
 COLUMNS = {"Zeit": {"quantity": "time", "unit": "s"}, "Druck": {"quantity": "pressure", "unit": "bar"}}
@@ -520,7 +520,7 @@ def test_a_worker_ends_with_its_server(tmp_path):
         "if __name__ == '__main__':\n"
         "    queue = FitQueue(write_slowly, count=1); task = queue.submit('set', pathlib.Path(sys.argv[1]), 600.0)\n"
         "    while queue.status(task)['fraction'] != 0.5: pass\n"
-        "    print([worker._process.pid for worker in queue._running.values()][0], flush=True); input()\n"
+        "    print([worker._worker._process.pid for worker in queue._running.values()][0], flush=True); input()\n"
     )
     (tmp_path / "server.py").write_text(script, encoding="utf-8")
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
@@ -549,7 +549,7 @@ def wait_until(holds, seconds=120.0):
 
 
 def test_a_worker_reports_nothing_unless_asked():
-    worker = Worker()
+    worker = LimitedWorker()
     try:
         assert worker.call(sum, ([1, 2],), 60.0) == 3
     finally:

@@ -135,7 +135,7 @@ def test_a_short_task_is_answered_while_two_long_ones_run_that_began_together():
 
 def test_a_worker_may_be_ended_at_any_instant_of_its_start():
     for delay in (0.0, 0.005, 0.05):
-        process, cancelled = worker.Worker(), threading.Event()
+        process, cancelled = worker.LimitedWorker(), threading.Event()
 
         def report(fraction, text, process=process, cancelled=cancelled):
             if cancelled.is_set():

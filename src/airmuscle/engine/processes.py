@@ -1,18 +1,26 @@
-"""Pools of local processes: started afresh, stopped on interruption, and ended together with their parent."""
+"""Local processes: a pool for many equal runs, and a worker for single tasks with a limit of time.
+
+They are started afresh, not as copies of this process, and end together with it.
+"""
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import multiprocessing
 import os
+import pickle
+import queue
 import signal
+import subprocess
+import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
-from typing import Any
+from typing import IO, Any
 
 from ..core.display import current_units, display
-from ..core.errors import InputError
+from ..core.errors import AirmuscleError, InputError
 
 _stop_event: Any = None
 _BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
@@ -124,3 +132,146 @@ def check_running() -> None:
     """Raise KeyboardInterrupt in a worker whose pool has been stopped."""
     if _stop_event is not None and _stop_event.is_set():
         raise KeyboardInterrupt
+
+
+START_LIMIT = 60.0
+"""Limit [s] of the start of a worker with its imports (chosen)."""
+_START = f"import sys; sys.path[:] = sys.argv[1:]; from {__name__} import serve_tasks; serve_tasks()"
+Report = Callable[..., None]
+"""Receives the progress of a task, with the arguments that the task states."""
+
+
+class WorkerError(AirmuscleError):
+    """The process of a worker ended without a result; `late` if because it exceeded the limit of time."""
+
+    def __init__(self, message: str = "the process ended without a result.", *, late: bool = False) -> None:
+        super().__init__(message)
+        self.late = late
+
+
+class Worker:
+    """A process that runs one task at a time; if it has ended, the next task starts another one.
+
+    prepare  function that a new process calls before its first task
+    quiet    whether what the process writes to the standard error is discarded
+
+    Unlike those of `process_pool`, the process does not import the program of the caller, a file of a user that may
+    call this one without `if __name__ == "__main__"`.
+    """
+
+    def __init__(self, prepare: Callable[[], object] | None = None, *, quiet: bool = False) -> None:
+        self._prepare, self._quiet = prepare, quiet
+        self._process: Any = None
+        self._lock = threading.Lock()
+
+    def call(
+        self, task: Callable[..., Any], arguments: tuple[Any, ...], limit: float, report: Report | None = None
+    ) -> Any:
+        """The result of `task(*arguments)`. Raises what the task raises; WorkerError after `limit` [s].
+
+        With `report`, the task receives as last argument a function for its progress, and `report` what it is told.
+        Functions, arguments and results are pickled.
+        """
+        process = self._process
+        if process is None or process.poll() is not None:
+            process = self._start()
+        if report is not None:
+            report(0.0, "starting")  # a task that was cancelled while the process was started ends here
+        return self._ask(process, (task, arguments, report is not None), limit, report)
+
+    def _start(self) -> Any:
+        self.stop()
+        with self._lock:
+            self._process = process = subprocess.Popen(
+                [sys.executable, "-c", _START, *sys.path], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL if self._quiet else None,
+            )  # fmt: skip
+        atexit.register(self.stop)
+        self._ask(process, (self._prepare or os.getpid, (), False), START_LIMIT)
+        return process
+
+    def _ask(self, process: Any, request: tuple[Any, ...], limit: float, report: Report | None = None) -> Any:
+        expired = threading.Event()
+        timer = threading.Timer(limit, _end, (process, expired))
+        timer.start()
+        try:
+            _write(pickle.dumps(request), process.stdin)
+            while True:
+                is_progress, content = pickle.loads(pickle.load(process.stdout))
+                if not is_progress:
+                    break
+                if report is not None:
+                    report(*content)
+        except (EOFError, OSError, ValueError, pickle.UnpicklingError):  # ValueError: another thread closed the pipe
+            self.stop()
+            raise WorkerError(late=expired.is_set()) from None
+        except BaseException:  # an interruption, after which the answer would be that to the next request
+            self.stop()
+            raise
+        finally:
+            timer.cancel()
+        result, error = content
+        if error is not None:
+            raise error
+        return result
+
+    def kill(self) -> None:
+        """End the process from another thread; the call that waits for it raises WorkerError."""
+        with self._lock:
+            process = self._process
+        if process is not None:
+            _end(process)
+
+    def stop(self) -> None:
+        """End the process; several threads may do so, of which one closes its pipes."""
+        with self._lock:
+            process, self._process = self._process, None
+        if process is None:
+            return
+        atexit.unregister(self.stop)
+        _end(process)
+        for pipe in (process.stdin, process.stdout):
+            with contextlib.suppress(OSError):
+                pipe.close()
+
+
+def _end(process: Any, ended: threading.Event | None = None) -> None:
+    if ended is not None:
+        ended.set()
+    process.kill()
+    process.wait()
+
+
+def _write(content: bytes, stream: Any) -> None:
+    pickle.dump(content, stream)
+    stream.flush()
+
+
+def serve_tasks() -> None:
+    """Run the tasks that arrive at the standard input; what they print goes to the standard error."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a terminal sends it to all processes; the parent ends this one
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    requests: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+    threading.Thread(target=_receive, args=(requests,), name="requests", daemon=True).start()
+    while True:
+        _write(_answer(requests.get(), answers), answers)
+
+
+def _receive(requests: queue.SimpleQueue[bytes]) -> None:
+    """Pass on requests; end the process, also during a task, when the parent closes the pipe or ends."""
+    with contextlib.suppress(EOFError, OSError):
+        while True:
+            requests.put(pickle.load(sys.stdin.buffer))
+    os._exit(0)
+
+
+def _answer(request: bytes, answers: IO[bytes]) -> bytes:
+    """The pickled result of a task, or the exception that it raised."""
+    try:
+        task, arguments, reports = pickle.loads(request)
+        if reports:
+            arguments = (*arguments, lambda *progress: _write(pickle.dumps((True, progress)), answers))
+        return pickle.dumps((False, (task(*arguments), None)), protocol=pickle.HIGHEST_PROTOCOL)
+    except Exception as error:  # raised by the caller
+        return pickle.dumps((False, (None, error)))

@@ -17,7 +17,7 @@ from typing import Any
 from ...core.errors import AirmuscleError
 from .fit_settings import FieldError
 from .requests import BadRequest
-from .worker import LimitError, Worker
+from .worker import LimitedWorker, LimitError
 
 FIT_WORKERS = 2
 """Maximum number of fits at a time (chosen)."""
@@ -49,7 +49,7 @@ class FitQueue:
     """Fits in order of their arrival. `task` is called with the arguments of a fit and a function for its progress."""
 
     def __init__(
-        self, task: Callable[..., Any], count: int = FIT_WORKERS, make_worker: Callable[[], Any] = Worker
+        self, task: Callable[..., Any], count: int = FIT_WORKERS, make_worker: Callable[[], Any] = LimitedWorker
     ) -> None:
         self._task, self._count, self._make_worker = task, count, make_worker
         self._tasks: collections.OrderedDict[str, FitTask] = collections.OrderedDict()

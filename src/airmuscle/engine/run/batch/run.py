@@ -18,6 +18,7 @@ from ...compile.program import CompiledSystem, compile_system
 from ...loop.control_loop import ControlLoop
 from ...loop.inputs import InputSignal
 from ...loop.piecewise_linear import PiecewiseLinear
+from ...processes import available_cores
 from ...state import check_system
 from ..bound_integrator import MAX_STEPS
 from ..integrators import ExplicitRungeKutta, Integrator, default_integrator
@@ -31,7 +32,7 @@ from .loops import LoopBatch, loops_of, vary
 from .precision import Double, Precision
 from .solution import BatchSolution
 from .storage import InMemory, OnDisk
-from .thread_pool import Queue, available_cores, progress, run_workers
+from .thread_pool import Queue, progress, run_workers
 from .variations import Variations
 
 

@@ -13,11 +13,11 @@ from ....core.errors import ParameterError
 from ....core.system import System
 from ...compile.cache.kernel import lane_blocks
 from ...compile.program import compile_system
+from ...processes import available_cores
 from ...state import check_system
 from ..integrators import ExplicitRungeKutta
 from .lanes import ALIGNMENT
 from .precision import Double, Precision
-from .thread_pool import available_cores
 
 Columns = npt.NDArray[Any]
 """An array (B, k, W) of B blocks of W lanes, in the precision of the batch."""

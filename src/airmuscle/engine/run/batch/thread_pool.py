@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import contextvars
-import os
 import sys
 import threading
 import time
@@ -17,13 +16,6 @@ import numpy.typing as npt
 BAR_DELAY = 2.0
 """Seconds after which a progress bar is drawn, on a terminal."""
 _hidden = contextvars.ContextVar("hidden", default=False)
-
-
-def available_cores() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 class Queue:
