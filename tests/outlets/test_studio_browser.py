@@ -167,6 +167,76 @@ def test_a_saved_page_works_without_a_network(browser, address, tmp_path):
         assert number(page, "Force [N]") == 222.0
 
 
+def test_a_cold_page_shows_that_it_loads_and_obeys_the_first_click(browser, address):
+    """The library arrives after the click; nothing takes the chosen tab back."""
+    with browser.new_context() as context:
+        page, held = context.new_page(), []
+        page.route("**/api/library*", lambda route: held.append(route))
+        page.goto(address)
+        shown = page.locator("#panel-muscle").evaluate("(panel) => getComputedStyle(panel, '::before').content")
+        assert shown == '"Loading …"'
+        assert not page.get_by_label("Muscle or law of the library").is_visible()
+        page.get_by_role("tab", name="Plant").click()
+        while not held:
+            page.wait_for_timeout(20)
+        held[0].continue_()
+        page.wait_for_selector("html[data-ready]", timeout=WAIT)
+        wait_for(page, "plant", "lift")
+        assert page.get_by_role("tab", selected=True).inner_text() == "Plant"
+        assert page.locator("#panel-muscle").is_hidden()
+        assert page.locator("[role=tabpanel][aria-busy]").count() == 0
+
+
+def test_the_button_back_leads_to_the_tab_before_and_keeps_the_numbers(muscle):
+    muscle.get_by_label("Force [N]").fill("123")
+    muscle.get_by_role("tab", name="Size").click()
+    muscle.get_by_role("tab", name="Plant").click()
+    wait_for(muscle, "plant", "lift")
+    muscle.go_back()
+    assert muscle.get_by_role("tab", selected=True).inner_text() == "Size"
+    muscle.go_back()
+    assert muscle.get_by_role("tab", selected=True).inner_text() == "Muscle"
+    assert number(muscle, "Force [N]") == 123.0
+    muscle.go_forward()
+    assert muscle.get_by_role("tab", selected=True).inner_text() == "Size"
+
+
+@pytest.mark.parametrize(("text", "sentence"), [("4.5 bar", "“4.5 bar” is no number"), ("", "The field is empty")])
+def test_a_wrong_number_has_a_sentence_and_no_results(muscle, text, sentence):
+    panel, before = muscle.locator("#panel-muscle"), number(muscle, "Contraction [%]")
+    muscle.get_by_label("Pressure [bar]").fill(text)
+    said = panel.get_by_role("status").inner_text()
+    assert said.startswith(f"Pressure: {sentence}")
+    assert "in bar, without the unit" in said
+    assert muscle.get_by_label("Contraction [%]").input_value() == "–"
+    assert panel.locator("dl.facts").inner_text() == ""
+    muscle.get_by_label("Force [N]").fill("100")
+    assert muscle.get_by_label("Pressure [bar]").input_value() == text
+    muscle.get_by_label("Pressure [bar]").fill("3")
+    assert number(muscle, "Contraction [%]") == before
+    assert panel.get_by_role("status").inner_text() == ""
+
+
+def test_a_wrong_parameter_has_a_sentence_that_says_what_is_shown(muscle):
+    row = muscle.locator("#panel-muscle .parameter").first
+    for text, sentence in (("-1", "-1 is out of bounds, allowed: 0.1 to 200 mm."), ("1 cm", "“1 cm” is no number")):
+        row.locator("input[type=text]").fill(text)
+        assert row.get_by_role("alert").inner_text().startswith(sentence)
+        assert row.get_by_role("alert").inner_text().endswith("What is shown belongs to 10 mm.")
+    row.locator("input[type=text]").fill("11")
+    assert row.get_by_role("alert").inner_text() == ""
+
+
+def test_print_is_dark_on_white_in_dark_mode(browser, address):
+    with opened(browser, address, scheme="dark") as page:
+        wait_for(page, "muscle", "dmsp-20-300")
+        page.evaluate("addEventListener('beforeprint', () => { window.printed = document.documentElement.dataset.theme; })")
+        page.pdf()
+        assert page.evaluate("window.printed") == "light"
+        assert page.evaluate("document.documentElement.dataset.theme") == "dark"
+        page.emulate_media(media="print")
+        assert not page.get_by_role("button", name="Save page").is_visible()
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [360, 768, 1600])
 def test_the_page_fits_every_width(browser, address, width, scheme):

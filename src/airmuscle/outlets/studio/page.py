@@ -39,7 +39,6 @@ SCRIPTS = (
     "scripts/joint-linear.js",
     "scripts/joint-drawing.js",
     "scripts/joint-charts.js",
-    "scripts/joint-gains.js",
     "scripts/joint-tab.js",
     "scripts/size-tab.js",
     "scripts/main.js",

@@ -38,6 +38,19 @@
     return element("span.symbol", {}, greek(name), index.length ? element("sub", {}, index.map(greek).join(" ")) : null);
   }
 
+  /* Shows what is wrong in `place`, or nothing; the field that it concerns is marked. */
+  function complain(place, text, field) {
+    place.textContent = text;
+    place.className = text ? "message error" : "";
+    if (field) field.setAttribute("aria-invalid", String(Boolean(text)));
+  }
+
+  /* What is wrong with the text of a field in which a number in a unit is expected. */
+  function noNumber(text, unit) {
+    const wanted = `a number${unit ? ` in ${unit}, without the unit` : ""}`;
+    return text.trim() ? `“${text.trim().slice(0, 40)}” is no number; write ${wanted}.` : `The field is empty; write ${wanted}.`;
+  }
+
   let clearing = 0;
   function say(text) {
     const status = document.getElementById("status");
@@ -74,12 +87,8 @@
     const choose = element("input", { type: "file", accept: ".toml,text/plain", "aria-label": `${label}: choose a file` });
     const message = element("p", { role: "alert" });
     const send = async (text) => {
-      message.className = "";
-      message.textContent = "";
-      try { await receive(text); area.value = text; } catch (error) {
-        message.className = "message error";
-        message.textContent = error.message;
-      }
+      complain(message, "");
+      try { await receive(text); area.value = text; } catch (error) { complain(message, error.message); }
     };
     choose.addEventListener("change", async () => { if (choose.files.length) { await readFile(choose.files[0], area, send); choose.value = ""; } });
     const drop = element("div.drop", {}, element("p.small", {}, "Drop a TOML file here, choose one, or paste its text below."), choose);
@@ -99,5 +108,5 @@
     await send(area.value);
   }
 
-  Object.assign(airmuscle, { element, symbolNode, svg, say, download, colour, oncePerFrame, textField });
+  Object.assign(airmuscle, { element, symbolNode, svg, complain, noNumber, say, download, colour, oncePerFrame, textField });
 })();

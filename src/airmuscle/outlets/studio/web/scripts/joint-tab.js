@@ -88,7 +88,7 @@
       if (request === this.request) this.host.removeAttribute("aria-busy");
     }
 
-    complain(text) { this.message.textContent = text; this.message.className = text ? "message error" : ""; }
+    complain(text) { airmuscle.complain(this.message, text); }
 
     open(sheet, state) {
       this.sheet = sheet;

@@ -2,7 +2,7 @@
 "use strict";
 
 (() => {
-  const { element, shortText, readNumber } = airmuscle;
+  const { element, complain, noNumber, shortText, readNumber } = airmuscle;
   const QUANTITIES = { pressure: ["Pressure", "bar", 1e5], contraction: ["Contraction", "%", 0.01], force: ["Force", "N", 1] };
 
   class PointPanel {
@@ -27,25 +27,25 @@
 
     typed(name) {
       const value = readNumber(this.fields[name].value) * QUANTITIES[name][2];
-      this.fields[name].toggleAttribute("aria-invalid", Number.isNaN(value));
-      if (Number.isNaN(value)) { this.fields[name].setAttribute("aria-invalid", "true"); return; }
       const solved = name === this.solved ? Object.keys(QUANTITIES).find((other) => other !== name) : this.solved;
       this.changed({ ...this.point, [name]: value }, solved, name);
     }
 
-    /* The fields but the one in which the user types */
+    /* The fields but the one in which the user types, and those with an entry that is no number */
     show(law, point, solved, typing) {
       this.point = point;
       this.solved = solved;
       for (const [name, [, , factor]] of Object.entries(QUANTITIES)) {
-        if (name !== typing) { this.fields[name].value = shortText(point[name] / factor, 6); this.fields[name].removeAttribute("aria-invalid"); }
+        if (name === solved || (name !== typing && !Number.isNaN(point[name]))) this.fields[name].value = shortText(point[name] / factor, 6);
+        this.fields[name].setAttribute("aria-invalid", String(name !== solved && Number.isNaN(point[name])));
         this.fields[name].classList.toggle("solved", name === solved);
         this.radios[name].checked = name === solved;
       }
       this.showFacts(law, point);
-      const [text, wrong] = remark(law, point, solved);
-      this.message.textContent = text;
-      this.message.className = text ? `message small${wrong ? " error" : ""}` : "";
+      const missing = Object.keys(QUANTITIES).find((name) => name !== solved && Number.isNaN(point[name]));
+      const [text, wrong] = missing ? [`${QUANTITIES[missing][0]}: ${noNumber(this.fields[missing].value, QUANTITIES[missing][1])}`, true] : remark(law, point, solved);
+      complain(this.message, text);
+      this.message.classList.toggle("error", wrong);
     }
 
     showFacts(law, { pressure, contraction, force }) {

@@ -32,6 +32,7 @@
       const pointHost = element("div"), chartHost = element("div"), drawingHost = element("div.drawing"), parameterHost = element("div");
       this.pressureField = element("input.grow", { type: "text", "aria-label": "Pressures of the isobars [bar]", autocomplete: "off" });
       this.pressureField.addEventListener("change", () => this.readPressures());
+      this.pressureMessage = element("p", { role: "alert" });
       this.resetButton = element("button", { type: "button", onclick: () => this.reset() }, "Reset parameters");
       const button = (text, action) => element("button", { type: "button", onclick: () => action().catch((error) => say(error.message)) }, text);
       const exports = element("div.row", {}, element("span.small.soft", {}, "Download"),
@@ -45,7 +46,7 @@
           card("Muscle", element("div.row", {}, element("div.grow", {}, this.select), this.compare), this.list, this.message, element("details", {}, element("summary", {}, "Own muscle file"), this.own)),
           card("Working point", pointHost), this.parameterCard),
         element("div.stack.second", {},
-          card("Force over contraction", chartHost, element("div.row.small", {}, element("span.soft", {}, "Isobars [bar]"), this.pressureField, exports)),
+          card("Force over contraction", chartHost, element("div.row.small", {}, element("span.soft", {}, "Isobars [bar]"), this.pressureField, exports), this.pressureMessage),
           card("Outline to scale", drawingHost), card("Source", this.about))));
       this.chart = new airmuscle.IsobarChart(chartHost, (at) => this.dragged(at));
       chartHost.addEventListener("keydown", (event) => this.key(event));
@@ -145,7 +146,7 @@
       this.refresh();
     }
 
-    complain(text) { this.message.textContent = text; this.message.className = text ? "message error" : ""; }
+    complain(text) { airmuscle.complain(this.message, text); }
 
     /* Everything after a change of the muscles. */
     refresh() {
@@ -172,8 +173,8 @@
     readPressures() {
       const values = this.pressureField.value.split(/[;\s]+/).filter(Boolean).map(airmuscle.readNumber);
       const valid = values.length <= 20 && values.every((v) => v > 0 && v <= 1000);
-      this.pressureField.setAttribute("aria-invalid", String(!valid));
-      if (!valid) { say("Give at most 20 pressures from 0 to 1000 bar, separated by semicolons."); return; }
+      airmuscle.complain(this.pressureMessage, valid ? "" : "Write at most 20 pressures from 0 to 1000 in bar, separated by semicolons; the chart shows the isobars before.", this.pressureField);
+      if (!valid) return;
       this.pressures = values.length ? values.map((v) => v * 1e5) : null;
       this.curves(false);
       this.showPoint();

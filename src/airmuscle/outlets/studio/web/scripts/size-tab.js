@@ -2,7 +2,7 @@
 "use strict";
 
 (() => {
-  const { element, source, say, download, shortText, Chart } = airmuscle;
+  const { element, complain, source, say, download, shortText, Chart } = airmuscle;
   const FIELDS = {
     lift: [["load", "Load", "20 kg", "mass or force"], ["stroke", "Stroke", "40 mm", ""], ["stiffness", "Stiffness of a spring", "", "optional: 2 N/mm"]],
     joint: [["torque", "Torque in either direction", "5 N m", ""], ["angle", "Range of the angle", "60 deg", ""], ["inertia", "Moment of inertia", "", "optional: 0.05 kg m^2"]],
@@ -39,7 +39,7 @@
       this.scenario = button("Scenario (TOML)", () => this.saveScenario());
       this.host.append(element("div.columns", {},
         element("div.stack", {}, card("Requirement", ".first", this.form)),
-        element("div.stack.second", {},
+        this.results = element("div.stack.second", { hidden: true },
           card("Muscles, best first", ".early", this.table, element("p.small.soft", {}, "Each at its shortest length. Pressure and contraction at the contracted end. Air: of all muscles, at the reference atmosphere of ISO 8778, without tubes."), element("div.row", {}, element("span.small.soft", {}, "Download"), button("CSV", () => download("sizing.csv", this.csv(), "text/csv")))),
           card("Working points", ".early", this.caption, chart, element("div.row", {}, element("span.small.soft", {}, "Download"), this.scenario)),
           card("Unsuitable muscles", ".late", this.unsuitable))));
@@ -80,14 +80,13 @@
 
     async find(chosen = 0) {
       const request = this.asked = {};
-      this.message.textContent = source.embedded ? this.message.textContent : "";
-      this.message.className = "";
+      if (!source.embedded) complain(this.message, "");
       this.host.setAttribute("aria-busy", "true");
       this.go.textContent = "Searching …";
       try {
         const sheet = source.embedded ? source.embedded.sheets.find((s) => s.tab === "size") : await source.sizing(this.request());
         if (request === this.asked) this.show(sheet, chosen);
-      } catch (error) { if (request === this.asked) { this.message.textContent = error.message; this.message.className = "message error"; } }
+      } catch (error) { if (request === this.asked) { complain(this.message, error.message); this.results.hidden = true; this.sheet = null; } }
       if (request !== this.asked) return;
       this.host.removeAttribute("aria-busy");
       this.go.textContent = "Find muscles";
@@ -95,6 +94,7 @@
 
     show(sheet, chosen) {
       this.sheet = sheet;
+      this.results.hidden = false;
       this.columns = COLUMNS.filter(([key]) => sheet.choices.some((choice) => choice.row[key] !== undefined && choice.row[key] !== null));
       const cell = (choice, key, i) => (key === "muscle" ? element("td", {}, element("button.name", { type: "button", onclick: () => this.choose(i) }, choice.name)) : element("td.number", {}, typeof choice.row[key] === "number" ? shortText(choice.row[key], 3 + (key === "length [mm]")) : "–"));
       this.rows = sheet.choices.map((choice, i) => element("tr", {}, ...this.columns.map(([key]) => cell(choice, key, i))));
