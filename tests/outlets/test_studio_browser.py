@@ -136,7 +136,7 @@ def test_a_plant_runs_by_schedule_and_by_hand_and_is_simulated_from_its_file(bro
     with opened(browser, address) as page:
         page.get_by_role("tab", name="Muscle").press("ArrowRight")
         page.get_by_role("tab", name="Fit").press("ArrowRight")
-        wait_for(page, "plant", "lift")
+        wait_for(page, "plant", "lift-dmsp-20")
         assert "steps" in page.locator("#panel-plant").inner_text()
         page.locator("#panel-plant .parameter", has_text="fill").first.get_by_role("button", name="1").click()
         page.wait_for_timeout(1500)
@@ -156,12 +156,12 @@ def test_a_saved_page_works_without_a_network(browser, address, tmp_path):
         wait_for(page, "muscle", "dmsp-20-300")
         page.get_by_label("Force [N]").fill("222")
         page.get_by_role("tab", name="Plant").click()
-        wait_for(page, "plant", "lift")
+        wait_for(page, "plant", "lift-dmsp-20")
         with page.expect_download() as download:
             page.get_by_role("button", name="Save page").click()
         download.value.save_as(tmp_path / "saved.html")
     with opened(browser, (tmp_path / "saved.html").as_uri(), offline=True) as page:
-        wait_for(page, "plant", "lift")
+        wait_for(page, "plant", "lift-dmsp-20")
         page.get_by_role("tab", name="Muscle").click()
         wait_for(page, "muscle", "dmsp-20-300")
         assert number(page, "Force [N]") == 222.0
@@ -181,7 +181,7 @@ def test_a_cold_page_shows_that_it_loads_and_obeys_the_first_click(browser, addr
             page.wait_for_timeout(20)
         held[0].continue_()
         page.wait_for_selector("html[data-ready]", timeout=WAIT)
-        wait_for(page, "plant", "lift")
+        wait_for(page, "plant", "lift-dmsp-20")
         assert page.get_by_role("tab", selected=True).inner_text() == "Plant"
         assert page.locator("#panel-muscle").is_hidden()
         assert page.locator("[role=tabpanel][aria-busy]").count() == 0
@@ -191,7 +191,7 @@ def test_the_button_back_leads_to_the_tab_before_and_keeps_the_numbers(muscle):
     muscle.get_by_label("Force [N]").fill("123")
     muscle.get_by_role("tab", name="Size").click()
     muscle.get_by_role("tab", name="Plant").click()
-    wait_for(muscle, "plant", "lift")
+    wait_for(muscle, "plant", "lift-dmsp-20")
     muscle.go_back()
     assert muscle.get_by_role("tab", selected=True).inner_text() == "Size"
     muscle.go_back()
@@ -242,7 +242,7 @@ def test_print_is_dark_on_white_in_dark_mode(browser, address):
 def test_the_page_fits_every_width(browser, address, width, scheme):
     with opened(browser, address, width=width, scheme=scheme) as page:
         assert page.evaluate("document.documentElement.dataset.theme") == scheme
-        for tab, name in (("muscle", "dmsp-20-300"), ("plant", "lift")):
+        for tab, name in (("muscle", "dmsp-20-300"), ("plant", "lift-dmsp-20")):
             page.get_by_role("tab", name=tab.title()).click()
             wait_for(page, tab, name)
             assert page.evaluate("document.documentElement.scrollWidth") <= width

@@ -17,20 +17,22 @@ from typer.testing import CliRunner
 import airmuscle as am
 from airmuscle.core import flatten, leaves, with_parameters
 from airmuscle.errors import FileError, ParameterError, PhysicsError, TraceError
-from airmuscle.files import list_laws, list_plants, to_toml
+from airmuscle.files import list_laws, load_scenario, to_toml
 from airmuscle.files.library import Location
 from airmuscle.files.library.build import build
 from airmuscle.files.scenario import build_scenario
 from airmuscle.outlets import export_page
 from airmuscle.outlets.cli import app
+from airmuscle.outlets.studio.app import library_list
 from airmuscle.outlets.studio.law_sheet import law_sheet
-from airmuscle.outlets.studio.tasks import plant_names, sheet_of_any, sheet_of_scenario_text
+from airmuscle.outlets.studio.tasks import sheet_of_any, sheet_of_scenario_text
 from airmuscle.outlets.studio.toml_template import fill_template
 from airmuscle.physics import Braid, PleatedTube, StraightFibre
 
 WITHOUT_CLOSED_FORM = ("festo-tool-dmsp-10", "festo-tool-dmsp-20", "festo-tool-dmsp-40", "saga2007-exact")
 pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
 LAWS = [name for name in list_laws() if name not in WITHOUT_CLOSED_FORM]
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 TOLERANCE = 1e-12
 EVALUATE = """
 console.log(JSON.stringify(DATA.map(([sheet, values, points]) => {
@@ -178,7 +180,7 @@ console.log(JSON.stringify([r.status, r.steps, r.columns]));
 """
 
 
-@pytest.mark.parametrize("name", ["lift", "joint-dmsp-20-proportional", pytest.param("joint-dmsp-20-matrix", marks=pytest.mark.slow)])  # fmt: skip
+@pytest.mark.parametrize("name", ["lift-dmsp-20", "joint-dmsp-20-proportional", pytest.param("joint-dmsp-20-matrix", marks=pytest.mark.slow)])  # fmt: skip
 def test_a_run_of_the_page_is_that_of_the_library(name, tmp_path):
     sheet = sheet_of_any(name)
     text = scripts("numbers") + sheet.pop("script") + scripts("plant-start", "plant-run") + RUN
@@ -200,13 +202,9 @@ def test_a_run_of_the_page_is_that_of_the_library(name, tmp_path):
 
 
 def scenario_of(name):
-    from airmuscle.files.library import plant_tables, read_toml
-    from airmuscle.outlets.studio.tasks import SCENARIOS
+    from airmuscle.files.library import plant_tables
 
-    if name in list_plants():
-        tables, location = plant_tables(name)
-    else:
-        tables, location = read_toml(SCENARIOS / f"{name}.toml"), Location(name, "", SCENARIOS)
+    tables, location = plant_tables(name)
     return build_scenario({key: tables[key] for key in ("title", "plant", "input", "run")}, location)
 
 
@@ -223,7 +221,7 @@ console.log(JSON.stringify([live.schedule, live.columns, again.columns]));
 
 def test_a_run_by_hand_is_the_run_of_its_schedule(tmp_path):
     """To the tolerance of the integrator: a run by hand meets every row with a step, the schedule interpolates."""
-    sheet = sheet_of_any("lift")
+    sheet = sheet_of_any("lift-dmsp-20")
     text = scripts("numbers") + sheet.pop("script") + scripts("plant-start", "plant-run") + BY_HAND
     schedule, live, again = run_script(text, sheet, tmp_path)
     assert [name for name in schedule if schedule[name]] == ["fill", "discharge"]
@@ -239,7 +237,7 @@ for (const [path, value] of Object.entries(DATA[1])) run.set(DATA[0].parameters.
 console.log(JSON.stringify([run.initial.settled, Array.from(run.initial.state), Array.from(run.values)]));
 """
 CHANGES = {
-    "lift": (
+    "lift-dmsp-20": (
         {"mechanism.mass": 17.0},
         {"muscle.contractile.geometry.radius": 0.012, "ambient.pressure": 9e4, "ambient.temperature": 310.0},
     ),
@@ -289,12 +287,48 @@ def test_a_scenario_of_a_user_is_read_with_its_parameters():
     np.testing.assert_array_equal(flatten(scenario.plant), values)
 
 
-def test_the_studio_offers_a_lift_and_the_plants_of_the_library():
-    assert plant_names() == ("lift", *list_plants())
+def test_every_plant_of_the_page_is_simulated_by_its_name():
+    offered = [row["name"] for row in library_list()["plants"]]
+    assert "lift-dmsp-20" in offered
+    assert [load_scenario(name).title for name in offered] == [row["title"] for row in library_list()["plants"]]
+
+
+CONTROLLED = """
+const run = new airmuscle.PlantRun(DATA[0]);
+for (const [path, value] of Object.entries(DATA[1])) run.set(DATA[0].parameters.find((row) => row.path === path), value);
+const r = run.controlled(DATA[0].duration, 0.005);
+console.log(JSON.stringify([r.status, r.columns]));
+"""
+
+
+@pytest.mark.parametrize("example", ["pressure_loop", "joint_cascade"])
+def test_an_own_scenario_runs_under_its_controller_also_with_other_parameters(example, tmp_path):
+    """With the drivers and sensors of the file, as the library computes it, to the tolerance of the integrator."""
+    given = (EXAMPLES / f"{example}.toml").read_text(encoding="utf-8")
+    given = given.replace('"1.5 1/bar"', '"1.6 1/bar"')  # 1.5 gives a pulse as long as the delay of the valve, to rounding
+    sheet = sheet_of_scenario_text(given)
+    script = scripts("numbers") + sheet.pop("script") + scripts("plant-start", "plant-run") + CONTROLLED
+    path = "mechanism.mass" if example == "pressure_loop" else "mechanism.inertia"
+    row = next(row for row in sheet["parameters"] if row["path"] == path)
+    for value in (row["value"], 1.4 * row["value"]):
+        status, columns = run_script(script, [sheet, {path: value}], tmp_path)
+        values = list(sheet["values"])
+        for place in row["places"]:
+            values[place] = value
+        written = fill_template(sheet["toml"]["plant"], values) + sheet["toml"]["input"] + "\n" + sheet["toml"]["run"]
+        recording = build_scenario(tomllib.loads(written), Location("page", "", Path())).simulate()
+        assert status == 0
+        _, own, other = np.intersect1d(np.round(columns["time"], 9), np.round(recording["time"], 9), return_indices=True)
+        np.testing.assert_allclose(columns["time"], 0.005 * np.arange(1 + round(sheet["duration"] / 0.005)), atol=1e-9)
+        assert own.size > 100
+        name = "pressure" if example == "pressure_loop" else "angle"
+        np.testing.assert_allclose(
+            np.array(columns[name])[own], recording[name][other], atol=1e-6 * np.ptp(recording[name])
+        )
 
 
 def test_a_saved_page_contains_everything(tmp_path):
-    file = export_page(["dmsp-20-300", "lift"], tmp_path / "page.html")
+    file = export_page(["dmsp-20-300", "lift-dmsp-20"], tmp_path / "page.html")
     page = file.read_text(encoding="utf-8")
     policy = re.search(r'Content-Security-Policy" content="([^"]*)"', page).group(1)
     assert "unsafe" not in policy

@@ -10,10 +10,11 @@ import json
 import threading
 from collections.abc import Callable, Mapping
 from importlib import metadata
+from pathlib import Path
 from typing import Any
 
 from ...core.errors import AirmuscleError
-from ...files.library.files import LAWS, list_laws, read_toml
+from ...files.library.files import LAWS, PLANTS, list_laws, list_plants, read_toml
 from .fit_routes import FitService
 from .fit_settings import FieldError
 from .joint_sheet import joint_names, sheet_of_joint
@@ -22,11 +23,9 @@ from .requests import BadRequest, decoded, json_answer, limited_body
 from .security import Access, Application, cookie_name, given_token, secured
 from .size_sheet import size_sheet
 from .tasks import (
-    plant_names,
-    plant_title,
     sheet_of_law,
     sheet_of_law_text,
-    sheet_of_offered_plant,
+    sheet_of_library_plant,
     sheet_of_scenario_text,
 )
 from .uploads import MAX_TEXT
@@ -90,14 +89,14 @@ class Sheets:
 
 def library_list() -> dict[str, Any]:
     """Names and titles of the laws and plants that the page offers."""
-    laws = [{"name": name, **_texts(read_toml(LAWS / f"{name}.toml"))} for name in list_laws()]
-    plants = [{"name": name, **plant_title(name)} for name in plant_names()]
-    joints = [{"name": name, **plant_title(name)} for name in joint_names()]
-    return {"version": metadata.version("airmuscle"), "laws": laws, "plants": plants, "joints": joints}
+    kinds = {"laws": (LAWS, list_laws()), "plants": (PLANTS, list_plants()), "joints": (PLANTS, joint_names())}
+    rows = {kind: [_row(folder, name) for name in names] for kind, (folder, names) in kinds.items()}
+    return {"version": metadata.version("airmuscle"), **rows}
 
 
-def _texts(tables: Mapping[str, Any]) -> dict[str, Any]:
-    return {"title": tables["title"], "provenance": tables["provenance"]}
+def _row(folder: Path, name: str) -> dict[str, str]:
+    tables = read_toml(folder / f"{name}.toml")
+    return {"name": name, "title": tables["title"], "provenance": tables.get("provenance", "chosen")}
 
 
 def create_app(
@@ -192,9 +191,9 @@ class Handlers:
     async def plant(self, request: Any) -> Any:
         """The sheet of a plant that the page offers."""
         name = request.path_params["name"]
-        if name not in plant_names():
+        if name not in list_plants():
             raise BadRequest(f"there is no plant '{name[:80]}'.", 404)
-        return await self._computed(self._sheets.of_library, sheet_of_offered_plant, name)
+        return await self._computed(self._sheets.of_library, sheet_of_library_plant, name)
 
     async def own_plant(self, request: Any) -> Any:
         """The sheet of a scenario of a user."""

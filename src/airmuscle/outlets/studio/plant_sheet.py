@@ -26,7 +26,7 @@ from .toml_template import toml_template
 NAMES = (
     "states", "inputs", "outputs", "run", "Solver", "prepare", "outputsOf", "SIZES",
 )  # fmt: skip
-"""What the page uses of a printed program."""
+"""What the page uses of a printed program; of one with a controller also the run of the loop."""
 MAX_DURATION = 1000.0
 """Longest run in the page [s] (chosen)."""
 MAX_PARAMETERS = 120
@@ -47,7 +47,7 @@ def sheet_of_tables(
             f"{location}: the run lasts {scenario.problem.duration:g} s; allowed range in the page: up to "
             f"{MAX_DURATION:g} s."
         )
-    program = make_run(scenario.problem, name="plant", title=scenario.title)
+    program = make_run(scenario.problem, name="plant", title=scenario.title, with_loop=True)
     module = am.outlets.JavaScript().run_files(program)["plant.mjs"]
     plant = scenario.plant
     sheet: dict[str, Any] = {
@@ -63,7 +63,8 @@ def sheet_of_tables(
         "temperature_index": [leaf.path for leaf in leaves(plant)].index("ambient.temperature"),
         "parameters": _parameter_rows(plant, sources),
         "inputs": _input_rows(plant),
-        "columns": _column_rows(program.columns, program.system.units),
+        "controlled": program.loop is not None,
+        "columns": _column_rows(program.system.columns, program.system.units),
         "muscles": [_muscle_row(plant, i) for i in range(len(plant.muscles))],
         "mechanism": _mechanism_row(plant),
         "references": [str(reference) for reference in cite(plant)],
@@ -71,7 +72,8 @@ def sheet_of_tables(
         "own_text": text,
     }
     sheet["id"] = hashlib.sha256((module + json.dumps(sheet)).encode()).hexdigest()[:32]
-    sheet["script"] = _script(sheet["id"], module)
+    names = (*NAMES, "simulate") if program.loop else NAMES
+    sheet["script"] = script_text(sheet["id"], _EXPORT.sub("", module), names)
     return sheet
 
 
@@ -80,11 +82,6 @@ def sheet_of_plant(tables: Mapping[str, Any], location: Location, name: str) -> 
     scenario = {key: tables[key] for key in TABLES if key in tables}
     sheet = sheet_of_tables(scenario, location, name, tables.get("sources", {}))
     return {**sheet, **{key: str(tables.get(key, "")) for key in ("provenance", "note", "warning")}}
-
-
-def _script(identifier: str, module: str) -> str:
-    text = _EXPORT.sub("", module)
-    return script_text(identifier, text, NAMES)
 
 
 def _parameter_rows(plant: am.Plant, sources: Mapping[str, str]) -> list[dict[str, Any]]:

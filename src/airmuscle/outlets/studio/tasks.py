@@ -7,7 +7,7 @@ from typing import Any
 
 from ...core.errors import ParameterError
 from ...files.library.entry_file import build_entry
-from ...files.library.files import PLANTS, is_path, list_plants, read_toml
+from ...files.library.files import is_path, list_plants, read_toml
 from ...files.library.law_file import describes_plant, describes_product, describes_valve, load_law
 from ...files.library.location import Location
 from ...files.library.plant_file import plant_tables
@@ -17,34 +17,17 @@ from .uploads import read_text_tables
 
 UPLOADED = Path("muscle.toml")
 """The name of a text of a user in messages."""
-SCENARIOS = Path(__file__).with_name("plants")
-"""Folder of the plants that belong to the studio."""
 
 
-def plant_names() -> tuple[str, ...]:
-    """Names of the plants that the page offers: those of the studio, then those of the library."""
-    return (*sorted(path.stem for path in SCENARIOS.glob("*.toml")), *list_plants())
-
-
-def plant_title(name: str) -> dict[str, str]:
-    """Title and provenance of a plant that the page offers."""
-    own = SCENARIOS / f"{name}.toml"
-    tables = read_toml(own if own.exists() else PLANTS / f"{name}.toml")
-    return {"title": tables["title"], "provenance": tables.get("provenance", "chosen")}
-
-
-def sheet_of_offered_plant(name: str) -> dict[str, Any]:
-    """The sheet of a plant that the page offers, by its complete name."""
-    if name in list_plants():
-        return sheet_of_plant(*plant_tables(name), name)
-    path = SCENARIOS / f"{name}.toml"
-    return sheet_of_plant(read_toml(path), Location(path.name, "", SCENARIOS), name)
+def sheet_of_library_plant(name: str) -> dict[str, Any]:
+    """The sheet of a plant of the library, by its complete name."""
+    return sheet_of_plant(*plant_tables(name), name)
 
 
 def warm_up() -> None:
     """Import what the sheets need, so that the first one is as fast as the next ones."""
     sheet_of_law("tondu-lopez")
-    sheet_of_offered_plant("lift")
+    sheet_of_library_plant("lift-dmsp-20")
 
 
 def sheet_of_scenario_text(text: str) -> dict[str, Any]:
@@ -57,8 +40,8 @@ def sheet_of_scenario_text(text: str) -> dict[str, Any]:
 
 def sheet_of_any(name: str) -> dict[str, Any]:
     """The sheet of a muscle, a law or a plant by its name, or of a muscle file or a scenario by its path."""
-    if name in plant_names():
-        return sheet_of_offered_plant(name)
+    if name in list_plants():
+        return sheet_of_library_plant(name)
     path = Path(name)
     tables = read_toml(path) if is_path(name) else {}
     if "plant" in tables:

@@ -65,6 +65,15 @@
       return { columns, status, steps: solver.steps, rejected: solver.rejected, time: solver.t, state: Array.from(solver.x) };
     }
 
+    /* The whole run under the controller of the scenario, with the columns of the plant. */
+    controlled(duration, rowTime) {
+      const times = Array.from({ length: Math.min(MOST_ROWS, 1 + Math.round(duration / rowTime)) }, (_, k) => this.start + k * rowTime);
+      const { columns, ...facts } = this.program.simulate({ parameters: Array.from(this.values), initial: Array.from(this.initial.state), times });
+      const rows = [];  /* the run has rows at further instants, such as those of pulses */
+      for (let i = 0; i < columns.time.length; i++) if (columns.time[i] > times[rows.length] - 1e-9) rows.push(i);
+      return { ...facts, columns: Object.fromEntries(this.names.map((name) => [name, rows.map((i) => columns[name][i])])) };
+    }
+
     /* A run that is driven by hand. */
     live() { return new LiveRun(this); }
 

@@ -3,7 +3,7 @@
 
 (() => {
   const { element, source, say, download, shortText, pythonFloat, PlantRun, oncePerFrame } = airmuscle;
-  const FIRST = "lift", SPEEDS = [0.05, 0.1, 0.25, 0.5, 1, 2, 5], WINDOW = 10, MOST_LIVE = 600;
+  const FIRST = "lift-dmsp-20", SPEEDS = [0.05, 0.1, 0.25, 0.5, 1, 2, 5], WINDOW = 10, MOST_LIVE = 600;
 
   class PlantTab {
     constructor(host, stateChanged) {
@@ -117,7 +117,7 @@
         show();
         return { slider, show, row: element("div.parameter", {}, element("div.bar", {}, element("span", {}, input.name), slider, output), element("div.row.small", {}, ...(low < 0 ? [low, 0, high] : [low, high]).map((v) => element("button", { type: "button", onclick: () => push(v) }, `${shortText(v / factor, 3)} ${unit}`)))) };
       });
-      this.inputs.replaceChildren(...this.sliders.map((s) => s.row), element("p.small.soft", {}, "Moving a slider starts a run by hand; what you do becomes the schedule of the scenario."));
+      this.inputs.replaceChildren(...this.sliders.map((s) => s.row), element("p.small.soft", {}, `Moving a slider starts a run by hand; what you do becomes the schedule of the scenario${this.sheet.controlled ? ", in place of its controller" : ""}.`));
     }
 
     setMode(mode) {
@@ -133,6 +133,8 @@
 
     changed() { if (this.mode === "schedule") this.rerun(); else this.live.jump = true; this.stateChanged(); }
 
+    get byController() { return this.sheet.controlled && !this.schedule; }
+
     segments() { return this.schedule ? this.run.segmentsOf(this.schedule, this.run.start + this.duration) : this.run.program.run.segments; }
 
     rowTime() { return Math.max(this.duration / 2000, 1e-4); }
@@ -140,9 +142,10 @@
     compute() {
       if (this.mode !== "schedule") return;
       const begin = performance.now();
-      this.result = this.run.scheduled(this.segments(), this.rowTime());
+      this.result = this.byController ? this.run.controlled(this.duration, this.rowTime()) : this.run.scheduled(this.segments(), this.rowTime());
       const taken = performance.now() - begin, { status, steps, time } = this.result;
       this.facts.textContent = `${shortText(this.duration)} s computed in ${shortText(taken, 2)} ms, ${steps} steps.`;
+      if (this.byController) this.facts.textContent += " The commands are those of the controller of the scenario.";
       if (!this.run.initial.settled) this.facts.textContent += " No equilibrium was found with these parameters: the run begins at the original state.";
       if (status) this.facts.textContent += ` The run ended at ${shortText(time)} s: ${status === 2 ? "the step became too small" : "a value is not finite"}; the parameters are not possible together.`;
       this.cursor = this.cursor > this.run.start && this.cursor <= this.run.start + this.duration ? this.cursor : this.run.start;
