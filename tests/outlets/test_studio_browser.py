@@ -171,7 +171,11 @@ def test_a_cold_page_shows_that_it_loads_and_obeys_the_first_click(browser, addr
     """The library arrives after the click; nothing takes the chosen tab back."""
     with browser.new_context() as context:
         page, held = context.new_page(), []
-        page.route("**/api/library*", lambda route: held.append(route))
+
+        def hold(route):
+            held.append(route)
+
+        page.route("**/api/library*", hold)
         page.goto(address)
         shown = page.locator("#panel-muscle").evaluate("(panel) => getComputedStyle(panel, '::before').content")
         assert shown == '"Loading …"'
