@@ -2,8 +2,9 @@
 
     python benchmarks/real_intervals.py FOLDER
 
-FOLDER is that of `real_data.py`. A surface is fitted to repeat 8 and to repeat 9 of each length; at points of the
-measured range, an interval of the difference has the half width sqrt(h8^2 + h9^2) of the two confidence bands.
+FOLDER is that of `real_data.py`. A surface is fitted to repeat 8 and to repeat 9 of each length, and each pooled law to
+all lengths of a repeat; at points of the measured range of each length, an interval of the difference has the half
+width sqrt(h8^2 + h9^2) of the two confidence bands.
 """
 
 from __future__ import annotations
@@ -28,29 +29,45 @@ def grid(runs: list[am.Recording]) -> am.Recording:
     return am.Recording({"pressure": pressure.ravel(), "contraction": contraction.ravel()}, "points")
 
 
+def compare_fits(fits: list[am.bench.Fit], points: am.Recording) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """At the points that pull: half widths of the first band and of the difference, and the differences [N]."""
+    bands = [am.bench.confidence_band(each, points) for each in fits]
+    widths = [(band.high - band.low) / 2 for band in bands]
+    pulls = bands[0].value > LEAST_FORCE
+    return widths[0][pulls], np.hypot(*widths)[pulls], (bands[0].value - bands[1].value)[pulls]
+
+
+def print_row(name: str, fits: list[am.bench.Fit], places: list[am.Recording]) -> np.ndarray:
+    """One row of the table; mask of the points whose interval holds the difference."""
+    width, half, difference = (np.concatenate(x) for x in zip(*(compare_fits(fits, p) for p in places), strict=True))
+    held = np.abs(difference) < half
+    numbers = f"{fits[0].rmse:>7.1f}{np.median(width):>12.1f}{rms(difference):>12.1f}{100 * np.mean(held):>7.0f}%"
+    print(f"{name:<67}{numbers}  {fits[0].error_basis}", flush=True)
+    return held
+
+
 def main() -> None:
-    """Print a row for each length and degree."""
+    """Print a row for each length and degree, and for each pooled law."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
-    first, second = repeats(parser.parse_args().folder)
-    inside = []
-    print(f"{'length':<8}{'degree':>7}{'rms':>7}{'half width':>12}{'difference':>12}{'held':>8}  standard errors")
-    for name in sorted({str(run.constants["specimen"]) for run in first}):
-        pair = [select_specimen(runs, name) for runs in (first, second)]
-        points = grid([*pair[0], *pair[1]])
+    repeated = repeats(parser.parse_args().folder)
+    print(f"{'law':<67}{'rms':>7}{'half width':>12}{'difference':>12}{'held':>8}  standard errors")
+    surfaces, pooled, places = [], [], []
+    for name in sorted({str(run.constants["specimen"]) for run in repeated[0]}):
+        pair = [select_specimen(runs, name) for runs in repeated]
+        constants = {n: pair[0][0].constants[n] for n in ("specimen", "resting_length")}
+        places.append(grid([*pair[0], *pair[1]]).with_constants(**constants))
         for degree in DEGREES:
             surface = am.characteristic.ContractileSurface.blank(degree, max_force=UNREACHED)
-            fits = [am.fit(surface, runs) for runs in pair]
-            bands = [am.bench.confidence_band(each, points) for each in fits]
-            half = np.hypot(*((band.high - band.low) / 2 for band in bands))
-            pulls = bands[0].value > LEAST_FORCE
-            difference = (bands[0].value - bands[1].value)[pulls]
-            held = np.abs(difference) < half[pulls]
-            inside.append(held)
-            width = np.median((bands[0].high - bands[0].low)[pulls]) / 2
-            numbers = f"{fits[0].rmse:>7.1f}{width:>12.1f}{rms(difference):>12.1f}{100 * np.mean(held):>7.0f}%"
-            print(f"{name:<8}{degree:>7}{numbers}  {fits[0].error_basis}", flush=True)
-    print(f"all points: {100 * np.mean(np.concatenate(inside)):.0f} %")
+            surfaces.append(
+                print_row(f"{name}, degree {degree}", [am.fit(surface, runs) for runs in pair], places[-1:])
+            )
+    print(f"all points: {100 * np.mean(np.concatenate(surfaces)):.0f} %")
+    for candidate in am.bench.standard_candidates(repeated[0]):
+        if isinstance(candidate.law, am.characteristic.PooledLengthLaw):
+            fits = [am.fit(candidate.law, runs) for runs in repeated]
+            pooled.append(print_row(candidate.name, fits, places))
+    print(f"all points: {100 * np.mean(np.concatenate(pooled)):.0f} %")
 
 
 if __name__ == "__main__":

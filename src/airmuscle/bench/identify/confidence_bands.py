@@ -11,7 +11,7 @@ from ...core.arrays import Array
 from ...core.errors import IdentificationError
 from ...recording import Recording
 from .parameter_covariance import student_quantile
-from .pooling import band_terms
+from .pooling import pooled_band
 from .problem import RESTING_LENGTH
 from .result import Fit
 
@@ -36,7 +36,7 @@ def confidence_band(fit: Fit, points: Recording, *, level: float = 0.95, predict
     several lengths.
 
     The band of a PooledLengthLaw is that of the specimen that `points` state (the constant `specimen`, or else the
-    resting length), or of a new muscle, with the scatter of the specimens, for independent rows.
+    resting length), or of a new muscle, with the scatter of the specimens and that of the runs.
     Raises IdentificationError without degrees of freedom, or for a level outside 0 to 1.
     """
     degrees_of_freedom = fit.degrees_of_freedom
@@ -58,7 +58,7 @@ def confidence_band(fit: Fit, points: Recording, *, level: float = 0.95, predict
         free = np.array([not estimate.on_bound for estimate in fit.estimates], dtype=bool)
         half = fit.parameter_covariance.half_widths(jacobian[:, free], level)
     else:
-        offset, variance = band_terms(fit, points, jacobian)
-        value, half = value + offset, quantile * np.sqrt(np.maximum(variance, 0.0))
+        offset, half = pooled_band(fit, points, jacobian, level)
+        value = value + offset
     half = np.hypot(half, prediction * quantile * fit.sigma)
     return Band(value, value - half, value + half)

@@ -183,7 +183,7 @@ def estimate_covariance(
         )
         if found.groups is not None and found.degrees_of_freedom >= MIN_DEGREES_OF_FREEDOM:
             return found
-    if not (runs.in_time or _is_correlated(residuals, runs.run)):
+    if not (runs.in_time or is_correlated(residuals, runs.run)):
         return independent
     parts = max(-(-(parameters + SPARE_GROUPS) // count), 2)
     while count * parts * MIN_GROUP_ROWS <= len(residuals):
@@ -254,6 +254,6 @@ def _degrees_of_freedom(leverages: Array, rows: Array) -> Array:
     return np.where(known > 0.0, np.maximum(trace**2 / np.where(known > 0.0, known, 1.0), 1.0), 1.0)
 
 
-def _is_correlated(residuals: Array, run: Indices) -> bool:
+def is_correlated(residuals: Array, run: Indices) -> bool:
     """Whether successive residuals of the runs are more alike than those of independent rows."""
     return bool(lag_one_autocorrelation(_split(residuals, run)) > SIGNIFICANCE / np.sqrt(residuals.size))

@@ -20,12 +20,14 @@ from .correlation_index import correlation_index
 from .cross_validation import specimen_name
 from .fit_points import FitPoints
 from .model_evidence import batch_sample_size
+from .parameter_covariance import Runs
+from .pooled_covariance import EffectRows, PooledCovariance, estimate_pooled_covariance
 from .problem import RESTING_LENGTH, SPECIMEN, FitProblem, evaluate, of_length
 from .result import Fit
 from .row_errors import WorstPoint, rms_of_rows, row_errors
 from .slack_rows import PULL_RATIO, Slackness
 from .solver import design_matrix
-from .specimen_effects import SpecimenEffects, Sums, predict_effects
+from .specimen_effects import SpecimenEffects, predict_effects
 
 Rows = npt.NDArray[np.bool_]
 DECAY_RANGE = 0.05
@@ -73,11 +75,13 @@ def _lengths(recordings: Sequence[Recording], names: Sequence[str]) -> dict[str,
 
 
 class PredictedEffects(NamedTuple):
-    """The effects of the specimens, the surface whose scaling they have, and their decay [1/N] below zero force."""
+    """The effects of the specimens, the surface whose scaling they have, their decay [1/N] below zero force, and the
+    ratio of the residual variance of a row to theirs."""
 
     effects: SpecimenEffects
     surface: ContractileSurface
     decay: float
+    ratio: float
 
 
 def _decayed(basis: Array, population: Array, decay: float) -> Array:
@@ -114,12 +118,13 @@ class Pooling:
         weights = np.where(used, problem.weights, 0.0)  # no sum changes with a row of zeros
         members = self.specimens.member, len(self.specimens.names)
         rest = problem.target - modelled
-        sums = Sums.of(weights[:, None] * matrix, weights[:, None] * basis, weights * rest, *members,
-                       int(np.count_nonzero(used)))  # fmt: skip
+        weighted = EffectRows(weights[:, None] * matrix, weights[:, None] * basis, weights * rest, *members)
+        sums = weighted.sums(number=int(np.count_nonzero(used)))
         effects = predict_effects(sums, self.specimens.names)
         left = (weights * (rest - np.sum(basis * effects.coefficients[members[0]], axis=1)))[used]
         effects = predict_effects(sums.scaled(batch_sample_size(left) / left.size), self.specimens.names)
-        predicted = PredictedEffects(effects, surface, decay)
+        ratio = (effects.sigma / effects.deviation) ** 2 * left.size / batch_sample_size(left)
+        predicted = PredictedEffects(effects, surface, decay, ratio)
         if not (problem.censoring > 0).any():
             return predicted
         measured = [
@@ -127,7 +132,6 @@ class Pooling:
             for own in (kept & (self.specimens.member == i) for i in range(members[1]))
         ]
         regions = [self._slack_region(i, predicted, values, kept) for i in range(members[1])]
-        ratio = (effects.sigma / effects.deviation) ** 2 * left.size / batch_sample_size(left)
         limited = [
             bounded_coefficients(own.joined(region), ratio, start)
             for own, region, start in zip(measured, regions, effects.coefficients, strict=True)
@@ -149,6 +153,19 @@ class Pooling:
         equal = np.full(count, np.sqrt(float(weights @ weights) / max(count, 1)))
         basis = _decayed(np.array(surface.basis(*region)).T, modelled, predicted.decay)
         return BoundedRows(basis, -modelled, np.ones(count), equal)
+
+    def covariance(self, values: Array, predicted: PredictedEffects, runs: Runs) -> PooledCovariance:
+        """The covariance of the errors of the population parameters (P,) and of the effects predicted for them."""
+        problem, (matrix, constant), effects = self.problem, self._design, predicted.effects
+        modelled = matrix @ values + constant
+        basis = _decayed(np.array(predicted.surface.basis(*problem.arguments)).T, modelled, predicted.decay)
+        used = problem.active_rows(modelled)
+        member, weights = self.specimens.member[used], problem.weights[used]
+        left = (problem.target - modelled)[used] - np.sum(basis[used] * effects.coefficients[member], axis=1)
+        matrix, basis, count = weights[:, None] * matrix[used], weights[:, None] * basis[used], len(effects.specimens)
+        rows = EffectRows(matrix, basis, weights * left, member, count)
+        scatter = effects.deviation, effects.degrees_of_freedom
+        return estimate_pooled_covariance(rows, runs.rows(used), predicted.ratio, *scatter)
 
     @property
     def _design(self) -> tuple[Array, Array]:
@@ -194,18 +211,19 @@ def pool(law: PooledLengthLaw, population: Fit, points: FitPoints) -> Fit:
     """
     pooling = make_pooling(law, points, population.problem)
     predicted = pooling.predict(population.values)
-    model, effects = _pooled(population.model, pooling.specimens, predicted), predicted.effects
+    covariance = pooling.covariance(population.values, predicted, points.runs)
+    effects = dataclasses.replace(predicted.effects, covariance=covariance)
+    model = _pooled(population.model, pooling.specimens, predicted)
     data = population.recording.with_columns(**{SPECIMEN: pooling.specimens.member.astype(float)})
     modelled = evaluate(model, "force", population.fitted_quantity.arguments, data)
     errors, measured = row_errors(population.problem, modelled), population.censoring == 0
-    deviations = np.sqrt(np.diag(effects.population_covariance))
-    estimates = zip(population.estimates, deviations.tolist(), strict=True)
+    estimates = zip(population.estimates, effects.population_errors.tolist(), strict=True)
     target = data["force"]
     return dataclasses.replace(
         population,
         model=model,
         estimates=tuple(dataclasses.replace(each, stderr=error) for each, error in estimates),
-        correlations=effects.population_covariance / np.outer(deviations, deviations),
+        correlations=effects.population_correlations,
         sigma=effects.sigma,
         rmse=rms_of_rows(errors, measured),
         max_error=WorstPoint.of(errors, data),
@@ -215,29 +233,30 @@ def pool(law: PooledLengthLaw, population: Fit, points: FitPoints) -> Fit:
     )
 
 
-def band_terms(fit: Fit, points: Recording, jacobian: Array) -> tuple[Array, Array]:
-    """The offset (N,) of the specimen that `points` state from the population, and the variance (N,) of the force.
+def pooled_band(fit: Fit, points: Recording, jacobian: Array, level: float) -> tuple[Array, Array]:
+    """The offset (N,) of the specimen that `points` state from the population, and the half width (N,) of the band of
+    the force.
 
     A specimen that the fit does not know has the mean of the prior, and the variance of the prior is added.
     """
     effects, model = fit.effects, fit.model
     assert effects is not None
+    assert effects.covariance is not None
     assert isinstance(model, PooledLengthLaw)
     surface: Any = model.effects[0]
     state = points["pressure"], points["contraction"]
     length = points.constants.get(RESTING_LENGTH)
     law = of_length(model.population, None if length is None else float(length))
     basis = np.array(surface.basis(*state)).T * np.asarray(model.effect_share(law.unclamped_force(*state)))[:, None]
-    name, size = specimen_name(points), basis.shape[1]
-    gradient = np.zeros((len(points), len(effects.covariance)))
-    gradient[:, : jacobian.shape[1]] = jacobian
-    offset, extra = np.zeros(len(points)), effects.deviation**2 * np.sum(basis**2, axis=1)
+    name, (count, size) = specimen_name(points), effects.coefficients.shape
+    gradient = np.hstack([jacobian, np.zeros((len(points), count * size))])
+    offset, scatter = np.zeros(len(points)), effects.deviation**2 * np.sum(basis**2, axis=1)
     if name in effects.specimens:
         index = effects.specimens.index(name)
         start = jacobian.shape[1] + index * size
         gradient[:, start : start + size] = basis
-        offset, extra = basis @ effects.coefficients[index], np.zeros(len(points))
-    return offset, np.einsum("ni,ij,nj->n", gradient, effects.covariance, gradient) + extra
+        offset, scatter = basis @ effects.coefficients[index], np.zeros(len(points))
+    return offset, effects.covariance.half_widths(gradient, level, scatter)
 
 
 def population_of(law: Any) -> Any:

@@ -155,10 +155,8 @@ class Fit(NotebookDisplay):
     @property
     def error_basis(self) -> str:
         """What the standard errors and bands were estimated from, and what they do not contain, as a phrase."""
-        if self.effects is not None:
-            return (
-                "from independent rows and the scatter of the specimens; the correlation within runs is not contained"
-            )
+        if self.effects is not None and self.effects.covariance is not None:
+            return self.effects.covariance.describe()
         bound = [estimate.name for estimate in self.estimates if estimate.on_bound]
         known = f"; {', '.join(bound)} on the bound counts as known" if bound else ""
         return self.parameter_covariance.describe() + known

@@ -10,12 +10,13 @@ residuals of the population law (Robinson, Statistical Science 6:15 (1991)).
 from __future__ import annotations
 
 import dataclasses
-from typing import NamedTuple
+import functools
 
 import numpy as np
-import numpy.typing as npt
 
-from ...core.arrays import Array, as_slice
+from ...core.arrays import Array
+from .parameter_covariance import NORMAL_QUANTILE
+from .pooled_covariance import PooledCovariance, Sums
 
 RATIO_RANGE = (-8.0, 10.0)
 """Decimal logarithms of the ratios of the residual variance to that of the effects that are searched (chosen)."""
@@ -25,7 +26,7 @@ _STEPS = (0.25, 0.01)
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SpecimenEffects:
-    """The effects of S specimens, with K coefficients each, and their standard errors; all SI."""
+    """The effects of S specimens, with K coefficients each; all SI."""
 
     specimens: tuple[str, ...]
     coefficients: Array
@@ -34,66 +35,35 @@ class SpecimenEffects:
     """Standard deviation of a coefficient between specimens."""
     sigma: float
     """Standard deviation of the residuals within the specimens."""
-    covariance: Array
-    """Covariance of the errors of the P population parameters and, after them, of the S K coefficients."""
     degrees_of_freedom: float
     """Effective number of parameters of the effects: the trace of their smoother, from 0 to S K (Hodges and Sargent,
     Biometrika 88:367 (2001))."""
+    covariance: PooledCovariance | None = None
+    """That of the errors of population parameters and coefficients; None where only the law was asked for."""
+
+    @functools.cached_property
+    def _all_errors(self) -> Array:
+        assert self.covariance is not None
+        return self.covariance.half_widths(np.eye(len(self.covariance.by_rows)), 0.95) / NORMAL_QUANTILE
 
     @property
     def standard_errors(self) -> Array:
-        """Standard errors of the predicted coefficients, shape (S, K)."""
-        size = self.coefficients.size
-        return np.asarray(np.sqrt(np.diag(self.covariance)[-size:]).reshape(self.coefficients.shape))
+        """Standard errors of the predicted coefficients, shape (S, K): 1.96 of them are half a 95 % interval."""
+        return self._all_errors[-self.coefficients.size :].reshape(self.coefficients.shape)
 
     @property
-    def population_covariance(self) -> Array:
-        """Covariance of the population parameters, with the scatter of the specimens, shape (P, P)."""
-        size = len(self.covariance) - self.coefficients.size
-        return self.covariance[:size, :size]
+    def population_errors(self) -> Array:
+        """The same of the population parameters, with the scatter of the specimens, shape (P,)."""
+        return self._all_errors[: -self.coefficients.size]
 
-
-class Sums(NamedTuple):
-    """Sums of products of the weighted rows: design matrix X (N, P) of the population, Z (N, S K) of the effects, and
-    residuals r (N,) of the population law."""
-
-    xx: Array
-    xz: Array
-    zz: Array
-    xr: Array
-    zr: Array
-    rr: float
-    rows: float
-
-    def scaled(self, share: float) -> Sums:
-        """The sums for rows that count only as this share of independent ones."""
-        xx, xz, zz, xr, zr = (share * each for each in (self.xx, self.xz, self.zz, self.xr, self.zr))
-        return Sums(xx, xz, zz, xr, zr, share * self.rr, share * self.rows)
-
-    @classmethod
-    def of(
-        cls,
-        matrix: Array,
-        basis: Array,
-        residuals: Array,
-        member: npt.NDArray[np.intp],
-        count: int,
-        rows: float | None = None,
-    ) -> Sums:
-        """The sums for a basis (N, K); the rows of each specimen, `member` (N,), have their own coefficients.
-
-        `rows` is the number of rows that count, by default all; the others are zero.
-        """
-        size = basis.shape[1]
-        xz, zz, zr = np.zeros((matrix.shape[1], count * size)), np.zeros((count * size,) * 2), np.zeros(count * size)
-        for i in range(count):
-            part, own = as_slice(np.flatnonzero(member == i)), slice(i * size, (i + 1) * size)
-            xz[:, own], zz[own, own] = matrix[part].T @ basis[part], basis[part].T @ basis[part]
-            zr[own] = basis[part].T @ residuals[part]
-        return cls(
-            matrix.T @ matrix, xz, zz, matrix.T @ residuals, zr, float(residuals @ residuals),
-            len(residuals) if rows is None else rows,
-        )  # fmt: skip
+    @property
+    def population_correlations(self) -> Array:
+        """Correlations of the errors of the population parameters, shape (P, P)."""
+        assert self.covariance is not None
+        size = len(self.population_errors)
+        covariance = self.covariance.matrix[:size, :size]
+        deviations = np.sqrt(np.diag(covariance))
+        return np.asarray(covariance / np.outer(deviations, deviations))
 
 
 def predict_effects(sums: Sums, specimens: tuple[str, ...]) -> SpecimenEffects:
@@ -108,15 +78,9 @@ def predict_effects(sums: Sums, specimens: tuple[str, ...]) -> SpecimenEffects:
     gradient, squares = sums.zr - sums.xz.T @ taken_up, sums.rr - float(sums.xr @ taken_up)
     ratio, sigma = _variance_ratio(within, gradient, squares, freedom)
     shrunk = np.linalg.inv(sums.zz + ratio * np.eye(size))
-    smoother = shrunk @ within
-    by_effects = np.vstack([projected, smoother - np.eye(size)])
-    by_residuals = np.zeros((len(sums.xx) + size,) * 2)
-    by_residuals[: len(sums.xx), : len(sums.xx)] = inverse
-    by_residuals[len(sums.xx) :, len(sums.xx) :] = smoother @ shrunk
-    covariance = sigma**2 * (by_residuals + by_effects @ by_effects.T / ratio)
     coefficients = (shrunk @ sums.zr).reshape(len(specimens), -1)
     deviation = sigma / float(np.sqrt(ratio))
-    return SpecimenEffects(specimens, coefficients, deviation, sigma, covariance, float(np.trace(smoother)))
+    return SpecimenEffects(specimens, coefficients, deviation, sigma, float(np.trace(shrunk @ within)))
 
 
 def _variance_ratio(within: Array, gradient: Array, squares: float, freedom: float) -> tuple[float, float]:
