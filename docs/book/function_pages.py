@@ -32,7 +32,7 @@ FACES = {
     "airmuscle.control.laws": "Control laws",
     "airmuscle.engine.loop": "Control loops",
     "airmuscle.engine.loop.inputs": "Input signals",
-    "airmuscle.engine.loop.trajectory": "Trajectories",
+    "airmuscle.engine.loop.sampled_signal": "Sampled signals and trajectories",
     "airmuscle.engine.run": "Simulation",
     "airmuscle.engine.run.batch": "Batch simulation",
     "airmuscle.control.estimation": "Estimators and predictive controllers",

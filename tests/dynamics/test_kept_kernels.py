@@ -21,11 +21,9 @@ from numba.core import ir
 from airmuscle.engine import DormandPrince8, Rodas4, Schedule, simulate
 from airmuscle.engine.compile import Function, compile_system
 from airmuscle.engine.compile.cache import kernel as kernels
-from airmuscle.engine.compile.cache import module
 from airmuscle.engine.compile.cache import store as kept
-from airmuscle.engine.compile.cache.inlining import shallow_scope_copies
 from airmuscle.engine.compile.cache.kernel import BoundKernel, Kernel
-from airmuscle.engine.compile.cache.object_code import build
+from airmuscle.engine.compile.cache.object_code import build, shallow_scope_copies
 from airmuscle.engine.compile.llvm.jit import object_code
 from airmuscle.errors import AirmuscleWarning
 
@@ -336,7 +334,7 @@ def squares() -> float:
 
 def test_the_machine_code_of_a_module_is_generated_once(empty, monkeypatch):
     texts = []
-    monkeypatch.setattr(module, "object_code", lambda text: texts.append(text) or object_code(text))
+    monkeypatch.setattr(kept, "object_code", lambda text: texts.append(text) or object_code(text))
     assert [squares(), squares()] == [10.0, 10.0]
     assert len(texts) == len(files(empty)) == 1
     (file,) = files(empty)

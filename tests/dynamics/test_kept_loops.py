@@ -12,7 +12,7 @@ from control_plants import LIFT, SPLIT, assert_identical
 from airmuscle.control import PID, OnOffController
 from airmuscle.engine import PWM, ControlLoop, Problem, RungeKutta4, SampledSignal, Schedule, SolenoidDriver, solve
 from airmuscle.engine.run import closed_loop
-from airmuscle.engine.run.kept_loops import MAX_FORMS, form_of
+from airmuscle.engine.run.closed_loop import form_of
 
 STEPS = Schedule({"pressure": ((0, 1e5), (0.5, 3e5), (0.703, 2e5))})
 SOLENOID = SolenoidDriver(2e-3, 1.5e-3, 1e-3, 1.2e-3)
@@ -91,10 +91,10 @@ def test_a_loop_whose_signals_may_change_is_not_kept():
 
 def test_few_forms_are_kept_with_a_plant():
     plant = dataclasses.replace(LIFT)
-    problems = [Problem(plant, ControlLoop(ON_OFF, 0.05, STEPS), 0.1 * i) for i in range(1, 3 + MAX_FORMS)]
+    problems = [Problem(plant, ControlLoop(ON_OFF, 0.05, STEPS), 0.1 * i) for i in range(1, 7)]
     for problem in problems:
         solve(problem)
-        assert len(problem.compiled.description.loop_runs) <= MAX_FORMS
+        assert 1 <= len(problem.compiled.description.cache.loops) <= 4
 
 
 class Emptied(list):
@@ -108,9 +108,8 @@ def test_what_another_thread_takes_first_is_made_anew():
     plant = dataclasses.replace(LIFT)
     loop, command = Problem(plant, ControlLoop(ON_OFF, 0.05, STEPS), 0.3), Problem(plant, Schedule({}), 0.3)
     alone = [solve(loop), solve(command)]
-    known = loop.compiled.description
-    known.loop_runs[form_of(loop)] = Emptied([None])
-    known.integrators[command.integrator] = Emptied([None])
-    known.recorders = Emptied([None])
+    cache = loop.compiled.description.cache
+    for pool in (cache.loops, cache.integrators, cache.recorders):
+        pool._idle = {key: Emptied(idle) for key, idle in pool._idle.items()}
     for problem, before in zip((loop, command), alone, strict=True):
         assert_identical(solve(problem), before, notes=True)

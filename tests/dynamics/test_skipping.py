@@ -19,9 +19,9 @@ from airmuscle.core import StateVariable, System, model, ops, parameter
 from airmuscle.engine import RungeKutta4, Schedule, simulate_batch
 from airmuscle.engine.compile import Program, compile_system
 from airmuscle.engine.compile.ir import emission
-from airmuscle.engine.compile.ir.branches import COMMANDED, STEADY, VARYING, skipping
 from airmuscle.engine.compile.ir.instructions import Code, Instruction, Operand, Operation
 from airmuscle.engine.compile.ir.scheduling import ConditionalBlock
+from airmuscle.engine.compile.ir.skipped_blocks import COMMANDED, STEADY, VARYING, skipping
 from airmuscle.physics import FillDischarge, Plant, Supply, ThreePositionValve, Valve
 
 BINARY = (
@@ -121,8 +121,8 @@ def computed(items: Any, leaves: dict[Operand, float]) -> tuple[Values, int]:
 @pytest.mark.parametrize("graphs", [GRAPHS // 20, pytest.param(GRAPHS, marks=pytest.mark.slow)])
 def test_random_code_gives_the_same_with_branches(monkeypatch: pytest.MonkeyPatch, graphs: int) -> None:
     """However little a branch saves; with part of the results early, as the rates of a stage are, or none."""
-    monkeypatch.setattr("airmuscle.engine.compile.ir.branches.WORTH", 1)
-    monkeypatch.setattr("airmuscle.engine.compile.ir.branches.WORTH_OF_CHOICES", 1)
+    monkeypatch.setattr("airmuscle.engine.compile.ir.skipped_blocks.WORTH", 1)
+    monkeypatch.setattr("airmuscle.engine.compile.ir.skipped_blocks.WORTH_OF_CHOICES", 1)
     rng, skipped = random.Random(1), 0
     for _ in range(graphs):
         code = drawn(rng)

@@ -24,7 +24,7 @@ from airmuscle.control import (
     WithFeedForward,
 )
 from airmuscle.engine import ColumnSensor, Measurement, SigmaDelta, SplitRange, WithSensors
-from airmuscle.engine.loop.random_numbers import drawn, drawn_normal, seeded
+from airmuscle.engine.loop.sensors import drawn, drawn_normal, seeded
 from airmuscle.errors import ParameterError
 
 H = 0.01

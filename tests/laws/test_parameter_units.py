@@ -6,7 +6,7 @@ import pytest
 
 from airmuscle.control import PID, Cascade, FrictionFeedForward, GainSchedule
 from airmuscle.engine import ColumnSensor, WithSensors
-from airmuscle.engine.loop.parameter_units import parameter_units
+from airmuscle.engine.loop.controller import parameter_units
 
 UNITS = {"position": "m", "pressure": "Pa", "speed": "rad/s", "fill": "1", "command": "N m", "force": "N"}
 INNER = PID("pressure", "fill", gain=1e-5, integral_time=1.0)

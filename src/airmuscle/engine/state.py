@@ -1,8 +1,8 @@
-"""State vector of a system from values by name, checked."""
+"""State vector of a system from values by name, checked; units of the columns of a run."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from ..core.arrays import Array
 from ..core.declaration import as_float
 from ..core.errors import ParameterError, suggestion
 from ..core.system import System
+from ..recording.columns import quantity_of
 
 
 def check_system(what: str, given: object) -> None:
@@ -58,3 +59,10 @@ def _check_names(names: list[str], state: Mapping[str, float]) -> None:
     raise ParameterError(
         f"the initial state lacks {', '.join(missing)}; use plant.state_at(pressure=...) or find_equilibrium."
     )
+
+
+def column_units(system: System, outputs: Sequence[str]) -> dict[str, str]:
+    """The unit of every state, input and output; empty where none is known."""
+    units = {name: getattr(quantity_of(name), "unit", "") for name in outputs}
+    units |= {i.name: i.unit for i in system.input_variables}
+    return {**units, **system.output_units, **{s.name: s.unit for s in system.states}}

@@ -15,8 +15,8 @@ from ...core.diagnostics import Status
 from ...core.errors import ParameterError, SolveError
 from ...core.reference import Reference
 from ...core.short_repr import ShortRepr
-from ...engine.compile.augmented_rates import augmented_rates
 from ...engine.compile.cache.kernel import Kernel
+from ...engine.compile.function import augmented_rates
 from ...engine.compile.program import compile_system
 from ...engine.loop.controller import Controller, Measurement
 from .design_checks import check_known, check_numbers, check_sample_time
@@ -33,7 +33,7 @@ QI2019 = Reference(
 )
 MAX_SEQUENCES = 1_000_000
 """Maximum number of sequences of modes (chosen)."""
-_choose = Kernel("choose_mode", "finite_control_set")
+_choose = Kernel("choose_mode", "best_mode_sequence")
 
 
 class FiniteSetMemory(NamedTuple):

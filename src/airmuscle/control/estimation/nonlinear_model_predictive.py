@@ -14,8 +14,7 @@ from ...core.errors import ParameterError
 from ...core.reference import Reference
 from ...core.short_repr import ShortRepr
 from ...engine.compile.program import compile_system
-from ...engine.loop.controller import Measurement
-from ...engine.loop.multivariable import MultivariableController, failure_notes
+from ...engine.loop.controller import Measurement, MultivariableController, failure_notes
 from ...physics.analysis.linear_model import linearise
 from ..laws.linear_model_predictive import RAWLINGS2017
 from .design_checks import check_known, check_numbers, check_sample_time

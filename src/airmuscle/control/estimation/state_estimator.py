@@ -16,8 +16,8 @@ from ...core.diagnostics import Status
 from ...core.errors import ParameterError, SolveError
 from ...core.short_repr import ShortRepr
 from ...core.system import System
-from ...engine.compile.augmented_rates import AugmentedRates, augmented_rates, states_and_outputs
 from ...engine.compile.cache.kernel import evaluate
+from ...engine.compile.function import AugmentedRates, augmented_rates, states_and_outputs
 from ...engine.compile.program import CompiledSystem, compile_system
 from ...engine.loop.control_loop import COMMAND
 from ...engine.state import check_system, state_vector

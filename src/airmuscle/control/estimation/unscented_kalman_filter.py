@@ -30,8 +30,8 @@ WAN_VAN_DER_MERWE2000 = Reference(
     doi="10.1109/ASSPCC.2000.882463",
     note="scaled sigma points with alpha, beta and kappa",
 )
-_predict = Kernel("predict_unscented", "unscented_kalman_filter")
-_correct = Kernel("correct_unscented", "unscented_kalman_filter")
+_predict = Kernel("predict_unscented", "kalman_filter")
+_correct = Kernel("correct_unscented", "kalman_filter")
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)

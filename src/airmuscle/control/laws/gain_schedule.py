@@ -13,10 +13,8 @@ from ...core.ops import Value
 from ...core.reference import Reference
 from ...core.system import united
 from ...core.tree import leaves, unflatten
-from ...engine.loop.control_law import ControlLaw
-from ...engine.loop.controller import Measurement
-from ...engine.loop.enclosing_law import EnclosingLaw
-from ...engine.loop.parameter_units import parameter_units
+from ...engine.loop.control_law import ControlLaw, EnclosingLaw
+from ...engine.loop.controller import Measurement, parameter_units
 
 RUGH_SHAMMA2000 = Reference(
     key="rugh-shamma-2000",

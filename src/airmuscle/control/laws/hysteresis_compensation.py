@@ -10,9 +10,8 @@ from ...core.errors import ParameterError, suggestion
 from ...core.ops import Value
 from ...core.reference import Reference
 from ...core.system import select_prefix, with_prefix
-from ...engine.loop.control_law import ControlLaw
+from ...engine.loop.control_law import ControlLaw, EnclosingLaw
 from ...engine.loop.controller import Measurement
-from ...engine.loop.enclosing_law import EnclosingLaw
 from ...physics.muscle.friction.prandtl_ishlinskii import KUHNEN2003
 from .hysteresis_operator import InverseHysteresisOperator
 

@@ -14,8 +14,7 @@ from ...core.arrays import Array
 from ...core.errors import AirmuscleError
 from ...core.reference import Reference
 from ...core.short_repr import ShortRepr
-from ...engine.loop.controller import Measurement
-from ...engine.loop.multivariable import MultivariableController, failure_notes
+from ...engine.loop.controller import Measurement, MultivariableController, failure_notes
 from .condensed_problem import CondensedProblem
 
 RAWLINGS2017 = Reference(

@@ -9,9 +9,8 @@ from ...core import ops
 from ...core.declaration import model, parameter
 from ...core.ops import Value
 from ...core.reference import Reference
+from ...engine.loop.control_law import Commanded, SisoController, commands, range_of
 from ...engine.loop.controller import Measurement
-from ...engine.loop.siso import SisoController
-from ...engine.loop.split_range import Commanded, commands, range_of
 from .pid import ASTROM_HAGGLUND1995
 
 

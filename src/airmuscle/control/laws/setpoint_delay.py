@@ -11,9 +11,8 @@ from ...core.errors import ParameterError
 from ...core.ops import Value
 from ...core.reference import Reference
 from ...core.system import select_prefix, with_prefix
-from ...engine.loop.control_law import ControlLaw
+from ...engine.loop.control_law import ControlLaw, EnclosingLaw
 from ...engine.loop.controller import Measurement
-from ...engine.loop.enclosing_law import EnclosingLaw
 from .pid import ASTROM_HAGGLUND1995
 
 MAX_SAMPLES = 1000

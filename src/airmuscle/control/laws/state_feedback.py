@@ -12,8 +12,7 @@ from ...core.ops import Value
 from ...core.reference import Reference
 from ...core.system import select_prefix, with_prefix
 from ...engine.loop.control_law import ControlLaw
-from ...engine.loop.controller import Measurement
-from ...engine.loop.multivariable import MultivariableController
+from ...engine.loop.controller import Measurement, MultivariableController
 
 FRANKLIN1998 = Reference(
     key="franklin-1998",

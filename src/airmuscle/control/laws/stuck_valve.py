@@ -10,9 +10,8 @@ from ...core.declaration import model, parameter
 from ...core.errors import ParameterError, suggestion
 from ...core.ops import Value
 from ...core.system import select_prefix, with_prefix
-from ...engine.loop.control_law import ControlLaw
+from ...engine.loop.control_law import ControlLaw, EnclosingLaw
 from ...engine.loop.controller import Measurement
-from ...engine.loop.enclosing_law import EnclosingLaw
 
 
 @model

@@ -23,11 +23,9 @@ from ...control.laws.with_feed_forward import WithFeedForward
 from ...core.annotation import check_field_types, one_line
 from ...core.errors import ParameterError
 from ...core.tree import leaves
-from ...engine.loop.control_law import ControlLaw
+from ...engine.loop.control_law import ControlLaw, SigmaDelta, SplitRange
 from ...engine.loop.controller import Controller
 from ...engine.loop.sensors import WithSensors
-from ...engine.loop.sigma_delta import SigmaDelta
-from ...engine.loop.split_range import SplitRange
 from .called_contender import COMMANDED, SensedController, sensed
 from .designed_controllers import AlongMotion, DeviationLaw, PredictiveDesign, QuadraticDesign, joint_design_model
 from .joints import SIDES, BenchmarkJoint

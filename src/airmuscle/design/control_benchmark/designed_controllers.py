@@ -18,10 +18,9 @@ from ...core.declaration import model, parameter
 from ...core.errors import ParameterError
 from ...core.ops import Value
 from ...core.reference import Reference
-from ...engine.loop.control_law import ControlLaw
+from ...engine.loop.control_law import ControlLaw, EnclosingLaw
+from ...engine.loop.control_loop import LawDesign
 from ...engine.loop.controller import Controller, Measurement
-from ...engine.loop.enclosing_law import EnclosingLaw
-from ...engine.loop.law_design import LawDesign
 from ...physics.analysis.linear_model import LinearModel
 from .joints import ENCODER_STEP, BenchmarkJoint
 from .motion_dynamics import angular_acceleration

@@ -10,7 +10,7 @@ import numpy as np
 from ...control.laws.antagonistic_inverse import AntagonisticInverse
 from ...core.arrays import Array
 from ...core.errors import ParameterError, suggestion
-from ...engine.loop.inputs import SampledSignal
+from ...engine.loop import SampledSignal
 from ...physics.plant.plant import Plant
 from .joints import BenchmarkJoint
 from .motion_dynamics import inverse_dynamics

@@ -13,8 +13,7 @@ from ...core.arrays import Array
 from ...core.errors import AirmuscleError
 from ...core.tree import flatten, leaves, structure
 from ...engine.loop.control_law import ControlLaw
-from ...engine.loop.control_loop import COMMAND, SETPOINT, ControlLoop
-from ...engine.loop.law_design import with_designed_laws
+from ...engine.loop.control_loop import COMMAND, SETPOINT, ControlLoop, with_designed_laws
 from ...engine.run.batch import BatchSolution, simulate_batch
 from ...engine.run.batch.loops import CONTROLLER
 from ...engine.run.batch.thread_pool import hidden_progress

@@ -16,7 +16,7 @@ from ...core.short_repr import ShortRepr
 from ...core.tree import Leaf, leaves
 from ...core.units import conversion, quantity
 from ...engine.loop.control_loop import ControlLoop
-from ...engine.loop.parameter_units import parameter_units
+from ...engine.loop.controller import parameter_units
 from ...files.library.files import is_path, list_plants, read_toml
 from ...files.library.law_file import load_law
 from ...files.library.location import Location, located_errors

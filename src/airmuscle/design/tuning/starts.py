@@ -11,9 +11,9 @@ import numpy as np
 from ...control.laws.pid import PID
 from ...core.arrays import Array
 from ...core.errors import AirmuscleError, ParameterError
+from ...engine.loop.control_law import inputs_of, range_of
+from ...engine.loop.driver import WithDrivers
 from ...engine.loop.inputs import Schedule
-from ...engine.loop.split_range import inputs_of, range_of
-from ...engine.loop.with_drivers import WithDrivers
 from ...engine.run import simulate
 from ...engine.run.integrators import Integrator
 from .case import LoopCase

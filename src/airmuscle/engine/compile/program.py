@@ -18,10 +18,11 @@ from ...core.arrays import Array
 from ...core.system import SensitivitySystem, System
 from . import functions, sensitivities, sensitivities_explicit
 from .cache.kernel import address_of
-from .cache.module import load_module
+from .cache.store import load_module
 from .functions import ArraySizes, TracedSystem
 from .functions_simd import lanes_module, row_outputs, rows_at_once
 from .llvm.types import LlvmType
+from .run_cache import RunCache
 
 Tableau = tuple[tuple[tuple[float, ...], ...], tuple[float, ...]]
 """Rows of an explicit Runge-Kutta tableau below its first, and its weights."""
@@ -140,23 +141,7 @@ class Description:
         self.positive_outputs = np.array([i for i, n in enumerate(self.output_names) if n in positive], dtype=np.intp)
         self.constants = dict(system.constants)
         self.remarks = system.describe()
-        self.default_state: Array | None = None
-        """The default initial state, once it has been found."""
-        self.checked_state: list[float] | None = None
-        """The last initial state that was checked and found possible."""
-        self.checked_input: tuple[Any, Any, Any] = None, None, None
-        """The last segments of inputs that were found within their ranges, what output times a run with them asked for,
-        and these times, if nobody can write to the arrays."""
-        self.integrators: dict[Any, list[Any]] = {}
-        """Integrators bound to this system that no run uses at present, by their integrator."""
-        self.holders: dict[Any, list[Any]] = {}
-        """The same for steps with held inputs."""
-        self.loop_runs: dict[Any, list[Any]] = {}
-        """Runs of control loops at this system that nothing uses at present, by the form of the loop."""
-        self.cited: dict[Any, tuple[Any, ...]] = {}
-        """Sources of the models and of an integrator, by the integrator."""
-        self.recorders: list[Any] = []
-        """Kernels of the rows bound to this system that no run uses at present."""
+        self.cache = RunCache()
         self._name_columns()
         self._name_ranges(system)
 

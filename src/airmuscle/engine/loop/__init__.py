@@ -1,18 +1,13 @@
 """Sampled loops: input signals in time, drivers between command and valve, interface of controllers, sensors."""
 
-from .control_law import ControlLaw
-from .control_loop import ControlLoop, ControlLoopState
+from .control_law import ControlLaw, SigmaDelta, SisoController, SplitRange
+from .control_loop import ControlLoop, ControlLoopState, LawDesign, designed_loop, with_designed_laws
 from .controller import Controller, Measurement, relative_unit
-from .driver import PWM, Driver, PwmState, SolenoidDriver
-from .inputs import ZERO_INPUT, InputSignal, Periodic, SampledSignal, Schedule
-from .law_design import LawDesign, designed_loop, with_designed_laws
+from .driver import PWM, Driver, PwmState, SolenoidDriver, WithDrivers
+from .inputs import ZERO_INPUT, InputSignal, Periodic, Schedule
 from .piecewise_linear import PiecewiseLinear, merge_columns
+from .sampled_signal import SampledSignal, Trajectory, spline_trajectory
 from .sensors import ColumnSensor, WithSensors
-from .sigma_delta import SigmaDelta
-from .siso import SisoController
-from .split_range import SplitRange
-from .trajectory import Trajectory, spline_trajectory
-from .with_drivers import WithDrivers
 
 __all__ = [
     "PWM",

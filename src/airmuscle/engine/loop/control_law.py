@@ -1,11 +1,21 @@
-"""ControlLaw: a controller that is written over `ops`, so that a whole loop runs as compiled code."""
+"""Control laws (interfaces): controllers written over `ops`, so that a whole loop runs as compiled code.
+
+Laws around other laws, laws of one column by one input or by two in split range, and sigma-delta modulation.
+"""
 
 from __future__ import annotations
 
 import abc
+import dataclasses
 from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from ...core import ops
+from ...core.declaration import model, parameter
+from ...core.errors import ParameterError
 from ...core.ops import Value
+from ...core.reference import Reference
+from ...core.system import select_prefix, with_prefix
 from .controller import Controller, Measurement
 
 
@@ -30,3 +40,147 @@ class ControlLaw(Controller):
         self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
     ) -> tuple[Mapping[str, Value], Mapping[str, Value]]:
         """The command of every input until the next sample, `dt` [s] later, and the memory for that sample."""
+
+
+class EnclosingLaw(ControlLaw):
+    """A control law that changes the measurements, the commands or the numbers of another one, its `law`."""
+
+    simulated: ClassVar[bool] = False
+    """Whether it simulates sensors or a fault of the plant, and is no part of a controller of a real plant."""
+
+    if TYPE_CHECKING:  # a field of a model, or designed
+
+        @property
+        def law(self) -> ControlLaw:
+            """The law inside."""
+
+    @property
+    def measured_columns(self) -> tuple[str, ...]:
+        return self.law.measured_columns
+
+    @property
+    def setpoints(self) -> tuple[str, ...]:
+        return self.law.setpoints
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        return self.law.inputs
+
+    @property
+    def initial_memory(self) -> Mapping[str, float]:
+        """That of the law, unless the enclosing law stores further values."""
+        return self.law.initial_memory
+
+
+def without_simulated(law: Any) -> Any:
+    """A control law without the simulated sensors and faults of the plant, at any depth: that of a real plant."""
+    if isinstance(law, EnclosingLaw) and law.simulated:
+        return without_simulated(law.law)
+    if isinstance(law, tuple):
+        return tuple(without_simulated(item) for item in law)
+    if not isinstance(law, ControlLaw) or not dataclasses.is_dataclass(law):
+        return law
+    given = {field.name: getattr(law, field.name) for field in dataclasses.fields(law) if field.init}
+    changed = {name: value for name, old in given.items() if (value := without_simulated(old)) != old}
+    return dataclasses.replace(law, **changed) if changed else law
+
+
+@model
+class SplitRange:
+    """Split range: a positive output u goes to one input, -u of a negative one to another, such as a fill and a
+    discharge valve; the other input is zero. u is between minus the maximum of the one and the maximum of the other."""
+
+    positive: str
+    negative: str
+
+    def check(self) -> None:
+        if self.positive == self.negative:
+            raise ParameterError(f"SplitRange: both inputs are '{self.positive}'; name two inputs.")
+
+
+Commanded = str | SplitRange
+
+
+def inputs_of(commanded: Commanded) -> tuple[str, ...]:
+    """The commanded inputs."""
+    return (commanded,) if isinstance(commanded, str) else (commanded.positive, commanded.negative)
+
+
+def range_of(commanded: Commanded, ranges: Mapping[str, tuple[Value, Value]]) -> tuple[Value, Value]:
+    """The range of a controller output, from those of the inputs."""
+    if isinstance(commanded, str):
+        return ranges[commanded]
+    return -ranges[commanded.negative][1], ranges[commanded.positive][1]
+
+
+def commands(commanded: Commanded, output: Value) -> dict[str, Value]:
+    """The values of the inputs for a controller output."""
+    if isinstance(commanded, str):
+        return {commanded: output}
+    return {commanded.positive: ops.maximum(output, 0.0), commanded.negative: ops.maximum(-output, 0.0)}
+
+
+class SisoController(ControlLaw):
+    """A control law that compares one column, `measured`, with its set point; `commanded` is the manipulated input."""
+
+    measured: str
+    commanded: Commanded
+
+    @property
+    def measured_columns(self) -> tuple[str, ...]:
+        return (self.measured,)
+
+    @property
+    def setpoints(self) -> tuple[str, ...]:
+        return (self.measured,)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        return inputs_of(self.commanded)
+
+
+INOSE1962 = Reference(
+    key="inose-1962",
+    authors="Inose, H., Yasuda, Y., Murakami, J.",
+    title="A telemetering system by code modulation - Δ-Σ modulation",
+    where="IRE Transactions on Space Electronics and Telemetry SET-8(3):204-209",
+    year=1962,
+    doi="10.1109/IRET-SET.1962.5008839",
+    note="first-order modulator",
+)
+
+
+@model
+class SigmaDelta(EnclosingLaw):
+    """v_k = s_(k-1) + u_k,   position_k = 1 where v_k >= 1/2, else 0,   s_k = v_k - position_k.
+
+    u command of the inner law for an input, 0 to 1, s sum of what has not been applied, by which the mean of the
+    positions follows u: the sums of both differ by at most 1/2 at any time. Unlike PWM it has no period; for small u
+    the valve opens seldom. A valve with a dead time needs a sample time that is longer than it. Commands below u_min
+    count as 0, which stops single openings at rest.
+    Reference: Inose, Yasuda and Murakami (1962).
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (INOSE1962,)
+
+    law: ControlLaw
+    minimum: float = parameter("1", "u_min", "command below which a valve is closed", bounds=(0.0, 1.0), default=0.0)
+
+    @property
+    def initial_memory(self) -> dict[str, float]:
+        """The sum of each input, `sum.fill`, and the values of the law."""
+        sums = dict.fromkeys(self.inputs, 0.0)
+        return {**with_prefix("sum.", sums), **with_prefix("law.", self.law.initial_memory)}
+
+    def step(
+        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
+    ) -> tuple[dict[str, Value], dict[str, Value]]:
+        wanted, law = self.law.step(select_prefix("law.", memory), measurement, dt)
+        positions: dict[str, Value] = {}
+        sums: dict[str, Value] = {}
+        for name, before in select_prefix("sum.", memory).items():
+            command = ops.clip(wanted[name], 0.0, 1.0)
+            total = before + ops.where(command >= self.minimum, command, 0.0)
+            positions[name] = ops.where(total >= 0.5, 1.0, 0.0)
+            sums[name] = total - positions[name]
+        return positions, {**with_prefix("sum.", sums), **with_prefix("law.", law)}

@@ -1,7 +1,11 @@
-"""ControlLoop: a sampled controller at a plant, with its sample time, set points, other inputs and drivers."""
+"""ControlLoop: a sampled controller at a plant, with its sample time, set points, other inputs and drivers.
+
+A control law that is designed from weights (LawDesign) is designed before the loop runs.
+"""
 
 from __future__ import annotations
 
+import abc
 import dataclasses
 import functools
 import math
@@ -13,14 +17,16 @@ import numpy as np
 
 from ...core.annotation import abridged
 from ...core.errors import ParameterError, suggestion
+from ...core.ops import Value
 from ...core.short_repr import ShortRepr
+from ...core.system import System
+from ...core.tree import Structure, structure, with_ambient
 from ...recording.recording import Recording
-from .controller import Controller
-from .driver import Driver
+from .control_law import ControlLaw, EnclosingLaw
+from .controller import Controller, Measurement, named_signal_units
+from .driver import Driver, WithDrivers
 from .inputs import ZERO_INPUT, InputSignal, Schedule, check_input_names, check_input_signal
-from .parameter_units import named_signal_units
 from .piecewise_linear import PiecewiseLinear, merge_columns
-from .with_drivers import WithDrivers
 
 COMMAND, SETPOINT, MEASURED = "command.", "setpoint.", "measured."
 """Prefixes of the columns of a recording that hold commands, set points and measurements of a controller."""
@@ -209,3 +215,63 @@ def _describe_controller(controller: Controller) -> str:
     values = [(name, getattr(controller, name)) for name in names]
     texts = [f"{name}={value:.12g}" if isinstance(value, float) else f"{name}={value!r}" for name, value in values]
     return f"{type(controller).__name__}({', '.join(texts)})"
+
+
+_without_design: set[Structure] = set()
+"""Structures of control laws that contain no design."""
+
+
+class LawDesign(EnclosingLaw):
+    """A control law whose numbers follow from declared weights by a design, such as Riccati equations.
+
+    A design cannot be traced; its result can. A run therefore compiles the designed `law`, and a search for the weights
+    designs it anew for each set. Everything else is that of the designed law.
+    """
+
+    @property
+    @abc.abstractmethod
+    def law(self) -> ControlLaw:
+        """The designed law."""
+
+    def step(
+        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
+    ) -> tuple[Mapping[str, Value], Mapping[str, Value]]:
+        return self.law.step(memory, measurement, dt)
+
+
+def with_designed_laws(law: Controller) -> Controller:
+    """A controller with the designed law in place of every LawDesign in it; the same object where there is none.
+
+    A controller that is no ControlLaw remains as it is.
+    """
+    if not isinstance(law, ControlLaw) or structure(law) in _without_design:
+        return law
+    designed: Controller = _designed(law)
+    if designed is law:
+        _without_design.add(structure(law))
+    return designed
+
+
+def _designed(part: Any) -> Any:
+    if isinstance(part, LawDesign):
+        return _designed(part.law)
+    if isinstance(part, tuple):
+        items = tuple(_designed(item) for item in part)
+        return part if all(a is b for a, b in zip(items, part, strict=True)) else items
+    if not isinstance(part, Controller) or not dataclasses.is_dataclass(part):
+        return part
+    fields = {field.name: getattr(part, field.name) for field in dataclasses.fields(part) if field.init}
+    designed_fields = {name: _designed(value) for name, value in fields.items()}
+    changed = {name: value for name, value in designed_fields.items() if value is not fields[name]}
+    return dataclasses.replace(part, **changed) if changed else part
+
+
+def designed_loop(loop: ControlLoop, system: System) -> ControlLoop:
+    """A loop with the designed laws in its controller; the same object where there is no design.
+
+    Pressures that the controller states as absolute are converted with the ambient pressure of the system.
+    """
+    controller, ambient = with_designed_laws(loop.controller), system.constants.get("ambient")
+    if isinstance(controller, ControlLaw) and isinstance(ambient, float):
+        controller = with_ambient(controller, ambient)
+    return loop if controller is loop.controller else dataclasses.replace(loop, controller=controller)

@@ -6,17 +6,14 @@ import abc
 import bisect
 import dataclasses
 import itertools
-import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
 
 from ...core.annotation import abridged, one_line
 from ...core.declaration import as_float
-from ...core.errors import AirmuscleWarning, ParameterError, suggestion
-from ...recording.recording import Recording
-from .approximation import approximate
+from ...core.errors import ParameterError, suggestion
 from .piecewise_linear import PiecewiseLinear
 
 MAX_INSTANTS = 10_000_000
@@ -68,12 +65,14 @@ def check_input_names(given: Iterable[str], inputs: Sequence[str], prefix: str =
             raise ParameterError(f"{prefix} '{name}'; there are {known}.{suggestion(name, inputs)}")
 
 
-def _check_mapping(kind: str, given: object, example: str = "((5, 1), (15, 0))") -> None:
+def check_mapping(kind: str, given: object, example: str = "((5, 1), (15, 0))") -> None:
+    """Raise ParameterError for anything that does not name inputs."""
     if not isinstance(given, Mapping):
         raise ParameterError(f"a {kind} is {abridged(given)}; name the inputs: {{'fill': {example}}}.")
 
 
-def _pairs(kind: str, name: str, given: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+def as_pairs(kind: str, name: str, given: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Pairs of time and value as numbers. Raises ParameterError for anything else."""
     try:
         return [(as_float("a time", time), as_float("a value", value)) for time, value in given]
     except (TypeError, ValueError, ParameterError):
@@ -82,7 +81,7 @@ def _pairs(kind: str, name: str, given: Sequence[tuple[float, float]]) -> list[t
         ) from None
 
 
-def _check_points(kind: str, noun: str, name: str, points: Sequence[tuple[float, float]]) -> None:
+def check_points(kind: str, noun: str, name: str, points: Sequence[tuple[float, float]]) -> None:
     """Raise ParameterError unless all numbers are finite and times rise."""
     if points and not np.isfinite(points).all():
         raise ParameterError(f"the {kind} of '{name}' holds a number that is not finite: {one_line(points)}.")
@@ -106,11 +105,11 @@ class Schedule(InputSignal):
     changes: Mapping[str, Sequence[tuple[float, float]]]
 
     def __post_init__(self) -> None:
-        _check_mapping("schedule", self.changes)
+        check_mapping("schedule", self.changes)
         changes = {}
         for name, given in self.changes.items():
-            pairs = _pairs("schedule", name, given)
-            _check_points("schedule", "instants", name, pairs)
+            pairs = as_pairs("schedule", name, given)
+            check_points("schedule", "instants", name, pairs)
             changes[name] = [t for t, _ in pairs], [0.0, *(v for _, v in pairs)]
         object.__setattr__(self, "_changes", changes)
         object.__setattr__(self, "_last", ((), 0.0, 0.0, None))
@@ -138,87 +137,6 @@ class Schedule(InputSignal):
                 times, levels = changes[name]
                 values[:, i] = [levels[bisect.bisect_right(times, t)] for t in starts]
         return PiecewiseLinear(np.array([*starts[1:], end]), values, np.zeros(values.shape))
-
-
-@dataclasses.dataclass(frozen=True)
-class SampledSignal(InputSignal):
-    """Piecewise linear inputs, each a sequence of (time [s], value); constant before the first and after the last."""
-
-    from_file: ClassVar[bool] = True
-
-    points: Mapping[str, Sequence[tuple[float, float]]]
-
-    def __post_init__(self) -> None:
-        _check_mapping("sampled signal", self.points)
-        for name, given in self.points.items():
-            points = _pairs("sampled signal", name, given)
-            if not points:
-                raise ParameterError(
-                    f"the sampled signal of '{name}' has no points; write pairs of time [s] and value."
-                )
-            _check_points("sampled signal", "times", name, points)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return tuple(self.points)
-
-    @classmethod
-    def recorded(cls, recording: Recording, columns: Mapping[str, str]) -> SampledSignal:
-        """Columns of a recording as inputs: for each input the column that it follows, in SI.
-
-        `SampledSignal.recorded(read_csv("bench.csv"), {"fill": "fill"})`
-        """
-        if not isinstance(recording, Recording):
-            raise ParameterError(
-                f"SampledSignal.recorded: {one_line(recording)} is no Recording; give what read_csv or read returns."
-            )
-        _check_mapping("recorded signal", columns, "'column'")
-        times = recording["time"].tolist()
-        return cls({name: tuple(zip(times, recording[c].tolist(), strict=True)) for name, c in columns.items()})
-
-    @classmethod
-    def sampled(
-        cls, functions: Mapping[str, Callable[[float], float]], *, duration: float, start: float = 0.0,
-        error: float = 1e-4,
-    ) -> SampledSignal:  # fmt: skip
-        """Functions of time [s], approximated to within `error` by straight lines that are bisected until they are.
-
-        Each line is compared with its function at a quarter, a half and three quarters of it, and none is longer than
-        1/64 of the duration (chosen); what a function does between these points is not seen. Raises ParameterError for
-        a function that 100 000 points do not approximate, for one that jumps (give it as a Schedule), and for one that
-        does not return a finite number.
-        """
-        _check_mapping("sampled signal", functions, "lambda t: 0.5")
-        duration = as_float("SampledSignal.sampled: duration", duration)
-        start = as_float("SampledSignal.sampled: start", start)
-        error = as_float("SampledSignal.sampled: error", error)
-        return cls({name: approximate(name, f, start, start + duration, error) for name, f in functions.items()})
-
-    def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
-        check_input_names(list(self.points), inputs)
-        end = start + duration
-        corners = {float(time) for points in self.points.values() for time, _ in points if start < time < end}
-        ends = np.array([*sorted(corners), end])
-        edges = np.concatenate([[start], ends])
-        values = np.zeros((edges.size, len(inputs)))
-        for i, name in enumerate(inputs):
-            if name in self.points:
-                times, levels = np.array(self.points[name], dtype=float).T
-                values[:, i] = np.interp(edges, times, levels)
-        return PiecewiseLinear(ends, values[:-1], np.diff(values, axis=0) / np.diff(edges)[:, None])
-
-    def checked_segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
-        """As of any signal; an AirmuscleWarning for an input that varies after the end of the run only."""
-        for name, points in self.points.items():
-            first, end = points[0][0], start + duration
-            if first > end and any(value != points[0][1] for _, value in points):
-                warnings.warn(
-                    f"the points of the input '{name}' begin at {first:.6g} s, after the end of the run at {end:.6g} "
-                    "s: its first value is held. If its times have another zero, subtract it, or set start_time.",
-                    AirmuscleWarning,
-                    stacklevel=7,
-                )
-        return super().checked_segments(inputs, start, duration)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -4,8 +4,13 @@ from .bound_integrator import BoundIntegrator
 from .compiled_law import LawSample
 from .integrators import DormandPrince8, ExplicitRungeKutta, Integrator, Rodas4, RungeKutta4
 from .jax_loop import loop_in_jax
-from .law_with_sensitivities import LawWithSensitivities
-from .loop_sensitivities import LoopWithSensitivities, TrackingSensitivity, differentiate_loop, tracking_sensitivity
+from .loop_sensitivities import (
+    LawWithSensitivities,
+    LoopWithSensitivities,
+    TrackingSensitivity,
+    differentiate_loop,
+    tracking_sensitivity,
+)
 from .problem import Problem
 from .run import advance, simulate, solve
 from .sampled_loop import prepare_loop

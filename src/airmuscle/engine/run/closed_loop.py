@@ -1,17 +1,28 @@
-"""Simulation of a control loop: from one sampling instant to the next, each met exactly."""
+"""Simulation of a control loop: from one sampling instant to the next, each met exactly.
+
+Runs of compiled loops are kept with the system for the next loop of the same form. Loops have the same form if they
+differ in the parameters of the control law alone: the sampling instants, the set points and the segments of the other
+inputs are then the same, and so is the kernel with its arrays.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Hashable
+from typing import Any
+
 import numpy as np
 
+from ...core import tree
 from ...core.arrays import Array
 from ...core.diagnostics import Diagnostic, DiagnosticCode, Status
+from ..loop.control_law import ControlLaw
 from ..loop.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop, ControlLoopState
+from ..loop.inputs import Schedule
 from ..loop.piecewise_linear import PiecewiseLinear
-from ..state_units import column_units
+from ..state import column_units
 from .bound_integrator import RawSolution
+from .compiled_law import parameters_of
 from .compiled_loop import CompiledLoop, CompiledRun
-from .kept_loops import form_of, keep_run, kept_run
 from .problem import Problem
 from .rows import make_recording, recorded_rows, truncate_at_invalid_row
 from .sampled_loop import SampledLoop, prepare_loop
@@ -88,3 +99,44 @@ def _controller_columns(run: CompiledRun, times: Array) -> dict[str, Array]:
     ):  # fmt: skip
         columns |= {f"{prefix}{name}": column for name, column in zip(names, values.T, strict=True)}
     return columns
+
+
+MAX_KEPT_ROWS = 100_000
+"""Rows up to which a run is kept (chosen)."""
+
+
+def form_of(problem: Problem) -> Hashable | None:
+    """The form of a problem's loop; None where a part of it may change, or where the run continues another one."""
+    loop = problem.input
+    assert isinstance(loop, ControlLoop)
+    law, given = loop.controller, problem.output_times
+    signals = type(loop.setpoint) is Schedule and type(loop.other_inputs) is Schedule
+    if not signals or problem.control_state is not None or not isinstance(law, ControlLaw):
+        return None
+    if not (given is None or type(given) in (float, int)):
+        return None
+    form = (
+        tree.structure(law), id(loop.setpoint), id(loop.other_inputs), tuple(loop.drivers.items()), loop.sample_time,
+        problem.start_time, problem.duration, given, problem.integrator,
+    )  # fmt: skip
+    try:
+        hash(form)
+    except TypeError:  # a driver or an integrator that can change
+        return None
+    return form
+
+
+def kept_run(problem: Problem, form: Hashable | None, state: ControlLoopState) -> CompiledRun | None:
+    """A run of this form that nothing else uses, at its beginning; None where none is kept."""
+    run: CompiledRun | None = problem.compiled.description.cache.loops.borrow(form)
+    if run is None:
+        return None
+    law: Any = problem.input.controller  # type: ignore[union-attr]
+    run.restart(problem.compiled, problem.initial_vector, parameters_of(law), state)
+    return run
+
+
+def keep_run(problem: Problem, form: Hashable, run: CompiledRun) -> None:
+    """Keep a run whose results have been copied. The form names signals by their identity, so the run holds them."""
+    if run.room <= MAX_KEPT_ROWS:
+        problem.compiled.description.cache.loops.give_back(form, run)

@@ -14,8 +14,7 @@ import numpy as np
 from ...core import autodiff, tree
 from ...core.arrays import Array
 from ...core.errors import TraceError
-from ..compile.function import Function
-from ..compile.lanes_function import LanesFunction
+from ..compile.function import Function, LanesFunction
 from ..loop.control_law import ControlLaw
 from ..loop.controller import Measurement
 

@@ -19,11 +19,10 @@ from ..loop.control_law import ControlLaw
 from ..loop.control_loop import ControlLoopState
 from ..loop.piecewise_linear import PiecewiseLinear
 from .bound_integrator import INTERRUPT_CHECK_STEPS, MAX_STEPS
-from .called_controller import CalledController
 from .compiled_law import compiled_sample, parameters_of
 from .driver_table import DriverTable, are_called, greatest_capacity
 from .integrators import Integrator
-from .sampled_loop import SampledLoop
+from .sampled_loop import CalledController, SampledLoop
 
 FIRST_SEGMENTS = 4096
 """Segments and rows that the buffers of driven inputs hold at first."""

@@ -11,8 +11,17 @@ import numpy as np
 from ...core.arrays import Array
 from ..compile.kernel_layout import DriverKind
 from ..loop.control_loop import ControlLoop, ControlLoopState
-from ..loop.driver import MAX_PERIODS, PWM, Driver, PwmState, SolenoidDriver, SolenoidState
-from ..loop.with_drivers import WithDrivers, apply_drivers, check_command_range
+from ..loop.driver import (
+    MAX_PERIODS,
+    PWM,
+    Driver,
+    PwmState,
+    SolenoidDriver,
+    SolenoidState,
+    WithDrivers,
+    apply_drivers,
+    check_command_range,
+)
 from .sampled_loop import SampledLoop
 
 MAX_CAPACITY = 1_000_000

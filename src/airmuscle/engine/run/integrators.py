@@ -77,7 +77,7 @@ class Rodas4(Integrator):
     """
 
     references: ClassVar[tuple[Reference, ...]] = (HAIRER_WANNER1996,)
-    printed_step: ClassVar[str] = "rodas4_step"
+    printed_step: ClassVar[str] = "rodas4"
 
     rtol: float = parameter("1", "rtol", "relative tolerance of a step", bounds=(1e-13, 0.1), default=1e-6)
 

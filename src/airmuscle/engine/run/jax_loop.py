@@ -127,7 +127,7 @@ def _double_precision() -> Any:
         import jax
     except ImportError:
         raise AirmuscleError("loop_in_jax needs the package 'jax'; pip install airmuscle[jax].") from None
-    if not jax.config.read("jax_enable_x64"):
+    if jax.numpy.zeros(0).dtype != float:
         raise AirmuscleError(
             'loop_in_jax: JAX is in single precision; write jax.config.update("jax_enable_x64", True) first.'
         )

@@ -18,11 +18,10 @@ from ...core.reference import Reference, cite
 from ...core.short_repr import ShortRepr
 from ...core.system import System
 from ..compile.program import CompiledSystem, compile_system
-from ..loop.control_loop import ControlLoop, ControlLoopState
+from ..loop.control_loop import ControlLoop, ControlLoopState, designed_loop
+from ..loop.driver import WithDrivers
 from ..loop.inputs import InputSignal, Schedule, check_input_signal
-from ..loop.law_design import designed_loop
 from ..loop.piecewise_linear import PiecewiseLinear
-from ..loop.with_drivers import WithDrivers
 from ..state import check_system, state_vector
 from .integrators import Integrator, default_integrator
 from .output_times import output_times
@@ -104,7 +103,7 @@ class Problem(ShortRepr):
     @property
     def references(self) -> tuple[Reference, ...]:
         """Sources of the models, of the integrator and of the controller, sorted by key."""
-        known = self.compiled.description.cited
+        known = self.compiled.description.cache.sources
         if self.integrator not in known:
             known[self.integrator] = tuple(cite((self.system, self.integrator)))
         if type(self.input) is Schedule or not cite((self.input,)):
@@ -127,7 +126,7 @@ class Problem(ShortRepr):
     def times(self) -> Array:
         """Output times (N,) [s] of an open-loop run; where the input is that of the last run with the plant, and so is
         all that they depend on, those of the last run, which nobody can write to."""
-        known, segments, given = self.compiled.description, self.segments, self.output_times
+        known, segments, given = self.compiled.description.cache, self.segments, self.output_times
         asked = given, self.start_time, self.duration
         kept, last_asked, last_times = known.checked_input
         if segments is not kept or not (given is None or type(given) in NUMBERS):
@@ -150,10 +149,10 @@ def initial_vector(compiled: CompiledSystem, state: Mapping[str, float]) -> Arra
     """A given initial state (n,), checked; that of the run before is not checked again."""
     known, system = compiled.description, compiled.system
     numbers = plain_numbers(state, known.state_limits)
-    if numbers is None or numbers != known.checked_state:
+    if numbers is None or numbers != known.cache.checked_state:
         vector = state_vector(system, state)
         system.check_state(state)
-        known.checked_state = vector.tolist()
+        known.cache.checked_state = vector.tolist()
         return vector
     return np.array(numbers)
 
@@ -176,7 +175,7 @@ def default_state(compiled: CompiledSystem) -> Array:
 
     Raises ParameterError for a system that has none, EquilibriumError for a plant without a stable equilibrium.
     """
-    known, system = compiled.description, compiled.system
+    known, system = compiled.description.cache, compiled.system
     if known.default_state is None:
         state = system.default_state()
         if state is None:
@@ -196,12 +195,12 @@ def check_signal(system: System, signal: InputSignal, start: float, duration: fl
 def check_input_range(compiled: CompiledSystem, segments: PiecewiseLinear, start: float) -> None:
     """Raise ParameterError where an input is beyond its range."""
     known = compiled.description
-    if segments is known.checked_input[0]:
+    if segments is known.cache.checked_input[0]:
         return
     if len(known.input_names):
         _check_within(compiled, segments, start)
     if not any(table.flags.writeable for table in (segments.ends, segments.values, segments.slopes)):
-        known.checked_input = segments, None, None
+        known.cache.checked_input = segments, None, None
 
 
 def _check_within(compiled: CompiledSystem, segments: PiecewiseLinear, start: float) -> None:

@@ -80,15 +80,12 @@ def recorded_rows(
 ) -> RowTable:
     """Inputs and outputs at states (N, n) and rising times (N,) of a run whose segments begin at `start` [s].
 
-    For a system with its own parameters, whose recorder is stored in its description.
+    For a system with its own parameters, whose recorder is kept with its description.
     """
-    idle = compiled.description.recorders
-    try:
-        recorder: RowRecorder = idle.pop()
-    except IndexError:  # none, or another thread was quicker
-        recorder = RowRecorder(compiled)
+    idle = compiled.description.cache.recorders
+    recorder: RowRecorder = idle.borrow(None) or RowRecorder(compiled)
     table = recorder.evaluate(states, times, segments, start)
-    idle.append(recorder)
+    idle.give_back(None, recorder)
     return table
 
 

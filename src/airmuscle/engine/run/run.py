@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import operator
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -44,11 +43,11 @@ def _solve_open_loop(problem: Problem) -> Solution:
     compiled, integrator = problem.compiled, problem.integrator
     assert integrator is not None
     segments, times = problem.segments, problem.times
-    pool = compiled.description.integrators
-    bound = borrow(pool, compiled, integrator)
+    pool = compiled.description.cache.integrators
+    bound: BoundIntegrator = pool.borrow(integrator) or integrator.bind(compiled)
     check = functools.partial(status_of_state, compiled, segments, problem.start_time)
     raw = bound.run(segments, problem.start_time, problem.initial_vector, times, check=check)
-    give_back(pool, integrator, bound)
+    pool.give_back(integrator, bound)
     rows, reached = raw.rows, raw.reached
     shown = (rows, times) if reached == times.size else (rows[:reached], times[:reached])
     table = recorded_rows(compiled, *shown, segments, problem.start_time)
@@ -75,20 +74,6 @@ def _end_between_rows(problem: Problem, raw: RawSolution) -> RawSolution:
     table = recorded_rows(compiled, rows, reached, problem.segments, problem.start_time)
     end, _ = truncate_at_invalid_row(compiled, again, table, instants)
     return raw if end is again else raw._replace(time=end.time, state=end.state, status=end.status)
-
-
-def borrow(pool: dict[Any, list[Any]], compiled: CompiledSystem, integrator: Integrator) -> BoundIntegrator:
-    """An integrator bound to a system: one of the pool that no other run uses, or a new one."""
-    try:
-        idle: BoundIntegrator = pool[integrator].pop()
-    except (KeyError, IndexError):
-        return integrator.bind(compiled)
-    return idle
-
-
-def give_back(pool: dict[Any, list[Any]], integrator: Integrator, bound: BoundIntegrator) -> None:
-    """Keep a bound integrator for the next run."""
-    pool.setdefault(integrator, []).append(bound)
 
 
 def simulate(
@@ -145,10 +130,10 @@ def advance(
     if final is not None:
         return dict(zip(compiled.description.state_names, final, strict=True))
     segments = _segments(compiled, inputs, start_time, dt)
-    pool = compiled.description.integrators
-    bound = borrow(pool, compiled, integrator)
+    pool = compiled.description.cache.integrators
+    bound: BoundIntegrator = pool.borrow(integrator) or integrator.bind(compiled)
     raw = bound.run(segments, start_time, state_vector(plant, state), _NO_TIMES)
-    give_back(pool, integrator, bound)
+    pool.give_back(integrator, bound)
     if raw.status == Status.DONE and (raw.state < compiled.description.lower_bounds).any():
         raw = raw._replace(status=Status.NEGATIVE_AIR_MASS)
     if raw.status != Status.DONE:
@@ -173,10 +158,11 @@ def _hold(
         if type(value) not in NUMBERS or not low <= value <= high:
             return None
         held[column] = value
-    bound = borrow(known.holders, compiled, integrator)
+    pool = known.cache.holders
+    bound: BoundIntegrator = pool.borrow(integrator) or integrator.bind(compiled)
     vector = np.array(x)
     status = bound.hold(vector, np.array(held), dt)
-    give_back(known.holders, integrator, bound)
+    pool.give_back(integrator, bound)
     final: list[float] = vector.tolist()
     if status is not Status.DONE or any(map(operator.lt, final, known.state_limits.values())):
         return None

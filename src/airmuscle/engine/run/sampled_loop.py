@@ -1,11 +1,12 @@
-"""SampledLoop: a control loop prepared for one run; everything that does not change from sample to sample."""
+"""SampledLoop: a control loop prepared for one run, what does not change from sample to sample; called controllers."""
 
 from __future__ import annotations
 
 import dataclasses
 import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +15,7 @@ from ...core.arrays import Array
 from ...core.errors import ParameterError
 from ..compile.program import CompiledSystem
 from ..loop.control_loop import ControlLoop, ControlLoopState
+from ..loop.controller import Measurement
 from ..loop.inputs import InputSignal
 from ..loop.piecewise_linear import FEW_SEGMENTS, PiecewiseLinear
 from .output_times import output_times
@@ -174,3 +176,34 @@ def _few_snapped(segments: PiecewiseLinear, edges: Array, close: float) -> Piece
             kept.append(row)
         last = moved
     return PiecewiseLinear(np.array(ends), segments.values[kept], segments.slopes[kept])
+
+
+class CalledController:
+    """The controller of a prepared loop with what it needs at each sample; its memory belongs to the run."""
+
+    def __init__(self, prepared: SampledLoop) -> None:
+        loop = prepared.loop
+        self._controller, self._sample_time, self._ranges = loop.controller, loop.sample_time, prepared.ranges
+        self._columns, self._names = loop.controller.measured_columns, loop.controller.setpoints
+        self._inputs = tuple(prepared.ranges)
+        self._rows = prepared.setpoints
+        self._last: tuple[list[float], dict[str, float]] = [], {}
+
+    def step(self, memory: Any, measured: Sequence[float], interval: int) -> tuple[list[float], Any]:
+        """The commands of a sample at the start of an interval, not limited, and the memory after it.
+
+        Raises ParameterError where the controller does not give a number for each input.
+        """
+        row = self._rows[interval]
+        if row != self._last[0]:
+            self._last = row, dict(zip(self._names, row, strict=True))
+        columns = dict(zip(self._columns, measured, strict=True))
+        measurement = Measurement(columns, self._last[1], self._ranges)
+        commands, memory = self._controller.step(memory, measurement, self._sample_time)
+        try:
+            return [0.0 + commands[name] for name in self._inputs], memory
+        except (KeyError, TypeError, ValueError):
+            raise ParameterError(
+                f"{type(self._controller).__name__} commands {commands!r}; it must give a number for each of "
+                f"{', '.join(self._inputs)}."
+            ) from None

@@ -14,7 +14,7 @@ from ...recording.notebook import Card, NotebookDisplay
 from ...recording.plot import plot_columns
 from ...recording.recording_card import recording_card
 from ..loop.control_loop import ControlLoopState
-from ..state_units import column_units
+from ..state import column_units
 from .problem import Problem
 
 if TYPE_CHECKING:

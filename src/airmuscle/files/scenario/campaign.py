@@ -16,7 +16,7 @@ from ...bench.segment.runs import CONTRACTION_BAND
 from ...core import tree
 from ...core.arrays import Array
 from ...core.errors import AirmuscleError
-from ...engine.loop.trajectory import ACCELERATION, spline_trajectory
+from ...engine.loop.sampled_signal import ACCELERATION, spline_trajectory
 from ...physics.mechanism import Isometric, PrescribedMotion
 from ...physics.muscle import Muscle
 from ...physics.plant.plant import Plant

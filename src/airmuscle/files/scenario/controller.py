@@ -26,10 +26,9 @@ from typing import Any
 from ...core.errors import ParameterError
 from ...core.system import Input
 from ...engine.loop.control_loop import ControlLoop
-from ...engine.loop.controller import Controller
+from ...engine.loop.controller import Controller, named_signal_units, parameter_units
 from ...engine.loop.inputs import InputSignal
-from ...engine.loop.parameter_units import named_signal_units, parameter_units
-from ...engine.state_units import column_units
+from ...engine.state import column_units
 from ...physics.plant.plant import Plant
 from ..library.location import Location, located_errors, read_finite_number
 from .inputs import build_drivers, build_input_signal

@@ -18,9 +18,9 @@ from typing import Any
 from ...bench.readers import read_csv
 from ...core.errors import ColumnError, ParameterError
 from ...core.system import Input
-from ...engine.loop.driver import Driver, SolenoidDriver
-from ...engine.loop.inputs import NO_INPUT, InputSignal, Periodic, SampledSignal, Schedule, check_input_names
-from ...engine.loop.with_drivers import WithDrivers
+from ...engine.loop.driver import Driver, SolenoidDriver, WithDrivers
+from ...engine.loop.inputs import NO_INPUT, InputSignal, Periodic, Schedule, check_input_names
+from ...engine.loop.sampled_signal import SampledSignal
 from ...recording.heading import split_unit
 from ..library.build import build, load_valve
 from ..library.location import Location, check_keys, check_type, located_errors, read_finite_number, read_text

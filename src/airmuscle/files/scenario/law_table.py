@@ -24,8 +24,7 @@ from ...core.declaration import Parameter, check_field, parameters
 from ...core.errors import ParameterError
 from ...core.units import is_known_unit
 from ...engine.loop.control_loop import check_present
-from ...engine.loop.controller import RELATIVE, Controller, SignalRelated
-from ...engine.loop.parameter_units import named_signal_units, unit_of
+from ...engine.loop.controller import RELATIVE, Controller, SignalRelated, named_signal_units, unit_of
 from ...physics.mechanism.base import Mechanism
 from ...physics.muscle import Muscle
 from ...physics.plant.plant import Plant

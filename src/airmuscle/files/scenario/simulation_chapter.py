@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from ...core.plotting import BLACK, BLUE, legend_below, new_figure
 from ...core.reference import cite
+from ...engine.loop import InputSignal, Periodic, SampledSignal, Schedule
 from ...engine.loop.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop
-from ...engine.loop.inputs import InputSignal, Periodic, SampledSignal, Schedule
-from ...engine.loop.with_drivers import WithDrivers
+from ...engine.loop.driver import WithDrivers
 from ...recording import Recording
 from ...report.chapter import Chapter, Plot
 from ...report.formatting import format_number, typographic

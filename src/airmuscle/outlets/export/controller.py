@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from ...core.arrays import Array
+from ...engine.loop.control_law import EnclosingLaw, without_simulated
 from ...engine.loop.control_loop import MEASURED
 from ...engine.loop.controller import Controller
-from ...engine.loop.enclosing_law import EnclosingLaw, without_simulated
 from ...engine.loop.sensors import WithSensors
 from ...engine.run import Problem, solve
-from ...engine.run.batch.precision import Double, Precision, Single
+from ...engine.run.batch.lanes import Double, Precision, Single
 from ...engine.run.sampled_loop import prepare_loop
 from .printed_controller import check_control_law, check_single_precision, print_controller
 from .targets import program_name

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from ...core.arrays import Array
 from ...core.errors import ParameterError
 from ...engine.loop.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop
+from ...engine.loop.driver import WithDrivers
 from ...engine.loop.piecewise_linear import PiecewiseLinear
-from ...engine.loop.with_drivers import WithDrivers
 from ...engine.run import Problem
 from ...engine.run.driver_table import KINDS, MAX_CAPACITY, DriverTable, greatest_capacity
 from ...engine.run.sampled_loop import CLOSE, SampledLoop, prepare_loop, snapped

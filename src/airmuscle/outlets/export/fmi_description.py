@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from importlib import metadata
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from ...engine.compile.partials import Place
+from ...engine.compile.jacobians import Place
 from ...engine.run.integrators import Rodas4
 from .fmi_units import add_units, has_unit
 from .fmi_variables import Variable, references_of

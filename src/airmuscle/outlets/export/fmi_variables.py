@@ -9,7 +9,7 @@ import dataclasses
 import math
 
 from ...core.errors import ParameterError, printable
-from ...engine.compile.partials import Place
+from ...engine.compile.jacobians import Place
 from ...engine.run.integrators import Rodas4
 from ...recording.columns import quantity_of
 from .printed_system import ExportedSystem

@@ -13,9 +13,8 @@ from pathlib import Path
 
 from ...core.atomic_output import atomic_folder
 from ...core.errors import ParameterError
-from ...engine.compile.event_indicators import EventIndicators, event_indicators
 from ...engine.compile.functions import Printer
-from ...engine.compile.partials import Partials, partials
+from ...engine.compile.jacobians import EventIndicators, Partials, event_indicators, partials
 from ...engine.run import Problem
 from ...engine.run.integrators import Rodas4
 from ...physics.plant.diagnostics import column_limits, describe_limit

@@ -14,7 +14,7 @@ from ...core.tree import Leaf, leaves
 from ...engine.compile.functions import ArraySizes, Extension, TracedSystem, implicit_module, rates_module
 from ...engine.compile.ir.emission import TargetLanguage
 from ...engine.compile.program import CompiledSystem
-from ...engine.state_units import column_units
+from ...engine.state import column_units
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -7,6 +7,7 @@ The functions write into arrays that they are given; c is what `prepare(p, c)` m
     slopes(y, r, m, T, l, h, c, f, D)   the same with f = (u, n), and D = df/d(y, m), row by row
     linear(x, u, c, f, A, B, C)         rates f, df/dx, df/du, and the derivatives of columns by x, row by row
     pair(x, f)                          x = (angle, p_1, p_2), f = PAIR
+    cut_segments(...)                   the kernel of `driven_inputs`, with its arguments
     needed(x, f)                        x = (angle, angular speed, angular acceleration, p_1, p_2), f = torque that the
                                         muscles must give, with that of their dampers
 """
@@ -20,6 +21,7 @@ import airmuscle as am
 from ...core import tree
 from ...core.errors import ParameterError
 from ...engine.compile.functions import Printer, TracedSystem
+from ...engine.compile.kernel_text import JavaScriptKernels
 from ...engine.compile.text.javascript import JavaScriptLanguage
 from ...engine.run.compiled_law import trace_sample
 from ...physics.analysis.joint_torque import load_function, torque_functions
@@ -29,6 +31,12 @@ PAIR = (
     "tension_first", "tension_second", "shut_valves", "load", "load_slope",
 )  # fmt: skip
 """Results of `pair`, in SI units: sums over both muscles, tensions, and the torque of weights and springs."""
+
+
+def inputs_program() -> str:
+    """The kernel that cuts the inputs which no controller commands into the segments of a sample."""
+    text = JavaScriptKernels().text("driven_inputs", ["cut_segments"])
+    return f"(() => {{\n{text}\nreturn {{ cut_segments }};\n}})()"
 
 
 def law_program(law: am.engine.ControlLaw, *, sample: bool, slopes: bool) -> str:

@@ -19,7 +19,7 @@ from ...files.library.files import list_plants
 from ...files.library.plant_file import plant_tables
 from ...files.scenario.scenario import TABLES, build_scenario
 from .joint_laws import JointController, joint_controllers, statics_within_valves, valve_set
-from .joint_program import PAIR, law_program, linear_program, pair_program
+from .joint_program import PAIR, inputs_program, law_program, linear_program, pair_program
 from .plant_sheet import sheet_of_tables
 
 DURATION = 1.0
@@ -84,7 +84,10 @@ def _programs(plant: am.Plant, controllers: tuple[JointController, ...], measure
     """The programs of the tab as expressions of JavaScript, by name."""
     compiled = compile_system(plant)
     states = compiled.description.state_names
-    programs = {"linear": linear_program(compiled.program.traced, states, measured), "statics": pair_program(plant)}
+    programs = {
+        "linear": linear_program(compiled.program.traced, states, measured), "statics": pair_program(plant),
+        "inputs": inputs_program(),
+    }  # fmt: skip
     for each in controllers:
         same = each.law is each.averaged
         programs[each.key] = law_program(each.law, sample=True, slopes=same)

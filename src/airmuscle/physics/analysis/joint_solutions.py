@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from ...core.arrays import Array
 from ...engine.compile.cache.kernel import Kernel
-from ...engine.compile.lanes_function import LANES, lanes_array
+from ...engine.compile.function import LANES, lanes_array
 from .joint_torque import QUANTITIES, TorqueFunction, TracedRow
 
 CELLS = 32
@@ -27,7 +27,7 @@ ROOM = 4
 MAX_BISECTIONS = 80
 AT_PRESSURE = QUANTITIES[:4]
 
-pair_solutions = Kernel("pair_solutions")
+pair_solutions = Kernel("pair_solutions", "newton")
 
 Functions = Sequence[TorqueFunction]
 Rows = npt.NDArray[np.intp]

@@ -11,7 +11,7 @@ import numpy as np
 from ...core.arrays import Array, ArrayProgram, make_program
 from ...core.errors import ParameterError
 from ...core.ops import Value, Values
-from ...engine.compile.lanes_function import LanesFunction
+from ...engine.compile.function import LanesFunction
 from ..muscle import ElasticSeriesElement, Muscle
 from ..plant.plant import Plant
 from ..pneumatics.gas import absolute_pressure

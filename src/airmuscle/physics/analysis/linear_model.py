@@ -15,8 +15,7 @@ from ...core.errors import AirmuscleError, ParameterError, suggestion
 from ...core.system import System
 from ...engine.compile.jacobians import derivatives
 from ...engine.compile.program import CompiledSystem, compile_system
-from ...engine.state import check_system, state_vector
-from ...engine.state_units import column_units
+from ...engine.state import check_system, column_units, state_vector
 from ..equilibrium import complete_inputs
 from ..plant.plant import Plant
 from .static_stiffness import Stiffness, stiffness

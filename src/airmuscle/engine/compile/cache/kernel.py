@@ -11,16 +11,16 @@ import functools
 import importlib
 import itertools
 import math
+import sys
 import threading
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
+from ..llvm.jit import engine_of
 from . import store
-from .announce import announce
-from .entry_point import slot_count
-from .object_code import build, load_engine
+from .object_code import build, slot_count
 
 _ITEMS = {np.dtype(np.int64): "q", np.dtype(np.float64): "d", np.dtype(np.float32): "f"}
 _KINDS = {(dtype, dimensions): f"{item}{dimensions}" for dtype, item in _ITEMS.items() for dimensions in range(5)}
@@ -90,7 +90,7 @@ class Kernel:
             code = store.save(self.name, kinds, build(self.numba, kinds))
         if not code:
             return None
-        engine = load_engine(code)
+        engine = engine_of(code)
         return _ENTRY(engine.get_function_address("entry")), engine
 
 
@@ -187,7 +187,12 @@ class BoundKernel:
 
 
 rodas4, fixed_step, lanes = Kernel("rodas4"), Kernel("fixed_step"), Kernel("lanes")
-evaluate, evaluate_rates, record = Kernel("evaluate"), Kernel("evaluate_rates", "rates"), Kernel("record")
+evaluate, evaluate_rates, record = Kernel("evaluate"), Kernel("evaluate_rates", "evaluate"), Kernel("record")
 newton, sampled_loop = Kernel("newton"), Kernel("sampled_loop")
-begin_step, end_step = Kernel("begin_step", "bounds"), Kernel("end_step", "bounds")
-lane_blocks, loop_lanes = Kernel("lane_blocks"), Kernel("loop_lanes")
+begin_step, end_step = Kernel("begin_step", "evaluate"), Kernel("end_step", "evaluate")
+lane_blocks, loop_lanes = Kernel("lane_blocks", "lanes"), Kernel("loop_lanes")
+
+
+def announce(name: str) -> None:
+    """Print to stderr that a kernel is being compiled, which takes some seconds."""
+    print(f"compiling {name}, once on this machine (some seconds) ...", file=sys.stderr, flush=True)

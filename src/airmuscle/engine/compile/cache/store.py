@@ -15,9 +15,11 @@ import pathlib
 import stat
 import warnings
 from collections.abc import Sequence
+from typing import Any
 
 from ....core.atomic_output import atomic_file
 from ....core.errors import AirmuscleWarning
+from ..llvm.jit import engine_of, object_code
 
 _POSIX = hasattr(os, "getuid")
 _PACKAGE = pathlib.Path(__file__).parents[1]
@@ -140,3 +142,16 @@ def _origin() -> bytes:
     parts = [path.read_bytes() for path in _SOURCES]
     parts += [version.read_bytes() if version and version.exists() else b"", llvmlite.__version__.encode()]
     return hashlib.sha256(b"\0".join(parts)).digest()
+
+
+def load_module(text: str) -> Any:
+    """An engine with the machine code of LLVM text; it must stay alive as long as its addresses are used.
+
+    Code generation takes two thirds of the time in which a system is compiled. The name of a stored module is the hash
+    of its text, so that a system of the same structure finds it.
+    """
+    name = "module-" + hashlib.sha256(text.encode()).hexdigest()[:40]
+    code = load(name, ())
+    if code is None:
+        code = save(name, (), object_code(text))
+    return engine_of(code)

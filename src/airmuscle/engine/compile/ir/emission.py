@@ -6,9 +6,9 @@ import abc
 from collections.abc import Callable, Mapping, Sequence
 
 from ....core.errors import TraceError
-from .branches import COMMANDED, STEADY, VARYING, skipping
 from .instructions import Code, Instruction, Operand, Operation
 from .scheduling import ConditionalBlock, Item
+from .skipped_blocks import COMMANDED, STEADY, VARYING, skipping
 
 LEVEL = {"u": COMMANDED, "w": STEADY, "h": STEADY}
 """Arguments that do not depend on the states: inputs, their slopes, and the step size."""

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import abc
 import ast
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Mapping, Sequence
 
 from .printer import KernelPrinter
-from .scopes import declarations
+from .source import KernelSource
+from .types import TypedKernel, pairs, stored_names
 
 
 class BraceKernels(KernelPrinter):
@@ -56,3 +58,45 @@ class BraceKernels(KernelPrinter):
 
     def branch(self, word: str, test: str) -> str:
         return f"{word} ({test}) {{"
+
+
+@dataclasses.dataclass(frozen=True)
+class Declarations:
+    """Places of declarations.
+
+    at        the assignment that declares a variable, by name
+    early     variables that are declared at the beginning of the function
+    constant  variables that are assigned once
+    """
+
+    at: Mapping[str, ast.stmt]
+    early: Sequence[str]
+    constant: frozenset[str]
+
+
+def declarations(source: KernelSource, kernel: TypedKernel) -> Declarations:
+    """The declarations of the local variables: at the first assignment, if its block contains every use."""
+    stored = list(stored_names(source.body))
+    loops = {ast.unparse(node.target) for node in ast.walk(source.node) if isinstance(node, ast.For)}
+    local = [name for name in dict.fromkeys(stored) if name not in source.arguments and name not in loops]
+    places = {name: _place(name, source.body) for name in local}
+    at = {name: node for name, node in places.items() if node is not None}
+    once = frozenset(name for name in at if stored.count(name) == 1)
+    return Declarations(at, [name for name in local if name not in at], once)
+
+
+def _mentions(name: str, node: ast.AST) -> bool:
+    return any(isinstance(n, ast.Name) and n.id == name for n in ast.walk(node))
+
+
+def _place(name: str, block: Sequence[ast.stmt]) -> ast.stmt | None:
+    """The statement of a block, or of a block within it, that declares a variable; None if there is none."""
+    first, *others = [node for node in block if _mentions(name, node)]
+    if isinstance(first, ast.Assign):
+        targets = [target.id for target, _ in pairs(first) if isinstance(target, ast.Name)]
+        return first if name in targets and not _mentions(name, first.value) else None
+    if others or not isinstance(first, ast.If | ast.While | ast.For):
+        return None
+    inner = [part for part in (first.body, first.orelse) if any(_mentions(name, node) for node in part)]
+    head = first.iter if isinstance(first, ast.For) else first.test
+    return None if _mentions(name, head) or len(inner) > 1 else _place(name, inner[0])

@@ -1,9 +1,13 @@
-"""Calls of compiled functions by address from kernels."""
+"""Calls of compiled functions by address from kernels, and the decorators of the parts of kernels.
+
+numba copies a part into the kernel that calls it, which so remains one function, whose machine code can be stored.
+"""
 
 from __future__ import annotations
 
 from typing import Any
 
+import numba
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
@@ -62,3 +66,10 @@ def call_kernel(typing_context: Any, address: Any, slots: Any) -> Any:
         return builder.call(builder.inttoptr(values[0], ir.FunctionType(word, [word]).as_pointer()), [values[1]])
 
     return signature, generate
+
+
+PART = numba.njit(error_model="numpy", nogil=True, inline="always")
+"""Decorator of a part of a kernel, with floating-point operations in the order in which they are written."""
+
+CONTRACTED_PART = numba.njit(error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True, inline="always")
+"""Decorator of a part whose sums may be reordered and whose products and sums may be fused."""

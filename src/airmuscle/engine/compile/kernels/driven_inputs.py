@@ -8,8 +8,8 @@ from __future__ import annotations
 from typing import Any
 
 from ..kernel_layout import DriverKind, Progress
+from .calls import PART
 from .drivers import delayed_switch, pulse_width_modulation
-from .parts import PART
 
 MODULATOR = DriverKind.MODULATOR.value
 SEGMENTS, ROWS = int(Progress.SEGMENTS), int(Progress.ROWS)

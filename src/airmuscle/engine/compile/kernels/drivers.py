@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .parts import PART
+from .calls import PART
 
 INFINITY = np.inf
 THRESHOLD = 0.5

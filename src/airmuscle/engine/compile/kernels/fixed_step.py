@@ -13,9 +13,8 @@ import numba
 import numpy as np
 
 from ....core.diagnostics import Status
-from .calls import invoke, pointer
-from .parts import CONTRACTED_PART
-from .segments import set_inputs, write_present
+from .calls import CONTRACTED_PART, invoke, pointer
+from .record import set_inputs, write_present
 
 DONE, PAUSED, NOT_FINITE = Status.DONE.value, Status.PAUSED.value, Status.NOT_FINITE.value
 

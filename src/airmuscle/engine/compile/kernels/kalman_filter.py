@@ -1,16 +1,15 @@
-"""Extended Kalman filter: prediction by an exponential Euler step, and correction by measured columns."""
+"""Extended and unscented Kalman filters: prediction of the state with its covariance, correction by measurements."""
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import Any
 
 import numba
 
 from ....core.diagnostics import Status
-from .calls import invoke, pointer
-from .exponential import exponential_step
-from .matrices import cholesky, multiply, solve_row
-from .parts import PART
+from .calls import PART, invoke, pointer
+from .matrices import cholesky, exponential_step, multiply, solve_row
 
 DONE, SINGULAR, NOT_FINITE = Status.DONE.value, Status.SINGULAR.value, Status.NOT_FINITE.value
 
@@ -104,5 +103,129 @@ def correct_extended(
             rest[i, j] = value
     multiply(rest, covariance, product)
     update_covariance(rest, product, gain, noise, covariance)
+    apply_gain(gain, difference, x)
+    return DONE
+
+
+@PART
+def sigma_points(x: Any, covariance: Any, spread: Any, points: Any, root: Any) -> None:
+    """`points` (2 N + 1, N): x, then x +- spread times the columns of a Cholesky factor of the covariance.
+
+    A state without variance gets a column of zeros; root (N, N) is workspace.
+    """
+    total = x.shape[0]
+    for j in range(total):
+        value = covariance[j, j]
+        for k in range(j):
+            value -= root[j, k] * root[j, k]
+        pivot = sqrt(value) if value > 1e-14 * covariance[j, j] else 0.0
+        root[j, j] = pivot
+        for i in range(j + 1, total):
+            value = covariance[i, j]
+            for k in range(j):
+                value -= root[i, k] * root[j, k]
+            root[i, j] = value / pivot if pivot > 0.0 else 0.0
+    for i in range(total):
+        for k in range(2 * total + 1):
+            points[k, i] = x[i]
+        for j in range(i + 1):
+            points[1 + j, i] += spread * root[i, j]
+            points[1 + total + j, i] -= spread * root[i, j]
+
+
+@PART
+def weighted_mean(points: Any, weights: Any, mean: Any) -> None:
+    """The mean (N,) of points (2 N + 1, N)."""
+    for i in range(mean.shape[0]):
+        value = weights[0] * points[0, i]
+        for q in range(1, points.shape[0]):
+            value += weights[2] * points[q, i]
+        mean[i] = value
+
+
+@PART
+def covariances_of_measurement(
+    points: Any, y: Any, x: Any, mean: Any, weights: Any, noise: Any, s: Any, cross: Any
+) -> None:
+    """Covariance `s` (p, p) of the measurement, and `cross` (N, p) of states and measurement."""
+    for j in range(mean.shape[0]):
+        for i in range(mean.shape[0]):
+            value = noise[i] if i == j else 0.0
+            for q in range(points.shape[0]):
+                weight = weights[2] if q else weights[1]
+                value += weight * (y[q, i] - mean[i]) * (y[q, j] - mean[j])
+            s[i, j] = value
+        for i in range(x.shape[0]):
+            value = 0.0
+            for q in range(points.shape[0]):
+                weight = weights[2] if q else weights[1]
+                value += weight * (points[q, i] - x[i]) * (y[q, j] - mean[j])
+            cross[i, j] = value
+
+
+@numba.njit(error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
+def predict_unscented(
+    rates: Any, c: Any, sizes: Any, h: Any, spread: Any, weights: Any, noise: Any, x: Any, u: Any, covariance: Any,
+    points: Any, root: Any, f: Any, a: Any, work: Any,
+) -> Any:  # fmt: skip
+    """Mean `x` (N,) and `covariance` (N, N) one sample later, in place.
+
+    sizes    (N,) magnitudes of the states
+    weights  (3,): of the mean of the central point, of its covariance, of all other points
+    points   (2 N + 1, N): the sigma points; root (N, N), f (n,), a (n, N), work (5, n, N + 1): workspace
+    """
+    n, total = f.shape[0], x.shape[0]
+    sigma_points(x, covariance, spread, points, root)
+    e = work[3]
+    for q in range(points.shape[0]):
+        point = points[q]
+        if exponential_step(rates, c, sizes, point, u, h, f, a, work[0], work[1], work[2], e, work[4]) != DONE:
+            return NOT_FINITE
+        for i in range(n):
+            point[i] += sizes[i] * e[i, total]
+    weighted_mean(points, weights, x)
+    for i in range(total):
+        for j in range(i + 1):
+            value = noise[i, j] + weights[1] * (points[0, i] - x[i]) * (points[0, j] - x[j])
+            for q in range(1, points.shape[0]):
+                value += weights[2] * (points[q, i] - x[i]) * (points[q, j] - x[j])
+            covariance[i, j] = value
+            covariance[j, i] = value
+    return DONE
+
+
+@numba.njit(error_model="numpy", nogil=True)
+def correct_unscented(
+    measured: Any, constants: Any, spread: Any, weights: Any, noise: Any, x: Any, u: Any, covariance: Any, values: Any,
+    difference: Any, s: Any, factor: Any, points: Any, root: Any, y: Any, c: Any, gain: Any, cross: Any,
+) -> Any:  # fmt: skip
+    """Mean `x` (N,) and `covariance` (N, N) after a measurement `values` (p,), in place.
+
+    noise                    (p,) variances of the measurement
+    difference, s            (p,), (p, p): the innovation and its covariance
+    points (2 N + 1, N), y (2 N + 1, p), factor (p, p), root (N, N), c (p, N), gain and cross (N, p): workspace
+    """
+    total, p = x.shape[0], values.shape[0]
+    sigma_points(x, covariance, spread, points, root)
+    for q in range(points.shape[0]):
+        invoke(measured, (pointer(points[q]), pointer(u), pointer(constants), pointer(y[q]), pointer(c)))
+    weighted_mean(y, weights, difference)
+    covariances_of_measurement(points, y, x, difference, weights, noise, s, cross)
+    for i in range(total):
+        for j in range(p):
+            gain[i, j] = cross[i, j]
+    if cholesky(s, factor) != DONE:
+        return SINGULAR
+    for i in range(total):
+        solve_row(factor, gain[i])
+    for i in range(p):
+        difference[i] = values[i] - difference[i]
+    for i in range(total):
+        for j in range(i + 1):
+            value = covariance[i, j]
+            for k in range(p):
+                value -= gain[i, k] * cross[j, k]
+            covariance[i, j] = value
+            covariance[j, i] = value
     apply_gain(gain, difference, x)
     return DONE

@@ -13,9 +13,8 @@ import numba
 import numpy as np
 
 from ....core.diagnostics import Status
-from .calls import invoke, pointer
+from .calls import PART, invoke, pointer
 from .lanes import write_columns
-from .parts import PART
 
 DONE, NOT_FINITE, INTERRUPTED = Status.DONE.value, Status.NOT_FINITE.value, Status.INTERRUPTED.value
 LARGEST = 1.7976931348623157e308

@@ -1,4 +1,4 @@
-"""Products and factors of small matrices, as parts of kernels; numba copies them into the kernel."""
+"""Small matrices as parts of kernels: products, factors, exponential Euler step with the Jacobian and the rates."""
 
 from __future__ import annotations
 
@@ -6,9 +6,95 @@ from math import sqrt
 from typing import Any
 
 from ....core.diagnostics import Status
-from .parts import PART
+from .calls import PART, invoke, pointer
 
-DONE, SINGULAR = Status.DONE.value, Status.SINGULAR.value
+DONE, NOT_FINITE, SINGULAR = Status.DONE.value, Status.NOT_FINITE.value, Status.SINGULAR.value
+MAX_NORM = 0.125
+"""Norm of the matrix to which the Taylor polynomial is applied."""
+
+
+@PART
+def scaled_rates(f: Any, a: Any, sizes: Any, h: Any, m: Any) -> Any:
+    """Write h (A, f) of the scaled states to `m` (n, N + 1); its 1-norm, infinite if it is not finite."""
+    n, total, norm = f.shape[0], sizes.shape[0], 0.0
+    for j in range(total + 1):
+        size = sizes[j] if j < total else 1.0
+        column = 0.0
+        for i in range(n):
+            value = h * (a[i, j] if j < total else f[i]) * size / sizes[i]
+            m[i, j] = value
+            column += abs(value)
+        if not column < 1e300:
+            column = 1e308
+        norm = max(norm, column)
+    return norm
+
+
+@PART
+def taylor_polynomial(m: Any, share: Any, square: Any, cube: Any, other: Any, e: Any) -> None:
+    """The Taylor polynomial of order 8 of exp(share m) in `e`, by Paterson and Stockmeyer's scheme."""
+    n, columns = m.shape
+    for i in range(n):
+        for j in range(columns):
+            m[i, j] *= share
+            square[i, j] = 0.0
+            cube[i, j] = 0.0
+    add_product(m, m, square)
+    add_product(square, m, cube)
+    for i in range(n):
+        for j in range(columns):
+            other[i, j] = m[i, j] / 5040.0 + square[i, j] / 40320.0
+            e[i, j] = m[i, j] / 24.0 + square[i, j] / 120.0
+        other[i, i] += 1.0 / 720.0
+        e[i, i] += 1.0 / 6.0
+    add_product(other, cube, e)
+    for i in range(n):
+        for j in range(columns):
+            other[i, j] = m[i, j] + 0.5 * square[i, j]
+        other[i, i] += 1.0
+    add_product(e, cube, other)
+    for i in range(n):
+        for j in range(columns):
+            e[i, j] = other[i, j]
+
+
+@PART
+def square_repeatedly(e: Any, times: Any, other: Any) -> None:
+    """Square the matrix whose first n rows are `e` (n, N + 1); the rows below are those of the identity."""
+    n, columns = e.shape
+    for _ in range(times):
+        for i in range(n):
+            for j in range(columns):
+                other[i, j] = e[i, j] if j >= n else 0.0
+        add_product(e, e, other)
+        for i in range(n):
+            for j in range(columns):
+                e[i, j] = other[i, j]
+
+
+@PART
+def exponential_step(
+    rates: Any, c: Any, sizes: Any, x: Any, u: Any, h: Any, f: Any, a: Any, m: Any, square: Any, cube: Any, e: Any,
+    other: Any,
+) -> Any:  # fmt: skip
+    """Row k < n of `e` (n, N + 1): exp(A h) of the scaled states, and in its last column the increment of state k.
+
+    rates(x, u, c, f, a)   its address: f (n,), a = df/dx (n, N); the N - n states at the end have no rates
+    m, square, cube, other (n, N + 1): workspace
+
+    exp of the matrix ((h A, h f), (0, 0)), scaled by the magnitudes `sizes` (N,) of the states: a Taylor polynomial of
+    a matrix whose norm was halved to less than 1/8, then squared.
+    """
+    invoke(rates, (pointer(x), pointer(u), pointer(c), pointer(f), pointer(a)))
+    norm, halvings, share, status = scaled_rates(f, a, sizes, h, m), 0, 1.0, NOT_FINITE
+    if norm < 1e300:
+        while norm * share > MAX_NORM:
+            share *= 0.5
+            halvings += 1
+        taylor_polynomial(m, share, square, cube, other, e)
+        square_repeatedly(e, halvings, other)
+        status = DONE
+    return status
 
 
 @PART

@@ -1,4 +1,4 @@
-"""Newton's method on a printed function g(x, p) = target of as many equations as unknowns."""
+"""Newton's method on printed functions: g(x, p) = target of many unknowns, and all solutions of a pair of muscles."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from typing import Any
 import numba
 
 from ....core.diagnostics import Status
-from .calls import invoke, pointer
-from .parts import PART
+from .calls import PART, invoke, pointer
 
 DONE, SINGULAR = Status.DONE.value, Status.SINGULAR.value
 NOT_FINITE, NOT_CONVERGED = Status.NOT_FINITE.value, Status.NOT_CONVERGED.value
@@ -97,3 +96,148 @@ def newton(
             break
     b[0] = step
     return status
+
+
+LANES, ITERATIONS = 8, 30
+"""Points of one call of a function, as in `LanesFunction`; iterations of Newton's method."""
+RESIDUAL, MARGIN, WIDENED = 1e-11, 1e-12, 0.5
+"""Relative residual of a solution; part of the range by which rounding may exceed it; widening of a cell's range."""
+
+
+@PART
+def evaluate_boundaries(function: Any, side: Any, levels: Any, t: Any, x: Any, values: Any, ends: Any) -> None:
+    """Write q, k and s at both boundaries of each cell of one side to `ends`."""
+    size = ends.shape[3]
+    for g in range(levels.shape[0]):
+        for lane in range(LANES):
+            x[lane] = levels[g, lane]
+        invoke(function, (pointer(t), pointer(x), pointer(values)))
+        for lane in range(LANES):
+            i = g * LANES + lane
+            for kind in range(3):
+                value = values[kind if kind < 2 else 4, lane]
+                if i < size:
+                    ends[side, kind, 0, i] = value
+                if 0 < i <= size:
+                    ends[side, kind, 1, i - 1] = value
+
+
+@PART
+def widen_ranges(side: Any, ends: Any) -> None:
+    """Turn the values at the boundaries into widened ranges; empty ones where s is not positive."""
+    for i in range(ends.shape[3]):
+        possible = max(ends[side, 2, 0, i], ends[side, 2, 1, i]) > 0.0
+        for kind in range(2):
+            a, b = ends[side, kind, 0, i], ends[side, kind, 1, i]
+            margin = WIDENED * abs(b - a)
+            ends[side, kind, 0, i] = min(a, b) - margin if possible else 1e300
+            ends[side, kind, 1, i] = max(a, b) + margin if possible else -1e300
+
+
+@PART
+def find_cells(q: Any, k: Any, ends: Any, cells: Any) -> Any:
+    """Write the pairs of cells in whose ranges a solution is possible; how many there are."""
+    size, count = ends.shape[3], 0
+    for i in range(size):
+        q_low, q_high = q - ends[0, 0, 1, i], q - ends[0, 0, 0, i]
+        k_low, k_high = k - ends[0, 1, 1, i], k - ends[0, 1, 0, i]
+        for j in range(size):
+            cells[count] = i * size + j
+            count += (
+                (ends[1, 0, 0, j] <= q_high)
+                & (ends[1, 0, 1, j] >= q_low)
+                & (ends[1, 1, 0, j] <= k_high)
+                & (ends[1, 1, 1, j] >= k_low)
+            )
+    return count
+
+
+@PART
+def newton_steps(q: Any, k: Any, low: Any, high: Any, x: Any, y: Any, values: Any, other_values: Any) -> Any:
+    """One step of Newton's method of each lane, limited to a fifth of the range; the largest step."""
+    largest, span = 0.0, high - low
+    for lane in range(LANES):
+        residual = values[0, lane] + other_values[0, lane] - q
+        other = values[1, lane] + other_values[1, lane] - k
+        a, c = values[2, lane], values[3, lane]
+        b, d = other_values[2, lane], other_values[3, lane]
+        determinant = a * d - b * c
+        step = (b * other - d * residual) / determinant
+        y_step = (c * residual - a * other) / determinant
+        if not (abs(step) < 1e300 and abs(y_step) < 1e300):
+            step = y_step = 0.0
+        largest = max(largest, abs(step), abs(y_step))
+        step = min(max(step, -0.2 * span), 0.2 * span)
+        y_step = min(max(y_step, -0.2 * span), 0.2 * span)
+        x[lane] = min(max(x[lane] + step, low), high)
+        y[lane] = min(max(y[lane] + y_step, low), high)
+    return largest
+
+
+@PART
+def is_solution(q: Any, k: Any, lane: Any, values: Any, other_values: Any) -> Any:
+    """Whether both equations are fulfilled and both s are positive."""
+    residual = abs(values[0, lane] + other_values[0, lane] - q)
+    other = abs(values[1, lane] + other_values[1, lane] - k)
+    scale = abs(values[0, lane]) + abs(other_values[0, lane]) + abs(q)
+    rigid = abs(values[1, lane]) + abs(other_values[1, lane]) + abs(k)
+    balanced = residual <= RESIDUAL * scale and other <= RESIDUAL * rigid
+    return balanced and values[4, lane] > 0.0 and other_values[4, lane] > 0.0
+
+
+@PART
+def store_new(n: Any, x: Any, y: Any, span: Any, solutions: Any, stored: Any) -> Any:
+    """Store a solution unless it is known; the number of solutions."""
+    known = False
+    for k in range(min(stored, solutions.shape[1])):
+        distance = max(abs(solutions[n, k, 0] - x), abs(solutions[n, k, 1] - y))
+        known = known or distance <= 1e-7 * span
+    if not known:
+        if stored < solutions.shape[1]:
+            solutions[n, stored, 0] = x
+            solutions[n, stored, 1] = y
+        stored += 1
+    return stored
+
+
+@numba.njit(error_model="numpy", nogil=True)
+def pair_solutions(
+    first: Any, second: Any, low: Any, high: Any, point: Any, wanted_q: Any, wanted_k: Any, levels: Any, solutions: Any,
+    counts: Any, arguments: Any, values: Any, other_values: Any, ends: Any, cells: Any,
+) -> None:  # fmt: skip
+    """Write up to R solutions of every point (N,) into `solutions` (N, R, 2), and their numbers into `counts` (N,).
+
+    first, second  addresses of functions in lanes, (t, x) -> (q, k, dq/dx, dk/dx, s); s > 0 at a solution
+    levels         (G, LANES): boundaries of the cells in x and in y, in ascending order; after the last one repeated
+    arguments (3, LANES), values and other_values (5, LANES): aligned workspace; ends (2, 3, 2, C), cells (C^2 + LANES,)
+    A count above R says that there were more solutions; equal ones are not removed.
+    """
+    size = ends.shape[3]
+    t, x, y, span = arguments[0], arguments[1], arguments[2], high - low
+    for n in range(point.shape[0]):
+        q, k = wanted_q[n], wanted_k[n]
+        for lane in range(LANES):
+            t[lane] = point[n]
+        evaluate_boundaries(first, 0, levels, t, x, values, ends)
+        evaluate_boundaries(second, 1, levels, t, x, other_values, ends)
+        widen_ranges(0, ends)
+        widen_ranges(1, ends)
+        count, stored = find_cells(q, k, ends, cells), 0
+        for start in range(0, count, LANES):
+            used = min(LANES, count - start)
+            for lane in range(LANES):
+                cell = cells[start + min(lane, used - 1)]
+                x[lane] = low + (cell // size + 0.5) * (span / size)
+                y[lane] = low + (cell % size + 0.5) * (span / size)
+            done = False
+            for iteration in range(ITERATIONS + 1):
+                invoke(first, (pointer(t), pointer(x), pointer(values)))
+                invoke(second, (pointer(t), pointer(y), pointer(other_values)))
+                if done or iteration == ITERATIONS:
+                    break
+                largest = newton_steps(q, k, low, high, x, y, values, other_values)
+                done = largest <= 1e-15 * span or (iteration > 3 and largest <= 1e-13 * span)
+            for lane in range(used):
+                if is_solution(q, k, lane, values, other_values):
+                    stored = store_new(n, x[lane], y[lane], span, solutions, stored)
+        counts[n] = stored

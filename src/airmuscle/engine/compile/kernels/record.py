@@ -6,8 +6,7 @@ from typing import Any
 
 import numba
 
-from .calls import as_vector, invoke, pointer
-from .parts import PART
+from .calls import CONTRACTED_PART, PART, as_vector, invoke, pointer
 
 
 @PART
@@ -118,3 +117,20 @@ def record(
             if not abs(outputs[row, i]) <= 1.7976931348623157e308:
                 return row
     return count
+
+
+@CONTRACTED_PART
+def set_inputs(base: Any, elapsed: Any, w: Any, u: Any) -> None:
+    """The inputs `u` so long after the start of a segment, where they were `base`; they move at `w`."""
+    for i in range(u.shape[0]):
+        u[i] = base[i] + elapsed * w[i]
+
+
+@CONTRACTED_PART
+def write_present(times: Any, row: Any, t: Any, y: Any, rows: Any) -> Any:
+    """Write the present states at the output times up to `t`; the next row."""
+    while row < times.shape[0] and times[row] <= t:
+        for i in range(y.shape[0]):
+            rows[row, i] = y[i]
+        row += 1
+    return row

@@ -1,17 +1,213 @@
-"""Kernel: a run by Rodas4, adaptive, through segments in which the inputs are linear."""
+"""Rodas4, a Rosenbrock method of order four for stiff systems: its step, and the kernel of an adaptive run.
+
+Hairer and Wanner, Solving Ordinary Differential Equations II (1996), section VI.4, method RODAS. Stiffly accurate,
+L-stable, six stages with one factorisation, dense output of order three. It carries the slope of inputs that are linear
+within a segment, and meets its end exactly. Exported programs print `single_step` and `state_between`.
+"""
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import Any
 
 import numba
 
 from ....core.diagnostics import Status
-from .parts import CONTRACTED_PART
-from .rodas4_step import interpolate, prepare_dense_output, take_step
-from .segments import write_present
+from .calls import CONTRACTED_PART, invoke, pointer
+from .record import set_inputs, write_present
 
 DONE, PAUSED = Status.DONE.value, Status.PAUSED.value
+STEP_TOO_SMALL, NOT_FINITE = Status.STEP_TOO_SMALL.value, Status.NOT_FINITE.value
+
+GAMMA, A21, C21 = 0.25, 1.544, -5.6688
+A31, A32 = 0.9466785280815826, 0.2557011698983284
+A41, A42, A43 = 3.314825187068521, 2.896124015972201, 0.9986419139977817
+A51, A52, A53, A54 = 1.221224509226641, 6.019134481288629, 12.53708332932087, -0.6878860361058950
+C31, C32 = -2.430093356833875, -0.2063599157091915
+C41, C42, C43 = -0.1073529058151375, -9.594562251023355, -20.47028614809616
+C51, C52, C53, C54 = 7.496443313967647, -10.24680431464352, -33.99990352819905, 11.70890893206160
+C61, C62, C63, C64, C65 = (
+    8.083246795921522, -7.981132988064893, -31.52159432874371, 16.31930543123136, -6.058818238834054,
+)  # fmt: skip
+D1, D2, D3, D4 = 0.25, -0.1043, 0.1035, -0.03620000000000023
+N2, N3, N4 = 0.386, 0.21, 0.63
+H21, H22, H23, H24, H25 = (
+    10.12623508344586, -7.487995877610167, -34.80091861555747, -7.992771707568823, 1.025137723295662,
+)  # fmt: skip
+H31, H32, H33, H34, H35 = (
+    -0.6762803392801253, 6.087714651680015, 16.43084320892478, 24.76722511418386, -6.594389125716872,
+)  # fmt: skip
+
+
+@CONTRACTED_PART
+def initial_step(y: Any, f0: Any, relative: Any, absolute: Any, left: Any) -> Any:
+    """The first step of a segment, from the sizes of states and rates; at most `left`."""
+    size = 0.0
+    rate = 0.0
+    for i in range(y.shape[0]):
+        scale = absolute[i] + relative * abs(y[i])
+        size += (y[i] / scale) * (y[i] / scale)
+        rate += (f0[i] / scale) * (f0[i] / scale)
+    h = left
+    if rate > 0.0:
+        h = min(h, 0.1 * sqrt(sqrt(relative)) * sqrt((size + 1.0) / rate))
+    return h
+
+
+@CONTRACTED_PART
+def compute_stages(
+    solve: Any, stage: Any, c: Any, factors: Any, y: Any, base: Any, w: Any, moving: Any, t: Any, start: Any, h: Any,
+    f0: Any, ft: Any, u: Any, x: Any, g: Any, k1: Any, k2: Any, k3: Any, k4: Any,
+) -> None:  # fmt: skip
+    """Stages one to four of a step from `t`; afterwards the inputs `u` are those at its end."""
+    n, r = y.shape[0], 1.0 / h
+    for i in range(n):
+        g[i] = f0[i] + h * D1 * ft[i]
+    invoke(solve, (pointer(factors), pointer(g), pointer(k1)))
+    if moving:
+        set_inputs(base, t + N2 * h - start, w, u)
+    for i in range(n):
+        x[i] = y[i] + A21 * k1[i]
+        g[i] = r * (C21 * k1[i]) + h * D2 * ft[i]
+    invoke(stage, (pointer(x), pointer(u), pointer(c), pointer(factors), pointer(g), pointer(k2)))
+    if moving:
+        set_inputs(base, t + N3 * h - start, w, u)
+    for i in range(n):
+        x[i] = y[i] + A31 * k1[i] + A32 * k2[i]
+        g[i] = r * (C31 * k1[i] + C32 * k2[i]) + h * D3 * ft[i]
+    invoke(stage, (pointer(x), pointer(u), pointer(c), pointer(factors), pointer(g), pointer(k3)))
+    if moving:
+        set_inputs(base, t + N4 * h - start, w, u)
+    for i in range(n):
+        x[i] = y[i] + A41 * k1[i] + A42 * k2[i] + A43 * k3[i]
+        g[i] = r * (C41 * k1[i] + C42 * k2[i] + C43 * k3[i]) + h * D4 * ft[i]
+    invoke(stage, (pointer(x), pointer(u), pointer(c), pointer(factors), pointer(g), pointer(k4)))
+    if moving:
+        set_inputs(base, t + h - start, w, u)
+
+
+@CONTRACTED_PART
+def compute_last_stages(
+    stage: Any, c: Any, factors: Any, y: Any, u: Any, h: Any, x: Any, g: Any,
+    k1: Any, k2: Any, k3: Any, k4: Any, k5: Any, k6: Any,
+) -> None:  # fmt: skip
+    """Stages five and six, at the end of the step."""
+    n, r = y.shape[0], 1.0 / h
+    for i in range(n):
+        x[i] = y[i] + A51 * k1[i] + A52 * k2[i] + A53 * k3[i] + A54 * k4[i]
+        g[i] = r * (C51 * k1[i] + C52 * k2[i] + C53 * k3[i] + C54 * k4[i])
+    invoke(stage, (pointer(x), pointer(u), pointer(c), pointer(factors), pointer(g), pointer(k5)))
+    for i in range(n):
+        x[i] += k5[i]
+        g[i] = r * (C61 * k1[i] + C62 * k2[i] + C63 * k3[i] + C64 * k4[i] + C65 * k5[i])
+    invoke(stage, (pointer(x), pointer(u), pointer(c), pointer(factors), pointer(g), pointer(k6)))
+
+
+@CONTRACTED_PART
+def finish_step(y: Any, x: Any, k6: Any, relative: Any, absolute: Any, yn: Any) -> Any:
+    """The states `yn` at the end of the step; its error in tolerances, rms over the states."""
+    error = 0.0
+    for i in range(y.shape[0]):
+        yn[i] = x[i] + k6[i]
+        part = k6[i] / (absolute[i] + relative * max(abs(y[i]), abs(yn[i])))
+        error += part * part
+    return sqrt(error / y.shape[0]) + 1e-16
+
+
+@CONTRACTED_PART
+def step_factor(error: Any) -> Any:
+    """The ratio of the next step to this one."""
+    ratio = 0.5
+    if error < 1e300:
+        ratio = min(6.0, max(0.2, 0.9 / sqrt(sqrt(error))))
+    return ratio
+
+
+@CONTRACTED_PART
+def take_step(
+    stage: Any, jac: Any, factor: Any, solve: Any, df_dt: Any, c: Any, y: Any, base: Any, w: Any, moving: Any,
+    t: Any, start: Any, end: Any, h: Any, relative: Any, absolute: Any, f0: Any, ft: Any, u: Any, x: Any, g: Any,
+    k1: Any, k2: Any, k3: Any, k4: Any, k5: Any, k6: Any, yn: Any, jacobian: Any, factors: Any,
+) -> Any:  # fmt: skip
+    """Try steps from `t`, beginning with `h` (0: to be found), until one is accepted; it leads from `y` to `yn`.
+
+    Returns a status, the step, the next step, whether it meets `end`, and the number of rejected steps.
+    """
+    set_inputs(base, t - start, w, u)
+    invoke(jac, (pointer(y), pointer(u), pointer(c), pointer(f0), pointer(jacobian)))
+    if moving:
+        invoke(df_dt, (pointer(y), pointer(u), pointer(c), pointer(w), pointer(ft)))
+    if h <= 0.0:
+        h = initial_step(y, f0, relative, absolute, end - t)
+    status, rejections = DONE, 0
+    while True:
+        last = t + 1.000001 * h >= end
+        tried = h
+        if last:
+            h = end - t
+        invoke(factor, (pointer(jacobian), (1.0 / h) / GAMMA, pointer(factors)))
+        compute_stages(solve, stage, c, factors, y, base, w, moving, t, start, h, f0, ft, u, x, g, k1, k2, k3, k4)
+        compute_last_stages(stage, c, factors, y, u, h, x, g, k1, k2, k3, k4, k5, k6)
+        error = finish_step(y, x, k6, relative, absolute, yn)
+        ratio = step_factor(error)
+        if error <= 1.0:
+            break
+        rejections += 1
+        h *= ratio
+        if h < 1e-14 * max(abs(t), end - start):
+            status = STEP_TOO_SMALL if error < 1e300 else NOT_FINITE
+            break
+    if rejections > 0:
+        ratio = min(ratio, 1.0)
+    following = h * ratio
+    if last:
+        following = max(following, tried)  # a step cut short by the end of a segment does not shorten the next
+    return status, h, following, last, rejections
+
+
+@CONTRACTED_PART
+def prepare_dense_output(k1: Any, k2: Any, k3: Any, k4: Any, k5: Any, d2: Any, d3: Any) -> None:
+    """The coefficients of the dense output of a step."""
+    for i in range(d2.shape[0]):
+        d2[i] = H21 * k1[i] + H22 * k2[i] + H23 * k3[i] + H24 * k4[i] + H25 * k5[i]
+        d3[i] = H31 * k1[i] + H32 * k2[i] + H33 * k3[i] + H34 * k4[i] + H35 * k5[i]
+
+
+@CONTRACTED_PART
+def interpolate(y: Any, yn: Any, d2: Any, d3: Any, q: Any, between: Any) -> None:
+    """The states `between` those before and after a step, `q` of the step after its beginning."""
+    p = 1.0 - q
+    for i in range(y.shape[0]):
+        between[i] = y[i] * p + q * (yn[i] + p * (d2[i] + q * d3[i]))
+
+
+@CONTRACTED_PART
+def single_step(
+    stage: Any, jac: Any, factor: Any, solve: Any, df_dt: Any, c: Any, y: Any, base: Any, w: Any, moving: Any,
+    t: Any, start: Any, end: Any, h: Any, relative: Any, nominal: Any, absolute: Any, f0: Any, ft: Any, u: Any, x: Any,
+    g: Any, k1: Any, k2: Any, k3: Any, k4: Any, k5: Any, k6: Any, yn: Any, jacobian: Any, factors: Any,
+    d2: Any, d3: Any,
+) -> Any:  # fmt: skip
+    """A step from `y` at `t` to `yn`, with its dense output; the absolute tolerance follows from the nominal states.
+
+    Returns a status, the time reached, the step, the next step, and the number of rejected steps.
+    """
+    for i in range(y.shape[0]):
+        absolute[i] = relative * nominal[i]
+        ft[i] = 0.0
+    status, h, following, last, rejections = take_step(
+        stage, jac, factor, solve, df_dt, c, y, base, w, moving, t, start, end, h, relative, absolute,
+        f0, ft, u, x, g, k1, k2, k3, k4, k5, k6, yn, jacobian, factors,
+    )  # fmt: skip
+    prepare_dense_output(k1, k2, k3, k4, k5, d2, d3)
+    reached = end if last else t + h
+    return status, reached, h, following, rejections
+
+
+@CONTRACTED_PART
+def state_between(y: Any, yn: Any, d2: Any, d3: Any, t: Any, h: Any, time: Any, between: Any) -> None:
+    """The states at a time within the step from `y` at `t` to `yn`."""
+    interpolate(y, yn, d2, d3, (time - t) / h, between)
 
 
 @CONTRACTED_PART
@@ -68,8 +264,7 @@ def rodas4(
     clock  (3,): time, next step (0: to be found), start of the current segment
     count  (4,): segment, next row, steps, rejected steps
     budget  steps after which the kernel pauses, so that its caller can be interrupted; call again to go on
-    work  (11 n + 2 m + jacobian_size + factor_size,): the caller owns it, because an array that a kernel makes
-          and then knows by address alone is freed before its last use
+    work  (11 n + 2 m + jacobian_size + factor_size,): of the caller; a kernel's own would be freed before its last use
     """
     f0, ft, x, yn, g, k, u, w, jacobian, factors = workspace(work, y.shape[0], values.shape[1], jacobian_size)
     k1, k2, k3, k4, k5, k6 = k

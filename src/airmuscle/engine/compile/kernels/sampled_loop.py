@@ -8,9 +8,8 @@ import numba
 
 from ....core.diagnostics import Status
 from ..kernel_layout import Progress, Waiting
-from .calls import call_kernel, invoke, pointer
+from .calls import PART, call_kernel, invoke, pointer
 from .driven_inputs import apply_drivers, is_full, load_columns, merge_inputs
-from .parts import PART
 
 DONE, PAUSED, NOT_FINITE = Status.DONE.value, Status.PAUSED.value, Status.NOT_FINITE.value
 NON_FINITE_COMMAND, BELOW_LIMIT = Status.NON_FINITE_COMMAND.value, Status.NEGATIVE_AIR_MASS.value

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
-from ..target import native
 from .emit import DECLARED
 
 LEVEL = 2
@@ -65,3 +65,20 @@ def engine_of(code: bytes) -> Any:
 def jit_compile(text: str) -> Any:
     """An engine with the machine code of LLVM text, for modules that are not stored."""
     return engine_of(object_code(text))
+
+
+@functools.cache
+def _target() -> Any:
+    import llvmlite.binding as llvm
+
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    return llvm.Target.from_default_triple()
+
+
+def native(level: int) -> Any:
+    """A code generator for this very processor, with so much optimisation (0 to 3); each engine owns its own."""
+    import llvmlite.binding as llvm
+
+    features = llvm.get_host_cpu_features().flatten()
+    return _target().create_target_machine(cpu=llvm.get_host_cpu_name(), features=features, opt=level)

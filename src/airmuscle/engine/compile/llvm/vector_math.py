@@ -16,8 +16,7 @@ import math
 from collections.abc import Collection, Sequence
 
 from .emit import STEADY_POWER, FunctionBody, function_of_values
-from .exact import ExactBody
-from .steady_power import steady_power
+from .exact import ExactBody, steady_power
 from .types import LlvmType
 
 LN2_HIGH, LN2_LOW = 0.693147180559890330187, 5.497923018708371e-14

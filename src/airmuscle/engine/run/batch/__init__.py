@@ -1,6 +1,6 @@
 """Batches: thousands of plants of one structure with different parameters, initial states and inputs, on all cores."""
 
-from .precision import Double, Precision, Single
+from .lanes import Double, Precision, Single
 from .run import simulate_batch
 from .solution import BatchSolution
 from .stepper import BatchStepper

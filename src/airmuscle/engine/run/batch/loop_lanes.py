@@ -16,9 +16,8 @@ from ...loop.control_law import ControlLaw
 from ..compiled_law import parameters_of, sample_in_lanes
 from ..integrators import ExplicitRungeKutta
 from .job import BatchJob
-from .lanes import aligned_arrays, retry_alone
+from .lanes import Double, aligned_arrays, retry_alone
 from .loops import LoopBatch
-from .precision import Double
 from .thread_pool import Queue
 
 NUMBER = Double().number

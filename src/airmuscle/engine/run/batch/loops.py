@@ -16,8 +16,7 @@ from ....core.errors import ParameterError
 from ....core.system import System
 from ...compile.program import CompiledSystem
 from ...loop.control_law import ControlLaw
-from ...loop.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop
-from ...loop.law_design import designed_loop
+from ...loop.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop, designed_loop
 from ..compiled_loop import CompiledLoop, CompiledRun
 from ..integrators import Integrator
 from ..problem import Problem

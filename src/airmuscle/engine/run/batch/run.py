@@ -26,12 +26,10 @@ from ..output_times import output_times as times_of
 from ..problem import check_input_range
 from .initial_states import check_states, count_of_states, default_states, given_states
 from .job import NOT_RUN, BatchJob
-from .lanes import check_precision, lane_workers
+from .lanes import Double, Precision, check_precision, lane_workers
 from .loop_lanes import loop_lane_workers, run_in_lanes
 from .loops import LoopBatch, loops_of, vary
-from .precision import Double, Precision
-from .solution import BatchSolution
-from .storage import InMemory, OnDisk
+from .solution import BatchSolution, InMemory, OnDisk
 from .thread_pool import Queue, progress, run_workers
 from .variations import Variations
 

@@ -16,8 +16,7 @@ from ...compile.program import compile_system
 from ...processes import available_cores
 from ...state import check_system
 from ..integrators import ExplicitRungeKutta
-from .lanes import ALIGNMENT
-from .precision import Double, Precision
+from .lanes import ALIGNMENT, Double, Precision
 
 Columns = npt.NDArray[Any]
 """An array (B, k, W) of B blocks of W lanes, in the precision of the batch."""

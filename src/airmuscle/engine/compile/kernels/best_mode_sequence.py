@@ -1,4 +1,7 @@
-"""Finite control set: the sequence of modes of a plant with the least cost, by enumeration with bounds."""
+"""Best sequence of the modes of a plant, such as open and closed valves: the one with the least predicted cost.
+
+By enumeration with bounds, the search of predictive control with a finite control set.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +10,8 @@ from typing import Any
 import numba
 
 from ....core.diagnostics import Status
-from .calls import invoke, pointer
-from .exponential import exponential_step
-from .parts import PART
+from .calls import PART, invoke, pointer
+from .matrices import exponential_step
 
 DONE, NOT_FINITE = Status.DONE.value, Status.NOT_FINITE.value
 
