@@ -93,8 +93,8 @@ class {name}(Friction):
     def force_along(self, displacement, time=None):
         return self.bristle_stiffness * deflection(displacement, self.slip)
 """
-CONTROLLER = """from ...engine.loop.siso import SisoController
-from ...engine.loop.split_range import Commanded, commands
+CONTROLLER = """from ...engine.loop import SisoController
+from ...engine.loop.control_law import Commanded, commands
 
 
 @model

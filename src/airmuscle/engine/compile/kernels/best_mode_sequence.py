@@ -1,4 +1,4 @@
-"""Best sequence of the modes of a plant, such as open and closed valves: the one with the least predicted cost.
+"""Best sequence of the modes of a plant, such as the states of on-off inputs: the one with the least predicted cost.
 
 By enumeration with bounds, the search of predictive control with a finite control set.
 """

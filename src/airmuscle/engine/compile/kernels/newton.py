@@ -1,4 +1,4 @@
-"""Newton's method on printed functions: g(x, p) = target of many unknowns, and all solutions of a pair of muscles."""
+"""Newton's method on printed functions: g(x, p) = target of many unknowns, and of pairs of functions."""
 
 from __future__ import annotations
 
