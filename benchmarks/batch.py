@@ -21,8 +21,8 @@ from ode8 import compilers
 import airmuscle as am
 from airmuscle.core import tree
 from airmuscle.engine import Double, Precision, Single
+from airmuscle.engine.processes import available_cores
 from airmuscle.engine.run.batch.initial_states import default_states
-from airmuscle.engine.run.batch.thread_pool import available_cores
 from airmuscle.engine.run.batch.variations import variations_of
 
 STEP, PLANTS, DURATION = 1e-3, 10_000, 5.0

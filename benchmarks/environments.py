@@ -17,7 +17,7 @@ from measure import Section, Target, format_time, print_section, time_variants
 import airmuscle as am
 from airmuscle.core.errors import AirmuscleWarning
 from airmuscle.engine import Double, Single
-from airmuscle.engine.run.batch.thread_pool import available_cores
+from airmuscle.engine.processes import available_cores
 
 COUNT, SUBSTEPS, PERIOD = 4096, 10, 0.01
 STEPS = 20

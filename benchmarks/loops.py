@@ -11,7 +11,7 @@ from measure import Section, Target, format_time, print_section
 
 import airmuscle as am
 from airmuscle.engine import BatchSolution
-from airmuscle.engine.run.batch.thread_pool import available_cores
+from airmuscle.engine.processes import available_cores
 
 COUNT, DURATION, SAMPLE_TIME = 10_000, 5.0, 5e-3
 SIMULATED = 400

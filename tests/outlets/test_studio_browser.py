@@ -234,12 +234,15 @@ def test_a_wrong_parameter_has_a_sentence_that_says_what_is_shown(muscle):
 def test_print_is_dark_on_white_in_dark_mode(browser, address):
     with opened(browser, address, scheme="dark") as page:
         wait_for(page, "muscle", "dmsp-20-300")
-        page.evaluate("addEventListener('beforeprint', () => { window.printed = document.documentElement.dataset.theme; })")
+        page.evaluate(
+            "addEventListener('beforeprint', () => { window.printed = document.documentElement.dataset.theme; })"
+        )
         page.pdf()
         assert page.evaluate("window.printed") == "light"
         assert page.evaluate("document.documentElement.dataset.theme") == "dark"
         page.emulate_media(media="print")
         assert not page.get_by_role("button", name="Save page").is_visible()
+
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [360, 768, 1600])

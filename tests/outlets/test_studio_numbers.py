@@ -305,7 +305,9 @@ console.log(JSON.stringify([r.status, r.columns]));
 def test_an_own_scenario_runs_under_its_controller_also_with_other_parameters(example, tmp_path):
     """With the drivers and sensors of the file, as the library computes it, to the tolerance of the integrator."""
     given = (EXAMPLES / f"{example}.toml").read_text(encoding="utf-8")
-    given = given.replace('"1.5 1/bar"', '"1.6 1/bar"')  # 1.5 gives a pulse as long as the delay of the valve, to rounding
+    given = given.replace(
+        '"1.5 1/bar"', '"1.6 1/bar"'
+    )  # 1.5 gives a pulse as long as the delay of the valve, to rounding
     sheet = sheet_of_scenario_text(given)
     script = scripts("numbers") + sheet.pop("script") + scripts("plant-start", "plant-run") + CONTROLLED
     path = "mechanism.mass" if example == "pressure_loop" else "mechanism.inertia"
@@ -318,7 +320,9 @@ def test_an_own_scenario_runs_under_its_controller_also_with_other_parameters(ex
         written = fill_template(sheet["toml"]["plant"], values) + sheet["toml"]["input"] + "\n" + sheet["toml"]["run"]
         recording = build_scenario(tomllib.loads(written), Location("page", "", Path())).simulate()
         assert status == 0
-        _, own, other = np.intersect1d(np.round(columns["time"], 9), np.round(recording["time"], 9), return_indices=True)
+        _, own, other = np.intersect1d(
+            np.round(columns["time"], 9), np.round(recording["time"], 9), return_indices=True
+        )
         np.testing.assert_allclose(columns["time"], 0.005 * np.arange(1 + round(sheet["duration"] / 0.005)), atol=1e-9)
         assert own.size > 100
         name = "pressure" if example == "pressure_loop" else "angle"
