@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import functools
 import multiprocessing
 import os
 import re
@@ -280,6 +281,15 @@ def local_dask():
         dask_cluster(cluster.scheduler_address) as executor,
     ):
         yield executor
+
+
+def test_each_worker_of_a_pool_has_one_thread_of_linear_algebra(monkeypatch):
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    environment = functools.partial(subprocess.check_output, shell=True, text=True)
+    with process_pool(2, one_thread_each=True) as pool:
+        said = set(pool.map(environment, ["sleep 0.3; echo $PPID has $OPENBLAS_NUM_THREADS"] * 8))
+    assert [text.split()[1:] for text in said] == [["has", "1"]] * 2
+    assert "OPENBLAS_NUM_THREADS" not in os.environ
 
 
 @pytest.mark.parametrize("place", [lambda: process_pool(3), threads, local_dask], ids=["processes", "threads", "dask"])

@@ -52,7 +52,8 @@ def process_pool(workers: int, *, one_thread_each: bool = False, terminate: bool
                             initargs=(stop_event, current_units()))  # fmt: skip
     try:
         with _one_thread_each() if one_thread_each else contextlib.nullcontext():
-            executor.submit(os.getpid)  # starts the workers
+            for _ in range(workers):  # each starts a worker, as none is idle yet
+                executor.submit(os.getpid)
         yield executor
     except BaseException:
         stop_event.set()
