@@ -514,8 +514,10 @@ def test_a_bad_scenario_says_where_and_writes_nothing(scenario: Path, tmp_path: 
 def one_paper(monkeypatch: pytest.MonkeyPatch) -> types.ModuleType:
     """A paper of one chapter in place of the true ones, which take seconds."""
     module = types.ModuleType("paper_of_a_test")
-    claims = (Claim("Saga 2007", "rings", Equal(4.0), 5.0, "1"), Claim("Saga 2007", "strain", None, 0.1, "1"))
-    module.chapter = lambda: Chapter("Saga 2007", "Straight fibres", "Text.", claims)  # type: ignore[attr-defined]
+    rings = [Claim("Saga 2007", "rings " * 40, Equal(4.0), value, "mm", case=f"line {value}") for value in (5.0, 6.0)]
+    claims = (*rings, Claim("Saga 2007", "strain", None, 0.1, "1"))
+    answers = (("May I use it?", "No."),)
+    module.chapter = lambda: Chapter("Saga 2007", "Straight fibres", "Text.", claims, answers=answers)  # type: ignore[attr-defined]
     monkeypatch.setitem(sys.modules, module.__name__, module)
     monkeypatch.setattr(run, "PAPERS", {"saga2007": module.__name__})
     return module
@@ -526,9 +528,14 @@ def test_reproduce_prints_the_claims_and_names_the_report_last(tmp_path: Path):
     result = airmuscle("reproduce", "saga", "--out", tmp_path / "report")
     assert result.exit_code == 0, "a claim that differs is a result, not a failure"
     assert result.stdout.splitlines()[-1] == f"report: {tmp_path / 'report' / 'report.html'}"
-    assert re.search(r"Saga 2007 +rings +4 +5 +✗ differs", result.stdout)
+    assert "Straight fibres\nMay I use it? No.\n" in result.stdout
+    lines = [line for line in result.stdout.splitlines() if "rings" in line]
+    assert len(lines) == 1, "one line a claim, which is cut"
+    assert re.fullmatch(r"(rings )+… +4 +5 to 6 mm +✗ differs *", lines[0])
+    assert re.search(r"\nstrain +– +0.1 +– not printed", result.stdout)
     assert "\n2 claims: 1 differs, 1 not printed\n" in result.stdout
     assert [c["verdict"] for c in json.loads((tmp_path / "report" / "claims.json").read_text())] == [
+        "differs",
         "differs",
         "not printed",
     ]

@@ -41,14 +41,21 @@ from airmuscle.report import (
     write_report,
 )
 from airmuscle.report.chapter import statements
-from airmuscle.report.formatting import MARKS, MEANINGS, count_verdicts, format_number, format_published
+from airmuscle.report.formatting import (
+    MARKS,
+    MEANINGS,
+    count_verdicts,
+    format_number,
+    format_published,
+    format_reproduced,
+)
 from airmuscle.report.html import MAX_SVG_BYTES, render_cell, render_header
 from airmuscle.units import display
 
 pytestmark = pytest.mark.drawn
 DATE = datetime.date(2024, 5, 17)
 KEYS = {
-    "paper", "kind", "claim", "statement", "case", "published", "expected", "reproduced", "unit", "tolerance", "verdict",
+    "paper", "kind", "claim", "statement", "case", "place", "published", "expected", "reproduced", "unit", "tolerance", "verdict",
     "note",
 }  # fmt: skip
 
@@ -136,6 +143,7 @@ def test_claims_come_back_from_json_as_they_went_in(report: Path):
         "unit": "N",
         "tolerance": 1.0,
         "verdict": "holds",
+        "place": "",
         "note": "as Fig. 7",
     }
     assert [claim["verdict"] for claim in claims[:5]] == ["holds", "holds", *["not printed"] * 3]
@@ -552,6 +560,33 @@ def test_the_readings_of_a_claim_are_folded_beneath_it_and_counted(tmp_path: Pat
     assert "<summary>3 readings: 2 hold, 1 differs</summary>" in page
     assert page.count("<details") == 1
     assert page.count(">strong") == 1, "the claim stands once"
+
+
+def test_the_range_of_the_readings_and_the_place_of_a_claim_are_seen_without_unfolding(tmp_path: Path):
+    """The range contains the readings with the criterion and the unit of the first one."""
+    share = Claim("paper", "strong", AtLeast(100.0), 87.0, "%", case="all chosen values")
+    claims = (*(dataclasses.replace(case, place="Fig. 8") for case in cases(2.0, None, 0.5)), share)
+    (statement,) = statements(claims)
+    assert format_reproduced(statement) == "0.5 to 2"
+    page = write_report([Chapter("paper", "t", "s", claims)], tmp_path, date=DATE).read_text(encoding="utf-8")
+    unfolded = page.partition("<details")[0]
+    assert ">≥ 1<" in unfolded
+    assert ">0.5 to 2<" in unfolded
+    assert ">Fig. 8<" in unfolded
+    assert "no page numbers" in unfolded
+    assert format_reproduced(statements(cases(3.0, 3.0))[0]) == "3"
+    assert format_reproduced(statements(cases(None))[0]) == "–"
+
+
+def test_answers_terms_and_commands_stand_before_the_claims_and_a_folded_table_after_its_title(tmp_path: Path):
+    chapter = Chapter(
+        "paper", "t", "Summary.", cases(2.0), (Table("long", "A long table", {"x [1]": [1.0]}, folded=True),),
+        answers=(("May I use it?", "Yes & no."),), terms=((r"\(w\)", "A factor."),), commands=(("airmuscle list", "Names."),),
+    )  # fmt: skip
+    page = write_report([chapter], tmp_path, date=DATE).read_text(encoding="utf-8")
+    order = ["<dt>May I use it?</dt><dd>Yes &amp; no.</dd>", "Summary.", "A factor.", "<code>airmuscle list</code>",
+             "Claims of the paper", '<details class="table"><summary']  # fmt: skip
+    assert sorted(order, key=page.index) == order
 
 
 def test_the_page_explains_each_verdict_and_counts_each_kind_first(tmp_path: Path):

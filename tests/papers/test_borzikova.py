@@ -8,6 +8,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from chapter_words import visible_words
 
 from airmuscle.bench.identify.surface.basis import LoadRange
 from airmuscle.papers import borzikova
@@ -221,3 +222,5 @@ def test_the_chapter_is_complete():
     breaks = next(t for t in chapter.tables if t.name == "borzikova_breaks")
     assert set(breaks.columns["surface"]) == {CORRECTED, EXPONENTIAL}
     assert breaks.note == f"Without violations: {MONOTONE}."
+    assert all(claim.place for claim in chapter.claims if claim.kind is Kind.CLAIM)
+    assert visible_words(chapter) <= 1350

@@ -6,6 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from chapter_words import visible_words
 
 from airmuscle.bench import fit
 from airmuscle.engine import ZERO_INPUT, DormandPrince8, RungeKutta4, SampledSignal, simulate
@@ -270,6 +271,11 @@ def test_every_chosen_number_stands_in_the_chapter_with_its_range(chapter):
     (deviations,) = [c for c in chapter.claims if "larger deviations during filling" in c.claim]
     assert "Filling is affected more than discharging" in deviations.note
     assert deviations.verdict == NOT_TESTABLE
+
+
+def test_the_chapter_names_the_place_of_each_claim_in_few_words(chapter):
+    assert all(claim.place for claim in chapter.claims if claim.kind is Kind.CLAIM)
+    assert visible_words(chapter) <= 1950
 
 
 @pytest.fixture(scope="module")

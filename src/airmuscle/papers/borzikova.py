@@ -11,17 +11,7 @@ from .borzikova_claims import PAPER, claims
 from .borzikova_figures import plots
 from .borzikova_surfaces import surfaces
 from .borzikova_tables import tables
-
-SUMMARY = (
-    r"The paper describes the contraction by \(k = k_\text{max}\,(1 - \text{e}^{v})\) with the exponent "
-    r"\(v = \sum_{i=0}^{4} \sum_{j=0}^{2} a_{ij}\,p^i F^j\), equation (1), where \(p\) is in bar and \(F\) in N. "
-    "Its measurements are lost; its three printed plane curves are used instead.\n\n"
-    r"The printed matrix cannot be the exponent \(v\). It is the direct polynomial "
-    r"\(k = \sum a_{ij}\,p^i F^j\) in per cent, with one misprinted exponent and two coefficients with too few "
-    "digits. Equation (1), fitted here, reproduces the curves exactly with both fitting procedures, because "
-    "three loads determine a quadratic in the force. Between the loads both surfaces violate the monotonicity "
-    "of a muscle, so a monotone surface is given as well."
-)
+from .texts import chapter_texts
 
 CHOSEN = (
     ("maximum pressure", "3.5 bar", "inferred: the catalogue pressure; the range is not printed"),
@@ -47,12 +37,11 @@ def chapter() -> Chapter:
     curves = SAM_30X290
     laws = surfaces(curves)
     return Chapter(
-        paper=PAPER,
-        title="Borzíková, Balara, Piteľ: contraction of the Shadow Air Muscle SAM 30 × 290",
-        summary=SUMMARY,
+        PAPER,
         claims=claims(curves, laws),
         tables=tables(curves, laws),
         plots=plots(curves, laws),
         references=(BORZIKOVA,),
         chosen=CHOSEN,
+        **chapter_texts(PAPER),
     )

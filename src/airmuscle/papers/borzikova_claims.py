@@ -119,13 +119,14 @@ _DIAMETERS = {load: diameter for diameter, load in _TEXT.items()}
 CURVES: tuple[ClaimRow, ...] = tuple(
     ClaimRow("correlation index of the plane curve", Equal(curve.printed_index, 0.0005), "1", None,
         "The index compares the curve with the measured points, which are lost, so it cannot be computed.",
-        {f"{curve.force:g} N": ()}, untestable=True)
+        {f"{curve.force:g} N": ()}, untestable=True, place="Fig. 4, plane curves")
     for curve in SAM_30X290.curves
 )  # fmt: skip
 SURFACE = ClaimRow(
     "correlation index of the surface on the three plane curves, not below the minimum printed for these",
     AtLeast(min(c.printed_index for c in SAM_30X290.curves), 0.0005, derived=True), "1", surface_index,
     cases={name: (name,) for name in (AS_EXPONENT, PRINTED, MISPRINT_CORRECTED, CORRECTED, EXPONENTIAL)},
+    place="equation (1), printed matrix",
 )  # fmt: skip
 RANK = ClaimRow(
     rf"{len(SAM_30X290.curves)} loads determine the coefficients of equation (1), of degree 4 in \(p\) and 2 in \(F\)",
@@ -137,30 +138,33 @@ PROCEDURE = ClaimRow(
     r"the linearised fit of equation (1) minimises \(S(A)\): ratio of its rms error to that of least squares on \(k\)",
     Equal(1.0, 0.005, derived=True), "1", linearised_ratio, "Plane curves rounded to 0.5 %:",
     {r"linear fit of \(\ln(1 - k/k_\text{max})\)": (False,),
-     r"repeated linearisation of \(f\) (Gauss-Newton)": (True,)},
+     r"repeated linearisation of \(f\) (Gauss-Newton)": (True,)}, place=r"method, sum \(S(A)\)",
 )  # fmt: skip
 LOAD = ClaimRow(
     "a load of 26 kg is 260 N", Equal(260.0, 0.5), "N", lambda: 26.0 * STANDARD_GRAVITY,
     r"The paper uses \(g\) = 10 m/s²; with standard gravity the loads are 44.1, 127.5 and 255.0 N. The printed values "
-    "are used.",
+    "are used.", place="plane curves",
 )  # fmt: skip
 CATALOGUE: tuple[ClaimRow, ...] = (
     *(ClaimRow("catalogue table: load that the muscle lifts at 3.5 bar", Equal(float(_TABLE[size])), "kg",
         lambda size: float(_TEXT[size]), "The reproduced value is the load in the text of the same paper at 25 % "
         "contraction and an unknown pressure; the table gives the force at 3.5 bar. The two cannot be compared.",
-        {case: (size,)}, untestable=True) for size, case in ((30, "30 x 290"), (20, "20 x 210"))),
+        {case: (size,)}, untestable=True, place="catalogue") for size, case in ((30, "30 x 290"), (20, "20 x 210"))),
     ClaimRow("catalogue table: diameter of the smallest muscle", Equal(6.0), "mm", lambda: float(_DIAMETERS[3]),
-        "The text gives the same length of 150 mm and the same load of 3 kg with this diameter."),
+        "The text gives the same length of 150 mm and the same load of 3 kg with this diameter.",
+        place="catalogue"),
 )  # fmt: skip
 MUSCLE: tuple[ClaimRow, ...] = (
     ClaimRow("text: 25 % contraction under a load", AtLeast(25.0), "%", largest_of_size, untestable=True,
-        cases={f"{load} kg, diameter {size} mm": (size,) for size, load in _TEXT.items()}),
+        cases={f"{load} kg, diameter {size} mm": (size,) for size, load in _TEXT.items()}, place="catalogue"),
     ClaimRow(r"the contraction saturates at \(k_\text{max}\) = 40 %: maximum over the pressure range",
-        Equal(100.0 * SATURATION, 0.5), "%", lambda curves: largest_contraction(curves, "smallest")),
-    ClaimRow("a load is needed in the initial position", None, "N", initial_load, untestable=True),
+        Equal(100.0 * SATURATION, 0.5), "%", lambda curves: largest_contraction(curves, "smallest"),
+        place="equation (1)"),
+    ClaimRow("a load is needed in the initial position", None, "N", initial_load, untestable=True,
+        place="text"),
     ClaimRow("the characteristic is the mean of filling and emptying", None, "%", lambda curves: None,
         "The two branches are not printed, so that neither the hysteresis nor the error of the mean can be computed.",
-        untestable=True),
+        untestable=True, place="text"),
 )  # fmt: skip
 
 

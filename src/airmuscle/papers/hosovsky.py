@@ -28,20 +28,7 @@ from .hosovsky_plant import (
     surface,
     surface_fit,
 )
-
-SUMMARY = r"""The equation of motion (1) is
-\(m\,\ddot{y} + F_\text{TL} + F_\text{PP} = F_\text{KE} - F_\text{E}\), with the forces of the damper \(F_\text{TL}\),
-the parallel spring \(F_\text{PP}\) and the contractile element \(F_\text{KE}\), and the external force \(F_\text{E}\).
-\(F_\text{KE}\) is a polynomial of total degree five in contraction and pressure with 21 coefficients, limited to 0 to
-1200 N. Two on/off valves by ISO 6358 fill and discharge the muscle.
-
-The paper prints neither the coefficients nor mass, spring, damper and geometry. The surface is fitted to the measured
-force map of a DMSP-20-300, and alternatively to the table of Festo's sizing tool. Valves, supply, schedule, released
-mass and integrator are as printed. All other values are listed below with their sources. Every statement on the quick
-release is evaluated for the nominal values, for each chosen value varied alone, and for all of them varied together.
-
-Equation (11) multiplies a volume flow by \(P_0\) = 100 kPa. The default here is the mass flow of ISO 6358, for which
-\(R\,T_0\,\rho_0\) = 99.72 kPa stands in its place; both are evaluated."""
+from .texts import chapter_texts
 
 
 def coefficient_table() -> Table:
@@ -74,8 +61,6 @@ def chapter(
     explanation = f"{causing.describe_effects(effects)} {causing_over_ranges.describe_ranges(ratios)}"
     return Chapter(
         PAPER,
-        "Hošovský et al.: muscle dynamics by Hill's model",
-        SUMMARY,
         claims=(
             *surface_claims(surface_fit()),
             *fill_claims(fill, explanation),
@@ -97,6 +82,7 @@ def chapter(
         plots=_plots(fill, effects, low, high),
         references=(*cite(fill.plant), MATRIX_CATALOGUE, *cite(law_file.load_law(FORCE_MAPS[0]))),
         chosen=(*parameters.as_rows(), *suspected.as_rows()),
+        **chapter_texts(PAPER),
     )
 
 

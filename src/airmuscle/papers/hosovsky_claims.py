@@ -68,16 +68,17 @@ FILL: tuple[ClaimRow, ...] = (
 )  # fmt: skip
 DEVIATIONS = ClaimRow(
     "model and muscle agree well during discharge, with larger deviations during filling", None, "kPa", None,
-    "The measured curve of Fig. 3 gives no values.", untestable=True,
+    "The measured curve of Fig. 3 gives no values.", untestable=True, place="Fig. 3",
 )  # fmt: skip
 MEASUREMENT: tuple[ClaimRow, ...] = (
     ClaimRow(f"the pressure sensor of 0 to {SENSOR_RANGE:g} MPa covers the step of 650 kPa: largest gauge pressure",
         AtMost(SENSOR_RANGE), "MPa", lambda step: step,
         "The paper does not state whether step and range are gauge or absolute; the range is taken as gauge.",
-        {"step absolute": (SUPPLY_PRESSURE / 1e6,), "step gauge": (0.65,)}),
+        {"step absolute": (SUPPLY_PRESSURE / 1e6,), "step gauge": (0.65,)},
+        place="instruments"),
     ClaimRow("the hysteresis of a fluidic muscle is less pronounced", None, "%", None,
         "No branches of a fluidic muscle and of another muscle are printed, so that they cannot be compared.",
-        untestable=True),
+        untestable=True, place="text"),
 )  # fmt: skip
 NEGLIGIBLE_NOTE = " A tenth of the effect of heat transfer is negligible (chosen)."
 GAS = {

@@ -23,13 +23,13 @@ MAX_DAMPING_DIFFERENCE = 0.30
 COMPARABLE = AtMost(MAX_DAMPING_DIFFERENCE, chosen=True)
 STATEMENTS: Mapping[str, ClaimRow] = {
     "acceleration": ClaimRow("a higher initial pressure gives a higher initial acceleration: difference",
-        AtLeast(0.0, derived=True), "m/s2"),
+        AtLeast(0.0, derived=True), "m/s2", place="Fig. 4"),
     "contraction": ClaimRow("a higher initial pressure gives a larger maximum contraction: difference",
-        AtLeast(0.0, derived=True), "%"),
+        AtLeast(0.0, derived=True), "%", place="Fig. 4"),
     "relative damping": ClaimRow("relative damping is comparable: relative difference of the damping ratios",
-        COMPARABLE, "1"),
+        COMPARABLE, "1", place="Fig. 4"),
     "absolute damping": ClaimRow("absolute damping is comparable: relative difference of the decay rates",
-        COMPARABLE, "1"),
+        COMPARABLE, "1", place="Fig. 4"),
 }  # fmt: skip
 """The four statements of the paper on the quick release, each with its criterion."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -70,7 +71,8 @@ def _chapters(selected: Sequence[str], pool: Executor | None) -> Iterator[tuple[
 def _compute(module: str) -> tuple[Chapter, float]:
     start = time.perf_counter()
     chapter = importlib.import_module(module).chapter()
-    return chapter, time.perf_counter() - start
+    tables = tuple(dataclasses.replace(table, folded=True) for table in chapter.tables)
+    return dataclasses.replace(chapter, tables=tables), time.perf_counter() - start
 
 
 def _compute_in_worker(module: str) -> tuple[Chapter, float]:

@@ -129,7 +129,7 @@ def relative_angle_error(name: str, line: str) -> tuple[float, str]:
 
 
 FEED_FORWARD = ClaimRow(
-    "7. Feed-forward control of a pair of muscles, greatest error of all angles relative to the greatest angle",
+    "Feed-forward control of a pair of muscles, greatest error of all angles relative to the greatest angle",
     AtMost(LIMIT, chosen=True), "%", relative_angle_error,
     f"Pulley radius {1e3 * RADIUS:g} mm, {100 * OFFSET:g} % contraction at angle 0, {TENSION:g} N in both muscles, "
     f"angles to {np.degrees(ANGLES[-1]):g} degrees: chosen. The paper describes no control experiment.",

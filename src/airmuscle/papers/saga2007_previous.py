@@ -156,6 +156,7 @@ PREVIOUS_MODEL = ClaimRow(
         f"line A, constant load of {FIG_1_LOAD:g} N": (radii_at_load,),
         "line A, constant contraction": (radii_at_contraction,),
     },
+    place="Fig. 1, equations (A) and (B)",
 )
 
 

@@ -103,7 +103,8 @@ class Claim:
     counts once. `printed` is None if the paper gives no value to compare with, `reproduced` is None if no value can be
     computed; in both cases the verdict is "not printed". `untestable` marks a statement that no
     computation can decide, because its measurements are lost, its condition is not printed or every law fulfils it: its
-    verdict is "not testable". `note` gives the reason of a difference, or the values chosen.
+    verdict is "not testable". `place` is where the paper states it, `note` gives the reason of a difference, or the
+    values chosen.
     """
 
     paper: str
@@ -115,6 +116,7 @@ class Claim:
     case: str = ""
     kind: Kind = Kind.CLAIM
     untestable: bool = False
+    place: str = ""
 
     @property
     def text(self) -> str:
@@ -138,6 +140,7 @@ class Claim:
             "claim": to_plain(self.text),
             "statement": to_plain(self.claim),
             "case": to_plain(self.case),
+            "place": to_plain(self.place),
             "published": printed.value if printed and printed.published else None,
             "expected": printed.value if printed and printed.derived else None,
             "reproduced": self.reproduced,
@@ -164,13 +167,15 @@ class ClaimRow:
     cases: Mapping[str, tuple[Any, ...]] = dataclasses.field(default_factory=lambda: {"": ()})
     kind: Kind = Kind.CLAIM
     untestable: bool = False
+    place: str = ""
 
     def claim(self, paper: str, case: str, *arguments: Any) -> Claim:
         """Return the claim of one paper in one case, evaluated for these arguments."""
         found = self.reproduce(*arguments) if self.reproduce else arguments or None
         value, reason = found if isinstance(found, tuple) else (found, "")
         note = f"{self.note} {reason}".strip()
-        return Claim(paper, self.text, self.printed, value, self.unit, note, case, self.kind, self.untestable)
+        shared = (self.kind, self.untestable, self.place)
+        return Claim(paper, self.text, self.printed, value, self.unit, note, case, *shared)
 
     def claims(self, paper: str, *subject: Any) -> tuple[Claim, ...]:
         """Return the claims of all cases; the function is given the subject before the arguments of the case."""
@@ -189,6 +194,13 @@ class Statement:
         """The note of several cases that have the same one; otherwise empty."""
         notes = {case.note for case in self.cases}
         return notes.pop() if len(notes) == 1 < len(self.cases) else ""
+
+    @property
+    def reproduced(self) -> list[float]:
+        """The values of the cases that have the expected value and the unit of the first one."""
+        first = self.cases[0]
+        alike = (case.reproduced for case in self.cases if (case.printed, case.unit) == (first.printed, first.unit))
+        return [value for value in alike if value is not None and math.isfinite(value)]
 
     @property
     def verdict(self) -> str:
@@ -217,6 +229,8 @@ class Table(ShortRepr):
     note: str = ""
     shown: bool = True
     """Whether the page shows it; long series are only written to their file."""
+    folded: bool = False
+    """Whether the page shows its title alone until the reader unfolds it."""
 
     def __post_init__(self) -> None:
         lengths = {
@@ -260,3 +274,9 @@ class Chapter(ShortRepr):
     chosen: tuple[tuple[str, str, str], ...] = ()
     """Values used for the figures: (meaning, value with unit, source or "chosen")."""
     equations: tuple[DisplayedEquation, ...] = ()
+    answers: tuple[tuple[str, str], ...] = ()
+    """Questions of a reader with answers of one sentence or two, before the summary."""
+    terms: tuple[tuple[str, str], ...] = ()
+    """Terms of the chapter with their definitions, after the answers."""
+    commands: tuple[tuple[str, str], ...] = ()
+    """Commands that evaluate a model of the chapter with other parameters, each with what it shows."""

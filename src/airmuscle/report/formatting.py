@@ -124,12 +124,12 @@ def typographic(text: str) -> str:
     return re.sub(r"(?<![\w.)])-(?=[\d∞])", "−", _EXPONENT.sub(power, text))
 
 
-def format_published(claim: Claim) -> str:
+def format_published(claim: Claim, *, with_tolerance: bool = True) -> str:
     """Return the published value with its relation and tolerance: `≥ 4`, `20 ± 0.5`; an en dash if there is none."""
     if claim.printed is None:
         return MISSING
     relation = _RELATIONS.get(type(claim.printed), "")
-    tolerance = f" ± {format_number(claim.printed.tolerance)}" if claim.printed.tolerance else ""
+    tolerance = f" ± {format_number(claim.printed.tolerance)}" if claim.printed.tolerance and with_tolerance else ""
     origin = " (chosen)" if claim.printed.chosen else " (derived)" if claim.printed.derived else ""
     return f"{relation}{format_number(claim.printed.value)}{tolerance}{origin}"
 
@@ -138,6 +138,14 @@ def count_verdicts(claims: Iterable[Claim], kind: Kind = Kind.CLAIM) -> dict[str
     """Return the number of statements of one kind with each verdict; the cases of a statement count once."""
     verdicts = [statement.verdict for statement in statements(claims, kind)]
     return {verdict: verdicts.count(verdict) for verdict in MARKS}
+
+
+def format_reproduced(statement: Statement, digits: int = DIGITS) -> str:
+    """Return the reproduced value of a statement, or the range of its readings: `1.64 to 41.18`."""
+    if not statement.reproduced:
+        return MISSING
+    low, high = (format_number(end(statement.reproduced), digits) for end in (min, max))
+    return low if low == high else f"{low} to {high}"
 
 
 def format_verdicts(count: int, verdict: str) -> str:

@@ -21,6 +21,7 @@ from .formatting import (
     format_cell,
     format_p_value,
     format_published,
+    format_reproduced,
     format_unit,
     format_verdicts,
     is_number_text,
@@ -33,6 +34,8 @@ MAX_SVG_BYTES = 600_000
 """Figures with a larger SVG are embedded as PNG: a dense chart would make the page slow."""
 MAX_LINE = 26
 """Characters of a text in a table cell that is not wrapped."""
+MAX_OPEN_ROWS = 12
+"""Rows of the table of values and their sources up to which it is not folded."""
 SYMBOL, UNIT = "symbol", "unit"
 """Headers of columns with a special format."""
 _BRACKETS = re.compile(r"\s*\[([^\]]*)\]$")
@@ -53,6 +56,7 @@ def render_page(chapters: Sequence[Chapter], figures: Path, *, title: str, date:
         equation=lambda latex: Markup(to_display_mathml(latex)),
         plain=to_plain,
         published=lambda claim: typographic(format_published(claim)),
+        reproduced=lambda statement: typographic(format_reproduced(statement)),
         unit=format_unit,
         anchor=anchor,
         paragraphs=paragraphs,
@@ -76,6 +80,7 @@ def render_page(chapters: Sequence[Chapter], figures: Path, *, title: str, date:
         meanings=MEANINGS,
         versions=versions(),
         zip=zip,
+        MAX_OPEN_ROWS=MAX_OPEN_ROWS,
         image=lambda plot: image_data_uri(figures / plot.name),
     )
 

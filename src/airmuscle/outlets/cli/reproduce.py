@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,15 +12,30 @@ from ...core.errors import AirmuscleError
 from ...engine.processes import available_cores
 from ...papers.run import reproduce as reproduce_papers
 from ...papers.run import select_papers
-from ...report.chapter import DEPENDS, DIFFERS, HOLDS, NOT_PRINTED, NOT_TESTABLE, Chapter, Claim, Kind
-from ...report.formatting import MARKS, count_verdicts, format_number, format_published
+from ...report.chapter import (
+    DEPENDS,
+    DIFFERS,
+    HOLDS,
+    NOT_PRINTED,
+    NOT_TESTABLE,
+    Chapter,
+    Claim,
+    Kind,
+    Statement,
+    statements,
+)
+from ...report.formatting import MARKS, count_verdicts, format_published, format_reproduced
 from ...report.formula import to_plain
 from .options import Folder
-from .terminal import echo, print_table
+from .terminal import WIDE_GAP, echo, print_table, table_width
 
 if TYPE_CHECKING:
     from rich.text import Text
 
+HEADERS = ("claim", "expected", "reproduced", "verdict")
+MIN_CLAIM = 28
+"""Smallest number of characters of a statement in the terminal, where the others are cut (chosen)."""
+PREFIXES = {Kind.CLAIM: "", Kind.FINDING: "comparison: ", Kind.CHECK: "check: "}
 COLOURS = {HOLDS: "green", DIFFERS: "bold red", DEPENDS: "yellow", NOT_TESTABLE: "dim", NOT_PRINTED: "dim"}
 
 
@@ -56,22 +72,29 @@ def reproduce(
         if chapters:
             echo(f"\nthe completed chapters were written to {out}", err=True)
         raise
-    _print_claims([claim for name in select_papers(papers) for claim in chapters[name].claims])
+    for name in select_papers(papers):
+        _print_chapter(chapters[name])
+    _print_counts([claim for chapter in chapters.values() for claim in chapter.claims])
     echo(f"report: {page}")
 
 
-def _print_claims(claims: list[Claim]) -> None:
-    """Print one table for each kind, and the number of statements by verdict, in which cases count once."""
-    headers = ("paper", "{}", "expected", "reproduced", "unit", "verdict")
-    for kind in Kind:
-        rows = [
-            (c.paper, to_plain(c.text), format_published(c), format_number(c.reproduced), _unit(c), _verdict(c.verdict))
-            for c in claims
-            if c.kind is kind
-        ]
-        if rows:
-            echo(f"\n{kind.description}")
-            print_table([h.format(kind.value) for h in headers], rows, right=("expected", "reproduced"))
+def _print_chapter(chapter: Chapter) -> None:
+    """Print one line for each statement; the readings of a statement are in the report."""
+    echo(f"\n{chapter.title}")
+    for question, answer in chapter.answers:
+        echo(textwrap.fill(f"{question} {to_plain(answer)}", table_width(), subsequent_indent="  "))
+    found = [(kind, each) for kind in Kind for each in statements(chapter.claims, kind)]
+    values = [(_expected(each), _reproduced(each), _verdict(each.verdict)) for _, each in found]
+    columns = zip(HEADERS[1:], *values, strict=True)
+    room = max(MIN_CLAIM, table_width() - sum(max(len(str(cell)) for cell in column) + WIDE_GAP for column in columns))
+    texts = (f"{PREFIXES[kind]}{to_plain(each.claim)}" for kind, each in found)
+    rows = [(textwrap.shorten(text, room, placeholder=" …"), *row) for text, row in zip(texts, values, strict=True)]
+    print_table(HEADERS, rows, right=HEADERS[1:3])
+
+
+def _print_counts(claims: list[Claim]) -> None:
+    """Print the number of statements by verdict, in which the readings of a statement count once."""
+    echo()
     for kind in Kind:
         counts = {verdict: count for verdict, count in count_verdicts(claims, kind).items() if count}
         total = sum(counts.values())
@@ -80,8 +103,13 @@ def _print_claims(claims: list[Claim]) -> None:
             echo(f"{total} {kind.value}{'s' if total > 1 else ''}: {listed}")
 
 
-def _unit(claim: Claim) -> str:
-    return "" if claim.unit == "1" else claim.unit
+def _expected(statement: Statement) -> str:
+    return format_published(statement.cases[0], with_tolerance=False)
+
+
+def _reproduced(statement: Statement) -> str:
+    unit = "" if statement.cases[0].unit == "1" or not statement.reproduced else statement.cases[0].unit
+    return f"{format_reproduced(statement, 3)} {unit}".rstrip()
 
 
 def _verdict(verdict: str) -> Text:

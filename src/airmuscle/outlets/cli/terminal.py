@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import sys
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -41,9 +42,7 @@ def print_table(headers: Sequence[str], rows: Iterable[Sequence[Any]], *, right:
 
     scales = [heading_scale(header) for header in headers]  # the units chosen for display
     cells = [[_cell(cell, factor) for cell, (factor, _) in zip(row, scales, strict=True)] for row in rows]
-    console = Console(
-        width=None if sys.stdout.isatty() or "COLUMNS" in os.environ else WIDE, highlight=False, emoji=False
-    )
+    console = Console(width=table_width(), highlight=False, emoji=False)
     headings = [without_markup(scale[1]) for scale in scales]
     widths, gap = _column_widths(headings, cells, console.width)
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, header_style="bold",
@@ -54,6 +53,11 @@ def print_table(headers: Sequence[str], rows: Iterable[Sequence[Any]], *, right:
     for row in cells:
         table.add_row(*row)
     console.print(table)
+
+
+def table_width() -> int:
+    """The width of a table [characters]: that of the terminal, or `WIDE`."""
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() or "COLUMNS" in os.environ else WIDE
 
 
 def _column_widths(headings: Sequence[str], cells: Sequence[Sequence[Any]], width: int) -> tuple[list[int | None], int]:
