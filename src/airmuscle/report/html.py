@@ -34,8 +34,6 @@ MAX_SVG_BYTES = 600_000
 """Figures with a larger SVG are embedded as PNG: a dense chart would make the page slow."""
 MAX_LINE = 26
 """Characters of a text in a table cell that is not wrapped."""
-MAX_OPEN_ROWS = 12
-"""Rows of the table of values and their sources up to which it is not folded."""
 SYMBOL, UNIT = "symbol", "unit"
 """Headers of columns with a special format."""
 _BRACKETS = re.compile(r"\s*\[([^\]]*)\]$")
@@ -80,7 +78,6 @@ def render_page(chapters: Sequence[Chapter], figures: Path, *, title: str, date:
         meanings=MEANINGS,
         versions=versions(),
         zip=zip,
-        MAX_OPEN_ROWS=MAX_OPEN_ROWS,
         image=lambda plot: image_data_uri(figures / plot.name),
     )
 
