@@ -20,7 +20,7 @@ import pytest
 from typer.testing import CliRunner
 from widths import widened
 
-from airmuscle.core import autodiff
+from airmuscle.core import StateVariable, System, autodiff, model, ops, parameter
 from airmuscle.engine import DormandPrince8, Problem, Rodas4, RungeKutta4, SampledSignal, Schedule, solve
 from airmuscle.errors import AirmuscleWarning, FileError, ParameterError
 from airmuscle.files import list_laws, load_law
@@ -424,6 +424,52 @@ def test_names_of_users_cannot_leave_their_text(tmp_path):
             write_program(problem, folder, target, name="plant", title=f"{left} */ \n int x; \\")
             _, csv = RUN[target](folder)
             assert len(csv.splitlines()) > 3
+
+
+@model
+class Named(System):
+    """A system whose names are those of arguments, values and keywords of the printed functions."""
+
+    c: float = parameter("1/s", "c", "ends a comment */ with ??/", bounds=(0.0, 10.0))
+    v2: float = parameter("1", "v2", "number of a value", bounds=(0.0, 10.0))
+    states = (StateVariable("x", "m", 1.0, "argument"), StateVariable("v1", "m", 1.0, "value"))
+    inputs = ("double",)
+
+    def rates(self, state, inputs):
+        return {"x": self.v2 * state["v1"] - self.c * state["x"], "v1": inputs["double"] - self.c * state["v1"]}
+
+    def outputs(self, state, inputs):
+        return {"f": ops.exp(-self.c * state["x"]), "x_rate": state["v1"]}
+
+
+@pytest.mark.parametrize("target", [C99(), JavaScript()], ids=str)
+def test_names_of_quantities_do_not_collide_with_those_of_the_program(target, tmp_path):
+    problem = Problem(Named(2.0, 0.5), SampledSignal({"double": RAMPS}), 1.0, {"x": 0.1, "v1": 0.0})
+    write_program(problem, tmp_path, target, name="plant")
+    check_run(*RUN[target](tmp_path), problem)
+
+
+@pytest.mark.parametrize(
+    ("target", "lines"),
+    [
+        (
+            C99(),
+            ("const double speed = x[2];  /* [m/s] speed of the load */", "/* [Pa] gauge pressure in the muscle */"),
+        ),
+        (JavaScript(), ("const speed = x[2];  // [m/s] speed of the load", "// [Pa] gauge pressure in the muscle")),
+        (Octave(), ("  speed = x(3);  % [m/s] speed of the load", "% [Pa] gauge pressure in the muscle")),
+    ],
+    ids=str,
+)
+def test_printed_functions_name_the_quantities_of_the_model(target, lines, tmp_path):
+    """States, inputs, parameters, rates and outputs, each with its unit and its meaning, wherever they are computed."""
+    write_program(problem_of("dmsp-20-300"), tmp_path, target, name="plant")
+    (text,) = (path.read_text() for path in tmp_path.iterdir() if path.name in ("plant.c", "plant.mjs", "plant.m"))
+    before, rates = re.split(r"(?:void|function) .*rhs\(", text)
+    rates = re.split(r"(?:void|function) .*jac\(", rates)[0]
+    for line in (*lines, "mechanism_gravity = c", "force = ", "contraction = ", "air_mass_rate = ", "[kg/s]"):
+        assert line in rates, line
+    assert "mechanism_mass = p" in before
 
 
 @TARGETS

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -15,6 +16,7 @@ from .ir.instructions import Code, Operand, finished, hoisted, instructions, rec
 from .ir.jacobian import ZERO, Tape, derivatives
 from .ir.sparse_lu import Factors
 from .llvm.emit import LlvmLanguage
+from .text.body import NO_LABEL
 
 LLVM = LlvmLanguage()
 PARAMETERS = "p"
@@ -80,6 +82,8 @@ class Printer:
         self._language = language
         self._prepare = language.body()
         self._places: dict[str, int] = {}
+        self.quantities: tuple[Mapping[str, Any], Any] | None = None
+        """Arguments and values of the quantities of the array "o", which have names in functions of these arguments."""
 
     @property
     def held(self) -> int:
@@ -113,8 +117,28 @@ class Printer:
     def end(self, name: str, inputs: Sequence[str], outputs: Sequence[str], block: FunctionBlock) -> None:
         """Close a function; the argument that holds parameters becomes `c`."""
         inputs = ["c" if a == PARAMETERS else a for a in inputs]
+        if self._language.labels:
+            self._name(block, inputs, outputs)
         self.text.append(self._language.function(name, inputs, outputs, block))
         self.needed |= {**block.needed, **self._prepare.needed}
+
+    def _name(self, block: Any, inputs: Sequence[str], outputs: Sequence[str]) -> None:
+        """Give the values of a function the names of the quantities that they are."""
+        labels, parameters = self._language.labels, self._prepare.loaded  # type: ignore[attr-defined]
+        of_c = (labels[PARAMETERS][parameters[v][1]] if v in parameters else NO_LABEL for v in self._places)
+        named: dict[str, tuple[str, int]] = {}
+        if self.quantities and set(map(self._argument, self.quantities[0])) <= set(inputs):
+            trial = copy.copy(block)  # it prints the quantities, too: those that have values already have their names
+            trial.lines, trial._known, trial.read, trial.loaded = [], dict(block._known), set(), {}
+            code = instructions(list(self.quantities[0].values()), [self.quantities[1]])
+            results = self.compute(trial, code, list(self.quantities[0]))
+            known = set(block._known.values())
+            named = {value: ("o", index) for (_, index), value in results.items() if value in known}
+        block.name_values({**labels, "c": list(of_c)}, named, {*inputs, *outputs})
+
+    @staticmethod
+    def _argument(name: str) -> str:
+        return "c" if name == PARAMETERS else name
 
     def without_parameters(self, inputs: dict[str, Any], outputs: dict[str, Any]) -> tuple[Code, dict[Operand, int]]:
         """The code of outputs without what depends on parameters alone, and where in `c` that stands."""
@@ -129,6 +153,8 @@ class Printer:
 
     def module(self) -> str:
         """`prepare` and all functions, as one text."""
+        if self._language.labels:
+            self._prepare.name_values(self._language.labels, {}, {PARAMETERS, "c"})  # type: ignore[attr-defined]
         return "\n".join([self._language.preparation("prepare", [PARAMETERS], ["c"], self._prepare), *self.text])
 
 
@@ -163,6 +189,7 @@ def implicit_module(
     stage, solve = lu.solved(a, [t.f[i] + g[i] for i in range(size)]), lu.solved(a, [b[i] for i in range(size)])
     point = {"x": t.x, "u": t.u, PARAMETERS: t.p}
     printer = Printer(language)
+    printer.quantities = point, t.o
     printer.add_code("rhs", list(point), finished(code), ["f"])
     printer.add_code("jac", list(point), slopes, ["f", "J"])
     printer.add("factor", {"J": lu.j, "d": lu.d}, {"A": lu.values}, ["d"])
@@ -181,6 +208,7 @@ def rates_module(
 ) -> tuple[str, ArraySizes]:
     """What a caller with an integrator of its own needs: rhs and outputs, as in `implicit_module`."""
     printer, point = Printer(language), {"x": t.x, "u": t.u, PARAMETERS: t.p}
+    printer.quantities = point, t.o
     printer.add("rhs", point, {"f": t.f})
     printer.add("outputs", point, {"o": t.o})
     extend(printer)

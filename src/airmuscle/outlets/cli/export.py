@@ -268,6 +268,7 @@ def _instruction(to: str, paths: tuple[Path, ...], law: bool, controller: bool) 
             return f"cc -std=c99 -O2 {sources} -lm -o replay && ./replay"
         return f"cc -O2 -c {sources}" if law else f"cc -O2 {sources} -lm -o run && ./run run.csv"
     if to == "js":
-        return f'import {{law}} from "./{names[0]}"' if law else f"node {names[1]} > run.csv"
+        program = next(name for name in names if law or name.endswith(".run.mjs"))
+        return f'import {{law}} from "./{program}"' if law else f"node {program} > run.csv"
     call = names[0].removesuffix(".m")
     return f"{call}(3e5, 0.1)" if law else f"octave --eval \"run_{call}('run.csv')\""

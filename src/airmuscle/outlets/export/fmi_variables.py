@@ -12,7 +12,7 @@ from ...core.errors import ParameterError, printable
 from ...engine.compile.jacobians import Place
 from ...engine.run.integrators import Rodas4
 from ...recording.columns import quantity_of
-from .printed_system import ExportedSystem
+from .printed_system import ExportedSystem, per_second
 from .run_data import RunData
 
 PARAMETERS, TOLERANCE = "parameters", "relative_tolerance"
@@ -79,16 +79,6 @@ def make_variables(system: ExportedSystem, run: RunData, indicators: int = 0) ->
         about = "changes its sign where the rates are not smooth"
         add(f"event_indicator[{i}]", "local", is_indicator=True, description=about)
     return _checked(variables)
-
-
-def per_second(unit: str) -> str:
-    """The unit of the derivative of a quantity by time."""
-    if unit in ("", "1"):
-        return "1/s"
-    above, slash, below = unit.partition("/")
-    if not slash:
-        return f"{unit}/s"
-    return f"{above}/s2" if below == "s" else f"{above}/({below.strip('()')} s)"
 
 
 def _stated(v: Variable) -> Variable:

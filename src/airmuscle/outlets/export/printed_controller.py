@@ -16,6 +16,7 @@ from ...engine.compile.ir import emission
 from ...engine.compile.ir.emission import TargetLanguage
 from ...engine.compile.ir.instructions import Code, instructions
 from ...engine.compile.ir.interpreter import InterpretedBody
+from ...engine.compile.text.body import Labels
 from ...engine.compile.text.c import CLanguage
 from ...engine.loop.control_law import ControlLaw
 from ...engine.loop.control_loop import ControlLoop
@@ -24,7 +25,7 @@ from ...engine.run.compiled_law import trace_sample
 from ...engine.run.sampled_loop import SampledLoop
 from .c_text import c_array, c_number, c_strings, with_cmake
 from .identifiers import make_identifiers
-from .printed_system import find_leaf
+from .printed_system import find_leaf, make_labels
 from .provenance import block_comment, provenance
 from .templates import filled
 
@@ -61,7 +62,7 @@ class PrintedController:
 
     def source_files(self) -> dict[str, str]:
         """Header and source, by file name."""
-        printer = Printer(CLanguage(self.number, f"{self.name}_"))
+        printer = Printer(CLanguage(self.number, f"{self.name}_", labels=self._labels))
         printer.add_code("sample", list(self.inputs), self.code, list(self.outputs))
         law = self.law
         counts = {
@@ -81,9 +82,22 @@ class PrintedController:
     def sample_in(self, language: TargetLanguage) -> str:
         """The function of a sample in another language; its arguments are measurement, set point, memory, parameters,
         and the arrays of the command and of the later memory, which MATLAB returns."""
-        printer = Printer(language)
+        printer = Printer(dataclasses.replace(language, labels=self._labels))  # type: ignore[type-var]
         printer.add_code("sample", list(self.inputs), self.code, list(self.outputs))
         return printer.text[-1]
+
+    @property
+    def _labels(self) -> Labels:
+        """Names of the elements of the arrays of a sample."""
+        law = self.law
+        names = {
+            "measurement": law.measured_columns, "setpoint": [f"{name} set point" for name in law.setpoints],
+            "memory": [f"memory {name}" for name in law.initial_memory], "command": law.inputs,
+            "later": [f"next {name}" for name in law.initial_memory],
+        }  # fmt: skip
+        rows = {array: [(name, "", "") for name in each] for array, each in names.items()}
+        of_law = [(leaf.path, leaf.declared.unit, leaf.declared.meaning) for leaf in self.tunable]
+        return make_labels({**rows, "parameters": of_law})
 
     def files(self, samples: ReplayedSamples) -> dict[str, str]:
         """Header, source and the program that replays samples, by file name."""

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from ...core.arrays import Array
-from ...core.errors import ParameterError, suggestion
+from ...core.errors import ParameterError, printable, suggestion
 from ...core.tree import Leaf, leaves
 from ...engine.compile.functions import ArraySizes, Extension, TracedSystem, implicit_module, rates_module
 from ...engine.compile.ir.emission import TargetLanguage
 from ...engine.compile.program import CompiledSystem
+from ...engine.compile.text.body import Label, Labels
 from ...engine.state import column_units
+from ...recording.columns import quantity_of
+from .identifiers import make_identifiers
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -66,7 +69,46 @@ class ExportedSystem:
     ) -> tuple[str, ArraySizes]:
         """The functions `prepare`, `rhs` and `outputs` of arrays; with `implicit` also those of a Rosenbrock step."""
         module = implicit_module if implicit else rates_module
+        language = dataclasses.replace(language, labels=self._labels)  # type: ignore[type-var]
         return module(self.traced, language, extend) if extend else module(self.traced, language)
+
+    @property
+    def _labels(self) -> Labels:
+        """Names, units and meanings of the elements of the arrays of the printed functions."""
+        states, inputs = self.compiled.system.states, self.compiled.system.input_variables
+        quantities = [quantity_of(name) for name in self.output_names]
+        return make_labels({
+            "x": [(s.name, s.unit, s.meaning) for s in states],
+            "u": [(i.name, i.unit, i.meaning) for i in inputs],
+            "o": [
+                (name, self.units[name], known.meaning if known else "")
+                for name, known in zip(self.output_names, quantities, strict=True)
+            ],
+            "p": [(leaf.path, leaf.declared.unit, leaf.declared.meaning) for leaf in self.tunable],
+            "f": [(f"{s.name}_rate", per_second(s.unit), "") for s in states],
+            "w": [(f"{i.name}_slope", per_second(i.unit), "") for i in inputs],
+        })  # fmt: skip
+
+
+def make_labels(tables: Mapping[str, Sequence[tuple[str, str, str]]]) -> Labels:
+    """Labels of arrays from the name, unit and meaning of each element; no two have the same name."""
+    rows = [(array, *row) for array, table in tables.items() for row in table]
+    labels: dict[str, list[Label]] = {array: [] for array in tables}
+    for identifier, (array, _, unit, meaning) in zip(make_identifiers([row[1] for row in rows]), rows, strict=True):
+        shown = f"[{unit}]" if unit not in ("", "1") else ""
+        text = printable(f"{shown} {meaning}").encode("ascii", "replace").decode()
+        labels[array].append(Label(identifier, text.replace("*/", "* /").replace("??", "? ?").strip()))
+    return labels
+
+
+def per_second(unit: str) -> str:
+    """The unit of the derivative of a quantity by time."""
+    if unit in ("", "1"):
+        return "1/s"
+    above, slash, below = unit.partition("/")
+    if not slash:
+        return f"{unit}/s"
+    return f"{above}/s2" if below == "s" else f"{above}/({below.strip('()')} s)"
 
 
 def export_system(compiled: CompiledSystem, tunable: Sequence[str] | None = None) -> ExportedSystem:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from ....core.errors import TraceError
 from .instructions import Code, Instruction, Operand, Operation
@@ -69,6 +70,9 @@ class FunctionBlock(abc.ABC):
 
 class TargetLanguage(abc.ABC):
     """A language in which functions of arrays are printed. Arrays are arguments that do not overlap."""
+
+    labels: Mapping[str, Sequence[Any]] = {}
+    """The names of the elements of arrays, in a language that has names for values."""
 
     @abc.abstractmethod
     def body(self, scalars: Sequence[str] = ()) -> FunctionBlock:

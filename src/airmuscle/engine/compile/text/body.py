@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import abc
 import math
-from collections.abc import Callable, Mapping, Sequence
+import re
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import NamedTuple
 
 from ..ir.emission import FunctionBlock, unknown_operation
 from ..ir.instructions import Operand, Operation
@@ -22,6 +24,22 @@ FUNCTIONS = {
 """Operations that are calls of a function, under the usual names."""
 
 
+_NUMBERED = re.compile(r"\bv\d+\b")
+_DEFINED = re.compile(r"^\s*(?:const )?(?:\w+ )?(v\d+) = ")
+
+
+class Label(NamedTuple):
+    """The name of a quantity as an identifier, and its unit and meaning."""
+
+    name: str
+    remark: str = ""
+
+
+NO_LABEL = Label("")
+Labels = Mapping[str, Sequence[Label]]
+"""The labels of the elements of arrays, by the name of the array."""
+
+
 class TextBody(FunctionBlock, abc.ABC):
     """The lines of one function in a language with infix operators; a subclass states what its language writes.
 
@@ -37,6 +55,8 @@ class TextBody(FunctionBlock, abc.ABC):
         super().__init__(scalars)
         self.read: set[str] = set()
         self.written: set[str] = set()
+        self.loaded: dict[str, tuple[str, int]] = {}
+        self.stored: dict[str, tuple[str, int]] = {}
 
     @abc.abstractmethod
     def element(self, array: str, index: int) -> str:
@@ -49,6 +69,10 @@ class TextBody(FunctionBlock, abc.ABC):
     @abc.abstractmethod
     def call(self, function: str, x: Sequence[str]) -> str:
         """The name of the value of a function of FUNCTIONS."""
+
+    @abc.abstractmethod
+    def remark(self, text: str) -> str:
+        """A comment at the end of a line."""
 
     @abc.abstractmethod
     def variable(self, name: str, value: str) -> str:
@@ -72,11 +96,37 @@ class TextBody(FunctionBlock, abc.ABC):
 
     def load(self, array: str, index: int) -> str:
         self.read.add(array)
-        return array if array in self.scalars else self.put(self.element(array, index))
+        if array in self.scalars:
+            return array
+        value = self.put(self.element(array, index))
+        self.loaded[value] = array, index
+        return value
 
     def store(self, array: str, index: int, value: str) -> None:
         self.written.add(array)
+        self.stored.setdefault(value, (array, index))
         self.lines.append(f"  {self.element(array, index)} = {value};")
+
+    def name_values(self, labels: Labels, named: Mapping[str, tuple[str, int]], taken: Collection[str]) -> None:
+        """Give the values that stand in arrays with labels the names of these, unless a name is taken.
+
+        `named` are the places of further values.
+        """
+        names: dict[str, Label] = {}
+        places = {**named, **self.stored, **self.loaded}
+        used = {"", *taken}
+        for value, (array, index) in sorted(places.items(), key=lambda item: item[0] in self.stored):
+            label = labels[array][index] if index < len(labels.get(array, ())) else None
+            if label and _NUMBERED.fullmatch(value) and label.name not in used and not _NUMBERED.fullmatch(label.name):
+                names[value] = label
+                used.add(label.name)
+        self.lines = [self._with_names(line, names) for line in self.lines]
+
+    def _with_names(self, line: str, names: Mapping[str, Label]) -> str:
+        found = _DEFINED.match(line)
+        remark = names[found[1]].remark if found and found[1] in names else ""
+        text = _NUMBERED.sub(lambda value: names[value[0]].name if value[0] in names else value[0], line)
+        return f"{text}  {self.remark(remark)}" if remark else text
 
     def operate(self, operation: Operation, x: Sequence[str]) -> str:
         if operation in _BINARY:
@@ -118,8 +168,9 @@ class TextBody(FunctionBlock, abc.ABC):
         tests = f" {self.either} ".join(f"{gate} {self.unequal} {self.constant(0.0)}" for gate in gates)
         self.lines.append(self.begin_branch(tests))
         outside, self._known = self._known, dict(self._known)  # values of the block are not available after it
-        inside = compute()
+        begin, inside = len(self.lines), compute()
         self._known = outside
         self.lines += [f"  {name} = {inside[operand]};" for operand, name in joined.items()]
+        self.lines[begin:] = [f"  {line}" for line in self.lines[begin:]]
         self.lines.append(self.end_branch)
         return joined

@@ -7,7 +7,7 @@ import struct
 from collections.abc import Sequence
 
 from ..ir.emission import FunctionBlock, TargetLanguage
-from .body import TextBody
+from .body import Labels, TextBody
 
 
 class CBody(TextBody):
@@ -22,6 +22,9 @@ class CBody(TextBody):
 
     def assignment(self, name: str, expression: str) -> str:
         return f"  const {self.number} {name} = {expression};"
+
+    def remark(self, text: str) -> str:
+        return f"/* {text} */"
 
     def variable(self, name: str, value: str) -> str:
         return f"  {self.number} {name} = {value};"
@@ -62,6 +65,8 @@ class CLanguage(TargetLanguage):
     number: str = "double"
     prefix: str = ""
     public: frozenset[str] | None = frozenset()
+
+    labels: Labels = dataclasses.field(default_factory=dict, hash=False)
 
     def body(self, scalars: Sequence[str] = ()) -> CBody:
         return CBody(scalars, self.number)

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Sequence
 
 from ..ir.emission import FunctionBlock, TargetLanguage
-from .body import TextBody
+from .body import Labels, TextBody
 
 
 class JavaScriptBody(TextBody):
@@ -18,6 +18,9 @@ class JavaScriptBody(TextBody):
 
     def assignment(self, name: str, expression: str) -> str:
         return f"  const {name} = {expression};"
+
+    def remark(self, text: str) -> str:
+        return f"// {text}"
 
     def variable(self, name: str, value: str) -> str:
         return f"  let {name} = {value};"
@@ -45,6 +48,8 @@ class JavaScriptLanguage(TargetLanguage):
 
     prefix: str = ""
     exported: bool = True
+
+    labels: Labels = dataclasses.field(default_factory=dict, hash=False)
 
     def body(self, scalars: Sequence[str] = ()) -> JavaScriptBody:
         return JavaScriptBody(scalars)

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Sequence
 
 from ..ir.emission import FunctionBlock, TargetLanguage
-from .body import TextBody
+from .body import Labels, TextBody
 
 COMPLEX = ("sqrt", "log", "log1p", "asin", "acos", "pow")
 """Functions that return complex numbers outside their real domain; here the result is NaN there."""
@@ -35,6 +35,9 @@ class MatlabBody(TextBody):
 
     def assignment(self, name: str, expression: str) -> str:
         return f"  {name} = {expression};"
+
+    def remark(self, text: str) -> str:
+        return f"% {text}"
 
     def variable(self, name: str, value: str) -> str:
         return f"  {name} = {value};"
@@ -76,6 +79,8 @@ class MatlabLanguage(TargetLanguage):
     """
 
     prefix: str = ""
+
+    labels: Labels = dataclasses.field(default_factory=dict, hash=False)
 
     def body(self, scalars: Sequence[str] = ()) -> MatlabBody:
         return MatlabBody(scalars)
