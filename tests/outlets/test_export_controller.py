@@ -291,3 +291,48 @@ def test_the_controller_of_the_cascade_with_sensors_is_exported_in_single_precis
     done = CliRunner().invoke(app, ["export", str(scenario), *options])
     assert done.exit_code == 0, done.output
     assert "0 commands differ by more than 0.0001" in replay(tmp_path, "-O0").stdout
+
+
+ARDUINO = """#include <cstdio>
+static unsigned long now;
+static unsigned long micros() { return now += 100; }
+"""
+READ = 'if (scanf("%lf", &measurement[LAW_MEASUREMENT_PRESSURE]) != 1) measurement[0] = 0;'
+SHOW = 'printf("%lu %.17g %.17g\\n", now, command[0], command[1]);'
+
+
+def test_the_arduino_library_commands_what_the_law_commands(tmp_path):
+    """The sketch, compiled against a stub of the Arduino functions, with a clock that counts 100 us a look."""
+    write_controller(problem_of(PRESSURE), tmp_path, name="law", arduino=True)
+    properties = dict(line.split("=", 1) for line in (tmp_path / "library.properties").read_text().splitlines())
+    required = {"name", "version", "author", "maintainer", "sentence", "paragraph", "category", "url", "architectures"}
+    assert required <= set(properties)
+    (sketch,) = tmp_path.glob("examples/*/*.ino")
+    assert sketch.stem == sketch.parent.name, "the rule of Arduino for sketches"
+    text = sketch.read_text().replace("measurement[LAW_MEASUREMENT_PRESSURE] = 0;", READ)
+    text = text.replace("(void)command[LAW_COMMAND_FILL];", SHOW)
+    (tmp_path / "sketch.cpp").write_text(f"{ARDUINO}{text}int main() {{ setup(); while (now < 50000) loop(); }}\n")
+    flags = ["-ffp-contract=off", "-Isrc", "-Wall", "-Wextra", "-Werror"]
+    subprocess.run([printed.require("gcc"), "-std=c99", *flags, "-c", "src/law.c"], cwd=tmp_path, check=True)
+    subprocess.run(
+        [printed.require("g++"), *flags, "sketch.cpp", "law.o", "-lm", "-o", "sketch"], cwd=tmp_path, check=True
+    )
+    measured = np.linspace(0.5e5, 2e5, 10)
+    done = subprocess.run(
+        ["./sketch"], cwd=tmp_path, input="\n".join(map(repr, measured.tolist())), capture_output=True, text=True
+    )
+    rows = np.array([line.split() for line in done.stdout.splitlines()], dtype=float)
+    problem = problem_of(PRESSURE)
+    printed_law = print_controller(prepare_loop(problem, problem.input.init(0.0)), "law")
+    expected = printed_law.replay(measured[:, None], np.full((10, 1), 1e5)).commands
+    assert np.ptp(expected) > 0
+    np.testing.assert_array_equal(rows[:, 1:], expected)
+    np.testing.assert_allclose(np.diff(rows[:, 0]), 5000, atol=200)
+
+
+def test_an_arduino_library_contains_a_controller(tmp_path):
+    example = str(Path(__file__).parents[2] / "examples/pressure_loop.toml")
+    wrong = CliRunner().invoke(app, ["export", example, "--to", "arduino", "--out", str(tmp_path / "a")])
+    assert "an Arduino library contains a controller; add --controller." in " ".join(wrong.output.split())
+    right = ["export", example, "--controller", "--to", "arduino", "--out", str(tmp_path / "b")]
+    assert "copy the folder to the libraries of Arduino" in CliRunner().invoke(app, right).output

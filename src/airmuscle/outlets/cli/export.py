@@ -33,7 +33,7 @@ from .terminal import echo, print_json
 
 TARGETS: dict[str, Target] = {"c": C99(), "js": JavaScript(), "octave": Octave()}
 """Languages by the names of the option --to."""
-NAMES = (*TARGETS, "fmu", "mujoco", "modelica")
+NAMES = (*TARGETS, "arduino", "fmu", "mujoco", "modelica")
 """All values of the option --to."""
 DEFAULT_FOLDER = Path("export")
 
@@ -109,6 +109,7 @@ def export(
       airmuscle export examples/pressure_loop.toml --to c --out loop_c
       airmuscle export examples/pressure_loop.toml --controller --to c --out controller
       airmuscle export examples/pressure_loop.toml --controller --to c --precision float --build --processor cortex-m4
+      airmuscle export examples/pressure_loop.toml --controller --to arduino --precision float --out pressure_loop
       airmuscle export examples/fill_discharge.toml --to fmu --fmi 2 --out fill.fmu
     """
     _check_options(to, law, controller, build, tunable, fmi is not None or sources_only or bool(platforms))
@@ -153,7 +154,7 @@ def _write(
     if controller:
         return write_controller(
             scenario.problem, out, name=name, title=scenario.title, tunable=tunable or (),
-            precision=PRECISIONS[precision],
+            precision=PRECISIONS[precision], arduino=to == "arduino",
         )  # fmt: skip
     return write_program(
         scenario.problem, out, TARGETS[to], name=name, title=scenario.title, tunable=tunable, columns=scenario.columns
@@ -194,8 +195,12 @@ def _check_options(
     """Raise BadParameter for options that do not fit together."""
     if to not in NAMES:
         raise typer.BadParameter(f"--to {to}: there are {', '.join(NAMES)}.")
-    if controller and (law or to != "c"):
-        raise typer.BadParameter("--controller: a controller is exported to C, and without --law; write --to c.")
+    if controller and (law or to not in ("c", "arduino")):
+        raise typer.BadParameter(
+            "--controller: a controller is exported to C, and without --law; write --to c, or --to arduino."
+        )
+    if to == "arduino" and not controller:
+        raise typer.BadParameter("--to arduino: an Arduino library contains a controller; add --controller.")
     if build and (law or to != "c"):
         raise typer.BadParameter("--build: there is a program to compile with --to c and without --law.")
     if law and to not in TARGETS:
@@ -267,6 +272,8 @@ def _instruction(to: str, paths: tuple[Path, ...], law: bool, controller: bool) 
         if controller:
             return f"cc -std=c99 -O2 {sources} -lm -o replay && ./replay"
         return f"cc -O2 -c {sources}" if law else f"cc -O2 {sources} -lm -o run && ./run run.csv"
+    if to == "arduino":
+        return f"copy the folder to the libraries of Arduino, and open {names[-1]}"
     if to == "js":
         program = next(name for name in names if law or name.endswith(".run.mjs"))
         return f'import {{law}} from "./{program}"' if law else f"node {program} > run.csv"

@@ -31,7 +31,7 @@ LEFT_OUT = (
 
 def write_controller(
     problem: Problem, folder: str | Path, *, name: str = "", title: str = "", tunable: Sequence[str] = (),
-    precision: Precision = Double(),
+    precision: Precision = Double(), arduino: bool = False,
 ) -> tuple[Path, ...]:  # fmt: skip
     """Write the control law of a problem as C99 for a microcontroller; returns the paths of its files.
 
@@ -40,6 +40,7 @@ def write_controller(
              depth of the law; the readings of sensors around the whole law are the data of the replay
     tunable  paths of the parameters that remain variables; none by default: all are constants of the program
     precision  Double(), or Single() for a processor that computes with floats alone
+    arduino  whether the files are an Arduino library with an example sketch, in place of the program of the replay
 
     The function is `NAME_step(memory, measurement, setpoint, command)`. Sample time and ranges of the commands are
     constants. The program `main.c` replays the measurements of the run. In double precision it compares the commands
@@ -61,6 +62,8 @@ def write_controller(
     samples = printed.replay(measured, prepared.setpoint_values)
     if precision == Single():
         check_single_precision(printed, samples, loop.sample_time)
+    if arduino:
+        return write_files(printed.arduino_files(loop.sample_time, prepared.setpoint_values[0].tolist()), folder)
     return write_files(printed.files(samples), folder)
 
 

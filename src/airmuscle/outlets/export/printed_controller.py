@@ -117,6 +117,42 @@ class PrintedController:
         }  # fmt: skip
         return with_cmake(self.name, {**self.source_files(), "main.c": filled("replay.c", places, self.name)})
 
+    def arduino_files(self, sample_time: float, setpoints: Sequence[float]) -> dict[str, str]:
+        """An Arduino library: properties, header and source in `src`, and an example sketch, by path.
+
+        sample_time  [s]
+        setpoints    (s,) at the beginning of the run
+        """
+        name, law = self.name, self.law
+        words = {
+            kind: [f"[{name.upper()}_{kind}_{word.upper()}]" for word in make_identifiers(names)]
+            for kind, names in self._kinds.items()
+        }
+        levels = [c_number(value, self.number) for value in setpoints]
+        pins = [f"A{i}" for i in range(len(law.measured_columns))]
+        places = {
+            "provenance": block_comment(self.provenance), "file": name, "number": self.number,
+            "period": str(round(1e6 * sample_time)),
+            "reads": "\n".join(f"  measurement{word} = 0; /* scale and offset of analogRead({pin}) */"
+                               for word, pin in zip(words["MEASUREMENT"], pins, strict=True)),
+            "writes": "\n".join(f"  (void)command{word}; /* {low!r} to {high!r}: analogWrite, say */"
+                                for word, (low, high) in zip(words["COMMAND"], self.ranges, strict=True)),
+            "setpoints": "\n".join(f"  setpoint{word} = {level};"
+                                   for word, level in zip(words["SETPOINT"], levels, strict=True)),
+        }  # fmt: skip
+        sentence = f"Control law {type(law).__name__} with a sample time of {sample_time:g} s"
+        properties = {
+            "name": name, "version": "1.0.0", "author": "exported by airmuscle", "maintainer": "exported by airmuscle",
+            "sentence": sentence, "paragraph": "A sample of the law as a C function without memory allocation.",
+            "category": "Device Control", "url": "https://example.org", "architectures": "*", "includes": f"{name}.h",
+        }  # fmt: skip
+        sketch = filled("sketch.ino", places, name)
+        return {
+            "library.properties": "".join(f"{key}={value}\n" for key, value in properties.items()),
+            **{f"src/{file}": text for file, text in self.source_files().items()},
+            f"examples/{name}_loop/{name}_loop.ino": sketch,
+        }
+
     def ranges_of(self, samples: ReplayedSamples) -> Array:
         """The width of the range of each command (c,); of one without limits its largest size in the run."""
         largest = np.abs(samples.commands).max(axis=0, initial=0.0)
@@ -134,14 +170,18 @@ class PrintedController:
             c_strings(f"const char *const {self.name}_parameter_names[{upper}_PARAMETERS + 1]", names),
         ))  # fmt: skip
 
-    def _enumerations(self) -> str:
-        kinds = {
+    @property
+    def _kinds(self) -> dict[str, Sequence[str]]:
+        """The names of the elements of the arrays, by the word of their enumeration."""
+        return {
             "MEMORY": tuple(self.law.initial_memory), "MEASUREMENT": self.law.measured_columns,
             "SETPOINT": self.law.setpoints, "COMMAND": self.law.inputs,
             "PARAMETER": tuple(leaf.path for leaf in self.tunable),
         }  # fmt: skip
+
+    def _enumerations(self) -> str:
         text = ""
-        for kind, names in kinds.items():
+        for kind, names in self._kinds.items():
             words = [f"{self.name.upper()}_{kind}_{word.upper()}" for word in make_identifiers(names)]
             text += f"enum {{ {', '.join(f'{word} = {i}' for i, word in enumerate(words))} }};\n" if words else ""
         return text

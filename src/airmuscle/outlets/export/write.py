@@ -117,5 +117,6 @@ def write_files(files: Mapping[str, str], folder: str | Path) -> tuple[Path, ...
     target = Path(folder)
     with atomic_folder(target) as staging:
         for file, text in files.items():
+            (staging / file).parent.mkdir(parents=True, exist_ok=True)
             (staging / file).write_bytes(text.encode("utf-8", "replace"))
     return tuple(target / file for file in files)
