@@ -180,6 +180,31 @@ static int advance(model_solver *s, const double *u, const double *c, double h, 
   return isfinite(*left) && isfinite(*past) ? MODEL_DONE : MODEL_NOT_FINITE;
 }
 
+/* Whether an actuator is the first of exported muscles at a degree of freedom. */
+static int is_first(const mjModel *m, const mjData *d, int i, int dof)
+{
+  int other, k;
+  for (other = 0; other < i; other++) {
+    const int instance = m->actuator_plugin[other];
+    if (instance < 0 || strncmp(mjp_getPluginAtSlot(m->plugin[instance])->name, "airmuscle.", 10) != 0) continue;
+    for (k = 0; k < d->moment_rownnz[other]; k++)
+      if (d->moment_colind[d->moment_rowadr[other] + k] == dof) return 0;
+  }
+  return 1;
+}
+
+/* MuJoCo takes the damping of a joint at the velocity after the step, which is an error of first order; with half the
+   change of velocity, estimated by the last acceleration, it is that of the mean velocity. */
+static void centre_damping(const mjModel *m, mjData *d, int i)
+{
+  int k;
+  for (k = 0; k < d->moment_rownnz[i]; k++) {
+    const int dof = d->moment_colind[d->moment_rowadr[i] + k];
+    if (m->dof_damping[dof] > 0.0 && is_first(m, d, i, dof))
+      d->qfrc_passive[dof] += 0.5 * m->opt.timestep * m->dof_damping[dof] * d->qacc[dof];
+  }
+}
+
 /* The states after a step of MuJoCo as mean rates, and the force over it. */
 static void integrate(const mjModel *m, mjData *d, muscle *own, int i, double *u, double *x)
 {
@@ -187,6 +212,7 @@ static void integrate(const mjModel *m, mjData *d, muscle *own, int i, double *u
   double c[MODEL_PRECOMPUTED + 1], last = act[ACT - 1], left, past, *rate = d->act_dot + m->actuator_actadr[i];
   model_solver s;
   int k;
+  centre_damping(m, d, i);
   load_of(m, d, own, i, own->p);
   model_prepare(own->p, c);
   if (last == 0.0) last = tension(x, u, c); /* the first step */
