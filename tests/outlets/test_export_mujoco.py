@@ -151,7 +151,9 @@ def test_two_muscles_on_a_joint_move_it_as_in_the_library(damping, mujoco, tmp_p
     the damping [N m s] of the joint, which MuJoCo alone integrates with an error of first order."""
     joint = AntagonisticJoint(0.03, 0.05, damping=damping)
     plant, name = replace(plants.EXAMPLES["joint with an external torque"], mechanism=joint), f"joint{10 * damping:.0f}"
-    made = [write_mujoco_plugin(plant, tmp_path / m.name, name=f"{name}_{m.name}", muscle=m.name) for m in plant.muscles]
+    made = [
+        write_mujoco_plugin(plant, tmp_path / m.name, name=f"{name}_{m.name}", muscle=m.name) for m in plant.muscles
+    ]
     angles = [joint_angle(mujoco, plant, made, step) for step in (2e-3, 1e-3)]
     state = find_equilibrium(plant, pressure=2e5)
     schedule = Schedule({"m0.fill": ((0.0, 0.0), (0.1, 1.0), (0.3, 0.0))})
