@@ -7,10 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from typer.testing import CliRunner
 
 from airmuscle.files import load_scenario
-from airmuscle.outlets.cli import app
 
 VALVES = '["circuit.fill.conductance", "circuit.discharge.conductance"]'
 
@@ -45,8 +43,3 @@ def noisy_run(scenario: Path, rng: np.random.Generator, deviations: Mapping[str,
     run = load_scenario(scenario).simulate()
     noisy = {name: run[name] + deviation * rng.standard_normal(len(run)) for name, deviation in deviations.items()}
     return {"time": run["time"], **noisy}
-
-
-def airmuscle(*arguments: object) -> Any:
-    """The result of a command, in a terminal of 160 columns."""
-    return CliRunner().invoke(app, [str(each) for each in arguments], env={"COLUMNS": "160"})

@@ -17,10 +17,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 from airmuscle.errors import AirmuscleWarning
-from airmuscle.outlets.cli import app
 
 DOCS = Path(__file__).parents[1] / "docs"
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -83,7 +82,7 @@ def run_command(line: str) -> str:
     """Run a command; those of airmuscle in this process, others in a shell if their program is installed."""
     words = shlex.split(line)
     if words[0] == "airmuscle":
-        done = CliRunner().invoke(app, words[1:])
+        done = airmuscle(*words[1:])
         assert done.exit_code == 0, f"{line}: {done.stderr}"
         return done.stdout
     if "cc " in line and shutil.which("cc") is None:

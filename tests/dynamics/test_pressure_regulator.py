@@ -12,13 +12,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 import airmuscle as am
 from airmuscle.engine import Rodas4
 from airmuscle.errors import ColumnError, IdentificationError, ParameterError
 from airmuscle.files import load_scenario
-from airmuscle.outlets.cli import app
 from airmuscle.physics import Isothermal, Manifold, SharedSupply, Supply, Tank, Valve, WithEnergyMeters
 from airmuscle.recording import Recording
 
@@ -165,7 +164,7 @@ def test_the_command_writes_a_regulator_that_a_scenario_takes(tmp_path):
     }
     am.write_csv(Recording(kilopascal, "bench"), tmp_path / "bench.csv")
     given = [tmp_path / "bench.csv", "--supply", "5.78 bar", "--starts", "1", "--out", out]
-    done = CliRunner().invoke(app, ["fit-regulator", *map(str, given)])
+    done = airmuscle("fit-regulator", *map(str, given))
     assert done.exit_code == 0, done.output
     assert "settled pressure minus command, taken as the zero of the sensor" in done.output
     assert "PressureRegulator" in (out / "regulator.toml").read_text(encoding="utf-8")

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 import airmuscle as am
 from airmuscle import load_data
@@ -37,7 +37,6 @@ from airmuscle.bench.identify.cross_validation import ALWAYS_FITTED, default_spl
 from airmuscle.bench.identify.force_evaluation import evaluate_force
 from airmuscle.bench.identify.recommendation import excess_error, recommend
 from airmuscle.errors import IdentificationError, ParameterError
-from airmuscle.outlets.cli import app
 from airmuscle.outlets.cli.fit_options import parse_split
 from airmuscle.physics import Braid, ContractileSurface, Hunt2017, InverseLength, LogarithmicLength, TonduLopez2000
 from airmuscle.recording import Recording
@@ -257,7 +256,7 @@ def test_the_command_writes_a_muscle_that_loads_back(tmp_path: Path):
         write_csv(run, files[-1])
     out = tmp_path / "out"
     options = ["--compare", "--leave-out", "run", "--resting-length", "300 mm", "--out", str(out), "--json"]
-    done = CliRunner().invoke(app, ["fit", *map(str, files), *options])
+    done = airmuscle("fit", *map(str, files), *options)
     assert done.exit_code == 0, done.output
     printed = json.loads(done.stdout)
     assert printed["purpose"] == RunSplit().purpose
@@ -274,11 +273,10 @@ def test_the_command_writes_a_muscle_that_loads_back(tmp_path: Path):
 
 
 def test_the_command_refuses_what_it_cannot_do(tmp_path: Path):
-    run = CliRunner()
-    done = run.invoke(app, ["fit", "dmsp-20-300", "--out", str(tmp_path / "a")])
+    done = airmuscle("fit", "dmsp-20-300", "--out", tmp_path / "a")
     assert done.exit_code == 2
     assert "--characteristic" in done.output
-    done = run.invoke(app, ["fit", "dmsp-20-300", "--compare", "--leave-out", "rows", "--out", str(tmp_path / "a")])
+    done = airmuscle("fit", "dmsp-20-300", "--compare", "--leave-out", "rows", "--out", tmp_path / "a")
     assert done.exit_code == 2
     assert "contraction" in done.output
     assert not (tmp_path / "a").exists()

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import airmuscle
 from laboratories import (
     ATMOSPHERE,
     FORCE,
@@ -31,14 +32,12 @@ from laboratories import (
     with_glitches,
     write,
 )
-from typer.testing import CliRunner
 
 from airmuscle.bench import Candidate, Fit, StaticStage, classify_records, compare, fit, read
 from airmuscle.bench.identify.campaign.static_stage import fit_static_stage
 from airmuscle.bench.identify.candidates import blank_surface
 from airmuscle.bench.identify.data_checks import DataChecks
 from airmuscle.errors import AirmuscleWarning, ColumnError
-from airmuscle.outlets.cli import app
 from airmuscle.physics import CreepElements, NoFriction
 from airmuscle.recording import Recording
 
@@ -184,7 +183,7 @@ def test_the_command_hysteresis_states_a_delay(tmp_path):
     tables = ramps(FRICTIONLESS, duration=12.0, sample_time=0.1, delay=0.4)
     paths = write({name: tables[name] for name in ("held_4", "held_12")}, tmp_path)
     options = ["--resting-length", "300 mm", "--elements", "2", "--out", str(tmp_path / "out")]
-    result = CliRunner().invoke(app, ["hysteresis", *map(str, paths), *options])
+    result = airmuscle("hysteresis", *map(str, paths), *options)
     assert result.exit_code == 0, result.output
     assert "note: The loops of the ramps" in result.output
     assert "those of a delay between the sensors" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")

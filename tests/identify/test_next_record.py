@@ -10,14 +10,13 @@ import math
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 from airmuscle.bench import Experiment, InitialConditions, StartTime, fit_dynamic, rank_records
 from airmuscle.bench.identify.dynamic.candidate_records import candidate_records
 from airmuscle.engine import Schedule, simulate
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.files import load
-from airmuscle.outlets.cli import app
 from airmuscle.physics import EnergyBalance, FillDischarge, Isometric, Muscle, Plant, Polytropic, Supply, Valve, Vessel
 from airmuscle.recording import Recording
 
@@ -162,7 +161,7 @@ def test_the_command_ranks_the_records_of_a_study(fill, tmp_path):
     (tmp_path / "fill.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
     (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
     call = ["plan", str(tmp_path / "study.toml")]
-    done = CliRunner().invoke(app, [*call, "--out", str(tmp_path / "plan"), "--json"])
+    done = airmuscle(*call, "--out", tmp_path / "plan", "--json")
     assert done.exit_code == 0, done.stderr
     said = json.loads(done.stdout)
     assert said["pair"] == [VALVE, WALL]
@@ -170,6 +169,6 @@ def test_the_command_ranks_the_records_of_a_study(fill, tmp_path):
     text = (tmp_path / "plan" / "plan.csv").read_text(encoding="utf-8")
     assert text.splitlines()[1].startswith("none,1.0,")
     assert "To separate them" in (tmp_path / "plan" / "report.html").read_text(encoding="utf-8")
-    assert CliRunner().invoke(app, [*call, "--separate", VALVE]).exit_code == 2
-    assert CliRunner().invoke(app, ["plan", "dmsp-20-300", "--separate", VALVE]).exit_code == 2
-    assert CliRunner().invoke(app, ["plan", "dmsp-20-300"]).exit_code == 2
+    assert airmuscle(*call, "--separate", VALVE).exit_code == 2
+    assert airmuscle("plan", "dmsp-20-300", "--separate", VALVE).exit_code == 2
+    assert airmuscle("plan", "dmsp-20-300").exit_code == 2

@@ -9,7 +9,7 @@ import json
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 from airmuscle.bench import BenchLimits, fit, read_csv
 from airmuscle.bench.identify.experiment_design import (
@@ -20,7 +20,6 @@ from airmuscle.bench.identify.experiment_design import (
     optimal_design,
 )
 from airmuscle.errors import IdentificationError, ParameterError
-from airmuscle.outlets.cli import app
 from airmuscle.physics import Braid, TonduLopez2000, ValidityRange
 from airmuscle.recording import Recording
 
@@ -100,7 +99,7 @@ ARGUMENTS = ["plan", "tondu-lopez", "--max-pressure", "5 bar", "--max-force", "4
 
 
 def test_the_command_prints_a_table_and_writes_points_to_follow(tmp_path):
-    done = CliRunner().invoke(app, [*ARGUMENTS, "--out", str(tmp_path / "bench")])
+    done = airmuscle(*ARGUMENTS, "--out", tmp_path / "bench")
     assert done.exit_code == 0, done.output
     assert "expected force" in done.output
     points = read_csv(tmp_path / "bench" / "plan.csv")
@@ -110,14 +109,14 @@ def test_the_command_prints_a_table_and_writes_points_to_follow(tmp_path):
 
 
 def test_the_command_prints_json():
-    done = CliRunner().invoke(app, [*ARGUMENTS, "--json"])
+    done = airmuscle(*ARGUMENTS, "--json")
     found = json.loads(done.output)
     assert len(found["runs"]) == 4
     assert found["relative_efficiency"] > 1.0
 
 
 def test_a_limit_without_its_unit_is_one_line():
-    done = CliRunner().invoke(app, ["plan", "tondu-lopez", "--max-pressure", "5", "--max-force", "400 N"])
+    done = airmuscle("plan", "tondu-lopez", "--max-pressure", "5", "--max-force", "400 N")
     assert done.exit_code == 1
     assert "has no unit" in done.output
 

@@ -11,7 +11,7 @@ import json
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 import airmuscle as am
 from airmuscle.bench import (
@@ -29,7 +29,6 @@ from airmuscle.bench.identify.pooled_covariance import EffectRows, estimate_pool
 from airmuscle.bench.identify.specimen_effects import predict_effects
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.files import Entry, load, save
-from airmuscle.outlets.cli import app
 from airmuscle.outlets.cli.fit_options import parse_split
 from airmuscle.physics import ContractileSurface, LogarithmicLength, PooledLengthLaw
 from airmuscle.recording import Recording
@@ -291,7 +290,7 @@ def test_partial_pooling_is_compared_where_three_specimens_are_measured():
 
 
 def answer_of(options: list[str]) -> str:
-    done = CliRunner().invoke(app, options)
+    done = airmuscle(*options)
     assert done.exit_code == 0, done.output
     return done.stdout
 
@@ -348,6 +347,6 @@ def test_a_purpose_names_the_rows_that_are_left_out():
     ],
 )
 def test_the_command_refuses_a_purpose_that_it_cannot_serve(options, message):
-    result = CliRunner().invoke(app, ["fit", "dmsp-20-300", *options])
+    result = airmuscle("fit", "dmsp-20-300", *options)
     assert result.exit_code != 0
     assert message in " ".join(result.output.replace("│", " ").split())

@@ -12,15 +12,14 @@ import json
 
 import numpy as np
 import pytest
+from command_line import airmuscle
 from scipy.stats import t as student
-from typer.testing import CliRunner
 
 from airmuscle.bench import Fit, RunSplit, bootstrap, confidence_band, fit, profile, write_csv
 from airmuscle.bench.identify.bootstrapping import RELIABLE_GROUPS
 from airmuscle.bench.identify.candidates import blank_surface
 from airmuscle.bench.identify.parameter_covariance import NORMAL_QUANTILE, _degrees_of_freedom
 from airmuscle.bench.identify.uncertainty_chapter import Uncertainty, uncertainty_chapter
-from airmuscle.outlets.cli import app
 from airmuscle.physics import Braid, TonduLopez2000
 from airmuscle.recording import Recording
 
@@ -232,7 +231,7 @@ def test_the_command_and_the_report_state_what_standard_errors_are_from(tmp_path
         files.append(tmp_path / f"{i}.csv")
         write_csv(run, files[-1])
     arguments = ["fit", *map(str, files), "--characteristic", "ContractileSurface", "--degree", "1"]
-    done = CliRunner().invoke(app, [*arguments, "--resting-length", "300 mm", "--out", str(tmp_path / "fit"), "--json"])
+    done = airmuscle(*arguments, "--resting-length", "300 mm", "--out", tmp_path / "fit", "--json")
     assert done.exit_code == 0, done.output
     assert json.loads(done.stdout)["standard_errors"].startswith("from the scatter of 6 runs")
     page = (tmp_path / "fit" / "report.html").read_text(encoding="utf-8").replace("\u00a0", " ")

@@ -7,12 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 from airmuscle.bench.identify.volume_fit import VolumePoints, fit_volume, volume_points
 from airmuscle.errors import ColumnError, IdentificationError
 from airmuscle.files import load
-from airmuscle.outlets.cli import app
 from airmuscle.physics import Braid, ChebyshevGeometry, ValidityRange, VirtualWork
 from airmuscle.physics.muscle.characteristic import maxwell_defect
 from airmuscle.recording import Recording
@@ -107,7 +106,7 @@ def test_fit_volume_writes_the_muscle_with_its_volume_and_the_maxwell_defect(tmp
     rows = "\n".join(f"{100 * c:.6f};{1e6 * v:.6f}" for c, v in zip(contraction, volume, strict=True))
     (tmp_path / "column.csv").write_text(f"contraction [%];volume [cm3]\n{rows}\n")
     arguments = ["fit-volume", str(tmp_path / "column.csv"), "--muscle", "dmsp-20-300", "--out", str(tmp_path / "out")]
-    result = CliRunner().invoke(app, [*arguments, "--json"])
+    result = airmuscle(*arguments, "--json")
     assert result.exit_code == 0, result.output
     data = json.loads(result.stdout)
     assert data["model"] == "Braid"
@@ -117,9 +116,6 @@ def test_fit_volume_writes_the_muscle_with_its_volume_and_the_maxwell_defect(tmp
     assert written.geometry.radius == pytest.approx(data["parameters"]["radius"])
     assert "standard deviation of the volume at most" in written.note
     assert "Maxwell defect" in (tmp_path / "out" / "report.html").read_text()
-    alone = CliRunner().invoke(
-        app,
-        ["fit-volume", str(tmp_path / "column.csv"), "--resting-length", "300 mm", "--out", str(tmp_path / "alone")],
-    )
+    alone = airmuscle("fit-volume", tmp_path / "column.csv", "--resting-length", "300 mm", "--out", tmp_path / "alone")
     assert alone.exit_code == 0, alone.output
     assert 'model = "Braid"' in (tmp_path / "alone" / "geometry.toml").read_text()

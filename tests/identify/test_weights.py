@@ -9,11 +9,10 @@ import json
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 from airmuscle.bench import estimate_sensors, fit, write_csv
 from airmuscle.bench.identify.weights import sensor_deviations
-from airmuscle.outlets.cli import app
 from airmuscle.physics import Braid, ContractileSurface, TonduLopez2000
 from airmuscle.recording import Recording
 
@@ -103,10 +102,7 @@ def test_the_command_line_weighs_by_sensor_unless_told(tmp_path):
         files.append(str(tmp_path / f"{run.origin}.csv"))
         write_csv(run, files[-1])
     law = ("--characteristic", "ContractileSurface", "--degree", "3", "--json", "--out", str(tmp_path / "fit"))
-    notes = [
-        json.loads(CliRunner().invoke(app, ["fit", *files, *law, *more]).stdout)["notes"]
-        for more in ((), ("--equal-weights",))
-    ]
+    notes = [json.loads(airmuscle("fit", *files, *law, *more).stdout)["notes"] for more in ((), ("--equal-weights",))]
     assert [any("test rigs with different sensors" in note for note in each) for each in notes] == [True, False]
     assert any(note.endswith("To weight all rows equally, use --equal-weights.") for note in notes[0])
     page = (tmp_path / "fit" / "report.html").read_text(encoding="utf-8")

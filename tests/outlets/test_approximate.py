@@ -9,16 +9,11 @@ import json
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 from airmuscle.files import load
-from airmuscle.outlets.cli import app
 
 MUSCLE = "dmsp-20-300"
-
-
-def airmuscle(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments], env={"COLUMNS": "160"})
 
 
 def test_the_printed_error_is_that_between_the_two_files(tmp_path):

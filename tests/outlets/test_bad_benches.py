@@ -10,21 +10,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 from airmuscle.bench import UNCENSORED, fit, read, write_csv
 from airmuscle.files import load
-from airmuscle.outlets.cli import app
 from airmuscle.physics import Braid, ContractileSurface, TonduLopez2000
 from airmuscle.recording import Recording
 
 MUSCLE = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.2)
 SURFACE = ("--characteristic", "ContractileSurface", "--degree", "3", "--resting-length", "300 mm")
 COMMANDS = [("fit", *SURFACE), ("hysteresis", "--resting-length", "300 mm"), ("inspect",)]
-
-
-def airmuscle(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments], env={"COLUMNS": "200"})
 
 
 def ramp(path: Path, pressure: float, *, ceiling: float = np.inf, seed: int = 1, count: int = 400) -> Path:

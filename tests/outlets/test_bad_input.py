@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 from widths import SAME_LAW, widened
 
 from airmuscle import advance, load, load_data, read_csv, simulate
@@ -26,7 +26,6 @@ from airmuscle.engine.run import bound_integrator
 from airmuscle.errors import FileError, ParameterError, SolveError, UnitError
 from airmuscle.files import list_laws
 from airmuscle.files.library import read_toml
-from airmuscle.outlets.cli import app
 from airmuscle.physics import FillDischarge, HangingMass, Plant, Supply, Valve, find_equilibrium
 from airmuscle.units import conversion, quantity
 
@@ -38,7 +37,7 @@ SURFACE = ("--characteristic", "ContractileSurface", "--degree", "2", "--resting
 def refused(folder: Path, *arguments: object) -> str:
     """The one line on stderr of a command that fails in a folder where nothing may appear."""
     before = sorted(folder.rglob("*"))
-    result = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    result = airmuscle(*arguments)
     assert result.exit_code == 1, result.output
     assert isinstance(result.exception, SystemExit), "no traceback"
     lines = [line for line in result.stderr.splitlines() if not line.startswith("warning: ")]
@@ -122,7 +121,7 @@ def test_a_bench_file_that_cannot_be_fitted(tmp_path: Path, text: str, message: 
 def test_what_other_programs_write_is_read(tmp_path: Path, content: bytes):
     (tmp_path / "bench.csv").write_bytes(content)
     arguments = ["fit", str(tmp_path / "bench.csv"), *SURFACE, "--out", str(tmp_path / "fit"), "--json"]
-    result = CliRunner().invoke(app, arguments)
+    result = airmuscle(*arguments)
     assert result.exit_code == 0, result.stderr
     assert json.loads(result.stdout)["rmse"] < 1e-6
 
@@ -146,7 +145,7 @@ def test_a_bad_option_of_fit(tmp_path: Path, option: tuple[str, str], message: s
 
 def test_a_data_set_is_known_by_a_unique_beginning_and_brings_its_units(tmp_path: Path):
     surface = ("--characteristic", "ContractileSurface", "--degree", "2")
-    result = CliRunner().invoke(app, ["fit", "dmsp-20", *surface, "--out", str(tmp_path / "fit"), "--json"])
+    result = airmuscle("fit", "dmsp-20", *surface, "--out", tmp_path / "fit", "--json")
     assert json.loads(result.stdout)["rows_used"] == len(load_data(MUSCLE))
     said = refused(tmp_path, "fit", MUSCLE, *surface, "--unit", "pressure=psi", "--out", tmp_path / "other")
     assert said == f"{MUSCLE}: a data set of the library contains its units and constants; omit --unit."
@@ -189,7 +188,7 @@ def test_every_entry_answers_or_refuses_in_one_line(name: str):
         ("--force=1e9 N", "--contraction=0.1"),
     )
     for given in (*beyond, ("--pressure=3 bar", "--contraction=0.95"), ("--pressure=9 MPa", "--force=100 N")):
-        result = CliRunner().invoke(app, ["evaluate", name, *given, "--json"])
+        result = airmuscle("evaluate", name, *given, "--json")
         assert isinstance(result.exception, SystemExit | None), given
         others = [line for line in result.stderr.splitlines() if not line.startswith("warning: ")]
         assert len(others) == result.exit_code, others
@@ -441,7 +440,7 @@ def test_an_interrupted_simulation_keeps_what_it_has(tmp_path: Path, monkeypatch
     bind = fixed_step.bind
     monkeypatch.setattr(fixed_step, "bind", lambda *arguments: Interrupted(bind(*arguments)))
     monkeypatch.setattr(bound_integrator, "INTERRUPT_CHECK_STEPS", 100)
-    result = CliRunner().invoke(app, ["simulate", str(tmp_path / "run.toml"), "--out", str(tmp_path / "run")])
+    result = airmuscle("simulate", tmp_path / "run.toml", "--out", tmp_path / "run")
     assert result.exit_code == 130
     lines = [line for line in result.stderr.splitlines() if not line.startswith(COMPILING)]
     assert lines == [f"partial results were written to {tmp_path / 'run'}", "interrupted"]

@@ -5,15 +5,13 @@ from __future__ import annotations
 import json
 
 import pytest
-from typer.testing import CliRunner
-
-from airmuscle.outlets.cli import app
+from command_line import airmuscle
 
 FAST = ["benchmark", "--controller", "PID", "--task", "step", "--budget", "0"]
 
 
 def run(*arguments):
-    return CliRunner().invoke(app, list(arguments))
+    return airmuscle(*arguments)
 
 
 def test_a_benchmark_writes_its_report_tables_and_figures(tmp_path):

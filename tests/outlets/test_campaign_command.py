@@ -12,20 +12,19 @@ import sys
 
 import numpy as np
 import pytest
+from command_line import airmuscle
 from made_campaign import THREE_LENGTHS, TrueMuscle, unseen_records, write_campaign, write_german
-from typer.testing import CliRunner
 
 from airmuscle.bench import read
 from airmuscle.errors import ParameterError
 from airmuscle.files import load, load_scenario
 from airmuscle.files.library import ParameterUncertainty
-from airmuscle.outlets.cli import app
 
 pytestmark = pytest.mark.slow  # the whole campaign takes a minute
 
 
 def run(*words):
-    return CliRunner().invoke(app, ["campaign", *map(str, words)])
+    return airmuscle("campaign", *map(str, words))
 
 
 @pytest.fixture(scope="module")

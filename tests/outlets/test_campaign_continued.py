@@ -12,11 +12,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import airmuscle
 from made_campaign import write_campaign
-from typer.testing import CliRunner
 
 from airmuscle.bench import LeftOutStage
-from airmuscle.outlets.cli import app
 from airmuscle.outlets.cli.campaign_stages import KeptStages
 from airmuscle.recording import Recording
 
@@ -87,7 +86,7 @@ def test_a_killed_campaign_does_not_fit_its_finished_stages_again(tmp_path, monk
 
     monkeypatch.setattr("airmuscle.bench.identify.campaign.campaign.fit_friction_stage", fitted_again)
     monkeypatch.setattr("airmuscle.bench.identify.campaign.campaign.fit_creep_stage", fitted_again)
-    done = CliRunner().invoke(app, ["campaign", str(rig), "--out", str(out)])
+    done = airmuscle("campaign", rig, "--out", out)
     assert done.exit_code == 0, done.stderr
     assert "continued after: creep, hysteresis" in done.stderr
     assert (out / "muscle.toml").exists()

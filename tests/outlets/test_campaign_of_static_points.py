@@ -9,12 +9,11 @@ import json
 
 import numpy as np
 import pytest
+from command_line import airmuscle
 from made_campaign import TrueMuscle
-from typer.testing import CliRunner
 
 from airmuscle import Recording, load, load_data, write_csv
 from airmuscle.files import load_scenario
-from airmuscle.outlets.cli import app
 from airmuscle.physics import Braid
 
 
@@ -32,7 +31,7 @@ def written(tmp_path_factory):
         folder / "out",
         "--json",
     ]
-    done = CliRunner().invoke(app, [*map(str, words)])
+    done = airmuscle(*map(str, words))
     assert done.exit_code == 0, done.stderr
     return folder / "out", json.loads(done.stdout)
 
@@ -57,7 +56,7 @@ def test_fills_alone_give_their_scenarios_with_the_braid_and_say_why_there_is_no
     write_csv(Recording(columns, "fill", {"resting_length": 0.3}), tmp_path / "fill.csv")
     braid = ("--braid", "radius=10 mm, angle=24.4 deg", "--resting-length", "300 mm")
     words = ["campaign", str(tmp_path / "fill.csv"), *braid, "--out", str(tmp_path / "out")]
-    done = CliRunner().invoke(app, words)
+    done = airmuscle(*words)
     said = " ".join(done.stdout.split())
     assert (
         "muscle: not written, because it needs a static law: no record is a slow run with force and length; record"
@@ -67,5 +66,5 @@ def test_fills_alone_give_their_scenarios_with_the_braid_and_say_why_there_is_no
     path = tmp_path / "out" / "scenarios" / "fill.toml"
     assert "because no force was measured" in path.read_text(encoding="utf-8").splitlines()[0]
     assert load_scenario(path).simulate()["pressure"].max() == pytest.approx(6.2e5, rel=0.03)
-    alone = CliRunner().invoke(app, [*words[:2], *braid[2:], "--out", str(tmp_path / "none")])
+    alone = airmuscle(*words[:2], *braid[2:], "--out", tmp_path / "none")
     assert "scenarios: not written: the muscle has no enclosed volume" in " ".join(alone.stdout.split())

@@ -20,8 +20,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import airmuscle
 from scenario_files import BRAID, CIRCUIT
-from typer.testing import CliRunner, Result
+from typer.testing import Result
 from widths import SAME_LAW, widened
 
 import airmuscle as airmuscle_package
@@ -29,7 +30,7 @@ from airmuscle.bench import read_csv
 from airmuscle.core import Reference, printable
 from airmuscle.errors import UnknownNameError
 from airmuscle.files import list_laws, list_plants, list_products, list_valves, load
-from airmuscle.outlets.cli import COMMANDS, app
+from airmuscle.outlets.cli import COMMANDS
 from airmuscle.outlets.cli.cite import as_bibtex
 from airmuscle.outlets.cli.terminal import print_json, print_table
 from airmuscle.papers import run
@@ -55,10 +56,6 @@ fill = [["0.1 s", 1], ["0.3 s", 0]]
 duration = "0.5 s"
 initial_state = {{ pressure = "1 bar" }}
 """
-
-
-def airmuscle(*arguments: object) -> Result:
-    return CliRunner().invoke(app, [str(argument) for argument in arguments], env={"COLUMNS": "160"})
 
 
 def shell(*arguments: object, **options: object) -> subprocess.CompletedProcess[str]:

@@ -7,11 +7,10 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 import airmuscle as am
 from airmuscle.errors import UnknownNameError
-from airmuscle.outlets.cli import app
 from airmuscle.outlets.cli.completion import SHELLS, complete_data, complete_entry, complete_plant
 
 
@@ -24,12 +23,12 @@ def completed(words: str, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     monkeypatch.setenv("COMP_WORDS", words)
     monkeypatch.setenv("COMP_CWORD", str(len(items) - 1))
     monkeypatch.setenv("_AIRMUSCLE_COMPLETE", "complete_bash")
-    return CliRunner().invoke(app, [], prog_name="airmuscle").stdout.split()
+    return airmuscle(prog_name="airmuscle").stdout.split()
 
 
 @pytest.mark.parametrize("shell", SHELLS)
 def test_the_script_of_each_shell_asks_this_program(shell: str):
-    script = CliRunner().invoke(app, ["--completion", shell])
+    script = airmuscle("--completion", shell)
     assert script.exit_code == 0
     assert f"_AIRMUSCLE_COMPLETE=complete_{shell}" in script.stdout
 
@@ -39,12 +38,12 @@ def test_the_script_for_bash_is_valid(tmp_path: Path):
     if bash is None:
         pytest.skip("bash is not installed")
     script = tmp_path / "completion.sh"
-    script.write_text(CliRunner().invoke(app, ["--completion", "bash"]).stdout, encoding="utf-8")
+    script.write_text(airmuscle("--completion", "bash").stdout, encoding="utf-8")
     assert subprocess.run([bash, "-n", str(script)]).returncode == 0
 
 
 def test_another_shell_is_refused_with_those_that_are_supported():
-    failed = CliRunner().invoke(app, ["--completion", "tcsh"])
+    failed = airmuscle("--completion", "tcsh")
     assert failed.exit_code == 2
     assert "'tcsh' is not supported; allowed are bash, zsh, fish" in " ".join(failed.stderr.split())
 

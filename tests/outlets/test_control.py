@@ -16,10 +16,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import airmuscle
 from scenario_files import writer_of
-from typer.testing import CliRunner
 
-import airmuscle
+import airmuscle as am
 from airmuscle.control import PID, OnOffController
 from airmuscle.design import load_study
 from airmuscle.engine import (
@@ -36,7 +36,6 @@ from airmuscle.engine import (
 from airmuscle.errors import AirmuscleError, ColumnError, ParameterError, UnitError, UnknownNameError
 from airmuscle.files import load_scenario, run_chapter, scenario_schema
 from airmuscle.files.scenario.simulation_chapter import describe_input
-from airmuscle.outlets.cli import app
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "pressure_loop.toml"
@@ -377,14 +376,14 @@ def test_a_run_that_ends_early_is_reported(tmp_path: Path):
     """RungeKutta4 with steps far too long for the valves."""
     changes = ("3e-9, critical_ratio = 0.3 }\ndischarge", "9e-6, critical_ratio = 0.3 }\ndischarge"), (
         'duration = "300 ms"', 'duration = "300 ms"\nintegrator = { model = "RungeKutta4", step = "5 ms" }')  # fmt: skip
-    done = CliRunner().invoke(app, ["simulate", str(written(tmp_path, *changes)), "--out", str(tmp_path / "run")])
+    done = airmuscle("simulate", written(tmp_path, *changes), "--out", tmp_path / "run")
     assert done.exit_code == 1
     assert "ended early" in (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
     assert (tmp_path / "run" / "figures" / "loop.png").exists()
 
 
 def test_the_program_runs_the_example(tmp_path: Path):
-    done = CliRunner().invoke(app, ["simulate", str(EXAMPLE), "--out", str(tmp_path / "run"), "--json"])
+    done = airmuscle("simulate", EXAMPLE, "--out", tmp_path / "run", "--json")
     assert done.exit_code == 0, done.output
     shown = json.loads(done.stdout)
     assert shown["range"]["setpoint.pressure"]["column"] == "setpoint.pressure [Pa]"
@@ -443,7 +442,7 @@ def test_a_study_varies_the_numbers_of_a_controller(tmp_path: Path):
     found = [study.scenario(i) for i in range(4)]
     assert [s.problem.input.controller.gain for s in found] == pytest.approx([5e-6, 5e-6, 2e-5, 2e-5])
     assert [s.problem.input.setpoint.changes["pressure"][1][1] for s in found] == [1.5e5, 2e5, 1.5e5, 2e5]
-    done = CliRunner().invoke(app, ["study", str(tmp_path / "study.toml"), "--out", str(tmp_path / "out")])
+    done = airmuscle("study", tmp_path / "study.toml", "--out", tmp_path / "out")
     assert done.exit_code == 0, done.output
     (tmp_path / "study.toml").write_text(STUDY.replace("controller.gain", "controller.gian"), encoding="utf-8")
     with pytest.raises(AirmuscleError, match=r"input.controller.gian.*Did you mean 'input.controller.gain'"):
@@ -455,7 +454,7 @@ def test_a_fingerprint_leaves_out_rooms_that_exist_and_no_controllers():
     from airmuscle.core.fingerprint import EXCLUDED_ROOMS
     from airmuscle.outlets.cli.campaign_stages import OMITTED_ROOMS
 
-    rooms = {path.parent.name for path in Path(airmuscle.__file__).parent.glob("*/__init__.py")}
+    rooms = {path.parent.name for path in Path(am.__file__).parent.glob("*/__init__.py")}
     assert {*EXCLUDED_ROOMS, *OMITTED_ROOMS} <= rooms
     assert not {"core", "engine", "physics", "control", "files", "design"} & set(EXCLUDED_ROOMS)
     assert not {"core", "engine", "physics", "recording", "bench"} & set(OMITTED_ROOMS)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 import airmuscle as am
 from airmuscle.core import display as module
@@ -25,7 +25,6 @@ from airmuscle.core.display import (
 from airmuscle.core.plotting import new_figure, rendered
 from airmuscle.design import process_pool
 from airmuscle.errors import FileError, UnitError
-from airmuscle.outlets.cli import app
 from airmuscle.units import display
 
 
@@ -191,11 +190,11 @@ def test_the_axes_of_a_report_have_round_numbers_in_the_chosen_unit():
 def test_tables_of_the_command_line_are_in_the_chosen_units_and_json_in_si():
     display("bar", "mm")
     point = ["evaluate", "dmsp-20-300", "--pressure", "300 kPa", "--force", "100 N"]
-    shown = CliRunner().invoke(app, point).stdout
+    shown = airmuscle(*point).stdout
     assert "3 bar" in shown
     assert "kPa" not in shown
-    assert '"pressure": 300000.0' in CliRunner().invoke(app, [*point, "--json"]).stdout
-    table = CliRunner().invoke(app, ["show", "dmsp-20-300"]).stdout
+    assert '"pressure": 300000.0' in airmuscle(*point, "--json").stdout
+    table = airmuscle("show", "dmsp-20-300").stdout
     assert "geometry.radius" not in table or " mm " in table
     assert " 300 " in table
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 from airmuscle.bench import Decimation, from_pandas, read, read_csv, to_xarray, write, write_csv
 from airmuscle.bench.readers import large_csv
 from airmuscle.errors import ColumnError, FileError, ParameterError
-from airmuscle.outlets.cli import app
 from airmuscle.recording import Recording
 
 pd = pytest.importorskip("pandas", reason="needs the package pandas")
@@ -125,10 +124,6 @@ def test_an_unknown_extension_and_an_unwritable_folder_are_named(tmp_path):
         with pytest.raises(FileError, match="cannot be written"):
             write(RUN, tmp_path / "no folder" / f"run{extension}")
     assert list(tmp_path.iterdir()) == []
-
-
-def airmuscle(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments], env={"COLUMNS": "160"})
 
 
 def test_the_command_converts_one_file_and_several(tmp_path):

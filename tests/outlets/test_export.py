@@ -17,7 +17,7 @@ import numpy as np
 import plants
 import printed
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 from widths import widened
 
 from airmuscle.core import StateVariable, System, autodiff, model, ops, parameter
@@ -25,7 +25,6 @@ from airmuscle.engine import DormandPrince8, Problem, Rodas4, RungeKutta4, Sampl
 from airmuscle.errors import AirmuscleWarning, FileError, ParameterError
 from airmuscle.files import list_laws, load_law
 from airmuscle.outlets import C99, JavaScript, Octave, make_identifiers, write_fmu, write_law, write_program
-from airmuscle.outlets.cli import app
 from airmuscle.outlets.export import build_and_run
 from airmuscle.outlets.export.identifiers import LONGEST, RESERVED
 from airmuscle.physics import HangingMass, Tabulated
@@ -559,10 +558,6 @@ def test_an_unknown_column_is_refused_with_the_nearest(tmp_path):
 
 
 # The command
-
-
-def airmuscle(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments], env={"COLUMNS": "160"})
 
 
 def test_the_command_writes_a_program_that_runs(tmp_path):

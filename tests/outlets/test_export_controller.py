@@ -11,8 +11,8 @@ import numpy as np
 import printed
 import pytest
 from called_controller import Called
+from command_line import airmuscle
 from control_plants import LIFT, PRESSURE, SPLIT
-from typer.testing import CliRunner
 from widths import widened
 
 from airmuscle.control import (
@@ -40,7 +40,6 @@ from airmuscle.engine import (
 from airmuscle.engine.run import prepare_loop
 from airmuscle.errors import FileError, ParameterError
 from airmuscle.outlets import write_controller
-from airmuscle.outlets.cli import app
 from airmuscle.outlets.export.microcontroller import COMPILER, EMULATOR, PROCESSORS, run_in_emulator
 from airmuscle.outlets.export.printed_controller import print_controller
 
@@ -166,7 +165,7 @@ def test_without_a_compiler_for_the_processor_the_packages_are_named(tmp_path, m
 )
 def test_options_of_a_controller_that_do_not_fit_are_refused(options, message, tmp_path):
     scenario = Path(__file__).parents[2] / "examples" / "pressure_loop.toml"
-    done = CliRunner().invoke(app, ["export", str(scenario), "--to", "c", "--out", str(tmp_path / "out"), *options])
+    done = airmuscle("export", scenario, "--to", "c", "--out", tmp_path / "out", *options)
     assert done.exit_code == 2
     assert message in " ".join(done.output.replace("\u2502", " ").split())
     assert not (tmp_path / "out").exists()
@@ -235,7 +234,7 @@ def test_what_cannot_be_printed_is_refused_by_name(tmp_path):
 
 def test_the_command_exports_the_controller_of_a_scenario(tmp_path):
     scenario = Path(__file__).parents[2] / "examples" / "pressure_loop.toml"
-    done = CliRunner().invoke(app, ["export", str(scenario), "--controller", "--to", "c", "--out", str(tmp_path)])
+    done = airmuscle("export", scenario, "--controller", "--to", "c", "--out", tmp_path)
     assert done.exit_code == 0, done.output
     assert {path.name for path in tmp_path.iterdir()} == {
         "pressure_loop.h",
@@ -244,7 +243,7 @@ def test_the_command_exports_the_controller_of_a_scenario(tmp_path):
         "CMakeLists.txt",
     }
     assert "250 samples, 0 commands differ" in replay(tmp_path).stdout
-    wrong = CliRunner().invoke(app, ["export", str(scenario), "--controller", "--to", "js", "--out", str(tmp_path)])
+    wrong = airmuscle("export", scenario, "--controller", "--to", "js", "--out", tmp_path)
     assert wrong.exit_code == 2
     assert "a controller is exported to C" in " ".join(wrong.output.replace("\u2502", " ").split())
 
@@ -288,7 +287,7 @@ def test_the_replay_has_the_readings_of_the_sensors_and_the_commands_of_the_run(
 def test_the_controller_of_the_cascade_with_sensors_is_exported_in_single_precision(tmp_path):
     scenario = Path(__file__).parents[2] / "examples" / "joint_cascade.toml"
     options = ["--controller", "--to", "c", "--precision", "float", "--out", str(tmp_path)]
-    done = CliRunner().invoke(app, ["export", str(scenario), *options])
+    done = airmuscle("export", scenario, *options)
     assert done.exit_code == 0, done.output
     assert "0 commands differ by more than 0.0001" in replay(tmp_path, "-O0").stdout
 

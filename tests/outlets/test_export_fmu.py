@@ -23,13 +23,12 @@ import numpy as np
 import plants
 import printed
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 from airmuscle.control import PID
 from airmuscle.engine import ControlLoop, Problem, Rodas4, RungeKutta4, Schedule, solve
 from airmuscle.errors import FileError, ParameterError
 from airmuscle.outlets import write_fmu
-from airmuscle.outlets.cli import app
 from airmuscle.outlets.export import compiler
 from airmuscle.outlets.export.fmi_units import BASE, base_powers
 from airmuscle.physics import ValidityRange
@@ -451,10 +450,6 @@ def test_units_are_powers_of_base_units():
 
 
 # The command
-
-
-def airmuscle(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments], env={"COLUMNS": "160"})
 
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "fill_discharge.toml"

@@ -11,8 +11,8 @@ import numpy as np
 import printed
 import pytest
 from called_controller import Called
+from command_line import airmuscle
 from control_plants import JOINT, LIFT, PRESSURE, PRESSURES, SPLIT
-from typer.testing import CliRunner
 
 from airmuscle.control import PID, Cascade, OnOffController
 from airmuscle.engine import (
@@ -30,7 +30,6 @@ from airmuscle.engine import (
 )
 from airmuscle.errors import ParameterError
 from airmuscle.outlets import C99, JavaScript, Octave, write_program
-from airmuscle.outlets.cli import app
 
 STEP = Schedule({"pressure": ((0.0, 1e5), (0.1, 3e5))})
 RAMP = SampledSignal({"pressure": ((0.0, 1e5), (0.087, 2.1e5), (0.2, 1.4e5))})
@@ -229,7 +228,7 @@ def test_a_run_that_continues_another_is_refused(tmp_path):
 
 def test_the_command_exports_the_loop_of_a_scenario(tmp_path):
     scenario = Path(__file__).parents[2] / "examples" / "pressure_loop.toml"
-    done = CliRunner().invoke(app, ["export", str(scenario), "--to", "c", "--out", str(tmp_path)])
+    done = airmuscle("export", scenario, "--to", "c", "--out", tmp_path)
     assert done.exit_code == 0, done.output
     names = {
         "pressure_loop.h",

@@ -15,14 +15,13 @@ import numpy as np
 import plants
 import printed
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 from airmuscle.control import PID
 from airmuscle.engine import ControlLoop, Problem, Schedule
 from airmuscle.engine.compile import compile_system
 from airmuscle.errors import ParameterError
 from airmuscle.outlets import write_modelica
-from airmuscle.outlets.cli import app
 
 
 def package(name, folder, **options):
@@ -102,7 +101,7 @@ def test_a_controller_is_refused_by_name(tmp_path):
 def test_the_command_writes_the_package(tmp_path):
     example = Path(__file__).parents[2] / "examples" / "fill_discharge.toml"
     arguments = ["export", str(example), "--to", "modelica", "--tunable", "mechanism.mass", "--out", str(tmp_path)]
-    done = CliRunner().invoke(app, arguments, env={"COLUMNS": "160"})
+    done = airmuscle(*arguments)
     assert done.exit_code == 0, done.output
     text = (tmp_path / "fill_discharge" / "package.mo").read_text(encoding="utf-8")
     assert 'parameter Real p_mechanism_mass(unit = "kg") = 10.0 "p.mechanism.mass";' in text

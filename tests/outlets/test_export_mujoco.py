@@ -16,13 +16,12 @@ import numpy as np
 import plants
 import printed
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 from widths import widened
 
 from airmuscle.engine import Problem, Rodas4, RungeKutta4, Schedule, solve
 from airmuscle.errors import ParameterError
 from airmuscle.outlets import write_mujoco_plugin
-from airmuscle.outlets.cli import app
 from airmuscle.outlets.export import compiler, mujoco_plugin
 from airmuscle.physics import AntagonisticJoint, FillDischarge, Supply, Valve, find_equilibrium
 
@@ -309,7 +308,7 @@ def test_a_muscle_that_is_not_there_is_refused(tmp_path):
 def test_the_command_writes_the_plugin(tmp_path):
     example = Path(__file__).parents[2] / "examples" / "fill_discharge.toml"
     arguments = ["export", str(example), "--to", "mujoco", "--out", str(tmp_path / "plugin")]
-    done = CliRunner().invoke(app, arguments, env={"COLUMNS": "160"})
+    done = airmuscle(*arguments)
     assert done.exit_code == 0, done.output
     assert (tmp_path / "plugin" / "fill_discharge_plugin.c").exists()
     assert "airmuscle.fill_discharge" in done.output

@@ -13,14 +13,13 @@ import numpy as np
 import plants
 import printed
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 from airmuscle.core import leaves
 from airmuscle.engine import Problem, RungeKutta4, Schedule
 from airmuscle.errors import ParameterError
 from airmuscle.files import load_law
 from airmuscle.outlets import C99, write_fmu, write_law
-from airmuscle.outlets.cli import app
 from airmuscle.outlets.export import platforms
 from airmuscle.outlets.export.compiler import run_command
 from airmuscle.outlets.export.platforms import PLATFORMS, find_cross_compiler, find_platform, this_platform
@@ -99,9 +98,7 @@ def test_the_folders_are_those_of_the_standard():
 
 
 def test_the_command_refuses_options_that_exclude_each_other(tmp_path):
-    done = CliRunner().invoke(
-        app, ["export", str(EXAMPLE), "--to", "fmu", "--sources-only", "--platforms", "win64", "--out", str(tmp_path)]
-    )
+    done = airmuscle("export", EXAMPLE, "--to", "fmu", "--sources-only", "--platforms", "win64", "--out", tmp_path)
     assert done.exit_code == 2
     assert "--sources-only and --platforms exclude each other" in " ".join(done.output.replace("\u2502", " ").split())
 

@@ -13,7 +13,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dynamic_study import VALVES, airmuscle, noisy_run, plant_table, run_table
+from command_line import airmuscle
+from dynamic_study import VALVES, noisy_run, plant_table, run_table
 
 from airmuscle.bench import CrossPrediction, InitialValue, StartTime, describe_cross_predictions, read_csv, write_csv
 from airmuscle.core import leaves

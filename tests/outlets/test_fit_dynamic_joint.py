@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dynamic_study import airmuscle, noisy_run
+from command_line import airmuscle
+from dynamic_study import noisy_run
 
 import airmuscle as am
 from airmuscle.bench import InitialConditions, write_csv

@@ -9,13 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 from airmuscle.bench.identify.candidates import blank_surface
 from airmuscle.errors import ParameterError, UnknownNameError
 from airmuscle.files import load, save
 from airmuscle.files.library.length_scaling import scale_to_length
-from airmuscle.outlets.cli import app
 from airmuscle.physics import Braid, EffectiveLength, MartensBoblan2017
 
 MUSCLE = "dmsp-20-300"
@@ -45,10 +44,6 @@ output_times = "10 ms"
 BARE_SCENARIO = re.sub(
     r"\[plant.muscle\]\n(.*)\n.*\n", "", SCENARIO.replace("[plant]", '[plant]\nmuscle = "fit/muscle.toml"')
 )
-
-
-def airmuscle(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments], env={"COLUMNS": "160"})
 
 
 def bench(path: Path, radius: float = 0.01) -> Path:

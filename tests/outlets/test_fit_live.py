@@ -12,13 +12,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 from airmuscle.bench import RowReader, follow_lines, read_csv
 from airmuscle.bench.readers.follow import MAX_UNREADABLE
 from airmuscle.errors import ColumnError, FileError
 from airmuscle.files import load
-from airmuscle.outlets.cli import app
 
 RIG = ("--max-pressure", "6 bar", "--max-force", "1.5 kN")
 
@@ -36,7 +35,7 @@ def replay(count: int = 6000, decimal: str = ".") -> str:
 
 
 def bench(*arguments: str, **options):
-    return CliRunner().invoke(app, ["fit-live", *arguments], **options)
+    return airmuscle("fit-live", *arguments, **options)
 
 
 def test_rows_as_they_come_are_those_of_the_complete_file(tmp_path: Path):

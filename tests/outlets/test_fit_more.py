@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 from airmuscle import load_data
 from airmuscle.bench import (
@@ -28,7 +28,6 @@ from airmuscle.bench.identify.band_plot import band_plot
 from airmuscle.bench.identify.candidates import blank_surface
 from airmuscle.bench.identify.levels import levels_of
 from airmuscle.files import load
-from airmuscle.outlets.cli import app
 from airmuscle.physics import ContractileSurface, Sarosi2012, ValidityRange
 from airmuscle.recording import Recording
 
@@ -36,10 +35,6 @@ MUSCLE = "dmsp-20-300"
 SURFACE = ("--characteristic", "ContractileSurface", "--degree", "2")
 SAROSI = Sarosi2012(1.2e-4, 420.0, -57.0, -8.7e-3, 2.7e-3, -310.0)
 BOX = ValidityRange(1e5, 6e5, 0.0, 0.2)
-
-
-def airmuscle(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments], env={"COLUMNS": "160"})
 
 
 def bench(path: Path, noise: float = 5.0, count: int = 120, seed: int = 1) -> Recording:

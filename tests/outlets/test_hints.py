@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 import airmuscle as am
 from airmuscle.bench import (
@@ -42,7 +42,7 @@ from airmuscle.bench.identify.candidates import blank_surface
 from airmuscle.core import Diagnostic, DiagnosticCode, Hint, HintedText
 from airmuscle.errors import ColumnError, SimulationError
 from airmuscle.files.library import located_errors
-from airmuscle.outlets.cli import COMMANDS, app
+from airmuscle.outlets.cli import COMMANDS
 from airmuscle.outlets.cli.option_hints import INSTRUCTIONS, in_options
 from airmuscle.physics import Sarosi2012
 from airmuscle.recording import Recording
@@ -58,10 +58,6 @@ VALUES = {
     "all_rows": True, "characteristic": ..., "censoring": ..., "free": ("circuit.fill.conductance",), "": ...,
 }  # fmt: skip
 """A value of every argument that a hint of the source names."""
-
-
-def airmuscle(*arguments: object) -> Any:
-    return CliRunner().invoke(app, [str(a) for a in arguments], env={"COLUMNS": "200"})
 
 
 def in_one_line(text: str) -> str:

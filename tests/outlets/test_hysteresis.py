@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 from airmuscle.bench import (
     PressurePath,
@@ -30,7 +30,6 @@ from airmuscle.bench.identify.hysteresis import hysteresis_chapters
 from airmuscle.bench.identify.hysteresis.plot import plot_loops
 from airmuscle.files import load, load_scenario, save
 from airmuscle.files.library import Location, build_muscle
-from airmuscle.outlets.cli import app
 from airmuscle.physics import CreepElements, MaxwellSlip
 from airmuscle.recording import Recording
 
@@ -39,10 +38,6 @@ TURNS = (0.02, 0.14, 0.08, 0.12, 0.05, 0.14, 0.02)
 MUSCLE = "dmsp-20-300"
 EXAMPLES = Path(__file__).parents[2] / "examples"
 LENGTH = ("--resting-length", "300 mm")
-
-
-def airmuscle(*arguments):
-    return CliRunner().invoke(app, [str(a) for a in arguments], env={"COLUMNS": "160"})
 
 
 def loop(path: Path, seed: int, friction: MaxwellSlip | None = SLIP, turns=TURNS, rows=150, pressure=3e5) -> Path:

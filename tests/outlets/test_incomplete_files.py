@@ -12,19 +12,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 from airmuscle.bench import ColumnMapping, NoTime, UniformTime, find_runs, inspect, read
 from airmuscle.bench.readers.file_name import FileNamePattern
 from airmuscle.errors import AirmuscleError, ColumnError
-from airmuscle.outlets.cli import app
 from airmuscle.recording import Recording
 
 RATE, ROWS = 530.0, 1061
-
-
-def airmuscle(*arguments: object) -> Any:
-    return CliRunner().invoke(app, [str(a) for a in arguments], env={"COLUMNS": "200"})
 
 
 def a_log(folder: Path, name: str, contraction: float = 0.0, digits: int = 3) -> Path:

@@ -12,16 +12,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner, Result
+from command_line import airmuscle
 
 from airmuscle.bench import inspect, read
-from airmuscle.outlets.cli import app
 
 ROWS = 400
-
-
-def airmuscle(*arguments: object) -> Result:
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 def seen(*arguments: object) -> list[dict]:

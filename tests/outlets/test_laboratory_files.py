@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_line import airmuscle
 from dynamic_study import plant_table
-from typer.testing import CliRunner
 
 import airmuscle as am
 from airmuscle.bench import (
@@ -34,7 +34,7 @@ from airmuscle.bench.readers import mapping_of_tables
 from airmuscle.core import STANDARD_GRAVITY
 from airmuscle.errors import ColumnError, FileError, IdentificationError, ParameterError
 from airmuscle.files import load_dynamic_fit
-from airmuscle.outlets.cli import COMMANDS, app
+from airmuscle.outlets.cli import COMMANDS
 from airmuscle.physics import ContractileSurface
 from airmuscle.recording import Recording
 from airmuscle.recording.row_notes import row_notes
@@ -50,10 +50,6 @@ OPTIONS = (
     "--displacement-zero", "--skip-rows", "--missing", "--missing-code", "--outliers", "--delimiter", "--decimal",
     "--sheet", "--group",
 )  # fmt: skip
-
-
-def airmuscle(*arguments: object) -> Any:
-    return CliRunner().invoke(app, [str(a) for a in arguments], env={"COLUMNS": "250"})
 
 
 def text(folder: Path, lines: Sequence[str], name: str = "bench.csv", separator: str = ";") -> Path:

@@ -9,13 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 import airmuscle as am
 from airmuscle.errors import ParameterError, UnknownNameError
 from airmuscle.files import PlantEntry, list_plants, load_law, load_scenario
 from airmuscle.files.library import PLANTS
-from airmuscle.outlets.cli import app
 
 pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
 each = pytest.mark.parametrize("name", list_plants())
@@ -72,17 +71,17 @@ def test_a_plant_is_loaded_by_name_and_its_example_moves_within_its_range_of_ang
 
 @each
 def test_a_plant_is_listed_and_shown_with_its_sources(name):
-    listed = json.loads(CliRunner().invoke(app, ["list", "--json"]).stdout)
+    listed = json.loads(airmuscle("list", "--json").stdout)
     (row,) = [r for r in listed if r["name"] == name]
     assert row["kind"].startswith("plant, ")
-    shown = CliRunner().invoke(app, ["show", name])
+    shown = airmuscle("show", name)
     assert shown.exit_code == 0
     assert "chosen" in shown.output
-    assert json.loads(CliRunner().invoke(app, ["show", name, "--json"]).stdout)["sources"]
+    assert json.loads(airmuscle("show", name, "--json").stdout)["sources"]
 
 
 def test_simulate_takes_the_name_of_a_plant(tmp_path):
-    done = CliRunner().invoke(app, ["simulate", "joint-dmsp-20-regulators", "--out", str(tmp_path / "run")])
+    done = airmuscle("simulate", "joint-dmsp-20-regulators", "--out", tmp_path / "run")
     assert done.exit_code == 0, done.output
     assert (tmp_path / "run" / "recording.csv").exists()
 

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dynamic_study import VALVES, airmuscle, noisy_run, plant_table, run_table
+from command_line import airmuscle
+from dynamic_study import VALVES, noisy_run, plant_table, run_table
 
 import airmuscle as am
 from airmuscle.bench import predict_static, rate_of_change, write_csv

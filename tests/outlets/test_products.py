@@ -7,8 +7,8 @@ import json
 
 import numpy as np
 import pytest
+from command_line import airmuscle
 from plants import EXAMPLES
-from typer.testing import CliRunner
 
 from airmuscle import simulate
 from airmuscle.engine import Schedule
@@ -16,14 +16,9 @@ from airmuscle.errors import ParameterError, UnknownNameError
 from airmuscle.files import entries_of_product, list_laws, list_products, load, load_law
 from airmuscle.files.library import ParameterUncertainty, scale_entry, without_parts
 from airmuscle.files.library.stated_band import StatedBand
-from airmuscle.outlets.cli import app
 from airmuscle.physics import CreepElements, LinearSpring, Ratings
 
 DMSP_20 = "dmsp-20-300"
-
-
-def airmuscle(*arguments: str):
-    return CliRunner().invoke(app, arguments)
 
 
 @pytest.mark.parametrize("name", list_products())

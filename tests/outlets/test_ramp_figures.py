@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 from airmuscle import load
 from airmuscle.bench import Fit, fit, fit_chapter
@@ -22,7 +22,6 @@ from airmuscle.bench.identify.ramp_plot import ramp_plot
 from airmuscle.core.plotting import MAX_VECTOR_MARKERS, new_figure, rendered, save
 from airmuscle.files import Entry
 from airmuscle.files.library import list_files
-from airmuscle.outlets.cli import app
 from airmuscle.physics import ContractileSurface
 from airmuscle.physics.muscle import compute_isobars
 from airmuscle.physics.muscle.isobar_plot import isobar_plot
@@ -139,7 +138,7 @@ def test_the_muscle_file_of_many_recordings_has_a_short_title_and_note(tmp_path:
         lines = [f"{p / 1e3},{c},{f}" for p, c, f in rows]
         paths[-1].write_text("pressure [kPa],contraction [1],force [N]\n" + "\n".join(lines), encoding="utf-8")
     options = ["--characteristic", "ContractileSurface", "--degree", "2", "--out", str(tmp_path / "fit")]
-    result = CliRunner().invoke(app, ["fit", *map(str, paths), *options])
+    result = airmuscle("fit", *map(str, paths), *options)
     assert result.exit_code == 0, result.output
     muscle = tomllib.loads((tmp_path / "fit" / "muscle.toml").read_text(encoding="utf-8"))
     assert len(muscle["title"]) < 160

@@ -9,9 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
-
-from airmuscle.outlets.cli import app
+from command_line import airmuscle
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -46,7 +44,7 @@ def test_the_commands_run(command, tmp_path, monkeypatch):
     words = shlex.split(command)[2:]
     words = [str(ROOT / word) if word.startswith("examples/") else word for word in words]
     monkeypatch.chdir(tmp_path)
-    done = CliRunner().invoke(app, words)
+    done = airmuscle(*words)
     assert done.exit_code == 0, done.stderr
 
 

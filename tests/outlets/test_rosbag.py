@@ -6,11 +6,10 @@ import sys
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 from airmuscle.bench import read
 from airmuscle.errors import FileError
-from airmuscle.outlets.cli import app
 
 pytestmark = pytest.mark.tool
 
@@ -112,7 +111,7 @@ def test_a_note_proposes_the_mapping_of_a_field_with_the_unit_of_its_message(sta
 
 
 def test_the_command_converts_a_bag_of_standard_messages(standard_messages, tmp_path):
-    done = CliRunner().invoke(app, ["convert", str(standard_messages), str(tmp_path / "run.csv")])
+    done = airmuscle("convert", standard_messages, tmp_path / "run.csv")
     assert done.exit_code == 0, done.output
     assert read(tmp_path / "run.csv")[0]["acc.y"].tolist() == [2.0] * 5
 
@@ -129,7 +128,7 @@ def test_the_command_converts_a_bag(bag, tmp_path):
     """As the guide states, here to CSV: the same columns, rows and numbers."""
     target, mapping = tmp_path / "run.csv", tmp_path / "rig.toml"
     mapping.write_text('[columns]\n"pressure" = "pressure [Pa]"\n')
-    done = CliRunner().invoke(app, ["convert", str(bag), str(target), "--mapping", str(mapping)])
+    done = airmuscle("convert", bag, target, "--mapping", mapping)
     assert done.exit_code == 0, done.output
     (run,), (written,) = read(bag, mapping=mapping), read(target)
     assert list(written) == list(run)
@@ -138,7 +137,7 @@ def test_the_command_converts_a_bag(bag, tmp_path):
 
 
 def test_a_quantity_without_unit_is_refused_with_the_option_that_states_it(bag, tmp_path):
-    done = CliRunner().invoke(app, ["convert", str(bag), str(tmp_path / "run.csv")])
+    done = airmuscle("convert", bag, tmp_path / "run.csv")
     assert done.exit_code == 1
     assert "To state the unit, use --unit 'pressure=...'." in " ".join(done.output.split())
     assert not (tmp_path / "run.csv").exists()

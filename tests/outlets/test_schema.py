@@ -13,14 +13,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 from airmuscle.core import parameters
 from airmuscle.errors import AirmuscleError
 from airmuscle.files import list_laws, list_plants, load, load_scenario, muscle_schema, scenario_schema, to_toml
 from airmuscle.files.library import PLANTS, build_entry, model_class
 from airmuscle.files.scenario import TABLES
-from airmuscle.outlets.cli import app
 
 ROOT = Path(__file__).parents[2]
 LIBRARY = sorted((ROOT / "src" / "airmuscle" / "files" / "library").glob("*.toml"))
@@ -226,17 +225,17 @@ def test_unit_meaning_and_bounds_are_those_of_the_declaration():
 
 
 def test_the_command_prints_or_writes_what_editors_read(tmp_path: Path):
-    printed = CliRunner().invoke(app, ["schema"])
+    printed = airmuscle("schema")
     assert (printed.exit_code, json.loads(printed.stdout)) == (0, SCENARIO)
     file = tmp_path / "new" / "muscle.schema.json"
-    written = CliRunner().invoke(app, ["schema", "--muscle", "--out", str(file)])
+    written = airmuscle("schema", "--muscle", "--out", file)
     assert (written.exit_code, written.stdout) == (0, f"schema: {file}\n")
     assert json.loads(file.read_text(encoding="utf-8")) == MUSCLE
     assert [p.name for p in file.parent.iterdir()] == [file.name]
     (tmp_path / "file").write_text("", encoding="utf-8")
-    refused = CliRunner().invoke(app, ["schema", "--out", str(tmp_path / "file" / "x.json")])
+    refused = airmuscle("schema", "--out", tmp_path / "file" / "x.json")
     assert refused.exit_code == 1
     assert "cannot be written to" in refused.stderr
-    nameless = CliRunner().invoke(app, ["schema", "--out", ""])
+    nameless = airmuscle("schema", "--out", "")
     assert nameless.exit_code == 2
     assert "--out must be a file name" in nameless.stderr

@@ -9,21 +9,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner, Result
+from command_line import airmuscle
 
 import airmuscle as am
 from airmuscle.design import JointRequirement, LiftRequirement, SizingConditions, choose, scenario_text
 from airmuscle.design.sizing.scenario import MOVING, RESTING
 from airmuscle.files import load_scenario
-from airmuscle.outlets.cli import app
 
 LIFT = ("size", "--load", "20 kg", "--stroke", "40 mm", "--supply", "6 bar")
 ONE = ("--muscle", "dmsp-20-300", "--max-count", "1")
 CONDITIONS = SizingConditions(supply=6e5)
-
-
-def airmuscle(*arguments: object) -> Result:
-    return CliRunner().invoke(app, [str(argument) for argument in arguments], env={"COLUMNS": "160"})
 
 
 def simulate(text: str, folder: Path) -> am.Recording:
@@ -181,17 +176,16 @@ def test_wrong_usage_is_exit_code_2(arguments):
 
 def test_an_equal_force_at_both_ends_is_one_number():
     arguments = ["size", "--load", "40 kg", "--stroke", "60 mm", "--supply", "6 bar", "--muscle", "dmsp-20-300"]
-    result = CliRunner().invoke(app, arguments, env={"COLUMNS": "200"})
+    result = airmuscle(*arguments, width=200)
     assert result.exit_code == 0, result.output
     assert "392" in result.stdout
     assert "392 to 392" not in result.stdout
 
 
 @pytest.mark.parametrize("width", [90, 100])
-def test_no_heading_and_no_number_of_the_table_is_broken(monkeypatch, width):
-    monkeypatch.setenv("COLUMNS", str(width))
+def test_no_heading_and_no_number_of_the_table_is_broken(width):
     words = ["size", "--load", "20 kg", "--stroke", "40 mm", "--supply", "6 bar", "--max-length", "400 mm"]
-    lines = CliRunner().invoke(app, words).stdout.splitlines()
+    lines = airmuscle(*words, width=width).stdout.splitlines()
     table = lines[1 : lines.index(next(line for line in lines if line.startswith("air:")))]
     assert max(map(len, table)) <= width
     head = " ".join(table[:2])

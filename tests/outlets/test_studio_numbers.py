@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import airmuscle
 from scenario_files import LIFT
 from studio_pages import BEGINNING, WEB, run_script, scripts
-from typer.testing import CliRunner
 
 import airmuscle as am
 from airmuscle.core import flatten, leaves, with_parameters
@@ -22,7 +22,6 @@ from airmuscle.files.library import Location
 from airmuscle.files.library.build import build
 from airmuscle.files.scenario import build_scenario
 from airmuscle.outlets import export_page
-from airmuscle.outlets.cli import app
 from airmuscle.outlets.studio.app import library_list
 from airmuscle.outlets.studio.law_sheet import law_sheet
 from airmuscle.outlets.studio.tasks import sheet_of_any, sheet_of_scenario_text
@@ -378,20 +377,19 @@ def test_colours_of_the_page_have_the_contrast_of_wcag_aa(theme):
 
 
 def test_the_command_writes_a_page_and_names_a_missing_package(tmp_path, monkeypatch):
-    runner = CliRunner()
     file = tmp_path / "page.html"
-    done = runner.invoke(app, ["studio", "tondu-lopez", "--export", str(file)])
+    done = airmuscle("studio", "tondu-lopez", "--export", file)
     assert (done.exit_code, done.stdout) == (0, f"page: {file}\n")
     assert file.read_text(encoding="utf-8").startswith("<!doctype html>")
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    done = runner.invoke(app, ["studio"])
+    done = airmuscle("studio")
     assert done.exit_code == 1
     assert "error: the studio needs starlette and uvicorn. Install them: pip install starlette uvicorn" in done.stderr
 
 
 @pytest.mark.parametrize("name", ["unknown-muscle", "matrix-821", "missing.toml"])
 def test_the_command_names_what_cannot_be_shown(name):
-    done = CliRunner().invoke(app, ["studio", name, "--no-browser"])
+    done = airmuscle("studio", name, "--no-browser")
     assert done.exit_code == 1
     assert done.stderr.startswith("error: ")
     assert name in done.stderr

@@ -24,8 +24,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import airmuscle
 from scenario_files import CIRCUIT, MUSCLE_FILE
-from typer.testing import CliRunner
 
 from airmuscle.core import fingerprint
 from airmuscle.design import dask_cluster, load_study, process_pool, run_study
@@ -37,7 +37,6 @@ from airmuscle.design.study.metrics import METRICS
 from airmuscle.engine import simulate, solve
 from airmuscle.errors import AirmuscleError, ColumnError, FileError, InputError, SimulationError
 from airmuscle.files import load_scenario
-from airmuscle.outlets.cli import app
 from airmuscle.outlets.cli.interruption import check_interrupted, deferred_sigint
 from airmuscle.report import save_table
 
@@ -196,7 +195,7 @@ def test_workers_exit_within_a_second_when_their_parent_is_killed(folder: Path):
 
 def test_only_a_resumed_study_is_reported_as_resumed(folder: Path):
     arguments = ["study", str(folder / "study.toml"), "--out", str(folder / "out"), "--workers", "1"]
-    first, second = (CliRunner().invoke(app, arguments) for _ in range(2))
+    first, second = (airmuscle(*arguments) for _ in range(2))
     assert "resuming" not in first.stderr
     assert "resuming: 22 of 22 runs are already saved" in second.stderr
     assert second.stdout == first.stdout
@@ -512,9 +511,7 @@ def test_an_unexpected_exception_fails_only_its_own_run(folder: Path, monkeypatc
 
 def test_a_study_in_which_all_runs_fail_is_an_error(folder: Path):
     edited(folder, "[design]", '"input.fill[0][1]" = [2]\n[design]')
-    done = CliRunner().invoke(
-        app, ["study", str(folder / "study.toml"), "--out", str(folder / "out"), "--workers", "1"]
-    )
+    done = airmuscle("study", folder / "study.toml", "--out", folder / "out", "--workers", "1")
     assert done.exit_code == 1
     assert "all 22 runs failed; reason of the first: " in done.stderr
     assert (folder / "out" / "results.csv").exists()
@@ -630,7 +627,7 @@ def test_the_report_shows_design_statistics_and_figures(folder: Path):
 
 def test_the_command_names_its_report_last(folder: Path):
     out = str(folder / "out")
-    done = CliRunner().invoke(app, ["study", str(folder / "study.toml"), "--out", out, "--workers", "1"])
+    done = airmuscle("study", folder / "study.toml", "--out", out, "--workers", "1")
     assert done.exit_code == 0, done.output
     assert done.stdout.splitlines()[-1] == f"report: {out}/report.html"
     assert "Two valves: 22 runs, MonteCarlo(count=22, seed=3)" in done.stdout
@@ -719,7 +716,7 @@ def test_invalid_executors_and_folders_are_rejected(folder: Path):
     with pytest.raises(FileError, match="cannot be written to"):
         run_study(load_study(folder / "study.toml"), folder / "file")
     study = str(folder / "study.toml")
-    both = CliRunner().invoke(app, ["study", study, "--workers", "2", "--dask", "tcp://localhost:1"])
+    both = airmuscle("study", study, "--workers", "2", "--dask", "tcp://localhost:1")
     assert both.exit_code == 1
     assert "--workers and --dask exclude each other" in both.stderr
 

@@ -12,13 +12,12 @@ import re
 from pathlib import Path
 
 import pytest
+from command_line import airmuscle
 from scenario_files import CIRCUIT, MUSCLE_FILE
-from typer.testing import CliRunner
 
 from airmuscle.design import Perturbations, load_scenario_loop, tune
 from airmuscle.errors import AirmuscleError, FileError, ParameterError
 from airmuscle.files import load_scenario
-from airmuscle.outlets.cli import app
 from airmuscle.outlets.cli import tune as command
 
 MUSCLE = f"""{MUSCLE_FILE}
@@ -72,7 +71,7 @@ def scenario(tmp_path: Path) -> Path:
 
 
 def run(*arguments: object):
-    return CliRunner().invoke(app, [str(each) for each in arguments])
+    return airmuscle(*arguments)
 
 
 def refused(*arguments: object) -> str:

@@ -8,11 +8,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 from airmuscle.bench import inspect, read
 from airmuscle.errors import FileError
-from airmuscle.outlets.cli import app
 
 HEAD = "time [s],pressure [kPa],force [N]\n"
 ROWS = "".join(f"{i},{100 + i},{50 + i}\n" for i in range(9))
@@ -57,7 +56,7 @@ def test_a_file_whose_name_is_no_text_is_fitted(tmp_path):
     except OSError:
         pytest.skip("the file system takes no such name")
     command = ["fit", name, "--characteristic", "ContractileSurface", "--degree", "2", "--out", str(tmp_path / "out")]
-    result = CliRunner().invoke(app, command)
+    result = airmuscle(*command)
     assert result.exit_code == 0, result.output
     assert r"bad\xff" in (tmp_path / "out" / "muscle.toml").read_text(encoding="utf-8").replace("\\\\", "\\")
 

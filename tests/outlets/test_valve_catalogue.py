@@ -10,7 +10,7 @@ import re
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
+from command_line import airmuscle
 
 import airmuscle as am
 from airmuscle.core import cite
@@ -31,7 +31,6 @@ from airmuscle.files import (
 )
 from airmuscle.files.library import Location
 from airmuscle.files.library.build import build
-from airmuscle.outlets.cli import app
 from airmuscle.papers.hosovsky_plant import MATRIX
 from airmuscle.physics import CheckValve, Valve, in_series
 
@@ -239,7 +238,7 @@ def test_a_file_without_a_valve_or_with_another_thing_is_refused(tmp_path: Path)
 
 def test_the_command_line_lists_shows_and_cites_valves():
     def run(*arguments: str):
-        return CliRunner().invoke(app, list(arguments), env={"COLUMNS": "160"})
+        return airmuscle(*arguments)
 
     listed = {entry["name"]: entry for entry in json.loads(run("list", "--json").output)}
     assert listed["matrix-821"]["kind"] == "valve, Valve"
