@@ -330,8 +330,8 @@ def test_the_arduino_library_commands_what_the_law_commands(tmp_path):
 
 
 def test_an_arduino_library_contains_a_controller(tmp_path):
-    example = str(Path(__file__).parents[2] / "examples/pressure_loop.toml")
-    wrong = CliRunner().invoke(app, ["export", example, "--to", "arduino", "--out", str(tmp_path / "a")])
+    example = Path(__file__).parents[2] / "examples/pressure_loop.toml"
+    wrong = airmuscle("export", example, "--to", "arduino", "--out", tmp_path / "a")
     assert "an Arduino library contains a controller; add --controller." in " ".join(wrong.output.split())
-    right = ["export", example, "--controller", "--to", "arduino", "--out", str(tmp_path / "b")]
-    assert "copy the folder to the libraries of Arduino" in CliRunner().invoke(app, right).output
+    right = airmuscle("export", example, "--controller", "--to", "arduino", "--out", tmp_path / "b")
+    assert "copy the folder to the libraries of Arduino" in right.output
