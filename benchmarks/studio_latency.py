@@ -1,4 +1,5 @@
-"""Latency of the studio: time from a key to the painted page, with ten isobars of 1000 points and with a joint.
+"""Latency of the studio: time from a key to the painted page, with ten isobars of 1000 points and with a joint; time
+of a small request while two heavy ones run.
 
 Run python benchmarks/studio_latency.py with the package playwright and Chromium; prints median and 95th percentile
 [ms], and the time of the page's scripts and of its whole main thread for each key [ms], as thread CPU time.
@@ -6,11 +7,19 @@ Run python benchmarks/studio_latency.py with the package playwright and Chromium
 
 from __future__ import annotations
 
+import http.client
+import json
+import math
 import shutil
 import statistics
 import subprocess
 import sys
+import threading
+import time
 from typing import Any
+from urllib.parse import urlsplit
+
+import airmuscle as am
 
 KEYS = 200
 PRESSURES = "0.5; 1; 1.5; 2; 2.5; 3; 3.5; 4; 4.5; 5"
@@ -52,6 +61,53 @@ def measured(page: Any, control: Any, keys: tuple[str, str]) -> str:
     )
 
 
+ROWS = 150_000
+"""Rows of each of the two files that are read meanwhile, of 4 MB (chosen)."""
+
+
+def beside_heavy_requests(address: str) -> str:
+    """One line on the sheets of the library, each requested while two files are being read."""
+    parts = urlsplit(address)
+
+    def send(method: str, path: str, body: bytes | None = None, query: str = "") -> bytes:
+        connection = http.client.HTTPConnection(str(parts.hostname), parts.port, timeout=300)
+        connection.request(method, f"{path}?{parts.query}{query}", body, {"X-Airmuscle": "1"})
+        answer = connection.getresponse()
+        content = answer.read()
+        if answer.status != 200:
+            raise RuntimeError(f"{path}: {content!r}")
+        connection.close()
+        return content
+
+    rows = (f"{0.01 * k:.2f},{3 + math.sin(0.001 * k):.4f},{400 + 90 * math.cos(0.001 * k):.2f}\n" for k in range(ROWS))
+    table = ("time [s],pressure [bar],force [N]\n" + "".join(rows)).encode()
+    sets = [json.loads(send("POST", "/api/fit/file", table, "&name=a.csv&set="))["set"] for _ in range(2)]
+    durations, alone, running = [], [], True
+
+    def read(name: str) -> None:
+        while running:
+            begin = time.perf_counter()
+            send("POST", "/api/fit/read", json.dumps({"set": name, "settings": {}}).encode())
+            alone.append(time.perf_counter() - begin)
+
+    readers = [threading.Thread(target=read, args=(name,)) for name in sets]
+    for reader in readers:
+        reader.start()
+    time.sleep(1.0)
+    for name in am.files.list_laws():
+        begin = time.perf_counter()
+        if name != "saga2007-exact":  # no closed form and no validity range: refused
+            send("GET", f"/api/law/{name}")
+            durations.append(time.perf_counter() - begin)
+    running = False
+    for reader in readers:
+        reader.join()
+    return (
+        f"median {statistics.median(durations):.2f} s, maximum {max(durations):.2f} s of {len(durations)} muscles and "
+        f"laws; reading of a file of {ROWS} rows: {statistics.median(alone):.1f} s"
+    )
+
+
 def main() -> None:
     """Start a server and a browser, and print the lines."""
     from playwright.sync_api import sync_playwright
@@ -60,6 +116,7 @@ def main() -> None:
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server, sync_playwright() as playwright:
         assert server.stdout is not None
         address = server.stdout.readline().split()[1]
+        print("first sheet of a muscle while two files are read:", beside_heavy_requests(address))
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=OPTIONS)
         context = browser.new_context(viewport={"width": 1280, "height": 1000})
         context.add_init_script(MEASURE)

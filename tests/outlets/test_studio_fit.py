@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 import subprocess
@@ -20,7 +21,7 @@ from studio_tasks import WorkerHere, fail, write_slowly
 pytest.importorskip("starlette", reason="needs starlette")
 
 import airmuscle as am
-from airmuscle.bench import LevelSplit, compare, read, standard_candidates
+from airmuscle.bench import Candidate, LevelSplit, compare, read, standard_candidates
 from airmuscle.bench.identify import model_selection
 from airmuscle.outlets.studio import fit_queue, fit_uploads
 from airmuscle.outlets.studio.app import create_app
@@ -151,7 +152,8 @@ REFUSED = (
     ({"resting_length": "300"}, "resting_length"), ({"resting_length": "-3 mm"}, "resting_length"),
     ({"resting_length": "3 kg"}, "resting_length"), ({"resting_length": "nan m"}, "resting_length"),
     ({"resting_length": "x" * 300}, "resting_length"), ({"resting_length": 3}, "resting_length"),
-    ({"ambient": "0 bar"}, "ambient"), ({"entry": "../../etc/passwd"}, "entry"), ({"leave_out": "rows"}, "leave_out"),
+    ({"braid_radius": "10", "braid_angle": "24 deg"}, "braid_radius"), ({"braid_radius": "10 mm"}, "braid_angle"),
+    ({"braid_radius": "10 mm", "braid_angle": "24 mm"}, "braid_angle"), ({"ambient": "0 bar"}, "ambient"), ({"entry": "../../etc/passwd"}, "entry"), ({"leave_out": "rows"}, "leave_out"),
     ({"decimal": ";"}, "decimal"), ({"delimiter": "x"}, "delimiter"), ({"time": "yesterday"}, "time"),
     ({"columns": []}, "columns"), ({"columns": {"p": "bar"}}, "column:p"),
     ({"columns": {"p": {"quantity": "os.system"}}}, "column:p"),
@@ -354,6 +356,36 @@ def test_the_specimen_that_does_not_follow_the_others_is_named(tmp_path):
         task = fit_of(app, {"columns": COLUMNS, "resting_length": "300 mm"})
     notes = request(app, "GET", f"/api/fit/task/{task}/result.json").json()["notes"]
     assert notes[0].strip() == "Specimen c does not follow the others."
+
+
+BRAID = {"braid_radius": "10 mm", "braid_angle": "24.4 deg"}
+
+
+@pytest.mark.parametrize("laws", [slice(1, 3), slice(0, 1)], ids=["without", "with"])
+def test_the_muscle_has_the_braid_of_the_page_unless_its_law_has_one(tmp_path, laws):
+    fixed = ("geometry.resting_length", "wall_thickness", "c1", "c2", "c3", "geometry.radius")
+    with pytest.MonkeyPatch.context() as patch:
+        chosen = [Candidate("own", LAW, fixed)] if laws.start == 0 else None
+        patch.setattr(model_selection, "standard_candidates", lambda runs: chosen or standard_candidates(runs)[laws])
+        app = make_app(tmp_path)
+        task = fit_of(app, {"columns": COLUMNS, "resting_length": "300 mm", **BRAID})
+    (tmp_path / "muscle.toml").write_bytes(request(app, "GET", f"/api/fit/task/{task}/muscle.toml").body)
+    notes = request(app, "GET", f"/api/fit/task/{task}/result.json").json()["notes"]
+    muscle = am.load(tmp_path / "muscle.toml")
+    if chosen:
+        assert [note for note in notes if note.startswith("The braid is not used: ")] != []
+    else:
+        assert muscle.geometry == am.geometry.Braid(0.010, math.radians(24.4), 0.3)
+        assert notes == []
+
+
+def test_a_braid_needs_one_resting_length(tmp_path):
+    app = make_app(tmp_path)
+    name = upload(app, "Messung.csv", german_table()).json()["set"]
+    task = post(app, "start", set=name, settings={"columns": COLUMNS, **BRAID}).json()["task"]
+    status = finished(app, task)
+    assert status["field"] == "resting_length"
+    assert status["error"] == "a braid has exactly one resting length; the files state none."
 
 
 def test_bands_and_equation_are_shown(result):

@@ -304,9 +304,8 @@ console.log(JSON.stringify([r.status, r.columns]));
 def test_an_own_scenario_runs_under_its_controller_also_with_other_parameters(example, tmp_path):
     """With the drivers and sensors of the file, as the library computes it, to the tolerance of the integrator."""
     given = (EXAMPLES / f"{example}.toml").read_text(encoding="utf-8")
-    given = given.replace(
-        '"1.5 1/bar"', '"1.6 1/bar"'
-    )  # 1.5 gives a pulse as long as the delay of the valve, to rounding
+    # with a gain of 1.5 a pulse is as long as the delay of the valve, to rounding
+    given = given.replace('"1.5 1/bar"', '"1.6 1/bar"')
     sheet = sheet_of_scenario_text(given)
     script = scripts("numbers") + sheet.pop("script") + scripts("plant-start", "plant-run") + CONTROLLED
     path = "mechanism.mass" if example == "pressure_loop" else "mechanism.inertia"

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import airmuscle as am
@@ -28,6 +28,8 @@ TEXTS = (
 """Fields with a text that applies to all files."""
 CONSTANTS = {"resting_length": "300 mm", "ambient": "98 kPa", "displacement_zero": "12 mm"}
 """Those that are constants of the runs, with an example."""
+BRAID = {"braid_radius": "10 mm", "braid_angle": "24.4 deg"}
+"""The geometry of a muscle whose law contains none, at rest, with examples."""
 FILE_FACTS = ("resting_length", "length", "specimen")
 """Facts that may be stated for one file."""
 COLUMN_CHOICES = (*am.recording.QUANTITIES, "resting_length", "ambient")
@@ -41,7 +43,7 @@ SPLITS: Mapping[str, am.bench.GroupSplit | None] = {
     "block": am.bench.BlockSplit(),
 }
 """Groups that are left out in turn; by default those that the data allow."""
-_UNITS = {"resting_length": "m", "ambient": "Pa", "displacement_zero": "m", "length": "m"}
+_UNITS = {"braid_radius": "m", "braid_angle": "rad", "resting_length": "m", "ambient": "Pa", "displacement_zero": "m", "length": "m"}
 
 
 class FieldError(InputError):
@@ -86,7 +88,7 @@ class FitSettings:
 
     def mapping(self, columns: Mapping[str, str] | None = None) -> am.bench.ColumnMapping:
         """The interpretation of all files, with these columns in place of all. Raises FieldError."""
-        texts: dict[str, Any] = {name: text for name, text in self.texts.items() if text}
+        texts: dict[str, Any] = {name: text for name, text in self.texts.items() if text and name not in BRAID}
         constants = {name: texts.pop(name) for name in CONSTANTS if name in texts}
         codes = texts.pop("missing_codes", "").replace(";", ",").split(",")
         if "skip_rows" in texts:
@@ -103,12 +105,25 @@ class FitSettings:
             field = next((name for name in TEXTS if name.split("_")[0] in error.message[:40]), "columns")
             raise FieldError(error.message, field) from None
 
+    def braid(self, resting_lengths: Sequence[float]) -> am.geometry.Braid | None:
+        """The braid of a muscle, from the resting lengths [m] of its records; None if none is stated. Raises FieldError."""
+        sizes = [quantity(self.texts[name], _UNITS[name]) for name in BRAID if self.texts[name]]
+        if not sizes:
+            return None
+        if len(resting_lengths) != 1:
+            stated = ", ".join(f"{1e3 * length:.4g} mm" for length in resting_lengths) or "none"
+            raise FieldError(f"a braid has exactly one resting length; the files state {stated}.", "resting_length")
+        try:
+            return am.geometry.Braid(sizes[0], sizes[1], resting_lengths[0])
+        except AirmuscleError as error:
+            raise FieldError(error.message, "braid_angle" if "angle" in error.message else "braid_radius") from None
+
 
 def read_settings(data: Any) -> FitSettings:
     """The settings in a request of the page. Raises FieldError."""
     if not isinstance(data, dict):
         raise FieldError("the request must be a table of settings.")
-    texts = {name: _text(data.get(name, ""), name) for name in TEXTS}
+    texts = {name: _text(data.get(name, ""), name) for name in (*TEXTS, *BRAID)}
     facts = _table(data.get("files", {}), "files")
     settings = FitSettings(
         texts,
@@ -124,9 +139,12 @@ def read_settings(data: Any) -> FitSettings:
 
 
 def _check(settings: FitSettings) -> None:
-    for name in CONSTANTS:
+    for name in (*CONSTANTS, *BRAID):
         if settings.texts[name]:
             _check_quantity(settings.texts[name], name, name)
+    missing = [name for name in BRAID if not settings.texts[name]]
+    if len(missing) == 1:
+        raise FieldError("a braid needs its radius and its angle.", missing[0])
     for file, facts in settings.facts.items():
         for name in ("resting_length", "length"):
             if facts.get(name):
@@ -142,7 +160,7 @@ def _check(settings: FitSettings) -> None:
 
 def _check_quantity(text: str, name: str, field: str) -> None:
     words = name.replace("_", " ")
-    example = CONSTANTS.get(name, "300 mm")
+    example = {**CONSTANTS, **BRAID}.get(name, "300 mm")
     try:
         value = quantity(text, _UNITS[name], ambient=0.0, where=words)
     except AirmuscleError as error:

@@ -30,7 +30,7 @@ from ...core.errors import AirmuscleError, AirmuscleWarning
 from ...files.library.entry import Entry
 from ...files.library.fit_files import write_fit
 from ...files.library.fitted_entry import fitted_entry, left_out_ratio, missing_geometry
-from ...files.library.initial_law import find_initial_law
+from ...files.library.initial_law import find_initial_law, resting_lengths
 from ...files.library.write import part_toml
 from ...report.write import as_json, write_into
 from .fit_hints import as_field_error, in_page_words
@@ -47,7 +47,7 @@ SHARES = (0.05, 0.75, 0.95)
 """Completed fractions after reading, comparison and friction (chosen for the progress)."""
 GEOMETRY = (
     "The muscle file contains no geometry, because the law needs none. A plant takes the enclosed volume from it: add "
-    "a table [geometry] to the file before a simulation; the note in the file states how it is measured."
+    "radius and angle of the braid under Muscle, or a table [geometry] to the file, before a simulation."
 )
 """Remark on a muscle without geometry."""
 FRICTION_LAWS = 4
@@ -64,12 +64,16 @@ def run_fit(folder: str, out: str, settings: FitSettings, report: Report) -> Non
     report(0.0, "reading the files")
     recordings, names = _recordings(Path(folder), settings)
     report(SHARES[0], "comparison of the laws")
+    braid = settings.braid(resting_lengths(recordings))
     try:
         selection, geometry = _select(recordings, settings, report)
     except AirmuscleError as error:
         raise as_field_error(error, "fit") from None
     best = selection.recommended
-    initial = Entry(best.candidate.name, best.candidate.name, "chosen", best.candidate.law, geometry)
+    own = isinstance(getattr(best.candidate.law, "geometry", None), am.geometry.Geometry)
+    initial = Entry(
+        best.candidate.name, best.candidate.name, "chosen", best.candidate.law, geometry if own else braid or geometry
+    )
     errors = ranked_specimen_errors(best, selection.comparisons, recordings)
     entry = fitted_entry(best.fit, initial, names, left_out_ratio(best), recordings, errors)
     chapters = compare_chapters(selection.comparisons, best, selection.reason)
@@ -80,7 +84,8 @@ def run_fit(folder: str, out: str, settings: FitSettings, report: Report) -> Non
         report(SHARES[2], "report")
         write_fit(staging, best.fit, entry, recordings, chapters)
         odd = [in_page_words(note) for note in odd_specimen_notes(errors)]
-        sheet["notes"] = [*odd, *([GEOMETRY] if missing_geometry(entry) else [])]
+        unused = [f"The braid is not used: {best.candidate.name} contains its geometry, which was fitted."]
+        sheet["notes"] = [*odd, *(unused if own and braid else []), *([GEOMETRY] if missing_geometry(entry) else [])]
         sheet["files"] = _pack(staging)
         (staging / RESULT).write_text(as_json(sheet), encoding="utf-8")
 

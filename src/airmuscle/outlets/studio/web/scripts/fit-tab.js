@@ -4,8 +4,8 @@
 (() => {
   const { element, source, fitSource, say, problemOf } = airmuscle;
   const PAUSE = 800;
-  const TEXTS = ["resting_length", "file_name", "ambient", "displacement_zero", "decimal", "delimiter", "time", "sheet", "group", "skip_rows", "missing", "missing_codes", "outliers"];
-  const SHOWN = ["resting_length", "outliers"];
+  const TEXTS = ["resting_length", "file_name", "ambient", "displacement_zero", "decimal", "delimiter", "time", "sheet", "group", "skip_rows", "missing", "missing_codes", "outliers", "braid_radius", "braid_angle"];
+  const SHOWN = ["resting_length", "outliers", "braid_radius", "braid_angle"];
   const SPLITS = [["", "automatic"], ["run", "one run at a time"], ["specimen", "one specimen at a time"], ["contraction", "one level of contraction"], ["pressure", "one level of pressure"], ["block", "blocks within each run"]];
   const empty = () => ({ columns: {}, files: {}, rules: [], entry: "", leave_out: "", hysteresis: false, ...Object.fromEntries(TEXTS.map((name) => [name, ""])) });
 
@@ -62,7 +62,7 @@
       this.host.append(element("div.columns", {},
         element("div.stack", {},
           card("Files", airmuscle.dropArea((files) => this.upload(files)), this.message, this.places.files, hosts.files),
-          card("Muscle", this.text("resting_length", "Resting length, without pressure and load", { placeholder: "300 mm" }), this.choice("entry", "Also compare an entry of the library", laws), this.further),
+          card("Muscle", this.text("resting_length", "Resting length, without pressure and load", { placeholder: "300 mm" }), this.text("braid_radius", "Radius of the braid, for the geometry of the muscle file", { placeholder: "optional: 10 mm" }), this.text("braid_angle", "Angle of the braid to the axis at rest", { placeholder: "optional: 24.4 deg" }), this.choice("entry", "Also compare an entry of the library", laws), this.further),
           card("Fit", this.choice("leave_out", "Cross-validation leaves out", SPLITS), element("label.row", { for: "fit-hysteresis" }, this.fields.hysteresis, "Friction from both branches (takes longer)"),
             this.places.fit, element("div.row", {}, this.startButton, this.cancelButton), this.bar, this.progressText)),
         element("div.stack", {}, this.columnsCard, this.dataCard, this.resultHost)));
