@@ -37,6 +37,7 @@ import rodas4
 import sensitivities
 import startup
 import static_fit
+import studio_latency
 from measure import Section, Target, describe_machine, package_versions, print_section, table, today
 
 RESULTS = pathlib.Path(__file__).with_name("RESULTS.md")
@@ -63,6 +64,7 @@ SECTIONS: tuple[tuple[Callable[[int], Section], int], ...] = (
     (outlets.section, 1),
     (new_plant.section, 7),
     (startup.section, 7),
+    (studio_latency.section, 1),
 )
 HEAD = """# Benchmark results
 

@@ -16,10 +16,11 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
 from typing import Any
 from urllib.parse import urlsplit
 
-import airmuscle as am
+from measure import Section, Target, format_time, print_section
 
 KEYS = 200
 PRESSURES = "0.5; 1; 1.5; 2; 2.5; 3; 3.5; 4; 4.5; 5"
@@ -63,10 +64,27 @@ def measured(page: Any, control: Any, keys: tuple[str, str]) -> str:
 
 ROWS = 150_000
 """Rows of each of the two files that are read meanwhile, of 4 MB (chosen)."""
+SMALL = ("tondu-lopez", "dmsp-10-250", "sarosi-dmsp-10", "hunt2017-festo-10", "reynolds2003", "chou-hannaford")
+"""Muscles and laws, each sheet of which alone takes less than 0.2 s."""
+TEXT = (
+    "Time from the request for the sheet of a muscle, which the server has not computed before, to its answer, while "
+    f"two requests that read files of {ROWS} rows are being answered without a pause."
+)
 
 
-def beside_heavy_requests(address: str) -> str:
-    """One line on the sheets of the library, each requested while two files are being read."""
+def served(use: Callable[[str], Any]) -> Any:
+    """What a function makes of the address of a server, which is ended afterwards."""
+    command = [sys.executable, "-u", "-m", "airmuscle", "studio", "--no-browser", "--port", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdout is not None
+        try:
+            return use(server.stdout.readline().split()[1])
+        finally:
+            server.terminate()
+
+
+def beside_heavy_requests(address: str) -> tuple[list[float], list[float]]:
+    """Times [s] of the small requests, and of the heavy ones that run meanwhile."""
     parts = urlsplit(address)
 
     def send(method: str, path: str, body: bytes | None = None, query: str = "") -> bytes:
@@ -74,49 +92,53 @@ def beside_heavy_requests(address: str) -> str:
         connection.request(method, f"{path}?{parts.query}{query}", body, {"X-Airmuscle": "1"})
         answer = connection.getresponse()
         content = answer.read()
+        connection.close()
         if answer.status != 200:
             raise RuntimeError(f"{path}: {content!r}")
-        connection.close()
         return content
 
     rows = (f"{0.01 * k:.2f},{3 + math.sin(0.001 * k):.4f},{400 + 90 * math.cos(0.001 * k):.2f}\n" for k in range(ROWS))
-    table = ("time [s],pressure [bar],force [N]\n" + "".join(rows)).encode()
-    sets = [json.loads(send("POST", "/api/fit/file", table, "&name=a.csv&set="))["set"] for _ in range(2)]
-    durations, alone, running = [], [], True
+    file = ("time [s],pressure [bar],force [N]\n" + "".join(rows)).encode()
+    send("GET", "/api/law/dmsp-20-300")  # the first worker process has started
+    sets = [json.loads(send("POST", "/api/fit/file", file, "&name=a.csv&set="))["set"] for _ in range(2)]
+    small, heavy, running = [], [], True
 
     def read(name: str) -> None:
         while running:
             begin = time.perf_counter()
             send("POST", "/api/fit/read", json.dumps({"set": name, "settings": {}}).encode())
-            alone.append(time.perf_counter() - begin)
+            heavy.append(time.perf_counter() - begin)
 
     readers = [threading.Thread(target=read, args=(name,)) for name in sets]
     for reader in readers:
         reader.start()
     time.sleep(1.0)
-    for name in am.files.list_laws():
+    for name in SMALL:
         begin = time.perf_counter()
-        if name != "saga2007-exact":  # no closed form and no validity range: refused
-            send("GET", f"/api/law/{name}")
-            durations.append(time.perf_counter() - begin)
+        send("GET", f"/api/law/{name}")
+        small.append(time.perf_counter() - begin)
     running = False
     for reader in readers:
         reader.join()
-    return (
-        f"median {statistics.median(durations):.2f} s, maximum {max(durations):.2f} s of {len(durations)} muscles and "
-        f"laws; reading of a file of {ROWS} rows: {statistics.median(alone):.1f} s"
+    return small, heavy
+
+
+def section(rounds: int = 1) -> Section:
+    """The small requests, without a browser."""
+    small, heavy = served(beside_heavy_requests)
+    rows = (
+        ("sheet of a muscle", format_time(statistics.median(small)), format_time(max(small))),
+        ("reading of a file", format_time(statistics.median(heavy)), format_time(max(heavy))),
     )
+    target = Target("page: a small request while two heavy ones run", max(small), 1.0, "s")
+    return Section("Page beside two heavy requests", TEXT, ("request", "median", "maximum"), rows, (target,))
 
 
-def main() -> None:
-    """Start a server and a browser, and print the lines."""
+def measure_keys(address: str) -> None:
+    """Print the lines of the keys."""
     from playwright.sync_api import sync_playwright
 
-    command = [sys.executable, "-u", "-m", "airmuscle", "studio", "--no-browser", "--port", "0"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server, sync_playwright() as playwright:
-        assert server.stdout is not None
-        address = server.stdout.readline().split()[1]
-        print("first sheet of a muscle while two files are read:", beside_heavy_requests(address))
+    with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=OPTIONS)
         context = browser.new_context(viewport={"width": 1280, "height": 1000})
         context.add_init_script(MEASURE)
@@ -134,8 +156,8 @@ def main() -> None:
         gain = page.get_by_label("proportional gain, K")
         print("gain of a joint, step of 2.2 s:", measured(page, gain, ("ArrowRight", "ArrowLeft")))
         browser.close()
-        server.terminate()
 
 
 if __name__ == "__main__":
-    main()
+    print_section(section())
+    served(measure_keys)

@@ -43,7 +43,14 @@ SPLITS: Mapping[str, am.bench.GroupSplit | None] = {
     "block": am.bench.BlockSplit(),
 }
 """Groups that are left out in turn; by default those that the data allow."""
-_UNITS = {"braid_radius": "m", "braid_angle": "rad", "resting_length": "m", "ambient": "Pa", "displacement_zero": "m", "length": "m"}
+_UNITS = {
+    "braid_radius": "m",
+    "braid_angle": "rad",
+    "resting_length": "m",
+    "ambient": "Pa",
+    "displacement_zero": "m",
+    "length": "m",
+}
 
 
 class FieldError(InputError):
@@ -106,7 +113,7 @@ class FitSettings:
             raise FieldError(error.message, field) from None
 
     def braid(self, resting_lengths: Sequence[float]) -> am.geometry.Braid | None:
-        """The braid of a muscle, from the resting lengths [m] of its records; None if none is stated. Raises FieldError."""
+        """The braid for the resting lengths [m] of the records; None if none is stated. Raises FieldError."""
         sizes = [quantity(self.texts[name], _UNITS[name]) for name in BRAID if self.texts[name]]
         if not sizes:
             return None

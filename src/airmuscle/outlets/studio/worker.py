@@ -87,7 +87,8 @@ SPARE = 2
 class WorkerPool:
     """Some workers, which are started when they are needed; with `warm`, SPARE more than are occupied are kept ready.
 
-    `warm` is a task without arguments that a new worker runs once, so that its imports delay nobody.
+    `warm` is a task without arguments that a new worker runs once, so that its imports delay nobody. One worker is
+    started at a time, so that the first one is ready soon.
     """
 
     def __init__(self, count: int, warm: Callable[[], Any] | None = None) -> None:
@@ -95,23 +96,25 @@ class WorkerPool:
         self._free: queue.LifoQueue[LimitedWorker] = queue.LifoQueue()
         self._warm = warm
         self._unused = list(self._all) if warm else []
+        self._starting = threading.Lock()
         for worker in [] if warm else self._all:
             self._free.put(worker)
 
-    def prepare(self, count: int = 1) -> None:
-        """Start further workers, each in a thread of its own, as far as there are some that were never started."""
-        with contextlib.suppress(IndexError):
-            for _ in range(count):
-                arguments = (self._unused.pop(),)
-                threading.Thread(target=self._start, args=arguments, name="airmuscle studio spare", daemon=True).start()
+    def prepare(self, idle: int = SPARE) -> None:
+        """Start workers in a thread until some are idle, as far as there are some that were never started."""
+        if self._unused and self._free.qsize() < idle:
+            threading.Thread(target=self._start, args=(idle,), name="airmuscle studio spare", daemon=True).start()
 
-    def _start(self, worker: LimitedWorker) -> None:
-        try:
-            if self._warm is not None:
-                worker.call(self._warm, (), START_LIMIT)
-        except LimitError:
-            worker.stop()  # it starts again with its next task
-        self._free.put(worker)
+    def _start(self, idle: int) -> None:
+        with self._starting:
+            while self._unused and self._free.qsize() < idle:
+                worker = self._unused.pop()
+                try:
+                    if self._warm is not None:
+                        worker.call(self._warm, (), START_LIMIT)
+                except LimitError:
+                    worker.stop()  # it starts again with its next task
+                self._free.put(worker)
 
     def call(self, task: Callable[..., Any], *arguments: Any, limit: float) -> Any:
         """The result of a task in a free worker. Raises what it raises, LimitError after `limit` [s]."""
@@ -127,8 +130,7 @@ class WorkerPool:
             worker = self._free.get(timeout=limit)
         except queue.Empty:
             raise LimitError("all workers of the studio are occupied; try again later.") from None
-        if self._free.qsize() < SPARE:
-            self.prepare()
+        self.prepare()
         try:
             yield worker
         finally:
