@@ -628,9 +628,10 @@ def test_a_parameter_on_its_bound_is_flagged_and_has_no_deviation():
         dataclasses.replace(found.model, end_correction=1.0), shorter, fixed=("geometry.radius", "end_correction")
     )
     places = points(truth.force, high=0.2, n=5)
-    bands = [confidence_band(each, places) for each in (found, known)]  # a parameter on its bound is taken as known
-    widths = [band.high - band.low for band in bands]
-    assert widths[0] == pytest.approx(widths[1], rel=0.02)
+    bands = [confidence_band(each, places) for each in (found, known)]
+    ratios = np.divide(*(band.high - band.low for band in bands))  # far beyond its bound, its error adds little
+    assert (ratios >= 1).all()
+    assert 1.01 < ratios.max() < 1.03
 
 
 def test_as_many_points_as_parameters_leave_the_deviations_unknown():

@@ -7,13 +7,25 @@ in its parameter is Student's interval; one of a parameter that the data leave o
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
 import pytest
 from scipy.stats import t as student
+from scipy.stats import truncnorm
 
-from airmuscle.bench import Huber, LevelSplit, RunSplit, bootstrap, confidence_band, fit, profile, weakly_determined
+from airmuscle.bench import (
+    Fit,
+    Huber,
+    LevelSplit,
+    RunSplit,
+    bootstrap,
+    confidence_band,
+    fit,
+    profile,
+    weakly_determined,
+)
 from airmuscle.bench.identify.bootstrapping import _assign_groups, _refit_iteratively
 from airmuscle.bench.identify.candidates import blank_surface
 from airmuscle.errors import IdentificationError
@@ -172,20 +184,55 @@ def test_the_profile_of_a_linear_parameter_is_students_interval(by_runs):
     assert ends.high == pytest.approx(found[name].value + half, abs=1e-3 * half)
 
 
-def test_bands_and_profiles_count_a_parameter_on_a_bound_as_known():
-    """The fit is that without the parameter, and so are its band and the interval of the others."""
+def on_its_bound() -> tuple[Fit, Recording]:
+    """A fit whose end correction is on its bound 1, and its points."""
     pressure, held = np.array([2e5, 4e5, 6e5, 3e5, 5e5]), np.array([0.02, 0.06, 0.1, 0.14, 0.18])
     law = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.0)
     force = law.unclamped_force(pressure, held) * (1.0 + held) + 2.0 * np.array([1.0, -1.0, 1.0, -1.0, 1.0])
     points = Recording({"pressure": pressure, "contraction": held, "force": force}, "bench")
-    found = fit(law, points)
-    on_bound = tuple(estimate.name for estimate in found.estimates if estimate.on_bound)
-    known = fit(found.model, points, fixed=on_bound)
-    assert on_bound
+    return fit(law, points, fixed=("geometry.radius",)), points
+
+
+def test_bands_count_a_parameter_on_a_bound_with_its_error_inside():
+    """The error of the others for a known value, and beside it that along their regression on the parameter, whose
+    error is that of a normal distribution truncated at the bound."""
+    found, _ = on_its_bound()
+    assert [estimate.on_bound for estimate in found.estimates] == [False, True]
+    jacobian = found.problem.jacobian(found.values)
+    errors = found.problem.predict(found.values) - found.problem.target
+    variance = errors @ errors / 4  # five rows, one parameter that is not on a bound
+    assert found.sigma**2 == pytest.approx(variance, rel=1e-9)
+    inverse = np.linalg.inv(jacobian.T @ jacobian)
+    own = np.sqrt(variance * inverse[1, 1])
+    beyond = float((inverse @ jacobian.T @ errors)[1] / own)  # the unconstrained estimate is lower by this
+    inside = truncnorm(beyond, np.inf, loc=-beyond)
+    slopes = np.append(-np.linalg.lstsq(jacobian[:, :1], jacobian[:, 1], rcond=None)[0], 1.0)
+    covariance = own**2 * (inside.var() + inside.mean() ** 2) * np.outer(slopes, slopes)
+    covariance[0, 0] += variance / np.sum(jacobian[:, 0] ** 2)
+    band = confidence_band(found, PLACES)
+    at = dataclasses.replace(found.problem, data=PLACES).jacobian(found.values)
+    half = student.ppf(0.975, 4) * np.sqrt(np.einsum("ni,ij,nj->n", at, covariance, at))
+    assert band.high - band.value == pytest.approx(half, rel=1e-6)
+    assert found.standard_errors[0] == pytest.approx(np.sqrt(covariance[0, 0]), rel=1e-6)
+    assert "counts as known" not in found.error_basis
+
+
+def test_a_parameter_on_a_bound_that_the_rows_do_not_determine_counts_as_known():
+    points = on_its_bound()[1].with_columns(contraction=np.zeros(5))  # where the end correction has no effect
+    law = TonduLopez2000(Braid(0.01, 0.45, 0.3), 1.0)
+    found = fit(law, points, fixed=("geometry.braid_angle",))
+    known = fit(law, points, fixed=("geometry.braid_angle", "end_correction"))
+    assert found.error_basis.endswith("end_correction on the bound counts as known")
+    assert found["geometry.radius"].stderr == pytest.approx(known["geometry.radius"].stderr, rel=1e-9)
+
+
+def test_the_profile_of_a_parameter_beside_one_on_a_bound_is_that_without_it():
+    found, points = on_its_bound()
+    known = fit(found.model, points, fixed=("geometry.radius", "end_correction"))
+    ends = [profile(each, "geometry.braid_angle") for each in (found, known)]
     assert found.sigma == pytest.approx(known.sigma, rel=1e-6)
-    assert confidence_band(found, PLACES).high == pytest.approx(confidence_band(known, PLACES).high, rel=1e-6)
-    low, expected = (profile(each, "geometry.radius").low for each in (found, known))  # towards the high end it leaves
-    assert low - found.values[0] == pytest.approx(expected - known.values[0], rel=1e-3)
+    steps = [(each.low - each.value, each.high - each.value) for each in ends]
+    assert min(abs(a / b - 1) for a, b in zip(*steps, strict=True)) < 1e-3  # towards the other end it leaves the bound
 
 
 def short_of_contraction(least: float, seed: int) -> Recording:

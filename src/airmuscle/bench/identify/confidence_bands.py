@@ -10,7 +10,7 @@ import numpy as np
 from ...core.arrays import Array
 from ...core.errors import IdentificationError
 from ...recording import Recording
-from .parameter_covariance import student_quantile
+from .model_evidence import student_quantile
 from .pooling import pooled_band
 from .problem import RESTING_LENGTH
 from .result import Fit
@@ -28,10 +28,9 @@ def confidence_band(fit: Fit, points: Recording, *, level: float = 0.95, predict
     """The confidence band of a fit at points: value -+ t sqrt(g^T C g), in the fitted quantity [SI].
 
     g is the gradient of the law with respect to its parameters, C their covariance, t the quantile of Student's
-    distribution; a parameter on a bound is treated as known. Covariance and degrees of freedom follow from the scatter
-    of the runs, or of parts of them, where rows are correlated (`fit.error_basis` states which); for independent rows
-    the latter are N - P. `prediction` gives the prediction band of one further observation of the measured runs: the
-    residual variance is added.
+    distribution. Covariance and degrees of freedom follow from the scatter of the runs, or of parts of them, where rows
+    are correlated (`fit.error_basis` states which); for independent rows the latter are N - P. `prediction` gives the
+    prediction band of one further observation of the measured runs: the residual variance is added.
     `points` has the columns that the law takes as arguments, and the constant `resting_length` if the law was fitted to
     several lengths.
 
@@ -55,8 +54,7 @@ def confidence_band(fit: Fit, points: Recording, *, level: float = 0.95, predict
     value, jacobian = problem.predict(fit.values), problem.jacobian(fit.values)
     quantile = float(student_quantile(degrees_of_freedom, level))
     if fit.effects is None:
-        free = np.array([not estimate.on_bound for estimate in fit.estimates], dtype=bool)
-        half = fit.parameter_covariance.half_widths(jacobian[:, free], level)
+        half = fit.parameter_covariance.half_widths(jacobian, level)
     else:
         offset, half = pooled_band(fit, points, jacobian, level)
         value = value + offset

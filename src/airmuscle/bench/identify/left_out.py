@@ -19,6 +19,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...core.arrays import Array
+from .model_evidence import student_quantile
 
 LEVEL = 0.95
 """Share of the rows that a band is stated for."""
@@ -33,10 +34,7 @@ def root_mean_square(errors: Sequence[float]) -> float:
 
 def t_quantile(degrees_of_freedom: float) -> float:
     """The quantile of Student's t distribution that bounds 95 % on both sides; that of the normal one for infinity."""
-    from scipy.special import stdtrit
-
-    finite = min(degrees_of_freedom, 1e9)
-    return float(stdtrit(finite, 0.5 + LEVEL / 2))
+    return float(student_quantile(degrees_of_freedom, LEVEL))
 
 
 def degrees_of_freedom(left_out: float, within: float, members: int) -> float:

@@ -1,10 +1,11 @@
-"""Model evidence: effective sample size, AICc and F test."""
+"""Model evidence: effective sample size, AICc, F test and Student's quantile."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from ...core.arrays import Array
 
@@ -54,6 +55,14 @@ def f_test_p_value(mean_square: float, reduced: float, sample_size: float, param
     if reduced <= 0:
         return 0.0
     return float(fdtrc(added, degrees_of_freedom, (mean_square - reduced) / added / (reduced / degrees_of_freedom)))
+
+
+def student_quantile(degrees_of_freedom: npt.ArrayLike, level: float) -> Array:
+    """Half widths of intervals of Student's distribution at a confidence level, in standard errors; of the normal
+    distribution for infinity."""
+    from scipy.special import stdtrit
+
+    return np.asarray(stdtrit(np.minimum(degrees_of_freedom, 1e9), 0.5 + level / 2))
 
 
 def format_p_value(p: float) -> str:

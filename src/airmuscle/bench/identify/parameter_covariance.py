@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.arrays import Array
-from .model_evidence import lag_one_autocorrelation
+from .model_evidence import lag_one_autocorrelation, student_quantile
 
 ROWS, PARTS, RUNS, SPECIMENS = "rows", "parts", "runs", "specimens"
 """What the errors are independent between."""
@@ -45,6 +45,7 @@ _MAX_LEVERAGE = 1.0 - 1e-9
 _CHUNK = 512
 
 Indices = npt.NDArray[np.intp]
+Mask = npt.NDArray[np.bool_]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -56,7 +57,7 @@ class Runs:
     in_time: bool
     """Whether the rows of a run follow each other in time."""
 
-    def rows(self, selection: npt.NDArray[np.bool_]) -> Runs:
+    def rows(self, selection: Mask) -> Runs:
         """The runs of a selection of the rows, a mask (N,)."""
         return dataclasses.replace(self, run=self.run[selection], specimen=self.specimen[selection])
 
@@ -70,14 +71,19 @@ class Groups(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ParameterCovariance:
-    """Covariance of the P parameters that are not on a bound, and of any combination of them."""
+    """Covariance of P parameters, and of any combination of them.
 
+    These are all fitted parameters, or those that are not on a bound where the rows do not determine all.
+    """
+
+    parameters: Mask
+    """Mask of the P parameters among all fitted ones, whose number is Q."""
     basis: Array
     """T with T T^T = (J^T J)^-1 of the weighted Jacobian, shape (P, P)."""
     sigma: float
     """Standard deviation of the residuals [SI]."""
     spare_rows: int
-    """Number of rows minus that of parameters."""
+    """Number of rows minus that of the parameters that are not on a bound."""
     run_count: int
     specimen_count: int
     unit: str = ROWS
@@ -98,23 +104,36 @@ class ParameterCovariance:
         gradients = self.groups.gradients @ self.basis.T
         return np.asarray(self._jackknife_factor * gradients.T @ gradients)
 
-    @property
-    def matrix(self) -> Array:
-        """The covariance, shape (P, P).
+    def of_parameters(self) -> tuple[Array, Array]:
+        """Standard errors (Q,) and correlations (Q, Q) of all fitted parameters; NaN for those that are not contained.
 
-        With groups of rows it contains the square of Student's quantile over that of the normal distribution, so that
-        1.96 standard errors are the half width of a 95 % interval (effective degrees of freedom, JCGM 100:2008, G.4).
+        With groups of rows the standard errors contain Student's quantile over that of the normal distribution, so that
+        1.96 of them are the half width of a 95 % interval (effective degrees of freedom, JCGM 100:2008, G.4).
         """
+        count, square = self.parameters.size, np.ix_(self.parameters, self.parameters)
+        errors, correlations = np.full(count, np.nan), np.full((count, count), np.nan)
         factor = 1.0 if self.groups is None else float(self._quantile(self.degrees_of_freedom, 0.95)) / NORMAL_QUANTILE
-        return np.asarray(factor**2 * self._scatter)
+        errors[self.parameters] = factor * np.sqrt(np.diag(self._scatter))
+        correlations[square] = self._design_correlations if self.groups is None else _normalised(self._scatter)
+        return errors, correlations
 
-    def parameter_half_widths(self, level: float) -> Array:
-        """Half widths of the intervals of the parameters at a confidence level, shape (P,)."""
-        return np.asarray(self._quantile(self.degrees_of_freedom, level) * np.sqrt(np.diag(self._scatter)))
+    def greatest_correlations(self) -> Array:
+        """The greatest magnitude of the correlations of each fitted parameter (Q,) with another for independent rows,
+        which depends only on the points; 0 for those that are not contained."""
+        greatest = np.zeros(self.parameters.size)
+        between = np.abs(self._design_correlations - np.eye(len(self.basis)))
+        greatest[self.parameters] = between.max(axis=1, initial=0.0)
+        return greatest
+
+    def error_ratio(self, index: int, level: float) -> float:
+        """Half width of the interval of a fitted parameter over its standard error for independent rows."""
+        position = int(np.count_nonzero(self.parameters[:index]))
+        half = float(self._quantile(self.degrees_of_freedom, level)) * np.sqrt(self._scatter[position, position])
+        return float(half / (self.sigma * np.linalg.norm(self.basis[position])))
 
     def half_widths(self, combinations: Array, level: float) -> Array:
-        """Half widths of the intervals of combinations of the parameters (K, P) at a confidence level, shape (K,)."""
-        variances, freedoms = self.variances(combinations)
+        """Half widths (K,) of the intervals of combinations of the fitted parameters (K, Q) at a confidence level."""
+        variances, freedoms = self.variances(combinations[:, self.parameters])
         return np.asarray(self._quantile(freedoms, level) * np.sqrt(variances))
 
     def _quantile(self, freedoms: npt.ArrayLike, level: float) -> Array:
@@ -122,14 +141,28 @@ class ParameterCovariance:
         return student_quantile(np.maximum(freedoms, least), level)
 
     @property
-    def correlations(self) -> Array:
-        """The correlation matrix, shape (P, P)."""
-        return self.design_correlations if self.groups is None else _normalised(self._scatter)
-
-    @property
-    def design_correlations(self) -> Array:
-        """The correlation matrix for independent rows, shape (P, P), which depends only on the points."""
+    def _design_correlations(self) -> Array:
         return _normalised(self.basis @ self.basis.T)
+
+    def within_bounds(self, low: Mask, high: Mask, descent: Array) -> ParameterCovariance:
+        """The covariance where some of the parameters, masks (P,), are on their lower and upper bounds.
+
+        descent  -J^T e (P,) of the weighted residuals e, which points outwards at a bound
+
+        With normal errors the unconstrained estimate of such a parameter is d standard errors beyond its bound. Its
+        true value lies inside: the error counts with the second moment about the bound of the normal distribution
+        truncated there, 1 + d^2 - d phi(d)/Phi(-d) of its variance: the whole of it at d = 0, 2/d^2 far beyond. The
+        errors of the others follow along their regression on it.
+        """
+        held = low | high
+        beyond = (self.basis @ (self.basis.T @ descent))[held] * np.where(high, 1.0, -1.0)[held]
+        distance = np.maximum(beyond, 0.0) / np.sqrt(np.diag(self._scatter)[held])
+        covariance = self.basis @ self.basis.T
+        slopes = np.linalg.solve(covariance[np.ix_(held, held)], covariance[np.ix_(held, ~held)]).T
+        basis, own = self.basis.copy(), np.sqrt(_truncated_square(distance))[:, None] * self.basis[held]
+        basis[~held] -= slopes @ (self.basis[held] - own)
+        basis[held] = own
+        return dataclasses.replace(self, basis=basis, spare_rows=self.spare_rows + int(np.count_nonzero(held)))
 
     def variances(self, combinations: Array) -> tuple[Array, Array]:
         """Variance and degrees of freedom, shape (K,) each, of combinations of the parameters, shape (K, P)."""
@@ -162,9 +195,10 @@ class ParameterCovariance:
 
 
 def estimate_covariance(
-    basis: Array, weighted: Array, residuals: Array, sigma: float, runs: Runs
+    basis: Array, weighted: Array, residuals: Array, sigma: float, runs: Runs, which: Mask
 ) -> ParameterCovariance:
-    """The covariance from the weighted Jacobian (N, P) and the residuals (N,) of the rows that determine the fit.
+    """The covariance from the weighted Jacobian (N, P) and the residuals (N,) of the rows that determine the fit, for
+    the parameters of the mask `which` (Q,).
 
     The groups are the specimens or else the runs, where these determine the standard errors. Otherwise they are
     successive parts of the runs, as few as do so, if the rows follow in time or are correlated in their order; if not,
@@ -172,7 +206,7 @@ def estimate_covariance(
     """
     spare, parameters = len(residuals) - len(basis), len(basis)
     specimens, count = (np.unique(each).size for each in (runs.specimen, runs.run))
-    independent = ParameterCovariance(basis, sigma, spare, count, specimens)
+    independent = ParameterCovariance(which, basis, sigma, spare, count, specimens)
     if spare <= 0 or not parameters or not sigma > 0:
         return independent
     rows = weighted @ basis
@@ -199,11 +233,13 @@ def _normalised(matrix: Array) -> Array:
     return np.asarray(matrix / np.outer(deviations, deviations))
 
 
-def student_quantile(degrees_of_freedom: npt.ArrayLike, level: float) -> Array:
-    """Half widths of intervals of Student's distribution at a confidence level, in standard errors."""
-    from scipy.special import stdtrit
+def _truncated_square(distance: Array) -> Array:
+    """E[x^2] of a standard normal x - `distance` that is positive: 1 + d^2 - d phi(d)/Phi(-d)."""
+    from scipy.special import erfcx
 
-    return np.asarray(stdtrit(degrees_of_freedom, 0.5 + level / 2))
+    hazard = np.sqrt(2.0 / np.pi) / erfcx(distance / np.sqrt(2.0))
+    near = 1.0 + distance * (distance - hazard)
+    return np.where(distance < 100.0, np.maximum(near, 0.0), 2.0 / np.maximum(distance, 100.0) ** 2)
 
 
 def successive_parts(run: Indices, parts: int) -> Indices:

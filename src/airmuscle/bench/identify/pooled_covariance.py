@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.arrays import Array, as_slice
+from .model_evidence import student_quantile
 from .parameter_covariance import (
     LEAST_DEGREES_OF_FREEDOM,
     MIN_DEGREES_OF_FREEDOM,
@@ -27,7 +28,6 @@ from .parameter_covariance import (
     Indices,
     Runs,
     is_correlated,
-    student_quantile,
     successive_parts,
 )
 

@@ -44,9 +44,7 @@ def weakly_determined(fit: Fit) -> tuple[str, ...]:
 
     These are highly correlated with another parameter or, in a nonlinear fit, have a large relative standard error.
     """
-    free = np.array([not e.on_bound for e in fit.estimates], dtype=bool)
-    design, correlation = fit.parameter_covariance.design_correlations, np.zeros(free.size)
-    correlation[free] = np.abs(design - np.eye(len(design))).max(axis=1, initial=0.0)
+    correlation = fit.parameter_covariance.greatest_correlations()
     nonlinear = not is_linear(fit.problem)  # in a linear fit a standard error is exact, however large
     return tuple(
         e.name
@@ -78,10 +76,8 @@ def profile(fit: Fit, name: str, *, level: float = 0.95) -> ProfileLikelihood:
         )
     index = fit.names.index(name)
     minimum = _sum_of_squares(fit.problem, fit.values)
-    covariance, free = fit.parameter_covariance, sum(not e.on_bound for e in fit.estimates[:index])
-    independent = covariance.sigma * float(np.linalg.norm(covariance.basis[free]))
-    half = float(covariance.parameter_half_widths(level)[free])
-    threshold = minimum * (1 + (half / independent) ** 2 / degrees_of_freedom)
+    ratio = fit.parameter_covariance.error_ratio(index, level)
+    threshold = minimum * (1 + ratio**2 / degrees_of_freedom)
     low, high = (_find_limit(fit, index, sign * estimate.stderr, threshold) for sign in (-1, 1))
     return ProfileLikelihood(name, estimate.unit, estimate.value, low, high, level)
 

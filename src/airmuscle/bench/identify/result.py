@@ -157,9 +157,10 @@ class Fit(NotebookDisplay):
         """What the standard errors and bands were estimated from, and what they do not contain, as a phrase."""
         if self.effects is not None and self.effects.covariance is not None:
             return self.effects.covariance.describe()
-        bound = [estimate.name for estimate in self.estimates if estimate.on_bound]
-        known = f"; {', '.join(bound)} on the bound counts as known" if bound else ""
-        return self.parameter_covariance.describe() + known
+        contained = self.parameter_covariance.parameters
+        known = [name for name, is_contained in zip(self.names, contained, strict=True) if not is_contained]
+        remark = f"; {', '.join(known)} on the bound counts as known" if known else ""
+        return self.parameter_covariance.describe() + remark
 
     @property
     def rows_used(self) -> int:

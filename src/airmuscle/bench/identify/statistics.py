@@ -21,6 +21,7 @@ from .solver import LeastSquaresSolution
 
 _MAX_NAMES = 3
 """Maximum number of parameters that the cause of a rank deficiency lists (chosen)."""
+Mask = npt.NDArray[np.bool_]
 DEGREE_REMEDY = "For the greatest degree that the levels determine"
 
 
@@ -36,32 +37,37 @@ class FitStatistics:
     sigma: float
     """Standard deviation of the residuals, in the unit of the fitted quantity; NaN without degrees of freedom."""
     covariance: ParameterCovariance
-    """Covariance of the parameters that are not on a bound."""
+    """Covariance of the parameters that the rows determine, without or with those on a bound."""
     standard_errors: Array
     correlations: Array
-    on_bound: npt.NDArray[np.bool_]
+    on_bound: Mask
 
 
 def compute_statistics(problem: FitProblem, solution: LeastSquaresSolution, loss: Loss, runs: Runs) -> FitStatistics:
     """Statistics of a solution. Raises IdentificationError where the design matrix is rank-deficient."""
-    values, jacobian = solution.values, solution.jacobian
-    on_bound, active, norms, singular, vectors = _decompose(problem, solution)
+    low, high = bounds_reached(problem, solution.values)
+    on_bound, active = low | high, problem.active_rows(solution.modelled)
+    design = _check_rank(problem, solution, on_bound)
     residuals = problem.residuals(solution.modelled)[active]
-    sigma, influences = _residual_std(residuals, singular.size, loss)
-    weighted = problem.weights[active, None] * jacobian[np.ix_(active, ~on_bound)]
-    basis = vectors.T / singular / norms[:, None]
-    covariance = estimate_covariance(basis, weighted, influences, sigma, runs.rows(active))
-    standard_errors, correlations = np.full(values.size, np.nan), np.full((values.size, values.size), np.nan)
-    standard_errors[~on_bound] = np.sqrt(np.diag(covariance.matrix))
-    correlations[np.ix_(~on_bound, ~on_bound)] = covariance.correlations
+    sigma, influences = _residual_std(residuals, design.norms.size, loss)
+    complete = _Design.of(problem, solution, np.ones(on_bound.size, dtype=bool)) if on_bound.any() else design
+    counted = design if complete.is_deficient else complete
+    weighted = problem.weights[active, None] * solution.jacobian[np.ix_(active, counted.columns)]
+    covariance = estimate_covariance(counted.basis, weighted, influences, sigma, runs.rows(active), counted.columns)
+    if counted is not design:
+        covariance = covariance.within_bounds(low, high, -weighted.T @ influences)
+    standard_errors, correlations = covariance.of_parameters()
+    standard_errors[on_bound], correlations[on_bound], correlations[:, on_bound] = np.nan, np.nan, np.nan
+    singular = design.singular_values
     condition = float(singular[0] / singular[-1]) if singular.size else 1.0
-    measured = uncensored_rank(problem, jacobian[:, ~on_bound]) if problem.censoring.any() else singular.size
+    measured = uncensored_rank(problem, solution.jacobian[:, ~on_bound]) if problem.censoring.any() else singular.size
     return FitStatistics(singular.size, measured, condition, sigma, covariance, standard_errors, correlations, on_bound)
 
 
 def check_determined(problem: FitProblem, solution: LeastSquaresSolution) -> None:
     """Raise IdentificationError where the design matrix at the solution is rank-deficient."""
-    _decompose(problem, solution)
+    low, high = bounds_reached(problem, solution.values)
+    _check_rank(problem, solution, low | high)
 
 
 def check_determined_by_levels(problem: FitProblem, solution: LeastSquaresSolution, at_levels: Recording) -> None:
@@ -75,36 +81,57 @@ def check_determined_by_levels(problem: FitProblem, solution: LeastSquaresSoluti
     check_determined(levelled, solution._replace(jacobian=levelled.jacobian(solution.values)))
 
 
-class _Decomposition(NamedTuple):
-    """Parameters on a bound, active rows, and the singular values of the others' columns, scaled to unit norm."""
+class _Design(NamedTuple):
+    """Columns of the design matrix of the active rows, a mask (P,): their norms, and the singular values and right
+    singular vectors of the columns scaled to unit norm."""
 
-    on_bound: npt.NDArray[np.bool_]
-    active: npt.NDArray[np.bool_]
+    columns: Mask
     norms: Array
     singular_values: Array
     right_singular_vectors: Array
 
+    @classmethod
+    def of(cls, problem: FitProblem, solution: LeastSquaresSolution, columns: Mask) -> _Design:
+        """The singular values at a solution."""
+        active = problem.active_rows(solution.modelled)
+        matrix = problem.weights[active, None] * solution.jacobian[np.ix_(active, columns)]
+        norms = np.linalg.norm(matrix, axis=0)
+        # R of the QR factorisation has the singular values and right singular vectors of the tall matrix, at less cost
+        triangle = np.linalg.qr(matrix / np.where(norms > 0, norms, 1.0), mode="r")
+        _, singular, vectors = np.linalg.svd(np.vstack([triangle, np.zeros((norms.size - len(triangle), norms.size))]))
+        return cls(columns, norms, singular, vectors)
 
-def _decompose(problem: FitProblem, solution: LeastSquaresSolution) -> _Decomposition:
-    on_bound = _on_bound(problem, solution.values)
-    active = problem.active_rows(solution.modelled)
-    matrix = problem.weights[active, None] * solution.jacobian[np.ix_(active, ~on_bound)]
-    norms = np.linalg.norm(matrix, axis=0)
-    # R of the QR factorisation has the singular values and right singular vectors of the tall matrix, at less cost
-    triangle = np.linalg.qr(matrix / np.where(norms > 0, norms, 1.0), mode="r")
-    _, singular, vectors = np.linalg.svd(np.vstack([triangle, np.zeros((norms.size - len(triangle), norms.size))]))
-    null = singular <= RANK_TOLERANCE * singular[0] if singular.size else np.zeros(0, dtype=bool)
-    if null.any():
-        shares = np.sqrt(np.sum(vectors[null] ** 2, axis=0))
-        raise _rank_deficiency(problem, ~on_bound, shares, int(np.count_nonzero(~null)))
-    return _Decomposition(on_bound, active, norms, singular, vectors)
+    @property
+    def null(self) -> Mask:
+        """Mask of the singular values that count as zero."""
+        return self.singular_values <= RANK_TOLERANCE * np.max(self.singular_values, initial=0.0)
+
+    @property
+    def is_deficient(self) -> bool:
+        """Whether the rows do not determine all of these parameters."""
+        return bool(self.null.any())
+
+    @property
+    def basis(self) -> Array:
+        """T with T T^T = (J^T J)^-1 of the columns."""
+        return np.asarray(self.right_singular_vectors.T / self.singular_values / self.norms[:, None])
 
 
-def _on_bound(problem: FitProblem, values: Array) -> npt.NDArray[np.bool_]:
-    """Mask of the parameters on a bound, within a margin, because the search stays strictly inside the bounds."""
+def _check_rank(problem: FitProblem, solution: LeastSquaresSolution, on_bound: Mask) -> _Design:
+    """The design of the parameters that are not on a bound. Raises IdentificationError where it is rank-deficient."""
+    design = _Design.of(problem, solution, ~on_bound)
+    if design.is_deficient:
+        shares = np.sqrt(np.sum(design.right_singular_vectors[design.null] ** 2, axis=0))
+        raise _rank_deficiency(problem, ~on_bound, shares, int(np.count_nonzero(~design.null)))
+    return design
+
+
+def bounds_reached(problem: FitProblem, values: Array) -> tuple[Mask, Mask]:
+    """Masks of the parameters on their lower and on their upper bound, within a margin, because the search stays
+    strictly inside."""
     low, high = problem.bounds
     margin = 1e-6 * np.maximum(np.abs(values), np.abs(problem.initial_values))
-    return (values - low <= margin) | (high - values <= margin)
+    return values - low <= margin, high - values <= margin
 
 
 def _residual_std(residuals: Array, parameters: int, loss: Loss) -> tuple[float, Array]:
@@ -122,7 +149,7 @@ def _residual_std(residuals: Array, parameters: int, loss: Loss) -> tuple[float,
     return float(np.sqrt(np.sum(influences**2) / degrees_of_freedom)), influences
 
 
-def _rank_deficiency(problem: FitProblem, free: npt.NDArray[np.bool_], shares: Array, rank: int) -> IdentificationError:
+def _rank_deficiency(problem: FitProblem, free: Mask, shares: Array, rank: int) -> IdentificationError:
     """The parameters with a share in the null space, and what to do; `shares` (P,) are their norms in it."""
     labels = [label for label, is_free in zip(problem.labels, free, strict=True) if is_free]
     names = [label for label, share in zip(labels, shares, strict=True) if share > 1e-3 * shares.max()]
