@@ -8,8 +8,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-from airmuscle.report import Chapter
-from airmuscle.report.html import render_page
+from airmuscle.report import Chapter, render_page
 
 _FOLDED = re.compile(r"<details(?! class=\"table\" open)[^>]*>\s*(<summary.*?</summary>).*?</details>", re.DOTALL)
 _HIDDEN = re.compile(r"<style.*?</style>|<nav.*?</nav>|<math.*?</math>|<[^>]*>", re.DOTALL)

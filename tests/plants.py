@@ -71,7 +71,7 @@ from airmuscle.physics import (
     WithOffsets,
     as_force_law,
 )
-from airmuscle.physics.muscle.geometry.chebyshev import as_polynomial
+from airmuscle.physics.muscle.geometry import as_polynomial
 
 VALVE, OTHER = Valve(1e-8, 0.4), Valve(3e-9, 0.2)
 TWO_VALVES = FillDischarge(Supply(5e5), VALVE, OTHER)

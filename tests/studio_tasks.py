@@ -7,7 +7,7 @@ from pathlib import Path
 
 from airmuscle.core import atomic_folder
 from airmuscle.errors import InputError
-from airmuscle.outlets.studio.fit_settings import FieldError
+from airmuscle.outlets.studio import FieldError
 
 
 class WorkerHere:

@@ -6,8 +6,7 @@ import importlib
 import inspect
 import pkgutil
 
-from airmuscle.files.library import files
-from airmuscle.files.library.models import PACKAGES, model_class, model_names
+from airmuscle.files.library import PACKAGES, files, model_class, model_names
 from airmuscle.physics import Characteristic
 
 PARTS = {"PlaneCurve", "PlaneCurves"}

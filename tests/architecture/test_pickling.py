@@ -16,9 +16,7 @@ from plants import EXAMPLES
 
 import airmuscle as am
 from airmuscle import bench, control, design, engine, outlets, physics
-from airmuscle.outlets.environments.default_tasks import joint_task
-from airmuscle.outlets.environments.plant_env import PlantEnv
-from airmuscle.outlets.environments.plant_vector_env import PlantVectorEnv
+from airmuscle.outlets.environments import PlantEnv, PlantVectorEnv, joint_task
 from airmuscle.units import bar
 
 COPIES: dict[str, Callable[[Any], Any]] = {

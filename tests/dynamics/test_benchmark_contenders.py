@@ -14,9 +14,7 @@ from benchmark_contender import JOINT, MINE, SHORT
 from called_controller import Called
 
 from airmuscle.design import Contender, StuckValve, benchmark_controllers, standard_contenders
-from airmuscle.design.control_benchmark.called_contender import Readings
-from airmuscle.design.control_benchmark.commissioning import identify_gains, tracking_error
-from airmuscle.design.control_benchmark.contenders import complete
+from airmuscle.design.control_benchmark import Readings, complete, identify_gains, tracking_error
 from airmuscle.design.tuning import with_gains
 from airmuscle.engine import Measurement
 from airmuscle.errors import ParameterError

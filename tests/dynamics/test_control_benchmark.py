@@ -31,10 +31,8 @@ from airmuscle.design import (
     on_off_joint,
     standard_contenders,
 )
-from airmuscle.design.control_benchmark.contenders import complete
-from airmuscle.design.control_benchmark.joints import check_truth_differs, kinds_of
+from airmuscle.design.control_benchmark import RATED_STROKES, check_truth_differs, complete, kinds_of, track
 from airmuscle.design.control_benchmark.task_signals import task_signals
-from airmuscle.design.control_benchmark.tracking_metrics import RATED_STROKES, track
 from airmuscle.errors import ParameterError
 from airmuscle.physics import LuGre, NoFriction
 from airmuscle.recording import Recording

@@ -11,7 +11,7 @@ import pytest
 import airmuscle as am
 from airmuscle.design import LiftRequirement, SizingConditions, size_muscles
 from airmuscle.files import list_plants
-from airmuscle.outlets.environments.default_tasks import arm_task, joint_task, lift_task
+from airmuscle.outlets.environments import arm_task, joint_task, lift_task
 from airmuscle.physics import Ambient, EnergyBalance, WallHeatTransfer
 from airmuscle.physics.pneumatics import DEFAULT_GAS
 

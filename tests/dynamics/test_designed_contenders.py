@@ -23,11 +23,15 @@ from airmuscle.design import (
     proportional_joint,
     standard_contenders,
 )
-from airmuscle.design.control_benchmark.benchmark import run_task, tune_contender
-from airmuscle.design.control_benchmark.contenders import complete
-from airmuscle.design.control_benchmark.designed_controllers import joint_design_model
-from airmuscle.design.control_benchmark.motion_dynamics import angular_acceleration
-from airmuscle.design.control_benchmark.plots import line_style, marker_style
+from airmuscle.design.control_benchmark import (
+    angular_acceleration,
+    complete,
+    joint_design_model,
+    line_style,
+    marker_style,
+    run_task,
+    tune_contender,
+)
 from airmuscle.engine import ControlLoop, Measurement, Schedule, simulate
 from airmuscle.engine.run import LawSample
 from airmuscle.errors import ParameterError

@@ -35,7 +35,7 @@ from airmuscle.physics import (
     find_equilibrium,
     stiffness,
 )
-from airmuscle.physics.pneumatics.gas import HEAT_CAPACITY_RATIO
+from airmuscle.physics.pneumatics import HEAT_CAPACITY_RATIO
 
 BRAID = Braid(0.01, 0.4363, 0.2)
 MUSCLE = Muscle(VirtualWork(BRAID), BRAID, LinearSpring(3000.0))

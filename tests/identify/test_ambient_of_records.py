@@ -9,7 +9,7 @@ import pytest
 
 from airmuscle import load
 from airmuscle.bench import Campaign, LeftOutStage, RowReader, classify_records, read
-from airmuscle.bench.identify.campaign.fill_stage import fit_fill_stage
+from airmuscle.bench.identify.campaign import fit_fill_stage
 from airmuscle.errors import ColumnError, ParameterError, UnitError
 from airmuscle.files import load_dynamic_fit, load_plant_model, load_scenario
 from airmuscle.files.scenario import campaign_scenarios

@@ -24,13 +24,17 @@ from airmuscle.bench import (
     read,
     standard_candidates,
 )
-from airmuscle.bench.identify.campaign.creep_stage import creep_stretches, fit_creep_stage
-from airmuscle.bench.identify.campaign.friction_stage import friction_along
+from airmuscle.bench.identify import PlannedRun
+from airmuscle.bench.identify.campaign import (
+    VolumeChange,
+    count_pulses,
+    creep_stretches,
+    fit_creep_stage,
+    friction_along,
+    held_steady,
+    relate_volumes,
+)
 from airmuscle.bench.identify.campaign.next_experiment import _levels
-from airmuscle.bench.identify.campaign.rows import held_steady
-from airmuscle.bench.identify.campaign.transient import count_pulses
-from airmuscle.bench.identify.campaign.volume import VolumeChange, relate_volumes
-from airmuscle.bench.identify.experiment_design import PlannedRun
 from airmuscle.errors import IdentificationError
 from airmuscle.physics import BoucWen
 from airmuscle.recording import Recording

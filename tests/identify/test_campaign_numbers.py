@@ -17,16 +17,12 @@ from airmuscle.bench import (
     fit_creep,
     fit_held_creep,
 )
+from airmuscle.bench.identify.campaign import check_one_rig, find_motion, find_pressure_steps, volume_change, with_force
 from airmuscle.bench.identify.campaign.error_band import _band, _inner, _left_out_residuals
 from airmuscle.bench.identify.campaign.release_stage import _mass
-from airmuscle.bench.identify.campaign.rig import check_one_rig
-from airmuscle.bench.identify.campaign.rows import with_force
-from airmuscle.bench.identify.campaign.transient import find_motion, find_pressure_steps
-from airmuscle.bench.identify.campaign.volume import volume_change
+from airmuscle.bench.identify.dynamic import SensorLocation, searches_at_lowest
 from airmuscle.bench.identify.dynamic.candidate_records import _Context
 from airmuscle.bench.identify.dynamic.fit import _describe_model_error
-from airmuscle.bench.identify.dynamic.reliability import searches_at_lowest
-from airmuscle.bench.identify.dynamic.sensing import SensorLocation
 from airmuscle.engine import Schedule
 from airmuscle.errors import IdentificationError
 from airmuscle.physics import Braid, FillDischarge, Isometric, Muscle, Plant, Polytropic, Supply, Valve, VirtualWork

@@ -31,13 +31,18 @@ from airmuscle.bench import (
     standard_candidates,
     write_csv,
 )
-from airmuscle.bench.identify.candidate_scores import FoldScore
-from airmuscle.bench.identify.compare_chapter import compare_chapter, compare_chapters
-from airmuscle.bench.identify.cross_validation import ALWAYS_FITTED, default_split
-from airmuscle.bench.identify.force_evaluation import evaluate_force
-from airmuscle.bench.identify.recommendation import excess_error, recommend
+from airmuscle.bench.identify import (
+    ALWAYS_FITTED,
+    FoldScore,
+    compare_chapters,
+    default_split,
+    evaluate_force,
+    excess_error,
+    recommend,
+)
+from airmuscle.bench.identify.compare_chapter import compare_chapter
 from airmuscle.errors import IdentificationError, ParameterError
-from airmuscle.outlets.cli.fit_options import parse_split
+from airmuscle.outlets.cli import parse_split
 from airmuscle.physics import Braid, ContractileSurface, Hunt2017, InverseLength, LogarithmicLength, TonduLopez2000
 from airmuscle.recording import Recording
 

@@ -34,8 +34,8 @@ from laboratories import (
 )
 
 from airmuscle.bench import Candidate, Fit, StaticStage, classify_records, compare, fit, read
-from airmuscle.bench.identify.campaign.static_stage import fit_static_stage
-from airmuscle.bench.identify.candidates import blank_surface
+from airmuscle.bench.identify import blank_surface
+from airmuscle.bench.identify.campaign import fit_static_stage
 from airmuscle.bench.identify.data_checks import DataChecks
 from airmuscle.errors import AirmuscleWarning, ColumnError
 from airmuscle.physics import CreepElements, NoFriction

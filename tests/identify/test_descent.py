@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from airmuscle.bench.identify.dynamic.levenberg_marquardt import bounded_step, minimise
+from airmuscle.bench.identify.dynamic import bounded_step, minimise
 
 FREE = np.full(2, -np.inf), np.full(2, np.inf)
 

@@ -21,7 +21,7 @@ from airmuscle.bench import (
     fit_dynamic,
     locate_pressure_sensor,
 )
-from airmuscle.bench.identify.dynamic.profile import DynamicProfile
+from airmuscle.bench.identify.dynamic import DynamicProfile
 from airmuscle.core import tree
 from airmuscle.engine import Schedule, simulate
 from airmuscle.engine.run import BoundIntegrator

@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import Estimate, Experiment, InitialConditions, fit_dynamic
-from airmuscle.bench.identify.dynamic import dynamic_chapters
-from airmuscle.bench.identify.dynamic.reliability import (
+from airmuscle.bench.identify.dynamic import (
     describe_bounds,
     describe_flatness,
     describe_optima,
     distinct_optima,
+    dynamic_chapters,
     searches_at_lowest,
 )
 from airmuscle.engine import Schedule, simulate

@@ -10,16 +10,21 @@ import math
 import numpy as np
 import pytest
 
-from airmuscle.bench.identify.correlation_index import correlation_index
-from airmuscle.bench.identify.surface.basis import Chebyshev, LoadRange, Monomials, conditioning
-from airmuscle.bench.identify.surface.exponential import SurfaceProblem, fit_linearised, fit_nonlinear
-from airmuscle.bench.identify.surface.monotone import (
+from airmuscle.bench.identify import (
     FALLS_WITH_PRESSURE,
     RISES_WITH_FORCE,
+    Chebyshev,
+    LoadRange,
+    Monomials,
+    SurfaceProblem,
+    conditioning,
     find_monotonicity_violations,
+    fit_linearised,
     fit_monotone,
+    fit_nonlinear,
     slope_constraints,
 )
+from airmuscle.bench.identify.correlation_index import correlation_index
 from airmuscle.core import autodiff
 from airmuscle.errors import IdentificationError
 from airmuscle.papers.borzikova_surfaces import sample

@@ -22,10 +22,7 @@ from airmuscle.bench import (
     fit_dynamic,
     stated_ambient,
 )
-from airmuscle.bench.identify.campaign import stage_result
-from airmuscle.bench.identify.campaign.fill_stage import fit_fill_stage
-from airmuscle.bench.identify.campaign.release_stage import fit_release_stage
-from airmuscle.bench.identify.campaign.volume import volume_change
+from airmuscle.bench.identify.campaign import fit_fill_stage, fit_release_stage, stage_result, volume_change
 from airmuscle.engine import Rodas4, Schedule, simulate
 from airmuscle.errors import ParameterError
 from airmuscle.physics import (

@@ -22,9 +22,8 @@ from airmuscle.bench import (
     fit_loop,
     preferred_fit,
 )
-from airmuscle.bench.identify.campaign.friction_stage import fit_friction_stage
-from airmuscle.bench.identify.hysteresis.fit import make_loop_series
-from airmuscle.bench.identify.hysteresis.limits import data_limits
+from airmuscle.bench.identify.campaign import fit_friction_stage
+from airmuscle.bench.identify.hysteresis import data_limits, make_loop_series
 from airmuscle.physics import BoucWen, CreepElements, Dahl, LuGre, MaxwellSlip
 from airmuscle.recording import Recording
 

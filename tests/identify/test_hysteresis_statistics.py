@@ -22,12 +22,17 @@ from airmuscle.bench import (
     fit_jointly,
     identified_friction,
 )
-from airmuscle.bench.identify.hysteresis.agreement import agreement_of_run, force_amplitude
-from airmuscle.bench.identify.hysteresis.axis import Axis
+from airmuscle.bench.identify import VolumePoints, fit_volume, volume_points
+from airmuscle.bench.identify.hysteresis import (
+    Axis,
+    DataLimits,
+    agreement_of_run,
+    data_limits,
+    force_amplitude,
+    parameters_on_bounds,
+)
 from airmuscle.bench.identify.hysteresis.creep import _fit_elements
 from airmuscle.bench.identify.hysteresis.holds import _drifts
-from airmuscle.bench.identify.hysteresis.limits import DataLimits, data_limits, parameters_on_bounds
-from airmuscle.bench.identify.volume_fit import VolumePoints, fit_volume, volume_points
 from airmuscle.errors import AirmuscleWarning, ColumnError, IdentificationError
 from airmuscle.physics import Dahl, IdentifiedFriction, MaxwellSlip
 from airmuscle.recording import Recording

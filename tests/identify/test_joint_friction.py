@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import ContractionPath, PolynomialCurve, find_loops, fit_jointly, fit_loop, identified_friction
-from airmuscle.bench.identify.hysteresis.fit import make_loop_series
-from airmuscle.bench.identify.hysteresis.search import search_parameters
+from airmuscle.bench.identify.hysteresis import make_loop_series, search_parameters
 from airmuscle.physics import (
     BoucWen,
     Dahl,

@@ -36,7 +36,7 @@ from laboratories import (
 )
 
 from airmuscle.bench import Fit, fit, read
-from airmuscle.bench.identify.candidates import blank_surface
+from airmuscle.bench.identify import blank_surface
 from airmuscle.errors import AirmuscleError, AirmuscleWarning
 
 MAX_ERROR = 0.02

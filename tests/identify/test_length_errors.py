@@ -13,9 +13,7 @@ import pytest
 
 import airmuscle as am
 from airmuscle.bench import Candidate, RunSplit, compare, estimate_length_error, find_length_errors, select_for_both
-from airmuscle.bench.identify import joint_selection
-from airmuscle.bench.identify.candidates import blank_surface
-from airmuscle.bench.identify.length_errors import corrected_length
+from airmuscle.bench.identify import blank_surface, corrected_length, joint_selection
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.physics import Braid, EffectiveLength, LogarithmicLength, TonduLopez2000
 from airmuscle.recording import Recording

@@ -12,13 +12,8 @@ import pytest
 from command_line import airmuscle
 
 from airmuscle.bench import BenchLimits, fit, read_csv
-from airmuscle.bench.identify.experiment_design import (
-    _exchange,
-    _log_determinant,
-    _select_greedily,
-    candidate_runs,
-    optimal_design,
-)
+from airmuscle.bench.identify import candidate_runs, optimal_design
+from airmuscle.bench.identify.experiment_design import _exchange, _log_determinant, _select_greedily
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.physics import Braid, TonduLopez2000, ValidityRange
 from airmuscle.recording import Recording

@@ -23,13 +23,11 @@ from airmuscle.bench import (
     select_for_both,
     standard_candidates,
 )
+from airmuscle.bench.identify import EffectRows, Runs, estimate_pooled_covariance, predict_effects
 from airmuscle.bench.identify.equation_section import equation_section
-from airmuscle.bench.identify.parameter_covariance import Runs
-from airmuscle.bench.identify.pooled_covariance import EffectRows, estimate_pooled_covariance
-from airmuscle.bench.identify.specimen_effects import predict_effects
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.files import Entry, load, save
-from airmuscle.outlets.cli.fit_options import parse_split
+from airmuscle.outlets.cli import parse_split
 from airmuscle.physics import ContractileSurface, LogarithmicLength, PooledLengthLaw
 from airmuscle.recording import Recording
 

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 import airmuscle as am
 from airmuscle.bench import fit
-from airmuscle.bench.identify import fit_points
-from airmuscle.bench.identify.statistics import count_levels
+from airmuscle.bench.identify import count_levels, fit_points
 from airmuscle.errors import IdentificationError
 from airmuscle.files import load
 from airmuscle.physics import ContractileSurface

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import UNCENSORED, BenchLimits, RecursiveFit, fit
-from airmuscle.bench.identify.recursive_fit import NextPoint
+from airmuscle.bench.identify import NextPoint
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.physics import ContractileSurface, ValidityRange
 from airmuscle.recording import Recording

@@ -14,14 +14,20 @@ from widths import widened
 
 import airmuscle as am
 from airmuscle.bench import Candidate, RunSplit, bootstrap, compare
-from airmuscle.bench.identify import bootstrapping, fitted_quantity_of
-from airmuscle.bench.identify.candidates import blank_surface
-from airmuscle.bench.identify.fit_points import FitPoints
+from airmuscle.bench.identify import (
+    FitPoints,
+    GroupRefits,
+    KnownMinima,
+    LeastSquaresSolution,
+    blank_surface,
+    bootstrapping,
+    find_initial_values,
+    fitted_quantity_of,
+    refit,
+    solve,
+    solve_iteratively,
+)
 from airmuscle.bench.identify.gauss_newton import gauss_newton
-from airmuscle.bench.identify.group_refits import GroupRefits, KnownMinima
-from airmuscle.bench.identify.solver import LeastSquaresSolution, solve, solve_iteratively
-from airmuscle.bench.identify.static_fit import refit
-from airmuscle.bench.identify.variable_projection import find_initial_values
 from airmuscle.core import autodiff, tree
 from airmuscle.physics import Braid, ContractileSurface, EffectiveLength, Hunt2017, InverseLength, TonduLopez2000
 from airmuscle.recording import Recording

@@ -15,11 +15,14 @@ import pytest
 import airmuscle
 from airmuscle import read_csv
 from airmuscle.bench import UNCENSORED, Candidate, Censoring, LevelSplit, compare, fit, standard_candidates
-from airmuscle.bench.identify.candidates import blank_surface
-from airmuscle.bench.identify.censored_least_squares import solve_censored_least_squares
-from airmuscle.bench.identify.cross_validation import label_folds
-from airmuscle.bench.identify.problem import make_problem
-from airmuscle.bench.identify.variable_projection import find_initial_values, is_linear_parameter
+from airmuscle.bench.identify import (
+    blank_surface,
+    find_initial_values,
+    is_linear_parameter,
+    label_folds,
+    make_problem,
+    solve_censored_least_squares,
+)
 from airmuscle.core import leaves
 from airmuscle.errors import IdentificationError
 from airmuscle.physics import (

@@ -24,12 +24,19 @@ from airmuscle.bench import (
     fit,
     standard_candidates,
 )
-from airmuscle.bench.identify import SpecimenErrors, odd_specimen_notes
-from airmuscle.bench.identify.fit_points import FitPoints
-from airmuscle.bench.identify.model_evidence import batch_sample_size
-from airmuscle.bench.identify.recommendation import eligible_models, excess_error, recommend
-from airmuscle.bench.identify.slack_rows import Slackness, SlackPull, slack_pull
-from airmuscle.bench.identify.solver import solve
+from airmuscle.bench.identify import (
+    FitPoints,
+    Slackness,
+    SlackPull,
+    SpecimenErrors,
+    batch_sample_size,
+    eligible_models,
+    excess_error,
+    odd_specimen_notes,
+    recommend,
+    slack_pull,
+    solve,
+)
 from airmuscle.core import tree
 from airmuscle.errors import IdentificationError
 from airmuscle.physics import Braid, ContractileSurface, LogarithmicLength, PooledLengthLaw

@@ -16,10 +16,9 @@ from command_line import airmuscle
 from scipy.stats import t as student
 
 from airmuscle.bench import Fit, RunSplit, bootstrap, confidence_band, fit, profile, write_csv
-from airmuscle.bench.identify.bootstrapping import RELIABLE_GROUPS
-from airmuscle.bench.identify.candidates import blank_surface
-from airmuscle.bench.identify.parameter_covariance import NORMAL_QUANTILE, _degrees_of_freedom
-from airmuscle.bench.identify.uncertainty_chapter import Uncertainty, uncertainty_chapter
+from airmuscle.bench.identify import NORMAL_QUANTILE, RELIABLE_GROUPS, Uncertainty, blank_surface
+from airmuscle.bench.identify.parameter_covariance import _degrees_of_freedom
+from airmuscle.bench.identify.uncertainty_chapter import uncertainty_chapter
 from airmuscle.physics import Braid, TonduLopez2000
 from airmuscle.recording import Recording
 

@@ -26,8 +26,8 @@ from airmuscle.bench import (
     profile,
     weakly_determined,
 )
+from airmuscle.bench.identify import blank_surface
 from airmuscle.bench.identify.bootstrapping import _assign_groups, _refit_iteratively
-from airmuscle.bench.identify.candidates import blank_surface
 from airmuscle.errors import IdentificationError
 from airmuscle.physics import Braid, ContractileSurface, Sarosi2012, TonduLopez2000
 from airmuscle.recording import Recording

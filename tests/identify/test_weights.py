@@ -12,7 +12,7 @@ import pytest
 from command_line import airmuscle
 
 from airmuscle.bench import estimate_sensors, fit, write_csv
-from airmuscle.bench.identify.weights import sensor_deviations
+from airmuscle.bench.identify import sensor_deviations
 from airmuscle.physics import Braid, ContractileSurface, TonduLopez2000
 from airmuscle.recording import Recording
 

@@ -45,9 +45,8 @@ from airmuscle.physics import (
     VirtualWork,
     as_force_law,
 )
-from airmuscle.physics.muscle.characteristic import SAM_30X290
-from airmuscle.physics.muscle.characteristic.energy_defect import maxwell_defect, virtual_work_defect
-from airmuscle.physics.muscle.geometry.chebyshev import as_polynomial
+from airmuscle.physics.muscle.characteristic import SAM_30X290, maxwell_defect, virtual_work_defect
+from airmuscle.physics.muscle.geometry import as_polynomial
 
 BRAID = Braid(0.01, 0.4363, 0.2)
 RUBBER = RubberLine(3e5, 1e5)

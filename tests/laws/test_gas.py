@@ -30,7 +30,7 @@ from airmuscle.physics import (
     VirialGas,
     virial_coefficient_of_air,
 )
-from airmuscle.physics.pneumatics.gas import SPECIFIC_HEAT_CONSTANT_PRESSURE, SPECIFIC_HEAT_CONSTANT_VOLUME
+from airmuscle.physics.pneumatics import SPECIFIC_HEAT_CONSTANT_PRESSURE, SPECIFIC_HEAT_CONSTANT_VOLUME
 
 AMBIENT = Ambient()
 WARM, SUPPLY = AMBIENT.temperature, 650e3

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from airmuscle.physics import Braid, Ratings, SwellingWall, TabulatedGeometry, Vessel
-from airmuscle.physics.muscle.geometry.chebyshev import as_polynomial
+from airmuscle.physics.muscle.geometry import as_polynomial
 from airmuscle.physics.muscle.series import find_largest_nonnegative
 
 BRAID = Braid(0.01, 0.4363, 0.2)

@@ -34,9 +34,7 @@ from airmuscle.bench import (
     plateau_points,
     quasi_static_rows,
 )
-from airmuscle.bench.segment import interval
-from airmuscle.bench.segment.branches import branch_column_agreement
-from airmuscle.bench.segment.sensor import estimate_noise, estimate_resolution
+from airmuscle.bench.segment import branch_column_agreement, estimate_noise, estimate_resolution, interval
 from airmuscle.errors import ColumnError
 from airmuscle.recording import Recording
 

@@ -32,9 +32,8 @@ from airmuscle.design import (
     scenario_text,
     size_muscles,
 )
-from airmuscle.design.sizing import choice_row
+from airmuscle.design.sizing import air_path, choice_row
 from airmuscle.design.sizing.static_muscle import static_muscle
-from airmuscle.design.sizing.valve_sizing import air_path
 from airmuscle.errors import AirmuscleError, ParameterError, SolveError
 from airmuscle.files import Entry
 from airmuscle.physics import (

@@ -9,8 +9,8 @@ import pytest
 
 from airmuscle import load_data
 from airmuscle.bench import FREE, ISOBARIC, ISOMETRIC, RecordKind, StaticStage, classify_records, find_runs, inspect
-from airmuscle.bench.identify.campaign.static_stage import fit_static_stage
-from airmuscle.bench.segment.static_points import find_static_points
+from airmuscle.bench.identify.campaign import fit_static_stage
+from airmuscle.bench.segment import find_static_points
 from airmuscle.physics import CreepElements, NoFriction
 from airmuscle.recording import Recording
 

@@ -37,7 +37,7 @@ from airmuscle.physics import (
     Valve,
     WithTubes,
 )
-from airmuscle.physics.pneumatics.gas import NO_FLOW, SPECIFIC_HEAT_CONSTANT_PRESSURE
+from airmuscle.physics.pneumatics import NO_FLOW, SPECIFIC_HEAT_CONSTANT_PRESSURE
 
 AMBIENT = Ambient()
 WARM = AMBIENT.temperature

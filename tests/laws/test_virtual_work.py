@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 from airmuscle.errors import SolveError, TraceError
 from airmuscle.files.library import catalogue
 from airmuscle.physics import Braid, ChouHannaford1996, TabulatedGeometry, TonduLopez2000, ValidityRange, VirtualWork
-from airmuscle.physics.muscle.characteristic.energy_defect import maxwell_defect, virtual_work_defect
-from airmuscle.physics.muscle.geometry.chebyshev import as_polynomial
+from airmuscle.physics.muscle.characteristic import maxwell_defect, virtual_work_defect
+from airmuscle.physics.muscle.geometry import as_polynomial
 
 BRAID = Braid(0.01, np.radians(25.0), 0.3)
 BOX = ValidityRange(5e4, 6e5, 0.0, 0.28)

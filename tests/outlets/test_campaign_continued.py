@@ -16,7 +16,7 @@ from command_line import airmuscle
 from made_campaign import write_campaign
 
 from airmuscle.bench import LeftOutStage
-from airmuscle.outlets.cli.campaign_stages import KeptStages
+from airmuscle.outlets.cli import KeptStages
 from airmuscle.recording import Recording
 
 STAGE = LeftOutStage("creep", "no record is a hold", "hold the length")

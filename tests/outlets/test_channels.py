@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from airmuscle.bench.readers.channels import Channel, merge_channels
+from airmuscle.bench.readers import Channel, merge_channels
 from airmuscle.errors import ColumnError
 
 OFFSETS = pytest.mark.parametrize("offset", [0.0, -3.0, 1.7e9], ids=["from 0", "before 0", "from 1970"])

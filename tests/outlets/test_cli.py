@@ -30,9 +30,7 @@ from airmuscle.bench import read_csv
 from airmuscle.core import Reference, printable
 from airmuscle.errors import UnknownNameError
 from airmuscle.files import list_laws, list_plants, list_products, list_valves, load
-from airmuscle.outlets.cli import COMMANDS
-from airmuscle.outlets.cli.cite import as_bibtex
-from airmuscle.outlets.cli.terminal import print_json, print_table
+from airmuscle.outlets.cli import COMMANDS, as_bibtex, print_json, print_table
 from airmuscle.papers import run
 from airmuscle.physics import ContractileSurface
 from airmuscle.report import Chapter, Claim, Equal

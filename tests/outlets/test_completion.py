@@ -11,7 +11,7 @@ from command_line import airmuscle
 
 import airmuscle as am
 from airmuscle.errors import UnknownNameError
-from airmuscle.outlets.cli.completion import SHELLS, complete_data, complete_entry, complete_plant
+from airmuscle.outlets.cli import SHELLS, complete_data, complete_entry, complete_plant
 
 
 def completed(words: str, monkeypatch: pytest.MonkeyPatch) -> list[str]:

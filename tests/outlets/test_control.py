@@ -35,7 +35,7 @@ from airmuscle.engine import (
 )
 from airmuscle.errors import AirmuscleError, ColumnError, ParameterError, UnitError, UnknownNameError
 from airmuscle.files import load_scenario, run_chapter, scenario_schema
-from airmuscle.files.scenario.simulation_chapter import describe_input
+from airmuscle.files.scenario import describe_input
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "pressure_loop.toml"

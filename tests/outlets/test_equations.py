@@ -31,9 +31,8 @@ from airmuscle.physics import (
     LogarithmicLength,
     PressureLaw,
 )
-from airmuscle.report import write_report
+from airmuscle.report import EXAMPLE, source_codes, write_report
 from airmuscle.report.equation import LawEquation, law_equation
-from airmuscle.report.equation.source_code import EXAMPLE, source_codes
 
 Values = Mapping[str, npt.NDArray[np.float64]]
 RANGES = {"pressure": (5e4, 5e5), "contraction": (0.01, 0.12), "force": (10.0, 400.0)}

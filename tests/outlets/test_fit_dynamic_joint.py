@@ -18,7 +18,7 @@ from airmuscle.bench import InitialConditions, write_csv
 from airmuscle.errors import EquilibriumError, ParameterError
 from airmuscle.files import load_dynamic_fit, load_scenario
 from airmuscle.files.library import Location
-from airmuscle.files.scenario.initial_state import build_initial_conditions
+from airmuscle.files.scenario import build_initial_conditions
 from airmuscle.physics import HangingMass
 from airmuscle.recording import Recording
 

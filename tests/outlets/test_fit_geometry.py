@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from command_line import airmuscle
 
-from airmuscle.bench.identify.candidates import blank_surface
+from airmuscle.bench.identify import blank_surface
 from airmuscle.errors import ParameterError, UnknownNameError
 from airmuscle.files import load, save
-from airmuscle.files.library.length_scaling import scale_to_length
+from airmuscle.files.library import scale_to_length
 from airmuscle.physics import Braid, EffectiveLength, MartensBoblan2017
 
 MUSCLE = "dmsp-20-300"

@@ -15,7 +15,7 @@ import pytest
 from command_line import airmuscle
 
 from airmuscle.bench import RowReader, follow_lines, read_csv
-from airmuscle.bench.readers.follow import MAX_UNREADABLE
+from airmuscle.bench.readers import MAX_UNREADABLE
 from airmuscle.errors import ColumnError, FileError
 from airmuscle.files import load
 

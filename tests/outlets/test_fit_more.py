@@ -24,9 +24,8 @@ from airmuscle.bench import (
     weakly_determined,
     write_csv,
 )
+from airmuscle.bench.identify import blank_surface, levels_of
 from airmuscle.bench.identify.band_plot import band_plot
-from airmuscle.bench.identify.candidates import blank_surface
-from airmuscle.bench.identify.levels import levels_of
 from airmuscle.files import load
 from airmuscle.physics import ContractileSurface, Sarosi2012, ValidityRange
 from airmuscle.recording import Recording

@@ -38,12 +38,11 @@ from airmuscle.bench import (
     standard_candidates,
     write_csv,
 )
-from airmuscle.bench.identify.candidates import blank_surface
+from airmuscle.bench.identify import blank_surface
 from airmuscle.core import Diagnostic, DiagnosticCode, Hint, HintedText
 from airmuscle.errors import ColumnError, SimulationError
 from airmuscle.files.library import located_errors
-from airmuscle.outlets.cli import COMMANDS
-from airmuscle.outlets.cli.option_hints import INSTRUCTIONS, in_options
+from airmuscle.outlets.cli import COMMANDS, INSTRUCTIONS, in_options
 from airmuscle.physics import Sarosi2012
 from airmuscle.recording import Recording
 

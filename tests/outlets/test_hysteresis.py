@@ -25,9 +25,8 @@ from airmuscle.bench import (
     read,
     write_csv,
 )
-from airmuscle.bench.identify.campaign.creep_stage import creep_force
-from airmuscle.bench.identify.hysteresis import hysteresis_chapters
-from airmuscle.bench.identify.hysteresis.plot import plot_loops
+from airmuscle.bench.identify.campaign import creep_force
+from airmuscle.bench.identify.hysteresis import hysteresis_chapters, plot_loops
 from airmuscle.files import load, load_scenario, save
 from airmuscle.files.library import Location, build_muscle
 from airmuscle.physics import CreepElements, MaxwellSlip

@@ -15,7 +15,7 @@ import pytest
 from command_line import airmuscle
 
 from airmuscle.bench import ColumnMapping, NoTime, UniformTime, find_runs, inspect, read
-from airmuscle.bench.readers.file_name import FileNamePattern
+from airmuscle.bench.readers import FileNamePattern
 from airmuscle.errors import AirmuscleError, ColumnError
 from airmuscle.recording import Recording
 

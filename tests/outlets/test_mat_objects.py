@@ -11,9 +11,7 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import read
-from airmuscle.bench.readers import mat_objects
-from airmuscle.bench.readers.mat_objects import MatlabObject, find_objects
-from airmuscle.bench.readers.raw_mat import read_mat_tables_here
+from airmuscle.bench.readers import MatlabObject, find_objects, mat_objects, read_mat_tables_here
 from airmuscle.errors import FileError
 
 scipy_io = pytest.importorskip("scipy.io")

@@ -28,8 +28,7 @@ from airmuscle.core import leaves, with_parameters
 from airmuscle.engine import Rodas4
 from airmuscle.errors import ColumnError, ParameterError
 from airmuscle.files import load_scenario
-from airmuscle.files.library import predict_with_entry
-from airmuscle.files.library.stated_band import StatedBand
+from airmuscle.files.library import StatedBand, predict_with_entry
 from airmuscle.physics import Dahl
 from airmuscle.recording import Recording
 

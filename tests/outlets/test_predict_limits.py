@@ -18,8 +18,7 @@ import airmuscle as am
 from airmuscle.bench import predict_static, rate_of_change, write_csv
 from airmuscle.errors import ParameterError
 from airmuscle.files import load_scenario
-from airmuscle.files.library import Location
-from airmuscle.files.library.stated_band import read_stated_band
+from airmuscle.files.library import Location, read_stated_band
 from airmuscle.recording import Recording
 
 LAW = "chou-hannaford"

@@ -14,8 +14,7 @@ from airmuscle import simulate
 from airmuscle.engine import Schedule
 from airmuscle.errors import ParameterError, UnknownNameError
 from airmuscle.files import entries_of_product, list_laws, list_products, load, load_law
-from airmuscle.files.library import ParameterUncertainty, scale_entry, without_parts
-from airmuscle.files.library.stated_band import StatedBand
+from airmuscle.files.library import ParameterUncertainty, StatedBand, scale_entry, without_parts
 from airmuscle.physics import CreepElements, LinearSpring, Ratings
 
 DMSP_20 = "dmsp-20-300"

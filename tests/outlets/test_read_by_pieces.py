@@ -12,9 +12,7 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import BlockMeans, Decimation, read
-from airmuscle.bench.readers import pieces, raw_columnar, raw_mat, raw_mdf
-from airmuscle.bench.readers.large_mat import read_large_mat
-from airmuscle.bench.readers.optional_dependency import is_installed
+from airmuscle.bench.readers import is_installed, pieces, raw_columnar, raw_mat, raw_mdf, read_large_mat
 from airmuscle.errors import AirmuscleError, ColumnError
 
 h5py = pytest.importorskip("h5py", reason="h5py is not installed")

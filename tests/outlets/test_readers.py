@@ -18,9 +18,13 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import BlockMeans, ColumnMapping, Decimation, read
-from airmuscle.bench.readers import large_csv, read_mapping, separate_process
-from airmuscle.bench.readers.clock import seconds_from_clock
-from airmuscle.bench.readers.separate_process import call_in_separate_process
+from airmuscle.bench.readers import (
+    call_in_separate_process,
+    large_csv,
+    read_mapping,
+    seconds_from_clock,
+    separate_process,
+)
 from airmuscle.errors import AirmuscleWarning, ColumnError, FileError, InputError, ParameterError, UnitError
 from airmuscle.recording import Recording
 

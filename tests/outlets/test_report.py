@@ -27,6 +27,9 @@ from airmuscle.core import Reference, atomic_folder, check_writable, plotting
 from airmuscle.errors import FileError, SolveError, UnknownNameError
 from airmuscle.papers import run
 from airmuscle.report import (
+    MARKS,
+    MAX_SVG_BYTES,
+    MEANINGS,
     AtLeast,
     AtMost,
     Chapter,
@@ -36,20 +39,17 @@ from airmuscle.report import (
     Plot,
     Table,
     as_json,
-    to_mathtext,
-    to_plain,
-    write_report,
-)
-from airmuscle.report.chapter import statements
-from airmuscle.report.formatting import (
-    MARKS,
-    MEANINGS,
     count_verdicts,
     format_number,
     format_published,
     format_reproduced,
+    render_cell,
+    render_header,
+    statements,
+    to_mathtext,
+    to_plain,
+    write_report,
 )
-from airmuscle.report.html import MAX_SVG_BYTES, render_cell, render_header
 from airmuscle.units import display
 
 pytestmark = pytest.mark.drawn

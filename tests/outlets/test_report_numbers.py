@@ -23,25 +23,23 @@ from airmuscle.bench import (
     fit_hysteresis,
     fit_jointly,
 )
-from airmuscle.bench.identify.campaign.campaign_chapters import (
-    ValidationRow,
-    _band_table,
-    _plan_table,
-    _validation_table,
-)
+from airmuscle.bench.identify import Uncertainty, VolumePoints, fit_volume
+from airmuscle.bench.identify.campaign import ValidationRow
+from airmuscle.bench.identify.campaign.campaign_chapters import _band_table, _plan_table, _validation_table
 from airmuscle.bench.identify.compare_chapter import _ranking
 from airmuscle.bench.identify.dynamic.dynamic_chapter import _estimate_table, _estimates, _optima_table, _record
-from airmuscle.bench.identify.hysteresis.hysteresis_chapter import _law_table, describe_row_counts
+from airmuscle.bench.identify.hysteresis import describe_row_counts
+from airmuscle.bench.identify.hysteresis.hysteresis_chapter import _law_table
 from airmuscle.bench.identify.hysteresis.joint_friction_chapter import _run_table
-from airmuscle.bench.identify.prediction.prediction_chapter import _overview, with_unit
+from airmuscle.bench.identify.prediction import with_unit
+from airmuscle.bench.identify.prediction.prediction_chapter import _overview
 from airmuscle.bench.identify.prediction.prediction_chapter import _record as predicted_record
 from airmuscle.bench.identify.static_fit_chapter import _rows
-from airmuscle.bench.identify.uncertainty_chapter import Uncertainty, _table
+from airmuscle.bench.identify.uncertainty_chapter import _table
 from airmuscle.bench.identify.volume_chapter import _compared, _volumes
-from airmuscle.bench.identify.volume_fit import VolumePoints, fit_volume
 from airmuscle.design import LiftRequirement, SizingConditions, choose
-from airmuscle.design.sizing.scenario import scenario_valves
-from airmuscle.design.sizing.sizing_chapter import _valve_settings, choice_row
+from airmuscle.design.sizing import choice_row, scenario_valves
+from airmuscle.design.sizing.sizing_chapter import _valve_settings
 from airmuscle.engine import Schedule
 from airmuscle.physics import (
     Braid,

@@ -10,7 +10,7 @@ import pytest
 
 from airmuscle.engine import PWM, Periodic, SampledSignal, Schedule, WithDrivers
 from airmuscle.files import load_scenario, run_chapter
-from airmuscle.files.scenario.simulation_chapter import MAX_DRIVER_SEGMENTS, describe_input
+from airmuscle.files.scenario import MAX_DRIVER_SEGMENTS, describe_input
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "fill_discharge.toml"
 

@@ -13,7 +13,7 @@ from command_line import airmuscle
 
 import airmuscle as am
 from airmuscle.design import JointRequirement, LiftRequirement, SizingConditions, choose, scenario_text
-from airmuscle.design.sizing.scenario import MOVING, RESTING
+from airmuscle.design.sizing import MOVING, RESTING
 from airmuscle.files import load_scenario
 
 LIFT = ("size", "--load", "20 kg", "--stroke", "40 mm", "--supply", "6 bar")

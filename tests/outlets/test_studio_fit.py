@@ -23,15 +23,22 @@ pytest.importorskip("starlette", reason="needs starlette")
 import airmuscle as am
 from airmuscle.bench import Candidate, LevelSplit, compare, read, standard_candidates
 from airmuscle.bench.identify import model_selection
-from airmuscle.outlets.studio import fit_queue, fit_uploads
-from airmuscle.outlets.studio.app import create_app
-from airmuscle.outlets.studio.fit_queue import FIT_WORKERS, MAX_WAITING, FitQueue
-from airmuscle.outlets.studio.fit_routes import MAX_SETTINGS, FitService
-from airmuscle.outlets.studio.fit_task import run_fit
-from airmuscle.outlets.studio.fit_uploads import UploadStore, check_file_name
-from airmuscle.outlets.studio.page import self_contained_page
-from airmuscle.outlets.studio.requests import BadRequest
-from airmuscle.outlets.studio.worker import LimitedWorker
+from airmuscle.outlets.studio import (
+    FIT_WORKERS,
+    MAX_SETTINGS,
+    MAX_WAITING,
+    BadRequest,
+    FitQueue,
+    FitService,
+    LimitedWorker,
+    UploadStore,
+    check_file_name,
+    create_app,
+    fit_queue,
+    fit_uploads,
+    run_fit,
+    self_contained_page,
+)
 
 LAW = am.load("dmsp-20-300").characteristic
 COLUMNS = {"Zeit": {"quantity": "time", "unit": "s"}, "Druck": {"quantity": "pressure", "unit": "bar"}}

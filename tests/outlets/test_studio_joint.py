@@ -13,8 +13,7 @@ from airmuscle.design import STANDARD_TASKS
 from airmuscle.engine import ControlLoop, Problem, SampledSignal, Schedule, solve
 from airmuscle.files.library import plant_tables
 from airmuscle.files.scenario import build_scenario
-from airmuscle.outlets.studio.joint_laws import joint_controllers, statics_within_valves
-from airmuscle.outlets.studio.joint_sheet import joint_tables, sheet_of_joint
+from airmuscle.outlets.studio import joint_controllers, joint_tables, sheet_of_joint, statics_within_valves
 from airmuscle.physics import linearise
 
 pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")

@@ -22,10 +22,8 @@ from airmuscle.files.library import Location
 from airmuscle.files.library.build import build
 from airmuscle.files.scenario import build_scenario
 from airmuscle.outlets import export_page
-from airmuscle.outlets.studio.app import library_list
+from airmuscle.outlets.studio import fill_template, library_list, sheet_of_any, sheet_of_scenario_text
 from airmuscle.outlets.studio.law_sheet import law_sheet
-from airmuscle.outlets.studio.tasks import sheet_of_any, sheet_of_scenario_text
-from airmuscle.outlets.studio.toml_template import fill_template
 from airmuscle.physics import Braid, PleatedTube, StraightFibre
 
 WITHOUT_CLOSED_FORM = ("festo-tool-dmsp-10", "festo-tool-dmsp-20", "festo-tool-dmsp-40", "saga2007-exact")

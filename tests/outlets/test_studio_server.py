@@ -22,15 +22,24 @@ from airmuscle import load
 from airmuscle.errors import InputError, ParameterError
 from airmuscle.files import to_toml
 from airmuscle.files.library import Location
+from airmuscle.outlets.studio import (
+    MAX_PAGE,
+    MAX_TEXT,
+    Access,
+    LimitError,
+    WorkerPool,
+    access_of,
+    bound_socket,
+    create_app,
+    is_loopback,
+    reachable_host,
+    read_text_tables,
+    self_contained_page,
+    sheet_of_tables,
+    single_file,
+    warning_of,
+)
 from airmuscle.outlets.studio import app as studio_app
-from airmuscle.outlets.studio import single_file
-from airmuscle.outlets.studio.app import MAX_PAGE, create_app
-from airmuscle.outlets.studio.page import self_contained_page
-from airmuscle.outlets.studio.plant_sheet import sheet_of_tables
-from airmuscle.outlets.studio.security import Access, is_loopback
-from airmuscle.outlets.studio.server import access_of, bound_socket, reachable_host, warning_of
-from airmuscle.outlets.studio.uploads import MAX_TEXT, read_text_tables
-from airmuscle.outlets.studio.worker import LimitError, WorkerPool
 
 MUSCLE = to_toml(load("tondu-lopez"))
 

@@ -29,15 +29,11 @@ from scenario_files import CIRCUIT, MUSCLE_FILE
 
 from airmuscle.core import fingerprint
 from airmuscle.design import dask_cluster, load_study, process_pool, run_study
-from airmuscle.design.study import chunk
-from airmuscle.design.study.chapter import study_chapter, write_study
-from airmuscle.design.study.design import DESIGNS
-from airmuscle.design.study.distributions import VARIATIONS
-from airmuscle.design.study.metrics import METRICS
+from airmuscle.design.study import DESIGNS, METRICS, VARIATIONS, chunk, study_chapter, write_study
 from airmuscle.engine import simulate, solve
 from airmuscle.errors import AirmuscleError, ColumnError, FileError, InputError, SimulationError
 from airmuscle.files import load_scenario
-from airmuscle.outlets.cli.interruption import check_interrupted, deferred_sigint
+from airmuscle.outlets.cli import check_interrupted, deferred_sigint
 from airmuscle.report import save_table
 
 ROOT = Path(__file__).parents[2]

@@ -14,19 +14,23 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from airmuscle.design.study.design import Grid, LatinHypercube, MonteCarlo, Saltelli, Sobol
-from airmuscle.design.study.distributions import (
+from airmuscle.design.study import (
+    Grid,
+    LatinHypercube,
     LevelSet,
     LogNormal,
+    MonteCarlo,
     Normal,
     Range,
+    Saltelli,
+    Sobol,
     Triangular,
     Truncated,
     Uniform,
     Variation,
+    read_difference,
     read_variation,
 )
-from airmuscle.design.study.fields import read_difference
 from airmuscle.errors import ParameterError
 from airmuscle.files.library import Location
 

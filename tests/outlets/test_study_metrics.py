@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from airmuscle.design.study.metrics import (
+from airmuscle.design.study import (
     Final,
     Maximum,
     Mean,

@@ -13,9 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from airmuscle.design.study.design import Saltelli
-from airmuscle.design.study.distributions import Normal, Uniform
-from airmuscle.design.study.sensitivity import sobol_indices
+from airmuscle.design.study import Normal, Saltelli, Uniform, sobol_indices
 
 A, B = 7.0, 0.1
 CUBE = [Uniform(-np.pi, np.pi)] * 3

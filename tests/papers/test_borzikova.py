@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from chapter_words import visible_words
 
-from airmuscle.bench.identify.surface.basis import LoadRange
+from airmuscle.bench.identify import LoadRange
 from airmuscle.papers import borzikova
 from airmuscle.papers import borzikova_claims as claims
 from airmuscle.papers.borzikova_surfaces import (

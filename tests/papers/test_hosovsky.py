@@ -48,8 +48,7 @@ from airmuscle.physics import (
     find_equilibrium,
 )
 from airmuscle.recording import Recording
-from airmuscle.report import Kind
-from airmuscle.report.chapter import DIFFERS, HOLDS, NOT_TESTABLE, statements
+from airmuscle.report import DIFFERS, HOLDS, NOT_TESTABLE, Kind, statements
 
 NUMBERS = UnpublishedParameters()
 

@@ -46,8 +46,7 @@ from airmuscle.physics import (
     UserDefinedFibreSum,
 )
 from airmuscle.physics.muscle.characteristic import LINE_A, LINE_B
-from airmuscle.report import Kind
-from airmuscle.report.chapter import DEPENDS, DIFFERS, HOLDS, NOT_PRINTED, NOT_TESTABLE, statements
+from airmuscle.report import DEPENDS, DIFFERS, HOLDS, NOT_PRINTED, NOT_TESTABLE, Kind, statements
 
 LINES = {"A": LINE_A, "B": LINE_B}
 AT = np.array([0.001, 0.01, 0.05, 0.10, 0.20, 0.35])

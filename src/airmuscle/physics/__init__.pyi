@@ -122,6 +122,7 @@ from .muscle.geometry import TrueArcParabola as TrueArcParabola
 from .muscle.geometry import UniformFibreSum as UniformFibreSum
 from .muscle.geometry import UserDefinedFibreSum as UserDefinedFibreSum
 from .muscle.geometry import Vessel as Vessel
+from .muscle.geometry import as_polynomial as as_polynomial
 from .plant import MuscleState as MuscleState
 from .plant import Plant as Plant
 from .plant import WithEnergyMeters as WithEnergyMeters

@@ -1,4 +1,5 @@
 from .branches import Branch as Branch
+from .branches import branch_column_agreement as branch_column_agreement
 from .branches import branch_directions as branch_directions
 from .branches import find_branches as find_branches
 from .branches import motion_direction as motion_direction
@@ -29,4 +30,6 @@ from .sampling import Sampling as Sampling
 from .sampling import analyse_sampling as analyse_sampling
 from .sensor import Sensor as Sensor
 from .sensor import estimate_noise as estimate_noise
+from .sensor import estimate_resolution as estimate_resolution
 from .sensor import estimate_sensors as estimate_sensors
+from .static_points import find_static_points as find_static_points

@@ -4,47 +4,6 @@ It is a package of its own between the library, whose entries it scales, and the
 analysis of a given plant (equilibria, statics of a joint) is below the library and knows no catalogue.
 """
 
-from .choice import (
-    SORT_KEYS,
-    MuscleChoice,
-    MuscleDesign,
-    Requirement,
-    UnsuitableMuscle,
-    by_air,
-    by_count,
-    by_diameter,
-    by_length,
-    by_reserve,
-)
-from .requirement import JointRequirement, LiftRequirement, SizingConditions
-from .scenario import scenario_text
-from .search import SizingResult, catalogue, choose, size_muscles
-from .sizing_chapter import choice_row
-from .static_muscle import EndPoint, StaticMuscle
-from .valve_sizing import discharge_valve, fill_valve
+from ...core.stubs import attach_stub
 
-__all__ = [
-    "SORT_KEYS",
-    "EndPoint",
-    "JointRequirement",
-    "LiftRequirement",
-    "MuscleChoice",
-    "MuscleDesign",
-    "Requirement",
-    "SizingConditions",
-    "SizingResult",
-    "StaticMuscle",
-    "UnsuitableMuscle",
-    "by_air",
-    "by_count",
-    "by_diameter",
-    "by_length",
-    "by_reserve",
-    "catalogue",
-    "choice_row",
-    "choose",
-    "discharge_valve",
-    "fill_valve",
-    "scenario_text",
-    "size_muscles",
-]
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

@@ -16,8 +16,10 @@ from .files import list_valves as list_valves
 from .files import read_toml as read_toml
 from .fitted_entry import list_files as list_files
 from .law_file import load_law as load_law
+from .length_scaling import scale_to_length as scale_to_length
 from .location import Location as Location
 from .location import located_errors as located_errors
+from .models import PACKAGES as PACKAGES
 from .models import model_class as model_class
 from .models import model_names as model_names
 from .plant_file import PlantEntry as PlantEntry
@@ -27,6 +29,8 @@ from .plant_file import plant_tables as plant_tables
 from .product_entry import ProductEntry as ProductEntry
 from .product_entry import load_product as load_product
 from .scaling import scale_entry as scale_entry
+from .stated_band import StatedBand as StatedBand
+from .stated_band import read_stated_band as read_stated_band
 from .uncertainty import ParameterUncertainty as ParameterUncertainty
 from .uncertainty import without_parts as without_parts
 from .valve_entry import ValveEntry as ValveEntry

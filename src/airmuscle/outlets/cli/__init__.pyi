@@ -1,3 +1,16 @@
+from .campaign_stages import KeptStages as KeptStages
+from .cite import as_bibtex as as_bibtex
 from .commands import COMMANDS as COMMANDS
 from .commands import app as app
+from .completion import SHELLS as SHELLS
+from .completion import complete_data as complete_data
+from .completion import complete_entry as complete_entry
+from .completion import complete_plant as complete_plant
 from .entry_point import main as main
+from .fit_options import parse_split as parse_split
+from .interruption import check_interrupted as check_interrupted
+from .interruption import deferred_sigint as deferred_sigint
+from .option_hints import INSTRUCTIONS as INSTRUCTIONS
+from .option_hints import in_options as in_options
+from .terminal import print_json as print_json
+from .terminal import print_table as print_table

@@ -1,6 +1,11 @@
 from .arm import ArmReaching as ArmReaching
+from .default_tasks import arm_task as arm_task
+from .default_tasks import joint_task as joint_task
+from .default_tasks import lift_task as lift_task
 from .joint import JointTracking as JointTracking
 from .lift import LoadLifting as LoadLifting
+from .plant_env import PlantEnv as PlantEnv
+from .plant_vector_env import PlantVectorEnv as PlantVectorEnv
 from .randomisation import FactorRange as FactorRange
 from .randomisation import FitUncertainty as FitUncertainty
 from .randomisation import Randomisation as Randomisation

@@ -1,6 +1,5 @@
 """Studio: a page in the browser that shows muscles and plants, computed in the page by printed programs."""
 
-from .server import serve
-from .single_file import export_page
+from ...core.stubs import attach_stub
 
-__all__ = ["export_page", "serve"]
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

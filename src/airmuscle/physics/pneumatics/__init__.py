@@ -7,9 +7,12 @@ from .distributed_tube import DistributedTube
 from .fill_discharge import ClosedChamber, FillDischarge, ThreePositionValve, ambient_air
 from .gas import (
     GAS_CONSTANT,
+    HEAT_CAPACITY_RATIO,
     NO_FLOW,
     REFERENCE_DENSITY,
     REFERENCE_TEMPERATURE,
+    SPECIFIC_HEAT_CONSTANT_PRESSURE,
+    SPECIFIC_HEAT_CONSTANT_VOLUME,
     Air,
     Ambient,
     EnergyBalance,
@@ -32,9 +35,12 @@ from .virial_gas import DEFAULT_GAS, VirialGas, WallHeatTransfer, virial_coeffic
 __all__ = [
     "DEFAULT_GAS",
     "GAS_CONSTANT",
+    "HEAT_CAPACITY_RATIO",
     "NO_FLOW",
     "REFERENCE_DENSITY",
     "REFERENCE_TEMPERATURE",
+    "SPECIFIC_HEAT_CONSTANT_PRESSURE",
+    "SPECIFIC_HEAT_CONSTANT_VOLUME",
     "Air",
     "AirSource",
     "Ambient",

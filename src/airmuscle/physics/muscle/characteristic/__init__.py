@@ -5,7 +5,7 @@ from .borzikova import SAM_30X290, BorzikovaDirect, BorzikovaExponential
 from .chou_hannaford1996 import ChouHannaford1996
 from .contractile_surface import ContractileSurface, exponents
 from .effective_length import EffectiveLength
-from .energy_defect import maxwell_defect
+from .energy_defect import maxwell_defect, virtual_work_defect
 from .exact_meridian import ExactMeridian
 from .hunt2017 import Hunt2017
 from .length_family import InverseLength, LogarithmicLength
@@ -58,4 +58,5 @@ __all__ = [
     "as_force_law",
     "exponents",
     "maxwell_defect",
+    "virtual_work_defect",
 ]

@@ -53,7 +53,7 @@ class VirtualWork(ForceLaw):
         if not type(self.geometry).traceable:
             raise TraceError(
                 f"VirtualWork: {type(self.geometry).__name__} is not in closed form, so that its second derivative "
-                "is not available. Replace it by airmuscle.physics.muscle.geometry.chebyshev.as_polynomial(geometry)."
+                "is not available. Replace it by airmuscle.geometry.as_polynomial(geometry)."
             )
         return super().slopes(pressure, contraction)
 

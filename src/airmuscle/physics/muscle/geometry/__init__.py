@@ -2,7 +2,7 @@
 
 from .base import Geometry
 from .braid import Braid
-from .chebyshev import ChebyshevGeometry
+from .chebyshev import ChebyshevGeometry, as_polynomial
 from .meridian_shapes import Catenary, CircularArc, Parabola, TrueArcParabola
 from .pleated import PleatedTube
 from .straight_fibre import HalfShellFibreSum, PrintedFibreSum, StraightFibre, UniformFibreSum, UserDefinedFibreSum
@@ -24,4 +24,5 @@ __all__ = [
     "UniformFibreSum",
     "UserDefinedFibreSum",
     "Vessel",
+    "as_polynomial",
 ]
