@@ -352,10 +352,10 @@ BOX = "min_pressure = 0\nmax_pressure = 6e5\nmin_contraction = 0\nmax_contractio
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("validity_range = 3", r"\[validity_range\] is 3; it must be a table. Write its limits in it: min_pressure, max_pressure, min_contraction, max_contraction\.$"),
+        ("validity_range = 3", r"\[validity_range\] is 3; it must be a table. Write its values in it: min_pressure, max_pressure, min_contraction, max_contraction\.$"),
         (f"[validity_range]\n{BOX.replace('0.25', '25')}", r"\[validity_range\]: ValidityRange.max_contraction .* is 25; allowed range: -0.5 to 1"),
         (f"[validity_range]\n{BOX.replace('min_pressure = 0', 'min_pressure = -3e5', 1)}", r"\[validity_range\]: .* is -300000 Pa"),
-        (f'[validity_range]\nmodel = "Braid"\n{BOX}', r"\[validity_range\]: Braid has no parameter 'min_pressure'"),
+        (f'[validity_range]\nmodel = "Braid"\n{BOX}', r"\[validity_range\]: Braid is not allowed here; a ValidityRange is required"),
         ('[[check]]\nquantity = "volume"\ncontraction = nan\nequals = 1\ntolerance = 1\nsource = "s"', r"contraction is nan"),
         ('[[check]]\nquantity = "volume"\ncontraction = 0\nequals = 1\ntolerance = -1\nsource = "s"', r"tolerance is -1"),
         ('[[reference]]\nkey = "k"\nauthors = "a"\ntitle = "t"\nwhere = "w"\ndoi = 3', r"\[reference 1\]: doi is 3"),

@@ -244,7 +244,7 @@ REFUSED = {
         "[1.2, 1.4]",
         "the initial value of gas.exponent is 1.1, outside its bounds 1.2 to 1.4",
     ),
-    "a deviation of zero": ('"500 Pa"', '"0 Pa"', "the standard deviation of a sensor must be greater than zero"),
+    "a deviation of zero": ('"500 Pa"', '"0 Pa"', "[observed], pressure is '0 Pa'; it must be greater than zero"),
     "a deviation of another kind": (
         '"500 Pa"',
         '"500 mm"',
@@ -261,7 +261,7 @@ REFUSED = {
         "Plant has no state or output 'heading'",
     ),
     "a margin of zero": ('"50 ms"', '"0 ms"', "start_time is '0 ms'; it must be greater than zero"),
-    "no whole number": ("starts = 2", "starts = 2.5", "starts is 2.5; it must be an integer of at least 1"),
+    "no whole number": ("starts = 2", "starts = 2.5", "starts is 2.5; it must be an integer"),
     "a command of no input": ("discharge = [[", "exhaust = [[", "no input 'exhaust'"),
     "no list": ('own = ["circuit.supply.pressure"]', 'own = "circuit.supply.pressure"', "it must be a list of paths"),
     "nothing observed": ('pressure = "500 Pa"\nposition = { deviation = "50 um", column = "height" }', "", "observed"),

@@ -226,7 +226,7 @@ stiffness = [["0 s", "40 N m/rad"]]"""
         ("delay = 2", "delay = -1", ParameterError, r"ColumnSensor: delay is -1 samples; allowed range: 0 to 1000"),
         ('column = "angle"', 'column = "angel"', ParameterError, r"\[input.controller.sensors\[0\]\], resolution is '0.0879 deg'; the unit of the signal 'angel' is not known"),
         ("seed = 1", "seed = 1.5", ParameterError, r"WithSensors: seed is 1.5; it must be a whole number"),
-        ('model = "ColumnSensor"', 'model = "PID"', ParameterError, r"\[input.controller.sensors\[0\]\]: PID has no parameter 'column'"),
+        ('model = "ColumnSensor"', 'model = "PID"', ParameterError, r"\[input.controller.sensors\[0\]\]: PID is not allowed here; a ColumnSensor is required"),
         ('measured = "angle"', 'measured = "angel"', ParameterError, r"measures 'angel', which the plant does not have"),
         ('"left.command", "right.command"', '"left.command"', ParameterError, r"\[input.controller.law.inner\]: ProportionalFeedback: 2 columns and 1 commanded inputs"),
     ],

@@ -274,8 +274,8 @@ def test_a_record_without_a_quantity_of_the_plant_is_refused(study, tmp_path):
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        ("uncertainty = 3", "must be a table with deviations"),
-        ("[uncertainty]\nparameters = []", "must be a table of standard deviations"),
+        ("uncertainty = 3", "must be a table. Write its values in it: deviations"),
+        ("[uncertainty]\nparameters = []", "deviations. is missing: standard deviation of the residuals"),
         ("[uncertainty]\ndeviations = { pressure = -1 }", "must be greater than zero"),
         ('[uncertainty]\ndeviations = { pressure = "1 kPa" }\nparameters = ["gas.x"]\nstandard_errors = [1.0]\n'
          "correlations = [[1.0]]", "the plant has no parameter 'gas.x'"),

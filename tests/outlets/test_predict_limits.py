@@ -18,7 +18,7 @@ import airmuscle as am
 from airmuscle.bench import predict_static, rate_of_change, write_csv
 from airmuscle.errors import ParameterError
 from airmuscle.files import load_scenario
-from airmuscle.files.library import Location, read_stated_band
+from airmuscle.files.library import PLANT_READER, Location, StatedBand
 from airmuscle.recording import Recording
 
 LAW = "chou-hannaford"
@@ -190,8 +190,10 @@ def test_a_record_of_a_plant_that_is_faster_than_those_of_the_fit_is_named(plant
 )
 def test_a_stated_band_with_a_number_that_is_none_is_refused(table, message):
     with pytest.raises(am.errors.AirmuscleError, match=message):
-        read_stated_band(
-            {"quantity": "force", "half_width": 5.0, "source": "x", **table}, Location("m.toml", "", Path())
+        PLANT_READER.build(
+            {"quantity": "force", "half_width": 5.0, "source": "x", **table},
+            Location("m.toml", "", Path()),
+            kind=StatedBand,
         )
 
 

@@ -18,7 +18,7 @@ from command_line import airmuscle
 from airmuscle.core import parameters
 from airmuscle.errors import AirmuscleError
 from airmuscle.files import list_laws, list_plants, load, load_scenario, muscle_schema, scenario_schema, to_toml
-from airmuscle.files.library import PLANTS, build_entry, model_class
+from airmuscle.files.library import PLANTS, Location, build_entry, model_class
 from airmuscle.files.scenario import TABLES
 
 ROOT = Path(__file__).parents[2]
@@ -211,7 +211,7 @@ def test_a_broken_muscle_is_found_by_the_schema_and_refused_by_the_program(was: 
     found = judged(tables, MUSCLE)
     assert any(f.startswith(fault) for f in found), found
     with pytest.raises(AirmuscleError):
-        build_entry(tables, "broken", Path("broken.toml"), ROOT)
+        build_entry(tables, Location("broken.toml", "", ROOT))
 
 
 # It is generated

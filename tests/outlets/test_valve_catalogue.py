@@ -29,10 +29,9 @@ from airmuscle.files import (
     load_scenario,
     load_valve,
 )
-from airmuscle.files.library import Location
-from airmuscle.files.library.build import build
+from airmuscle.files.library import PLANT_READER, Location
 from airmuscle.papers.hosovsky_plant import MATRIX
-from airmuscle.physics import CheckValve, Valve, in_series
+from airmuscle.physics import CheckValve, Orifice, Valve, in_series
 
 pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
 every_valve = pytest.mark.parametrize("name", list_valves())
@@ -54,7 +53,8 @@ closing_delay = "7 ms"
 [[check]]
 upstream = "7 bara"
 downstream = "1 bara"
-flow = "840 l/min"
+quantity = "flow"
+equals = "840 l/min"
 tolerance = "1 l/min"
 source = "the bench"
 [[reference]]
@@ -142,9 +142,11 @@ def test_a_limit_of_use_is_a_warning():
 
 def test_a_table_may_name_a_valve_of_the_catalogue_or_of_a_file_beside_it(tmp_path: Path):
     place = Location("scenario.toml", "plant.circuit.fill", written(tmp_path, GOOD).parent)
-    assert build({"library": "matrix-821"}, place) == MATRIX
-    assert build({"library": "ckd-m4ga1-r", "path": "exhaust"}, place) == load_valve("ckd-m4ga1-r").exhaust
-    assert build({"library": "valve.toml", "path": "exhaust"}, place).conductance == pytest.approx(3e-8)
+    assert PLANT_READER.build({"library": "matrix-821"}, place, kind=Orifice) == MATRIX
+    exhaust = PLANT_READER.build({"library": "ckd-m4ga1-r", "path": "exhaust"}, place, kind=Orifice)
+    assert exhaust == load_valve("ckd-m4ga1-r").exhaust
+    of_file = PLANT_READER.build({"library": "valve.toml", "path": "exhaust"}, place, kind=Orifice)
+    assert of_file.conductance == pytest.approx(3e-8)
 
 
 SCENARIO = """
@@ -193,7 +195,7 @@ def test_a_scenario_runs_with_valves_of_the_catalogue(tmp_path: Path):
 )
 def test_a_valve_that_is_not_there_is_refused(tmp_path: Path, table, error, message: str):
     with pytest.raises(error, match=message):
-        build(table, Location("scenario.toml", "fill", tmp_path))
+        PLANT_READER.build(table, Location("scenario.toml", "fill", tmp_path), kind=Orifice)
 
 
 @pytest.mark.parametrize(
@@ -205,15 +207,15 @@ def test_a_valve_that_is_not_there_is_refused(tmp_path: Path, table, error, mess
             'model = "SubsonicIndexValve"',
             'model = "Supply"\npressure = 1e5',
             ParameterError,
-            r"\[valve\]: .*'conductance'",
+            r"\[valve\]: Supply is not allowed here; an Orifice is required: .*Valve",
         ),
         ('"2 dm3/(s bar)"', '"2 dm3/s"', UnitError, r"\[valve\], conductance: unit 'dm3/s' cannot be converted to"),
         ('"4 ms"', '"-4 ms"', ParameterError, r"\[switching_times\]: .*opening_delay .* allowed range: 0 to 1 s"),
         ('"4 ms"', '"4 mm"', UnitError, r"\[switching_times\], opening_delay: unit 'mm' cannot be converted to 's'"),
-        ('closing_delay = "7 ms"', "", ParameterError, "'closing_delay' is missing"),
+        ('closing_delay = "7 ms"', "", ParameterError, "'closing_delay' is missing: time from the command to close"),
         ('upstream = "7 bara"', 'upstream = "7 barg"', UnitError, r"\[check 1\], upstream: unit 'barg' is gauge"),
-        ('flow = "840 l/min"', "", ParameterError, r"\[check 1\]: 'flow' is missing; give a number in m3/s"),
-        ('flow = "840 l/min"', "flow = nan", ParameterError, r"\[check 1\], flow is nan; it must be finite"),
+        ('equals = "840 l/min"', "", ParameterError, r"\[check 1\]: 'equals' is missing: published value"),
+        ('equals = "840 l/min"', "equals = nan", ParameterError, r"\[check 1\]: equals is nan; it must be finite"),
         ('source = "the bench"', "", ParameterError, r"\[check 1\]: 'source' is missing"),
         ("[[check]]", "[check]", ParameterError, r"'check' must be an array of tables; write \[\[check\]\]"),
         ('key = "ours"', "key = 1", ParameterError, "key is 1; it must be a text in quotes"),

@@ -13,7 +13,7 @@ from ..bench.identify.correlation_index import CorrelationIndex, correlation_ind
 from ..bench.identify.surface.basis import LoadRange
 from ..bench.identify.surface.monotone import fit_monotone
 from ..core.errors import AirmuscleWarning
-from ..files.library.law_file import load_law
+from ..files.library.entry_file import load_law
 from ..physics.muscle.characteristic.borzikova import SAM_30X290, PlaneCurves
 
 MISPRINT_INDEX = 2

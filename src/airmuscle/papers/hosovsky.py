@@ -7,7 +7,7 @@ from typing import Any
 import airmuscle as am
 
 from ..core.reference import cite
-from ..files.library import law_file
+from ..files.library import load_law
 from ..physics.muscle.characteristic.contractile_surface import exponents
 from ..physics.muscle.characteristic.energy_defect import maxwell_defect
 from ..report.chapter import Chapter, Plot, Table
@@ -80,7 +80,7 @@ def chapter(
             *_time_series(fill, low, high),
         ),
         plots=_plots(fill, effects, low, high),
-        references=(*cite(fill.plant), MATRIX_CATALOGUE, *cite(law_file.load_law(FORCE_MAPS[0]))),
+        references=(*cite(fill.plant), MATRIX_CATALOGUE, *cite(load_law(FORCE_MAPS[0]))),
         chosen=(*parameters.as_rows(), *suspected.as_rows()),
         **chapter_texts(PAPER),
     )
@@ -107,12 +107,12 @@ def maxwell_table(parameters: UnpublishedParameters) -> Table:
     laws: dict[str, tuple[am.characteristic.Characteristic, am.geometry.Geometry]]
     laws = {f"surface fitted to {name}, without the limits": (surface_fit(name).model, shape) for name in FORCE_MAPS}
     for name in ("dmsp-20-300", "dmsp-10-250"):
-        entry = law_file.load_law(name)
+        entry = load_law(name)
         laws[f"Martens-Boblan 2017, {name}"] = (entry.characteristic, entry.muscle.geometry)
     validity_ranges = [
         surface(FORCE_MAPS[0]).validity_range,
         surface(FORCE_MAPS[1]).validity_range,
-        *(law_file.load_law(n).validity_range for n in ("dmsp-20-300", "dmsp-10-250")),
+        *(load_law(n).validity_range for n in ("dmsp-20-300", "dmsp-10-250")),
     ]
     defects = [
         maxwell_defect(law, volume, validity_range)

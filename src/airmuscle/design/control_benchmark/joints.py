@@ -13,7 +13,7 @@ from ...core.errors import ParameterError
 from ...core.short_repr import ShortRepr
 from ...engine.loop.driver import Driver, SolenoidDriver
 from ...engine.loop.sensors import ColumnSensor
-from ...files.library.law_file import load_law
+from ...files.library.entry_file import load_law
 from ...physics.equilibrium import find_equilibrium
 from ...physics.mechanism import AntagonisticJoint, JointWithExternalTorque
 from ...physics.muscle import LinearDamper, Muscle

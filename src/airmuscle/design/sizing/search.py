@@ -13,8 +13,8 @@ import numpy as np
 from ...core.errors import AirmuscleError, AirmuscleWarning, ParameterError, SolveError
 from ...core.short_repr import ShortRepr
 from ...files.library.entry import Entry
+from ...files.library.entry_file import load_law
 from ...files.library.files import LAWS, list_laws, list_products, read_toml
-from ...files.library.law_file import load_law
 from .choice import MuscleChoice, Requirement, SortKey, UnsuitableMuscle, by_air, rank
 from .joint import JointSearch
 from .lift import LiftSearch

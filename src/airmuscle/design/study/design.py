@@ -15,7 +15,7 @@ import numpy as np
 
 from ...core.arrays import Array
 from ...core.errors import ParameterError
-from ...files.library.build import custom_field
+from ...files.library.fields import custom_field
 from .distributions import LevelSet, Variation
 from .fields import read_count
 

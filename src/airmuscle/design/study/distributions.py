@@ -6,14 +6,14 @@ import abc
 import dataclasses
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...core.arrays import Array
 from ...core.errors import ParameterError
-from ...files.library.build import build, custom_field
+from ...files.library.build import TableReader
+from ...files.library.fields import custom_field
 from ...files.library.location import Location, read_finite_number
 from .fields import read_count, read_difference, read_quantity, read_ratio
 
@@ -169,8 +169,8 @@ class Triangular(Distribution):
         return stats.triang((self.mode - self.low) / (self.high - self.low), self.low, self.high - self.low)
 
 
-def _read_inner(value: Any, unit: str, where: str) -> Distribution:
-    inner: Distribution = build(value, Location(where, "", Path()), classes=DISTRIBUTIONS, unit=unit)
+def _read_inner(value: Any, unit: str, where: Location) -> Distribution:
+    inner: Distribution = TableReader(classes=DISTRIBUTIONS, known=unit).build(value, where)
     return inner
 
 
@@ -225,7 +225,7 @@ def read_variation(value: Any, unit: str, location: Location) -> Variation:
             f'{location} is {value!r}; write a list of values, or a distribution such as {{ model = "Uniform", '
             "low = ..., high = ... }."
         )
-    variation = build(value, location, classes=VARIATIONS, unit=unit)
+    variation = TableReader(classes=VARIATIONS, known=unit).build(value, location)
     return variation.levels if isinstance(variation, Range) else variation
 
 

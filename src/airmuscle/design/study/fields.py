@@ -15,12 +15,12 @@ from ...files.library.location import read_finite_number
 _NUMBER = re.compile(r"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 
-def read_quantity(value: Any, unit: str, where: str) -> float:
+def read_quantity(value: Any, unit: str, where: object) -> float:
     """A finite number in the contextual unit. Raises ParameterError or UnitError."""
     return read_finite_number(value, unit, where)
 
 
-def read_difference(value: Any, unit: str, where: str) -> float:
+def read_difference(value: Any, unit: str, where: object) -> float:
     """A difference of two quantities, converted without the offset of its unit (degC, bara)."""
     number = read_finite_number(value, unit, where)
     return (
@@ -28,24 +28,24 @@ def read_difference(value: Any, unit: str, where: str) -> float:
     )
 
 
-def read_ratio(value: Any, unit: str, where: str) -> float:
+def read_ratio(value: Any, unit: str, where: object) -> float:
     """A dimensionless number, or a percentage as text."""
     return read_finite_number(value, "1", where)
 
 
-def read_time(value: Any, unit: str, where: str) -> float:
+def read_time(value: Any, unit: str, where: object) -> float:
     """A time [s]."""
     return read_finite_number(value, "s", where)
 
 
-def read_count(value: Any, unit: str, where: str) -> int:
+def read_count(value: Any, unit: str, where: object) -> int:
     """A non-negative integer."""
     if isinstance(value, bool) or not isinstance(value, int) or value < 0:
         raise ParameterError(f"{where} is {value!r}; it must be a non-negative integer.")
     return value
 
 
-def read_name(value: Any, unit: str, where: str) -> str:
+def read_name(value: Any, unit: str, where: object) -> str:
     """A non-empty text."""
     if not isinstance(value, str) or not value:
         raise ParameterError(f"{where} is {value!r}; it must be a quoted name.")

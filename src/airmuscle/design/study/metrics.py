@@ -16,7 +16,7 @@ import numpy as np
 
 from ...core.arrays import Array
 from ...core.errors import ParameterError
-from ...files.library.build import custom_field
+from ...files.library.fields import custom_field
 from .fields import read_name, read_quantity, read_ratio, read_time
 
 

@@ -31,7 +31,7 @@ from ...core.absolute_pressure import ambient_pressure
 from ...core.errors import ParameterError, suggestion
 from ...core.fingerprint import fingerprint
 from ...core.short_repr import ShortRepr
-from ...files.library.build import build
+from ...files.library.build import TableReader
 from ...files.library.files import read_toml
 from ...files.library.location import Location, check_keys, located_errors, read_text
 from ...files.scenario.scenario import Scenario, build_scenario, load_scenario, run_column_units
@@ -143,7 +143,8 @@ def _build_study(file: Path, tables: Mapping[str, Any], location: Location, temp
     vary = _require_table(tables, "vary", location)
     parameters = {path: template.parameter(path, str(location.inside("vary"))) for path in vary}
     variations = [_read_variation(vary[path], parameter, location) for path, parameter in parameters.items()]
-    design: Design = build(_require_table(tables, "design", location), location.inside("design"), classes=DESIGNS)
+    table = _require_table(tables, "design", location)
+    design: Design = TableReader(classes=DESIGNS).build(table, location.inside("design"))
     with located_errors(location.inside("design")):
         values = design.values(variations)
     metrics = _require_table(tables, "metrics", location)
@@ -234,7 +235,7 @@ def _read_metrics(tables: Mapping[str, Any], scenario: Scenario, location: Locat
         if isinstance(column, str) and column not in known:
             near = suggestion(column, known)
             raise ParameterError(f"{inner}: a run has no column '{column}'; its columns are {', '.join(known)}.{near}")
-        metric = build(table, inner, classes=METRICS, unit=known.get(str(column), "1") or "1")
+        metric = TableReader(classes=METRICS, known=known.get(str(column), "1") or "1").build(table, inner)
         with located_errors(inner):
             metric.check_range(scenario.problem.start_time, scenario.problem.duration)
             if isinstance(metric, TimeSeries):

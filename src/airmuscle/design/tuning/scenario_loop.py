@@ -17,8 +17,8 @@ from ...core.tree import Leaf, leaves
 from ...core.units import conversion, quantity
 from ...engine.loop.control_loop import ControlLoop
 from ...engine.loop.controller import parameter_units
+from ...files.library.entry_file import load_law
 from ...files.library.files import is_path, list_plants, read_toml
-from ...files.library.law_file import load_law
 from ...files.library.location import Location, located_errors
 from ...files.library.uncertainty import ParameterUncertainty
 from ...files.library.write import write_text

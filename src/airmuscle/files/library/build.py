@@ -1,189 +1,168 @@
-"""Models from TOML tables, and valve entries from TOML files.
+"""Objects from TOML tables: one reader for muscle, valve, product and plant files, scenarios and studies.
 
-A table names its class, `model = "Braid"`, and its fields: numbers in the declared unit or text with a unit
-(`"300 mm"`), lists for tuples, tables for nested models. A list may also be a column of a data file, relative to
-the folder of the TOML file: `{ file = "data/map.csv", column = "force" }`. An orifice may also be a valve of the
-library, `{ library = "matrix-821" }`, or of a valve file, `{ library = "my/valve.toml" }`. A valve file contains model
-tables, so that both are read in this module:
-
-    title = "..."                   what it is, and which of its paths
-    provenance = "data sheet"       origin of the numbers
-    [valve]                         flow law and its parameters; the path to the muscle if the paths differ
-    [exhaust]                       optional: the path to the surroundings, if its values differ
-    [switching_times]               optional: opening_delay and closing_delay, as published
-    [[check]]                       published flows that the law must reproduce
-    [[reference]]                   sources
+A table is an object of a dataclass, its keys are the fields. Numbers are in the declared unit or texts with a unit
+(`"300 mm"`), tuples are lists, objects inside are tables. `model = "Braid"` names the class; it may be omitted where
+only one is possible, and a model without parameters is its name alone (`gas = "Isothermal"`). A list of numbers may
+also be a column of a data file, relative to the folder of the TOML file: `{ file = "data/map.csv", column = "force" }`.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import typing
 from collections.abc import Callable, Mapping
-from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
-from ...core.declaration import check_field, parameters
+from ...core.annotation import abridged
+from ...core.declaration import Parameter, check_field, parameters
 from ...core.errors import ParameterError
-from ...core.units import ABSOLUTE
-from ...physics.pneumatics.valve import Orifice
-from .entry import Check, issue_warning
-from .fields import accepts, check_required, describe_type, item_type, read_parameter
-from .files import VALVES, complete_name, is_path, list_valves, read_toml
-from .location import Location, check_keys, check_type, located_errors, read_finite_number, read_table_array, read_text
-from .models import model_class
-from .references import read_references
-from .valve_entry import PATHS, SwitchingTimes, ValveEntry
+from .fields import (
+    accepts,
+    check_required,
+    describe_type,
+    describes_tables,
+    is_table,
+    item_type,
+    options,
+    read_parameter,
+)
+from .location import Location, check_keys, located_errors
+from .models import allows, model_class, model_names
 
-TEXT_KEYS = ("title", "provenance", "note", "warning")
-"""Keys of an entry file with a text as value; the first two are required."""
-_CHECK_UNITS = {"upstream": ABSOLUTE, "downstream": ABSOLUTE, "flow": "m3/s", "tolerance": "m3/s"}
-
-Reader = Callable[[Any, str, str], Any]
-"""Reads the value of a field, given the contextual unit and the location for error messages."""
-
-
-def custom_field(read: Reader, meaning: str, **field: Any) -> Any:
-    """Declare a dataclass field that `read` reads from a file, instead of a parameter with a fixed unit."""
-    return dataclasses.field(metadata={"read": read, "meaning": meaning}, **field)
+Named = Callable[[Any, Location, "TableReader"], Any]
+"""The part that a text or a table with `library` names; None if it describes the part itself."""
 
 
-def build(
-    table: Mapping[str, Any],
-    location: Location,
-    given: Mapping[str, Any] | None = None,
-    *,
-    classes: Mapping[str, type[Any]] | None = None,
-    unit: str = "1",
-    kind: Any = Any,
-) -> Any:
-    """The model that a table describes. Raises ParameterError, UnitError or UnknownNameError with the location.
+class Signals(Protocol):
+    """What a table does not state of a model whose units follow from signals: the fields and units it has from them."""
 
-    given    fields that are models already and are not in the table
-    classes  the allowed classes by name; by default all registered models
-    unit     contextual unit of the fields declared with `custom_field`
-    kind     annotation of the place of the model; an unknown name is answered with the models that it allows
+    def concerns(self, cls: type[Any]) -> bool:
+        """Whether the fields or units of a class depend on the signals."""
+
+    def parts(self, cls: type[Any], hints: Mapping[str, Any]) -> dict[str, Any]:
+        """The fields that a table need not give."""
+
+    def make(self, cls: type[Any], parts: Mapping[str, Any], numbers: Mapping[str, Any], location: Location) -> Any:
+        """The object of a class from its parts and the numbers of its table, which are not read yet."""
+
+
+@dataclasses.dataclass(frozen=True)
+class TableReader:
+    """Reader of tables as objects.
+
+    classes  the allowed classes by name, for the outermost table; by default all registered models
+    known    what the readers of fields declared with `custom_field` are given, such as a unit or a plant
+    named    readers of parts that may be named instead of described, by their class
+    signals  for controllers, see law_table.py
     """
-    if not isinstance(table, Mapping):
-        raise ParameterError(
-            f'{location} is {table!r}; it must be a table. Write model = "..." and its parameters in it.'
-        )
-    if "library" in table and "model" not in table and classes is None:
-        return _library_orifice(table, location)
-    if not isinstance(table.get("model"), str):
-        choice = f"one of {', '.join(classes)}" if classes else 'such as model = "Braid"'
-        raise ParameterError(f'{location}: the model is not named; write model = "...", {choice}, and its parameters.')
-    cls = model_class(table["model"], f"{location}, model", classes, kind)
-    fields = {key: value for key, value in table.items() if key != "model"}
-    for key in fields:
+
+    classes: Mapping[str, type[Any]] | None = None
+    known: Any = None
+    named: Mapping[type[Any], Named] = dataclasses.field(default_factory=dict)
+    signals: Signals | None = None
+
+    def build(self, table: Any, location: Location, given: Mapping[str, Any] | None = None, *, kind: Any = Any) -> Any:
+        """The object that a table describes; `given` are fields that are not read from the table.
+
+        kind  annotation of the place of the object, by which other classes are refused
+
+        Raises ParameterError, UnitError, UnknownNameError, FileError or ColumnError with the location.
+        """
+        for cls, read in self.named.items():
+            if cls in options(kind) and (part := read(table, location, self)) is not None:
+                return part
+        if isinstance(table, str) and is_table(kind):
+            table = {"model": table}
+        cls = self._class(table, location, kind)
+        given = given or {}
+        names = {f.metadata.get("key", f.name): f.name for f in dataclasses.fields(cls) if f.init}
+        values = {key: value for key, value in table.items() if key != "model" or key in names}
+        is_named = "model" in table and "model" not in names
+        for key in values if is_named else ():
+            with located_errors(location):
+                check_field(cls, key)
+        library = ["library"] if any(each in self.named for each in options(kind)) else []
+        check_keys(values, [*(key for key in names if key), *library], location)
+        values = {names[key]: value for key, value in values.items() if names[key] not in given}
+        hints = typing.get_type_hints(cls)
+        declared = {p.name: p for p in parameters(cls)}
+        signals = self.signals if self.signals is not None and self.signals.concerns(cls) else None
+        parts = signals.parts(cls, hints) if signals else {}
+        parts |= {n: self._part(v, cls, n, hints[n], location) for n, v in values.items() if n not in declared}
+        check_required(cls, {**values, **parts, **given}, hints, location, is_named)
+        numbers = {name: value for name, value in values.items() if name in declared}
+        if signals:
+            return signals.make(cls, parts, numbers, location)
         with located_errors(location):
-            check_field(cls, key)
-    declared = {p.name: p for p in parameters(cls)}
-    hints = typing.get_type_hints(cls)
-    check_required(cls, {**fields, **(given or {})}, hints, location)
-    readers = {f.name: f.metadata["read"] for f in dataclasses.fields(cls) if "read" in f.metadata}
-    values = {
-        key: readers[key](value, unit, f"{location}, {key}")
-        if key in readers
-        else read_parameter(value, declared[key], hints[key], location)
-        if key in declared
-        else _build_part(value, hints[key], key, location)
-        for key, value in fields.items()
-    }
-    with located_errors(location):
-        return cls(**values, **(given or {}))
+            units = cls.units_of_table(table) if hasattr(cls, "units_of_table") else {}
+        numbers = {n: read_parameter(v, _in_unit(declared[n], units), hints[n], location) for n, v in numbers.items()}
+        with located_errors(location):
+            return cls(**parts, **numbers, **given)
+
+    def _class(self, table: Any, location: Location, kind: Any) -> type[Any]:
+        """The class of a table. Raises ParameterError or UnknownNameError."""
+        only = only_class(kind) if self.classes is None else None
+        if not isinstance(table, Mapping):
+            of_kind = "" if kind is Any else f" of {describe_type(kind)}"
+            content = f'model = "..."{of_kind} and its parameters in it'
+            if only is not None:
+                content = f"its values in it: {', '.join(_keys(only))}"
+            raise ParameterError(f"{location} is {abridged(table)}; it must be a table. Write {content}.")
+        if only is not None and ("model" not in table or "model" in _keys(only)):
+            return only
+        if not isinstance(table.get("model"), str):
+            choice = ", ".join(self.classes or (() if kind is Any else model_names(kind)))
+            example = f"one of {choice}" if choice else 'such as model = "Braid"'
+            raise ParameterError(
+                f'{location}: the model is not named; write model = "...", {example}, and its parameters.'
+            )
+        cls = model_class(table["model"], f"{location}, model", self.classes, kind)
+        if not allows(kind, cls):
+            listed = "" if only else f": {', '.join(model_names(kind))}"
+            raise ParameterError(
+                f"{location}: {cls.__name__} is not allowed here; {describe_type(kind)} is required{listed}."
+            )
+        return cls
+
+    def _part(self, value: Any, cls: type[Any], name: str, hint: Any, location: Location) -> Any:
+        """A field without a declared unit: an object, a tuple of them, a number, a text, true or false."""
+        field = cls.__dataclass_fields__[name]
+        key = str(field.metadata.get("key", name))
+        if "read" in field.metadata:
+            return field.metadata["read"](value, self.known, location.at(key))
+        return self.value(value, hint, location, key, 1 if "key" in field.metadata else None)
+
+    def value(self, value: Any, hint: Any, location: Location, key: str, first: int | None = None) -> Any:
+        """The value of a key by an annotation; `first` is the number of the first table of an array in messages."""
+        item = item_type(hint)
+        if isinstance(value, list) and item is not None:
+            places = [f"{key}[{i}]" if first is None else f"{key} {i + first}" for i in range(len(value))]
+            return tuple(self.value(v, item, location, p) for v, p in zip(value, places, strict=True))
+        if accepts(hint, value) and not isinstance(value, Mapping):
+            return value
+        if describes_tables(hint) or (is_table(hint) and isinstance(value, Mapping | str)):
+            return self.build(value, location.inside(key), kind=hint)
+        if isinstance(value, Mapping) and is_table(item):
+            raise ParameterError(f"{location}: '{key}' must be an array of tables; write [[{key}]] above each.")
+        raise ParameterError(f"{location}: {key} is {abridged(value)}; it must be {describe_type(hint)}.")
 
 
-def _build_part(value: Any, hint: Any, key: str, location: Location) -> Any:
-    """A structural field: a model, a tuple of models, an integer, a text, true or false."""
-    inner = location.inside(key)
-    if isinstance(value, Mapping):
-        part = build(value, inner, kind=hint)
-    elif isinstance(value, list):
-        part = tuple(_build_part(v, item_type(hint), f"{key}[{i}]", location) for i, v in enumerate(value))
-    elif isinstance(value, str) and not accepts(hint, value):
-        part = build({"model": value}, inner, kind=hint)
-    else:
-        part = value
-    if not accepts(hint, part):
-        what = type(part).__name__ if dataclasses.is_dataclass(part) else repr(part)
-        raise ParameterError(f"{location}: {key} is {what}; it must be {describe_type(hint)}.")
-    return part
+build = TableReader().build
 
 
-def _library_orifice(table: Mapping[str, Any], location: Location) -> Orifice:
-    """An orifice of a valve of the library or of a valve file, relative to the folder of the TOML file."""
-    check_keys(table, ("library", "path"), location)
-    name = read_text(table, "library", location, needed=True)
-    path = read_text({"path": PATHS[0], **table}, "path", location, needed=True)
-    with located_errors(location):
-        return load_valve(location.folder / name if name.endswith(".toml") else name).orifice(path)
+def _in_unit(declared: Parameter, units: Mapping[str, str]) -> Parameter:
+    return dataclasses.replace(declared, unit=units[declared.name]) if declared.name in units else declared
 
 
-def load_valve(name_or_path: str | Path) -> ValveEntry:
-    """A valve by its name or a unique beginning of it, or a valve file by its path.
-
-    Raises UnknownNameError, FileError, ParameterError or UnitError with the location. A warning of the entry is issued
-    as an AirmuscleWarning.
-    """
-    if is_path(name_or_path):
-        path = file = Path(name_or_path)
-    else:
-        path = VALVES / f"{complete_name(str(name_or_path), list_valves(), 'valve')}.toml"
-        file = Path(path.name)
-    entry = build_valve_entry(read_toml(path), path.stem, file)
-    issue_warning(entry.name, entry.warning, stacklevel=2)
-    return entry
+def _keys(cls: type[Any]) -> list[str]:
+    """The keys of the table of a class."""
+    return [key for f in dataclasses.fields(cls) if f.init and (key := f.metadata.get("key", f.name))]
 
 
-def build_valve_entry(tables: Mapping[str, Any], name: str, file: Path) -> ValveEntry:
-    """The valve entry of the tables of a file; error messages name `file`. Raises ParameterError or UnitError."""
-    location = Location(str(file), "", file.parent)
-    check_keys(tables, (*TEXT_KEYS, *PATHS, "switching_times", "check", "reference"), location)
-    if "valve" not in tables:
-        raise ParameterError(f"{location}: the table [valve] is missing; it names a flow law and its parameters.")
-    texts = read_entry_texts(tables, location)
-    orifices = {key: _build_orifice(tables[key], location.inside(key)) for key in PATHS if key in tables}
-    return ValveEntry(
-        name=name,
-        **texts,
-        **orifices,
-        switching_times=_read_switching_times(tables, location.inside("switching_times")),
-        checks=tuple(_read_check(*row) for row in read_table_array(tables, "check", location)),
-        references=read_references(tables, location),
-    )
-
-
-def read_entry_texts(tables: Mapping[str, Any], location: Location) -> dict[str, Any]:
-    """Title, provenance, note and warning of an entry file. Raises ParameterError without one of the first two."""
-    return {key: read_text(tables, key, location, needed=key in TEXT_KEYS[:2]) for key in TEXT_KEYS}
-
-
-def _build_orifice(table: Any, location: Location) -> Any:
-    return check_type(build(table, location, kind=Orifice), Orifice, location)
-
-
-def _read_switching_times(tables: Mapping[str, Any], location: Location) -> SwitchingTimes | None:
-    table = tables.get("switching_times", {})
-    if not isinstance(table, Mapping):
-        raise ParameterError(f'{location} is {table!r}; it must be a table. Write opening_delay = "10 ms" in it.')
-    if "switching_times" not in tables:
+def only_class(kind: Any) -> type[Any] | None:
+    """The class of a place where only one is possible."""
+    classes = [option for option in options(kind) if dataclasses.is_dataclass(option) and inspect.isclass(option)]
+    if len(classes) != 1 or inspect.isabstract(classes[0]) or set(model_names(kind)) - {classes[0].__name__}:
         return None
-    names = tuple(p.name for p in parameters(SwitchingTimes))
-    check_keys(table, names, location)
-    for name in names:
-        if name not in table:
-            raise ParameterError(f"{location}: '{name}' is missing; give both {' and '.join(names)}.")
-    with located_errors(location):
-        return SwitchingTimes(**{name: read_finite_number(table[name], "s", f"{location}, {name}") for name in names})
-
-
-def _read_check(table: Mapping[str, Any], location: Location) -> Check:
-    check_keys(table, (*_CHECK_UNITS, "source"), location)
-    for key, unit in _CHECK_UNITS.items():
-        if key not in table:
-            raise ParameterError(f"{location}: '{key}' is missing; give a number in {unit}, or a text with a unit.")
-    values = {key: read_finite_number(table[key], unit, f"{location}, {key}") for key, unit in _CHECK_UNITS.items()}
-    conditions = (("upstream", values["upstream"]), ("downstream", values["downstream"]))
-    source = read_text(table, "source", location, needed=True)
-    return Check("flow", conditions, values["flow"], values["tolerance"], source)
+    return classes[0]

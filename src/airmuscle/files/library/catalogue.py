@@ -13,33 +13,14 @@ from ...bench.readers import read_csv
 from ...core.errors import FileError
 from ...core.reference import Reference
 from ...recording import Recording
-from .build import build_valve_entry
-from .entry import Entry, issue_warning
-from .entry_file import build_entry
-from .files import (
-    DATA,
-    LAWS,
-    PLANTS,
-    PRODUCTS,
-    VALVES,
-    complete_name,
-    is_path,
-    list_data,
-    list_library,
-    list_plants,
-    list_products,
-    list_valves,
-    read_toml,
-)
-from .law_file import describes_plant, describes_product, describes_valve
+from .entry import AnyEntry, PlantEntry, issue_warning
+from .entry_file import build_entry, kind_of
+from .files import DATA, FOLDERS, complete_name, is_path, list_data, list_library, list_names, read_toml
 from .location import Location
-from .plant_file import PlantEntry, build_plant_entry
-from .product_entry import ProductEntry, build_product_entry
-from .references import read_references
-from .valve_entry import ValveEntry
+from .plant_file import build_plant_entry
 
 
-def load(name_or_path: str | Path) -> Entry | ValveEntry | PlantEntry | ProductEntry:
+def load(name_or_path: str | Path) -> AnyEntry:
     """A library entry (muscle, law, valve, plant or product) by its name or a unique beginning of it, in any case, or a
     file by its path.
 
@@ -48,30 +29,18 @@ def load(name_or_path: str | Path) -> Entry | ValveEntry | PlantEntry | ProductE
     is issued as an AirmuscleWarning.
     """
     if is_path(name_or_path):
-        path = file = Path(name_or_path)
+        path = Path(name_or_path)
+        location = Location.of_file(path)
     else:
         name = complete_name(str(name_or_path), list_library(), "library entry")
-        folder = _folder_of(name)
+        folder = next(folder for folder in FOLDERS.values() if name in list_names(folder))
         path = folder / f"{name}.toml"
-        file = Path(path.name)
+        location = Location(path.name, "", folder)
     tables = read_toml(path)
-    entry: Entry | ValveEntry | PlantEntry | ProductEntry
-    if describes_valve(tables):
-        entry = build_valve_entry(tables, path.stem, file)
-    elif describes_plant(tables):
-        entry = build_plant_entry(tables, path.stem, file, path.parent)
-    elif describes_product(tables):
-        entry = build_product_entry(tables, path.stem, file)
-    else:
-        entry = build_entry(tables, path.stem, file, path.parent)
+    kind = kind_of(tables)
+    entry: AnyEntry = build_plant_entry(tables, location) if kind is PlantEntry else build_entry(tables, location, kind)
     issue_warning(entry.name, entry.warning, stacklevel=2)
     return entry
-
-
-def _folder_of(name: str) -> Path:
-    """The folder of the file of an entry."""
-    folders = ((VALVES, list_valves()), (PLANTS, list_plants()), (PRODUCTS, list_products()))
-    return next((folder for folder, names in folders if name in names), LAWS)
 
 
 def load_data(name: str) -> Recording:
@@ -89,7 +58,7 @@ def load_data(name: str) -> Recording:
 def _data_references(path: Path) -> tuple[Reference, ...]:
     """References of a data set, from the file on the sources of its folder."""
     file = path.parent / "references.toml"
-    for i, source in enumerate(read_toml(file)["source"], 1):
+    for source in read_toml(file)["source"]:
         if path.stem in source["data_sets"]:
-            return read_references(source, Location(file.name, f"source.{i}", file.parent))
+            return tuple(Reference(**reference) for reference in source["reference"])
     raise FileError(f"{file}: there is no source of the data set '{path.stem}'.")

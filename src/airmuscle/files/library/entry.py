@@ -1,18 +1,39 @@
-"""Entry: a library file of a muscle or a law, with sources, provenance and checks."""
+"""Entries of the library: muscles and laws, valves, products and plants, with sources, provenance and checks.
+
+The fields of an entry are the keys of its file, see build.py. A valve file, for example:
+
+    title = "..."                   what it is, and which of its paths
+    provenance = "data sheet"       origin of the numbers
+    [valve]                         flow law and its parameters; the path to the muscle if the paths differ
+    [exhaust]                       optional: the path to the surroundings, if its values differ
+    [switching_times]               optional: opening_delay and closing_delay, as published
+    [[check]]                       published flows that the law must reproduce
+    [[reference]]                   sources
+"""
 
 from __future__ import annotations
 
 import dataclasses
+import math
 import warnings
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
-from ...core.errors import AirmuscleWarning, UnknownNameError
+from ...core.annotation import check_field_types, one_line
+from ...core.declaration import model, parameter
+from ...core.errors import AirmuscleWarning, ParameterError, UnknownNameError, suggestion
 from ...core.reference import Reference
+from ...core.units import ABSOLUTE
 from ...physics.muscle import CreepElements, Damper, Muscle, Ratings, SeriesElement, Spring, Stop, Wall
 from ...physics.muscle.characteristic.base import Characteristic, ForceLaw
 from ...physics.muscle.characteristic.validity_range import ValidityRange
 from ...physics.muscle.friction.base import Friction
 from ...physics.muscle.geometry.base import Geometry
+from ...physics.plant.plant import Plant
+from ...physics.pneumatics.gas import REFERENCE_DENSITY, REFERENCE_TEMPERATURE
+from ...physics.pneumatics.valve import Orifice
 from .entry_display import EntryDisplay
+from .fields import under
 from .stated_band import StatedBand
 from .uncertainty import ParameterUncertainty
 
@@ -25,31 +46,82 @@ MISSING_GEOMETRY = (
     "table [geometry] in the file or in [plant.muscle]"
 )
 """Geometry that a law needs to be a muscle, and the ways to give and to measure it."""
+PATHS = ("valve", "exhaust")
+"""Flow paths through a valve that a file may describe; the first is the default."""
+CONDITIONS = {
+    "pressure": ("Pa", ("contraction", "force")), "contraction": ("1", ("pressure", "force")),
+    "force": ("N", ("pressure", "contraction")), "volume": ("m3", ("contraction",)),
+    "flow": ("m3/s", ("upstream", "downstream")),
+}  # fmt: skip
+"""Quantities of a check, each with its unit and the quantities on which it depends; a flow is that of a valve."""
+
+
+def _condition(unit: str, symbol: str, meaning: str) -> Any:
+    return parameter(unit, symbol, meaning, default=None)
 
 
 @dataclasses.dataclass(frozen=True)
 class Check:
-    """Published value that an entry must reproduce: `quantity` under `conditions` within a tolerance, all SI."""
+    """Published value that an entry must reproduce within a tolerance: a quantity at given values of others, all SI.
+
+    A volume flow is [m3/s at the reference atmosphere] between two absolute pressures [Pa].
+    """
 
     quantity: str
-    conditions: tuple[tuple[str, float], ...]
-    equals: float
-    tolerance: float
     source: str
+    equals: float = parameter("1", "x", "published value")
+    tolerance: float = parameter("1", "dx", "permitted deviation")
+    pressure: float | None = _condition("Pa", "p", "gauge pressure")
+    contraction: float | None = _condition("1", "eps", "contraction")
+    force: float | None = _condition("N", "F", "force")
+    upstream: float | None = _condition(ABSOLUTE, "p_1", "absolute pressure upstream of a valve")
+    downstream: float | None = _condition(ABSOLUTE, "p_2", "absolute pressure downstream of a valve")
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
+        _, required = _conditions_of(self.quantity)
+        if tuple(name for name, _ in self.conditions) != required:
+            raise ParameterError(
+                f"a check of the {self.quantity} requires {' and '.join(required)}, and no other quantity."
+            )
+        for name, value in (("equals", self.equals), ("tolerance", self.tolerance), *self.conditions):
+            if not math.isfinite(value) or (name == "tolerance" and value < 0.0):
+                must = "not be negative" if math.isfinite(value) else "be finite"
+                raise ParameterError(f"{name} is {value:g}; it must {must}.")
+
+    @property
+    def conditions(self) -> tuple[tuple[str, float], ...]:
+        """The quantities on which the checked one depends, with their values."""
+        names = ("pressure", "contraction", "force", "upstream", "downstream")
+        return tuple((name, getattr(self, name)) for name in names if getattr(self, name) is not None)
+
+    @staticmethod
+    def units_of_table(table: Mapping[str, Any]) -> dict[str, str]:
+        """The units of the numbers of a table that depend on its quantity."""
+        return dict.fromkeys(("equals", "tolerance"), _conditions_of(table.get("quantity"))[0])
+
+
+def _conditions_of(quantity: Any) -> tuple[str, tuple[str, ...]]:
+    """The unit of a checked quantity, and the quantities on which it depends. Raises ParameterError."""
+    if quantity not in tuple(CONDITIONS):
+        raise ParameterError(
+            f"quantity '{one_line(quantity)}' cannot be checked; there are {', '.join(CONDITIONS)}."
+            f"{suggestion(str(quantity), CONDITIONS)}"
+        )
+    return CONDITIONS[quantity]
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class Entry(EntryDisplay):
     """Library entry of a muscle or a law, all numbers SI; `muscle` is the Muscle for use in a plant.
 
-    `provenance` is the origin of the numbers (printed, measured, secondary source, fitted, chosen), `warning` a
-    restriction of use, which is issued when the entry is loaded, `validity_range` the range of the measurements or the
-    publication, `uncertainty` the standard errors and correlations of fitted parameters, if the file states them,
-    `error_band` the 95 % band of the predicted quantity, `ratings` the values that the maker of the muscle permits, if
-    known.
+    `provenance` is the origin of the numbers, words of PROVENANCES between commas, `warning` a restriction of use,
+    which is issued when the entry is loaded, `validity_range` the range of the measurements or the publication,
+    `uncertainty` the standard errors and correlations of fitted parameters, if the file states them, `error_band` the
+    95 % band of the predicted quantity, `ratings` the values that the maker of the muscle permits, if known.
     """
 
-    name: str
+    name: str = dataclasses.field(metadata=under(""))
     title: str
     provenance: str
     characteristic: Characteristic
@@ -65,8 +137,8 @@ class Entry(EntryDisplay):
     warning: str = ""
     validity_range: ValidityRange | None = None
     ratings: Ratings | None = None
-    checks: tuple[Check, ...] = ()
-    references: tuple[Reference, ...] = ()
+    checks: tuple[Check, ...] = dataclasses.field(default=(), metadata=under("check"))
+    references: tuple[Reference, ...] = dataclasses.field(default=(), metadata=under("reference"))
     uncertainty: ParameterUncertainty | None = None
     error_band: StatedBand | None = None
 
@@ -81,6 +153,95 @@ class Entry(EntryDisplay):
         return Muscle(
             self.characteristic, self.geometry, validity_range=self.validity_range, ratings=self.ratings, **parts
         )
+
+
+@model
+class SwitchingTimes:
+    """Published switching times of a valve; a data sheet may state upper limits, such as "10 ms or less"."""
+
+    from_file: ClassVar[bool] = False
+
+    opening_delay: float = parameter("s", "t_on", "time from the command to open until open", bounds=(0.0, 1.0))
+    closing_delay: float = parameter("s", "t_off", "time from the command to close until closed", bounds=(0.0, 1.0))
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class ValveEntry(EntryDisplay):
+    """Library entry of a valve, all numbers SI; `valve` and `exhaust` are the orifices for use in a circuit.
+
+    `provenance` is the origin of the numbers, `note` states what was published and how it was converted.
+    """
+
+    name: str = dataclasses.field(metadata=under(""))
+    title: str
+    provenance: str
+    valve: Orifice
+    exhaust: Orifice | None = None
+    switching_times: SwitchingTimes | None = None
+    note: str = ""
+    warning: str = ""
+    checks: tuple[Check, ...] = dataclasses.field(default=(), metadata=under("check"))
+    references: tuple[Reference, ...] = dataclasses.field(default=(), metadata=under("reference"))
+
+    def orifice(self, path: str) -> Orifice:
+        """Orifice of a flow path, "valve" or "exhaust". Raises UnknownNameError if the entry has no such path."""
+        orifice: Orifice | None = getattr(self, path, None) if path in PATHS else None
+        if orifice is None:
+            available = ", ".join(p for p in PATHS if getattr(self, p) is not None)
+            hint = suggestion(str(path), PATHS) if path not in PATHS else ""
+            raise UnknownNameError(f"{self.name} has no path '{path}'; it has {available}.{hint}")
+        return orifice
+
+    def flow(self, upstream: float, downstream: float) -> float:
+        """Volume flow [m3/s at the reference atmosphere] of the open valve at 293.15 K, absolute pressures [Pa]."""
+        return float(self.valve.mass_flow(upstream, downstream, 1.0, REFERENCE_TEMPERATURE) / REFERENCE_DENSITY)
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class ProductEntry(EntryDisplay):
+    """Library entry of a commercial muscle: the values that its maker permits [SI], with provenance and sources.
+
+    It has no characteristic; the file of a muscle or a law that was measured on this product refers to it, `product =
+    "festo-dmsp-20"`, or has a table [ratings] of its own.
+    """
+
+    name: str = dataclasses.field(metadata=under(""))
+    title: str
+    provenance: str
+    ratings: Ratings
+    note: str = ""
+    warning: str = ""
+    references: tuple[Reference, ...] = dataclasses.field(default=(), metadata=under("reference"))
+
+    def _table(self) -> list[tuple[str, ...]]:
+        return [("permitted", "range"), *((row.quantity, str(row)) for row in self.ratings.ranges())]
+
+
+@dataclasses.dataclass(frozen=True, repr=False)
+class PlantEntry(EntryDisplay):
+    """Plant of the library, all numbers SI; its file has the tables of a scenario, and the source of each number.
+
+    `sources` are pairs of a path in the file, such as mechanism.radius, and the source of the numbers under it:
+    "chosen" if no publication states them. `warning` is issued when the plant is loaded.
+    """
+
+    name: str = dataclasses.field(metadata=under(""))
+    title: str
+    provenance: str
+    plant: Plant
+    note: str = ""
+    warning: str = ""
+    sources: tuple[tuple[str, str], ...] = ()
+    references: tuple[Reference, ...] = dataclasses.field(default=(), metadata=under("reference"))
+
+    def _table(self) -> list[tuple[str, ...]]:
+        return [tuple(row) for row in self.plant._card().table]
+
+    def _chart(self) -> Any:
+        return self.plant._card().draw
+
+
+AnyEntry = Entry | ValveEntry | ProductEntry | PlantEntry
 
 
 def issue_warning(name: str, warning: str, stacklevel: int) -> None:

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ...core.annotation import check_field_types, one_line
+from ...core.errors import ParameterError, suggestion
 from ...core.plotting import LINES, new_figure, relabel_in_display_units
 from ...core.reference import cite
 from ...physics.muscle.display import PARAMETERS, parameter_rows, plot_isobars
@@ -15,12 +17,25 @@ from ...recording.notebook import Card, NotebookDisplay
 PARTS = ("characteristic", "geometry", "spring", "damper", "friction", "wall", "series", "stop", "creep", "valve",
          "exhaust", "switching_times")  # fmt: skip
 """Components of an entry whose parameters are shown."""
+PROVENANCES = (
+    "printed", "corrected", "converted", "measured", "data sheet", "secondary source", "fitted", "chosen", "example",
+)  # fmt: skip
+"""Words for the origin of the numbers of an entry."""
 FLOW_SUPPLY = 7e5
 """Absolute pressure [Pa] upstream of a valve in its chart (chosen)."""
 
 
 class EntryDisplay(NotebookDisplay, abc.ABC):
-    """Base of the library entries for their display."""
+    """Base of the library entries: the check of their fields, and their display."""
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
+        for word in map(str.strip, getattr(self, "provenance", "").split(",")):
+            if word not in PROVENANCES:
+                raise ParameterError(
+                    f"provenance is '{one_line(word)}'; allowed are {', '.join(PROVENANCES)}, several between commas."
+                    f"{suggestion(word, PROVENANCES)}"
+                )
 
     def _card(self) -> Card:
         entry: Any = self

@@ -1,108 +1,118 @@
-"""Entry files: from the TOML tables of a muscle or a law to an Entry."""
+"""Entries of the library by name, or from files of the same form: muscles and laws, valves, and products."""
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ...core.errors import ParameterError, suggestion
-from ...physics.muscle import CreepElements, Damper, SeriesElement, Spring, Stop, Wall
-from ...physics.muscle.characteristic.base import Characteristic
-from ...physics.muscle.characteristic.validity_range import ValidityRange
-from ...physics.muscle.friction.base import Friction
+from ...core.errors import ParameterError, UnknownNameError
+from ...core.reference import Reference
 from ...physics.muscle.geometry.base import Geometry
-from .build import TEXT_KEYS, build, read_entry_texts
-from .entry import Check, Entry
-from .location import Location, check_keys, check_type, read_finite_number, read_table_array, read_text
-from .product_entry import build_limits, read_ratings
-from .references import read_references
-from .stated_band import read_stated_band
-from .uncertainty import read_uncertainty
+from .build import build
+from .entry import Entry, PlantEntry, ProductEntry, ValveEntry, issue_warning
+from .files import FOLDERS, complete_name, entries_of_product, is_path, list_laws, list_names, read_toml
+from .location import Location, located_errors, read_text
 
-QUANTITIES = {"pressure": "Pa", "contraction": "1", "force": "N", "volume": "m3"}
-"""Quantities of a check, each with the unit of numbers without a unit."""
-PARTS = {
-    "characteristic": Characteristic, "geometry": Geometry, "spring": Spring, "damper": Damper, "friction": Friction,
-    "wall": Wall, "series": SeriesElement, "stop": Stop, "creep": CreepElements,
+NOUNS: Mapping[type[Any], str] = {
+    ValveEntry: "valve", PlantEntry: "plant", ProductEntry: "product", Entry: "muscle or law",
 }  # fmt: skip
-"""Tables of an entry file that describe a model, each with the class that is required."""
-KEYS = (*TEXT_KEYS, *PARTS, "product", "ratings", "validity_range", "uncertainty", "error_band", "check", "reference")
-"""Keys of an entry file."""
-_CONDITIONS = {
-    "pressure": ("contraction", "force"),
-    "contraction": ("pressure", "force"),
-    "force": ("pressure", "contraction"),
-    "volume": ("contraction",),
-}
-_CHECK_TEXTS = ("quantity", "source")
-_CHECK_KEYS = (*_CHECK_TEXTS, "equals", "tolerance", *QUANTITIES)
+"""Kinds of entries in words, which are those of their folders."""
 
 
-def build_entry(tables: Mapping[str, Any], name: str, file: Path, folder: Path) -> Entry:
-    """The entry of the tables of a file; error messages name `file`, data files are relative to `folder`.
+def load_law(name_or_path: str | Path) -> Entry:
+    """A muscle or a law by its name or a unique beginning of it, or its file by its path; as `load`, without valves."""
+    tables, location = _tables(name_or_path, Entry)
+    check_describes_law(tables, f"{location}: the file")
+    entry: Entry = build_entry(tables, location)
+    issue_warning(entry.name, entry.warning, stacklevel=2)
+    return entry
 
-    Raises UnknownNameError, FileError, ParameterError or UnitError with the location.
+
+def load_valve(name_or_path: str | Path) -> ValveEntry:
+    """A valve by its name or a unique beginning of it, or a valve file by its path.
+
+    Raises UnknownNameError, FileError, ParameterError or UnitError with the location. A warning of the entry is issued
+    as an AirmuscleWarning.
     """
-    location = Location(str(file), "", folder)
-    check_keys(tables, KEYS, location)
-    texts = read_entry_texts(tables, location)
-    if "characteristic" not in tables:
-        raise ParameterError(
-            f"{location}: the table [characteristic] is missing; it names a force law and its parameters."
-        )
-    parts = {
-        key: check_type(build(tables[key], location.inside(key), kind=kind), kind, location.inside(key))
-        for key, kind in PARTS.items()
-        if key in tables
-    }
-    if "geometry" not in parts:
-        geometry = getattr(parts["characteristic"], "geometry", None)
-        parts["geometry"] = geometry if isinstance(geometry, Geometry) else None
-    ratings, product_references = read_ratings(tables, location)
-    return Entry(
-        name=name,
-        **texts,
-        **parts,
-        ratings=ratings,
-        validity_range=build_limits(ValidityRange, tables["validity_range"], location.inside("validity_range"))
-        if "validity_range" in tables
-        else None,
-        checks=tuple(_read_check(*row) for row in read_table_array(tables, "check", location)),
-        references=(*read_references(tables, location), *product_references),
-        uncertainty=read_uncertainty(tables["uncertainty"], location.inside("uncertainty"))
-        if "uncertainty" in tables
-        else None,
-        error_band=read_stated_band(tables["error_band"], location.inside("error_band"))
-        if "error_band" in tables
-        else None,
-    )
+    tables, location = _tables(name_or_path, ValveEntry)
+    entry: ValveEntry = build_entry(tables, location, ValveEntry)
+    issue_warning(entry.name, entry.warning, stacklevel=2)
+    return entry
 
 
-def _read_check(table: Mapping[str, Any], location: Location) -> Check:
-    check_keys(table, _CHECK_KEYS, location)
-    quantity, source = (read_text(table, key, location, needed=True) for key in _CHECK_TEXTS)
-    if quantity not in QUANTITIES:
-        raise ParameterError(
-            f"{location}: quantity '{quantity}' cannot be checked; there are {', '.join(QUANTITIES)}."
-            f"{suggestion(quantity, QUANTITIES)}"
-        )
-    for key in ("equals", "tolerance"):
-        if key not in table:
+def load_product(name: str) -> ProductEntry:
+    """A commercial muscle by its name or a unique beginning of it. Raises UnknownNameError."""
+    entry: ProductEntry = build_entry(*tables_of_name(str(name), ProductEntry), ProductEntry)
+    return entry
+
+
+def _tables(name_or_path: str | Path, kind: type[Any]) -> tuple[dict[str, Any], Location]:
+    """The tables of an entry of this kind, by name or path, and their location."""
+    if is_path(name_or_path):
+        path = Path(name_or_path)
+        return read_toml(path), Location.of_file(path)
+    return tables_of_name(str(name_or_path), kind)
+
+
+def tables_of_name(name: str, kind: type[Any]) -> tuple[dict[str, Any], Location]:
+    """The tables of the entry of this kind with a name, or a unique beginning of it, and their location."""
+    noun = NOUNS[kind]
+    if kind is Entry:
+        _check_law_name(name)
+    path = FOLDERS[noun] / f"{complete_name(name, list_names(FOLDERS[noun]), noun)}.toml"
+    return read_toml(path), Location(path.name, "", path.parent)
+
+
+def _check_law_name(name: str) -> None:
+    """Raise UnknownNameError for the name of a valve, a plant or a product."""
+    noun = next((noun for noun, folder in FOLDERS.items() if name in list_names(folder)), NOUNS[Entry])
+    if noun == NOUNS[ProductEntry]:
+        laws = entries_of_product(name)
+        entries = f"its laws are {', '.join(laws)}" if laws else "no law of it is published; fit one to measurements"
+        raise UnknownNameError(f"'{name}' is a product, of which the library states the permitted values; {entries}.")
+    if noun != NOUNS[Entry]:
+        raise UnknownNameError(f"'{name}' is a {noun}; a muscle or a law is required: {', '.join(list_laws())}.")
+
+
+def kind_of(tables: Mapping[str, Any]) -> type[Any]:
+    """The kind of the entry that tables describe."""
+    if "characteristic" in tables:
+        return Entry
+    kinds = {"valve": ValveEntry, "plant": PlantEntry, "ratings": ProductEntry}
+    return next((kind for table, kind in kinds.items() if table in tables), Entry)
+
+
+def check_describes_law(tables: Mapping[str, Any], what: str) -> None:
+    """Raise ParameterError unless tables describe a muscle or a law; `what` begins the message."""
+    kind = kind_of(tables)
+    if kind is not Entry:
+        noun = "product without a law" if kind is ProductEntry else NOUNS[kind]
+        raise ParameterError(f"{what} describes a {noun}; a muscle or a law is required.")
+
+
+def build_entry(tables: Mapping[str, Any], location: Location, kind: type[Any] = Entry) -> Any:
+    """The muscle, law, valve or product of the tables of a file.
+
+    The ratings of an Entry are those of its `product` unless it states some. Raises UnknownNameError, FileError,
+    ParameterError or UnitError with the location.
+    """
+    given: dict[str, Any] = {"name": Path(location.file).stem}
+    cited: tuple[Reference, ...] = ()
+    if kind is Entry and "product" in tables:
+        if "ratings" in tables:
             raise ParameterError(
-                f"{location}: '{key}' is missing; give a number in {QUANTITIES[quantity]}, or a text with a unit."
+                f"{location}: both 'product' and [ratings] are given; the ratings of a product are in its own file. "
+                "Remove one of them."
             )
-    conditions = tuple((key, _read_value(table, key, key, location)) for key in QUANTITIES if key in table)
-    required = _CONDITIONS[quantity]
-    if tuple(key for key, _ in conditions) != required:
-        raise ParameterError(
-            f"{location}: a check of the {quantity} requires {' and '.join(required)}, and no other quantity."
-        )
-    equals, tolerance = (_read_value(table, key, quantity, location) for key in ("equals", "tolerance"))
-    if tolerance < 0:
-        raise ParameterError(f"{location}: tolerance is {table['tolerance']!r}; it must not be negative.")
-    return Check(quantity, conditions, equals, tolerance, source)
-
-
-def _read_value(table: Mapping[str, Any], key: str, quantity: str, location: Location) -> float:
-    return read_finite_number(table[key], QUANTITIES[quantity], f"{location}, {key}")
+        with located_errors(location):
+            product = load_product(read_text(tables, "product", location, needed=True))
+        given["ratings"], cited = product.ratings, product.references
+        tables = {key: value for key, value in tables.items() if key != "product"}
+    entry = build(tables, location, given, kind=kind)
+    if kind is not Entry:
+        return entry
+    inside = getattr(entry.characteristic, "geometry", None)
+    geometry = inside if entry.geometry is None and isinstance(inside, Geometry) else entry.geometry
+    return dataclasses.replace(entry, geometry=geometry, references=(*entry.references, *cited))

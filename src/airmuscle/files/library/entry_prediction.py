@@ -19,7 +19,7 @@ from ...physics.muscle.characteristic.base import ForceLaw
 from ...physics.muscle.muscle import LENGTH_TOLERANCE
 from ...recording import Recording
 from .entry import Entry
-from .length_scaling import scale_to_length
+from .scaling import scale_to_length
 
 UNKNOWN = "not known for a specimen that was not measured"
 """Words in place of a band that no specimens left out of the fit give."""

@@ -12,39 +12,42 @@ from ...core.errors import FileError, UnknownNameError, suggestion
 
 LAWS = Path(__file__).parent
 """Folder of the muscles and laws."""
-VALVES = LAWS / "valves"
-"""Folder of the valves."""
 PLANTS = LAWS / "plants"
 """Folder of the plants."""
-PRODUCTS = LAWS / "products"
-"""Folder of the ratings of commercial muscles."""
 DATA = LAWS / "data"
 """Folder of the data sets."""
+FOLDERS = {"valve": LAWS / "valves", "plant": PLANTS, "product": LAWS / "products", "muscle or law": LAWS}
+"""Folders of the entries, by what they are."""
+
+
+def list_names(folder: Path) -> tuple[str, ...]:
+    """Names of the entries in a folder of the library, sorted."""
+    return tuple(sorted(path.stem for path in folder.glob("*.toml")))
 
 
 def list_library() -> tuple[str, ...]:
     """Names of all entries that `load` reads: muscles, laws, valves, plants and products, sorted."""
-    return tuple(sorted((*list_laws(), *list_valves(), *list_plants(), *list_products())))
+    return tuple(sorted(name for folder in FOLDERS.values() for name in list_names(folder)))
 
 
 def list_laws() -> tuple[str, ...]:
     """Names of all muscles and laws, sorted."""
-    return tuple(sorted(path.stem for path in LAWS.glob("*.toml")))
+    return list_names(LAWS)
 
 
 def list_valves() -> tuple[str, ...]:
     """Names of all valves, sorted."""
-    return tuple(sorted(path.stem for path in VALVES.glob("*.toml")))
+    return list_names(FOLDERS["valve"])
 
 
 def list_plants() -> tuple[str, ...]:
     """Names of all plants, sorted."""
-    return tuple(sorted(path.stem for path in PLANTS.glob("*.toml")))
+    return list_names(PLANTS)
 
 
 def list_products() -> tuple[str, ...]:
     """Names of all commercial muscles of which the ratings are known, sorted."""
-    return tuple(sorted(path.stem for path in PRODUCTS.glob("*.toml")))
+    return list_names(FOLDERS["product"])
 
 
 def entries_of_product(name: str) -> tuple[str, ...]:

@@ -11,10 +11,10 @@ from ...core.errors import HintedText, ParameterError, UnknownNameError, suggest
 from ...physics.muscle.characteristic.base import Characteristic
 from ...recording import Recording
 from .entry import Entry
+from .entry_file import load_law
 from .files import is_path
-from .law_file import load_law
-from .length_scaling import scale_to_length
 from .models import model_class, model_names
+from .scaling import scale_to_length
 
 
 class InitialLaw(NamedTuple):

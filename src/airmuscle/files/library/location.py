@@ -10,27 +10,41 @@ from pathlib import Path
 from typing import Any
 
 from ...core import units
+from ...core.annotation import abridged
 from ...core.errors import AirmuscleError, ParameterError, suggestion
 
 
 @dataclasses.dataclass(frozen=True)
 class Location:
-    """Location of a table in a file, for error messages; data files are relative to `folder`."""
+    """Location of a table in a file, or of the value of a `key` in it, for error messages.
+
+    Data files are relative to `folder`.
+    """
 
     file: str
     table: str
     folder: Path
+    key: str = ""
+
+    @classmethod
+    def of_file(cls, path: Path) -> Location:
+        """Location of the tables of a file."""
+        return cls(str(path), "", path.parent)
 
     def inside(self, key: str) -> Location:
         """Location of a table or list item inside this table."""
-        return dataclasses.replace(self, table=f"{self.table}.{key}" if self.table else key)
+        return dataclasses.replace(self, table=".".join(filter(None, (self.table, self.key, key))), key="")
+
+    def at(self, key: str) -> Location:
+        """Location of the value of a key of this table."""
+        return dataclasses.replace(self, key=f"{self.key}, {key}" if self.key else key)
 
     def __str__(self) -> str:
-        return f"{self.file}, [{self.table}]" if self.table else self.file
+        return ", ".join(filter(None, (self.file, self.table and f"[{self.table}]", self.key)))
 
 
 @contextlib.contextmanager
-def located_errors(location: Location | str) -> Iterator[None]:
+def located_errors(location: object) -> Iterator[None]:
     """Context that prefixes the message of every AirmuscleError with a location."""
     try:
         yield
@@ -47,22 +61,22 @@ def check_keys(table: Mapping[str, Any], known: Sequence[str], location: Locatio
             )
 
 
-def read_number(value: Any, unit: str, where: str, about: str = "") -> float:
+def read_number(value: Any, unit: str, where: object, about: str = "") -> float:
     """Number in SI units, from a number in `unit` or a text with a unit; `about` is appended to the error message.
 
     Raises ParameterError or UnitError.
     """
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         expected = "a number" if unit == "1" else f"a number in {unit}"
-        raise ParameterError(f"{where} is {value!r}; it must be {expected}, or a text with a unit{about}.")
-    return units.quantity(value, unit, where=where)
+        raise ParameterError(f"{where} is {abridged(value)}; it must be {expected}, or a text with a unit{about}.")
+    return units.quantity(value, unit, where=str(where))
 
 
-def read_finite_number(value: Any, unit: str, where: str) -> float:
+def read_finite_number(value: Any, unit: str, where: object) -> float:
     """Finite number in SI units, as `read_number`. Raises ParameterError for inf and nan, which TOML allows."""
     number = read_number(value, unit, where)
     if not math.isfinite(number):
-        raise ParameterError(f"{where} is {value}; it must be finite.")
+        raise ParameterError(f"{where} is {abridged(value)}; it must be finite.")
     return number
 
 
@@ -70,7 +84,7 @@ def read_text(table: Mapping[str, Any], key: str, location: Location, *, needed:
     """Text under a key; empty if the key is missing and not needed. Raises ParameterError."""
     value = table.get(key, "")
     if not isinstance(value, str):
-        raise ParameterError(f"{location}: {key} is {value!r}; it must be a text in quotes.")
+        raise ParameterError(f"{location}: {key} is {abridged(value)}; it must be a text in quotes.")
     if needed and not value.strip():
         raise ParameterError(f"{location}: '{key}' is missing; it must be a text in quotes.")
     return value

@@ -35,13 +35,13 @@ def _is_file_model(cls: type[Any]) -> bool:
 
 def model_names(kind: Any = Any) -> tuple[str, ...]:
     """Names of all classes that a file may name, sorted; with an annotation `kind`, of those that it allows."""
-    return tuple(sorted(name for name, cls in _registry().items() if _allows(kind, cls)))
+    return tuple(sorted(name for name, cls in _registry().items() if allows(kind, cls)))
 
 
-def _allows(kind: Any, cls: type[Any]) -> bool:
+def allows(kind: Any, cls: type[Any]) -> bool:
     """Whether the outermost type of an annotation allows the instances of a class."""
     if typing.get_origin(kind) in (typing.Union, types.UnionType):
-        return any(_allows(option, cls) for option in typing.get_args(kind))
+        return any(allows(option, cls) for option in typing.get_args(kind))
     base = typing.get_origin(kind) or kind
     return kind is Any or (inspect.isclass(base) and issubclass(cls, base))
 

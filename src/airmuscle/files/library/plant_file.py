@@ -9,6 +9,9 @@ A plant of the library is a file of the same form as a scenario, with its proven
     [run]                           duration and initial state of the example run
     [sources]                       source of each number of the tables, by its path or the beginning of its path
     [[reference]]                   references
+
+Parts of a plant may be named: a muscle and a plant of the library or of a file, and an orifice or a driver with the
+values of a valve, `{ library = "matrix-821" }`; of a muscle and of a plant the other keys replace parts.
 """
 
 from __future__ import annotations
@@ -19,67 +22,40 @@ from pathlib import Path
 from types import NoneType
 from typing import Any
 
+from ...core.annotation import abridged
 from ...core.errors import ParameterError
-from ...core.reference import Reference
+from ...engine.loop.driver import Driver, SolenoidDriver
 from ...physics.muscle import Muscle
 from ...physics.muscle.characteristic.base import ForceLaw
 from ...physics.plant.plant import Plant
-from .build import TEXT_KEYS, build, read_entry_texts
-from .entry import MISSING_GEOMETRY, Entry, issue_warning
-from .entry_display import EntryDisplay
-from .files import PLANTS, complete_name, list_plants, read_toml
-from .law_file import load_law
-from .location import Location, check_keys, check_type, located_errors, read_finite_number, read_text
-from .references import read_references
+from ...physics.pneumatics.valve import Orifice
+from .build import TableReader, build
+from .entry import MISSING_GEOMETRY, PATHS, Entry, PlantEntry, ValveEntry, issue_warning
+from .entry_file import load_law, load_valve, tables_of_name
+from .location import Location, check_keys, located_errors, read_finite_number, read_text
 from .scaling import scale_entry
 
 SCENARIO_TABLES = ("plant", "input", "run", "output")
 """Tables of a plant of the library that a scenario has, too."""
-KEYS = (*TEXT_KEYS, *SCENARIO_TABLES, "sources", "reference")
-"""Keys of the file of a plant."""
-
-
 SIZES = ("resting_length", "diameter")
 """Sizes to which a table that names a library entry may scale its muscle."""
 
 
-@dataclasses.dataclass(frozen=True, repr=False)
-class PlantEntry(EntryDisplay):
-    """Plant of the library, all numbers SI.
-
-    `sources` are pairs of a path in the file, such as mechanism.radius, and the source of the numbers under it:
-    "chosen" if no publication states them. `warning` is issued when the plant is loaded.
-    """
-
-    name: str
-    title: str
-    provenance: str
-    plant: Plant
-    note: str = ""
-    warning: str = ""
-    sources: tuple[tuple[str, str], ...] = ()
-    references: tuple[Reference, ...] = ()
-
-    def _table(self) -> list[tuple[str, ...]]:
-        return [tuple(row) for row in self.plant._card().table]
-
-    def _chart(self) -> Any:
-        return self.plant._card().draw
-
-
-def build_plant_entry(tables: Mapping[str, Any], name: str, file: Path, folder: Path) -> PlantEntry:
-    """The entry of the tables of a file; error messages name `file`, data files are relative to `folder`.
-
-    Raises FileError, ParameterError, UnitError or UnknownNameError with the location.
-    """
-    location = Location(str(file), "", folder)
-    check_keys(tables, KEYS, location)
+def build_plant_entry(tables: Mapping[str, Any], location: Location) -> PlantEntry:
+    """The entry of the tables of a file. Raises FileError, ParameterError, UnitError or UnknownNameError."""
+    keys = ("title", "provenance", "note", "warning", *SCENARIO_TABLES, "sources", "reference")
+    check_keys(tables, keys, location)
     sources, in_sources = tables.get("sources", {}), location.inside("sources")
     if not isinstance(sources, Mapping):
-        raise ParameterError(f"{in_sources} is {sources!r}; it must be a table of paths and sources.")
-    pairs = tuple((path, read_text(sources, path, in_sources, needed=True)) for path in sources)
-    texts, plant = read_entry_texts(tables, location), build_plant(tables["plant"], location.inside("plant"))
-    return PlantEntry(name, plant=plant, sources=pairs, references=read_references(tables, location), **texts)
+        raise ParameterError(f"{in_sources} is {abridged(sources)}; it must be a table of paths and sources.")
+    given = {
+        "name": Path(location.file).stem,
+        "plant": build_plant(tables["plant"], location.inside("plant")),
+        "sources": tuple((path, read_text(sources, path, in_sources, needed=True)) for path in sources),
+    }
+    own = {key: value for key, value in tables.items() if key not in (*SCENARIO_TABLES, "sources")}
+    entry: PlantEntry = build(own, location, given, kind=PlantEntry)
+    return entry
 
 
 def plant_tables(name: str) -> tuple[dict[str, Any], Location]:
@@ -87,66 +63,104 @@ def plant_tables(name: str) -> tuple[dict[str, Any], Location]:
 
     Its warning is issued as an AirmuscleWarning. Raises UnknownNameError.
     """
-    path = PLANTS / f"{complete_name(name, list_plants(), 'plant')}.toml"
-    tables = read_toml(path)
-    issue_warning(path.stem, tables.get("warning", ""), stacklevel=2)
-    return tables, Location(path.name, "", path.parent)
+    tables, location = tables_of_name(name, PlantEntry)
+    issue_warning(Path(location.file).stem, tables.get("warning", ""), stacklevel=2)
+    return tables, location
 
 
-def _with_library_plant(table: Mapping[str, Any], location: Location) -> dict[str, Any]:
-    """The table of a plant of the library, with the parts that `table` replaces."""
-    inner = location.inside("library")
-    if not isinstance(table["library"], str):
-        raise ParameterError(f"{inner} is {table['library']!r}; name a plant of the library.")
-    with located_errors(inner):
-        tables, _ = plant_tables(table["library"])
-    return {**tables["plant"], **{key: value for key, value in table.items() if key != "library"}}
-
-
-def build_plant(table: Mapping[str, Any], location: Location) -> Plant:
+def build_plant(table: Any, location: Location) -> Plant:
     """The plant of a table [plant]. Raises FileError, ParameterError, UnitError or UnknownNameError."""
-    if "library" in table:
-        table = _with_library_plant(table, location)
-    value = table.get("muscle")
-    if value is None:
-        raise ParameterError(
-            f"{location}: 'muscle' is missing; name a library entry or a muscle file, or write [plant.muscle]."
-        )
-    muscle: Muscle | tuple[Muscle, ...]
-    if isinstance(value, list):
-        muscle = tuple(build_muscle(item, location.inside(f"muscle[{i}]")) for i, item in enumerate(value))
-    else:
-        muscle = build_muscle(value, location.inside("muscle"))
-    others = {"model": "Plant", **{key: item for key, item in table.items() if key != "muscle"}}
-    plant: Plant = check_type(build(others, location, {"muscle": muscle}), Plant, location)
+    plant: Plant = PLANT_READER.build(table, location, kind=Plant)
     return plant
 
 
 def build_muscle(value: Any, location: Location) -> Muscle:
     """The muscle of a library name, a file or a table. Raises FileError, ParameterError, UnitError or
     UnknownNameError."""
-    if isinstance(value, Mapping):
-        table = {"model": "Muscle", **value}
-        name = table.pop("library", None)
-        parts = {} if name is None else _entry_parts(_load_scaled(name, table, location), table, location)
-        muscle: Muscle = build(table, location, parts)
-        return muscle
-    entry = _load_entry(value, location)
-    with located_errors(location):
-        return entry.muscle
+    muscle: Muscle = PLANT_READER.build(value, location, kind=Muscle)
+    return muscle
 
 
-def _load_scaled(name: Any, table: dict[str, Any], location: Location) -> Entry:
-    """The entry of this name, scaled to the sizes of the table, which are removed from it."""
-    entry = _load_entry(name, location.inside("library"))
-    sizes = {key: read_finite_number(table.pop(key), "m", f"{location}, {key}") for key in SIZES if key in table}
+def _named_plant(table: Any, location: Location, reader: TableReader) -> Plant | None:
+    """A plant of the library, with the parts that a table replaces."""
+    if not isinstance(table, Mapping):
+        return None
+    if not {"library", "muscle"} & set(table):
+        raise ParameterError(
+            f"{location}: 'muscle' is missing; name a library entry or a muscle file, or write [plant.muscle]."
+        )
+    if "library" not in table:
+        return None
+    if not isinstance(table["library"], str):
+        raise ParameterError(
+            f"{location.inside('library')} is {abridged(table['library'])}; name a plant of the library."
+        )
+    with located_errors(location.inside("library")):
+        tables, _ = plant_tables(table["library"])
+    replaced = {key: value for key, value in table.items() if key != "library"}
+    plant: Plant = reader.build({**tables["plant"], **replaced}, location, kind=Plant)
+    return plant
+
+
+def _named_muscle(value: Any, location: Location, reader: TableReader) -> Muscle | None:
+    """A library entry or a muscle file, with the parts that a table replaces."""
+    if isinstance(value, str):
+        entry = _load_entry(value, location)
+        with located_errors(location):
+            return entry.muscle
+    if isinstance(value, Mapping) and "library" not in value:
+        return None
+    if not isinstance(value, Mapping):
+        raise ParameterError(f"{location} is {abridged(value)}; name a library entry or a muscle file.")
+    table = {key: item for key, item in value.items() if key not in ("library", *SIZES)}
+    entry = _load_entry(value["library"], location.inside("library"))
+    sizes = {key: read_finite_number(value[key], "m", location.at(key)) for key in SIZES if key in value}
     with located_errors(location):
-        return scale_entry(entry, **sizes)
+        entry = scale_entry(entry, **sizes)
+    muscle: Muscle = reader.build(table, location, _entry_parts(entry, table, location), kind=Muscle)
+    return muscle
+
+
+def _named_orifice(table: Any, location: Location, reader: TableReader) -> Orifice | None:
+    """An orifice of a valve of the library or of a valve file."""
+    if not isinstance(table, Mapping) or "library" not in table:
+        return None
+    check_keys(table, ("library", "path"), location)
+    path = read_text({"path": PATHS[0], **table}, "path", location, needed=True)
+    valve = _load_valve(table, location)
+    with located_errors(location):
+        return valve.orifice(path)
+
+
+def _named_driver(table: Any, location: Location, reader: TableReader) -> SolenoidDriver | None:
+    """A driver with the switching times of a valve of the library or of a valve file."""
+    if not isinstance(table, Mapping) or "library" not in table:
+        return None
+    check_keys(table, ("library",), location)
+    valve = _load_valve(table, location)
+    if valve.switching_times is None:
+        raise ParameterError(
+            f'{location}: {valve.name}: no switching times are published; write model = "SolenoidDriver" and its '
+            "opening_delay."
+        )
+    return SolenoidDriver(valve.switching_times.opening_delay, valve.switching_times.closing_delay)
+
+
+PLANT_READER = TableReader(
+    named={Plant: _named_plant, Muscle: _named_muscle, Orifice: _named_orifice, Driver: _named_driver}
+)
+"""Reader of plants and their parts, which may be named."""
+
+
+def _load_valve(table: Mapping[str, Any], location: Location) -> ValveEntry:
+    name = read_text(table, "library", location, needed=True)
+    with located_errors(location):
+        return load_valve(location.folder / name if name.endswith(".toml") else name)
 
 
 def _load_entry(value: Any, location: Location) -> Entry:
     if not isinstance(value, str):
-        raise ParameterError(f"{location} is {value!r}; name a library entry or a muscle file.")
+        raise ParameterError(f"{location} is {abridged(value)}; name a library entry or a muscle file.")
     with located_errors(location):
         return load_law(location.folder / value if value.endswith(".toml") else value)
 

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Collection, Mapping
-from typing import Any
+from collections.abc import Collection
 
 import numpy as np
 
+from ...core.annotation import check_field_types
 from ...core.arrays import Array
 from ...core.errors import ParameterError
-from .location import Location, check_keys
-
-KEYS = ("parameters", "standard_errors", "correlations")
-"""Keys of the table [uncertainty]."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -28,6 +24,7 @@ class ParameterUncertainty:
     correlations: tuple[tuple[float, ...], ...]
 
     def __post_init__(self) -> None:
+        check_field_types(self)
         count = len(self.parameters)
         rows = [len(row) for row in self.correlations]
         if len(self.standard_errors) != count or rows != [count] * count:
@@ -59,34 +56,6 @@ class ParameterUncertainty:
         variances, directions = np.linalg.eigh(np.array(self.correlations).reshape(count, count))
         root = directions * np.sqrt(np.maximum(variances, 0.0))
         return np.asarray(normal @ root.T * np.array(self.standard_errors))
-
-
-def read_uncertainty(table: Any, location: Location) -> ParameterUncertainty:
-    """The uncertainty of a table [uncertainty]. Raises ParameterError with the location."""
-    if not isinstance(table, Mapping):
-        raise ParameterError(f"{location} is {table!r}; it must be a table with {', '.join(KEYS)}.")
-    check_keys(table, KEYS, location)
-    missing = [key for key in KEYS if key not in table]
-    if missing:
-        raise ParameterError(f"{location}: '{missing[0]}' is missing; give {', '.join(KEYS)}.")
-    try:
-        names = tuple(str(name) for name in table["parameters"])
-        errors = tuple(float(value) for value in table["standard_errors"])
-        matrix = tuple(tuple(float(value) for value in row) for row in table["correlations"])
-    except (TypeError, ValueError):
-        raise ParameterError(
-            f"{location}: parameters must be a list of paths, standard_errors a list of numbers, and correlations a "
-            "list of rows of numbers."
-        ) from None
-    try:
-        return ParameterUncertainty(names, errors, matrix)
-    except ParameterError as error:
-        raise error.located(location) from None
-
-
-def uncertainty_table(uncertainty: ParameterUncertainty) -> dict[str, Any]:
-    """The table [uncertainty] of a muscle file."""
-    return {key: getattr(uncertainty, key) for key in KEYS}
 
 
 def without_parts(uncertainty: ParameterUncertainty, parts: Collection[str]) -> ParameterUncertainty | None:

@@ -3,43 +3,48 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from ...bench.identify import Fit
+from ...bench.identify.static_fit_chapter import fit_chapter
+from ...core.annotation import abridged, one_line
 from ...core.atomic_output import atomic_file
-from ...core.errors import FileError
-from .build import TEXT_KEYS
+from ...core.errors import FileError, ParameterError
+from ...core.reference import Reference
+from ...physics.muscle import Muscle, Ratings
+from ...physics.muscle.characteristic.base import Characteristic
+from ...physics.muscle.characteristic.validity_range import ValidityRange
+from ...physics.plant.plant import Plant
+from ...recording import Recording
+from ...report.chapter import Chapter
+from ...report.write import write_into
 from .entry import OPTIONAL_PARTS, Check, Entry
-from .saved_entry import Savable, entry_of
-from .uncertainty import uncertainty_table
+from .fitted_entry import fitted_entry
+from .stated_band import StatedBand
+from .uncertainty import ParameterUncertainty
+
+Savable = Entry | Fit | Muscle | Characteristic
+"""What a muscle file may contain."""
+WITHOUT_MODEL = Check | Reference | Ratings | ValidityRange | ParameterUncertainty | StatedBand
+"""Objects of a file that are written without their class and without the values that are not stated."""
 
 
 def to_toml(entry: Entry) -> str:
     """Text of the library file of an entry; numbers in SI units with all digits."""
-    tables: dict[str, Any] = {key: getattr(entry, key) for key in TEXT_KEYS if getattr(entry, key)}
-    for part in ("characteristic", "geometry", *OPTIONAL_PARTS):
-        thing = getattr(entry, part)
-        belongs_to_law = part == "geometry" and thing == getattr(entry.characteristic, "geometry", None)
-        if thing is not None and not belongs_to_law:
-            tables[part] = model_table(thing)
-    if entry.ratings is not None:
-        tables["ratings"] = {name: getattr(entry.ratings, name) for name in entry.ratings.stated}
-    if entry.validity_range is not None:
-        tables["validity_range"] = dataclasses.asdict(entry.validity_range)
-    if entry.uncertainty is not None:
-        tables["uncertainty"] = uncertainty_table(entry.uncertainty)
-    if entry.error_band is not None:
-        stated = dataclasses.asdict(entry.error_band)
-        tables["error_band"] = {key: value for key, value in stated.items() if value not in (None, (), "")}
-    if entry.checks:
-        tables["check"] = [_check_table(check) for check in entry.checks]
-    if entry.references:
-        tables["reference"] = [
-            {key: value for key, value in dataclasses.asdict(reference).items() if value not in (None, "")}
-            for reference in entry.references
-        ]
-    return _to_text(tables)
+    geometry = None if entry.geometry == getattr(entry.characteristic, "geometry", None) else entry.geometry
+    return _to_text(stated_table(dataclasses.replace(entry, geometry=geometry)))
+
+
+def stated_table(thing: Any) -> dict[str, Any]:
+    """The table of an object: the keys of its fields, without those that have their default."""
+    table: dict[str, Any] = {}
+    for field in dataclasses.fields(thing):
+        key, value = field.metadata.get("key", field.name), getattr(thing, field.name)
+        if key and not (value == field.default and isinstance(value, type(field.default))):
+            table[key] = value
+    return table
 
 
 def part_toml(name: str, thing: Any) -> str:
@@ -75,8 +80,17 @@ def save(entry: Savable, path: str | Path) -> Path:
     """
     entry = entry_of(entry)
     if not isinstance(path, str | Path):
-        raise FileError(f"save: {path!r} is not a path; give a text or a Path.")
+        raise FileError(f"save: {abridged(path)} is not a path; give a text or a Path.")
     return write_text(Path(path), to_toml(entry))
+
+
+def write_fit(
+    folder: Path, result: Fit, entry: Entry, recordings: Sequence[Recording], chapters: Sequence[Chapter] = ()
+) -> None:
+    """Write muscle.toml and the report into a folder made by `atomic_folder`; `chapters` precede that of the fit."""
+    save(entry, folder / "muscle.toml")
+    notes = tuple(dict.fromkeys(note for recording in recordings for note in recording.notes))
+    write_into(folder, [*chapters, fit_chapter(result, entry, notes)], title="Fit")
 
 
 def write_text(path: Path, text: str) -> Path:
@@ -104,15 +118,10 @@ def model_table(thing: Any) -> dict[str, Any]:
     }
 
 
-def _check_table(check: Check) -> dict[str, Any]:
-    return {"quantity": check.quantity, **dict(check.conditions), "equals": check.equals,
-            "tolerance": check.tolerance, "source": check.source}  # fmt: skip
-
-
 def _plain(value: Any) -> Any:
     """Models as tables, tuples as lists, NumPy numbers as floats; in a table, values stand before inner tables."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return _plain(model_table(value))
+        return _plain(stated_table(value) if isinstance(value, WITHOUT_MODEL) else model_table(value))
     if isinstance(value, Mapping):
         plain = {key: _plain(item) for key, item in value.items()}
         return dict(sorted(plain.items(), key=lambda item: _is_table(item[1])))
@@ -124,3 +133,36 @@ def _plain(value: Any) -> Any:
 def _is_table(value: Any) -> bool:
     """Whether TOML writes a value as a table or an array of tables."""
     return isinstance(value, dict) or (isinstance(value, list) and any(isinstance(item, dict) for item in value))
+
+
+def entry_of(thing: Savable) -> Entry:
+    """The entry of a muscle, a law or a fit; an entry itself. Raises ParameterError for anything else."""
+    if isinstance(thing, Entry):
+        return thing
+    if isinstance(thing, Fit):
+        return fitted_entry(thing, _of_law(thing.model), [Path(thing.recording.origin)])
+    if isinstance(thing, Muscle):
+        return _of_muscle(thing)
+    if isinstance(thing, Characteristic):
+        return _of_law(thing)
+    remedy = ""
+    if isinstance(thing, Plant):
+        remedy = " A plant is written with its run: airmuscle.files.save_scenario(scenario, path)."
+    raise ParameterError(
+        f"save: {one_line(thing)} is not a muscle, a characteristic, a fit or an entry of the library.{remedy}"
+    )
+
+
+def _of_law(law: Characteristic) -> Entry:
+    name = type(law).__name__
+    return Entry(name, name, "chosen", law, validity_range=getattr(law, "validity_range", None))
+
+
+def _of_muscle(muscle: Muscle) -> Entry:
+    """The entry with the elements that differ from those of a muscle without any."""
+    absent = {field.name: field.default for field in dataclasses.fields(Muscle)}
+    parts = {name: getattr(muscle, name) for name in OPTIONAL_PARTS if getattr(muscle, name) != absent[name]}
+    return Entry(
+        muscle.name, f"{muscle.name}: {type(muscle.contractile).__name__}", "chosen", muscle.contractile,
+        muscle.geometry, validity_range=muscle.validity_range, ratings=muscle.ratings, **parts,
+    )  # fmt: skip

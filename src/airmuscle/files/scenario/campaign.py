@@ -22,9 +22,8 @@ from ...physics.muscle import Muscle
 from ...physics.plant.plant import Plant
 from ...physics.pneumatics import ProportionalRegulator, SecondOrderLag, Supply, Valve
 from ...recording import Recording
-from ..library.uncertainty import KEYS
 from ..library.write import scenario_toml
-from .plant_uncertainty import SEPARATOR, fit_uncertainty
+from .plant_uncertainty import COVARIANCE_KEYS, SEPARATOR, fit_uncertainty
 
 POINTS = 120
 """Number of points of the pressure and of the motion of a slow record (chosen)."""
@@ -115,7 +114,7 @@ def _known_in(table: dict[str, Any], plant: Plant) -> dict[str, Any]:
     """The table without the covariance if the plant lacks one of its parameters."""
     paths = {leaf.path for leaf in tree.leaves(plant)}
     named = {path for name in table.get("parameters", ()) for path in name.split(SEPARATOR)}
-    return table if named <= paths else {key: value for key, value in table.items() if key not in KEYS}
+    return table if named <= paths else {key: value for key, value in table.items() if key not in COVARIANCE_KEYS}
 
 
 def _fitted_record(

@@ -18,24 +18,45 @@ Laws inside a law, such as those of a Cascade, are read by law_table.py.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from ...core.annotation import abridged
 from ...core.errors import ParameterError
 from ...core.system import Input
 from ...engine.loop.control_loop import ControlLoop
 from ...engine.loop.controller import Controller, named_signal_units, parameter_units
-from ...engine.loop.inputs import InputSignal
+from ...engine.loop.inputs import InputSignal, check_input_names
 from ...engine.state import column_units
 from ...physics.plant.plant import Plant
-from ..library.location import Location, located_errors, read_finite_number
-from .inputs import build_drivers, build_input_signal
+from ..library.build import build
+from ..library.fields import custom_field
+from ..library.location import Location, located_errors
+from .inputs import build_input_signal, read_drivers
 from .law_table import build_law
+from .values import Number
 
-LOOP_KEYS = ("sample_time", "setpoint")
-"""Keys of the table that are not parameters of the controller."""
+
+def _read_setpoint(value: Any, plant: Any, where: Location) -> Mapping[str, Any]:
+    """The table of the set points, which `build_control_loop` reads."""
+    if not isinstance(value, Mapping):
+        example = 'pressure = [["0 s", "1 bar"]]'
+        raise ParameterError(f"{where} is {abridged(value)}; it must be a table of set points, such as {example}.")
+    return value
+
+
+@dataclasses.dataclass(frozen=True)
+class LoopTable:
+    """Keys of the table of a controller that are not its parameters."""
+
+    sample_time: float = custom_field(Number("s", positive=True), 'sample time, such as sample_time = "10 ms"')
+    setpoint: Mapping[str, Any] = custom_field(_read_setpoint, "set point, the table [input.controller.setpoint]")
+
+
+LOOP_KEYS = tuple(field.name for field in dataclasses.fields(LoopTable))
 
 
 def signal_units(plant: Plant, start: Mapping[str, float]) -> dict[str, str]:
@@ -55,33 +76,32 @@ def build_control_loop(
     inner, controller_table = location.inside("controller"), table["controller"]
     if not isinstance(controller_table, Mapping):
         raise ParameterError(
-            f'{inner} is {controller_table!r}; it must be a table. Write model = "PID", its parameters, '
+            f'{inner} is {abridged(controller_table)}; it must be a table. Write model = "PID", its parameters, '
             "sample_time and setpoint in it."
         )
-    parameter_table = {key: value for key, value in controller_table.items() if key not in LOOP_KEYS}
-    controller = build_law(parameter_table, plant, units, inner)
-    for key, example in (("sample_time", 'sample_time = "10 ms"'), ("setpoint", f"[{inner.table}.setpoint]")):
-        if key not in controller_table:
-            raise ParameterError(f"{inner}: '{key}' is missing; write {example}.")
+    own = {key: value for key, value in controller_table.items() if key not in LOOP_KEYS}
+    controller = build_law(own, plant, units, inner)
+    stated = {key: value for key, value in controller_table.items() if key in LOOP_KEYS}
+    keys: LoopTable = build(stated, inner, kind=LoopTable)
+    setpoint = _build_setpoint(keys.setpoint, controller, units, inner.inside("setpoint"))
     other_inputs = {key: value for key, value in table.items() if key not in ("controller", "drivers")}
-    sample_time = read_finite_number(controller_table["sample_time"], "s", f"{inner}, sample_time")
-    setpoint = _build_setpoint(controller_table["setpoint"], controller, units, inner.inside("setpoint"))
     other_signal = build_input_signal(other_inputs, plant.input_variables, location)
-    drivers = build_drivers(table.get("drivers", {}), plant.inputs, location.inside("drivers"))
+    drivers = read_drivers(table.get("drivers", {}), plant, location.at("drivers"))
+    with located_errors(location.inside("drivers")):
+        check_input_names(list(drivers), plant.inputs)
     with located_errors(inner):
-        loop = ControlLoop(controller, sample_time, setpoint, other_signal, drivers)
+        loop = ControlLoop(controller, keys.sample_time, setpoint, other_signal, drivers)
         loop.check_columns([name for name in units if name not in plant.inputs], plant.inputs)
     return loop
 
 
-def _build_setpoint(table: Any, controller: Controller, units: Mapping[str, str], location: Location) -> InputSignal:
-    names: Sequence[str] = controller.setpoints
-    if not isinstance(table, Mapping):
-        raise ParameterError(f'{location} is {table!r}; it must be a table. Write {names[0]} = [["0 s", ...]] in it.')
+def _build_setpoint(
+    table: Mapping[str, Any], controller: Controller, units: Mapping[str, str], location: Location
+) -> InputSignal:
     if "drivers" in table:
         raise ParameterError(f"{location}: a set point has no drivers; write [input.drivers] for those of the inputs.")
     known = {**named_signal_units(controller), **{name: unit for name, unit in units.items() if unit}}
-    setpoints = [Input(name, known.get(name) or "1", -math.inf, math.inf) for name in names]
+    setpoints = [Input(name, known.get(name) or "1", -math.inf, math.inf) for name in controller.setpoints]
     return build_input_signal(table, setpoints, location, "the controller has no set point")
 
 

@@ -39,23 +39,18 @@ from typing import Any
 
 from ...bench.identify.dynamic import CrossPrediction, DynamicFit, Experiment, InitialValue, cross_predict, fit_dynamic
 from ...bench.identify.dynamic.experiment import ParameterPaths, RecordUnknown
-from ...core import tree
 from ...core.absolute_pressure import ambient_pressure
-from ...core.errors import ParameterError
 from ...core.short_repr import ShortRepr
 from ...engine.run import Integrator
 from ...physics.plant.plant import Plant
 from ..library.files import read_toml
-from ..library.location import Location, check_keys, read_finite_number, read_text
+from ..library.location import Location, check_keys, read_text
 from ..library.plant_file import build_plant
 from ..library.write import scenario_toml
 from .initial_state import pressure_names
 from .plant_uncertainty import fit_uncertainty
-from .record import Record, optional_table
-from .study_tables import build_method, read_integer, read_list, read_observed, read_own, read_shared, required_table
-
-_TABLES = ("title", "plant", "input", "observed", "fit", "record")
-_FIT = ("free", "own", "start_time", "initial_state", "starts", "seed", "integrator", "bounds")
+from .record import build_records
+from .values import FitTable, read_observed, required_table, table_reader
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -126,57 +121,25 @@ def load_dynamic_fit(path: str | Path) -> DynamicFitSetup:
     Raises FileError, ParameterError, UnitError, UnknownNameError or ColumnError with the location.
     """
     file = Path(path)
-    tables = read_toml(file)
-    location = Location(str(file), "", file.parent)
-    check_keys(tables, _TABLES, location)
+    tables, location = read_toml(file), Location.of_file(file)
+    check_keys(tables, ("title", "plant", "input", "observed", "fit", "record"), location)
     plant = build_plant(required_table(tables, "plant", location), location.inside("plant"))
-    with ambient_pressure(plant.ambient.pressure):
-        return _build_setup(file, tables, location, plant)
-
-
-def _build_setup(file: Path, tables: Mapping[str, Any], location: Location, plant: Plant) -> DynamicFitSetup:
-    """The dynamic fit of a plant, whose ambient pressure is that of the texts."""
-    observed = read_observed(required_table(tables, "observed", location), plant, location.inside("observed"))
-    rows = tables.get("record")
-    if not isinstance(rows, list) or not rows:
-        raise ParameterError(f'{location}: no record is given; write [[record]] with file = "fill.csv" for each.')
-    records = [
-        Record(row, location.inside(f"record {i}"), tables, plant).build_experiment(observed)
-        for i, row in enumerate(rows, 1)
-    ]
-    fit, in_fit = required_table(tables, "fit", location), location.inside("fit")
-    check_keys(fit, _FIT, in_fit)
-    return DynamicFitSetup(
-        title=read_text(tables, "title", location, needed=False) or file.stem,
-        plant=plant,
-        experiments=tuple(experiment for experiment, _ in records),
-        input_tables=tuple(table for _, table in records),
-        observed={name: deviation for name, (deviation, _) in observed.items()},
-        columns={name: column for name, (_, column) in observed.items() if column != name},
-        free=tuple(read_shared(item, f"{in_fit}, free") for item in read_list(fit, "free", in_fit)),
-        own=read_own(fit, plant, in_fit),
-        bounds=_read_bounds(optional_table(fit, "bounds", in_fit), plant, in_fit.inside("bounds")),
-        starts=read_integer(fit, "starts", 1, in_fit),
-        seed=read_integer(fit, "seed", 0, in_fit),
-        method=build_method(fit, in_fit),
-    )  # fmt: skip
-
-
-def _read_bounds(table: Mapping[str, Any], plant: Plant, location: Location) -> dict[str, tuple[float, float]]:
-    declared = {leaf.path: leaf.declared for leaf in tree.leaves(plant)}
-    bounds = {}
-    for path, value in table.items():
-        check_keys({path: value}, tuple(declared), location)
-        where = f"{location}, {path}"
-        if not isinstance(value, list) or len(value) != 2:
-            raise ParameterError(
-                f"{where} is {value!r}; it must be a list of minimum and maximum, such as [1.01, 1.4]."
-            )
-        low, high = (read_finite_number(end, declared[path].unit, where) for end in value)
-        lower, upper = declared[path].bounds
-        if low < lower or high > upper:
-            raise ParameterError(f"{where} is {value!r}; allowed range: {lower:g} to {upper:g}.")
-        if not low < high:
-            raise ParameterError(f"{where} is {value!r}; the minimum must be less than the maximum.")
-        bounds[path] = low, high
-    return bounds
+    with ambient_pressure(plant.ambient.pressure):  # that of the texts
+        observed = read_observed(required_table(tables, "observed", location), plant, location.at("observed"))
+        records = build_records(tables, tables, plant, observed, location)
+        table = required_table(tables, "fit", location)
+        fit: FitTable = table_reader(plant).build(table, location.inside("fit"), kind=FitTable)
+        return DynamicFitSetup(
+            title=read_text(tables, "title", location, needed=False) or file.stem,
+            plant=plant,
+            experiments=tuple(experiment for experiment, _ in records),
+            input_tables=tuple(table for _, table in records),
+            observed={name: deviation for name, (deviation, _) in observed.items()},
+            columns={name: column for name, (_, column) in observed.items() if column != name},
+            free=fit.free,
+            own=fit.unknowns(plant),
+            bounds=fit.bounds,
+            starts=fit.starts,
+            seed=fit.seed,
+            method=fit.integrator,
+        )

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...bench.identify.dynamic import InitialConditions
+from ...core.annotation import abridged
 from ...core.errors import EquilibriumError, HintedText, ParameterError
 from ...physics.equilibrium import find_equilibrium
 from ...physics.plant.plant import Plant
@@ -53,14 +54,19 @@ def read_initial_values(
     return pressures, {name: value for name, value in values.items() if name not in (PRESSURE, *names)}
 
 
+def read_initial_table(value: Any, plant: Any, where: Location) -> Mapping[str, Any]:
+    """The table `initial_state`, which `build_initial_state` reads. Raises ParameterError for anything else."""
+    if not isinstance(value, Mapping):
+        raise ParameterError(
+            f'{where} is {abridged(value)}; it must be a table. Write initial_state = {{ pressure = "0 bar" }}.'
+        )
+    return value
+
+
 def build_initial_state(
-    table: Any, plant: Plant, location: Location, equilibrium: dict[str, float] | None
+    table: Mapping[str, Any], plant: Plant, location: Location, equilibrium: dict[str, float] | None
 ) -> dict[str, float]:
     """The initial state of a run; `equilibrium` replaces the computed one. Raises ParameterError or UnitError."""
-    if not isinstance(table, Mapping):
-        raise ParameterError(
-            f'{location} is {table!r}; it must be a table. Write initial_state = {{ pressure = "0 bar" }}.'
-        )
     all_states = {state.name: state.unit for state in plant.states}
     if set(table) == set(all_states):
         return {name: read_finite_number(table[name], unit, f"{location}, {name}") for name, unit in all_states.items()}

@@ -12,23 +12,69 @@ fill = { model = "SolenoidDriver", opening_delay = "5 ms" }     optional: one dr
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...bench.readers import read_csv
+from ...core.annotation import abridged
 from ...core.errors import ColumnError, ParameterError
 from ...core.system import Input
-from ...engine.loop.driver import Driver, SolenoidDriver, WithDrivers
+from ...engine.loop.driver import Driver, WithDrivers
 from ...engine.loop.inputs import NO_INPUT, InputSignal, Periodic, Schedule, check_input_names
 from ...engine.loop.sampled_signal import SampledSignal
 from ...recording.heading import split_unit
-from ..library.build import build, load_valve
-from ..library.location import Location, check_keys, check_type, located_errors, read_finite_number, read_text
+from ..library.fields import custom_field
+from ..library.location import Location, located_errors, read_finite_number
 from ..library.models import model_class
+from ..library.plant_file import PLANT_READER
+from .values import Number
 
-RESERVED_KEYS = ("model", "period", "file", "columns", "drivers")
-"""Keys of the table that are not inputs."""
 Points = tuple[tuple[float, float], ...]
+Chain = Driver | tuple[Driver, ...]
+
+
+def _read_names(value: Any, plant: Any, where: Location) -> Mapping[str, str]:
+    """A table of names."""
+    if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value.values()):
+        raise ParameterError(f'{where} is {abridged(value)}; it must be a table such as {{ fill = "valve" }}.')
+    return value
+
+
+def read_drivers(value: Any, plant: Any, where: Location) -> dict[str, Chain]:
+    """The drivers of a table by input. Raises ParameterError, UnitError or UnknownNameError."""
+    if not isinstance(value, Mapping):
+        raise ParameterError(
+            f'{where} is {abridged(value)}; it must be a table. Write fill = {{ model = "SolenoidDriver" }} in '
+            f"[{where.table}.{where.key}]."
+        )
+    place = where.inside("")
+    return {name: PLANT_READER.value(item, Chain, place, name) for name, item in value.items()}
+
+
+@dataclasses.dataclass(frozen=True)
+class SignalTable:
+    """Keys of the table of an input signal that are no inputs."""
+
+    model: str | None = None
+    period: float | None = custom_field(Number("s"), "period after which the signal is repeated", default=None)
+    file: str | None = None
+    columns: Mapping[str, str] | None = custom_field(_read_names, "columns of the file by input", default=None)
+    drivers: Mapping[str, Chain] = custom_field(read_drivers, "drivers by input", default_factory=dict)
+
+    def signal_class(self, location: Location) -> type[Schedule] | type[SampledSignal]:
+        """The class of the signal. Raises UnknownNameError or ParameterError."""
+        name = self.model or ("SampledSignal" if self.file is not None else "Schedule")
+        cls = model_class(name, f"{location}, model", kind=Schedule | SampledSignal)
+        if not issubclass(cls, Schedule | SampledSignal):
+            raise ParameterError(
+                f"{location}: {cls.__name__} is not an input signal; there are Schedule and SampledSignal."
+            )
+        return cls
+
+
+RESERVED_KEYS = tuple(field.name for field in dataclasses.fields(SignalTable))
+"""Keys of the table that are not inputs."""
 
 
 def build_input_signal(
@@ -43,113 +89,62 @@ def build_input_signal(
             f"{location}: a controller is allowed only in a scenario; give the commanded inputs as rows or a file."
         )
     units = {command.name: command.unit for command in commands}
-    inputs = tuple(units)
     rows = {key: value for key, value in table.items() if key not in RESERVED_KEYS}
+    stated = {key: value for key, value in table.items() if key in RESERVED_KEYS}
+    keys: SignalTable = PLANT_READER.build(stated, location, kind=SignalTable)
     with located_errors(location):
-        check_input_names(list(rows), inputs, unknown_name)
-    points = _read_file_points(table, units, location)
+        check_input_names(list(rows), tuple(units), unknown_name)
+    with located_errors(location.inside("drivers")):
+        check_input_names(list(keys.drivers), tuple(units))
+    points = _read_file_points(keys, list(rows), units, location)
     for key, value in rows.items():
         if key in points:
             raise ParameterError(f"{location}: '{key}' is given both by the file and by rows; remove one of them.")
-        where = f"{location}, {key}"
-        points[key] = tuple(_read_point(row, units[key], where) for row in _read_rows(value, where))
+        points[key] = _read_rows(value, units[key], location.at(key))
     with located_errors(location):
-        signal: InputSignal = _signal_class(table, location)(points)
-    if "period" in table:
-        period = read_finite_number(table["period"], "s", f"{location}, period")
-        with located_errors(location):
-            signal = Periodic(signal, period)
-    drivers = build_drivers(table.get("drivers", {}), inputs, location.inside("drivers"))
-    return WithDrivers(signal, drivers) if drivers else signal
+        signal: InputSignal = keys.signal_class(location)(points)
+        signal = signal if keys.period is None else Periodic(signal, keys.period)
+    return WithDrivers(signal, keys.drivers) if keys.drivers else signal
 
 
-def _signal_class(table: Mapping[str, Any], location: Location) -> type[Schedule] | type[SampledSignal]:
-    name = table.get("model", "SampledSignal" if "file" in table else "Schedule")
-    cls = model_class(name, f"{location}, model", kind=Schedule | SampledSignal)
-    if not issubclass(cls, Schedule | SampledSignal):
-        raise ParameterError(
-            f"{location}: {cls.__name__} is not an input signal; there are Schedule and SampledSignal."
-        )
-    return cls
-
-
-def _read_rows(rows: Any, where: str) -> list[Any]:
+def _read_rows(rows: Any, unit: str, where: Location) -> Points:
     if not isinstance(rows, list):
         raise ParameterError(
-            f'{where} is {rows!r}; it must be a list of instants and values, such as [["5 s", 1], ["15 s", 0]].'
+            f'{where} is {abridged(rows)}; it must be a list of instants and values, such as [["5 s", 1], ["15 s", 0]].'
         )
-    return rows
+    return tuple(_read_point(row, unit, where) for row in rows)
 
 
-def _read_point(row: Any, unit: str, where: str) -> tuple[float, float]:
+def _read_point(row: Any, unit: str, where: Location) -> tuple[float, float]:
     if not (isinstance(row, list) and len(row) == 2):
-        raise ParameterError(f'{where} contains {row!r}; each item must be an instant and a value, such as ["5 s", 1].')
+        raise ParameterError(
+            f'{where} contains {abridged(row)}; each item must be an instant and a value, such as ["5 s", 1].'
+        )
     return read_finite_number(row[0], "s", where), read_finite_number(row[1], unit, where)
 
 
-def _read_file_points(table: Mapping[str, Any], units: Mapping[str, str], location: Location) -> dict[str, Points]:
+def _read_file_points(
+    keys: SignalTable, rows: Sequence[str], units: Mapping[str, str], location: Location
+) -> dict[str, Points]:
     """Points of the inputs that follow a column of a data file; none if no file is named."""
-    columns, inputs = table.get("columns"), tuple(units)
-    if "file" not in table:
+    columns, inputs = keys.columns, tuple(units)
+    if keys.file is None:
         if columns is not None:
             raise ParameterError(f'{location}: columns is given without file; write file = "bench.csv" next to it.')
         return {}
-    path = read_text(table, "file", location, needed=True)
     with located_errors(location):
-        recording = read_csv(location.folder / path)
+        recording = read_csv(location.folder / keys.file)
         names = {*recording, *(split_unit(heading)[0] for heading in recording)}
         same = {name: name for name in inputs if name in names}
-        if columns is None:
-            columns = same
-            if not columns:
-                raise ColumnError(
-                    f"{path} has no column with the name of an input ({', '.join(inputs)}); its columns are "
-                    f'{", ".join(recording)}. Write columns = {{ {inputs[0] if inputs else "fill"} = "..." }}.'
-                )
-    if not isinstance(columns, Mapping) or not all(isinstance(column, str) for column in columns.values()):
-        raise ParameterError(f'{location}, columns is {columns!r}; it must be a table such as {{ fill = "valve" }}.')
-    used = {*columns.values(), *(split_unit(heading)[0] for heading in columns.values()), *table}
-    columns = {**{name: name for name in same if name not in used}, **columns}
-    with located_errors(location):
+        if columns is None and not same:
+            raise ColumnError(
+                f"{keys.file} has no column with the name of an input ({', '.join(inputs)}); its columns are "
+                f'{", ".join(recording)}. Write columns = {{ {inputs[0] if inputs else "fill"} = "..." }}.'
+            )
+        columns = same if columns is None else columns
+        used = {*columns.values(), *(split_unit(heading)[0] for heading in columns.values()), *rows}
+        columns = {**{name: name for name in same if name not in used}, **columns}
         check_input_names(list(columns), inputs)
         values = {name: recording.in_unit(column, units[name]) for name, column in columns.items()}
         signal = SampledSignal.recorded(recording.with_columns(**values), {name: name for name in columns})
         return {name: tuple(points) for name, points in signal.points.items()}
-
-
-def build_drivers(table: Any, inputs: Sequence[str], location: Location) -> dict[str, Driver | tuple[Driver, ...]]:
-    """The drivers of a table [input.drivers] by input. Raises ParameterError, UnitError or UnknownNameError."""
-    if not isinstance(table, Mapping):
-        raise ParameterError(
-            f'{location} is {table!r}; it must be a table. Write fill = {{ model = "SolenoidDriver" }} in '
-            f"[{location.table}]."
-        )
-    with located_errors(location):
-        check_input_names(list(table), inputs)
-    return {name: _build_chain(value, location.inside(name)) for name, value in table.items()}
-
-
-def _build_chain(value: Any, location: Location) -> Driver | tuple[Driver, ...]:
-    if isinstance(value, list):
-        return tuple(_build_driver(item, location.inside(f"[{i}]")) for i, item in enumerate(value))
-    return _build_driver(value, location)
-
-
-def _build_driver(value: Any, location: Location) -> Driver:
-    if isinstance(value, Mapping) and "library" in value and "model" not in value:
-        check_keys(value, ("library",), location)
-        return _library_driver(read_text(value, "library", location, needed=True), location)
-    table = {"model": value} if isinstance(value, str) else value
-    driver: Driver = check_type(build(table, location, kind=Driver), Driver, location)
-    return driver
-
-
-def _library_driver(name: str, location: Location) -> SolenoidDriver:
-    """Driver with the switching times of a valve of the library or of a valve file, relative to the scenario."""
-    with located_errors(location):
-        valve = load_valve(location.folder / name if name.endswith(".toml") else name)
-        if valve.switching_times is None:
-            raise ParameterError(
-                f'{valve.name}: no switching times are published; write model = "SolenoidDriver" and its opening_delay.'
-            )
-    return SolenoidDriver(valve.switching_times.opening_delay, valve.switching_times.closing_delay)

@@ -20,7 +20,8 @@ import typing
 from collections.abc import Mapping
 from typing import Any
 
-from ...core.declaration import Parameter, check_field, parameters
+from ...core.annotation import abridged
+from ...core.declaration import Parameter, parameters
 from ...core.errors import ParameterError
 from ...core.units import is_known_unit
 from ...engine.loop.control_loop import check_present
@@ -28,101 +29,68 @@ from ...engine.loop.controller import RELATIVE, Controller, SignalRelated, named
 from ...physics.mechanism.base import Mechanism
 from ...physics.muscle import Muscle
 from ...physics.plant.plant import Plant
-from ..library.build import build
-from ..library.fields import accepts, check_required, describe_type, item_type, read_parameter
+from ..library.fields import origin, read_parameter
 from ..library.location import Location, located_errors
-from ..library.models import model_class, model_names
-from ..library.plant_file import build_muscle
+from ..library.plant_file import PLANT_READER
 
 
-def build_law(table: Mapping[str, Any], plant: Plant, units: Mapping[str, str], location: Location) -> Controller:
+def build_law(table: Any, plant: Plant, units: Mapping[str, str], location: Location) -> Controller:
     """The controller of a table, with the laws inside it; `units` are those of the signals of the plant by name.
 
     The table is read twice: the first time without its numbers, to find the signals that determine their units.
     Raises ParameterError, UnitError or UnknownNameError with the location.
     """
-    if isinstance(table.get("model"), str):
-        cls = model_class(table["model"], f"{location}, model", kind=Controller)
-        if not issubclass(cls, Controller):
-            known = ", ".join(model_names(Controller))
-            raise ParameterError(f"{location}: {cls.__name__} is not a controller; there are {known}.")
-    outline = _LawTable(plant, None).model(table, location)
+
+    def built(known: Mapping[str, str] | None) -> Controller:
+        reader = dataclasses.replace(PLANT_READER, signals=PlantSignals(plant, known))
+        controller: Controller = reader.build(table, location, kind=Controller)
+        return controller
+
+    outline = built(None)
     with located_errors(location):
         check_present(outline, [name for name in units if name not in plant.inputs], plant.inputs)
         named = named_signal_units(outline)
-        signals = {**named, **{name: unit or named.get(name, "") for name, unit in units.items()}}
-    controller: Controller = _LawTable(plant, signals).model(table, location)
-    return controller
+    return built({**named, **{name: unit or named.get(name, "") for name, unit in units.items()}})
 
 
 @dataclasses.dataclass(frozen=True)
-class _LawTable:
-    """Reader of the tables of a controller; without units it makes models whose numbers are not read."""
+class PlantSignals:
+    """Signals of a plant with their units; without units, of the models that depend on them no numbers are read."""
 
     plant: Plant
     units: Mapping[str, str] | None
 
-    def model(self, table: Any, location: Location, kind: Any = Controller) -> Any:
-        """The model of a table; one that does not depend on signals is built as in any other table."""
-        cls = self._class(table, location, kind)
-        if not issubclass(cls, SignalRelated) and not _contains_plant(cls):
-            return build(table, location, kind=kind)
-        hints = typing.get_type_hints(cls)
-        fields = {key: value for key, value in table.items() if key != "model"}
-        for key in fields:
-            with located_errors(location):
-                check_field(cls, key)
-        declared = {p.name: p for p in parameters(cls)}
-        parts = self._of_plant(cls, hints) | {
-            key: self._part(value, hints[key], key, location) for key, value in fields.items() if key not in declared
-        }
-        check_required(cls, {**fields, **parts}, hints, location)
-        outline = _outline(cls, parts)
-        if self.units is None:
-            return outline
-        numbers = {key: self._number(value, declared[key], hints[key], outline, location)
-                   for key, value in fields.items() if key in declared}  # fmt: skip
-        with located_errors(location):
-            return cls(**parts, **numbers)
+    def concerns(self, cls: type[Any]) -> bool:
+        """Whether a class has numbers in units of signals, or muscles or a mechanism, which are those of the plant."""
+        hints = typing.get_type_hints(cls).values()
+        return issubclass(cls, SignalRelated) or any(_has(h, kind) for h in hints for kind in (Muscle, Mechanism))
 
-    def _class(self, table: Any, location: Location, kind: Any) -> type[Any]:
-        if not isinstance(table, Mapping) or not isinstance(table.get("model"), str):
-            build(table, location)  # raises the error of a table without a model
-        return model_class(table["model"], f"{location}, model", kind=kind)
-
-    def _of_plant(self, cls: type[Any], hints: Mapping[str, Any]) -> dict[str, Any]:
+    def parts(self, cls: type[Any], hints: Mapping[str, Any]) -> dict[str, Any]:
         """Muscles and mechanism of the plant, for the fields of a static inverse that need them."""
         own = {tuple[Muscle, ...]: self.plant.muscles, Mechanism: self.plant.mechanism}
         return {name: own[hints[name]] for name in plant_fields(cls)}
 
-    def _part(self, value: Any, hint: Any, key: str, location: Location) -> Any:
-        """A structural field: a model, a tuple of them, an integer, a text, true or false."""
-        inner = location.inside(key)
-        if isinstance(value, list):
-            return tuple(self._part(v, item_type(hint), f"{key}[{i}]", location) for i, v in enumerate(value))
-        part = value
-        if _is_muscle(hint, value):
-            part = build_muscle(value, inner)
-        elif isinstance(value, Mapping):
-            part = self.model(value, inner, hint)
-        elif isinstance(value, str) and not accepts(hint, value):
-            part = self.model({"model": value}, inner, hint)
-        if not accepts(hint, part):
-            what = type(part).__name__ if dataclasses.is_dataclass(part) else repr(part)
-            raise ParameterError(f"{location}: {key} is {what}; it must be {describe_type(hint)}.")
-        return part
+    def make(self, cls: type[Any], parts: Mapping[str, Any], numbers: Mapping[str, Any], location: Location) -> Any:
+        """The model of a class; its numbers are read in the units of the signals that its parts name."""
+        outline = _outline(cls, parts)
+        if self.units is None:
+            return outline
+        hints = typing.get_type_hints(cls)
+        declared = {p.name: p for p in parameters(cls)}
+        read = {n: self._number(v, declared[n], hints[n], outline, location) for n, v in numbers.items()}
+        with located_errors(location):
+            return cls(**parts, **read)
 
     def _number(self, value: Any, declared: Parameter, hint: Any, outline: Any, location: Location) -> Any:
         """A declared parameter in SI units, read in the units of the signals of its law."""
         units = self.units or {}
-        several = isinstance(value, list) and typing.get_origin(hint) is tuple
         if isinstance(outline, Controller) and declared.unit in RELATIVE:
             names = outline.inputs
             if len({units.get(name) for name in names}) > 1:
                 raise ParameterError(
                     f"{location}: {' and '.join(names)} have different units; choose inputs of the same unit."
                 )
-        if not several:
+        if not isinstance(value, list) or origin(hint) is not tuple:
             return _read(value, declared, self._unit(value, declared, 0, outline, location), hint, location)
         return tuple(
             _read(item, dataclasses.replace(declared, name=f"{declared.name}[{i}]"),
@@ -137,8 +105,8 @@ class _LawTable:
         except KeyError as error:
             if isinstance(value, str):
                 raise ParameterError(
-                    f"{location}, {declared.name} is {value!r}; the unit of the signal {error} is not known, because "
-                    "it is no column or input of the plant. Correct the name, or give a number in SI units."
+                    f"{location.at(declared.name)} is {abridged(value)}; the unit of the signal {error} is not known, "
+                    "because it is no column or input of the plant. Correct the name, or give a number in SI units."
                 ) from None
             return "1"
 
@@ -147,7 +115,7 @@ def _read(value: Any, declared: Parameter, unit: str, hint: Any, location: Locat
     """A number or a column of a file; a unit that depends on no signal is no unit of a text."""
     if isinstance(value, str) and not is_known_unit(unit):
         raise ParameterError(
-            f"{location}, {declared.name} is {value!r}; it must be a number in SI units, without a unit "
+            f"{location.at(declared.name)} is {abridged(value)}; it must be a number in SI units, without a unit "
             f"({declared.symbol}, {declared.meaning})."
         )
     return read_parameter(value, dataclasses.replace(declared, unit=unit), hint, location)
@@ -170,19 +138,5 @@ def plant_fields(cls: type[Any]) -> tuple[str, ...]:
     return tuple(f.name for f in dataclasses.fields(cls) if hints[f.name] in (tuple[Muscle, ...], Mechanism))
 
 
-def _contains_plant(cls: type[Any]) -> bool:
-    """Whether a model has muscles or a mechanism as a field."""
-    return any(_has(hint, kind) for hint in typing.get_type_hints(cls).values() for kind in (Muscle, Mechanism))
-
-
 def _has(hint: Any, kind: type[Any]) -> bool:
     return hint is kind or any(_has(option, kind) for option in typing.get_args(hint))
-
-
-def _is_muscle(hint: Any, value: Any) -> bool:
-    """Whether a value names or describes a muscle where one is allowed."""
-    if not _has(hint, Muscle):
-        return False
-    return isinstance(value, str) or (
-        isinstance(value, Mapping) and ("library" in value or value.get("model") == "Muscle")
-    )

@@ -31,14 +31,13 @@ from ...core import tree
 from ...core.arrays import Array
 from ...core.errors import ParameterError
 from ...physics.plant.plant import Plant
-from ..library.location import Location, check_keys, read_finite_number
-from ..library.uncertainty import KEYS, read_uncertainty
-from .record import optional_table, signal_unit
-from .study_tables import read_integer
+from ..library.fields import custom_field
+from ..library.location import Location, located_errors
+from ..library.uncertainty import ParameterUncertainty
+from .values import BySignal, table_reader
 
-DEVIATIONS = "deviations"
-ALL_KEYS = (DEVIATIONS, "records", "factors", "ranges", "rates", *KEYS)
-"""Keys of the table."""
+COVARIANCE_KEYS = ("parameters", "standard_errors", "correlations")
+"""Keys of the covariance of the parameters."""
 SEPARATOR = ", "
 """Between the paths of parameters with a common value."""
 
@@ -64,7 +63,7 @@ def fit_uncertainty(fit: DynamicFit, cross: Sequence[Mapping[str, float]] = ()) 
             factors[name] = t_quantile(degrees_of_freedom(error, _noise(fit, name), len(predicted)))
     known = {name: value for name, value in deviations.items() if value > 0.0}
     records = [model.experiment.recording for model in models]
-    table: dict[str, Any] = {DEVIATIONS: known, "records": len(models), **({"factors": factors} if factors else {})}
+    table: dict[str, Any] = {"deviations": known, "records": len(models), **({"factors": factors} if factors else {})}
     ranges = {name: _ends([record[name] for record in records]) for name in deviations}
     return {**table, "ranges": ranges, "rates": {n: maximum_rate(records, n) for n in deviations}, **_covariance(fit)}
 
@@ -104,59 +103,45 @@ def tail_factor(fit: DynamicFit, name: str) -> float:
     return 1.0 if rms == 0.0 else max(float(np.quantile(np.abs(residuals), LEVEL)) / (NORMAL_QUANTILE * rms), 1.0)
 
 
-def read_plant_uncertainty(table: Any, plant: Plant, location: Location) -> PlantUncertainty:
-    """The uncertainty of a table [uncertainty] of a scenario. Raises ParameterError or UnitError with the location."""
-    if not isinstance(table, Mapping):
-        raise ParameterError(f"{location} is {table!r}; it must be a table with {', '.join(ALL_KEYS)}.")
-    check_keys(table, ALL_KEYS, location)
-    found = PlantUncertainty(
-        _read_positive(table.get(DEVIATIONS), plant, location.inside(DEVIATIONS)),
-        records=read_integer(table, "records", 1, location) if "records" in table else None,
-        factors=_read_positive(table["factors"], None, location.inside("factors")) if "factors" in table else {},
-        ranges=_read_ranges(optional_table(table, "ranges", location), plant, location.inside("ranges")),
-        rates=_read_rates(optional_table(table, "rates", location), plant, location.inside("rates")),
+@dataclasses.dataclass(frozen=True)
+class UncertaintyTable:
+    """Table [uncertainty] of a scenario."""
+
+    deviations: Mapping[str, float] = custom_field(
+        BySignal(positive=True), "standard deviation of the residuals by quantity, such as pressure = 620.0"
     )
-    given = {key: table[key] for key in KEYS if key in table}
-    if not given:
-        return found
-    parameters = read_uncertainty(given, location)
-    groups = tuple(tuple(name.split(SEPARATOR)) for name in parameters.parameters)
+    records: int | None = None
+    factors: Mapping[str, float] = custom_field(
+        BySignal("1", positive=True), "half width of the band in deviations", default_factory=dict
+    )
+    ranges: Mapping[str, tuple[float, float]] = custom_field(
+        BySignal(pairs=True), "ends of the measured quantities", default_factory=dict
+    )
+    rates: Mapping[str, float] = custom_field(
+        BySignal(per="/s"), "maximum rates of change of the quantities", default_factory=dict
+    )
+    parameters: tuple[str, ...] = ()
+    standard_errors: tuple[float, ...] = ()
+    correlations: tuple[tuple[float, ...], ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.records is not None and self.records < 1:
+            raise ParameterError(f"records is {self.records}; it must be an integer of at least 1.")
+        if not self.deviations:
+            raise ParameterError("deviations is empty; write standard deviations, such as pressure = 620.0.")
+
+
+def read_plant_uncertainty(value: Any, plant: Plant, where: Location) -> PlantUncertainty:
+    """The uncertainty of a table [uncertainty] of a scenario. Raises ParameterError or UnitError with the location."""
+    place = where.inside("")
+    table: UncertaintyTable = table_reader(plant).build(value, place, kind=UncertaintyTable)
+    with located_errors(place):
+        fitted = ParameterUncertainty(table.parameters, table.standard_errors, table.correlations)
+    groups = tuple(tuple(name.split(SEPARATOR)) for name in fitted.parameters)
     paths = {leaf.path for leaf in tree.leaves(plant)}
     unknown = [path for group in groups for path in group if path not in paths]
     if unknown:
-        raise ParameterError(f"{location}, parameters: the plant has no parameter '{unknown[0]}'.")
-    return dataclasses.replace(found, parameters=groups, covariance=parameters.covariance)
-
-
-def _read_positive(table: Any, plant: Plant | None, location: Location) -> dict[str, float]:
-    """Positive numbers by quantity [SI], or ratios without a plant."""
-    if not isinstance(table, Mapping) or not table:
-        raise ParameterError(
-            f"{location} is {table!r}; it must be a table of standard deviations, such as pressure = 620.0."
-        )
-    numbers = {}
-    for name, value in table.items():
-        unit = "1" if plant is None else signal_unit(name, plant) or "1"
-        numbers[name] = read_finite_number(value, unit, f"{location}, {name}")
-        if not numbers[name] > 0.0:
-            raise ParameterError(f"{location}, {name} is {value!r}; it must be greater than zero.")
-    return numbers
-
-
-def _read_ranges(table: Mapping[str, Any], plant: Plant, location: Location) -> dict[str, tuple[float, float]]:
-    """The ends of quantities [SI]."""
-    ranges = {}
-    for name, value in table.items():
-        if not isinstance(value, list) or len(value) != 2:
-            raise ParameterError(f"{location}, {name} is {value!r}; it must be a list of minimum and maximum.")
-        low, high = (read_finite_number(end, signal_unit(name, plant) or "1", f"{location}, {name}") for end in value)
-        ranges[name] = low, high
-    return ranges
-
-
-def _read_rates(table: Mapping[str, Any], plant: Plant, location: Location) -> dict[str, float]:
-    """Maximum rates of change of quantities [SI per s]."""
-    return {
-        name: read_finite_number(value, f"{signal_unit(name, plant) or '1'}/s", f"{location}, {name}")
-        for name, value in table.items()
-    }
+        raise ParameterError(f"{place}, parameters: the plant has no parameter '{unknown[0]}'.")
+    return PlantUncertainty(
+        table.deviations, groups, fitted.covariance, table.records, table.factors, table.ranges, table.rates
+    )

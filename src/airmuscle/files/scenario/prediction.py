@@ -30,14 +30,12 @@ from ..library.files import is_path, list_plants, read_toml
 from ..library.location import Location, check_keys, located_errors
 from ..library.plant_file import plant_tables
 from .initial_state import first_value, pressure_names, recorded_pressures
-from .record import Record, optional_table, with_observed
+from .record import Record, build_records, with_observed
 from .scenario import TABLES, Scenario, build_scenario
-from .study_tables import build_method, read_observed, read_own
+from .values import FitTable, optional_table, read_observed, table_reader
 
 PREDICTABLE = ("pressure", "contraction", "length", "position", "angle", "force", "tension")
 """Quantities that are predicted for a plant whose scenario states no observed quantities."""
-_FILE = ("title", "input", "observed", "fit", "record")
-_FIT = ("own", "start_time", "initial_state", "integrator")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -66,30 +64,24 @@ class PlantModel:
 
     def predict_file(self, path: Path) -> list[RecordPrediction]:
         """Predict each record of a file of records. Raises FileError, ParameterError, UnitError or ColumnError."""
-        tables, location = read_toml(path), Location(str(path), "", path.parent)
-        check_keys(tables, _FILE, location)
-        plant, fit = self.scenario.plant, optional_table(tables, "fit", location)
-        check_keys(fit, _FIT, location.inside("fit"))
-        own, method = read_own(fit, plant, location.inside("fit")), build_method(fit, location.inside("fit"))
+        tables, location = read_toml(path), Location.of_file(path)
+        check_keys(tables, ("title", "input", "observed", "fit", "record"), location)
+        plant, table, in_fit = self.scenario.plant, optional_table(tables, "fit", location), location.inside("fit")
+        check_keys(table, ("own", "start_time", "initial_state", "integrator"), in_fit)
+        fit: FitTable = table_reader(plant).build(table, in_fit, kind=FitTable)
         observed = dict(self._observed)
         if "observed" in tables:
-            in_observed = location.inside("observed")
-            observed = read_observed(optional_table(tables, "observed", location), plant, in_observed)
-        rows = tables.get("record")
-        if not isinstance(rows, list) or not rows:
-            raise ParameterError(f'{location}: no record is given; write [[record]] with file = "fill.csv" for each.')
+            observed = read_observed(tables["observed"], plant, location.at("observed"))
         if not observed:
             raise ParameterError(
                 f"{location}: the scenario of the plant states no observed quantities; give them in [observed]."
             )
-        merged = {"plant": self.tables["plant"], "input": self.tables.get("input", {}), **tables}
-        predictions = []
-        for i, row in enumerate(rows, 1):
-            record = Record(row, location.inside(f"record {i}"), merged, plant, predicted=True)
-            experiment, _ = record.build_experiment(observed)
-            deviations = {name: deviation for name, (deviation, _) in observed.items()}
-            predictions.append(self._predict(experiment, deviations, own, method))
-        return predictions
+        shared = {"plant": self.tables["plant"], "input": self.tables.get("input", {}), **tables}
+        deviations = {name: deviation for name, (deviation, _) in observed.items()}
+        return [
+            self._predict(experiment, deviations, fit.unknowns(plant), fit.integrator)
+            for experiment, _ in build_records(tables, shared, plant, observed, location, predicted=True)
+        ]
 
     @property
     def _observed(self) -> Mapping[str, tuple[float, str]]:
@@ -151,7 +143,7 @@ def load_plant_model(path: str | Path) -> PlantModel:
     if str(path) in list_plants() and not is_path(str(path)) and not file.exists():
         tables, location = plant_tables(str(path))
     else:
-        tables, location = read_toml(file), Location(str(file), "", file.parent)
+        tables, location = read_toml(file), Location.of_file(file)
     kept = {key: tables[key] for key in TABLES if key in tables} if "sources" in tables else tables
     scenario = build_scenario(kept, location)
     if "controller" in tables.get("input", {}):

@@ -39,21 +39,55 @@ from ...engine.loop.inputs import InputSignal
 from ...engine.run import Integrator, Problem, solve
 from ...physics.plant.plant import Plant
 from ...recording import Recording
-from ..library.build import build
+from ..library.fields import custom_field
 from ..library.files import is_path, list_plants, read_toml
-from ..library.location import Location, check_keys, check_type, located_errors, read_finite_number, read_text
+from ..library.location import Location, check_keys, located_errors, read_finite_number
 from ..library.plant_file import SCENARIO_TABLES, build_plant, plant_tables
 from .controller import build_control_loop, signal_units
-from .initial_state import build_initial_state
+from .initial_state import build_initial_state, read_initial_table
 from .inputs import build_input_signal
 from .plant_uncertainty import read_plant_uncertainty
-from .study_tables import read_observed
+from .values import Number, read_observed, read_table, required_table, table_reader
 
-TABLES = ("title", *SCENARIO_TABLES, "observed", "uncertainty")
-RUN = ("duration", "start_time", "output_times", "initial_state", "integrator")
-OUTPUT = ("columns",)
 DEFAULT_INITIAL_STATE: Mapping[str, Any] = MappingProxyType({"pressure": 0.0})
 """Default initial state of a run: equilibrium at ambient pressure."""
+
+
+@dataclasses.dataclass(frozen=True)
+class RunTable:
+    """Table [run] of a scenario."""
+
+    duration: float = custom_field(Number("s", positive=True), 'duration of the run, such as duration = "25 s"')
+    start_time: float = custom_field(Number("s"), "time at the start of the run", default=0.0)
+    output_times: float | None = custom_field(Number("s", positive=True), "sample time of the rows", default=None)
+    initial_state: Mapping[str, Any] = custom_field(
+        read_initial_table, "pressures or states", default_factory=lambda: DEFAULT_INITIAL_STATE
+    )
+    integrator: Integrator | None = None
+
+
+@dataclasses.dataclass(frozen=True)
+class OutputTable:
+    """Table [output] of a scenario."""
+
+    columns: tuple[str, ...] = ()
+
+
+@dataclasses.dataclass(frozen=True)
+class ScenarioTables:
+    """Tables of a scenario, which are keys of its file; `input` depends on the initial state and is read later."""
+
+    plant: Plant
+    run: RunTable
+    title: str = ""
+    input: Mapping[str, Any] = custom_field(read_table, "input signals or a controller", default_factory=dict)
+    output: OutputTable = OutputTable()
+    observed: Mapping[str, tuple[float, str]] = custom_field(read_observed, "of a fit", default_factory=dict)
+    uncertainty: PlantUncertainty | None = custom_field(read_plant_uncertainty, "of a fit", default=None)
+
+
+TABLES = ("title", *SCENARIO_TABLES, "observed", "uncertainty")
+RUN = tuple(field.name for field in dataclasses.fields(RunTable))
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -105,7 +139,7 @@ def load_scenario(path: str | Path) -> Scenario:
         return build_scenario({key: tables[key] for key in TABLES if key in tables}, location)
     if not is_path(str(path)) and not file.exists():
         raise FileError(f"{path}: there is no such file, and no such plant; plants are {', '.join(list_plants())}.")
-    return build_scenario(read_toml(file), Location(str(file), "", file.parent))
+    return build_scenario(read_toml(file), Location.of_file(file))
 
 
 def build_scenario(
@@ -121,69 +155,35 @@ def build_scenario(
     """
     check_keys(tables, TABLES, location)
     for key in ("plant", "run"):
-        _check_table(tables.get(key), key, location)
+        required_table(tables, key, location)
     plant = plant or build_plant(tables["plant"], location.inside("plant"))
-    with ambient_pressure(plant.ambient.pressure):
-        return _build_run(tables, location, plant, equilibrium)
+    with ambient_pressure(plant.ambient.pressure):  # that of the texts
+        read = table_reader(plant).build(tables, location, {"plant": plant}, kind=ScenarioTables)
+        return _build_run(tables, read, location, equilibrium)
 
 
 def _build_run(
-    tables: Mapping[str, Any], location: Location, plant: Plant, equilibrium: dict[str, float] | None
+    tables: Mapping[str, Any], read: ScenarioTables, location: Location, equilibrium: dict[str, float] | None
 ) -> Scenario:
-    """The scenario of a plant, whose ambient pressure is that of the texts."""
-    run, in_run = tables["run"], location.inside("run")
-    check_keys(run, RUN, in_run)
-    if "duration" not in run:
-        raise ParameterError(f"{in_run}: 'duration' is missing; write it as duration = \"25 s\".")
-    duration = _read_duration(run, "duration", in_run)
-    in_input, input_table = location.inside("input"), _check_table(tables.get("input", {}), "input", location)
-    open_loop = _build_input_signal(input_table, plant, in_input)  # before the search for an equilibrium
-    initial_state = build_initial_state(
-        run.get("initial_state", DEFAULT_INITIAL_STATE), plant, in_run.inside("initial_state"), equilibrium
-    )
-    integrator = (
-        _build_model(run["integrator"], Integrator, in_run.inside("integrator")) if "integrator" in run else None
-    )
-    start_time = read_finite_number(run.get("start_time", 0.0), "s", f"{in_run}, start_time")
-    output_times = _read_duration(run, "output_times", in_run) if "output_times" in run else None
-    signal: InputSignal | ControlLoop | None = open_loop
+    run, plant, in_input = read.run, read.plant, location.inside("input")
+    signal: InputSignal | ControlLoop | None = None
+    if "controller" not in read.input:  # before the search for an equilibrium, from which units of a loop follow
+        signal = build_input_signal(read.input, plant.input_variables, in_input)
+    place = location.inside("run").inside("initial_state")
+    initial_state = build_initial_state(run.initial_state, plant, place, equilibrium)
     if signal is None:
-        signal = build_control_loop(input_table, plant, signal_units(plant, initial_state), in_input)
+        signal = build_control_loop(read.input, plant, signal_units(plant, initial_state), in_input)
     with located_errors(in_input):
-        problem = Problem(plant, signal, duration, initial_state, start_time, output_times, integrator)
-    output_table = _check_table(tables.get("output", {}), "output", location)
+        problem = Problem(plant, signal, run.duration, initial_state, run.start_time, run.output_times, run.integrator)
+    check_columns(read.output.columns, list(run_column_units(problem)), location.inside("output"))
     return Scenario(
-        title=read_text(tables, "title", location, needed=False) or Path(location.file).stem,
+        title=read.title.strip() or Path(location.file).stem,
         problem=problem,
-        columns=_read_columns(output_table, list(run_column_units(problem)), location.inside("output")),
-        uncertainty=_read_uncertainty(tables, plant, location),
-        observed=_read_observed(tables, plant, location),
-        defaults=tuple(key for key in RUN if key not in run),
+        columns=read.output.columns,
+        uncertainty=read.uncertainty,
+        observed=read.observed,
+        defaults=tuple(key for key in RUN if key not in tables["run"]),
     )
-
-
-def _check_table(value: Any, key: str, location: Location) -> Mapping[str, Any]:
-    if not isinstance(value, Mapping):
-        what = "is missing" if value is None else f"is {value!r}; it must be a table"
-        raise ParameterError(f"{location}: the table [{key}] {what}.")
-    return value
-
-
-def _read_observed(tables: Mapping[str, Any], plant: Plant, location: Location) -> dict[str, tuple[float, str]]:
-    if "observed" not in tables:
-        return {}
-    return read_observed(_check_table(tables["observed"], "observed", location), plant, location.inside("observed"))
-
-
-def _read_uncertainty(tables: Mapping[str, Any], plant: Plant, location: Location) -> PlantUncertainty | None:
-    if "uncertainty" not in tables:
-        return None
-    return read_plant_uncertainty(tables["uncertainty"], plant, location.inside("uncertainty"))
-
-
-def _build_input_signal(table: Mapping[str, Any], plant: Plant, location: Location) -> InputSignal | None:
-    """The input signal of a table; None if the table has a controller, whose units follow from the initial state."""
-    return None if "controller" in table else build_input_signal(table, plant.input_variables, location)
 
 
 def run_column_units(problem: Problem) -> dict[str, str]:
@@ -191,14 +191,6 @@ def run_column_units(problem: Problem) -> dict[str, str]:
     assert isinstance(problem.system, Plant)
     units = {"time": "s"} | signal_units(problem.system, problem.initial_state or {})
     return units | (problem.input.units(units) if isinstance(problem.input, ControlLoop) else {})
-
-
-def _read_duration(table: Mapping[str, Any], key: str, location: Location) -> float:
-    """A positive duration [s]."""
-    duration = read_finite_number(table[key], "s", f"{location}, {key}")
-    if not duration > 0:
-        raise ParameterError(f"{location}, {key} is {table[key]!r}; it must be greater than zero.")
-    return duration
 
 
 def initial_pressure(tables: Mapping[str, Any], location: Location, plant: Plant) -> float | None:
@@ -212,21 +204,10 @@ def initial_pressure(tables: Mapping[str, Any], location: Location, plant: Plant
         )
 
 
-def _read_columns(table: Mapping[str, Any], known: Sequence[str], location: Location) -> tuple[str, ...]:
-    check_keys(table, OUTPUT, location)
-    columns = table.get("columns", [])
-    if not isinstance(columns, list) or not all(isinstance(name, str) for name in columns):
-        raise ParameterError(
-            f'{location}, columns is {columns!r}; it must be a list of names, such as ["pressure", "force"].'
-        )
+def check_columns(columns: Sequence[str], known: Sequence[str], location: Location) -> None:
+    """Raise ParameterError for a column that a run does not have."""
     for name in columns:
         if name not in known:
             raise ParameterError(
                 f"{location}: the run has no column '{name}'; there are {', '.join(known)}.{suggestion(name, known)}"
             )
-    return tuple(columns)
-
-
-def _build_model(value: Any, kind: type[Any], location: Location) -> Any:
-    table = {"model": value} if isinstance(value, str) else value
-    return check_type(build(table, location, kind=kind), kind, location)

@@ -1,4 +1,4 @@
-"""JSON schemas of scenario and muscle files for editors, generated from the declared models.
+"""JSON schemas of scenario and muscle files for editors, generated from the declared tables and models.
 
 With a schema, an editor marks unknown keys, values of the wrong type and numbers out of bounds, and shows unit and
 meaning of each parameter. Names of inputs, columns and files are not in the schema; they are checked when the file is
@@ -16,18 +16,18 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...core.declaration import Parameter, parameters
-from ...core.reference import Reference
 from ...engine.loop.controller import RELATIVE, Controller
 from ...engine.loop.driver import Driver
-from ...engine.run.integrators import Integrator
 from ...physics.muscle import Muscle
 from ...physics.plant.plant import Plant
 from ...physics.pneumatics.valve import Orifice
-from ..library import entry_file, plant_file, stated_band, uncertainty
-from ..library.build import TEXT_KEYS
+from ..library import plant_file
+from ..library.build import only_class
+from ..library.entry import CONDITIONS, PATHS, Check, Entry
+from ..library.fields import is_required, options, origin
 from ..library.models import model_class, model_names
-from ..library.valve_entry import PATHS
-from . import controller, inputs, plant_uncertainty, scenario
+from ..library.stated_band import PREDICTED, StatedBand
+from . import controller, initial_state, inputs, plant_uncertainty, scenario, values
 from .law_table import plant_fields
 
 Schema = dict[str, Any]
@@ -37,100 +37,47 @@ _UNIT = r"\s*([^\s\d.,]|1/).*"
 """Pattern of the unit after a number: no comma and no further digit, except 1/s."""
 _TEXT: Schema = {"type": "string"}
 _PLAIN: Mapping[Any, str] = {int: "integer", float: "number", str: "string", bool: "boolean"}
+_ANY_UNIT = {
+    (Check, "equals"),
+    (Check, "tolerance"),
+    *((StatedBand, name) for name in ("half_width", "held_half_width")),
+}
+"""Numbers whose unit depends on another key of their table."""
+_CHOICES = {(Check, "quantity"): tuple(CONDITIONS), (StatedBand, "quantity"): PREDICTED}
+"""Texts of which only some are allowed."""
 
 
 def scenario_schema() -> Schema:
     """Schema of a scenario file; see docs/scenario.md."""
     models = _ModelSchemas()
-    tables = {
-        "title": _TEXT,
-        "plant": _plant(models),
-        "input": _input(models),
-        "run": _run(models),
-        "output": _table({"columns": {"type": "array", "items": _TEXT}}),
-        "observed": {"type": "object", "additionalProperties": _observed()},
-        "uncertainty": _table(_plant_uncertainty(), (plant_uncertainty.DEVIATIONS,)),
-    }
-    return _document("A simulation with airmuscle", _select_keys(tables, scenario.TABLES), ("plant", "run"), models)
+    tables = models.table(scenario.ScenarioTables, model_needed=None)
+    tables["properties"] |= {"plant": _plant(models), "input": _input(models)}
+    return _document("A simulation with airmuscle", tables, models)
 
 
 def muscle_schema() -> Schema:
     """Schema of a muscle file, the form of all muscles and laws of the library; see docs/muscle-file.md."""
     models = _ModelSchemas()
-    quantities = {name: _quantity(unit) for name, unit in entry_file.QUANTITIES.items()}
-    check = {
-        "quantity": {"enum": list(quantities)},
-        "source": _TEXT,
-        "equals": _quantity(""),
-        "tolerance": _quantity(""),
-        **quantities,
-    }
-    tables = {
-        **dict.fromkeys(TEXT_KEYS, _TEXT),
-        **{key: models.kind(cls) for key, cls in entry_file.PARTS.items()},
-        "product": _TEXT,
-        "ratings": models.table(model_class("Ratings", "schema"), model_needed=False),
-        "validity_range": models.table(model_class("ValidityRange", "schema"), model_needed=False),
-        "uncertainty": _table(_uncertainty(), uncertainty.KEYS),
-        "error_band": _table(_error_band(), stated_band.KEYS[:2]),
-        "check": {"type": "array", "items": _table(check, ("quantity", "equals", "tolerance", "source"))},
-        "reference": {"type": "array", "items": models.table(Reference, model_needed=None)},
-    }
-    return _document(
-        "A muscle or a law in airmuscle",
-        _select_keys(tables, entry_file.KEYS),
-        ("title", "provenance", "characteristic"),
-        models,
-    )
+    tables = models.table(Entry, model_needed=None)
+    tables["properties"] |= {"product": _TEXT}
+    return _document("A muscle or a law in airmuscle", tables, models)
 
 
-def _uncertainty() -> Schema:
-    numbers = {"type": "array", "items": {"type": "number"}}
-    names = {"type": "array", "items": _TEXT}
-    return {"parameters": names, "standard_errors": numbers, "correlations": {"type": "array", "items": numbers}}
+def _document(title: str, tables: Schema, models: _ModelSchemas) -> Schema:
+    return {"$schema": DRAFT, **tables, "title": title, "$defs": dict(sorted(models.definitions.items()))}
 
 
-def _observed() -> Schema:
-    deviation = _quantity("", 0.0)
-    return {"anyOf": [deviation, _table({"deviation": deviation, "column": _TEXT}, ("deviation",))]}
-
-
-def _plant_uncertainty() -> Schema:
-    deviations = {"type": "object", "additionalProperties": _quantity("")}
-    ends = {"type": "object", "additionalProperties": _list_of(_quantity(""))}
-    keys = {plant_uncertainty.DEVIATIONS: deviations, "records": {"type": "integer", "minimum": 1}}
-    return {**keys, "factors": deviations, "ranges": ends, "rates": deviations, **_uncertainty()}
-
-
-def _error_band() -> Schema:
-    numbers = {**dict.fromkeys(stated_band.WIDTHS, _quantity("", 0.0))}
-    numbers |= {key: _quantity(unit, 0.0) for key, unit in stated_band.RATES.items()}
-    texts = dict.fromkeys(("source", "new_specimen_source"), _TEXT)
-    lists = {"specimens": _list_of(_TEXT), "resting_lengths": _list_of(_quantity("m", 0.0))}
-    return {"quantity": {"enum": list(stated_band.PREDICTED)}, **numbers, **texts, **lists}
+def _table(properties: Schema, required: Sequence[str] = ()) -> Schema:
+    required_keys = {"required": list(required)} if required else {}
+    return {"type": "object", "properties": properties, **required_keys, "additionalProperties": False}
 
 
 def _list_of(items: Schema) -> Schema:
     return {"type": "array", "items": items}
 
 
-def _document(title: str, properties: Schema, required: Sequence[str], models: _ModelSchemas) -> Schema:
-    return {
-        "$schema": DRAFT,
-        "title": title,
-        **_table(properties, required),
-        "$defs": dict(sorted(models.definitions.items())),
-    }
-
-
-def _select_keys(tables: Schema, keys: Sequence[str]) -> Schema:
-    """The schemas of the keys that the loader of the file accepts, in their order; KeyError if one is missing."""
-    return {key: tables[key] for key in keys}
-
-
-def _table(properties: Schema, required: Sequence[str] = ()) -> Schema:
-    required_keys = {"required": list(required)} if required else {}
-    return {"type": "object", "properties": properties, **required_keys, "additionalProperties": False}
+def _by_name(items: Schema) -> Schema:
+    return {"type": "object", "additionalProperties": items}
 
 
 def _quantity(unit: str, low: float = -math.inf, high: float = math.inf) -> Schema:
@@ -148,47 +95,77 @@ class _ModelSchemas:
 
     def kind(self, cls: type[Any]) -> Schema:
         """Any model of a class: a table that names it, or its name alone if it needs no parameters."""
+        if only_class(cls) is not None:
+            return self._reference(cls)
         name = f"Any{cls.__name__}"
         if name not in self.definitions:
             self.definitions[name] = {}  # placeholder, because its members may contain the same kind
-            members = [n for n in model_names() if issubclass(model_class(n, "schema"), cls)]
-            alone = [n for n in members if not _required_fields(model_class(n, "schema"))]
-            tables = [self._reference(n) for n in members]
+            members = [model_class(n, "schema") for n in model_names(cls)]
+            alone = [member.__name__ for member in members if not _required_keys(member)]
+            tables = [self._reference(member) for member in members]
             if cls is Orifice:
                 tables.append(_table({"library": _TEXT, "path": {"enum": list(PATHS)}}, ("library",)))
             self.definitions[name] = {"anyOf": [*([{"enum": alone}] if alone else []), *tables]}
         return {"$ref": f"#/$defs/{name}"}
 
-    def _reference(self, name: str) -> Schema:
+    def _reference(self, cls: type[Any]) -> Schema:
+        name = cls.__name__
         if name not in self.definitions:
             self.definitions[name] = {}
-            self.definitions[name] = self.table(model_class(name, "schema"))
+            self.definitions[name] = self.table(cls, model_needed=only_class(cls) is None)
         return {"$ref": f"#/$defs/{name}"}
 
     def table(self, cls: type[Any], *, model_needed: bool | None = True) -> Schema:
-        """Table of one model; the key `model` is required (True), optional (False) or not allowed (None)."""
-        properties: Schema = {} if model_needed is None else {"model": {"const": cls.__name__}}
+        """Table of one class; the key `model` is required (True), optional (False) or not allowed (None)."""
+        is_model = hasattr(cls, "from_file") and model_needed is not None
+        properties: Schema = {"model": {"const": cls.__name__}} if is_model else {}
         declared = {p.name: p for p in parameters(cls)}
         hints = typing.get_type_hints(cls)
         for field in dataclasses.fields(cls):
-            if field.init:
-                properties[field.name] = self.field(declared.get(field.name), hints[field.name])
-        of_plant = plant_fields(cls)
-        required = [*(["model"] if model_needed else []), *(n for n in _required_fields(cls) if n not in of_plant)]
+            if field.init and (key := field.metadata.get("key", field.name)):
+                properties[key] = self._field(cls, field, declared.get(field.name), hints[field.name])
+        own = [*(["model"] if is_model and model_needed else []), *_required_keys(cls)]
         summary = " ".join(inspect.cleandoc(cls.__doc__ or "").partition("\n\n")[0].split())
-        return {"description": summary, **_table(properties, required)}
+        return {"description": summary, **_table(properties, [n for n in own if n not in plant_fields(cls)])}
 
-    def field(self, declared: Parameter | None, hint: Any) -> Schema:
-        """A parameter with meaning, unit and bounds, or a structural field."""
-        if declared is None:
-            return self.part(hint)
-        number = _quantity("" if declared.unit in RELATIVE else declared.unit, *declared.bounds)
-        if typing.get_origin(hint) is tuple:
+    def _field(self, cls: type[Any], field: dataclasses.Field[Any], declared: Parameter | None, hint: Any) -> Schema:
+        """A field of a class: a number with meaning, unit and bounds, a value with a reader of its own, or a part."""
+        if declared is not None:
+            return self.number(declared, hint, (cls, field.name) in _ANY_UNIT)
+        if "read" in field.metadata:
+            return {"description": field.metadata["meaning"], **self._read(field.metadata["read"])}
+        if (cls, field.name) in _CHOICES:
+            return {"enum": list(_CHOICES[cls, field.name])}
+        return self.part(hint)
+
+    def number(self, declared: Parameter, hint: Any, any_unit: bool) -> Schema:
+        """A declared parameter."""
+        number = _quantity("" if any_unit or declared.unit in RELATIVE else declared.unit, *declared.bounds)
+        if any(origin(option) is tuple for option in options(hint)):
             column = _table({"file": _TEXT, "column": _TEXT}, ("file", "column"))
-            number = {"anyOf": [{"type": "array", "items": number}, column]}
+            number = {"anyOf": [_list_of(number), column]}
         unit = "" if declared.unit == "1" else f" [{declared.unit}]"
         default = {"default": declared.default} if isinstance(declared.default, float | int) else {}
         return {"description": f"{declared.symbol}{unit}: {declared.meaning}", **number, **default}
+
+    def _read(self, reader: Any) -> Schema:
+        """What a reader of a field takes."""
+        if isinstance(reader, values.Number):
+            return _quantity(reader.unit, 0.0 if reader.positive else -math.inf)
+        if isinstance(reader, values.BySignal):
+            number = _quantity("", 0.0 if reader.positive else -math.inf)
+            return _by_name(_list_of(number) if reader.pairs else number)
+        if reader is values.read_observed:
+            deviation = _quantity("", 0.0)
+            return _by_name({"anyOf": [deviation, _table({"deviation": deviation, "column": _TEXT}, ("deviation",))]})
+        if reader is plant_uncertainty.read_plant_uncertainty:
+            return self._reference(plant_uncertainty.UncertaintyTable)
+        if reader is initial_state.read_initial_table:
+            return _by_name(_quantity("m"))
+        if reader is inputs.read_drivers:
+            each = {"anyOf": [self.kind(Driver), _table({"library": _TEXT}, ("library",))]}
+            return _by_name({"anyOf": [*each["anyOf"], _list_of(each)]})
+        return _by_name(_TEXT)
 
     def muscle(self) -> Schema:
         """A muscle: the name of a library entry or of a file, or a table, which may be based on one."""
@@ -202,20 +179,17 @@ class _ModelSchemas:
         """A structural field, by its annotation."""
         if hint is Muscle:
             return self.muscle()
-        if typing.get_origin(hint) in (typing.Union, types.UnionType):
-            options = [self.part(option) for option in typing.get_args(hint) if option is not types.NoneType]
-            return options[0] if len(options) == 1 else {"anyOf": options}
-        if typing.get_origin(hint) is tuple:
-            return {"type": "array", "items": self.part(typing.get_args(hint)[0])}
+        if len(options(hint)) > 1:
+            parts = [self.part(option) for option in options(hint) if option is not types.NoneType]
+            return parts[0] if len(parts) == 1 else {"anyOf": parts}
+        if origin(hint) is tuple:
+            return _list_of(self.part(typing.get_args(hint)[0]))
         return {"type": _PLAIN[hint]} if hint in _PLAIN else self.kind(hint)
 
 
-def _required_fields(cls: type[Any]) -> list[str]:
-    return [
-        field.name
-        for field in dataclasses.fields(cls)
-        if field.init and field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
-    ]
+def _required_keys(cls: type[Any]) -> list[str]:
+    required = (f.metadata.get("key", f.name) for f in dataclasses.fields(cls) if is_required(f))
+    return [key for key in required if key]
 
 
 def _plant(models: _ModelSchemas) -> Schema:
@@ -224,48 +198,28 @@ def _plant(models: _ModelSchemas) -> Schema:
     needed = plant.pop("required")
     plant["properties"]["library"] = {"description": "a plant of the library, whose parts are replaced", **_TEXT}
     plant["anyOf"] = [{"required": ["library"]}, {"required": needed}]
-    plant["properties"]["muscle"] = {"anyOf": [*each["anyOf"], {"type": "array", "items": each}]}
+    plant["properties"]["muscle"] = {"anyOf": [*each["anyOf"], _list_of(each)]}
     return plant
 
 
 def _input(models: _ModelSchemas) -> Schema:
+    """Table of input signals; keys that are not reserved are inputs with their rows."""
     point = {"type": "array", "prefixItems": [_quantity("s"), _quantity("")], "minItems": 2, "maxItems": 2}
-    rows = {"description": "instants [s] and values", "type": "array", "items": point}
-    driver = models.kind(Driver)
-    each = {"anyOf": [driver, _table({"library": _TEXT}, ("library",))]}
-    chain = {"anyOf": [*each["anyOf"], {"type": "array", "items": each}]}
-    keys = {
-        "model": {"enum": ["Schedule", "SampledSignal"]},
-        "period": _quantity("s"),
-        "file": _TEXT,
-        "columns": {"type": "object", "additionalProperties": _TEXT},
-        "drivers": {"type": "object", "additionalProperties": chain},
+    reserved = models.table(inputs.SignalTable)["properties"]
+    reserved["model"] = {"enum": ["Schedule", "SampledSignal"]}
+    signal = {
+        "type": "object",
+        "properties": {key: value for key, value in reserved.items() if key != "drivers"},
+        "additionalProperties": {"description": "instants [s] and values", **_list_of(point)},
     }
-    reserved = _select_keys(keys, inputs.RESERVED_KEYS)
-    signal_keys = {key: value for key, value in reserved.items() if key != "drivers"}
-    signal = {"type": "object", "properties": signal_keys, "additionalProperties": rows}
     return {**signal, "properties": {**reserved, "controller": _controller(models, signal)}}
 
 
 def _controller(models: _ModelSchemas, setpoint: Schema) -> Schema:
     """A controller with its parameters, sample time and set point."""
-    keys = {"sample_time": _quantity("s", low=0.0), "setpoint": setpoint}
-    tables = []
-    for name in model_names():
-        cls = model_class(name, "schema")
-        if issubclass(cls, Controller):
-            table = models.table(cls)
-            table["properties"] |= _select_keys(keys, controller.LOOP_KEYS)
-            tables.append({**table, "required": [*table["required"], *controller.LOOP_KEYS]})
+    keys = {**models.table(controller.LoopTable)["properties"], "setpoint": setpoint}
+    tables = [models.table(model_class(name, "schema")) for name in model_names(Controller)]
+    for table in tables:
+        table["properties"] |= keys
+        table["required"] += controller.LOOP_KEYS
     return {"anyOf": tables}
-
-
-def _run(models: _ModelSchemas) -> Schema:
-    keys = {
-        "duration": _quantity("s", low=0.0),
-        "start_time": _quantity("s"),
-        "output_times": _quantity("s", low=0.0),
-        "initial_state": {"type": "object", "additionalProperties": _quantity("m")},
-        "integrator": models.kind(Integrator),
-    }
-    return _table(_select_keys(keys, scenario.RUN), ("duration",))

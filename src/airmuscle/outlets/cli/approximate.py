@@ -17,8 +17,8 @@ from ...core import leaves
 from ...core.errors import ParameterError
 from ...core.units import quantity
 from ...files.library.entry import Entry
+from ...files.library.entry_file import load_law
 from ...files.library.initial_law import find_initial_law
-from ...files.library.law_file import load_law
 from ...files.library.write import save
 from ...physics.muscle.characteristic import ValidityRange
 from ...physics.muscle.characteristic.validity_range import validity_range_of

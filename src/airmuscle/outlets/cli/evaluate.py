@@ -17,7 +17,7 @@ from ...core.errors import AirmuscleWarning, GeometryLimitError, PhysicsError, R
 from ...core.plotting import save
 from ...core.units import quantity
 from ...files.library.entry import Entry
-from ...files.library.law_file import load_law
+from ...files.library.entry_file import load_law
 from ...files.library.scaling import scale_entry
 from ...physics.muscle import Ratings
 from ...physics.muscle.characteristic import Characteristic, ForceLaw, ValidityRange

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from ...core.atomic_output import check_writable
-from ...files.library.law_file import load_law
+from ...files.library.entry_file import load_law
 from ...files.scenario.scenario import load_scenario
 from ..export import (
     C99,

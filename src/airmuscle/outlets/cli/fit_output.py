@@ -10,7 +10,7 @@ from typing import Any
 from ...bench.identify import Fit
 from ...core.atomic_output import atomic_folder
 from ...files.library.entry import Entry
-from ...files.library.fit_files import write_fit
+from ...files.library.write import write_fit
 from ...recording import Recording
 from ...report.chapter import Chapter
 from .option_hints import in_options

@@ -17,9 +17,9 @@ from ...core.declaration import parameters
 from ...core.errors import ParameterError, PhysicsError
 from ...core.units import quantity
 from ...files.library.entry import Entry
+from ...files.library.entry_file import load_law
 from ...files.library.fitted_entry import list_files
 from ...files.library.initial_law import resting_lengths
-from ...files.library.law_file import load_law
 from ...files.library.write import part_toml, save
 from ...physics.muscle.characteristic import ValidityRange
 from ...physics.muscle.characteristic.energy_defect import EnergyDefect, maxwell_defect

@@ -17,7 +17,7 @@ from ...bench.identify.hysteresis.selection import SelectedFriction, select_fric
 from ...bench.readers.reading_chapter import reading_chapters
 from ...core.atomic_output import atomic_folder, check_writable
 from ...files.library.entry import Entry
-from ...files.library.law_file import load_law
+from ...files.library.entry_file import load_law
 from ...files.library.uncertainty import without_parts
 from ...files.library.write import part_toml, save
 from ...physics.muscle.characteristic.base import ForceLaw

@@ -9,10 +9,8 @@ from pathlib import Path
 
 from ...files.library.files import (  # fmt: skip
     DATA,
+    FOLDERS,
     LAWS,
-    PLANTS,
-    PRODUCTS,
-    VALVES,
     list_data,
     list_laws,
     list_plants,
@@ -62,9 +60,9 @@ def library_rows() -> list[ListRow]:
     laws = [_entry_row(LAWS / f"{name}.toml") for name in list_laws()]
     return [
         *(_with_data_set(row, data.pop(row.name)) if row.name in data else row for row in laws),
-        *(_valve_row(VALVES / f"{name}.toml") for name in list_valves()),
-        *(_plant_row(PLANTS / f"{name}.toml") for name in list_plants()),
-        *(_product_row(PRODUCTS / f"{name}.toml") for name in list_products()),
+        *(_valve_row(FOLDERS["valve"] / f"{name}.toml") for name in list_valves()),
+        *(_plant_row(FOLDERS["plant"] / f"{name}.toml") for name in list_plants()),
+        *(_product_row(FOLDERS["product"] / f"{name}.toml") for name in list_products()),
         *data.values(),
     ]
 

@@ -12,8 +12,8 @@ from ...bench.readers import write_csv
 from ...core.atomic_output import atomic_folder, check_writable
 from ...core.display import quantity_text
 from ...core.units import quantity
+from ...files.library.entry_file import load_law
 from ...files.library.files import is_path, read_toml
-from ...files.library.law_file import load_law
 from ...physics.muscle.characteristic import ValidityRange
 from .options import Json, Name, OptionalFolder
 from .plan_records import describes_study, plan_records

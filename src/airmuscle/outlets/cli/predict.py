@@ -15,9 +15,10 @@ from ...bench.readers.reading_chapter import reading_chapters
 from ...core.atomic_output import atomic_folder, check_writable
 from ...core.errors import FileError
 from ...core.units import quantity
+from ...files.library.entry import PlantEntry
+from ...files.library.entry_file import kind_of, load_law
 from ...files.library.entry_prediction import predict_with_entry
 from ...files.library.files import is_path, list_plants, read_toml
-from ...files.library.law_file import describes_plant, load_law
 from ...files.scenario.prediction import load_plant_model
 from ...report.write import write_into
 from .bench_files import read_recordings
@@ -116,7 +117,7 @@ def predict(
 def _is_plant(model: str) -> bool:
     """Whether the model is a plant: a scenario file, or a plant of the library."""
     if is_path(model) or Path(model).exists():
-        return describes_plant(read_toml(Path(model)))
+        return kind_of(read_toml(Path(model))) is PlantEntry
     return model in list_plants()
 
 

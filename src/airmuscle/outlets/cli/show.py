@@ -9,12 +9,9 @@ from ...core import cite, leaves
 from ...core.display import in_display_unit
 from ...core.tree import continues_list
 from ...files.library.catalogue import load
-from ...files.library.entry import Entry
+from ...files.library.entry import Entry, PlantEntry, ProductEntry, ValveEntry
 from ...files.library.files import entries_of_product
-from ...files.library.plant_file import PlantEntry
-from ...files.library.product_entry import ProductEntry
 from ...files.library.scaling import scale_entry
-from ...files.library.valve_entry import ValveEntry
 from ...physics.muscle import Ratings
 from ...report.formatting import format_number
 from .options import Diameter, Json, Name, RestingLength

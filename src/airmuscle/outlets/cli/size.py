@@ -23,7 +23,7 @@ from ...design.sizing import (
 )
 from ...design.sizing.choice import Requirement
 from ...design.sizing.sizing_chapter import choice_row, sizing_chapter
-from ...files.library.law_file import load_law
+from ...files.library.entry_file import load_law
 from ...report.formatting import format_number
 from ...report.write import write_into
 from .options import Json, OptionalFolder

@@ -9,9 +9,7 @@ import warnings
 
 from ...core.errors import AirmuscleWarning
 from ...files.library.catalogue import load
-from ...files.library.entry import Entry
-from ...files.library.plant_file import PlantEntry
-from ...files.library.valve_entry import ValveEntry
+from ...files.library.entry import Entry, PlantEntry, ValveEntry
 from ...physics.mechanism import HangingMass
 from ...physics.muscle import LinearDamper
 from ...physics.plant import Plant

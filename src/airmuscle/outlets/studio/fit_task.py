@@ -28,10 +28,9 @@ from ...bench.segment import check_contents, motion_direction
 from ...core.atomic_output import atomic_folder
 from ...core.errors import AirmuscleError, AirmuscleWarning
 from ...files.library.entry import Entry
-from ...files.library.fit_files import write_fit
 from ...files.library.fitted_entry import fitted_entry, left_out_ratio, missing_geometry
 from ...files.library.initial_law import find_initial_law, resting_lengths
-from ...files.library.write import part_toml
+from ...files.library.write import part_toml, write_fit
 from ...report.write import as_json, write_into
 from .fit_hints import as_field_error, in_page_words
 from .fit_reading import read_set

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
 from ...core.errors import ParameterError
-from ...files.library.entry_file import build_entry
+from ...files.library.entry_file import build_entry, check_describes_law, load_law
 from ...files.library.files import is_path, list_plants, read_toml
-from ...files.library.law_file import describes_plant, describes_product, describes_valve, load_law
 from ...files.library.location import Location
 from ...files.library.plant_file import plant_tables
 from .law_sheet import law_sheet
 from .plant_sheet import sheet_of_plant, sheet_of_tables
 from .uploads import read_text_tables
 
-UPLOADED = Path("muscle.toml")
-"""The name of a text of a user in messages."""
+UPLOADED = Location("muscle.toml", "", Path())
+"""The location of a text of a user in messages."""
 
 
 def sheet_of_library_plant(name: str) -> dict[str, Any]:
@@ -58,7 +58,5 @@ def sheet_of_law(name: str) -> dict[str, Any]:
 def sheet_of_law_text(text: str) -> dict[str, Any]:
     """The sheet of a muscle file of a user. Raises ParameterError for another kind of file."""
     tables = read_text_tables(text)
-    for kind, described in (("plant", describes_plant), ("valve", describes_valve), ("product", describes_product)):
-        if described(tables):
-            raise ParameterError(f"the text describes a {kind}; a muscle or a law is required.")
-    return {**law_sheet(build_entry(tables, "own muscle", UPLOADED, Path())), "own_text": text}
+    check_describes_law(tables, "the text")
+    return {**law_sheet(dataclasses.replace(build_entry(tables, UPLOADED), name="own muscle")), "own_text": text}

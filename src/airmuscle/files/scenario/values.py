@@ -1,0 +1,186 @@
+"""Values in the tables of scenarios, fits and predictions: numbers, and numbers by the names of signals of the plant.
+
+Tables of these files are dataclasses, whose fields are declared with `custom_field` and a reader of this module. What
+the reader knows is the plant.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+from ...bench.identify.dynamic import InitialValue, StartTime
+from ...bench.identify.dynamic.experiment import ParameterPaths, RecordUnknown
+from ...core import tree
+from ...core.annotation import abridged
+from ...core.errors import ParameterError
+from ...engine.run import Integrator
+from ...physics.plant.plant import Plant
+from ...recording.columns import quantity_of
+from ..library.build import TableReader
+from ..library.fields import custom_field
+from ..library.location import Location, check_keys, read_finite_number, read_text
+from ..library.plant_file import PLANT_READER
+from .initial_state import PRESSURE, pressure_names
+
+MAX_STARTS, MAX_SEED = 10_000, 2**32 - 1
+"""Maximum number of starting points of a search (chosen), and greatest seed."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Number:
+    """Reader of a finite number in SI units; a `positive` one is greater than zero."""
+
+    unit: str
+    positive: bool = False
+
+    def __call__(self, value: Any, plant: Plant | None, where: object) -> float:
+        number = read_finite_number(value, self.unit, where)
+        if self.positive and not number > 0:
+            raise ParameterError(f"{where} is {abridged(value)}; it must be greater than zero.")
+        return number
+
+
+@dataclasses.dataclass(frozen=True)
+class BySignal:
+    """Reader of a table of numbers, or of pairs of minimum and maximum, by the names of quantities of the plant.
+
+    unit  of all numbers; by default that of the quantity, followed by `per`
+    """
+
+    unit: str | None = None
+    per: str = ""
+    pairs: bool = False
+    positive: bool = False
+
+    def __call__(self, value: Any, plant: Plant, where: Location) -> dict[str, Any]:
+        return {
+            name: self._read(item, name, plant, where.at(name))
+            for name, item in read_table(value, plant, where).items()
+        }
+
+    def _read(self, value: Any, name: str, plant: Plant, where: Location) -> Any:
+        number = Number(self.unit or f"{signal_unit(name, plant) or '1'}{self.per}", self.positive)
+        if not self.pairs:
+            return number(value, plant, where)
+        if not isinstance(value, list) or len(value) != 2:
+            raise ParameterError(f"{where} is {abridged(value)}; it must be a list of minimum and maximum.")
+        return number(value[0], plant, where), number(value[1], plant, where)
+
+
+def read_table(value: Any, plant: Any, where: Location) -> Mapping[str, Any]:
+    """A table as it is. Raises ParameterError for anything else."""
+    if not isinstance(value, Mapping):
+        raise ParameterError(f"{where} is {abridged(value)}; it must be a table.")
+    return value
+
+
+def table_reader(plant: Plant) -> TableReader:
+    """The reader of tables whose fields depend on the plant."""
+    return dataclasses.replace(PLANT_READER, known=plant)
+
+
+def optional_table(tables: Mapping[str, Any], key: str, location: Location) -> Mapping[str, Any]:
+    """A table inside tables; empty if it is missing. Raises ParameterError if the value is not a table."""
+    table = tables.get(key, {})
+    if not isinstance(table, Mapping):
+        raise ParameterError(f"{location}: the table [{key}] is {abridged(table)}; it must be a table.")
+    return table
+
+
+def required_table(tables: Mapping[str, Any], key: str, location: Location) -> Mapping[str, Any]:
+    """A table that must be there. Raises ParameterError."""
+    if key not in tables:
+        raise ParameterError(f"{location}: the table [{key}] is missing.")
+    return optional_table(tables, key, location)
+
+
+def signal_unit(name: str, plant: Plant) -> str | None:
+    """Unit of a quantity or a state of the plant; None if unknown."""
+    quantity = quantity_of(name)
+    return quantity.unit if quantity else next((s.unit for s in plant.states if s.name == name), None)
+
+
+def read_observed(table: Any, plant: Plant, where: Location) -> dict[str, tuple[float, str]]:
+    """Standard deviation [SI] and column of each measured output. Raises ParameterError or UnitError."""
+    observed, table, where = {}, read_table(table, plant, where), where.inside("")
+    for name, value in table.items():
+        entry = value if isinstance(value, Mapping) else {"deviation": value}
+        check_keys(entry, ("deviation", "column"), where.inside(name))
+        deviation = Number(signal_unit(name, plant) or "1", positive=True)(
+            entry.get("deviation"), plant, where.at(name)
+        )
+        observed[name] = deviation, read_text(entry, "column", where.inside(name), needed=False) or name
+    if not observed:
+        raise ParameterError(
+            f'{where}: no output is given; write pressure = "500 Pa", the standard deviation of its sensor.'
+        )
+    return observed
+
+
+def read_paths(value: Any, plant: Plant, where: Location) -> tuple[ParameterPaths, ...]:
+    """Paths of parameters; an item may also be a list of paths with one common value. Raises ParameterError."""
+    if not isinstance(value, list):
+        raise ParameterError(
+            f'{where} is {abridged(value)}; it must be a list of paths, such as ["circuit.fill.conductance"].'
+        )
+    for item in value:
+        paths = item if isinstance(item, list) and item else [item]
+        if not all(isinstance(path, str) for path in paths):
+            raise ParameterError(
+                f"{where} contains {abridged(item)}; each item must be a path in quotes, or a list of paths with one "
+                "common value."
+            )
+    return tuple(tuple(item) if isinstance(item, list) else item for item in value)
+
+
+def read_bounds(value: Any, plant: Plant, where: Location) -> dict[str, tuple[float, float]]:
+    """The bounds of parameters [SI] by path. Raises ParameterError or UnitError."""
+    declared = {leaf.path: leaf.declared for leaf in tree.leaves(plant)}
+    bounds = {}
+    for path, pair in read_table(value, plant, where).items():
+        check_keys({path: pair}, tuple(declared), where)
+        place = where.at(path)
+        if not isinstance(pair, list) or len(pair) != 2:
+            raise ParameterError(
+                f"{place} is {abridged(pair)}; it must be a list of minimum and maximum, such as [1.01, 1.4]."
+            )
+        low, high = (read_finite_number(end, declared[path].unit, place) for end in pair)
+        lower, upper = declared[path].bounds
+        if low < lower or high > upper:
+            raise ParameterError(f"{place} is {abridged(pair)}; allowed range: {lower:g} to {upper:g}.")
+        if not low < high:
+            raise ParameterError(f"{place} is {abridged(pair)}; the minimum must be less than the maximum.")
+        bounds[path] = low, high
+    return bounds
+
+
+@dataclasses.dataclass(frozen=True)
+class FitTable:
+    """Table [fit] of a dynamic fit or, without what concerns the search, of a prediction."""
+
+    free: tuple[ParameterPaths, ...] = custom_field(read_paths, "unknowns of all records", default=())
+    own: tuple[ParameterPaths, ...] = custom_field(read_paths, "unknowns of each record", default=())
+    start_time: float | None = custom_field(Number("s", positive=True), "margin of the start time", default=None)
+    initial_state: Mapping[str, float] = custom_field(
+        BySignal(positive=True), "margins of initial values", default_factory=dict
+    )
+    starts: int = 1
+    seed: int = 0
+    integrator: Integrator | None = None
+    bounds: Mapping[str, tuple[float, float]] = custom_field(read_bounds, "bounds by path", default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name, value, low, high in (("starts", self.starts, 1, MAX_STARTS), ("seed", self.seed, 0, MAX_SEED)):
+            if not low <= value <= high:
+                raise ParameterError(f"{name} is {abridged(value)}; allowed range: {low} to {high}.")
+
+    def unknowns(self, plant: Plant) -> tuple[RecordUnknown, ...]:
+        """The unknowns of each record: parameters, the start time and initial values, within their margins."""
+        found: list[RecordUnknown] = list(self.own)
+        if self.start_time is not None:
+            found.append(StartTime(self.start_time))
+        for name, within in self.initial_state.items():
+            found += [InitialValue(each, within) for each in (pressure_names(plant) if name == PRESSURE else (name,))]
+        return tuple(found)
