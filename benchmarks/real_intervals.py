@@ -46,11 +46,8 @@ def print_row(name: str, fits: list[am.bench.Fit], places: list[am.Recording]) -
     return held
 
 
-def main() -> None:
-    """Print a row for each length and degree, and for each pooled law."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path)
-    repeated = repeats(parser.parse_args().folder)
+def held_points(repeated: tuple[list[am.Recording], list[am.Recording]]) -> tuple[np.ndarray, np.ndarray]:
+    """Masks of the points of all surfaces and of all pooled laws; a row is printed for each."""
     print(f"{'law':<67}{'rms':>7}{'half width':>12}{'difference':>12}{'held':>8}  standard errors")
     surfaces, pooled, places = [], [], []
     for name in sorted({str(run.constants["specimen"]) for run in repeated[0]}):
@@ -62,12 +59,19 @@ def main() -> None:
             surfaces.append(
                 print_row(f"{name}, degree {degree}", [am.fit(surface, runs) for runs in pair], places[-1:])
             )
-    print(f"all points: {100 * np.mean(np.concatenate(surfaces)):.0f} %")
     for candidate in am.bench.standard_candidates(repeated[0]):
         if isinstance(candidate.law, am.characteristic.PooledLengthLaw):
             fits = [am.fit(candidate.law, runs) for runs in repeated]
             pooled.append(print_row(candidate.name, fits, places))
-    print(f"all points: {100 * np.mean(np.concatenate(pooled)):.0f} %")
+    return np.concatenate(surfaces), np.concatenate(pooled)
+
+
+def main() -> None:
+    """Print a row for each length and degree, and for each pooled law."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path)
+    for kind, held in zip(("surfaces", "pooled laws"), held_points(repeats(parser.parse_args().folder)), strict=True):
+        print(f"all points of {kind}: {100 * np.mean(held):.0f} %")
 
 
 if __name__ == "__main__":
