@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import concurrent.futures
 import copy
+import dataclasses
+import enum
+import functools
+import inspect
 import multiprocessing
 import pickle
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import control_plants
@@ -15,10 +20,11 @@ import pytest
 from plants import EXAMPLES
 
 import airmuscle as am
-from airmuscle import bench, control, design, engine, outlets, physics
-from airmuscle.outlets.environments import PlantEnv, PlantVectorEnv, joint_task
+from airmuscle import bench, control, design, engine, files, outlets, physics
+from airmuscle.outlets.environments import PlantEnv, PlantVectorEnv, arm_task, joint_task, lift_task
 from airmuscle.units import bar
 
+EXAMPLE_FILES = Path(__file__).parents[2] / "examples"
 COPIES: dict[str, Callable[[Any], Any]] = {
     "pickle": lambda thing: pickle.loads(pickle.dumps(thing)),
     "copy": copy.copy,
@@ -70,6 +76,20 @@ def linear_model() -> Any:
     return am.linearise(LIFT, LIFT.state_at(pressure=2 * bar, position=0.01))
 
 
+MADE_BY_AN_EXPORT = {outlets.MuscleActuator}
+"""Classes of which an object is made together with files."""
+
+
+def predictive() -> Any:
+    permitted = {"position": 1e-3, "speed": 0.1, "fill": 0.1, "discharge": 0.1}
+    noises = {"process_noise": {"air_mass": 1e-6, "speed": 0.1, "air_mass.disturbance": 1e-5},
+              "measurement_noise": {"position": 1e-4}}  # fmt: skip
+    one = ("position",)
+    return control.design_predictive(
+        linear_model(), 0.01, measured=one, controlled=one, disturbed=("air_mass",), permitted=permitted, **noises
+    )
+
+
 RESULTS: dict[str, Callable[[], Any]] = {
     "a problem": open_loop,
     "a solved problem": lambda: used(open_loop()),
@@ -103,6 +123,12 @@ RESULTS: dict[str, Callable[[], Any]] = {
         LIFT, ("pressure",), 0.01, {}, {"pressure": 500.0}
     ),
     "an entry of the library": lambda: am.load("dmsp-20-300"),
+    "a scenario of the library": lambda: files.load_scenario(EXAMPLE_FILES / "pressure_loop.toml"),
+    "a study": lambda: design.load_study(EXAMPLE_FILES / "valve_study.toml"),
+    "a learning law": lambda: control.IterativeLearning(0.01, (1.0, 0.5)),
+    "a predictive law": predictive,
+    "tasks of an arm and of a lift": lambda: (*arm_task(), *lift_task()),
+    "a reader of rows": lambda: bench.RowReader("log"),
 }
 
 
@@ -111,6 +137,39 @@ RESULTS: dict[str, Callable[[], Any]] = {
 def test_results_can_be_copied(name, way):
     thing = RESULTS[name]()
     assert type(COPIES[way](thing)) is type(thing)
+
+
+def parts(thing: Any, seen: set[int]) -> Iterator[Any]:
+    """An object and the objects of this package inside it."""
+    if id(thing) in seen:
+        return
+    seen.add(id(thing))
+    yield thing
+    inner = thing.values() if isinstance(thing, dict) else thing if isinstance(thing, tuple | list) else ()
+    if type(thing).__module__.startswith("airmuscle"):
+        inner = [*inner, *vars(thing).values()] if hasattr(thing, "__dict__") else inner
+    for each in inner:
+        yield from parts(each, seen)
+
+
+def test_every_public_class_that_stores_more_than_its_fields_is_among_the_results():
+    """A class that is no plain data, or that stores what it has computed, can fail to be copied; others cannot."""
+    made = [make() for make in RESULTS.values()]
+    known = {cls for thing in parts((made, *EXAMPLES.values()), set()) for cls in type(thing).__mro__}
+    faces = (am, bench, control, design, engine, files, outlets, physics)
+    public = {f"{face.__name__}.{name}": getattr(face, name) for face in faces for name in face.__all__}
+    missing = {
+        name
+        for name, cls in public.items()
+        if inspect.isclass(cls) and not inspect.isabstract(cls) and not issubclass(cls, BaseException)
+        if cls not in known and cls not in MADE_BY_AN_EXPORT
+        if not (dataclasses.is_dataclass(cls) or issubclass(cls, tuple | enum.Enum)) or stores_results(cls)
+    }
+    assert missing == set()
+
+
+def stores_results(cls: type) -> bool:
+    return any(isinstance(each, functools.cached_property) for base in cls.__mro__ for each in vars(base).values())
 
 
 @pytest.mark.parametrize("way", COPIES)
