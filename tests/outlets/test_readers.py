@@ -433,7 +433,7 @@ def test_a_mapping_that_does_not_match_the_file_is_an_error(tmp_path: Path, colu
         ("[columns]\np = 3", ParameterError, "column 'p' is mapped to 3; write 'pressure [bara]'"),
         ("columns = 3", ParameterError, "columns must be a table"),
         ("sheet = 3", ParameterError, "sheet = 3; it must be a quoted text"),
-        ("x = ", FileError, "rig.toml: is not a valid TOML file"),
+        ("x = ", FileError, "rig.toml: is not valid TOML"),
         ('delimiter = ","\ndecimal = ","', ParameterError, "are both ','"),
         ('decimal = "x"', ParameterError, "it must be '.' or ','"),
         ('delimiter = "x"', ParameterError, "it must be a comma, semicolon, tab, blank"),

@@ -23,9 +23,14 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import re
 import unicodedata
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Self
+
+MAX_WORD = 200
+"""Maximum number of characters of an argument that a message quotes (chosen)."""
+_LONG_WORD = re.compile(rf"\S{{{MAX_WORD + 1},}}")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -117,6 +122,11 @@ def printable(text: str) -> str:
     return text if text.isprintable() else "".join(c if _is_printable(c) else _escape(c) for c in text)
 
 
+def quotable(text: str) -> str:
+    """The printable text, without the middle of words that are longer than any name, such as the contents of a file."""
+    return _LONG_WORD.sub(lambda word: f"{word[0][: MAX_WORD - 40]}…{word[0][-39:]}", printable(text))
+
+
 def _is_printable(character: str) -> bool:
     return character.isprintable() or character in "\n\t" or unicodedata.category(character) == "Zs"
 
@@ -138,7 +148,7 @@ class AirmuscleError(Exception):
 
     def __init__(self, message: str = "", *, hint: Hint | None = None) -> None:
         text = message if isinstance(message, HintedText) else HintedText(str(message))
-        super().__init__(HintedText(text, *([] if hint is None else [hint])).changed(printable))
+        super().__init__(HintedText(text, *([] if hint is None else [hint])).changed(quotable))
 
     @property
     def message(self) -> HintedText:

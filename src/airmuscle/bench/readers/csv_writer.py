@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import TextIO
 
-from ...core.annotation import one_line
+from ...core.annotation import abridged, one_line
 from ...core.atomic_output import atomic_file
 from ...core.errors import FileError, ParameterError
 from ...recording.recording import Recording, column_heading
@@ -27,7 +27,7 @@ def write_csv(recording: Recording, path: str | Path, *, comments: bool = True) 
             f"write_csv: {one_line(recording)} is not a Recording. Pass the result of simulate, read or read_csv."
         )
     if not isinstance(path, str | Path):
-        raise FileError(f"write_csv: {path!r} is not a path. Pass the name of a file.")
+        raise FileError(f"write_csv: {abridged(path)} is not a path. Pass the name of a file.")
     path = Path(path)
     try:
         with atomic_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:

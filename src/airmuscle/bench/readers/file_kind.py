@@ -1,4 +1,4 @@
-"""File kind: type of a path, checked before any of its contents is read.
+"""File kind: type of a path, checked before any of its contents is read; and the reading of TOML.
 
 A pipe or a device may have no end, and the contents of a binary file are no table.
 """
@@ -6,8 +6,11 @@ A pipe or a device may have no end, and the contents of a binary file are no tab
 from __future__ import annotations
 
 import os
+import re
 import stat
+import tomllib
 from pathlib import Path
+from typing import Any
 
 from ...core.errors import FileError
 
@@ -26,6 +29,10 @@ _KINDS = (
     (stat.S_ISSOCK, "a socket"),
 )  # fmt: skip
 
+MAX_TOML, MAX_KEYS = 4_000_000, 50
+"""Maximum size of a TOML file [bytes], and parts of a key (chosen): the parser takes the square of the latter."""
+_DEEP_KEY = re.compile(r"(?:[\w-]+[ \t]*\.[ \t]*)" + f"{{{MAX_KEYS}}}")
+
 
 def check_regular_file(path: Path) -> None:
     """Raise FileError unless the path is a regular file that is not empty; the file is not opened.
@@ -42,6 +49,31 @@ def check_regular_file(path: Path) -> None:
         raise FileError(f"{path}: cannot be read, because it is {kind}. Pass a regular file; copy the data into one.")
     if not state.st_size:
         raise FileError(f"{path}: the file is empty.")
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The tables of a TOML file. Raises FileError if it cannot be read or is not valid TOML."""
+    check_regular_file(path)
+    if path.stat().st_size > MAX_TOML:
+        raise FileError(f"{path}: the file has more than {MAX_TOML} bytes. Write its numbers to a data file.")
+    try:
+        return parse_toml(path.read_text(encoding="utf-8-sig"), str(path))
+    except OSError as error:
+        raise FileError(f"{path}: cannot be read ({error.strerror}). Check the name and the folder.") from None
+    except UnicodeDecodeError as error:
+        raise FileError(f"{path}: is not UTF-8 text (byte {error.start}). Save it as UTF-8.") from None
+
+
+def parse_toml(text: str, origin: str) -> dict[str, Any]:
+    """The tables of a TOML text. Raises FileError if it is not valid; `origin` begins the message."""
+    if _DEEP_KEY.search(text):
+        raise FileError(f"{origin}: a key has more than {MAX_KEYS} parts between dots.")
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise FileError(f"{origin}: is not valid TOML: {error}.") from None
+    except (ValueError, RecursionError) as error:  # an integer of thousands of digits, or brackets in brackets
+        raise FileError(f"{origin}: cannot be read ({error}).") from None
 
 
 def check_text_file(path: Path) -> None:

@@ -25,17 +25,16 @@ spare = ""
 from __future__ import annotations
 
 import dataclasses
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ...core.annotation import check_field_types
-from ...core.errors import ColumnError, FileError, ParameterError, suggestion
+from ...core.annotation import abridged, check_field_types
+from ...core.errors import AirmuscleError, ColumnError, ParameterError, suggestion
 from ...recording.columns import QUANTITIES
 from ...recording.heading import parse_heading
 from .constants import parse_constant_name
-from .file_kind import check_regular_file
+from .file_kind import read_toml
 from .file_name import FileNamePattern
 from .header import bare_heading
 from .missing_values import MISSING_VALUES, MissingValues
@@ -142,14 +141,7 @@ class ColumnMapping:
 def read_mapping(path: str | Path) -> ColumnMapping:
     """Read a mapping from a TOML file. Raises FileError, ParameterError or ColumnError."""
     path = Path(path)
-    check_regular_file(path)
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as reason:
-        raise FileError(f"{path}: cannot be read ({reason.strerror}). Check the name and the folder.") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as reason:
-        raise FileError(f"{path.name}: is not a valid TOML file ({reason}).") from None
-    return mapping_of_tables(content, path.name)
+    return mapping_of_tables(read_toml(path), path.name)
 
 
 def mapping_of_tables(content: Mapping[str, Any], where: str) -> ColumnMapping:
@@ -162,7 +154,7 @@ def mapping_of_tables(content: Mapping[str, Any], where: str) -> ColumnMapping:
                 f"{where}: unknown key '{key}'; allowed range: {', '.join(known)}.{suggestion(key, known)}"
             )
         if key in _TEXTS and not isinstance(value, str):
-            raise ParameterError(f"{where}: {key} = {value!r}; it must be a quoted text.")
+            raise ParameterError(f"{where}: {key} = {abridged(value)}; it must be a quoted text.")
     _check_numbers(content, where)
     columns = content.pop("columns", {})
     if not isinstance(columns, dict):
@@ -170,16 +162,19 @@ def mapping_of_tables(content: Mapping[str, Any], where: str) -> ColumnMapping:
     if not isinstance(content.get("constants", {}), dict):
         raise ParameterError(f"{where}: constants must be a table: [constants], followed by one line per constant.")
     headings = {name: _parse_entry(where, name, value) for name, value in columns.items()}
-    return ColumnMapping().with_overrides(columns=headings, **content)
+    try:
+        return ColumnMapping().with_overrides(columns=headings, **content)
+    except AirmuscleError as error:
+        raise error.located(where) from None
 
 
 def _check_numbers(content: dict[str, Any], where: str) -> None:
     """Check `skip_rows` and `missing_codes`, which becomes a tuple. Raises ParameterError."""
     skip, codes = content.get("skip_rows", 0), content.get("missing_codes", [])
     if not isinstance(skip, int) or isinstance(skip, bool):
-        raise ParameterError(f"{where}: skip_rows = {skip!r}; it must be a number of lines, such as 7.")
+        raise ParameterError(f"{where}: skip_rows = {abridged(skip)}; it must be a number of lines, such as 7.")
     if not isinstance(codes, list) or not all(isinstance(c, float | int | str) and c is not True for c in codes):
-        raise ParameterError(f'{where}: missing_codes = {codes!r}; it must be a list, such as [-999, "OL"].')
+        raise ParameterError(f'{where}: missing_codes = {abridged(codes)}; it must be a list, such as [-999, "OL"].')
     if codes:
         content["missing_codes"] = tuple(code if isinstance(code, str) else float(code) for code in codes)
 
@@ -191,7 +186,7 @@ def _parse_entry(where: str, column: str, value: Any) -> str:
     if isinstance(value, dict) and isinstance(value.get("quantity"), str) and set(value) <= {"quantity", "unit"}:
         return f"{value['quantity']} [{value['unit']}]" if value.get("unit") else value["quantity"]
     raise ParameterError(
-        f"{where}: column '{column}' is mapped to {value!r}; write 'pressure [bara]' or "
+        f"{where}: column '{column}' is mapped to {abridged(value)}; write 'pressure [bara]' or "
         '{ quantity = "pressure", unit = "bara" }.'
     )
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...core.annotation import abridged
 from ...core.errors import ColumnError, FileError, Hint
 from ...recording.row_notes import list_rows
 from .file_kind import check_text_file
@@ -31,7 +32,7 @@ _THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}[.,]\d{3}")
 def read_csv_table(path: str | Path, text_format: TextFormat = TextFormat()) -> RawTable:
     """Read the table in a text file. Raises FileError or ColumnError."""
     if not isinstance(path, str | Path):
-        raise FileError(f"read_csv: {path!r} is not a path. Pass the name of a file.")
+        raise FileError(f"read_csv: {abridged(path)} is not a path. Pass the name of a file.")
     path = Path(path)
     check_text_file(path)
     lines = [(i, line) for i, line in enumerate(re.split(r"\r\n|\n|\r", _read_text(path)), 1) if has_content(line)]

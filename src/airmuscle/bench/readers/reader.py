@@ -7,6 +7,7 @@ import glob
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
+from ...core.annotation import abridged
 from ...core.errors import FileError, printable
 from ...recording.recording import Recording
 from ..checks import warn_of_suspicious_values
@@ -167,7 +168,7 @@ def find_files(source: Source) -> list[Path]:
     if not isinstance(source, str | Path):
         if not isinstance(source, Iterable):
             raise FileError(
-                f"read: {source!r} is not a path. Pass a file, a folder, a glob pattern, or a list of them."
+                f"read: {abridged(source)} is not a path. Pass a file, a folder, a glob pattern, or a list of them."
             )
         return [path for each in source for path in find_files(each)]
     path = Path(source)

@@ -8,6 +8,7 @@ import dataclasses
 import re
 from collections.abc import Mapping
 
+from ...core.annotation import abridged
 from ...core.errors import FileError, ParameterError
 from .header import (
     are_headings,
@@ -44,12 +45,12 @@ class TextFormat:
     def __post_init__(self) -> None:
         if self.delimiter is not None and self.delimiter not in _DELIMITERS:
             raise ParameterError(
-                f"delimiter is {self.delimiter!r}; it must be a comma, semicolon, tab, blank or '|'. Omit it for "
-                "automatic detection."
+                f"delimiter is {abridged(self.delimiter)}; it must be a comma, semicolon, tab, blank or '|'. Omit it "
+                "for automatic detection."
             )
         if self.decimal is not None and self.decimal not in _DECIMALS:
             raise ParameterError(
-                f"decimal is {self.decimal!r}; it must be '.' or ','. Omit it for automatic detection."
+                f"decimal is {abridged(self.decimal)}; it must be '.' or ','. Omit it for automatic detection."
             )
         if self.delimiter == self.decimal == ",":
             raise ParameterError("delimiter and decimal are both ','; they must differ. Export the table with ';'.")

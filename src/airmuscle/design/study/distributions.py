@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ...core.annotation import abridged
 from ...core.arrays import Array
 from ...core.errors import ParameterError
 from ...files.library.build import TableReader
@@ -222,7 +223,7 @@ def read_variation(value: Any, unit: str, location: Location) -> Variation:
         return LevelSet(tuple(read_finite_number(item, unit, f"{location}[{i}]") for i, item in enumerate(value)))
     if not isinstance(value, Mapping):
         raise ParameterError(
-            f'{location} is {value!r}; write a list of values, or a distribution such as {{ model = "Uniform", '
+            f'{location} is {abridged(value)}; write a list of values, or a distribution such as {{ model = "Uniform", '
             "low = ..., high = ... }."
         )
     variation = TableReader(classes=VARIATIONS, known=unit).build(value, location)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
+from ...core.annotation import abridged
 from ...core.errors import ParameterError
 from ...files.library.location import read_finite_number
 
@@ -41,12 +42,12 @@ def read_time(value: Any, unit: str, where: object) -> float:
 def read_count(value: Any, unit: str, where: object) -> int:
     """A non-negative integer."""
     if isinstance(value, bool) or not isinstance(value, int) or value < 0:
-        raise ParameterError(f"{where} is {value!r}; it must be a non-negative integer.")
+        raise ParameterError(f"{where} is {abridged(value)}; it must be a non-negative integer.")
     return value
 
 
 def read_name(value: Any, unit: str, where: object) -> str:
     """A non-empty text."""
     if not isinstance(value, str) or not value:
-        raise ParameterError(f"{where} is {value!r}; it must be a quoted name.")
+        raise ParameterError(f"{where} is {abridged(value)}; it must be a quoted name.")
     return value

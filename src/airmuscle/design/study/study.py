@@ -28,6 +28,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.absolute_pressure import ambient_pressure
+from ...core.annotation import abridged
 from ...core.errors import ParameterError, suggestion
 from ...core.fingerprint import fingerprint
 from ...core.short_repr import ShortRepr
@@ -169,7 +170,7 @@ def _read_scenario(value: Any, location: Location) -> ScenarioTemplate:
             return ScenarioTemplate(read_toml(file), Location(str(file), "", file.parent), load_scenario(file))
     if not isinstance(value, Mapping):
         raise ParameterError(
-            f'{location}: scenario is {value!r}; name a file, scenario = "fill.toml", or write the tables '
+            f'{location}: scenario is {abridged(value)}; name a file, scenario = "fill.toml", or write the tables '
             "[scenario.plant], [scenario.input] and [scenario.run]."
         )
     return ScenarioTemplate(value, location.inside("scenario"), build_scenario(value, location.inside("scenario")))
@@ -186,7 +187,7 @@ _EXAMPLES = {
 def _require_table(tables: Mapping[str, Any], key: str, location: Location) -> Mapping[str, Any]:
     table = tables.get(key)
     if not isinstance(table, Mapping) or not table:
-        problem = "is missing" if table is None else "is empty" if table == {} else f"is {table!r}, not a table"
+        problem = "is missing" if table is None else "is empty" if table == {} else f"is {abridged(table)}, not a table"
         raise ParameterError(
             f"{location}: [{key}] {problem}; it must contain at least one entry, such as {_EXAMPLES[key]}."
         )
@@ -208,7 +209,7 @@ def _read_follow(
     table: Any, template: ScenarioTemplate, varied: list[str], location: Location
 ) -> tuple[tuple[ScenarioParameter, int], ...]:
     if not isinstance(table, Mapping):
-        raise ParameterError(f'{location} is {table!r}; write "path" = "path of a varied parameter".')
+        raise ParameterError(f'{location} is {abridged(table)}; write "path" = "path of a varied parameter".')
     followers = []
     for path, leader in table.items():
         parameter = template.parameter(path, str(location))
@@ -216,7 +217,7 @@ def _read_follow(
             raise ParameterError(f"{location}: '{path}' is also under [vary]; remove it from [vary] or from [follow].")
         if leader not in varied:
             near = suggestion(str(leader), varied)
-            raise ParameterError(f"{location}: '{path}' follows {leader!r}, which is not under [vary].{near}")
+            raise ParameterError(f"{location}: '{path}' follows {abridged(leader)}, which is not under [vary].{near}")
         unit = template.parameter(leader, str(location)).unit
         if unit != parameter.unit:
             raise ParameterError(

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from ...bench.readers.file_kind import check_regular_file
+from ...bench.readers.file_kind import read_toml as read_toml_file
+from ...core.annotation import one_line
 from ...core.errors import FileError, UnknownNameError, suggestion
 
 LAWS = Path(__file__).parent
@@ -18,6 +18,8 @@ DATA = LAWS / "data"
 """Folder of the data sets."""
 FOLDERS = {"valve": LAWS / "valves", "plant": PLANTS, "product": LAWS / "products", "muscle or law": LAWS}
 """Folders of the entries, by what they are."""
+MAX_NAME = 255
+"""Maximum length of a name in a file system; the question whether a longer one exists is an error."""
 
 
 def list_names(folder: Path) -> tuple[str, ...]:
@@ -73,17 +75,17 @@ def complete_name(name: str, known: Iterable[str], kind: str) -> str:
         return folded
     matches = [candidate for candidate in known if folded and candidate.lower().startswith(folded)]
     if len(matches) > 1:
-        raise UnknownNameError(f"'{name}' is ambiguous: {', '.join(matches)}. Write more of the name.")
+        raise UnknownNameError(f"'{one_line(name)}' is ambiguous: {', '.join(matches)}. Write more of the name.")
     if not matches:
         hint = _file_in_folder(name) or suggestion(folded, known) or _names_with(folded, known)
-        raise UnknownNameError(f"no {kind} '{name}'; there are {', '.join(known)}.{hint}")
+        raise UnknownNameError(f"no {kind} '{one_line(name)}'; there are {', '.join(known)}.{hint}")
     return matches[0]
 
 
 def _file_in_folder(name: str) -> str:
     """A sentence with the muscle file or the scenario in a folder of this name; empty if there is none."""
     files = (Path(name) / file for file in ("muscle.toml", "scenario.toml"))
-    found = next((file.as_posix() for file in files if name and file.is_file()), "")
+    found = next((file.as_posix() for file in files if 0 < len(name) <= MAX_NAME and file.is_file()), "")
     return f" '{name}' is a folder; write {found}." if found else ""
 
 
@@ -113,13 +115,6 @@ def read_toml(path: Path) -> dict[str, Any]:
         if path.is_dir():
             rest = "; it contains neither muscle.toml nor scenario.toml, which a fit or a campaign writes."
             raise FileError(f"{path}: is a folder{_file_in_folder(str(path)).partition(' is a folder')[2] or rest}")
-        check_regular_file(path)
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
+    except OSError as error:  # a name that is too long
         raise FileError(f"{path}: cannot be read ({error.strerror}).") from None
-    except UnicodeDecodeError as error:
-        raise FileError(f"{path}: is not UTF-8 text (byte {error.start}). Save it as UTF-8.") from None
-    except tomllib.TOMLDecodeError as error:
-        raise FileError(f"{path}: is not valid TOML: {error}.") from None
-    except (ValueError, RecursionError) as error:  # a null byte in the path, or brackets nested too deeply
-        raise FileError(f"{path}: cannot be read ({error}).") from None
+    return read_toml_file(path)

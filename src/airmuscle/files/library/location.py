@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ...core import units
-from ...core.annotation import abridged
+from ...core.annotation import abridged, one_line
 from ...core.errors import AirmuscleError, ParameterError, suggestion
 
 
@@ -57,7 +57,7 @@ def check_keys(table: Mapping[str, Any], known: Sequence[str], location: Locatio
     for key in table:
         if key not in known:
             raise ParameterError(
-                f"{location}: unknown key '{key}'; there are {', '.join(known)}.{suggestion(key, known)}"
+                f"{location}: unknown key '{one_line(key)}'; there are {', '.join(known)}.{suggestion(key, known)}"
             )
 
 

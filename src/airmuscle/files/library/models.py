@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...control import laws
+from ...core.annotation import abridged, one_line
 from ...core.errors import UnknownNameError, suggestion
 from ...engine import loop, run
 from ...physics import mechanism, muscle, plant, pneumatics
@@ -52,9 +53,11 @@ def model_class(name: str, where: str, classes: Mapping[str, type[Any]] | None =
     UnknownNameError begins with `where` and lists the classes, of all models only those that `kind` allows.
     """
     if not isinstance(name, str):
-        raise UnknownNameError(f'{where} is {name!r}; it must be a name in quotes, such as "Braid".')
+        raise UnknownNameError(f'{where} is {abridged(name)}; it must be a name in quotes, such as "Braid".')
     known = _registry() if classes is None else classes
     if name not in known:
         names = tuple(classes) if classes is not None else model_names(kind) or model_names()
-        raise UnknownNameError(f"{where}: no model '{name}'; there are {', '.join(names)}.{suggestion(name, known)}")
+        raise UnknownNameError(
+            f"{where}: no model '{one_line(name)}'; there are {', '.join(names)}.{suggestion(name, known)}"
+        )
     return known[name]

@@ -44,7 +44,7 @@ from ...core.short_repr import ShortRepr
 from ...engine.run import Integrator
 from ...physics.plant.plant import Plant
 from ..library.files import read_toml
-from ..library.location import Location, check_keys, read_text
+from ..library.location import Location, check_keys, located_errors, read_text
 from ..library.plant_file import build_plant
 from ..library.write import scenario_toml
 from .initial_state import pressure_names
@@ -71,13 +71,16 @@ class DynamicFitSetup(ShortRepr):
     method: Integrator | None = None
     columns: Mapping[str, str] = dataclasses.field(default_factory=dict)
     """Measured column of each observed output that has another name."""
+    origin: str = ""
+    """Name of the file, for messages."""
 
     def fit(self) -> DynamicFit:
         """The result of the fit; see `airmuscle.bench.fit_dynamic`."""
-        return fit_dynamic(
-            self.plant, self.experiments, free=self.free, observed=self.observed, per_record=self.own,
-            bounds=self.bounds, starts=self.starts, seed=self.seed, method=self.method,
-        )  # fmt: skip
+        with located_errors(self.origin or self.title):
+            return fit_dynamic(
+                self.plant, self.experiments, free=self.free, observed=self.observed, per_record=self.own,
+                bounds=self.bounds, starts=self.starts, seed=self.seed, method=self.method,
+            )  # fmt: skip
 
     def cross_predictions(self, fit: DynamicFit) -> tuple[CrossPrediction, ...]:
         """Each record predicted by the common parameters of a fit to the others, searched from the joint fit."""
@@ -142,4 +145,5 @@ def load_dynamic_fit(path: str | Path) -> DynamicFitSetup:
             starts=fit.starts,
             seed=fit.seed,
             method=fit.integrator,
+            origin=str(file),
         )

@@ -14,7 +14,7 @@ from ...bench.identify.dynamic import InitialValue, StartTime
 from ...bench.identify.dynamic.experiment import ParameterPaths, RecordUnknown
 from ...core import tree
 from ...core.annotation import abridged
-from ...core.errors import ParameterError
+from ...core.errors import ParameterError, suggestion
 from ...engine.run import Integrator
 from ...physics.plant.plant import Plant
 from ...recording.columns import quantity_of
@@ -125,6 +125,7 @@ def read_paths(value: Any, plant: Plant, where: Location) -> tuple[ParameterPath
         raise ParameterError(
             f'{where} is {abridged(value)}; it must be a list of paths, such as ["circuit.fill.conductance"].'
         )
+    known = [leaf.path for leaf in tree.leaves(plant)]
     for item in value:
         paths = item if isinstance(item, list) and item else [item]
         if not all(isinstance(path, str) for path in paths):
@@ -132,6 +133,10 @@ def read_paths(value: Any, plant: Plant, where: Location) -> tuple[ParameterPath
                 f"{where} contains {abridged(item)}; each item must be a path in quotes, or a list of paths with one "
                 "common value."
             )
+        for path in paths:
+            if path not in known:
+                near = suggestion(path, known) or f" The parameters are {', '.join(known)}."
+                raise ParameterError(f"{where}: the plant has no parameter '{path}'.{near}")
     return tuple(tuple(item) if isinstance(item, list) else item for item in value)
 
 

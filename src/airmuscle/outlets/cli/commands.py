@@ -15,7 +15,7 @@ from typing import Annotated, Any, NamedTuple
 import typer
 from typer.core import TyperGroup
 
-from ...core.errors import AirmuscleError, AirmuscleWarning, printable, suggestion
+from ...core.errors import AirmuscleError, AirmuscleWarning, quotable, suggestion
 from .completion import install_completion_classes, print_completion_script
 from .interruption import INTERRUPTED, check_interrupted, deferred_sigint
 from .option_hints import in_options
@@ -141,7 +141,7 @@ def _printable_usage_errors() -> Iterator[None]:
     try:
         yield
     except _UsageError as error:
-        error.message = printable(error.message)
+        error.message = quotable(error.message)
         raise
 
 

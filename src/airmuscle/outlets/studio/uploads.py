@@ -6,11 +6,11 @@ the machine of the server.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from typing import Any
 
-from ...core.errors import FileError, ParameterError
+from ...bench.readers.file_kind import parse_toml
+from ...core.errors import ParameterError
 from ...core.units import is_known_unit
 from ...files.library.files import is_path
 
@@ -24,12 +24,7 @@ TEXT_KEYS = ("title", "provenance", "note", "warning", "source", "sources", "ref
 
 def read_text_tables(text: str) -> dict[str, Any]:
     """The tables of a TOML text that refers to no file. Raises FileError or ParameterError."""
-    try:
-        tables = tomllib.loads(text.removeprefix("\ufeff"))
-    except tomllib.TOMLDecodeError as error:
-        raise FileError(f"the text is not valid TOML: {error}.") from None
-    except (ValueError, RecursionError):
-        raise FileError("the text cannot be read as TOML; its brackets are nested too deeply.") from None
+    tables = parse_toml(text.removeprefix("\ufeff"), "the text")
     check_self_contained(tables)
     return tables
 

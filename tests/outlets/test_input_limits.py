@@ -1,0 +1,59 @@
+"""Input of any size and depth costs a bounded time, and a message quotes at most 200 characters of it."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import pytest
+
+from airmuscle.errors import FileError, ParameterError, UnknownNameError
+from airmuscle.files import load, load_scenario
+from airmuscle.files.library import read_toml
+
+LIMIT = 5.0
+"""Time [s of the processor] that no refusal takes."""
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("x." * 20_000 + "y = 1", "a key has more than 50 parts between dots"),
+        ("[" + "x." * 20_000 + "y]", "a key has more than 50 parts between dots"),
+        ("x = {" + "a . " * 60 + "b = 1}", "a key has more than 50 parts between dots"),
+        ("x = [" + "1," * 2_500_000 + "]", r"more than 4000000 bytes\. Write its numbers to a data file"),
+        ("x = " + "[" * 100_000 + "]" * 100_000, "cannot be read"),
+        ("x = " + "1" * 5000, "cannot be read"),
+    ],
+    ids=["dotted key", "dotted table", "dotted key in a table", "numbers", "lists in lists", "digits"],
+)
+def test_a_toml_file_that_would_take_minutes_is_refused(tmp_path: Path, text: str, message: str):
+    (tmp_path / "m.toml").write_text(text, encoding="utf-8")
+    start = time.process_time()
+    with pytest.raises(FileError, match=rf"m\.toml: .*{message}"):
+        read_toml(tmp_path / "m.toml")
+    assert time.process_time() - start < LIMIT
+
+
+def test_a_key_of_fifty_parts_is_read(tmp_path: Path):
+    (tmp_path / "m.toml").write_text("a." * 49 + "b = 1\n# " + "dots . . ." * 50, encoding="utf-8")
+    assert list(read_toml(tmp_path / "m.toml")) == ["a"]
+
+
+@pytest.mark.parametrize("text", ["a" * 20_000, "1, " * 7000], ids=["a word", "many words"])
+def test_a_message_quotes_at_most_200_characters_of_a_value(tmp_path: Path, text: str):
+    head = 'title = "t"\nprovenance = "chosen"\n[characteristic]\nmodel = "ChouHannaford1996"\n'
+    (tmp_path / "m.toml").write_text(f'{head}geometry = "{text}"', encoding="utf-8")
+    with pytest.raises(UnknownNameError, match=r"m\.toml, \[characteristic\.geometry\], model: no model") as raised:
+        load(tmp_path / "m.toml")
+    assert len(str(raised.value)) < len(str(tmp_path)) + 400
+    (tmp_path / "s.toml").write_text(f'run = {{ duration = "1 s" }}\n[plant]\nmuscle = [{text!r}]', encoding="utf-8")
+    with pytest.raises((UnknownNameError, ParameterError)) as raised:
+        load_scenario(tmp_path / "s.toml")
+    assert text[:500] not in str(raised.value)
+
+
+def test_a_path_that_is_longer_than_any_name_is_quoted_by_its_ends():
+    with pytest.raises(FileError, match=r"^aaaa.*…a*\.toml: ") as raised:
+        load("a" * 5000 + ".toml")
+    assert len(str(raised.value)) < 300
