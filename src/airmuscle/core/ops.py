@@ -29,9 +29,11 @@ _PLAIN = frozenset({float, int, bool})
 _SMALLEST, _LARGEST = sys.float_info.min, sys.float_info.max
 _DOMAINS = {
     **dict.fromkeys(("sin", "cos", "tan", "arctan", "arcsinh", "tanh", "floor"), (-_LARGEST, _LARGEST)),
-    **dict.fromkeys(("exp", "sinh", "cosh"), (-700.0, 700.0)),
+    **dict.fromkeys(("exp", "expm1", "sinh", "cosh"), (-700.0, 700.0)),
+    **dict.fromkeys(("arcsin", "arccos"), (-1.0, 1.0)),
     "sqrt": (0.0, _LARGEST),
     "log": (_SMALLEST, _LARGEST),
+    "log1p": (math.nextafter(-1.0, 0.0), _LARGEST),
 }
 """Numbers for which a function is certain to have a finite value."""
 
@@ -111,6 +113,19 @@ def both(a: Value, b: Value) -> Value:
     return library.logical_and(a, b) if hasattr(library, "logical_and") else library.logic_and(a, b)
 
 
+def either(a: Value, b: Value) -> Value:
+    """Logical disjunction of two conditions."""
+    library = _library(a, b)
+    if library is None:
+        return bool(a or b)
+    return library.logical_or(a, b) if hasattr(library, "logical_or") else library.logic_or(a, b)
+
+
+def hypot(x: Value, y: Value) -> Value:
+    """Square root of x^2 + y^2; v/hypot(v, v_0) is a smooth sign of a speed v whose transition is v_0 wide."""
+    return sqrt(x * x + y * y)
+
+
 def floor(x: Value) -> Value:
     """Greatest integer that is not above `x`; its derivative is 0."""
     return _unary("floor", x)
@@ -145,6 +160,16 @@ def log(x: Value) -> Value:
     return _unary("log", x)
 
 
+def expm1(x: Value) -> Value:
+    """exp(x) - 1, accurate for small `x`."""
+    return _unary("expm1", x)
+
+
+def log1p(x: Value) -> Value:
+    """Natural logarithm of 1 + x, accurate for small `x`; NaN below -1."""
+    return _unary("log1p", x)
+
+
 def sin(x: Value) -> Value:
     """Sine of an angle in radians."""
     return _unary("sin", x)
@@ -173,6 +198,16 @@ def cosh(x: Value) -> Value:
 def tanh(x: Value) -> Value:
     """Hyperbolic tangent."""
     return _unary("tanh", x)
+
+
+def arcsin(x: Value) -> Value:
+    """Inverse sine, in radians; NaN outside of -1 to 1."""
+    return _unary("arcsin", x)
+
+
+def arccos(x: Value) -> Value:
+    """Inverse cosine, in radians; NaN outside of -1 to 1."""
+    return _unary("arccos", x)
 
 
 def arctan(x: Value) -> Value:

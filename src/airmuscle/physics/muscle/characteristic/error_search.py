@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np  # noqa: TID251  (numbers only)
+import numpy as np
 
 from ....core.arrays import Array
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from typing import Any
 
-import numpy as np  # noqa: TID251  (the fit works on numbers; the model that it returns is traced)
+import numpy as np
 
 from ....core.arrays import Array
 from ....core.declaration import model, parameter

@@ -8,11 +8,11 @@ from __future__ import annotations
 import bisect
 import functools
 import itertools
-import math  # noqa: TID251  (numbers only, never traced)
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-import numpy as np  # noqa: TID251  (numbers only, never traced)
+import numpy as np
 
 from ....core.arrays import Array
 
