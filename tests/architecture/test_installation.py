@@ -3,6 +3,7 @@
 import importlib.machinery
 import importlib.resources
 import importlib.util
+import json
 import os
 import re
 import subprocess
@@ -10,8 +11,11 @@ import sys
 import tomllib
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
+import jinja2
 import pytest
+import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -69,9 +73,59 @@ def pins(lock: str) -> list[tuple[str, str]]:
     return [(f"{match[1]}{match[3].rstrip()}", match[2]) for match in found if match]
 
 
-def test_the_citation_and_the_package_state_the_same_version():
+def test_all_files_of_a_release_state_the_same_version():
     version = PROJECT["project"]["version"]
     assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert json.loads((ROOT / "codemeta.json").read_text(encoding="utf-8"))["version"] == version
+    assert recipe()["package"]["version"] == version
+
+
+def recipe() -> dict[str, Any]:
+    """The conda recipe, rendered as conda-build does."""
+    text = (ROOT / "release" / "conda" / "meta.yaml").read_text(encoding="utf-8")
+    return yaml.safe_load(jinja2.Template(text).render(PYTHON="python"))
+
+
+def test_the_conda_recipe_has_the_dependencies_of_the_package():
+    """Its form alone: no conda-build is at hand."""
+    stated = {
+        line.replace("matplotlib-base", "matplotlib").replace(" ", "") for line in recipe()["requirements"]["run"]
+    }
+    project = PROJECT["project"]
+    assert stated == {f"python{project['requires-python']}", *project["dependencies"]}
+    assert recipe()["about"]["license"] == project["license"]
+    assert recipe()["about"]["license_file"] == project["license-files"]
+    assert {"source", "build", "requirements", "test", "about", "extra"} < set(recipe())
+
+
+def release_metadata() -> ModuleType:
+    path = ROOT / "release" / "metadata.py"
+    module = importlib.util.module_from_spec(importlib.util.spec_from_file_location("metadata", path))
+    importlib.machinery.SourceFileLoader("metadata", str(path)).exec_module(module)
+    return module
+
+
+def test_links_of_the_readme_hold_outside_the_repository():
+    readme, portable = (ROOT / "README.md").read_text(encoding="utf-8"), release_metadata().portable_readme
+    relative = re.findall(r"\]\((?!https?://)([^)]+)\)", readme)
+    text = portable(readme, "")
+    assert len(relative) > 10
+    assert "](" not in text
+    assert "All commands at a glance" in text
+    text = portable(readme, "https://forge.example/group/airmuscle/")
+    assert not re.search(r"\]\((?!https?://)", text)
+    assert "](https://forge.example/group/airmuscle/raw/main/docs/images/chain.png)" in text
+    assert "](https://forge.example/group/airmuscle/blob/main/docs/commands.md)" in text
+    assert portable("[a](https://x.org/b) ![](c.png)", "") == "[a](https://x.org/b) "
+
+
+@pytest.mark.parametrize("repository", ["", "https://forge.example/group/airmuscle"])
+def test_a_package_has_addresses_where_the_repository_is_known(repository: str):
+    metadata: dict[str, Any] = {}
+    release_metadata().ReleaseMetadata(str(ROOT), {"repository": repository}).update(metadata)
+    assert metadata["urls"].get("Repository", "") == repository
+    assert metadata["readme"]["text"].startswith("# airmuscle")
+    assert ("Changelog" in metadata["urls"]) == bool(repository)
 
 
 def test_the_package_contains_the_marker_of_its_type_annotations():

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 from command_line import airmuscle
 
 from airmuscle.bench import Decimation, from_pandas, read, read_csv, to_xarray, write, write_csv
 from airmuscle.bench.readers import large_csv
-from airmuscle.errors import ColumnError, FileError, ParameterError
+from airmuscle.errors import AirmuscleError, ColumnError, FileError, ParameterError
 from airmuscle.recording import Recording
 
 pd = pytest.importorskip("pandas", reason="needs the package pandas")
@@ -53,6 +55,12 @@ def test_units_of_a_data_frame_are_converted():
 def test_what_is_no_frame_of_measurements_is_refused(frame, error, message):
     with pytest.raises(error, match=message):
         from_pandas(frame)
+
+
+def test_without_pandas_the_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(AirmuscleError, match=r"needs the package pandas. Install it: pip install airmuscle\[lab\]"):
+        RUN.to_pandas()
 
 
 @pytest.mark.tool

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import base64
 import dataclasses
 import importlib
 import inspect
+import pickle
 import pkgutil
 import re
 from collections.abc import Iterator
+from pathlib import Path
 from xml.dom import minidom
 
 import numpy as np
@@ -18,9 +21,11 @@ from airmuscle.core import given_axes, new_figure
 from airmuscle.core.short_repr import MAX_LINES, ShortRepr
 from airmuscle.errors import ParameterError
 from airmuscle.physics import ContractileSurface
-from airmuscle.physics.muscle import parameter_rows
+from airmuscle.physics.muscle import compute_isobars, parameter_rows
+from airmuscle.physics.muscle.isobar_plot import isobar_plot
 from airmuscle.recording.notebook import MAX_NOTES, MAX_ROWS, Card, NotebookDisplay, render_card
 from airmuscle.recording.panels import panels_of
+from airmuscle.recording.plot import duty_cycle, is_pulsed
 
 MAX_BYTES = 200_000
 BULKY = re.compile(r"\b(\w*Array|NDArray|Recording|\w*Fit|Problem|Plant|System|Comparison|Study|Entry|RankedModel)\b")
@@ -190,3 +195,73 @@ def test_many_curves_are_named_by_colour_and_line_style():
     (panel,) = am.Recording({"time": time, **dict.fromkeys(names, time)}, "arm").plot().axes
     assert [text.get_text() for text in panel.get_legend().get_texts()] == [*(f"m{i}" for i in range(6)), "fill",
                                                                             "discharge"]  # fmt: skip
+
+
+def test_a_plot_shows_its_picture_as_the_last_line_of_a_cell(recording: am.Recording):
+    figure = recording.plot("pressure")
+    assert figure._repr_png_().startswith(b"\x89PNG")
+    assert pickle.loads(pickle.dumps(figure))._repr_png_() == figure._repr_png_()
+
+
+@pytest.mark.tool
+def test_a_kernel_shows_the_picture_and_the_card(tmp_path: Path):
+    nbclient = pytest.importorskip("nbclient", reason="needs the package nbclient")
+    nbformat = pytest.importorskip("nbformat", reason="needs the package nbformat")
+    pytest.importorskip("ipykernel", reason="needs the package ipykernel")
+    cells = (
+        "import airmuscle as am\nbench = am.load_data('dmsp-20-300')\nbench",
+        "fit = am.fit(am.characteristic.ContractileSurface.blank(3), bench)\nfit.plot()",
+        "import matplotlib.pyplot as plt\nfit.plot()",
+    )
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(text) for text in cells])
+    nbclient.NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(tmp_path)}}).execute()
+    card, *plots = [[output["data"] for output in cell["outputs"] if "data" in output] for cell in notebook.cells]
+    assert "<table" in card[0]["text/html"]
+    for shown in plots:
+        assert len(shown) == 1
+        assert base64.b64decode(shown[0]["image/png"]).startswith(b"\x89PNG")
+
+
+def test_a_legend_is_inside_the_axes_of_a_caller(recording: am.Recording):
+    """Unless its figure has a layout, which makes room for a legend outside."""
+    import matplotlib.figure
+
+    for layout, inside in ((None, True), ("constrained", False)):
+        figure = matplotlib.figure.Figure(layout=layout)
+        axes = figure.subplots()
+        run = dataclasses.replace(
+            recording, columns={"left.force": recording["force"], "right.force": recording["force"]}
+        )
+        run.plot(ax=axes)
+        figure.draw_without_rendering()
+        legend, box = axes.get_legend().get_window_extent(), axes.get_window_extent()
+        assert (legend.x1 <= box.x1 + 1) == inside
+        assert legend.x1 <= figure.bbox.x1
+
+
+def test_a_pulsed_input_is_drawn_as_duty_cycle_and_envelope():
+    """Pulses of 30 % at 100 Hz for 2 s: the curve is 0.3, the envelope reaches from 0 to 1."""
+    starts = np.arange(0.0, 2.0, 0.01)
+    time = np.sort(np.concatenate([starts, starts + 0.003]))
+    values = np.tile([1.0, 0.0], starts.size)
+    middles, means, low, high = duty_cycle(time, values)
+    assert is_pulsed(values)
+    inner = (middles > 0.05) & (middles < 1.9)
+    assert np.mean(means[inner]) == pytest.approx(0.3, rel=0.02)
+    assert (low[inner].min(), high[inner].max()) == (0.0, 1.0)
+    figure = am.Recording({"time": time, "fill": values}, "pulses").plot()
+    assert len(figure.axes[0].get_lines()[0].get_xdata()) <= 150
+    assert len(figure.axes[0].collections) == 1
+    assert not is_pulsed(np.sin(np.linspace(0.0, 40.0, 4000)))
+    assert not is_pulsed(np.zeros(100))
+
+
+def test_the_lines_of_a_model_are_over_the_points_of_many_rows(recording: am.Recording):
+    law = am.load("dmsp-20-300").characteristic
+    for rows in (32, 2720):
+        given = recording.rows(np.tile(np.arange(32), rows // 32))
+        plot = isobar_plot(law, "isobars", compute_isobars(law, pressures=np.unique(given["pressure"])), measured=given)
+        lines = [line for line in plot.figure.axes[0].get_lines() if len(line.get_xdata())]
+        points = max(line.get_zorder() for line in lines if line.get_linestyle() == "None")
+        curves = min(line.get_zorder() for line in lines if line.get_linestyle() != "None")
+        assert (curves > points) == (rows > 500)

@@ -1,4 +1,4 @@
-"""What the README shows is what runs: its Python, its commands, and the files it points to."""
+"""What the README and the page of commands show is what runs; the files that the README points to are there."""
 
 from __future__ import annotations
 
@@ -15,8 +15,11 @@ ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
-def blocks(language):
-    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
+COMMANDS = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
+
+
+def blocks(language, text=README):
+    return re.findall(rf"```{language}\n(.*?)```", text, flags=re.DOTALL)
 
 
 def test_the_python_runs_and_is_ten_lines(tmp_path):
@@ -30,7 +33,7 @@ def test_the_python_runs_and_is_ten_lines(tmp_path):
 
 
 def commands():
-    lines = [line.partition("#")[0].strip() for block in blocks("sh") for line in block.splitlines()]
+    lines = [line.partition("#")[0].strip() for block in blocks("sh", COMMANDS) for line in block.splitlines()]
     served = "./run airmuscle studio"  # a server, which the tests of the studio start
     return [line for line in lines if line.startswith("./run airmuscle") and line != served]
 

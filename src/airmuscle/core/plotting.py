@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import io
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -39,17 +40,23 @@ _STYLE: Any = {
 def new_figure(rows: int = 1, columns: int = 1, *, width: float = 6.3, height: float = 3.6, **subplots: Any) -> Any:
     """Return a Matplotlib figure and its axes in the shared style with constrained layout.
 
-    `width` and `height` are in inches. The figure has no window and no global state; write it with `save`.
+    `width` and `height` are in inches. The figure has no window and no global state; write it with `save`. As the last
+    line of a cell of a notebook it shows its picture.
     """
     import matplotlib as mpl
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(width, height), layout="constrained")
+        figure: Any = Figure(figsize=(width, height), layout="constrained")
         FigureCanvasAgg(figure)
         axes = figure.subplots(rows, columns, **subplots)
+    figure._repr_png_ = functools.partial(_picture, figure)  # asked for by IPython, which knows figures of pyplot only
     return figure, axes
+
+
+def _picture(figure: Any) -> bytes:
+    return rendered(figure, ("png",), _STYLE["figure.dpi"])["png"]
 
 
 def save(figure: Any, path: Any) -> None:
@@ -109,12 +116,15 @@ def _rasterise_markers(figure: Any) -> None:
 
 
 def legend_outside(axes: Any, **options: Any) -> Any:
-    """Add a legend to the right of the axes, where it covers no data."""
+    """Add a legend to the right of the axes, where it covers no data; inside those of a caller without a layout, of
+    whose figure it would be cut off."""
     style = {
         "fontsize": 8,
         "title_fontsize": 8,
         "frameon": False,
     }  # the shared style applies only while the figure is created
+    if axes.get_figure(root=True).get_layout_engine() is None:
+        return axes.legend(loc="best", **{**style, **options})
     return axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, **{**style, **options})
 
 

@@ -18,6 +18,8 @@ PANELS_IN_A_COLUMN = 7
 """Maximum number of panels below each other; more are plotted in two columns."""
 MAX_LEGEND = 6
 """Maximum number of curves that a legend names one by one; of more it names the colours and the line styles."""
+MAX_PULSES, BINS = 40, 150
+"""Number of alternations above which the duty cycle is drawn with the envelope, and of its intervals (chosen)."""
 _SUPERSCRIPTS = {ord("^"): None, ord("2"): "²", ord("3"): "³"}
 
 
@@ -66,7 +68,11 @@ def _draw(panels: Sequence[Panel], columns: Mapping[str, Array], time: Array | N
         for curve in panel.curves:
             values = columns[curve.name]
             abscissa = time if time is not None else np.arange(1, len(values) + 1)
-            axis.plot(abscissa, values * factor, label=curve.label, **_style(curve, parts, time is not None))
+            style = _style(curve, parts, time is not None)
+            if time is not None and is_pulsed(values):
+                abscissa, values, low, high = duty_cycle(time, values)
+                axis.fill_between(abscissa, low * factor, high * factor, color=style["color"], alpha=0.18, linewidth=0)
+            axis.plot(abscissa, values * factor, label=curve.label, **style)
         axis.set_ylabel(f"{panel.title}\n[{unit.translate(_SUPERSCRIPTS)}]" if unit else panel.title)
         if len(panel.curves) > 1:
             handles = axis.get_lines()[-len(panel.curves) :] if len(panel.curves) <= MAX_LEGEND else _key(panel, parts)
@@ -74,6 +80,28 @@ def _draw(panels: Sequence[Panel], columns: Mapping[str, Array], time: Array | N
         subplot = axis.get_subplotspec()
         if subplot is None or subplot.is_last_row() or axis is axes[len(panels) - 1]:
             axis.set_xlabel("time [s]" if time is not None else "row")
+
+
+def is_pulsed(values: Array) -> bool:
+    """Whether a column is switched on and off more often than a plot resolves."""
+    size = np.abs(values) / max(np.abs(values).max(initial=0.0), np.finfo(float).tiny)
+    on = size[(size < 0.1) | (size > 0.25)] > 0.2
+    return int(np.count_nonzero(np.diff(on))) > MAX_PULSES
+
+
+def duty_cycle(time: Array, values: Array) -> tuple[Array, Array, Array, Array]:
+    """Middle of each of BINS equal intervals of time, and mean over it, minimum and maximum of a pulsed column.
+
+    The mean holds each value until the next row, as a pulsed input does; intervals without a row are left out.
+    """
+    edges = np.linspace(time[0], time[-1], BINS + 1)
+    integral = np.concatenate(([0.0], np.cumsum(values[:-1] * np.diff(time))))
+    means = np.diff(np.interp(edges, time, integral)) / np.diff(edges)
+    starts = np.searchsorted(time, edges[:-1])
+    filled = np.flatnonzero(np.diff(np.append(starts, len(time))) > 0)
+    rows = starts[filled]
+    middles = 0.5 * (edges[1:] + edges[:-1])
+    return middles[filled], means[filled], np.minimum.reduceat(values, rows), np.maximum.reduceat(values, rows)
 
 
 def _key(panel: Panel, parts: Sequence[str]) -> list[Any]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core.annotation import check_field_types, one_line
 from ..core.arrays import Array
-from ..core.errors import ColumnError, HintedText, ParameterError, suggestion
+from ..core.errors import AirmuscleError, ColumnError, HintedText, ParameterError, suggestion
 from ..core.reference import Reference
 from ..core.units import conversion
 from .columns import quantity_of
@@ -145,7 +145,10 @@ class Recording(NotebookDisplay):
 
     def to_pandas(self) -> pd.DataFrame:
         """The recording as a data frame with units in the column headings: `pressure [Pa]`."""
-        import pandas as pd
+        try:
+            import pandas as pd
+        except ImportError:
+            raise AirmuscleError("to_pandas needs the package pandas. Install it: pip install airmuscle[lab]") from None
 
         return pd.DataFrame({column_heading(name): values for name, values in self.columns.items()})
 

@@ -21,6 +21,8 @@ PRESSURE_TOLERANCE = 0.005
 """Maximum difference between a measured point and its isobar, as a fraction of the maximum pressure (chosen)."""
 MAX_TITLE_LINES = 3
 """Maximum number of lines of a title; the rest is left out."""
+MANY_POINTS = 500
+"""Number of measured rows above which they are a cloud under the lines of the model (chosen)."""
 
 
 def isobar_table(curves: Isobars, name: str = "isobars") -> Table:
@@ -73,6 +75,7 @@ def describe_point(point: WorkingPoint) -> str:
 def _draw_isobars(axes: Any, curves: Isobars, point: WorkingPoint | None, measured: Recording | None) -> None:
     """Draw the isobars, high pressures dark; `_draw_working_point` draws the isobar of the working point."""
     from matplotlib import colormaps
+    from matplotlib.patheffects import withStroke
 
     shades = colormaps["viridis"](np.linspace(0.0, 0.85, curves.pressures.size))[::-1]
     for i in range(curves.pressures.size - 1, -1, -1):
@@ -85,9 +88,13 @@ def _draw_isobars(axes: Any, curves: Isobars, point: WorkingPoint | None, measur
             rows = np.abs(measured["pressure"] - pressure) <= PRESSURE_TOLERANCE * curves.pressures.max()
             marker = {"marker": plotting.MARKERS[i % len(plotting.MARKERS)], "markersize": 4}
             points = {"linestyle": "none", "color": shades[i], "clip_on": False, "zorder": 3}
-            axes.plot(100 * measured["contraction"][rows], measured["force"][rows], **marker, **points)
+            if len(measured) > MANY_POINTS:  # a cloud of points under the lines of the model
+                points |= {"markersize": 1.5, "alpha": 0.3, "zorder": 1.5}
+            axes.plot(100 * measured["contraction"][rows], measured["force"][rows], **{**marker, **points})
             axes.plot([], [], linestyle="-", linewidth=1.4, **marker, **style)  # line and marker in the legend
             style["label"], dashes = "_nolegend_", "-"
+            if len(measured) > MANY_POINTS:
+                style |= {"path_effects": [withStroke(linewidth=3.0, foreground="white")], "zorder": 4}
         axes.plot(100 * curves.contractions, mask_slack(forces), linestyle=dashes, linewidth=1.4, **style)
 
 
