@@ -10,6 +10,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import airmuscle
 from book.mathml import set_up_mathml
+from book.search_index import set_up_search
 
 project = "airmuscle"
 author = copyright = "The airmuscle developers"
@@ -29,6 +30,7 @@ html_copy_source = False
 html_show_sphinx = False
 html_static_path = [str(Path(__file__).with_name("static"))]
 html_css_files = ["book.css"]
+html_js_files = ["search.js"]
 html_math_renderer = "mathml"
 html_theme_options: dict[str, Any] = {
     "light_css_variables": {"color-brand-primary": "#00567f", "color-brand-content": "#00567f"},
@@ -40,5 +42,6 @@ pygments_dark_style = "a11y-dark"
 
 
 def setup(app: Any) -> None:
-    """Register the renderer of formulas."""
+    """Register the renderer of formulas, the index of the search, and what makes pages accessible."""
     set_up_mathml(app)
+    set_up_search(app)

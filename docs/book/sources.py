@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import re
 import shutil
+import tomllib
 from pathlib import Path
 
 from . import command_pages, function_pages, model_pages
+from .ascii_math import FormulaError, to_latex
 from .contents import DOCS, GENERATED, ROOT, Part, documents, parts
 from .docstrings import joined_lines
 from .formulas_in_text import displayed, is_formula_block
+from .latex_symbols import GREEK
 
 COPIED = ("benchmarks/RESULTS.md", "benchmarks/CONTROL.md", "benchmarks/REAL_DATA.md", "CHANGELOG.md")
 """Pages outside docs/ that belong to the site."""
 INDENTED = re.compile(r"(?<=\n\n)(?:    .*\n|\n(?=    ))+(?=\n|\Z)")
+KEPT = re.compile(r"(^ {4}.*?$|^```.*?^```|`[^`]*`|\]\([^)]*\)|^\[[^\]]*\]:.*?$|<[^>]+>)", re.MULTILINE | re.DOTALL)
+_GREEK = "|".join(sorted(GREEK - {"psi", "pi"} | {"eps"}, key=len, reverse=True))
+SYMBOL = re.compile(rf"(?<![\w\\/.^-])(?:(?:{_GREEK}|[A-Za-z])_[A-Za-z0-9]+|(?:{_GREEK})'?)(?![\w(/.^-]\w|\w|\()")
 FENCED = re.compile(r"(^```.*?^```\n?)", re.MULTILINE | re.DOTALL)
 
 
@@ -40,8 +46,23 @@ def site_text(text: str, depth: int = 0) -> str:
     """A page of the repository as a page of the site: indented formulas are rendered, links lead to the site."""
     pieces = FENCED.split(text)
     for i in range(0, len(pieces), 2):
-        pieces[i] = INDENTED.sub(_formula_block, pieces[i])
+        pieces[i] = typeset_symbols(INDENTED.sub(_formula_block, pieces[i]))
     return _links("".join(pieces), depth)
+
+
+def typeset_symbols(prose: str) -> str:
+    """Prose with the symbols in it, such as theta_g, as mathematics; code, targets of links and blocks stay."""
+    pieces = KEPT.split(prose)
+    for i in range(0, len(pieces), 2):
+        pieces[i] = SYMBOL.sub(_symbol, pieces[i])
+    return "".join(pieces)
+
+
+def _symbol(match: re.Match[str]) -> str:
+    try:
+        return f"{{math}}`{to_latex(match[0], display=False).strip()}`"
+    except FormulaError:  # no symbol, such as x_2dot
+        return match[0]
 
 
 def _formula_block(match: re.Match[str]) -> str:
@@ -95,7 +116,14 @@ def index(contents: tuple[Part, ...]) -> str:
         lists.append("\n".join(items) + "\n")
         pages = "\n".join([*(_document(item.target) for item in part.items), *extra])
         trees.append(f"```{{toctree}}\n:hidden:\n:caption: {part.title}\n\n{pages}\n```\n")
-    return "\n".join([head, *(_links(text, 0) for text in lists), *trees])
+    return "\n".join([head.replace("@repository@", _repository()), *(_links(text, 0) for text in lists), *trees])
+
+
+def _repository() -> str:
+    """A line with the address of the repository, if pyproject.toml states it."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    address = project["tool"]["hatch"]["metadata"]["hooks"]["custom"]["repository"]
+    return f"Source code, issues and releases: [{address}]({address})." if address else ""
 
 
 GENERATED_TEXTS = {

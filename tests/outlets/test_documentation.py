@@ -6,10 +6,13 @@ The generators of the site run here; Sphinx itself only in the slow test, if it 
 from __future__ import annotations
 
 import dataclasses
+import json
 import re
+import subprocess
 from pathlib import Path
 from xml.etree import ElementTree
 
+import printed
 import pytest
 import typer
 from book import command_pages, function_pages, gallery, model_pages
@@ -17,6 +20,7 @@ from book.ascii_math import FormulaError, to_latex
 from book.contents import DOCS, ROOT, broken_links, documents, listed, parts
 from book.docstrings import to_markdown
 from book.formulas_in_text import markdown
+from book.search_index import page_rows
 from book.sources import COPIED, index, site_text
 
 import airmuscle
@@ -216,3 +220,52 @@ def test_the_site_is_built_without_warnings_and_needs_no_network(tmp_path: Path)
     assert [page.name for page in pages if loaded.search(page.read_text(encoding="utf-8"))] == []
     law = (tmp_path / "html" / "models" / "characteristic" / "TonduLopez2000.html").read_text(encoding="utf-8")
     assert "<math" in law
+
+
+def test_symbols_in_running_text_are_typeset():
+    text = "The angle theta_g and eps of r_1, `theta_g`, [a](theta_g.md), 30 psi, x_y.z, tests/rho_1.py and rho."
+    assert site_text(text) == (
+        r"The angle {math}`\theta _{g}` and {math}`\varepsilon` of {math}`r_{1}`, `theta_g`, a, 30 psi, x_y.z, "
+        r"tests/rho_1.py and {math}`\rho`."
+    )
+
+
+def test_the_index_of_the_search_has_each_section_with_its_text():
+    article = (
+        '<section id="a"><h1>Reading<a class="headerlink" href="#a">#</a></h1><p>Decimal &amp; <b>comma</b></p>'
+        '<section id="b"><h2>Units<a class="headerlink" href="#b">#</a></h2><p>kPa</p></section></section>'
+    )
+    assert page_rows("reading.html", article) == [
+        ["Reading", "Reading", "reading.html", "Decimal & comma"],
+        ["Reading", "Units", "reading.html#b", "kPa"],
+    ]
+
+
+SEARCHED = (
+    ["Reading", "Reading", "reading.html", "Files of German loggers with a decimal comma. A displacement has a zero."],
+    ["Units", "Units", "units.html", "The decimal point of reports."],
+    ["Joints", "Joints", "joints.html", "Two muscles on a pulley are displaced."],
+)
+
+
+@pytest.mark.parametrize(
+    ("query", "first"),
+    [("German decimal comma", "reading.html"), ("displacements", "reading.html"), ("pulleys", "joints.html"),
+     ("point of a report", "units.html"), ("hydraulics", None)],
+)  # fmt: skip
+def test_the_search_takes_all_forms_of_any_of_the_words(query: str, first: str | None, tmp_path: Path):
+    script = DOCS / "book" / "static" / "search.js"
+    call = f"require({json.dumps(str(script))}).search({json.dumps(query)}, {json.dumps(SEARCHED)})"
+    done = subprocess.run(
+        [printed.require("node"), "-p", f"({call}[0] || {{}}).address"], capture_output=True, text=True
+    )
+    assert done.stdout.strip() == str(first or "undefined"), done.stderr
+
+
+@pytest.mark.parametrize("page", documents(), ids=lambda path: path.name)
+def test_lines_of_code_fit_the_column_of_the_site(page: Path):
+    """Output of the program, in blocks without a language, scrolls."""
+    blocks = re.findall(
+        r"^```(?:python|sh|toml|c)\n(.*?)^```", page.read_text(encoding="utf-8"), re.MULTILINE | re.DOTALL
+    )
+    assert [line for block in blocks for line in block.splitlines() if len(line) > 95] == []

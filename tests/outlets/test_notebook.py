@@ -25,7 +25,6 @@ from airmuscle.physics.muscle import compute_isobars, parameter_rows
 from airmuscle.physics.muscle.isobar_plot import isobar_plot
 from airmuscle.recording.notebook import MAX_NOTES, MAX_ROWS, Card, NotebookDisplay, render_card
 from airmuscle.recording.panels import panels_of
-from airmuscle.recording.plot import duty_cycle, is_pulsed
 
 MAX_BYTES = 200_000
 BULKY = re.compile(r"\b(\w*Array|NDArray|Recording|\w*Fit|Problem|Plant|System|Comparison|Study|Entry|RankedModel)\b")
@@ -244,16 +243,16 @@ def test_a_pulsed_input_is_drawn_as_duty_cycle_and_envelope():
     starts = np.arange(0.0, 2.0, 0.01)
     time = np.sort(np.concatenate([starts, starts + 0.003]))
     values = np.tile([1.0, 0.0], starts.size)
-    middles, means, low, high = duty_cycle(time, values)
-    assert is_pulsed(values)
-    inner = (middles > 0.05) & (middles < 1.9)
-    assert np.mean(means[inner]) == pytest.approx(0.3, rel=0.02)
-    assert (low[inner].min(), high[inner].max()) == (0.0, 1.0)
-    figure = am.Recording({"time": time, "fill": values}, "pulses").plot()
-    assert len(figure.axes[0].get_lines()[0].get_xdata()) <= 150
-    assert len(figure.axes[0].collections) == 1
-    assert not is_pulsed(np.sin(np.linspace(0.0, 40.0, 4000)))
-    assert not is_pulsed(np.zeros(100))
+    axes = am.Recording({"time": time, "fill": values}, "pulses").plot().axes[0]
+    middles, means = axes.get_lines()[0].get_data()
+    assert len(means) <= 150
+    assert np.mean(means[(middles > 0.05) & (middles < 1.9)]) == pytest.approx(0.3, rel=0.02)
+    (envelope,) = axes.collections
+    assert (envelope.get_paths()[0].vertices[:, 1].min(), envelope.get_paths()[0].vertices[:, 1].max()) == (0.0, 1.0)
+    for other in (np.sin(20.0 * time), np.zeros_like(time)):
+        axes = am.Recording({"time": time, "fill": other}, "no pulses").plot().axes[0]
+        assert len(axes.get_lines()[0].get_xdata()) == len(time)
+        assert len(axes.collections) == 0
 
 
 def test_the_lines_of_a_model_are_over_the_points_of_many_rows(recording: am.Recording):
