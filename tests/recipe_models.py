@@ -156,7 +156,7 @@ def add(root: Path, kind: str, name: str, without: str = "") -> None:
     line = f"from .{module} import {name}"
     edits = {
         "file": (package / f"{module}.py", (HEAD + recipe.text).format(name=name, root=recipe.root)),
-        "export": (package / "__init__.py", f'\n{line}\n__all__ += ["{name}"]\n'),
+        "export": (package / "__init__.pyi", f"{line} as {name}\n"),
         "library": (source / "files" / "library" / f"{module}.toml", LAW_FILE.format(name=name)),
         "example": (
             root / "tests" / "plants.py",

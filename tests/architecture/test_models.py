@@ -27,7 +27,7 @@ def models_by_package():
 def test_every_model_is_exported():
     known = {*model_names(), *PARTS}
     missing = [
-        f"export {cls.__name__} in {package.replace('.', '/')}/__init__.py"
+        f"export {cls.__name__} in {package.replace('.', '/')}/__init__.pyi"
         for package, cls in models_by_package()
         if not inspect.isabstract(cls) and cls.__name__ not in known
     ]

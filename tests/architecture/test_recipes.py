@@ -46,7 +46,7 @@ for plant, signal in ((of(law), command), (fed(circuit), command), (of(friction=
 """Construction from tables, evaluation and 0.1 s of simulation of all four models."""
 STEPS = [(kind, step) for kind, recipe in RECIPES.items() for step in recipe.steps]
 MESSAGES = {
-    "export": r"export {name} in airmuscle/{folder}/__init__\.py",
+    "export": r"export {name} in airmuscle/{folder}/__init__\.pyi",
     "library": r"write a file in airmuscle/files/library that names {name}",
     "example": r"{name}: airmuscle\.{package}\.{module} is in no plant of tests/plants\.py",
     "exemption": r"{name}: airmuscle\.{package}\.{module} is in no plant of tests/plants\.py, nor in NOT_IN_A_PLANT",
@@ -115,7 +115,7 @@ def test_a_missing_file_is_named_by_the_import(complete: Path, kind: str):
     name, package = named(kind), RECIPES[kind].package
     file = complete / "src" / "airmuscle" / RECIPES[kind].folder / f"{name.lower()}.py"
     aside = file.rename(file.with_suffix(".aside"))
-    done = run(complete, "-c", f"import airmuscle.{package}")
+    done = run(complete, "-c", f"from airmuscle.{package} import {name}")
     aside.rename(file)
     assert done.stderr.endswith(f"No module named 'airmuscle.{package}.{name.lower()}'\n")
 
@@ -125,7 +125,7 @@ def test_each_step_is_in_the_rules(kind: str, step: str):
     text = (ROOT / "AGENTS.md").read_text(encoding="utf-8").split("## Adding a model")[1]
     places = {
         "file": f"`{RECIPES[kind].folder}/`",
-        "export": "`__init__.py` of the package",
+        "export": "`__init__.pyi` of the package",
         "library": "`src/airmuscle/files/library/`",
         "example": "`tests/plants.py`",
         "exemption": "`NOT_IN_A_PLANT`",

@@ -1,10 +1,5 @@
 """Recordings: measured and simulated runs in one type."""
 
-from .columns import QUANTITIES, Quantity
-from .recording import Recording
+from ..core.stubs import attach_stub
 
-__all__ = [
-    "QUANTITIES",
-    "Quantity",
-    "Recording",
-]
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

@@ -18,53 +18,6 @@ tracking index of a run (`RootMeanSquareError` by default) and the objective ove
 objects; an objective may also be any function from `CaseMetrics` to the values (E,) of E sets of gains.
 """
 
-from .case import LoopCase, with_gains
-from .objective import CaseMetrics, RobustObjective
-from .optimisation import tune
-from .perturbations import Perturbations, PerturbedFamily, perturbed_family
-from .process_models import (
-    FirstOrderDeadTime,
-    IntegratorDeadTime,
-    UltimatePoint,
-    first_order_of_step,
-    integrator_of_step,
-    ultimate_point,
-)
-from .result import Tuning, TuningHistory
-from .rules import RuleSettings, amigo_pi, amigo_pid, simc
-from .scenario_loop import ScenarioLoop, load_scenario_loop
-from .starts import StepExperiment, rule_settings, rule_starts, step_experiment
-from .tracking import IntegralAbsoluteError, IntegralTimeAbsoluteError, RootMeanSquareError, TrackingIndex
+from ...core.stubs import attach_stub
 
-__all__ = [
-    "CaseMetrics",
-    "FirstOrderDeadTime",
-    "IntegralAbsoluteError",
-    "IntegralTimeAbsoluteError",
-    "IntegratorDeadTime",
-    "LoopCase",
-    "Perturbations",
-    "PerturbedFamily",
-    "RobustObjective",
-    "RootMeanSquareError",
-    "RuleSettings",
-    "ScenarioLoop",
-    "StepExperiment",
-    "TrackingIndex",
-    "Tuning",
-    "TuningHistory",
-    "UltimatePoint",
-    "amigo_pi",
-    "amigo_pid",
-    "first_order_of_step",
-    "integrator_of_step",
-    "load_scenario_loop",
-    "perturbed_family",
-    "rule_settings",
-    "rule_starts",
-    "simc",
-    "step_experiment",
-    "tune",
-    "ultimate_point",
-    "with_gains",
-]
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

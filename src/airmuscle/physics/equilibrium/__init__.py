@@ -1,11 +1,5 @@
 """Static equilibria of a plant for given pressures in its muscles, or given masses of air."""
 
-from .equilibrium import Equilibrium, complete_inputs, find_equilibria, find_equilibrium, find_equilibrium_of_each
+from ...core.stubs import attach_stub
 
-__all__ = [
-    "Equilibrium",
-    "complete_inputs",
-    "find_equilibria",
-    "find_equilibrium",
-    "find_equilibrium_of_each",
-]
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

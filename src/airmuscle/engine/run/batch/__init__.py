@@ -1,15 +1,5 @@
 """Batches: thousands of plants of one structure with different parameters, initial states and inputs, on all cores."""
 
-from .lanes import Double, Precision, Single
-from .run import simulate_batch
-from .solution import BatchSolution
-from .stepper import BatchStepper
+from ....core.stubs import attach_stub
 
-__all__ = [
-    "BatchSolution",
-    "BatchStepper",
-    "Double",
-    "Precision",
-    "Single",
-    "simulate_batch",
-]
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

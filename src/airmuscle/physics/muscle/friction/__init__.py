@@ -1,21 +1,5 @@
 """Friction: hysteresis models of the force that opposes the motion of a muscle."""
 
-from .base import Friction, NoFriction
-from .bouc_wen import BoucWen
-from .dahl import Dahl
-from .lugre import LuGre
-from .maxwell_slip import MaxwellSlip
-from .prandtl_ishlinskii import PrandtlIshlinskii
-from .wrapper import IdentifiedFriction, PressureScaledFriction
+from ....core.stubs import attach_stub
 
-__all__ = [
-    "BoucWen",
-    "Dahl",
-    "Friction",
-    "IdentifiedFriction",
-    "LuGre",
-    "MaxwellSlip",
-    "NoFriction",
-    "PrandtlIshlinskii",
-    "PressureScaledFriction",
-]
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

@@ -1,28 +1,5 @@
 """Geometries: enclosed volume and outline of a muscle as functions of contraction."""
 
-from .base import Geometry
-from .braid import Braid
-from .chebyshev import ChebyshevGeometry, as_polynomial
-from .meridian_shapes import Catenary, CircularArc, Parabola, TrueArcParabola
-from .pleated import PleatedTube
-from .straight_fibre import HalfShellFibreSum, PrintedFibreSum, StraightFibre, UniformFibreSum, UserDefinedFibreSum
-from .tabulated import TabulatedGeometry, Vessel
+from ....core.stubs import attach_stub
 
-__all__ = [
-    "Braid",
-    "Catenary",
-    "ChebyshevGeometry",
-    "CircularArc",
-    "Geometry",
-    "HalfShellFibreSum",
-    "Parabola",
-    "PleatedTube",
-    "PrintedFibreSum",
-    "StraightFibre",
-    "TabulatedGeometry",
-    "TrueArcParabola",
-    "UniformFibreSum",
-    "UserDefinedFibreSum",
-    "Vessel",
-    "as_polynomial",
-]
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

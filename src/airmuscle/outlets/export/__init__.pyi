@@ -1,0 +1,15 @@
+from .building import build_and_run as build_and_run
+from .controller import PRECISIONS as PRECISIONS
+from .controller import write_controller as write_controller
+from .fmu import WrittenFmu as WrittenFmu
+from .fmu import write_fmu as write_fmu
+from .identifiers import make_identifiers as make_identifiers
+from .modelica import write_modelica as write_modelica
+from .mujoco_plugin import MuscleActuator as MuscleActuator
+from .mujoco_plugin import write_mujoco_plugin as write_mujoco_plugin
+from .targets import C99 as C99
+from .targets import JavaScript as JavaScript
+from .targets import Octave as Octave
+from .targets import Target as Target
+from .write import write_law as write_law
+from .write import write_program as write_program
