@@ -125,7 +125,6 @@ class Printer:
     def _name(self, block: Any, inputs: Sequence[str], outputs: Sequence[str]) -> None:
         """Give the values of a function the names of the quantities that they are."""
         labels, parameters = self._language.labels, self._prepare.loaded  # type: ignore[attr-defined]
-        of_c = (labels[PARAMETERS][parameters[v][1]] if v in parameters else NO_LABEL for v in self._places)
         named: dict[str, tuple[str, int]] = {}
         if self.quantities and set(map(self._argument, self.quantities[0])) <= set(inputs):
             trial = copy.copy(block)  # it prints the quantities, too: those that have values already have their names
@@ -134,7 +133,8 @@ class Printer:
             results = self.compute(trial, code, list(self.quantities[0]))
             known = set(block._known.values())
             named = {value: ("o", index) for (_, index), value in results.items() if value in known}
-        block.name_values({**labels, "c": list(of_c)}, named, {*inputs, *outputs})
+        of_c = [labels[PARAMETERS][parameters[v][1]] if v in parameters else NO_LABEL for v in self._places]
+        block.name_values({**labels, "c": of_c}, named, {*inputs, *outputs})
 
     @staticmethod
     def _argument(name: str) -> str:
