@@ -12,6 +12,19 @@ from airmuscle.files import load_scenario
 
 VALVES = '["circuit.fill.conductance", "circuit.discharge.conductance"]'
 
+HELD = 'model = "Isometric"\ncontraction = 0.05'
+"""A muscle of constant length, as the mechanism of a plant."""
+STUDY = f"""
+[input]
+fill = [["0.1 s", 1], ["1 s", 0]]
+discharge = [["1.3 s", 1]]
+[observed]
+pressure = "500 Pa"
+[fit]
+free = [{VALVES}, "gas.exponent"]
+"""
+"""Filling and discharge, from which the valves and the exponent of the gas are identified."""
+
 
 def plant_table(
     mechanism: str, *, exponent: float, conductance: float, damping: float | None = None, supply: float = 5

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from dynamic_study import plant_table
 
 from airmuscle import load
 from airmuscle.bench import Campaign, LeftOutStage, RowReader, classify_records, read
@@ -16,21 +17,7 @@ from airmuscle.files.scenario import campaign_scenarios
 from airmuscle.physics import Ambient
 from airmuscle.recording import Recording
 
-PLANT = """
-title = "rig"
-[plant]
-gas = { model = "Polytropic", exponent = 1.2 }
-[plant.muscle]
-library = "dmsp-20-300"
-[plant.circuit]
-model = "FillDischarge"
-supply = { model = "Supply", pressure = "5 bar" }
-fill = { model = "Valve", conductance = 3e-9, critical_ratio = 0.3 }
-discharge = { model = "Valve", conductance = 3e-9, critical_ratio = 0.3 }
-[plant.mechanism]
-model = "Isometric"
-contraction = 0.1
-"""
+PLANT = 'title = "rig"' + plant_table('model = "Isometric"\ncontraction = 0.1', exponent=1.2, conductance=3e-9)
 INPUT = '[input]\nfill = [["0.1 s", 1]]\n'
 STUDY = (
     INPUT + '[observed]\npressure = "500 Pa"\n[fit]\nfree = ["circuit.fill.conductance"]\n[[record]]\nfile = "r.csv"\n'

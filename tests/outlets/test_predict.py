@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import airmuscle
-from dynamic_study import VALVES, noisy_run, plant_table, run_table
+from dynamic_study import HELD, noisy_run, plant_table, run_table
+from dynamic_study import STUDY as STUDY_OF_VALVES
 
 import airmuscle as am
 from airmuscle.bench import (
@@ -34,17 +35,7 @@ from airmuscle.recording import Recording
 
 NOISE = 4.0
 """Standard deviation of the measured force [N]."""
-HELD = 'model = "Isometric"\ncontraction = 0.05'
-STUDY = f"""
-[input]
-fill = [["0.1 s", 1], ["1 s", 0]]
-discharge = [["1.3 s", 1]]
-[observed]
-pressure = "500 Pa"
-[fit]
-free = [{VALVES}, "gas.exponent"]
-start_time = "50 ms"
-"""
+STUDY = STUDY_OF_VALVES + 'start_time = "50 ms"\n'
 RECORD = '[[record]]\nfile = "{}"\ninitial_state = {{ pressure = "0.2 bar" }}\n'
 TRUE = {"exponent": 1.25, "conductance": 3e-9}
 LATER_INPUT = '[input]\nfill = [["0.2 s", 1], ["0.5 s", 0], ["0.8 s", 1]]\ndischarge = [["1.5 s", 1]]\n'

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import airmuscle
-from dynamic_study import VALVES, noisy_run, plant_table, run_table
+from dynamic_study import HELD, STUDY, noisy_run, plant_table, run_table
 
 import airmuscle as am
 from airmuscle.bench import predict_static, rate_of_change, write_csv
@@ -22,16 +22,6 @@ from airmuscle.files.library import PLANT_READER, Location, StatedBand
 from airmuscle.recording import Recording
 
 LAW = "chou-hannaford"
-HELD = 'model = "Isometric"\ncontraction = 0.05'
-STUDY = f"""
-[input]
-fill = [["0.1 s", 1], ["1 s", 0]]
-discharge = [["1.3 s", 1]]
-[observed]
-pressure = "500 Pa"
-[fit]
-free = [{VALVES}, "gas.exponent"]
-"""
 
 
 def sweep(pressure: float = 3e5, seed: int = 1, rows: int = 300, top: float = 0.2, duration: float = 60.0) -> Recording:
