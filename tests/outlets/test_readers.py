@@ -275,7 +275,8 @@ def test_a_damaged_file_is_one_error_that_names_it(tmp_path: Path, ending: str):
 
 
 @pytest.mark.parametrize(
-    ("ending", "package"), [(".xlsx", "openpyxl"), (".mat", "pymatreader"), (".tdms", "nptdms"), (".mf4", "asammdf")]
+    ("ending", "package"),
+    [(".xlsx", "python_calamine"), (".mat", "pymatreader"), (".tdms", "nptdms"), (".mf4", "asammdf")],
 )
 def test_a_missing_package_is_an_error_with_the_install_command(tmp_path: Path, monkeypatch, ending: str, package: str):
     monkeypatch.setitem(sys.modules, package, None)
@@ -676,16 +677,22 @@ def test_a_damaged_matlab_file_does_not_end_the_process(tmp_path: Path, save):
 def test_a_file_whose_reader_ends_or_takes_too_long_is_damaged(tmp_path: Path, monkeypatch):
     (tmp_path / "bad_reader.py").write_text(
         "import os, time\ndef end(path): os._exit(1)\ndef wait(path): time.sleep(60)\n"
+        "def loop(path):\n    while True: pass\ndef fill(path): bytearray(10**11)\ndef fail(path): None.get\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
     separate_process.stop()
     path = csv(tmp_path / "run.csv")
+    monkeypatch.setattr(separate_process, "CPU_LIMIT", 1.0)
+    limits = separate_process.TIME_LIMIT
     for function, limit, cause in (
-        ("end", separate_process.TIME_LIMIT, "its reader ended without a result"),
+        ("end", limits, "its reader ended without a result"),
+        ("loop", limits, "its reader ended without a result"),
+        ("fill", limits, "MemoryError:"),
+        ("fail", limits, "AttributeError: 'NoneType' object has no attribute 'get'"),
         ("wait", 1.0, "its reading takes more than 1 s"),
     ):
         monkeypatch.setattr(separate_process, "TIME_LIMIT", limit)
-        with pytest.raises(FileError, match=rf"run.csv: the file is damaged \({cause}\). Copy it again"):
+        with pytest.raises(FileError, match=rf"run.csv: the file is damaged or too large \({cause}\). Copy it again"):
             call_in_separate_process("bad_reader", function, path)
 
 

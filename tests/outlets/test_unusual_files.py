@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import datetime
 import os
 import sys
+import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 from command_line import airmuscle
 
-from airmuscle.bench import inspect, read
-from airmuscle.errors import FileError
+from airmuscle.bench import DropMissing, inspect, read
+from airmuscle.errors import ColumnError, FileError
 
 HEAD = "time [s],pressure [kPa],force [N]\n"
 ROWS = "".join(f"{i},{100 + i},{50 + i}\n" for i in range(9))
@@ -70,6 +72,51 @@ def test_an_empty_chart_sheet_is_passed_over(tmp_path):
     book.save(tmp_path / "bench.xlsx")
     (recording,) = read(tmp_path / "bench.xlsx")
     assert len(recording) == 9
+
+
+def with_contents(path: Path, member: str, *changes: tuple[bytes, bytes]) -> Path:
+    """The workbook with changes of the contents of a member."""
+    with zipfile.ZipFile(path) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    for old, new in changes:
+        assert old in members[member], old
+        members[member] = members[member].replace(old, new)
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in members.items():
+            archive.writestr(name, content)
+    return path
+
+
+def test_formulas_dates_hidden_sheets_and_merged_cells_of_a_workbook(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book, start = openpyxl.Workbook(), datetime.datetime(2024, 5, 17, 12)
+    book.active.append(["log of the rig"])
+    book.active.merge_cells("A1:C1")
+    book.active.append(["time", "pressure [kPa]", "force [N]"])
+    for i in range(9):
+        book.active.append([start + datetime.timedelta(milliseconds=100 * i), f"={100 + i}*1", 50 + i])
+    hidden = book.create_sheet("hidden")
+    for row in [["time [s]", "force [N]"], *([i, 2 * i] for i in range(9))]:
+        hidden.append(row)
+    hidden.sheet_state = "hidden"
+    book.save(tmp_path / "bench.xlsx")
+    computed = [(f"<f>{100 + i}*1</f><v></v>".encode(), f"<f>{100 + i}*1</f><v>{100 + i}</v>".encode()) for i in range(9)]
+    first, second = read(with_contents(tmp_path / "bench.xlsx", "xl/worksheets/sheet1.xml", *computed))
+    assert first["time"] == pytest.approx(0.1 * np.arange(9), abs=1e-6)
+    assert first["pressure"].tolist() == [1e3 * (100 + i) for i in range(9)]
+    assert second["force"].tolist() == [2.0 * i for i in range(9)]
+    assert [each.origin for each in (first, second)] == ["bench.xlsx, sheet 'Sheet'", "bench.xlsx, sheet 'hidden'"]
+
+
+def test_a_formula_that_was_never_computed_and_one_with_an_error_have_no_value(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for row in [["time [s]", "force [N]"], *([i, 50 + i] for i in range(7)), [7, "=1/0"], [8, "#DIV/0!"]]:
+        book.active.append(row)
+    book.save(tmp_path / "bench.xlsx")
+    with pytest.raises(ColumnError, match=r"2 cells in 2 of 9 rows .* row 9 \(force empty\), row 10 \(force empty\)"):
+        read(tmp_path / "bench.xlsx")
+    assert len(read(tmp_path / "bench.xlsx", missing=DropMissing())[0]) == 7
 
 
 @pytest.mark.parametrize("userblock", [0, 512])

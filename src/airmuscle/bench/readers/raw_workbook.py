@@ -1,23 +1,45 @@
-"""Reader of old Excel workbooks (.xls) and OpenDocument spreadsheets (.ods): one table for each sheet with a table."""
+"""Reader of workbooks (.xlsx, .xlsm, .xls, .ods): one table for each worksheet that contains one."""
 
 from __future__ import annotations
 
+import datetime
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from ...core.errors import ColumnError, FileError, suggestion
+from .clock import seconds_from_clock
+from .header import (
+    COMMA_NUMBER,
+    POINT_NUMBER,
+    are_headings,
+    count_cells,
+    is_number,
+    missing_header_error,
+    parse_constant_cells,
+    parse_unit_row,
+    stated_heading_row,
+)
 from .optional_dependency import import_lab_package, run_reader
-from .raw_excel import Rows, check_sheet_exists, nonempty_rows, tables_of_sheets
 from .separate_process import read_in_separate_process
-from .table import RawTable
+from .table import Cells, RawTable
 from .text_format import TextFormat
+
+_NUMBERS = float | int | datetime.date | datetime.time | datetime.timedelta
+Rows = list[tuple[int, list[Any]]]
+"""Non-empty rows of a worksheet with their numbers, counted from 1."""
 
 
 def read_workbook_tables(
     path: Path, sheet: str | None = None, text_format: TextFormat = TextFormat()
 ) -> tuple[RawTable, ...]:
-    """Read one table from each sheet that contains one, or from the named sheet, as `read_excel_tables`.
+    """Read one table from each worksheet that contains one, or from the named worksheet.
 
-    The package for these formats is native code, therefore a separate process reads the file. Raises FileError or
-    ColumnError.
+    text_format  the place of the headings; delimiter and decimal sign do not apply
+
+    Of a formula, its stored value is read; a cell with an error is empty, and chart sheets have no cells. The package
+    for these formats is native code, therefore a separate process reads the file. Raises FileError or ColumnError.
     """
     tables: tuple[RawTable, ...] = read_in_separate_process(
         "python_calamine", __name__, "read_workbook_tables_here", path, sheet, text_format
@@ -31,9 +53,113 @@ def read_workbook_tables_here(path: Path, sheet: str | None, text_format: TextFo
 
     def read() -> dict[str, Rows]:
         with calamine.CalamineWorkbook.from_path(str(path)) as book:
-            check_sheet_exists(path, sheet, book.sheet_names)
-            names = book.sheet_names if sheet is None else [sheet]
-            rows = {name: book.get_sheet_by_name(name).to_python(skip_empty_area=False) for name in names}
-        return {name: nonempty_rows(tuple(row) for row in table) for name, table in rows.items()}
+            names = [each.name for each in book.sheets_metadata if each.typ == calamine.SheetTypeEnum.WorkSheet]
+            if sheet is not None and sheet not in names:
+                raise FileError(
+                    f"{path.name}: no sheet '{sheet}'; the sheets are {', '.join(names)}.{suggestion(sheet, names)}"
+                )
+            return {name: _nonempty_rows(book.get_sheet_by_name(name)) for name in names if sheet in (None, name)}
 
-    return tables_of_sheets(path, run_reader(path, f"a workbook ({path.suffix})", read), text_format)
+    sheets = {name: rows for name, rows in run_reader(path, "a workbook", read).items() if _contains_table(rows)}
+    if not sheets:
+        raise FileError(
+            f"{path.name}: no worksheet contains a table. A table consists of a row of headings and rows of numbers."
+        )
+    several = len(sheets) > 1
+    return tuple(
+        _parse_table(f"{path.name}, sheet '{name}'" if several else path.name, rows, text_format)
+        for name, rows in sheets.items()
+    )
+
+
+def _nonempty_rows(sheet: Any) -> Rows:
+    """The rows with content, with their numbers, counted from 1."""
+    rows = enumerate(sheet.to_python(skip_empty_area=False), 1)
+    return [(i, row) for i, row in rows if any(cell not in (None, "") for cell in row)]
+
+
+def _contains_table(rows: Rows) -> bool:
+    return any(_is_numeric(row) for _, row in rows)
+
+
+def _parse_table(origin: str, rows: Rows, text_format: TextFormat) -> RawTable:
+    """The table of a worksheet; rows above the headings may state constants."""
+    texts = ((i, [_text(cell) for cell in row]) for i, row in rows)
+    stated = stated_heading_row(texts, text_format.named, text_format.skip_rows)
+    if text_format.skip_rows is not None and stated is None:
+        raise FileError(f"{origin}: there is no table below the {text_format.skip_rows} rows of skip_rows.")
+    start = _find_heading_row(rows) if stated is None else stated
+    constants = dict(
+        constant for _, row in rows[:start] if (constant := parse_constant_cells([_text(cell) for cell in row]))
+    )
+    first, cells = rows[start]
+    used = [j for j, cell in enumerate(cells) if cell not in (None, "")]
+    if are_headings([_text(c) for c in cells]):
+        headings, body = [_text(cells[j]) for j in used], rows[start + 1 :]
+    elif text_format.headerless:
+        headings, body = [str(n) for n in range(1, len(used) + 1)], rows[start:]
+    else:
+        raise missing_header_error(f"{origin}, row {first}")
+    units = parse_unit_row(headings, [_text(body[0][1][j]) for j in used] if body else [])
+    body = body[1:] if units else body
+    if not body:
+        raise FileError(f"{origin}: no rows of numbers below the headings ({', '.join(headings)}).")
+    _check_headings_cover(origin, headings, used, body)
+    columns = tuple(_column([row[j] for _, row in body]) for j in used)
+    return RawTable(origin, tuple(headings), units, columns, np.array([i for i, _ in body]), "row", constants)
+
+
+def _find_heading_row(rows: Rows) -> int:
+    """The index of the last row above the numbers that is as wide as they are, or of the row above the unit row."""
+    numeric = next((i for i, (_, row) in enumerate(rows) if _is_numeric(row)), 0)
+    width = count_cells(rows[numeric][1])
+    above = [i for i in range(numeric) if count_cells(rows[i][1]) >= width]
+    if not above:
+        return numeric
+    adjacent = len(above) > 1 and above[-2] == above[-1] - 1
+    last = [_text(c) for c in rows[above[-1]][1]]
+    return above[-2] if adjacent and parse_unit_row([_text(c) for c in rows[above[-2]][1]], last) else above[-1]
+
+
+def _is_numeric(row: list[Any]) -> bool:
+    """Whether more than half of the cells of a row are numbers or times, also as texts; the others may be names."""
+    cells = [c for c in row if c not in (None, "")]
+    numbers = sum(_is_numeric_text(c) if isinstance(c, str) else isinstance(c, _NUMBERS) for c in cells)
+    return 2 * numbers > len(cells)
+
+
+def _is_numeric_text(cell: str) -> bool:
+    """Whether a text is a number, a clock time or a date."""
+    return is_number(cell) or seconds_from_clock((cell,)) is not None
+
+
+def _check_headings_cover(origin: str, headings: list[str], used: list[int], body: Rows) -> None:
+    for i, row in body:
+        outside = [j for j, cell in enumerate(row) if cell not in (None, "") and j not in used]
+        if outside:
+            raise ColumnError(
+                f"{origin}, row {i}: the cell '{_text(row[outside[0]])}' has no heading (the headings are "
+                f"{', '.join(headings)}). Add a heading to its column, or move the cell outside the rows of the table."
+            )
+
+
+def _text(cell: Any) -> str:
+    if isinstance(cell, float) and cell.is_integer() and abs(cell) < 1e15:
+        return str(int(cell))  # as it is shown
+    if isinstance(cell, datetime.date | datetime.time):
+        return cell.isoformat()
+    return "" if cell is None else str(cell).strip()
+
+
+def _column(cells: list[Any]) -> Cells:
+    """A column of numbers, also of numbers that are stored as texts with one decimal sign; otherwise of texts."""
+    if all(isinstance(cell, float | int) and not isinstance(cell, bool) for cell in cells):
+        return np.array(cells, dtype=float)
+    texts = [_text(cell) for cell in cells]
+    stored = [cell for cell in cells if isinstance(cell, str)]
+    if not any(POINT_NUMBER.fullmatch(text.strip()) for text in stored):
+        texts = [text.replace(",", ".") if COMMA_NUMBER.fullmatch(text) else text for text in texts]
+    try:
+        return np.array([float(text) for text in texts])
+    except ValueError:
+        return texts

@@ -20,7 +20,6 @@ from .mapping import ColumnMapping, apply_mapping, read_mapping
 from .missing_values import MissingValues
 from .raw_columnar import read_hdf5_tables, read_parquet_tables
 from .raw_csv import read_csv_table
-from .raw_excel import read_excel_tables
 from .raw_mat import read_mat_tables
 from .raw_mdf import read_mdf_tables
 from .raw_rosbag import read_rosbag_tables
@@ -34,12 +33,10 @@ from .unit_consistency import check_unit_consistency
 Source = str | Path | Iterable[str | Path]
 Tables = tuple[RawTable, ...]
 
+WORKBOOKS = (".xlsx", ".xlsm", ".xls", ".ods")
 TEXT_EXTENSIONS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".prn")
 _BINARY_READERS: Mapping[str, Callable[[Path, ColumnMapping, Downsampling], Tables]] = {
-    ".xlsx": lambda path, m, d: read_excel_tables(path, m.sheet, m.text_format),
-    ".xlsm": lambda path, m, d: read_excel_tables(path, m.sheet, m.text_format),
-    ".xls": lambda path, m, d: read_workbook_tables(path, m.sheet, m.text_format),
-    ".ods": lambda path, m, d: read_workbook_tables(path, m.sheet, m.text_format),
+    **dict.fromkeys(WORKBOOKS, lambda path, m, d: read_workbook_tables(path, m.sheet, m.text_format)),
     ".parquet": lambda path, m, d: read_parquet_tables(path, m.group),
     ".h5": lambda path, m, d: read_hdf5_tables(path, m.group, d),
     ".hdf5": lambda path, m, d: read_hdf5_tables(path, m.group, d),

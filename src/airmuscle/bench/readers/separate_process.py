@@ -7,16 +7,26 @@ from __future__ import annotations
 
 import importlib
 import threading
+import time
 from pathlib import Path
 from typing import Any
 
-from ...core.errors import FileError
+from ...core.errors import AirmuscleError, FileError
 from ...engine.processes import Worker, WorkerError
 from .file_kind import check_regular_file
 from .optional_dependency import check_lab_package
 
+try:
+    import resource
+except ImportError:  # Windows, where the time is limited alone
+    resource = None  # type: ignore[assignment]
+
 TIME_LIMIT = 60.0
 """Time limit [s] of a file, and of every further 100 MB (chosen: 20 MB take less than one second)."""
+CPU_LIMIT = 15.0
+"""Limit of the time of the processor [s], in the same way (chosen)."""
+MEMORY_LIMIT, MEMORY_FACTOR = 6e9, 20.0
+"""Limit of the memory [bytes], with this multiple of the size of the file (chosen)."""
 _worker = Worker(quiet=True)
 _lock = threading.Lock()
 
@@ -37,20 +47,36 @@ def call_in_separate_process(module: str, function: str, path: Path, *arguments:
     An exception of the function is raised here. Raises FileError if the process ends or exceeds the time limit.
     """
     path = Path(path).absolute()
-    limit = TIME_LIMIT * (1.0 + path.stat().st_size / 1e8)
+    limit, seconds = (each * (1.0 + path.stat().st_size / 1e8) for each in (TIME_LIMIT, CPU_LIMIT))
     try:
         with _lock:
-            return _worker.call(call_function, (module, function, path, *arguments), limit)
+            return _worker.call(call_function, (seconds, module, function, path, *arguments), limit)
     except WorkerError as error:
         cause = f"its reading takes more than {limit:.0f} s" if error.late else "its reader ended without a result"
-        raise FileError(
-            f"{path.name}: the file is damaged ({cause}). Copy it again from its source, or export it as text."
-        ) from None
+    except AirmuscleError:
+        raise
+    except Exception as error:  # in what a package returned of a damaged file
+        cause = " ".join(f"{type(error).__name__}: {error}".split())[:120]
+    raise FileError(
+        f"{path.name}: the file is damaged or too large ({cause}). Copy it again from its source, or export it as text."
+    )
 
 
-def call_function(module: str, function: str, *arguments: Any) -> Any:
-    """The result of a function of a module, which is imported only in the separate process."""
-    return getattr(importlib.import_module(module), function)(*arguments)
+def call_function(seconds: float, module: str, function: str, path: Path, *arguments: Any) -> Any:
+    """The result of a function of a module, which is imported only in the separate process, within its limits.
+
+    `seconds` of the processor limit the time.
+    """
+    if resource is not None:
+        size = path.stat().st_size
+        _limit(resource.RLIMIT_CPU, time.process_time() + seconds)
+        _limit(resource.RLIMIT_AS, MEMORY_LIMIT + MEMORY_FACTOR * size)
+    return getattr(importlib.import_module(module), function)(path, *arguments)
+
+
+def _limit(kind: int, value: float) -> None:
+    hard = resource.getrlimit(kind)[1]
+    resource.setrlimit(kind, (int(value) + 1 if hard == resource.RLIM_INFINITY else min(int(value) + 1, hard), hard))
 
 
 def stop() -> None:
