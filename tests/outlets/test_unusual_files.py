@@ -100,7 +100,9 @@ def test_formulas_dates_hidden_sheets_and_merged_cells_of_a_workbook(tmp_path):
         hidden.append(row)
     hidden.sheet_state = "hidden"
     book.save(tmp_path / "bench.xlsx")
-    computed = [(f"<f>{100 + i}*1</f><v></v>".encode(), f"<f>{100 + i}*1</f><v>{100 + i}</v>".encode()) for i in range(9)]
+    computed = [
+        (f"<f>{100 + i}*1</f><v></v>".encode(), f"<f>{100 + i}*1</f><v>{100 + i}</v>".encode()) for i in range(9)
+    ]
     first, second = read(with_contents(tmp_path / "bench.xlsx", "xl/worksheets/sheet1.xml", *computed))
     assert first["time"] == pytest.approx(0.1 * np.arange(9), abs=1e-6)
     assert first["pressure"].tolist() == [1e3 * (100 + i) for i in range(9)]
