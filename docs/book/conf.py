@@ -9,6 +9,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import airmuscle
+from book.accessible import set_up_accessibility
 from book.mathml import set_up_mathml
 from book.search_index import set_up_search
 
@@ -45,3 +46,4 @@ def setup(app: Any) -> None:
     """Register the renderer of formulas, the index of the search, and what makes pages accessible."""
     set_up_mathml(app)
     set_up_search(app)
+    set_up_accessibility(app)

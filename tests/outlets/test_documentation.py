@@ -16,6 +16,7 @@ import printed
 import pytest
 import typer
 from book import command_pages, function_pages, gallery, model_pages
+from book.accessible import accessible
 from book.ascii_math import FormulaError, to_latex
 from book.contents import DOCS, ROOT, broken_links, documents, listed, parts
 from book.docstrings import to_markdown
@@ -227,6 +228,14 @@ def test_symbols_in_running_text_are_typeset():
     assert site_text(text) == (
         r"The angle {math}`\theta _{g}` and {math}`\varepsilon` of {math}`r_{1}`, `theta_g`, a, 30 psi, x_y.z, "
         r"tests/rho_1.py and {math}`\rho`."
+    )
+
+
+def test_captions_landmarks_and_regions_that_scroll_are_accessible():
+    page = '<p class="caption" role="heading">A</p><aside class="sidebar-drawer"><pre><span></span>x</pre></aside>'
+    assert accessible(page) == (
+        '<p class="caption" role="heading" aria-level="2">A</p><aside class="sidebar-drawer" aria-label="Pages">'
+        '<pre tabindex="0"><span></span>x</pre></aside>'
     )
 
 
