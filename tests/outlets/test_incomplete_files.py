@@ -183,7 +183,6 @@ def test_fit_takes_columns_and_constants_by_options(tmp_path: Path) -> None:
 
 def mat_file(path: Path, **variables: Any) -> Path:
     scipy_io = pytest.importorskip("scipy.io")
-    pytest.importorskip("pymatreader")
     scipy_io.savemat(path, variables)
     return path
 

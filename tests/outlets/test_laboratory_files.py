@@ -295,7 +295,6 @@ def test_values_that_are_not_numbers_are_missing_in_a_workbook_and_in_matlab(tmp
     path = workbook(tmp_path, GAPS)
     assert only(path, missing=DropMissing())["time"].tolist() == [0, 4, 5, 11]
     scipy_io = pytest.importorskip("scipy.io")
-    pytest.importorskip("pymatreader")
     force = np.array([1.0, np.nan, -999.0, 4.0])
     scipy_io.savemat(tmp_path / "bench.mat", {"time_s": np.arange(4.0), "force_N": force})
     assert only(tmp_path / "bench.mat", missing=DropMissing((-999,)))["force"].tolist() == [1, 4]

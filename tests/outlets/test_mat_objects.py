@@ -15,7 +15,6 @@ from airmuscle.bench.readers import MatlabObject, find_objects, mat_objects, rea
 from airmuscle.errors import FileError
 
 scipy_io = pytest.importorskip("scipy.io")
-pytest.importorskip("pymatreader")
 FORCE = np.linspace(10.0, 20.0, 12)
 
 

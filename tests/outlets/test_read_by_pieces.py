@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import BlockMeans, Decimation, read
-from airmuscle.bench.readers import is_installed, pieces, raw_columnar, raw_mat, raw_mdf, read_large_mat
+from airmuscle.bench.readers import pieces, raw_columnar, raw_mat, raw_mdf, read_contents
 from airmuscle.errors import AirmuscleError, ColumnError
 
 h5py = pytest.importorskip("h5py", reason="h5py is not installed")
@@ -100,8 +100,6 @@ def test_the_pieces_of_a_column_give_the_rows_of_the_whole(small_pieces, size, d
     ],
 )
 def test_a_large_file_gives_every_nth_row_as_measured_with_a_note(tmp_path, small_pieces, name, write, reader):
-    if name.endswith(".mat"):
-        pytest.importorskip("pymatreader", reason="pymatreader is not installed")
     (table,) = reader(write(tmp_path / name), Decimation(1000))
     columns = dict(zip([heading.partition(" ")[0] for heading in table.headings], table.columns, strict=True))
     step = 11
@@ -121,13 +119,13 @@ def test_a_reading_of_the_user_is_reduced_as_well(tmp_path):
     assert recording["time"][-1] == TIME[::21][-1]
 
 
-def test_a_matrix_texts_and_constants_of_a_large_matlab_file_are_kept_and_cells_are_named(tmp_path, small_pieces):
-    pytest.importorskip("pymatreader", reason="pymatreader is not installed")
-    large = read_large_mat(mat_7_3(tmp_path / "run.mat"), None, Decimation(1000))
+def test_a_matrix_texts_and_constants_and_cells_of_a_large_matlab_file_are_kept(tmp_path, small_pieces):
+    large = read_contents(mat_7_3(tmp_path / "run.mat"), Decimation(1000))
     np.testing.assert_array_equal(large.variables["data"], np.stack([TIME, FORCE]).T[::11])
     assert large.variables["resting_length_mm"] == 300.0
     assert large.variables["operator"] == "MU"
-    assert large.notes == ("Not read from the large file: notes, a cell array.",)
+    assert large.variables["notes"] == [300.0]
+    assert large.notes == ()
     assert large.reductions["run"].rows == ROWS
 
 
@@ -142,12 +140,14 @@ def test_no_more_than_a_piece_of_a_dataset_is_requested(tmp_path, monkeypatch, s
 
     path = mat_7_3(tmp_path / "run.mat")
     monkeypatch.setattr(h5py.Dataset, "__getitem__", spied)
-    read_large_mat(path, None, Decimation(1000))
+    read_contents(path, Decimation(1000))
     assert 0 < max(requested) <= 2 * 900
 
 
 def test_a_file_of_fewer_rows_is_read_as_a_whole(tmp_path):
-    assert read_large_mat(mat_7_3(tmp_path / "run.mat"), None, Decimation(ROWS)) is None
+    whole = read_contents(mat_7_3(tmp_path / "run.mat"), Decimation(ROWS))
+    np.testing.assert_array_equal(whole.variables["run"]["force_N"], FORCE)
+    assert whole.reductions["run"].step == 1
 
 
 def test_lengths_that_the_reduction_would_hide_are_refused(tmp_path):
@@ -159,8 +159,6 @@ def test_lengths_that_the_reduction_would_hide_are_refused(tmp_path):
 
 @pytest.mark.parametrize("write", [mat_7_3, mat_5])
 def test_a_damaged_large_file_is_an_error_and_no_crash(tmp_path, write):
-    if not is_installed("pymatreader"):
-        pytest.skip("pymatreader is not installed")
     path = write(tmp_path / "run.mat")
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
     with pytest.raises(AirmuscleError, match=r"run\.mat"):
@@ -183,7 +181,6 @@ print(len(table.rows), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - befo
 def test_the_memory_for_a_matlab_file_of_320_megabytes_is_that_of_a_piece(tmp_path):
     """In a process of its own, after a small file, so that the packages are loaded: resident memory grows by less than a
     quarter of the file."""
-    pytest.importorskip("pymatreader", reason="pymatreader is not installed")
     small, path = mat_7_3(tmp_path / "small.mat"), tmp_path / "large.mat"
     with h5py.File(path, "w", userblock_size=512) as file:
         for name in ("time_s", "force_N"):

@@ -153,14 +153,12 @@ def save_v73(path: Path, content: dict[str, object]) -> Path:
 
 @pytest.mark.parametrize("save", [save_v5, save_v73])
 def test_matlab_vectors(tmp_path: Path, save):
-    pytest.importorskip("pymatreader")
     recording = only(read(save(tmp_path / "run.mat", mat_content()), units={"time": "s"}))
     same(recording)
     assert recording.constants["resting_length"] == pytest.approx(0.31)
 
 
 def test_matlab_structs_matrices_and_simulink(tmp_path: Path):
-    pytest.importorskip("pymatreader")
     struct = {"run1": mat_content() | {"units": {"t": "s"}}, "run2": {"force_N": FORCE[:9]}}
     first, second = read(save_v5(tmp_path / "two.mat", struct))
     same(first)
@@ -191,7 +189,6 @@ def test_the_function_workspace_of_a_matlab_file_is_no_column(tmp_path: Path):
 
 
 def test_matlab_without_a_vector(tmp_path: Path):
-    pytest.importorskip("pymatreader")
     said = refusal(FileError, save_v5(tmp_path / "run.mat", {"name": "x", "n": 3.0}))
     assert "run.mat: no vector of numbers (the file contains name, n)" in said
 
@@ -276,7 +273,7 @@ def test_a_damaged_file_is_one_error_that_names_it(tmp_path: Path, ending: str):
 
 @pytest.mark.parametrize(
     ("ending", "package"),
-    [(".xlsx", "python_calamine"), (".mat", "pymatreader"), (".tdms", "nptdms"), (".mf4", "asammdf")],
+    [(".xlsx", "python_calamine"), (".h5", "h5py"), (".tdms", "nptdms"), (".mf4", "asammdf")],
 )
 def test_a_missing_package_is_an_error_with_the_install_command(tmp_path: Path, monkeypatch, ending: str, package: str):
     monkeypatch.setitem(sys.modules, package, None)
@@ -660,7 +657,6 @@ def test_an_error_escapes_the_control_characters_of_a_file(tmp_path: Path):
 
 @pytest.mark.parametrize("save", [save_v5, save_v73])
 def test_a_damaged_matlab_file_does_not_end_the_process(tmp_path: Path, save):
-    pytest.importorskip("pymatreader")
     content = save(tmp_path / "run.mat", mat_content()).read_bytes()
     unknown_type = content.index(b"t\0\0\0") + 4  # type of the numbers, for which SciPy has a segmentation fault
     for position in (unknown_type, 130, len(content) // 2, len(content) - 100):

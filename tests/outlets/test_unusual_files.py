@@ -129,3 +129,60 @@ def test_hdf5_under_the_name_of_matlab_is_read_as_hdf5(tmp_path, userblock: int)
             file[name] = np.arange(9.0) + i
     (recording,) = read(tmp_path / "bench.mat")
     assert recording["force"].tolist() == [*range(2, 11)]
+
+
+def cells(*values: object) -> np.ndarray:
+    """A cell array of MATLAB."""
+    made = np.empty(len(values), dtype=object)
+    made[:] = values
+    return made
+
+
+@pytest.mark.parametrize(
+    ("value", "what"),
+    [
+        (np.arange(9) * 1j, "complex numbers"),
+        (cells(*"abcdefghi"), "texts"),
+        (cells(*([np.ones(2)] * 9)), "cells"),
+    ],
+    ids=["complex", "texts", "cells"],
+)
+def test_a_column_of_matlab_that_contains_no_real_numbers_is_left_out_with_a_remark(tmp_path, value, what: str):
+    scipy_io = pytest.importorskip("scipy.io")
+    scipy_io.savemat(tmp_path / "bench.mat", {"time_s": np.arange(9.0), "force_N": np.arange(9.0), "state": value})
+    (recording,) = read(tmp_path / "bench.mat")
+    assert list(recording) == ["time", "force"]
+    assert f"Not read, because it contains no real numbers: state ({what})." in recording.notes
+
+
+def test_complex_numbers_cells_and_a_sparse_matrix_of_version_7_3_are_left_out_with_a_remark(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "bench.mat", "w", userblock_size=512) as file:
+        for name in ("time_s", "force_N"):
+            file[name] = np.arange(9.0)[None, :]
+        file["z"] = np.zeros((1, 9), dtype=[("real", float), ("imag", float)])
+        file["state"] = np.array([[file["force_N"].ref] * 9], dtype=h5py.ref_dtype)
+        file.create_group("S").attrs["MATLAB_sparse"] = 9
+        for name, kind in {
+            "time_s": "double",
+            "force_N": "double",
+            "z": "double",
+            "state": "cell",
+            "S": "double",
+        }.items():
+            file[name].attrs["MATLAB_class"] = np.bytes_(kind)
+    with (tmp_path / "bench.mat").open("r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
+    (recording,) = read(tmp_path / "bench.mat")
+    assert recording["force"].tolist() == [*range(9)]
+    assert {"Not read: S, a sparse matrix.", "Not read: z, which contains no real numbers."} <= set(recording.notes)
+    assert "Not read, because it contains no real numbers: state (cells)." in recording.notes
+
+
+@pytest.mark.parametrize("signals", [3.0, np.zeros((0, 0)), {"label": "force"}, "force"])
+def test_a_struct_with_time_and_signals_that_simulink_did_not_save(tmp_path, signals):
+    scipy_io = pytest.importorskip("scipy.io")
+    out = {"time": np.arange(9.0), "force_N": np.arange(9.0), "signals": signals}
+    scipy_io.savemat(tmp_path / "bench.mat", {"out": out})
+    (recording,) = read(tmp_path / "bench.mat", units={"time": "s"})
+    assert recording["force"].tolist() == [*range(9)]

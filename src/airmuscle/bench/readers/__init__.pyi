@@ -12,10 +12,10 @@ from .follow import MAX_UNREADABLE as MAX_UNREADABLE
 from .follow import RowReader as RowReader
 from .follow import follow_lines as follow_lines
 from .header import parse_unit_row as parse_unit_row
-from .large_mat import read_large_mat as read_large_mat
 from .mapping import ColumnMapping as ColumnMapping
 from .mapping import mapping_of_tables as mapping_of_tables
 from .mapping import read_mapping as read_mapping
+from .mat_contents import read_contents as read_contents
 from .mat_objects import MatlabObject as MatlabObject
 from .mat_objects import find_objects as find_objects
 from .missing_values import DropMissing as DropMissing

@@ -7,8 +7,7 @@ structure with time that Simulink saves; tables and timetables with the package 
 from __future__ import annotations
 
 import dataclasses
-import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,20 +17,13 @@ from ...core.errors import ColumnError, FileError, Hint, suggestion
 from ...recording.heading import parse_heading
 from .channels import Channel, merge_channels
 from .downsampling import Decimation, Downsampling
-from .large_mat import LargeContents, is_version_7_3, read_large_mat
+from .mat_contents import is_plain_hdf5, read_contents
 from .mat_objects import READABLE, MatlabObject, find_objects, read_objects
-from .optional_dependency import import_lab_package, run_reader
+from .optional_dependency import run_reader
 from .pieces import Reduction, with_reduction
-from .raw_columnar import check_no_external_links, check_own_values, read_hdf5_tables
+from .raw_columnar import read_hdf5_tables
 from .separate_process import read_in_separate_process
 from .table import RawTable
-
-_INTERNAL_PREFIXES = ("__", "#")
-"""Beginnings of names that no MATLAB variable has: header, function workspace, references, subsystem."""
-HDF5_SIGNATURE, HDF5_BLOCK = b"\x89HDF\r\n\x1a\n", 512
-"""Signature of an HDF5 file, and the least size of the block before it [bytes] (HDF5 file format, superblock)."""
-_UNNAMED = "None"
-"""Name that SciPy gives to objects."""
 
 
 def read_mat_tables(
@@ -42,13 +34,13 @@ def read_mat_tables(
     If the vectors of a struct differ in length, those of the length of the mapped `columns` are read, or without any
     those of the length of the known quantities.
 
-    A file with a variable of more than `downsampling.max_rows` rows is reduced while it is read, see `read_large_mat`.
-    The packages for this format are native code, therefore a separate process reads the file.
+    A file with a variable of more than `downsampling.max_rows` rows is reduced while it is read. The packages for this
+    format are native code, therefore a separate process reads the file.
     """
-    if _is_plain_hdf5(path):
+    if is_plain_hdf5(path):
         return read_hdf5_tables(path, group, downsampling)
     tables: tuple[RawTable, ...] = read_in_separate_process(
-        "pymatreader", __name__, "read_mat_tables_here", path, group, tuple(columns), downsampling
+        "scipy", __name__, "read_mat_tables_here", path, group, tuple(columns), downsampling
     )
     return tables
 
@@ -57,25 +49,12 @@ def read_mat_tables_here(
     path: Path, group: str | None, columns: Sequence[str] = (), downsampling: Downsampling = Decimation()
 ) -> tuple[RawTable, ...]:
     """As `read_mat_tables`, in this process."""
-    pymatreader = import_lab_package("pymatreader", path)
-    _check_links(path)
-    large = run_reader(path, "MATLAB", lambda: read_large_mat(path, pymatreader, downsampling))
-
-    def read() -> Mapping[str, Any]:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # about unreadable objects; the error below reports missing vectors
-            return dict(pymatreader.read_mat(str(path))) if large is None else large.variables
-
-    contents = run_reader(path, "MATLAB", read)
+    contents = run_reader(path, "MATLAB", lambda: read_contents(path, downsampling))
     objects = find_objects(path)
     tables = run_reader(path, "MATLAB", lambda: read_objects(path, objects))
     unread = [each for each in objects if each.name not in tables]
     opaque = {each.name for each in objects}
-    variables = {
-        name: value
-        for name, value in contents.items()
-        if not name.startswith(_INTERNAL_PREFIXES) and name not in opaque and name != _UNNAMED
-    } | tables
+    variables = {name: value for name, value in contents.variables.items() if name not in opaque} | tables
     groups = dict(_find_groups("", variables))
     if group is not None and group not in groups:
         names = ", ".join(name or "(no struct)" for name in groups)
@@ -89,34 +68,13 @@ def read_mat_tables_here(
             f"{', '.join([*variables, *map(str, unread)]) or 'no variables'}). {_remedy(unread)}"
         )
     constants = _scalar_fields(variables)
-    made = [_make_table(path, name, fields, constants, len(groups) > 1, columns) for name, fields in selected.items()]
-    notes = tuple(f"Not read: {each}. {_remedy([each])}" for each in unread)
-    if large is not None:
-        made, notes = _with_reductions(selected, made, large, downsampling), notes + large.notes
-    return tuple(dataclasses.replace(table, notes=(*table.notes, *notes)) for table in made)
-
-
-def _is_plain_hdf5(path: Path) -> bool:
-    """Whether a file is HDF5 without the header of MATLAB, as h5py writes it."""
-    if not path.is_file():  # a pipe may have no end; the reader states the reason
-        return False
-    try:
-        with path.open("rb") as file:
-            beginning = file.read(2 * HDF5_BLOCK)
-    except OSError:
-        return False
-    starts = (0, HDF5_BLOCK)  # without and with the least user block
-    return not beginning.startswith(b"MATLAB") and any(beginning.startswith(HDF5_SIGNATURE, i) for i in starts)
-
-
-def _with_reductions(
-    names: Iterable[str], tables: Sequence[RawTable], large: LargeContents, downsampling: Downsampling
-) -> list[RawTable]:
-    whole = Reduction(0, 1)
-    return [
-        with_reduction(table, large.reductions.get(name, whole), downsampling)
-        for name, table in zip(names, tables, strict=True)
-    ]
+    notes = (*(f"Not read: {each}. {_remedy([each])}" for each in unread), *contents.notes)
+    made = []
+    for name, fields in selected.items():
+        table = _make_table(path, name, fields, constants, len(groups) > 1, columns)
+        table = with_reduction(table, contents.reductions.get(name, Reduction(0, 1)), downsampling)
+        made.append(dataclasses.replace(table, notes=(*table.notes, *notes)))
+    return tuple(made)
 
 
 def _remedy(unread: Sequence[MatlabObject]) -> str:
@@ -129,24 +87,11 @@ def _remedy(unread: Sequence[MatlabObject]) -> str:
     return f"Export in MATLAB: {commands}.{package}"
 
 
-def _check_links(path: Path) -> None:
-    """Raise FileError if a file of version 7.3, which is HDF5, takes values from another file."""
-    if not is_version_7_3(path):
-        return
-    h5py = import_lab_package("h5py", path)
-
-    def check() -> None:
-        with h5py.File(path, "r") as file:
-            check_own_values(h5py, file, path)
-            check_no_external_links(h5py, file, path)
-
-    run_reader(path, "MATLAB", check)
-
-
 def _find_groups(name: str, fields: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
     """The structs with vectors by their dotted names; the variables outside any struct have the name ''."""
-    if "time" in fields and "signals" in fields:
-        yield name, _simulink_signals(fields)
+    signals = _simulink_signals(fields) if "time" in fields and "signals" in fields else None
+    if signals is not None:
+        yield name, signals
         return
     if any(_is_vector(value) or _is_matrix(value) for value in fields.values()):
         yield name, fields
@@ -163,14 +108,15 @@ def _is_matrix(value: Any) -> bool:
     return isinstance(value, np.ndarray) and value.ndim == 2 and value.dtype.kind in "biuf" and min(value.shape) > 0
 
 
-def _simulink_signals(fields: Mapping[str, Any]) -> dict[str, Any]:
+def _simulink_signals(fields: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The signals of the structure with time that Simulink saves; None for another struct with these fields."""
     signals = fields["signals"]
-    parts = signals if isinstance(signals, Sequence) else [signals]
-    if isinstance(signals, Mapping) and isinstance(
-        signals.get("values"), list
-    ):  # an array of structs, stored field by field
-        parts = [dict(zip(signals, each, strict=True)) for each in zip(*signals.values(), strict=True)]
-    named = {str(p.get("label") or f"signal {i}"): np.asarray(p["values"]) for i, p in enumerate(parts, 1)}
+    if isinstance(signals, Mapping) and isinstance(signals.get("values"), list):  # an array of structs, by field
+        signals = [dict(zip(signals, each, strict=True)) for each in zip(*signals.values(), strict=True)]
+    parts = [signals] if isinstance(signals, Mapping) else list(signals) if isinstance(signals, Sequence) else []
+    if not parts or not all(isinstance(part, Mapping) and "values" in part for part in parts):
+        return None
+    named = {str(part.get("label") or f"signal {i}"): np.asarray(part["values"]) for i, part in enumerate(parts, 1)}
     return {"time_s": fields["time"], **named}
 
 
@@ -190,7 +136,19 @@ def _make_table(
     origin = f"{path.name}, {name or 'variables'}" if several else path.name
     channels, notes = _of_one_length(origin, list(_channels(origin, fields)), columns)
     table = merge_channels(origin, channels, {**constants, **_scalar_fields(fields)})
+    left_out = [f"{key} ({what})" for key, value in fields.items() if (what := _no_numbers(value, len(table.rows)))]
+    if left_out:
+        notes = (*notes, f"Not read, because it contains no real numbers: {', '.join(left_out)}.")
     return dataclasses.replace(table, notes=(*table.notes, *notes))
+
+
+def _no_numbers(value: Any, rows: int) -> str:
+    """What a column of `rows` values contains in place of real numbers; empty for any other value."""
+    if not isinstance(value, np.ndarray | list) or len(value) != rows or _is_vector(value) or _is_matrix(value):
+        return ""
+    if isinstance(value, np.ndarray) and value.dtype.kind == "c":
+        return "complex numbers"
+    return "texts" if all(isinstance(each, str) for each in value) else "cells"
 
 
 def _of_one_length(
