@@ -12,11 +12,19 @@ from typing import Any
 
 import numpy as np
 
-from airmuscle import characteristic, friction, geometry, physics
+from airmuscle import characteristic, geometry, physics
 from airmuscle.bench.identify.hysteresis.plot import plot_loops
 from airmuscle.core import plotting
 from airmuscle.core.errors import AirmuscleError
-from airmuscle.physics import Characteristic, Friction, Geometry, Orifice, PulleyProfile, ValidityRange
+from airmuscle.physics import (
+    Characteristic,
+    Friction,
+    Geometry,
+    LoopScales,
+    Orifice,
+    PulleyProfile,
+    ValidityRange,
+)
 from airmuscle.physics.muscle.isobar_plot import isobar_plot
 from airmuscle.physics.muscle.isobars import compute_isobars
 
@@ -26,15 +34,12 @@ BRAID = geometry.Braid(radius=0.010, braid_angle=0.426, resting_length=0.300)
 IDEAL = characteristic.VirtualWork(BRAID)
 RANGE = ValidityRange(0.0, 6e5, 0.0, 0.25)
 VALVE = physics.Valve(conductance=2.6167e-9, critical_ratio=0.433)
+LOOP = LoopScales(stroke=5e-3, amplitude=20.0, elements=3)
+"""Scales of the loops of friction laws."""
 SAMPLES: dict[str, Any] = {
     "VirtualWork": IDEAL,
     "Clamped": characteristic.Clamped(IDEAL, 0.0, 800.0),
     "EffectiveLength": characteristic.EffectiveLength(IDEAL, resting_length=0.3, dead_length=0.02),
-    "BoucWen": friction.BoucWen(stiffness=4e4, coulomb_force=20.0),
-    "Dahl": friction.Dahl(stiffness=4e4, coulomb_force=20.0),
-    "LuGre": friction.LuGre(stiffness=4e4, coulomb_force=20.0, stribeck_force=5.0),
-    "MaxwellSlip": friction.MaxwellSlip((2e4, 1e4, 5e3), (3e-4, 9e-4, 2e-3)),
-    "PrandtlIshlinskii": friction.PrandtlIshlinskii((2e4, 1e4), (3e-4, 1.2e-3), (-8.0, 8.0), (-0.3, 0.4)),
     "Braid": BRAID,
     "Valve": VALVE,
     "SubsonicIndexValve": physics.SubsonicIndexValve(2.6167e-9, 0.3, 0.6, cracking_pressure=2e4),
@@ -63,7 +68,7 @@ def draw(cls: type[Any]) -> Any:
     thing, title = _example(cls)
     if isinstance(thing, Characteristic):
         return _isobars(thing, title, _range_of(cls))
-    if isinstance(thing, Friction) and cls is not friction.NoFriction:
+    if isinstance(thing, Friction):
         figure = plot_loops(thing)
         figure.axes[0].set_title(title, fontsize=9)
         return figure
@@ -77,7 +82,8 @@ def _example(cls: type[Any]) -> tuple[Any, str]:
         for thing in components(entry):
             if type(thing) is cls:
                 return thing, f"{cls.__name__}: {entry.title}"
-    return SAMPLES.get(cls.__name__), f"{cls.__name__}; all numbers chosen"
+    sample = cls.guess(LOOP) if issubclass(cls, Friction) else SAMPLES.get(cls.__name__)
+    return sample, f"{cls.__name__}; all numbers chosen"
 
 
 def _range_of(cls: type[Any]) -> ValidityRange:

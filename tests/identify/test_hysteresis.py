@@ -25,7 +25,17 @@ from airmuscle.bench import (
 from airmuscle.bench.identify import aicc, effective_sample_size, f_test_p_value
 from airmuscle.bench.identify.hysteresis import branch_gap, loop_path, plot_loops, repeat_difference
 from airmuscle.errors import IdentificationError, ParameterError
-from airmuscle.physics import BoucWen, Braid, Dahl, LuGre, MaxwellSlip, PrandtlIshlinskii, VirtualWork
+from airmuscle.physics import (
+    BoucWen,
+    Braid,
+    Dahl,
+    IdentifiedFriction,
+    LoopScales,
+    LuGre,
+    MaxwellSlip,
+    PrandtlIshlinskii,
+    VirtualWork,
+)
 from airmuscle.recording import Recording
 
 LENGTH = 0.2
@@ -226,6 +236,13 @@ def test_candidates_are_sized_by_the_data_and_all_of_them_fit():
     assert all(f.rmse < 0.35 * f.rmse_without_friction for f in fits)
     best = min(fits, key=lambda f: f.rmse)
     assert name(best.friction) in ("MaxwellSlip", "PrandtlIshlinskii")
+
+
+def test_a_friction_law_without_a_guess_is_not_fitted():
+    scales = LoopScales.of(np.array([0.0, 0.02]), np.array([-3.0, 3.0]))
+    assert (scales.stroke, scales.amplitude, scales.stiffness) == (0.02, 3.0, 1500.0)
+    assert Dahl.guess(scales) == Dahl(1500.0, 3.0)
+    assert IdentifiedFriction.guess(scales) is None
 
 
 def test_runs_that_cannot_tell_are_refused():

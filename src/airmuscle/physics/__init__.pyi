@@ -78,6 +78,7 @@ from .muscle.characteristic import CircleVirtualWork as CircleVirtualWork
 from .muscle.characteristic import Clamped as Clamped
 from .muscle.characteristic import ContractileSurface as ContractileSurface
 from .muscle.characteristic import ContractionLaw as ContractionLaw
+from .muscle.characteristic import DataScales as DataScales
 from .muscle.characteristic import EffectiveLength as EffectiveLength
 from .muscle.characteristic import ExactMeridian as ExactMeridian
 from .muscle.characteristic import ForceLaw as ForceLaw
@@ -102,6 +103,7 @@ from .muscle.friction import BoucWen as BoucWen
 from .muscle.friction import Dahl as Dahl
 from .muscle.friction import Friction as Friction
 from .muscle.friction import IdentifiedFriction as IdentifiedFriction
+from .muscle.friction import LoopScales as LoopScales
 from .muscle.friction import LuGre as LuGre
 from .muscle.friction import MaxwellSlip as MaxwellSlip
 from .muscle.friction import NoFriction as NoFriction

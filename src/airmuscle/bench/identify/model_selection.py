@@ -52,9 +52,6 @@ class Comparison(ShortRepr):
             raise IdentificationError(f"the comparison has no model '{name}'; it has {', '.join(models)}.")
         return models[name]
 
-    def _left_out(self) -> tuple[tuple[str, tuple[ExcludedModel, ...]], ...]:
-        return (("excluded", self.excluded), ("not compared", self.unavailable))
-
     def _listed(self) -> tuple[RankedModel, ...]:
         """The first models of the ranking, and the recommended one."""
         first = self.ranking[:MAX_LISTED]
@@ -79,7 +76,11 @@ class Comparison(ShortRepr):
         rows += [f"and {more} more, with larger errors; the report and `ranking` contain all."] if more else []
         notes = [f"note: {note}" for note in self.notes]
         notes += [f"note: {m.candidate.name}: {note}" for m in self._listed() for note in m.notes]
-        excluded = [f"{word}: {e}" for word, models in self._left_out() for e in models if e.error is None]
+        excluded = [f"excluded: {e}" for e in self.excluded if e.error is None]
+        causes = dict.fromkeys(e.cause for e in self.unavailable)
+        excluded += [
+            f"not compared: {', '.join(e.name for e in self.unavailable if e.cause == c)}: {c}." for c in causes
+        ]
         errors = [f"{e.name} ({e.error:.4g} N)" for e in self.excluded if e.error is not None]
         excluded += (
             [f"excluded, as the error is too large (cross-validation ended early): {', '.join(errors)}."]

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from ...bench.identify import standard_candidates
 from ...core.errors import HintedText, ParameterError, UnknownNameError, suggestion
-from ...physics.muscle.characteristic.base import Characteristic
+from ...physics.muscle.characteristic import Characteristic, ContractileSurface
 from ...recording import Recording
 from .entry import Entry
 from .entry_file import load_law
@@ -37,10 +37,8 @@ def find_initial_law(
     cls = model_class(name, option)
     if not issubclass(cls, Characteristic):
         raise ParameterError(f"{option}: {name} is not a characteristic; there are {', '.join(_law_names())}.")
-    if hasattr(cls, "blank"):
-        # An upper limit of twice the measured force clamps no measured point, and still limits the extrapolation.
-        max_force = 2.0 * max(1.0, *(float(run["force"].max()) for run in recordings))
-        return InitialLaw(Entry(name, name, "chosen", cls.blank(degree, max_force=max_force)))
+    if issubclass(cls, ContractileSurface):
+        return InitialLaw(Entry(name, name, "chosen", cls.guess(recordings, degree)))
     for candidate in standard_candidates(recordings):
         if type(candidate.law) is cls:
             return InitialLaw(Entry(name, name, "chosen", candidate.law), candidate.fixed)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 import dataclasses
+import inspect
 
 import numpy as np
 import numpy.typing as npt
@@ -11,8 +12,9 @@ import numpy.typing as npt
 from ....core.arrays import Array
 from ....core.declaration import model, parameter
 from ....core.errors import Hint, IdentificationError
+from ....physics.muscle import friction
 from ....physics.muscle.characteristic.base import Characteristic
-from ....physics.muscle.friction import BoucWen, Dahl, Friction, LuGre, MaxwellSlip, PrandtlIshlinskii
+from ....physics.muscle.friction import Friction, LoopScales
 from ....recording import Recording
 from ...segment import motion_direction
 from .axis import MILLIMETRES, Axis
@@ -108,26 +110,15 @@ class PolynomialCurve(StaticCurve):
 
 
 def initial_friction_laws(path: Array, force: Array, elements: int = 8) -> tuple[Friction, ...]:
-    """Every friction law with initial parameters, scaled by a path [m] and the forces [N] along it.
+    """Every law of `friction` with a `guess`, its initial parameters scaled by a path [m] and the forces [N] along it.
 
     `elements` is the number of elements of MaxwellSlip and PrandtlIshlinskii. Raises IdentificationError for a constant
     path.
     """
-    stroke, amplitude = float(np.ptp(path)), max(float(np.std(force)), 1e-3)
-    if not stroke > 0:
-        raise IdentificationError(
-            "the displacement of the friction is constant, so it cannot be identified. Give a run with a rising and a "
-            "falling branch."
-        )
-    limits = tuple(stroke * np.geomspace(0.01, 0.7, elements))
-    stiffness, equal = 10 * amplitude / stroke, (amplitude / elements / stroke,) * elements
-    return (
-        Dahl(stiffness, amplitude),
-        LuGre(stiffness, amplitude, 0.2 * amplitude, stroke / 5.0),
-        BoucWen(stiffness, amplitude, 1.5, 0.6),
-        MaxwellSlip(equal, limits),
-        PrandtlIshlinskii(equal, limits, (0.1 * amplitude, -0.1 * amplitude), (0.0, 0.0)),
-    )
+    scales = LoopScales.of(path, force, elements)
+    classes = (getattr(friction, name) for name in dir(friction))
+    started = (cls.guess(scales) for cls in classes if inspect.isclass(cls) and issubclass(cls, Friction))
+    return tuple(law for law in started if law is not None)
 
 
 def fit_hysteresis(

@@ -9,6 +9,7 @@ from .borzikova import BorzikovaExponential as BorzikovaExponential
 from .chou_hannaford1996 import ChouHannaford1996 as ChouHannaford1996
 from .contractile_surface import ContractileSurface as ContractileSurface
 from .contractile_surface import exponents as exponents
+from .data_scales import DataScales as DataScales
 from .effective_length import EffectiveLength as EffectiveLength
 from .energy_defect import maxwell_defect as maxwell_defect
 from .energy_defect import virtual_work_defect as virtual_work_defect

@@ -8,14 +8,16 @@ several solutions, the one reached from rest is returned: the smallest contracti
 from __future__ import annotations
 
 import abc
-from typing import Any, ClassVar, NamedTuple
+from collections.abc import Callable
+from typing import Any, ClassVar, NamedTuple, Self
 
 from ....core import autodiff, ops
 from ....core.declaration import model, parameter
-from ....core.errors import ParameterError
+from ....core.errors import IdentificationError, ParameterError
 from ....core.ops import Value
 from ....core.reference import Reference
 from ..quantity_arguments import accept_quantities_in
+from .data_scales import MeasuredPoints
 from .solve import describe_range, find_first_root, warn_above_whole_length
 
 _UNITS = {
@@ -45,6 +47,31 @@ class Characteristic(abc.ABC):
     references: ClassVar[tuple[Reference, ...]] = ()
     traceable: ClassVar[bool] = True
     """Whether the model is in closed form over `ops`; otherwise a plant uses it through `as_force_law`."""
+    redundant: ClassVar[tuple[str, ...]] = ()
+    """Parameters that a fit keeps at those of `guess`, because they only scale other parameters."""
+
+    @classmethod
+    def guess(cls, data: MeasuredPoints) -> Self:
+        """The law with initial parameters for a fit to measured points: recordings, or their `DataScales`.
+
+        A law that defines it is compared with the others. Raises IdentificationError where they do not follow from the
+        data.
+        """
+        raise IdentificationError(
+            f"{cls.__name__} is not started from data; give its initial parameters.",
+            cause="it needs initial parameters",
+        )
+
+    @classmethod
+    def variants(cls, data: MeasuredPoints, surface: Callable[[int], ForceLaw]) -> dict[str, Characteristic]:
+        """The initial laws of this class that are compared, by name: that of `guess`, or several structures.
+
+        surface  a surface of a total degree with coefficients of zero, for laws that contain another one
+
+        Empty for a law without `guess`. Raises IdentificationError as `guess`.
+        """
+        own = getattr(cls.guess, "__func__", None) is not getattr(Characteristic.guess, "__func__", None)
+        return {cls.__name__: cls.guess(data)} if own else {}
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Self
 
 from ....core import ops
 from ....core.declaration import model
@@ -10,6 +10,7 @@ from ....core.ops import Value
 from ....core.reference import Reference
 from ..geometry.braid import CHOU_HANNAFORD_1996, Braid
 from .base import MIN_PRESSURE, ForceLaw
+from .data_scales import DataScales, MeasuredPoints
 from .solve import check_solution
 
 
@@ -27,6 +28,10 @@ class ChouHannaford1996(ForceLaw):
     references: ClassVar[tuple[Reference, ...]] = (CHOU_HANNAFORD_1996,)
 
     geometry: Braid
+
+    @classmethod
+    def guess(cls, data: MeasuredPoints) -> Self:
+        return cls(DataScales.of(data).braid)
 
     @property
     def thread(self) -> Value:

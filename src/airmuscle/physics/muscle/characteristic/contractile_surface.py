@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from typing import ClassVar
 
 from ....core import ops
@@ -11,7 +12,8 @@ from ....core.errors import ParameterError
 from ....core.ops import Value
 from ....core.reference import Reference
 from ..geometry.base import check_degree
-from .base import ForceLaw
+from .base import Characteristic, ForceLaw
+from .data_scales import DataScales, MeasuredPoints
 from .validity_range import ValidityRange
 
 HOSOVSKY_HILL = Reference(
@@ -87,6 +89,15 @@ class ContractileSurface(ForceLaw):
         check_degree("ContractileSurface", degree)
         size = len(exponents(degree))
         return cls((0.0,) * size, 0.0, 1.0, 0.0, 1.0, min_force, max_force, degree)
+
+    @classmethod
+    def guess(cls, data: MeasuredPoints, degree: int = 5) -> ContractileSurface:
+        """Return the blank surface of a total degree with an upper limit of twice the measured force."""
+        return cls.blank(degree, max_force=max(2.0 * DataScales.of(data).force, 1.0))
+
+    @classmethod
+    def variants(cls, data: MeasuredPoints, surface: Callable[[int], ForceLaw]) -> dict[str, Characteristic]:
+        return {f"surface of degree {n}": cls.guess(data, n) for n in range(1, 7)}
 
     def with_validity_range(
         self, pressure: tuple[float, float], contraction: tuple[float, float]

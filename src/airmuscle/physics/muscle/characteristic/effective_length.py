@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from typing import Any
 
 from ....core.declaration import model, parameter
 from ....core.errors import ParameterError
 from ....core.ops import Value
-from .base import ForceLaw
+from .base import Characteristic, ForceLaw
+from .data_scales import DataScales, MeasuredPoints
 
 _RANGE_FACTOR = 2.0
 """Factor by which the contraction range of the inner surface exceeds that of the whole muscle (chosen)."""
@@ -32,6 +34,14 @@ class EffectiveLength(ForceLaw):
     end_shift: float = parameter(
         "m", "d", "elongation of the ends, or zero error of the length", bounds=(-0.1, 0.1), default=0.0
     )
+
+    @classmethod
+    def variants(cls, data: MeasuredPoints, surface: Callable[[int], ForceLaw]) -> dict[str, Characteristic]:
+        scales = DataScales.of(data).check_lengths()
+        return {
+            f"effective length, degree {n}": cls(surface(n), scales.resting_length, dead_length=0.005)
+            for n in range(2, 6)
+        }
 
     def check(self) -> None:
         if not self.dead_length < self.resting_length:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Self
 
 from ....core import ops
 from ....core.declaration import model, parameter
@@ -10,6 +10,7 @@ from ....core.errors import ParameterError
 from ....core.ops import Value
 from ....core.reference import Reference
 from .base import PressureLaw
+from .data_scales import DataScales, MeasuredPoints
 
 HUNT_2017 = Reference(
     "hunt-2017",
@@ -61,6 +62,13 @@ class Hunt2017(PressureLaw):
         default=15.6e3,
     )
     direction: int = 0
+
+    @classmethod
+    def guess(cls, data: MeasuredPoints) -> Self:
+        scales = DataScales.of(data)
+        factor = 450.0 / scales.force  # the published values are of a 10 mm muscle, with a maximum force of about 450 N
+        span = min(max(scales.contraction, 0.02), 0.5)
+        return cls(span, span_by_force=0.331e-3 * factor * span / 0.17, by_force=1.23e3 * factor)
 
     def check(self) -> None:
         if self.direction not in (-1, 0, 1):

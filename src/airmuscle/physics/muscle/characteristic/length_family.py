@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-from typing import Any, Self
+from collections.abc import Callable
+from typing import Any, ClassVar, Self
 
 from ....core import ops
 from ....core.declaration import model, parameter
 from ....core.ops import Value
-from .base import ForceLaw
+from .base import Characteristic, ForceLaw
+from .data_scales import DataScales, MeasuredPoints
 
 
 @model
@@ -20,6 +22,9 @@ class LengthFamily(ForceLaw):
     not applied.
     """
 
+    term: ClassVar[str]
+    """The length factor as a text, in the names of `variants`."""
+
     inner: ForceLaw
     change: ForceLaw
     resting_length: float = parameter(
@@ -28,6 +33,15 @@ class LengthFamily(ForceLaw):
     reference_length: float = parameter(
         "m", "L_ref", "reference length, at which the correction is zero", bounds=(1e-3, 20.0), fitted=False
     )
+
+    @classmethod
+    def variants(cls, data: MeasuredPoints, surface: Callable[[int], ForceLaw]) -> dict[str, Characteristic]:
+        length = DataScales.of(data).check_lengths().resting_length
+        return {
+            f"term in {cls.term}, degree {n}, change of degree {k}": cls(surface(n), surface(k), length, length)
+            for n in range(2, 6)
+            for k in range(1, min(n, 3) + 1)
+        }
 
     @property
     def contraction_range(self) -> tuple[float, float]:
@@ -81,6 +95,8 @@ class InverseLength(LengthFamily):
     `with_resting_length` returns the model of another muscle of the same type. Developed for airmuscle.
     """
 
+    term: ClassVar[str] = "1/L0"
+
     def length_factor(self) -> Value:
         return self.reference_length / self.resting_length - 1.0
 
@@ -94,6 +110,8 @@ class LogarithmicLength(LengthFamily):
     `with_resting_length` returns the model of another muscle of the same type. Developed for airmuscle from measured
     muscles of 83 to 382 mm, whose force increased about equally with the first and the second doubling of length.
     """
+
+    term: ClassVar[str] = "ln L0"
 
     def length_factor(self) -> Value:
         return ops.log(self.resting_length / self.reference_length)

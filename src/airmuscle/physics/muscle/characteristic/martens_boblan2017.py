@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Self
 
 from ....core import ops
 from ....core.declaration import model, parameter
@@ -10,6 +10,7 @@ from ....core.ops import Value
 from ....core.reference import Reference
 from ..geometry.braid import Braid
 from .base import ForceLaw
+from .data_scales import DataScales, MeasuredPoints
 
 MARTENS_BOBLAN_2017 = Reference(
     "martens-boblan-2017",
@@ -42,6 +43,7 @@ class MartensBoblan2017(ForceLaw):
     """
 
     references: ClassVar[tuple[Reference, ...]] = (MARTENS_BOBLAN_2017,)
+    redundant: ClassVar[tuple[str, ...]] = ("wall_thickness",)  # it only multiplies the modulus
 
     geometry: Braid
     wall_thickness: float = parameter(
@@ -51,6 +53,13 @@ class MartensBoblan2017(ForceLaw):
     c1: float = parameter("Pa/m", "c_1", "modulus of the wall, linear term")
     c2: float = parameter("Pa/m^2", "c_2", "modulus of the wall, quadratic term")
     c3: float = parameter("Pa/m^3", "c_3", "modulus of the wall, cubic term")
+
+    @classmethod
+    def guess(cls, data: MeasuredPoints) -> Self:
+        braid = DataScales.of(data).braid
+        length = braid.resting_length
+        # The modulus of a DMSP-10 in terms of L/L_0
+        return cls(braid, 1.8e-3, 74.085e6, -172.3e6 / length, 114.8e6 / length**2, -13.26e6 / length**3)
 
     @property
     def contraction_range(self) -> tuple[float, float]:

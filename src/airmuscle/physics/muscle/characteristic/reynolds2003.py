@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Self
 
 from ....core import ops
 from ....core.declaration import model, parameter
@@ -10,6 +10,7 @@ from ....core.ops import Value
 from ....core.reference import Reference
 from ..passive_elements import Damper, Spring
 from .base import ForceLaw
+from .data_scales import DataScales, MeasuredPoints
 
 REYNOLDS_2003 = Reference(
     "reynolds-2003",
@@ -41,6 +42,10 @@ class Reynolds2003(ForceLaw):
     )
     stiffness_offset: float = parameter("N/m", "k_0", "stiffness at zero pressure", default=5.71e3)
     stiffness_by_pressure: float = parameter("N/m/Pa", "k_1", "increase of the stiffness with pressure", default=0.0307)
+
+    @classmethod
+    def guess(cls, data: MeasuredPoints) -> Self:
+        return cls(DataScales.of(data).resting_length)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
         contractile = self.force_offset + self.force_by_pressure * pressure

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Self
 
 from ....core import ops
 from ....core.declaration import model, parameter
 from ....core.ops import Value
 from ....core.reference import Reference
 from .base import ForceLaw
+from .data_scales import DataScales, MeasuredPoints
 
 SAROSI_2012 = Reference(
     "sarosi-2012",
@@ -38,6 +39,15 @@ class Sarosi2012(ForceLaw):
     a4: float = parameter("N/Pa", "a_4", "increase with the product of contraction and pressure")
     a5: float = parameter("N/Pa", "a_5", "increase with pressure")
     a6: float = parameter("N", "a_6", "force at zero pressure and large contraction")
+
+    @classmethod
+    def guess(cls, data: MeasuredPoints) -> Self:
+        scales = DataScales.of(data)
+        factor = scales.force / 1500.0  # relative to a DMSP-20, whose measured map these values fit
+        by_pressure = factor * 6e5 / scales.pressure
+        return cls(
+            1.2e-4 * by_pressure, 420 * factor, -57.0, -8.7e-3 * by_pressure, 2.7e-3 * by_pressure, -310 * factor
+        )
 
     def force(self, pressure: Value, contraction: Value) -> Value:
         decaying = (self.a1 * pressure + self.a2) * ops.exp(self.a3 * contraction)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Self
 
 from ....core import ops
 from ....core.declaration import model, parameter
@@ -10,6 +10,7 @@ from ....core.ops import Value
 from ....core.reference import Reference
 from ..passive_elements import Damper, Spring
 from .base import ForceLaw
+from .data_scales import DataScales, MeasuredPoints
 
 SERRES_2009 = Reference(
     "serres-2009",
@@ -47,6 +48,10 @@ class Serres2009(ForceLaw):
     stiffening: float = parameter(
         "N/m/Pa", "k_3", "stiffening line: increase with pressure", bounds=(0.0, 1e3), default=0.0179
     )
+
+    @classmethod
+    def guess(cls, data: MeasuredPoints) -> Self:
+        return cls(DataScales.of(data).resting_length)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
         contractile = self.force_offset + self.force_by_pressure * pressure

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, Self
 
 from ....core import ops
 from ....core.declaration import model, parameter
@@ -10,6 +10,7 @@ from ....core.ops import Value
 from ....core.reference import Reference
 from ..geometry.braid import Braid
 from .base import MIN_PRESSURE, ForceLaw
+from .data_scales import DataScales, MeasuredPoints
 from .solve import check_solution
 
 TONDU_LOPEZ_2000 = Reference(
@@ -39,6 +40,10 @@ class TonduLopez2000(ForceLaw):
     end_correction: float = parameter(
         "1", "k", "contraction of the middle relative to that of the whole muscle", bounds=(1.0, 3.0), default=1.0
     )
+
+    @classmethod
+    def guess(cls, data: MeasuredPoints) -> Self:
+        return cls(DataScales.of(data).braid, 1.1)
 
     @property
     def contraction_range(self) -> tuple[float, float]:

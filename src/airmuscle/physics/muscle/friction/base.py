@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import abc
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 from ....core.declaration import model
 from ....core.ops import Value, Values
 from ....core.reference import Reference
 from ....core.system import StateVariable
+from .path import LoopScales
 
 
 class IdentifiedRange(NamedTuple):
@@ -32,6 +33,11 @@ class Friction(abc.ABC):
     """Whether the force depends on the path only, not on the speed."""
     linear_in: ClassVar[str | None] = None
     """The field in which the force of `force_along` is linear, or None; a fit solves for it by linear least squares."""
+
+    @classmethod
+    def guess(cls, scales: LoopScales) -> Self | None:
+        """The law with initial parameters for a fit to a loop of these scales; None for a law that is not fitted."""
+        return None
 
     @property
     @abc.abstractmethod

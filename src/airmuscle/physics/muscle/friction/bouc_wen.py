@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 from ....core import ops
 from ....core.declaration import model, parameter
@@ -10,7 +10,7 @@ from ....core.ops import Value, Values
 from ....core.reference import Reference
 from ....core.system import StateVariable
 from .base import Friction
-from .path import relative_deflection
+from .path import LoopScales, relative_deflection
 
 BOUC1967 = Reference(
     key="bouc-1967",
@@ -57,6 +57,10 @@ class BoucWen(Friction):
     coulomb_force: float = parameter("N", "F_C", "friction force in steady sliding", bounds=(1e-6, 1e5))
     sharpness: float = parameter("1", "n", "sharpness of the transition to sliding", bounds=(1.0, 20.0), default=1.0)
     unloading: float = parameter("1", "sigma", "shape of unloading", bounds=(0.5, 20.0), default=0.5)
+
+    @classmethod
+    def guess(cls, scales: LoopScales) -> Self:
+        return cls(scales.stiffness, scales.amplitude, 1.5, 0.6)
 
     @property
     def states(self) -> tuple[StateVariable, ...]:

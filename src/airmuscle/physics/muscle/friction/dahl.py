@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 from ....core import ops
 from ....core.declaration import model, parameter
@@ -10,7 +10,7 @@ from ....core.ops import Value, Values
 from ....core.reference import Reference
 from ....core.system import StateVariable
 from .base import Friction
-from .path import deflection
+from .path import LoopScales, deflection
 
 DAHL1968 = Reference(
     key="dahl-1968",
@@ -35,6 +35,10 @@ class Dahl(Friction):
 
     stiffness: float = parameter("N/m", "sigma_0", "stiffness of the bristle", bounds=(1e-3, 1e9))
     coulomb_force: float = parameter("N", "F_C", "friction force in steady sliding", bounds=(1e-6, 1e5))
+
+    @classmethod
+    def guess(cls, scales: LoopScales) -> Self:
+        return cls(scales.stiffness, scales.amplitude)
 
     @property
     def states(self) -> tuple[StateVariable, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 from ....core import ops
 from ....core.declaration import model, parameter
@@ -10,7 +10,7 @@ from ....core.ops import Value, Values
 from ....core.reference import Reference
 from ....core.system import StateVariable
 from .base import Friction
-from .path import compute_speed, deflection
+from .path import LoopScales, compute_speed, deflection
 
 CANUDAS_DE_WIT1995 = Reference(
     key="canudas-de-wit-1995",
@@ -47,6 +47,10 @@ class LuGre(Friction):
     stribeck_speed: float = parameter("m/s", "v_S", "Stribeck speed", bounds=(1e-6, 100.0), default=0.01)
     bristle_damping: float = parameter("N s/m", "sigma_1", "damping of the bristles", bounds=(0.0, 1e6), default=0.0)
     damping: float = parameter("N s/m", "sigma_2", "viscous damping", bounds=(0.0, 1e6), default=0.0)
+
+    @classmethod
+    def guess(cls, scales: LoopScales) -> Self:
+        return cls(scales.stiffness, scales.amplitude, 0.2 * scales.amplitude, scales.stroke / 5.0)
 
     @property
     def states(self) -> tuple[StateVariable, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 from ....core import ops
 from ....core.declaration import model, parameter
@@ -12,7 +12,7 @@ from ....core.ops import Value, Values
 from ....core.reference import Reference
 from ....core.system import StateVariable
 from .base import Friction
-from .path import stop_operators
+from .path import LoopScales, stop_operators
 
 IWAN1966 = Reference(
     key="iwan-1966",
@@ -87,6 +87,10 @@ class MaxwellSlip(Friction):
         "1", "eta", "fraction of the deflection over which sliding begins in a plant", bounds=(1e-4, 1.0),
         fitted=False, default=0.05,
     )  # fmt: skip
+
+    @classmethod
+    def guess(cls, scales: LoopScales) -> Self:
+        return cls(scales.element_stiffnesses, scales.element_limits)
 
     def check(self) -> None:
         check_equal_lengths("MaxwellSlip", self.stiffnesses, self.limits)

@@ -1,4 +1,4 @@
-"""Friction forces along a displacement path, row by row, exact for motion that is linear between rows.
+"""Friction forces along a displacement path, row by row, exact for linear motion between rows; scales of loops.
 
 This file works on numbers only, for `Friction.force_along`; it is never traced, so it may use NumPy.
 """
@@ -6,18 +6,67 @@ This file works on numbers only, for `Friction.force_along`; it is never traced,
 from __future__ import annotations
 
 import bisect
+import dataclasses
 import functools
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from ....core.arrays import Array
+from ....core.errors import IdentificationError
 
 CURVE_NODES, CURVE_END = 4801, 24.0
 """Nodes of the loading curve of `relative_deflection`, and its end -ln((1 - w)/2), where 1 - w is 8e-11 (chosen)."""
+
+
+MIN_FRICTION = 1e-3
+"""Least initial amplitude of a friction [N] (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class LoopScales:
+    """Scales of a hysteresis loop, by which a friction law scales its initial parameters; all SI."""
+
+    stroke: float
+    """Range of the displacement [m]."""
+    amplitude: float
+    """Standard deviation of the force without the static curve [N]."""
+    elements: int
+    """Number of elements of a law of several."""
+
+    @classmethod
+    def of(cls, displacement: Any, force: Any, elements: int = 8) -> Self:
+        """The scales of a displacement [m] and the forces [N] along it.
+
+        elements  number of elements of a law of several
+
+        Raises IdentificationError for a constant displacement.
+        """
+        stroke = float(np.ptp(displacement))
+        if not stroke > 0:
+            raise IdentificationError(
+                "the displacement of the friction is constant, so it cannot be identified. Give a run with a rising "
+                "and a falling branch."
+            )
+        return cls(stroke, max(float(np.std(force)), MIN_FRICTION), elements)
+
+    @property
+    def stiffness(self) -> float:
+        """Initial stiffness [N/m]: the amplitude within a tenth of the stroke (chosen)."""
+        return 10 * self.amplitude / self.stroke
+
+    @property
+    def element_limits(self) -> tuple[float, ...]:
+        """Limits of the elements [m], from a hundredth of the stroke to 0.7 of it (chosen)."""
+        return tuple(self.stroke * np.geomspace(0.01, 0.7, self.elements))
+
+    @property
+    def element_stiffnesses(self) -> tuple[float, ...]:
+        """Equal stiffnesses of the elements [N/m]."""
+        return (self.amplitude / self.elements / self.stroke,) * self.elements
 
 
 def _increments(displacement: Any) -> Array:

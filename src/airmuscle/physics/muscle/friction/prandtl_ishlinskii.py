@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 from ....core import ops
 from ....core.declaration import model, parameter
@@ -12,7 +12,7 @@ from ....core.reference import Reference
 from ....core.system import StateVariable
 from .base import Friction
 from .maxwell_slip import check_equal_lengths, element_rate
-from .path import stop_operators
+from .path import LoopScales, stop_operators
 
 KUHNEN2003 = Reference(
     key="kuhnen-2003",
@@ -63,6 +63,13 @@ class PrandtlIshlinskii(Friction):
         "1", "eta", "fraction of the deflection over which sliding begins in a plant", bounds=(1e-4, 1.0),
         fitted=False, default=0.05,
     )  # fmt: skip
+
+    @classmethod
+    def guess(cls, scales: LoopScales) -> Self:
+        return cls(
+            scales.element_stiffnesses, scales.element_limits, (0.1 * scales.amplitude, -0.1 * scales.amplitude),
+            (0.0, 0.0),
+        )  # fmt: skip
 
     def check(self) -> None:
         check_equal_lengths("PrandtlIshlinskii", self.stiffnesses, self.limits)
