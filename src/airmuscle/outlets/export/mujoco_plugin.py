@@ -19,9 +19,9 @@ from ...core.system import Input
 from ...core.tree import leaves, with_parameters
 from ...engine.compile.program import compile_system
 from ...engine.run.integrators import Rodas4
-from ...physics.mechanism import ExternalLoad, HangingMass
-from ...physics.mechanism.external_load import SHORTENING, SHORTENING_SPEED
+from ...physics.mechanism import HangingMass
 from ...physics.plant import Plant, open_plant
+from .actuator import control_range, controls_of, single_muscle
 from .c_source import CSource
 from .c_text import c_integers, c_number, c_strings
 from .compiler import compile_library
@@ -72,9 +72,7 @@ class MuscleActuator(ShortRepr):
     @property
     def control_range(self) -> tuple[float, float]:
         """Lowest and highest control."""
-        if len(self.controls) == 2:
-            return -self.controls[1].maximum, self.controls[0].maximum
-        return (self.controls[0].minimum, self.controls[0].maximum) if self.controls else (0.0, 0.0)
+        return control_range(self.controls)
 
     def add_to(
         self, spec: Any, *, name: str, tendon: str = "", joint: str = "", gear: float = 1.0,
@@ -150,14 +148,9 @@ def write_mujoco_plugin(plant: Plant, folder: str | Path, *, name: str = "", mus
     the version of MuJoCo that it was built with. Raises ParameterError for a plant that cannot be exported, and
     FileError.
     """
-    part = open_plant(_single(plant, muscle))
+    part = open_plant(single_muscle(plant, muscle))
     program = checked_name(name) or program_name(part.muscles[0].name)
-    controls = tuple(i for i in part.input_variables if i.name not in (SHORTENING, SHORTENING_SPEED))
-    if len(controls) > 2 or (len(controls) == 2 and any(i.minimum != 0.0 for i in controls)):
-        raise ParameterError(
-            "an actuator of MuJoCo has one control; a circuit with a single input, or two valves that open from 0, "
-            f"can be exported, but the inputs are {', '.join(i.name for i in controls)}."
-        )
+    controls = controls_of(part)
     lines = provenance(f"Muscle {part.muscles[0].name} for MuJoCo", part, (), [NOTE])
     files = _sources(part, program, controls, lines)
     target = Path(folder)
@@ -189,24 +182,6 @@ def check_mujoco() -> Any:
             "mujoco>=3.17,!=4.0.0"
         )
     return mujoco
-
-
-def _single(plant: Plant, muscle: str) -> Plant:
-    """The plant with one of its muscles and the circuit of this muscle."""
-    names = [m.name for m in plant.muscles]
-    if len(names) == 1:
-        if muscle and muscle != names[0]:
-            raise ParameterError(f"there is no muscle '{muscle}'; the plant has {names[0]}.")
-        return plant
-    if len(plant.circuits) != len(names):
-        raise ParameterError(
-            f"the muscles {', '.join(names)} share the circuit {type(plant.circuits[0]).__name__} and cannot be "
-            "separate actuators of MuJoCo; give each muscle a circuit of its own."
-        )
-    if muscle not in names:
-        raise ParameterError(f"choose one of the muscles {', '.join(names)}; given: '{muscle}'.")
-    k = names.index(muscle)
-    return dataclasses.replace(plant, muscle=plant.muscles[k], circuit=plant.circuits[k], mechanism=ExternalLoad())
 
 
 def _sources(part: Plant, name: str, controls: Sequence[Input], lines: Sequence[str]) -> dict[str, bytes]:

@@ -112,11 +112,12 @@ def checked_name(name: str) -> str:
     return name
 
 
-def write_files(files: Mapping[str, str], folder: str | Path) -> tuple[Path, ...]:
-    """Write texts by file name into a folder, all or none; their paths. Raises FileError."""
+def write_files(files: Mapping[str, str] | Mapping[str, str | bytes], folder: str | Path) -> tuple[Path, ...]:
+    """Write texts or bytes by file name into a folder, all or none; their paths. Raises FileError."""
     target = Path(folder)
     with atomic_folder(target) as staging:
         for file, text in files.items():
             (staging / file).parent.mkdir(parents=True, exist_ok=True)
-            (staging / file).write_bytes(text.encode("utf-8", "replace"))
+            content = text if isinstance(text, bytes) else text.encode("utf-8", "replace")
+            (staging / file).write_bytes(content)
     return tuple(target / file for file in files)

@@ -43,12 +43,17 @@ Labels = Mapping[str, Sequence[Label]]
 class TextBody(FunctionBlock, abc.ABC):
     """The lines of one function in a language with infix operators; a subclass states what its language writes.
 
-    `read` and `written` are the arrays that the function uses so far.
+    `read` and `written` are the arrays that the function uses so far, `loaded` and `stored` the places of their values
+    by name, `sizes` the lengths of the arrays that are written.
     """
 
     language: str
     """Name of the language in messages."""
     equal, unequal, either = "==", "!=", "||"
+    margin, end = "  ", ";"
+    """What stands before and after every statement."""
+    defines, declares = "", ""
+    """What stands before the name of a value at its definition, and of one that a branch may change."""
     infinity, not_a_number = "INFINITY", "NAN"
 
     def __init__(self, scalars: Sequence[str] = ()) -> None:
@@ -57,6 +62,7 @@ class TextBody(FunctionBlock, abc.ABC):
         self.written: set[str] = set()
         self.loaded: dict[str, tuple[str, int]] = {}
         self.stored: dict[str, tuple[str, int]] = {}
+        self.sizes: dict[str, int] = {}
 
     @abc.abstractmethod
     def element(self, array: str, index: int) -> str:
@@ -73,10 +79,6 @@ class TextBody(FunctionBlock, abc.ABC):
     @abc.abstractmethod
     def remark(self, text: str) -> str:
         """A comment at the end of a line."""
-
-    @abc.abstractmethod
-    def variable(self, name: str, value: str) -> str:
-        """The line that declares a value which a branch may change."""
 
     @abc.abstractmethod
     def begin_branch(self, test: str) -> str:
@@ -104,8 +106,16 @@ class TextBody(FunctionBlock, abc.ABC):
 
     def store(self, array: str, index: int, value: str) -> None:
         self.written.add(array)
+        self.sizes[array] = max(self.sizes.get(array, 0), index + 1)
         self.stored.setdefault(value, (array, index))
-        self.lines.append(f"  {self.element(array, index)} = {value};")
+        self.lines.append(self.assigned(self.element(array, index), value))
+
+    def assignment(self, name: str, expression: str) -> str:
+        return self.assigned(f"{self.defines}{name}", expression)
+
+    def assigned(self, variable: str, value: str) -> str:
+        """The line that assigns a value to a variable or an element."""
+        return f"{self.margin}{variable} = {value}{self.end}"
 
     def name_values(self, labels: Labels, named: Mapping[str, tuple[str, int]], taken: Collection[str]) -> None:
         """Give the values that stand in arrays with labels the names of these, unless a name is taken.
@@ -164,13 +174,13 @@ class TextBody(FunctionBlock, abc.ABC):
         self, gates: Sequence[str], compute: Callable[[], dict[Operand, str]], instead: Mapping[Operand, str]
     ) -> dict[Operand, str]:
         joined = {operand: self.new_name() for operand in instead}
-        self.lines += [self.variable(joined[operand], value) for operand, value in instead.items()]
+        self.lines += [self.assigned(f"{self.declares}{joined[operand]}", value) for operand, value in instead.items()]
         tests = f" {self.either} ".join(f"{gate} {self.unequal} {self.constant(0.0)}" for gate in gates)
         self.lines.append(self.begin_branch(tests))
         outside, self._known = self._known, dict(self._known)  # values of the block are not available after it
         begin, inside = len(self.lines), compute()
         self._known = outside
-        self.lines += [f"  {name} = {inside[operand]};" for operand, name in joined.items()]
+        self.lines += [self.assigned(name, inside[operand]) for operand, name in joined.items()]
         self.lines[begin:] = [f"  {line}" for line in self.lines[begin:]]
-        self.lines.append(self.end_branch)
+        self.lines += [self.end_branch] if self.end_branch else []
         return joined

@@ -18,16 +18,11 @@ class CBody(TextBody):
     def __init__(self, scalars: Sequence[str] = (), number: str = "double") -> None:
         super().__init__(scalars)
         self.number, self._suffix = number, "f" if number == "float" else ""
+        self.defines, self.declares = f"const {number} ", f"{number} "
         self.infinity = "INFINITY" if self._suffix else "HUGE_VAL"  # INFINITY is a float, which clang would promote
-
-    def assignment(self, name: str, expression: str) -> str:
-        return f"  const {self.number} {name} = {expression};"
 
     def remark(self, text: str) -> str:
         return f"/* {text} */"
-
-    def variable(self, name: str, value: str) -> str:
-        return f"  {self.number} {name} = {value};"
 
     def literal(self, value: float) -> str:
         """In single precision the nearest number; what is too large for it becomes infinite, as in arithmetic."""

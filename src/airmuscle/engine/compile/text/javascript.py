@@ -16,14 +16,10 @@ class JavaScriptBody(TextBody):
     equal, unequal = "===", "!=="
     infinity, not_a_number = "Infinity", "NaN"
 
-    def assignment(self, name: str, expression: str) -> str:
-        return f"  const {name} = {expression};"
+    defines, declares = "const ", "let "
 
     def remark(self, text: str) -> str:
         return f"// {text}"
-
-    def variable(self, name: str, value: str) -> str:
-        return f"  let {name} = {value};"
 
     def element(self, array: str, index: int) -> str:
         return f"{array}[{index}]"

@@ -29,25 +29,11 @@ class MatlabBody(TextBody):
     infinity, not_a_number = "Inf", "NaN"
     end_branch = "  end"
 
-    def __init__(self, scalars: Sequence[str] = ()) -> None:
-        super().__init__(scalars)
-        self.sizes: dict[str, int] = {}
-
-    def assignment(self, name: str, expression: str) -> str:
-        return f"  {name} = {expression};"
-
     def remark(self, text: str) -> str:
         return f"% {text}"
 
-    def variable(self, name: str, value: str) -> str:
-        return f"  {name} = {value};"
-
     def element(self, array: str, index: int) -> str:
         return f"{array}({index + 1})"
-
-    def store(self, array: str, index: int, value: str) -> None:
-        self.sizes[array] = max(self.sizes.get(array, 0), index + 1)
-        super().store(array, index, value)
 
     def choose(self, test: str, when_true: str, when_false: str) -> str:
         key = f"({test}) ? {when_true} : {when_false}"

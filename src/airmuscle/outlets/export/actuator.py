@@ -1,0 +1,248 @@
+"""Actuator for learning stacks: one muscle with its circuit as functions of a command, its length and its speed.
+
+start(q, c, x)       states x at q = (gauge pressure [Pa], length [m])
+step(x, z, c, h, y)  states y after a time h [s] under z = (command, length [m], speed [m/s]): the command is held,
+                     the length moves at its speed; classical Runge-Kutta method, as `simulate` with RungeKutta4(h)
+observe(x, z, c, o)  o = (tension [N], gauge pressure [Pa], 1 within the validity range of the muscle, else 0)
+prepare(p, c)        c, what these need of the parameters
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ...core import autodiff
+from ...core.errors import ParameterError
+from ...core.system import Input
+from ...core.tree import Leaf, leaves
+from ...engine.compile import compile_system, derivatives
+from ...engine.compile.functions import Printer, TracedSystem
+from ...engine.compile.ir.emission import TargetLanguage
+from ...engine.run.integrators import RungeKutta4
+from ...physics.mechanism import ExternalLoad
+from ...physics.mechanism.external_load import SHORTENING, SHORTENING_SPEED
+from ...physics.plant import Plant, open_plant
+from .printed_system import make_labels
+
+SAFETY = 1.0
+"""Largest product of the default step and the fastest rate of the plant; 2.8 is the limit of the method (chosen)."""
+MAX_STEP = 1e-3
+"""Longest default step [s] (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ActuatorModel:
+    """One muscle of a plant, open towards its load, with one command.
+
+    part       the plant with length and speed of the muscle as inputs
+    controls   inputs that the command opens: one, or two of which a negative command opens the second
+    step       the longest step of the integrator [s]
+    """
+
+    part: Plant
+    controls: tuple[Input, ...]
+    step: float
+
+    @property
+    def command_range(self) -> tuple[float, float]:
+        """Lowest and highest command."""
+        return control_range(self.controls)
+
+    @property
+    def parameters(self) -> list[Leaf]:
+        """The parameters, in the order of their vector."""
+        return list(leaves(self.part))
+
+    @functools.cached_property
+    def _traced(self) -> TracedSystem:
+        return compile_system(self.part).program.traced
+
+    def _inputs(self, z: Any, p: Any) -> Any:
+        """The inputs of the plant at command, length and speed."""
+        import casadi
+
+        rest = self._rest_length(p)
+        low, high = self.command_range
+        command = casadi.fmin(casadi.fmax(z[0], low), high)
+        values = {SHORTENING: rest - z[1], SHORTENING_SPEED: -z[2]}
+        if len(self.controls) == 1:
+            values[self.controls[0].name] = command
+        elif self.controls:
+            values |= {
+                self.controls[0].name: casadi.fmax(command, 0.0),
+                self.controls[1].name: casadi.fmax(-command, 0.0),
+            }
+        return casadi.vertcat(casadi.SX(0, 1), *(values[name] for name in self.part.inputs))
+
+    def _rest_length(self, p: Any) -> Any:
+        import casadi
+
+        model, vector = autodiff.symbolic(self.part)
+        return casadi.substitute(casadi.SX(model.resting_lengths[0]), vector, p)
+
+    @functools.cached_property
+    def step_of_time(self) -> tuple[dict[str, Any], Any]:
+        """Arguments and result of `step`."""
+        import casadi
+
+        t, z, h = self._traced, casadi.SX.sym("z", 3), casadi.SX.sym("h")
+        rates = casadi.Function("rates", [t.x, t.u, t.p], [t.f])
+        rows, weights = RungeKutta4(self.step).tableau()
+        slopes: list[Any] = []
+        for row in ((), *rows):
+            increment = sum((a * k for a, k in zip(row, slopes, strict=True) if a), casadi.SX(0))
+            at = casadi.vertcat(z[0], z[1] + sum(row) * h * z[2], z[2])
+            slopes.append(rates(t.x + h * increment if row else t.x, self._inputs(at, t.p), t.p))
+        later = t.x + h * sum((b * k for b, k in zip(weights, slopes, strict=True) if b), casadi.SX(0))
+        return {"x": t.x, "z": z, "p": t.p, "h": h}, later
+
+    @functools.cached_property
+    def observe(self) -> tuple[dict[str, Any], Any]:
+        """Arguments and result of `observe`."""
+        import casadi
+
+        t, z = self._traced, casadi.SX.sym("z", 3)
+        o = casadi.substitute(t.o, t.u, self._inputs(z, t.p))
+        known = {**{n: t.x[i] for i, n in enumerate(s.name for s in self.part.states)},
+                 **{n: o[i] for i, n in enumerate(t.output_names)}}  # fmt: skip
+        valid = casadi.SX(1.0)
+        for limit in self.part.column_limits:
+            low, high = limit.bounds
+            if limit.column in known and np.isfinite(low):
+                valid = casadi.logic_and(valid, known[limit.column] >= low)
+            if limit.column in known and np.isfinite(high):
+                valid = casadi.logic_and(valid, known[limit.column] <= high)
+        return {"x": t.x, "z": z, "p": t.p}, casadi.vertcat(known["force"], known["pressure"], valid)
+
+    @functools.cached_property
+    def start(self) -> tuple[dict[str, Any], Any]:
+        """Arguments and result of `start`."""
+        import casadi
+
+        model, p = autodiff.symbolic(self.part)
+        q = casadi.SX.sym("q", 2)
+        shortening = model.resting_lengths[0] - q[1]
+        settled, volumes = model.settle_muscles((q[0],), {SHORTENING: shortening})
+        state = model.fill_muscles((q[0],), volumes, settled)
+        values = casadi.vertcat(*(casadi.SX(state[s.name]) for s in self.part.states))
+        autodiff.check_finite(values, type(self.part).__name__)
+        return {"q": q, "p": p}, values
+
+    def print_functions(self, language: TargetLanguage) -> tuple[str, int]:
+        """`prepare` and the functions in a language, and the length of c."""
+        import casadi
+
+        printer = Printer(dataclasses.replace(language, labels=self._labels))  # type: ignore[type-var]
+        for name, (inputs, result), output in (
+            ("start", self.start, "x"), ("step", self.step_of_time, "y"), ("observe", self.observe, "o"),
+        ):  # fmt: skip
+            printer.add(name, inputs, {output: casadi.cse(casadi.densify(result))}, ["h"] if "h" in inputs else ())
+        return printer.module(), printer.held
+
+    @property
+    def command_meaning(self) -> str:
+        """What the command sets."""
+        names = [control.name for control in self.controls]
+        if len(names) == 2:
+            return f"{names[0]} where positive, {names[1]} where negative"
+        return f"{names[0]}: {self.controls[0].meaning}" if names else "without effect"
+
+    @property
+    def _labels(self) -> Any:
+        states = [(s.name, s.unit, s.meaning) for s in self.part.states]
+        unit = self.controls[0].unit if self.controls else ""
+        return make_labels({
+            "x": states, "y": [(f"next {name}", unit, "") for name, unit, _ in states],
+            "z": [("command", unit, ""), ("length", "m", "of the muscle"), ("speed", "m/s", "of the length")],
+            "q": [("initial pressure", "Pa", "gauge"), ("initial length", "m", "of the muscle")],
+            "o": [("tension", "N", ""), ("pressure", "Pa", "gauge"), ("valid", "", "1 within the validity range")],
+            "p": [(leaf.path, leaf.declared.unit, leaf.declared.meaning) for leaf in self.parameters],
+        })  # fmt: skip
+
+
+def actuator_model(plant: Plant, *, muscle: str = "", step: float | None = None) -> ActuatorModel:
+    """One muscle of a plant with its circuit, without the load.
+
+    muscle  its name, if the plant has several, each with a circuit of its own
+    step    the longest step of the integrator [s]; by default 1 ms, or less where the plant is faster
+
+    Raises ParameterError for a plant that has not one command, and a step that is not positive.
+    """
+    part = open_plant(single_muscle(plant, muscle))
+    controls = controls_of(part)
+    if step is None:
+        step = _stable_step(part)
+    if not 0.0 < step < 1.0:
+        raise ParameterError(f"actuator: step is {step!r} s; allowed range: above 0 to 1 s.")
+    return ActuatorModel(part, controls, step)
+
+
+def single_muscle(plant: Plant, muscle: str) -> Plant:
+    """The plant with one of its muscles and the circuit of this muscle. Raises ParameterError."""
+    names = [m.name for m in plant.muscles]
+    if len(names) == 1:
+        if muscle and muscle != names[0]:
+            raise ParameterError(f"there is no muscle '{muscle}'; the plant has {names[0]}.")
+        return plant
+    if len(plant.circuits) != len(names):
+        raise ParameterError(
+            f"the muscles {', '.join(names)} share the circuit {type(plant.circuits[0]).__name__} and cannot be "
+            "separate actuators; give each muscle a circuit of its own."
+        )
+    if muscle not in names:
+        raise ParameterError(f"choose one of the muscles {', '.join(names)}; given: '{muscle}'.")
+    k = names.index(muscle)
+    return dataclasses.replace(plant, muscle=plant.muscles[k], circuit=plant.circuits[k], mechanism=ExternalLoad())
+
+
+def controls_of(part: Plant) -> tuple[Input, ...]:
+    """The inputs of an open plant that one command sets. Raises ParameterError for more than two."""
+    controls = tuple(i for i in part.input_variables if i.name not in (SHORTENING, SHORTENING_SPEED))
+    if len(controls) > 2 or (len(controls) == 2 and any(i.minimum != 0.0 for i in controls)):
+        raise ParameterError(
+            "an actuator has one control; a circuit with a single input, or two valves that open from 0, can be "
+            f"exported, but the inputs are {', '.join(i.name for i in controls)}."
+        )
+    return controls
+
+
+def control_range(controls: Sequence[Input]) -> tuple[float, float]:
+    """Lowest and highest command of these inputs; of two, a negative one opens the second."""
+    if len(controls) == 2:
+        return -controls[1].maximum, controls[0].maximum
+    return (controls[0].minimum, controls[0].maximum) if controls else (0.0, 0.0)
+
+
+def _stable_step(part: Plant) -> float:
+    """The longest step of 1 ms / 2^k that resolves the fastest rate at a few states, with valves open and closed."""
+    compiled, fastest = compile_system(part), 1.0
+    for pressure in (2e4, 2e5, 5e5):
+        for contraction in (0.0, 0.1, 0.2):
+            shortening = contraction * part.resting_lengths[0]
+            try:
+                state = open_plant(part, (shortening,)).state_at(pressure=pressure)
+            except ParameterError:
+                continue
+            for opening in (0.0, 0.5, 1.0):
+                inputs = [_level(i, opening, shortening) for i in part.input_variables]
+                slopes = derivatives(compiled, list(state.values()), inputs).rates_by_state
+                sizes = compiled.nominal
+                if np.isfinite(slopes).all():
+                    rates = np.linalg.eigvals(slopes * sizes / sizes[:, None])
+                    fastest = max(fastest, float(np.abs(rates).max(initial=0.0)))
+    step = MAX_STEP
+    while step * fastest > SAFETY:
+        step /= 2.0
+    return step
+
+
+def _level(variable: Input, opening: float, shortening: float) -> float:
+    """The value of an input at which the fastest rate is looked for."""
+    if variable.name in (SHORTENING, SHORTENING_SPEED):
+        return shortening if variable.name == SHORTENING else 0.0
+    return variable.minimum + opening * (min(variable.maximum, 1e6) - variable.minimum)

@@ -1,0 +1,171 @@
+"""Actuators for learning stacks: modules of PyTorch and Warp and graphs of ONNX, with adapters for robot simulators."""
+
+from __future__ import annotations
+
+import abc
+import dataclasses
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ...core.arrays import Array
+from ...core.errors import ParameterError
+from ...engine.compile.ir.emission import TargetLanguage
+from ...engine.compile.text.torch import TorchLanguage
+from ...engine.compile.text.warp import WarpLanguage
+from ...engine.run.batch import Double, Precision, Single
+from ...files.library.uncertainty import ParameterUncertainty
+from ...physics.plant import Plant
+from .actuator import ActuatorModel, actuator_model
+from .onnx_model import onnx_models
+from .provenance import line_comment, provenance
+from .targets import program_name
+from .templates import filled
+from .write import checked_name, write_files
+
+OF_FILE = {"characteristic": "contractile"}
+"""Parts of a muscle that have another name in a muscle file, by that name."""
+NOTE = (
+    "The functions are those of the model. The command is held and the length moves at its speed within a step; the "
+    "flag says where the validity range of the muscle is left."
+)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ExportedActuator:
+    """An actuator ready for a stack.
+
+    identified, root  parameters with an uncertainty, by path, and the root (K, K) of their covariance [SI]
+    """
+
+    name: str
+    title: str
+    model: ActuatorModel
+    provenance: Sequence[str]
+    identified: tuple[str, ...]
+    root: Array
+
+    def places(self, language: TargetLanguage) -> dict[str, str]:
+        """The places of a template."""
+        model, (low, high) = self.model, self.model.command_range
+        functions, held = model.print_functions(language)
+        bounds = np.array([leaf.declared.bounds for leaf in model.parameters], dtype=float).reshape(-1, 2)
+        return {
+            "provenance": line_comment(self.provenance).replace("%", "#"), "title": self.title,
+            "class": self.class_name, "file": self.name, "functions": functions, "held": str(max(held, 1)),
+            "unit": model.controls[0].unit if model.controls else "1", "command": model.command_meaning,
+            "length": repr(float(model.part.resting_lengths[0])), "low": repr(float(low)), "high": repr(float(high)),
+            "step": repr(float(model.step)), "states": _tuple(s.name for s in model.part.states),
+            "parameters": _tuple(leaf.path for leaf in model.parameters),
+            "defaults": _tuple(float(leaf.value) for leaf in model.parameters),
+            "lower": _tuple(bounds[:, 0].tolist()), "upper": _tuple(bounds[:, 1].tolist()),
+            "identified": _tuple(self.identified), "spread": _tuple(tuple(row) for row in self.root.tolist()),
+        }  # fmt: skip
+
+    @property
+    def class_name(self) -> str:
+        """The name of the class."""
+        return "".join(word[:1].upper() + word[1:] for word in self.name.split("_"))
+
+
+class Stack(abc.ABC):
+    """A learning stack that an actuator is written for."""
+
+    word: ClassVar[str]
+    """Name of the stack in file names and in the option --to."""
+
+    @abc.abstractmethod
+    def files(self, actuator: ExportedActuator) -> dict[str, str | bytes]:
+        """The files by name."""
+
+
+@dataclasses.dataclass(frozen=True)
+class TorchStack(Stack):
+    """A module of PyTorch, with adapters for mjlab and Isaac Lab."""
+
+    word: ClassVar[str] = "torch"
+
+    def files(self, actuator: ExportedActuator) -> dict[str, str | bytes]:
+        places, name = actuator.places(TorchLanguage()), actuator.name
+        return {
+            f"{name}.py": filled("torch_actuator.pyt", places, name),
+            f"{name}_mjlab.py": filled("mjlab_actuator.pyt", places, name),
+            f"{name}_isaaclab.py": filled("isaaclab_actuator.pyt", places, name),
+        }
+
+
+@dataclasses.dataclass(frozen=True)
+class WarpStack(Stack):
+    """Kernels of NVIDIA Warp, with an adapter for Newton."""
+
+    word: ClassVar[str] = "warp"
+    precision: Precision = Single()
+
+    def files(self, actuator: ExportedActuator) -> dict[str, str | bytes]:
+        number = "wp.float32" if self.precision == Single() else "wp.float64"
+        places, name = actuator.places(WarpLanguage()) | {"real": number}, actuator.name
+        return {
+            f"{name}_warp.py": filled("warp_actuator.pyt", places, name),
+            f"{name}_newton.py": filled("newton_actuator.pyt", places, name),
+        }
+
+
+@dataclasses.dataclass(frozen=True)
+class OnnxStack(Stack):
+    """Graphs of ONNX with states as inputs and outputs: one of the start, one of a step."""
+
+    word: ClassVar[str] = "onnx"
+    precision: Precision = Double()
+    tunable: bool = False
+    """Whether the parameters are an input."""
+    substeps: int = 1
+    """Steps of the integrator in a step of the graph."""
+
+    def files(self, actuator: ExportedActuator) -> dict[str, str | bytes]:
+        single, model = self.precision == Single(), actuator.model
+        return dict(onnx_models(actuator.name, actuator.title, model, actuator.provenance, single,
+                                tunable=self.tunable, substeps=self.substeps))  # fmt: skip
+
+
+def write_actuator(
+    plant: Plant, folder: str | Path, stack: Stack = TorchStack(), *, name: str = "", title: str = "", muscle: str = "",
+    step: float | None = None, uncertainty: ParameterUncertainty | None = None,
+) -> tuple[Path, ...]:  # fmt: skip
+    """Write one muscle of a plant with its circuit as a batched actuator of a learning stack; the paths of its files.
+
+    plant        its load is left out: the simulator carries it
+    stack        TorchStack(), WarpStack(precision) or OnnxStack(precision)
+    muscle       name of the muscle, if the plant has several, each with a circuit of its own
+    step         the longest step of the integrator [s]; by default 1 ms, or less where the plant is faster
+    uncertainty  of the parameters of the muscle, as its file states it, from which `randomise` draws
+
+    Raises ParameterError for a plant that cannot be exported, and FileError.
+    """
+    model = actuator_model(plant, muscle=muscle, step=step)
+    title = title or model.part.muscles[0].name
+    identified, root = _spread(model, uncertainty)
+    lines = provenance(title, model.part, (), [NOTE])
+    actuator = ExportedActuator(checked_name(name) or program_name(title), title, model, lines, identified, root)
+    return write_files(stack.files(actuator), folder)
+
+
+def _spread(model: ActuatorModel, given: ParameterUncertainty | None) -> tuple[tuple[str, ...], Array]:
+    """The paths of the identified parameters in the plant, and the root of their covariance."""
+    if given is None:
+        return (), np.zeros((0, 0))
+    known = {leaf.path for leaf in model.parameters}
+    paths = []
+    for path in given.parameters:
+        part, dot, rest = path.partition(".")
+        paths.append(f"muscle.{OF_FILE.get(part, part)}{dot}{rest}")
+        if paths[-1] not in known:
+            raise ParameterError(f"write_actuator: the plant has no parameter '{paths[-1]}' of the uncertainty.")
+    return tuple(paths), given.deviations(np.eye(len(paths))).T
+
+
+def _tuple(values: Any) -> str:
+    """A tuple as text of Python."""
+    return re.sub(r"-?\binf\b", lambda found: f'float("{found[0]}")', repr(tuple(values)))
