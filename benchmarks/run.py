@@ -24,6 +24,7 @@ import derivative
 import environments
 import growth
 import identification
+import learning
 import live
 import loops
 import memory
@@ -59,6 +60,7 @@ SECTIONS: tuple[tuple[Callable[[int], Section], int], ...] = (
     (live.section, 1),
     (controllers.section, 20),
     (environments.section, 9),
+    (learning.section, 9),
     (bootstrap.section, 5),
     (model_comparison.section, 3),
     (outlets.section, 1),

@@ -1,5 +1,6 @@
 from .library import CheckResult as CheckResult
 from .library import Entry as Entry
+from .library import ParameterUncertainty as ParameterUncertainty
 from .library import PlantEntry as PlantEntry
 from .library import ProductEntry as ProductEntry
 from .library import ValveEntry as ValveEntry

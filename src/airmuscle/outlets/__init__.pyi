@@ -13,9 +13,15 @@ from .export import PRECISIONS as PRECISIONS
 from .export import JavaScript as JavaScript
 from .export import MuscleActuator as MuscleActuator
 from .export import Octave as Octave
+from .export import OnnxStack as OnnxStack
+from .export import Stack as Stack
 from .export import Target as Target
+from .export import TorchStack as TorchStack
+from .export import WarpStack as WarpStack
 from .export import WrittenFmu as WrittenFmu
 from .export import make_identifiers as make_identifiers
+from .export import regulated_plant as regulated_plant
+from .export import write_actuator as write_actuator
 from .export import write_controller as write_controller
 from .export import write_fmu as write_fmu
 from .export import write_law as write_law

@@ -15,25 +15,29 @@ from ..export import (
     PRECISIONS,
     JavaScript,
     Octave,
+    OnnxStack,
+    Stack,
     Target,
+    TorchStack,
+    WarpStack,
     write_controller,
-    write_fmu,
     write_law,
-    write_modelica,
-    write_mujoco_plugin,
     write_program,
 )
 from ..export.building import BuiltProgram, build_and_run
 from ..export.identifiers import make_identifier
 from ..export.microcontroller import PROCESSORS, run_in_emulator
-from ..export.platforms import PLATFORMS, Platform, find_platform
+from ..export.platforms import PLATFORMS, find_platform
 from .completion import complete_entry
+from .export_models import export_actuator, export_fmu, export_modelica, export_mujoco
 from .options import Folder, Json
 from .terminal import echo, print_json
 
 TARGETS: dict[str, Target] = {"c": C99(), "js": JavaScript(), "octave": Octave()}
 """Languages by the names of the option --to."""
-NAMES = (*TARGETS, "arduino", "fmu", "mujoco", "modelica")
+STACKS: dict[str, Stack] = {"torch": TorchStack(), "warp": WarpStack(), "onnx": OnnxStack()}
+"""Learning stacks by the names of the option --to."""
+NAMES = (*TARGETS, "arduino", "fmu", "mujoco", "modelica", *STACKS)
 """All values of the option --to."""
 DEFAULT_FOLDER = Path("export")
 
@@ -74,7 +78,9 @@ ProcessorName = Annotated[
     ),
 ]  # fmt: skip
 Fmi = Annotated[int | None, typer.Option("--fmi", metavar="2|3", help="Version of FMI for --to fmu. Default: 3.")]
-MuscleName = Annotated[str, typer.Option("--muscle", metavar="NAME", help="One muscle of the plant; --to mujoco.")]
+MuscleName = Annotated[
+    str, typer.Option("--muscle", metavar="NAME", help="One muscle of the plant; --to mujoco, torch, warp, onnx.")
+]
 SourcesOnly = Annotated[bool, typer.Option("--sources-only", help="An FMU without a binary; --to fmu.")]
 
 
@@ -94,7 +100,7 @@ def export(
     sources_only: SourcesOnly = False, platforms: Platforms = None, muscle: MuscleName = "",
     precision: PrecisionName = "double", processor: ProcessorName = "", json: Json = False,
 ) -> None:  # fmt: skip
-    """Export to C, JavaScript, MATLAB, FMU, MuJoCo or Modelica.
+    """Export to C, JavaScript, MATLAB, FMU, MuJoCo, Modelica, PyTorch, Warp or ONNX.
 
     \b
     The program contains the equations of the plant, the integrator, and a run of the scenario that writes CSV; in C,
@@ -106,6 +112,7 @@ def export(
       airmuscle export examples/fill_discharge.toml --to c --out fill_c
       airmuscle export examples/fill_discharge.toml --to octave --tunable mechanism.mass --out fill_m
       airmuscle export dmsp-20-300 --law --to js --out law_js
+      airmuscle export dmsp-20-300 --to torch --out actuator
       airmuscle export examples/pressure_loop.toml --to c --out loop_c
       airmuscle export examples/pressure_loop.toml --controller --to c --out controller
       airmuscle export examples/pressure_loop.toml --controller --to c --precision float --build --processor cortex-m4
@@ -119,16 +126,19 @@ def export(
         if sources_only and platforms:
             raise typer.BadParameter("--sources-only and --platforms exclude each other.")
         targets = [find_platform(each) for each in dict.fromkeys(platforms or ())]
-        _export_fmu(source, out, name, tunable, 3 if fmi is None else fmi, not sources_only, targets, json)
+        export_fmu(source, out, name, tunable, 3 if fmi is None else fmi, not sources_only, targets, json)
         return
-    if muscle and to != "mujoco":
-        raise typer.BadParameter("--muscle belongs to --to mujoco.")
+    if muscle and to not in ("mujoco", *STACKS):
+        raise typer.BadParameter(f"--muscle belongs to --to mujoco, {', '.join(STACKS)}.")
     check_writable(out)
     if to == "mujoco":
-        _export_mujoco(source, out, name, muscle, json)
+        export_mujoco(source, out, name, muscle, json)
+        return
+    if to in STACKS:
+        export_actuator(source, out, name, muscle, STACKS[to], json)
         return
     if to == "modelica":
-        _export_modelica(source, out, name, tunable, json)
+        export_modelica(source, out, name, tunable, json)
         return
     paths = _write(source, out, to, name, law, controller, tunable, precision)
     built = (run_in_emulator(paths, PROCESSORS[processor]) if processor else build_and_run(paths)) if build else None
@@ -211,57 +221,6 @@ def _check_options(
         raise typer.BadParameter("--tunable: all parameters of a law can be changed; leave it out.")
     if of_an_fmu and to != "fmu":
         raise typer.BadParameter("--fmi, --sources-only and --platforms belong to --to fmu.")
-
-
-def _export_fmu(
-    source: str, out: Path, name: str, tunable: list[str] | None, fmi: int, binary: bool, platforms: list[Platform],
-    json: bool,
-) -> None:  # fmt: skip
-    """Write an FMU into a folder, or to a file that ends in .fmu."""
-    path = out if out.suffix == ".fmu" else out / f"{name}.fmu"
-    check_writable(path.parent)
-    scenario = load_scenario(source)
-    written = write_fmu(
-        scenario.problem, path, fmi=fmi, name=name, title=scenario.title, tunable=tunable, binary=binary,
-        platforms=platforms,
-    )  # fmt: skip
-    if json:
-        print_json({"files": [str(path)], "platforms": list(written.platforms), "remark": written.remark})
-        return
-    echo(f"file: {path}")
-    if written.platforms:
-        names = ", ".join(written.platforms)
-        echo(f"FMI {fmi}.0, Model Exchange and Co-Simulation, with sources and a binary for {names}")
-    else:
-        echo(f"FMI {fmi}.0, Model Exchange and Co-Simulation, sources without a binary: {written.remark}")
-    echo(f"run: fmpy simulate {path}")
-
-
-def _export_mujoco(source: str, out: Path, name: str, muscle: str, json: bool) -> None:
-    """Write a MuJoCo plugin into a folder."""
-    made = write_mujoco_plugin(load_scenario(source).plant, out, name=name, muscle=muscle)
-    files = [str(path) for path in (made.source, made.library) if path is not None]
-    if json:
-        print_json({"files": files, "plugin": made.plugin_name, "remark": made.remark})
-        return
-    for file in files:
-        echo(f"file: {file}")
-    echo(f"plugin: {made.plugin_name}" + (f", source only: {made.remark}" if made.remark else ""))
-    low, high = made.control_range
-    size = f'actdim="{len(made.plant.states)}" dyntype="user" ctrlrange="{low:g} {high:g}"'
-    echo(f'MJCF: <plugin plugin="{made.plugin_name}" tendon="NAME" {size}/>')
-
-
-def _export_modelica(source: str, out: Path, name: str, tunable: list[str] | None, json: bool) -> None:
-    """Write a Modelica package into a folder."""
-    scenario = load_scenario(source)
-    paths = write_modelica(scenario.problem, out, name=name, title=scenario.title, tunable=tunable)
-    if json:
-        print_json({"files": [str(path) for path in paths]})
-        return
-    for path in paths:
-        echo(f"file: {path}")
-    echo(f'Modelica: loadFile("{paths[0]}"); block {name}.Plant')
 
 
 def _instruction(to: str, paths: tuple[Path, ...], law: bool, controller: bool) -> str:

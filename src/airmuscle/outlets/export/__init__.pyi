@@ -4,6 +4,12 @@ from .controller import write_controller as write_controller
 from .fmu import WrittenFmu as WrittenFmu
 from .fmu import write_fmu as write_fmu
 from .identifiers import make_identifiers as make_identifiers
+from .learning import OnnxStack as OnnxStack
+from .learning import Stack as Stack
+from .learning import TorchStack as TorchStack
+from .learning import WarpStack as WarpStack
+from .learning import regulated_plant as regulated_plant
+from .learning import write_actuator as write_actuator
 from .modelica import write_modelica as write_modelica
 from .mujoco_plugin import MuscleActuator as MuscleActuator
 from .mujoco_plugin import write_mujoco_plugin as write_mujoco_plugin

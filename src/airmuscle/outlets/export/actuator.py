@@ -127,7 +127,13 @@ class ActuatorModel:
         model, p = autodiff.symbolic(self.part)
         q = casadi.SX.sym("q", 2)
         shortening = model.resting_lengths[0] - q[1]
-        settled, volumes = model.settle_muscles((q[0],), {SHORTENING: shortening})
+        try:
+            settled, volumes = model.settle_muscles((q[0],), {SHORTENING: shortening})
+        except TypeError:
+            raise ParameterError(
+                f"actuator: {self.part.muscles[0].name} has a series spring, whose initial state is found by iteration "
+                "and has no printed form; leave the series spring out."
+            ) from None
         state = model.fill_muscles((q[0],), volumes, settled)
         values = casadi.vertcat(*(casadi.SX(state[s.name]) for s in self.part.states))
         autodiff.check_finite(values, type(self.part).__name__)

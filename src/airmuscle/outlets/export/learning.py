@@ -17,7 +17,10 @@ from ...engine.compile.ir.emission import TargetLanguage
 from ...engine.compile.text.torch import TorchLanguage
 from ...engine.compile.text.warp import WarpLanguage
 from ...engine.run.batch import Double, Precision, Single
+from ...files import load_scenario
 from ...files.library.uncertainty import ParameterUncertainty
+from ...physics.mechanism import ExternalLoad
+from ...physics.muscle import Muscle
 from ...physics.plant import Plant
 from .actuator import ActuatorModel, actuator_model
 from .onnx_model import onnx_models
@@ -150,6 +153,14 @@ def write_actuator(
     lines = provenance(title, model.part, (), [NOTE])
     actuator = ExportedActuator(checked_name(name) or program_name(title), title, model, lines, identified, root)
     return write_files(stack.files(actuator), folder)
+
+
+def regulated_plant(muscle: Muscle) -> Plant:
+    """A muscle behind the pressure regulator SMC ITV2050 of the library (`vessel-smc-itv2050`), open to its load.
+
+    The regulator is one that was fitted to published responses with a vessel, not to this muscle.
+    """
+    return Plant(muscle, load_scenario("vessel-smc-itv2050").plant.circuit, ExternalLoad())
 
 
 def _spread(model: ActuatorModel, given: ParameterUncertainty | None) -> tuple[tuple[str, ...], Array]:

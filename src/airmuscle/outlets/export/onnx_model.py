@@ -15,7 +15,6 @@ from .actuator import ActuatorModel
 
 OPSET, IR_VERSION = 17, 8
 """Versions of the operators and of the format: ONNX Runtime reads them from 1.12 on."""
-ROWS = {"pressure": "start", "command": "step", "length": "", "speed": "step"}
 
 
 def onnx_models(
@@ -52,23 +51,25 @@ def onnx_models(
         step.results["x"] = step.results.pop("y")
     observed = step.results["o"]
     valid = step.node("Greater", observed[2], step.constant(0.5))
+    rows_out = {"tension": observed[0], "pressure": observed[1], "valid": valid}
+    given = ("state", *driven, "dt")
     models = {
         f"{name}_start.onnx": _model(onnx, start, model, single, tunable, begun, {"state": "x"}, {}),
-        f"{name}.onnx": _model(
-            onnx, step, model, single, tunable, ("state", *driven, "dt"), {"next_state": "x"},
-            {"tension": observed[0], "pressure": observed[1], "valid": valid},
-        ),
-    }  # fmt: skip
+        f"{name}.onnx": _model(onnx, step, model, single, tunable, given, {"next_state": "x"}, rows_out),
+    }
+    for each in models.values():
+        onnx.helper.set_model_props(each, _facts(title, model, provenance))
+    return {file: each.SerializeToString() for file, each in models.items()}
+
+
+def _facts(title: str, model: ActuatorModel, provenance: Sequence[str]) -> dict[str, str]:
+    """The metadata of both graphs."""
     low, high = model.command_range
-    facts = {
+    return {
         "title": title, "provenance": "\n".join(provenance), "step": repr(model.step),
-        "command": f"{low!r} to {high!r}",
-        "states": ", ".join(s.name for s in model.part.states),
+        "command": f"{low!r} to {high!r}", "states": ", ".join(s.name for s in model.part.states),
         "parameters": ", ".join(leaf.path for leaf in model.parameters),
     }  # fmt: skip
-    for each in models.values():
-        onnx.helper.set_model_props(each, facts)
-    return {file: each.SerializeToString() for file, each in models.items()}
 
 
 class _Graph(GraphBody):
@@ -87,8 +88,8 @@ class _Graph(GraphBody):
 
 
 def _model(
-    onnx: Any, graph: _Graph, model: ActuatorModel, single: bool, tunable: bool, inputs: Sequence[str], arrays: Mapping[str, str],
-    rows: Mapping[str, str],
+    onnx: Any, graph: _Graph, model: ActuatorModel, single: bool, tunable: bool, inputs: Sequence[str],
+    arrays: Mapping[str, str], rows: Mapping[str, str],
 ) -> Any:  # fmt: skip
     """A model whose inputs are rows (count,), the states (n, count), and numbers."""
     helper, kind = onnx.helper, onnx.TensorProto.FLOAT if single else onnx.TensorProto.DOUBLE

@@ -1,0 +1,94 @@
+"""Models for simulators by `airmuscle export`: FMUs, MuJoCo plugins, Modelica and batched actuators."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ...core.atomic_output import check_writable
+from ...files import list_plants
+from ...files.library.entry_file import load_law
+from ...files.library.files import read_toml
+from ...files.scenario.scenario import load_scenario
+from ..export import (
+    Stack,
+    regulated_plant,
+    write_actuator,
+    write_fmu,
+    write_modelica,
+    write_mujoco_plugin,
+)
+from ..export.platforms import Platform
+from .terminal import echo, print_json
+
+
+def export_fmu(
+    source: str, out: Path, name: str, tunable: list[str] | None, fmi: int, binary: bool, platforms: list[Platform],
+    json: bool,
+) -> None:  # fmt: skip
+    """Write an FMU into a folder, or to a file that ends in .fmu."""
+    path = out if out.suffix == ".fmu" else out / f"{name}.fmu"
+    check_writable(path.parent)
+    scenario = load_scenario(source)
+    written = write_fmu(
+        scenario.problem, path, fmi=fmi, name=name, title=scenario.title, tunable=tunable, binary=binary,
+        platforms=platforms,
+    )  # fmt: skip
+    if json:
+        print_json({"files": [str(path)], "platforms": list(written.platforms), "remark": written.remark})
+        return
+    echo(f"file: {path}")
+    if written.platforms:
+        names = ", ".join(written.platforms)
+        echo(f"FMI {fmi}.0, Model Exchange and Co-Simulation, with sources and a binary for {names}")
+    else:
+        echo(f"FMI {fmi}.0, Model Exchange and Co-Simulation, sources without a binary: {written.remark}")
+    echo(f"run: fmpy simulate {path}")
+
+
+def export_mujoco(source: str, out: Path, name: str, muscle: str, json: bool) -> None:
+    """Write a MuJoCo plugin into a folder."""
+    made = write_mujoco_plugin(load_scenario(source).plant, out, name=name, muscle=muscle)
+    files = [str(path) for path in (made.source, made.library) if path is not None]
+    if json:
+        print_json({"files": files, "plugin": made.plugin_name, "remark": made.remark})
+        return
+    for file in files:
+        echo(f"file: {file}")
+    echo(f"plugin: {made.plugin_name}" + (f", source only: {made.remark}" if made.remark else ""))
+    low, high = made.control_range
+    size = f'actdim="{len(made.plant.states)}" dyntype="user" ctrlrange="{low:g} {high:g}"'
+    echo(f'MJCF: <plugin plugin="{made.plugin_name}" tendon="NAME" {size}/>')
+
+
+def export_actuator(source: str, out: Path, name: str, muscle: str, stack: Stack, json: bool) -> None:
+    """Write the batched actuator of a muscle of a plant, or of a muscle behind a pressure regulator."""
+    if _is_plant(source):
+        paths = write_actuator(load_scenario(source).plant, out, stack, name=name, muscle=muscle)
+    else:
+        entry = load_law(source)
+        paths = write_actuator(
+            regulated_plant(entry.muscle), out, stack, name=name, title=entry.title, uncertainty=entry.uncertainty
+        )
+    if json:
+        print_json({"files": [str(path) for path in paths]})
+        return
+    for path in paths:
+        echo(f"file: {path}")
+
+
+def _is_plant(source: str) -> bool:
+    """Whether a source is a plant of the library or a scenario file, not a muscle."""
+    file = Path(source)
+    return source in list_plants() if not file.exists() else "plant" in read_toml(file)
+
+
+def export_modelica(source: str, out: Path, name: str, tunable: list[str] | None, json: bool) -> None:
+    """Write a Modelica package into a folder."""
+    scenario = load_scenario(source)
+    paths = write_modelica(scenario.problem, out, name=name, title=scenario.title, tunable=tunable)
+    if json:
+        print_json({"files": [str(path) for path in paths]})
+        return
+    for path in paths:
+        echo(f"file: {path}")
+    echo(f'Modelica: loadFile("{paths[0]}"); block {name}.Plant')
