@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from airmuscle.errors import FileError, ParameterError, UnknownNameError
+from airmuscle.bench import read
+from airmuscle.errors import ColumnError, FileError, ParameterError, UnknownNameError
 from airmuscle.files import load, load_scenario
 from airmuscle.files.library import read_toml
 
@@ -57,3 +58,19 @@ def test_a_path_that_is_longer_than_any_name_is_quoted_by_its_ends():
     with pytest.raises(FileError, match=r"^aaaa.*…a*\.toml: ") as raised:
         load("a" * 5000 + ".toml")
     assert len(str(raised.value)) < 300
+
+
+def wide(folder: Path, columns: int) -> Path:
+    """A text of many columns and three rows."""
+    head = ",".join(["time [s]", "pressure [kPa]", *(f"channel {i}" for i in range(columns - 2))])
+    rows = "".join(",".join([str(i)] * columns) + "\n" for i in range(3))
+    (folder / "wide.csv").write_text(f"{head}\n{rows}", encoding="utf-8")
+    return folder / "wide.csv"
+
+
+def test_a_table_of_more_columns_than_any_test_rig_has_is_refused(tmp_path: Path):
+    start = time.process_time()
+    with pytest.raises(ColumnError, match=r"wide\.csv: the table has 200000 columns; at most 5000 are read\. Export"):
+        read(wide(tmp_path, 200_000))
+    assert len(list(read(wide(tmp_path, 2000))[0])) == 2000
+    assert time.process_time() - start < LIMIT

@@ -106,3 +106,14 @@ def test_a_displacement_is_not_taken_for_a_contraction_but_explained(tmp_path):
 def test_a_force_in_kilopond_is_read(tmp_path):
     (recording,) = read(write(tmp_path / "run.csv", columns(), HEAD.replace("[N]", "[kp]")))
     assert recording["force"] == pytest.approx(9.80665 * columns()["force"], abs=1e-4)
+
+
+def test_a_length_and_a_contraction_that_contradict_each_other_give_a_warning(tmp_path):
+    values = columns()
+    values["length"] = 300.0 * (1.0 - values["contraction"] / 100.0)
+    head = f"{HEAD},length [mm]"
+    assert warned([write(tmp_path / "run.csv", values, head)]) == []
+    values["length"] = np.full(200, 300.0)
+    (text,) = warned([write(tmp_path / "run.csv", values, head)])
+    assert "run.csv: with the resting length of 300 mm, the length of 300 mm is a contraction of 0 %" in text
+    assert "the file states 19.9 %, which is used. Check the resting length" in text

@@ -186,3 +186,33 @@ def test_a_struct_with_time_and_signals_that_simulink_did_not_save(tmp_path, sig
     scipy_io.savemat(tmp_path / "bench.mat", {"out": out})
     (recording,) = read(tmp_path / "bench.mat", units={"time": "s"})
     assert recording["force"].tolist() == [*range(9)]
+
+
+@pytest.mark.parametrize(
+    ("heading", "below", "message"),
+    [
+        ("pressure [kPa]", "bar", r"the heading 'pressure \[kPa\]' states kPa, but the row of units below it bar"),
+        ("pressure [kPa(a)]", "kPa(g)", r"states kPa\(a\), but the row of units below it kPa\(g\)"),
+        ("pressure [kPa]", "kPa", None),
+        ("pressure [kPa]", "kPa(a)", None),
+        ("pressure [kPa]", "", None),
+        ("pressure", "kPa", None),
+    ],
+)
+def test_a_unit_row_that_contradicts_a_heading_is_refused(tmp_path, heading: str, below: str, message: str | None):
+    path = table(tmp_path, f"time [s],{heading},force [N]\ns,{below},N\n{ROWS}")
+    if message is None:
+        assert len(read(path)[0]) == 9
+        return
+    with pytest.raises(ColumnError, match=message):
+        read(path)
+    (recording,) = read(path, units={"pressure": "kPa"})
+    assert recording["pressure"][0] == 1e5
+
+
+@pytest.mark.parametrize("cell", ["25:61:00", "12:00:60", "12:99:10"])
+def test_a_clock_time_that_is_none_is_named(tmp_path, cell: str):
+    rows = "".join(f"12:00:0{i},{100 + i},{50 + i}\n" for i in range(9))
+    path = table(tmp_path, HEAD.replace(" [s]", "") + rows.replace("12:00:04", cell))
+    with pytest.raises(ColumnError, match=rf"line 6: time '{cell}' is not a number or a clock time\. Correct the cell"):
+        read(path)

@@ -12,7 +12,12 @@ from collections.abc import Callable, Iterator, Sequence
 
 from ...core.errors import AirmuscleWarning
 from ...recording.recording import Recording
-from .contractions import check_contraction_limit, check_contraction_signs, check_elongation
+from .contractions import (
+    check_contraction_limit,
+    check_contraction_signs,
+    check_elongation,
+    check_length_and_contraction,
+)
 from .force_zero import check_force_zero
 from .forces import check_force_area, check_force_signs
 from .missing_codes import check_missing_codes, without_missing_codes
@@ -29,6 +34,7 @@ CHECKS: tuple[BenchCheck, ...] = (
     check_force_zero,
     check_contraction_signs,
     check_contraction_limit,
+    check_length_and_contraction,
     check_elongation,
     check_pressure_limit,
     check_force_area,

@@ -18,6 +18,8 @@ SMALL_CONTRACTION = 0.01
 """Contraction in percent below which the numbers may be ratios (chosen)."""
 NOISE_RANGE = 10.0
 """Range of a held contraction, in standard deviations of its noise (chosen)."""
+MAX_DIFFERENCE = 0.02
+"""Median difference between the stated contraction and that of the length, up to which they agree (chosen)."""
 MAX_CONTRACTION = 0.55
 """Greatest contraction at which a pneumatic muscle pulls: pleated muscles without membrane stretch reach at most
 2 (1 - E(1/2)/K(1/2)) = 54.3 %, that of a slender `PleatedTube` at zero force (Daerden and Lefeber 2001); braided ones
@@ -76,6 +78,23 @@ def check_contraction_limit(recordings: Sequence[Recording]) -> Iterator[str]:
 
 def _files_beyond(recordings: Sequence[Recording]) -> str:
     return file_list([each.origin for each in recordings if limits(each["contraction"])[1] > MAX_CONTRACTION])
+
+
+def check_length_and_contraction(recordings: Sequence[Recording]) -> Iterator[str]:
+    """A length and a contraction of one file that contradict each other with the resting length."""
+    for each in recordings:
+        rest = each.constants.get("resting_length")
+        if not isinstance(rest, float | int) or not {"length", "contraction"} <= set(each.columns):
+            continue
+        of_length = (rest - each["length"]) / rest
+        difference = np.abs(of_length - each["contraction"])
+        if float(np.nanmedian(difference)) > MAX_DIFFERENCE:
+            row = int(np.nanargmax(difference))
+            yield (
+                f"{each.origin}: with the resting length of {1e3 * rest:.4g} mm, the length of "
+                f"{1e3 * each['length'][row]:.4g} mm is a contraction of {100 * of_length[row]:.3g} %, but the file "
+                f"states {100 * each['contraction'][row]:.3g} %, which is used. Check the resting length and the units."
+            )
 
 
 def check_elongation(recordings: Sequence[Recording]) -> Iterator[str]:

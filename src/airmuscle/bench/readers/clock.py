@@ -11,7 +11,7 @@ import numpy as np
 from ...core.arrays import Array
 
 _GERMAN_DATE = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})[ T](.+)")
-_TIME_OF_DAY = re.compile(r"(\d{1,3}):(\d{2}):(\d{2}(?:\.\d+)?)")
+_TIME_OF_DAY = re.compile(r"(\d{1,3}):([0-5]\d):([0-5]\d(?:\.\d+)?)")
 
 
 def seconds_from_clock(cells: Sequence[str]) -> Array | None:

@@ -22,7 +22,7 @@ from .clock import seconds_from_clock
 from .constants import check_constants, collect_constants, constant_from_column, parse_constant_name
 from .missing_values import MissingValues, RefuseMissing
 from .plausibility import check_plausible
-from .repeated_columns import check_unique, without_repeated_columns
+from .repeated_columns import check_unique, check_width, without_repeated_columns
 from .specimens import label_texts
 from .table import Cells, RawTable
 from .time_base import RecordedTime, TimeBase
@@ -42,6 +42,7 @@ def interpret(
     A constant that is the name of a quantity, `length`, gives a column with this value in every row.
     Raises ColumnError or UnitError; the message names file, row, value and remedy.
     """
+    check_width(table)
     table = without_repeated_columns(table)
     held = {name: value for name, value in constants.items() if _is_quantity(name)}
     run_constants = collect_constants(table, {n: value for n, value in constants.items() if n not in held})
@@ -136,14 +137,31 @@ def resolve_headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]
                 f"{suggestion(key, names)}"
             )
     row = table.units or ()
-    headings = [
-        Heading(h.text, h.name, user_units.get(h.name, user_units.get(h.text)) or below or h.unit, h.known)
-        for h, below in zip(parsed, [*row, *[""] * (len(parsed) - len(row))], strict=False)
-    ]
+    headings = []
+    for h, below in zip(parsed, [*row, *[""] * (len(parsed) - len(row))], strict=False):
+        stated = user_units.get(h.name, user_units.get(h.text))
+        if not stated and h.known:
+            _check_unit_row(table, h, below)
+        headings.append(Heading(h.text, h.name, stated or below or h.unit, h.known))
     check_unique(table, headings)
     if not any(heading.known for heading in headings):
         raise _no_known_column(table, headings)
     return headings
+
+
+def _check_unit_row(table: RawTable, heading: Heading, below: str) -> None:
+    """Raise ColumnError where the unit in the row below a heading contradicts that in the heading."""
+    if not below or heading.unit is None or below == heading.unit:
+        return
+    with contextlib.suppress(UnitError):  # of a unit that is none; its conversion states the reason
+        one, other = (conversion(unit, heading.target or "1") for unit in (heading.unit, below))
+        reference_differs = one.offset != other.offset and not (one.assumed_gauge or other.assumed_gauge)
+        if one.factor != other.factor or reference_differs:
+            raise ColumnError(
+                f"{table.origin}: the heading '{heading.text}' states {heading.unit}, but the row of units below it "
+                f"{below}. Correct one of them.",
+                hint=Hint("To state the unit", "units", {heading.name: ...}),
+            )
 
 
 def _override_notes(table: RawTable, headings: list[Heading]) -> list[str]:

@@ -35,7 +35,9 @@ class ExaminedColumn:
         """What is wrong with a cell, for a sentence."""
         cell = self.cells[row]
         if isinstance(cell, str):
-            return f"{self.heading.name} '{cell}' is not a number" if cell else f"{self.heading.name} has an empty cell"
+            clock = " or a clock time" if self.heading.name == "time" else ""
+            number = f"{self.heading.name} '{cell}' is not a number{clock}"
+            return number if cell else f"{self.heading.name} has an empty cell"
         reason = ", the code of a missing value" if math.isfinite(cell) else "; it must be finite"
         return f"{self.heading.name} is {cell:g}{reason}"
 
@@ -63,8 +65,8 @@ def _examine_column(index: int, heading: Heading, cells: Cells, codes: Sequence[
     missing = marked | np.isin(values, numeric)
     bad = ~np.isfinite(values) & ~missing
     if heading.name == "time" and bad.any():
-        clock = seconds_from_clock([cell for cell, gone in zip(cells, missing, strict=True) if not gone])
-        bad = bad if clock is None else np.zeros(len(cells), dtype=bool)
+        times = np.array([seconds_from_clock((cell,)) is not None for cell in cells])
+        bad = ~times & ~missing if times.any() else bad
     return ExaminedColumn(index, heading, cells, missing, bad)
 
 

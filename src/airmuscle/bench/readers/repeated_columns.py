@@ -1,4 +1,4 @@
-"""Repeated columns of a table: equal ones are read once; different ones of one quantity are an error."""
+"""Columns of a table: their number; equal ones are read once; different ones of one quantity are an error."""
 
 from __future__ import annotations
 
@@ -11,17 +11,22 @@ from ...core.errors import ColumnError
 from ...recording.heading import Heading
 from .table import Cells, RawTable
 
+MAX_COLUMNS = 5000
+"""Maximum number of columns of a table (chosen)."""
+
 
 def without_repeated_columns(table: RawTable) -> RawTable:
     """The table without the columns that repeat heading, unit and cells of a column before; a note names them."""
     units = table.units or ("",) * len(table.headings)
     kept, repeated = list[int](), list[str]()
-    for i, heading in enumerate(table.headings):
-        same = [k for k in kept if table.headings[k] == heading and units[k] == units[i]]
-        if heading and any(_equal(table.columns[k], table.columns[i]) for k in same):
-            repeated.append(heading)
+    same: dict[tuple[str, str], list[int]] = {}
+    for i, pair in enumerate(zip(table.headings, units, strict=True)):
+        before = same.setdefault(pair, [])
+        if pair[0] and any(_equal(table.columns[k], table.columns[i]) for k in before):
+            repeated.append(pair[0])
         else:
             kept.append(i)
+            before.append(i)
     if not repeated:
         return table
     names = ", ".join(f"'{name}'" for name in dict.fromkeys(repeated))
@@ -33,6 +38,15 @@ def without_repeated_columns(table: RawTable) -> RawTable:
         columns=tuple(table.columns[i] for i in kept),
         notes=(*table.notes, note),
     )
+
+
+def check_width(table: RawTable) -> None:
+    """Raise ColumnError for a table of more columns than any test rig has, whose inspection would take minutes."""
+    if len(table.headings) > MAX_COLUMNS:
+        raise ColumnError(
+            f"{table.origin}: the table has {len(table.headings)} columns; at most {MAX_COLUMNS} are read. Export the "
+            "needed columns alone."
+        )
 
 
 def _equal(one: Cells, other: Cells) -> bool:
