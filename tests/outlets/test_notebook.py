@@ -110,8 +110,8 @@ def test_the_repr_of_each_object_is_short(displayed: dict[str, NotebookDisplay])
 
 
 def result_classes() -> Iterator[type]:
-    """The dataclasses in the faces of the packages that are no models and contain arrays or other results."""
-    packages = [m.name for m in pkgutil.walk_packages(am.__path__, "airmuscle.") if m.ispkg]
+    """The dataclasses in the faces of the rooms that are no models and contain arrays or other results."""
+    packages = [m.name for m in pkgutil.iter_modules(am.__path__, "airmuscle.") if m.ispkg]
     for package in map(importlib.import_module, packages):
         for name in getattr(package, "__all__", ()):
             thing = getattr(package, name)

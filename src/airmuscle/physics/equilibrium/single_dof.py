@@ -1,16 +1,23 @@
-"""Equilibria of plants with one coordinate, over the whole permitted range of their muscles."""
+"""Equilibria of plants with one coordinate: grid over the permitted range, and roots between its points."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from ...core.arrays import Array
-from .roots import balances
 from .statics import Rows, Statics
 
+GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+JUMP = 1e-6
+"""Residual at a root relative to the median of all points; with a greater residual, the sign changes by a
+discontinuity (chosen)."""
+CLOSE = 1e-13
+"""Step at which a root search ends, relative to the initial interval; the remaining error is far smaller (chosen)."""
 GRID_POINTS = 101
 """Number of points that are evaluated between the ends of the range."""
 
@@ -108,3 +115,132 @@ def _edges(line: Line, inside: Array, outside: Array) -> Array:
         there = line.within_reach(middle[:, None])[:, 0]
         inside, outside = np.where(there, middle, inside), np.where(there, outside, middle)
     return inside
+
+
+def balances(plants: Line, x: Array, f: Array) -> tuple[Rows, Array]:
+    """Rows of the plants and coordinates of all roots, in ascending order, from accelerations f (N, K) at ascending x.
+
+    Roots are the points with f = 0 (both ends of an interval with f = 0), one point between neighbours of different
+    sign, and two points where f crosses zero twice between neighbours of equal sign.
+    """
+    with np.errstate(invalid="ignore", over="ignore"):
+        zero = np.pad(f == 0.0, ((0, 0), (1, 1)))
+        exact = zero[:, 1:-1] & ~(zero[:, :-2] & zero[:, 2:])
+        crossing = f[:, :-1] * f[:, 1:] < 0.0
+        nearing = _nears_zero(f)
+    rows, i = np.nonzero(exact)
+    root_parts = [(rows, x[rows, i])]
+    rows, i = np.nonzero(crossing)
+    root_parts.append(_roots(plants, f, rows, x[rows, i], x[rows, i + 1]))
+    rows, i = np.nonzero(nearing)
+    around = np.stack([x[rows, i + k] for k in range(3)])
+    root_parts += _pairs(plants, f, rows, around, np.sign(f[rows, i + 1]))
+    row, place = (np.concatenate(parts) for parts in zip(*root_parts, strict=True))
+    order = np.lexsort((place, row))
+    return row[order], place[order]
+
+
+def _roots(plants: Line, f: Array, rows: Rows, low: Array, high: Array) -> tuple[Rows, Array]:
+    """The roots between points of different sign; there is none where the function passes through infinity."""
+    if not rows.size:
+        return rows, low
+    there = plants.of(rows)
+    root = between(there, low, high)
+    left, size = np.abs(there.accelerations(root)), np.abs(f)[rows]
+    kept = left <= JUMP * np.nanmin(size, axis=1)
+    doubtful = np.flatnonzero(~kept)
+    kept[doubtful] = left[doubtful] <= JUMP * np.nanmedian(size[doubtful], axis=1)
+    return rows[kept], root[kept]
+
+
+def between(plants: Line, low: Array, high: Array) -> Array:
+    """The roots between points (R,) of different sign by the false position method (Illinois variant)."""
+    search = _Search(np.arange(low.size), low, high, plants.accelerations(low), plants.accelerations(high), low)
+    close = np.maximum(CLOSE * (high - low), np.spacing(np.maximum(np.abs(low), np.abs(high))))
+    roots, ended = low.copy(), np.zeros(low.size, dtype=bool)
+    for _ in range(200):
+        middle = search.middle()
+        at = plants.accelerations(middle)
+        roots[search.rows] = np.where(ended, roots[search.rows], middle)
+        inside = (search.low < middle) & (middle < search.high)
+        ended |= (at == 0.0) | (np.abs(middle - search.last) <= close[search.rows]) | ~inside
+        if ended.all():
+            break
+        search = search.narrowed(middle, at)
+        if 2 * ended.sum() > ended.size:  # continue with the unfinished rows only
+            kept = np.flatnonzero(~ended)
+            plants, search, ended = plants.of(kept), search.of(kept), ended[kept]
+    return roots
+
+
+class _Search(NamedTuple):
+    """Bracketing interval of every row: both ends, the function values there, and the last point evaluated."""
+
+    rows: Rows
+    low: Array
+    high: Array
+    at_low: Array
+    at_high: Array
+    last: Array
+
+    def of(self, kept: Rows) -> _Search:
+        """Some of the rows."""
+        return _Search(self.rows[kept], *(part[kept] for part in self[1:]))
+
+    def middle(self) -> Array:
+        """Zero of the secant through the ends; an end itself if the root is within its rounding error."""
+        with np.errstate(all="ignore"):
+            crossing = self.low + (self.high - self.low) * self.at_low / (self.at_low - self.at_high)
+        return np.where(np.isfinite(crossing), np.clip(crossing, self.low, self.high), 0.5 * (self.low + self.high))
+
+    def narrowed(self, middle: Array, at: Array) -> _Search:
+        """The subinterval that contains the root; the value at an end that is retained twice is halved (Illinois)."""
+        as_low = at * self.at_low > 0.0
+        at_low = self.at_low * np.where(self.last >= self.high, 0.5, 1.0)
+        at_high = self.at_high * np.where(self.last <= self.low, 0.5, 1.0)
+        return _Search(
+            self.rows,
+            np.where(as_low, middle, self.low),
+            np.where(as_low, self.high, middle),
+            np.where(as_low, at, at_low),
+            np.where(as_low, at_high, at),
+            middle,
+        )
+
+
+def _nears_zero(f: Array) -> npt.NDArray[np.bool_]:
+    """Whether the second of three neighbours of equal sign is nearest to zero (N, K - 2)."""
+    a, b, c = (f[:, k : k + max(f.shape[1] - 2, 0)] for k in range(3))
+    one_sign = (np.sign(a) == np.sign(b)) & (np.sign(b) == np.sign(c)) & (b != 0.0)
+    a, b, c = np.abs(a), np.abs(b), np.abs(c)
+    return np.asarray(one_sign & (b <= np.minimum(a, c)) & (b < np.maximum(a, c)))
+
+
+def _pairs(plants: Line, f: Array, rows: Rows, x: Array, sign: Array) -> list[tuple[Rows, Array]]:
+    """The two roots between three points x (3, R) of equal sign, if the function crosses zero twice there."""
+    if not rows.size:
+        return []
+    turn = _across(plants.of(rows).accelerations, x[0], x[2], sign)
+    there = np.isfinite(turn)
+    rows, x, turn = rows[there], x[:, there], turn[there]
+    return [_roots(plants, f, rows, low, high) for low, high in ((x[0], turn), (turn, x[2]))]
+
+
+def _across(function: Callable[[Array], Array], low: Array, high: Array, sign: Array) -> Array:
+    """A point between two at which the function has the opposite sign, by golden-section search; NaN without one."""
+    inner = np.stack([high - GOLDEN * (high - low), low + GOLDEN * (high - low)])
+    values = np.stack([sign * function(v) for v in inner])
+    turn = np.full(low.shape, np.nan)
+    for _ in range(50):
+        least = np.where(values[1] < values[0], inner[1], inner[0])
+        turn = np.where(np.isnan(turn) & (values.min(axis=0) < 0.0), least, turn)
+        if np.isfinite(turn).all():
+            break
+        left = values[0] < values[1]
+        low, high = np.where(left, low, inner[0]), np.where(left, inner[1], high)
+        kept, of_kept = np.where(left, inner[0], inner[1]), np.where(left, values[0], values[1])
+        asked = np.where(left, high - GOLDEN * (high - low), low + GOLDEN * (high - low))
+        at = sign * function(asked)
+        inner = np.stack([np.where(left, asked, kept), np.where(left, kept, asked)])
+        values = np.stack([np.where(left, at, of_kept), np.where(left, of_kept, at)])
+    return turn

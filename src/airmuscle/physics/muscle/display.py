@@ -11,7 +11,7 @@ import numpy as np
 
 from ...core.arrays import Array
 from ...core.display import contraction_text, in_display_unit, quantity_text
-from ...core.plotting import given_axes, new_figure
+from ...core.plotting import given_axes, legend_outside, new_figure
 from ...core.tree import continues_list, leaves
 from .characteristic.base import Characteristic
 from .characteristic.validity_range import ValidityRange, validity_range_of
@@ -42,12 +42,14 @@ def plot_isobars(
         pressures = np.linspace(0.0, CHART_MAX_PRESSURE, CHART_PRESSURES + 1)[1:]
     given: Array | None = None if pressures is None else np.atleast_1d(np.asarray(pressures, dtype=float))
     curves = compute_isobars(law, known, pressures=given)
-    if ax is not None:
-        draw_isobars(given_axes(ax, 1, "plot of a muscle")[0], curves, title)
-        return ax
-    figure, axes = new_figure(height=3.0)
-    draw_isobars(axes, curves, textwrap.shorten(title, 90, placeholder=" …"))
-    return figure
+    if ax is None:
+        shown, axes = new_figure(height=3.0)
+        title = textwrap.shorten(title, 90, placeholder=" …")
+    else:
+        shown, axes = ax, given_axes(ax, 1, "plot of a muscle")[0]
+    draw_isobars(axes, curves, title)
+    legend_outside(axes, title="gauge pressure")
+    return shown
 
 
 def parameter_rows(parts: dict[str, Any], last: Sequence[str] = ()) -> list[tuple[str, ...]]:

@@ -12,11 +12,16 @@ from ...core import plotting
 from ...core.arrays import Array
 from ...core.display import chosen_scale, quantity_text
 from ...core.errors import PhysicsError
+from ...recording import Recording
 from .characteristic.base import Characteristic, ContractionLaw
 from .characteristic.validity_range import ValidityRange
 
 MAX_FORCE_RATIO = 8.0
 """Maximum of the force axis as a multiple of the median force, for laws that diverge (chosen)."""
+PRESSURE_TOLERANCE = 0.005
+"""Maximum difference between a measured point and its isobar, as a fraction of the maximum pressure (chosen)."""
+MANY_POINTS = 500
+"""Number of measured rows above which they are a cloud under the lines of the model (chosen)."""
 POINTS, COARSE_POINTS = 241, 61
 """Points of an isobar; points for a law that is slow to evaluate, and for the search of the contraction range."""
 
@@ -56,25 +61,48 @@ def compute_isobars(
     return Isobars(pressures, contractions, np.array(forces))
 
 
-def draw_isobars(axes: Any, curves: Isobars, title: str) -> None:
-    """Draw isobars into Matplotlib axes, high pressures dark, with a legend to their right."""
-    from matplotlib import colormaps
+def axis_scales() -> tuple[tuple[float, str], tuple[float, str]]:
+    """Factor from SI and unit of the contraction and of the force in a chart."""
+    return chosen_scale("1", 100.0, "%"), chosen_scale("N", 1.0, "N")
 
-    (across, unit), (up, force_unit) = chosen_scale("1", 100.0, "%"), chosen_scale("N", 1.0, "N")
+
+def draw_isobars(
+    axes: Any, curves: Isobars, title: str, point: WorkingPoint | None = None, measured: Recording | None = None
+) -> None:
+    """Draw isobars into Matplotlib axes, high pressures dark, without a legend.
+
+    Measured points have the colour of the curve of their pressure. That of a working point is left to the caller.
+    """
+    from matplotlib import colormaps
+    from matplotlib.patheffects import withStroke
+
+    (across, unit), (up, force_unit) = axis_scales()
     shades = colormaps["viridis"](np.linspace(0.0, 0.85, curves.pressures.size))[::-1]
     for i in range(curves.pressures.size - 1, -1, -1):
-        if (curves.forces[i] > 0).any():
-            style = {"color": shades[i], "linestyle": plotting.DASHES[i % 5], "linewidth": 1.4}
-            label = quantity_text(curves.pressures[i], "Pa", "kPa")
-            axes.plot(across * curves.contractions, up * mask_slack(curves.forces[i]), label=label, **style)
+        pressure, forces = curves.pressures[i], curves.forces[i]
+        if (point is not None and np.isclose(pressure, point.pressure, atol=1.0)) or not (forces > 0).any():
+            continue
+        style: dict[str, Any] = {"color": shades[i], "label": quantity_text(pressure, "Pa", "kPa"), "linewidth": 1.4}
+        dashes: Any = plotting.DASHES[i % 5]
+        if measured is not None:
+            rows = np.abs(measured["pressure"] - pressure) <= PRESSURE_TOLERANCE * curves.pressures.max()
+            marker = {"marker": plotting.MARKERS[i % len(plotting.MARKERS)], "markersize": 4}
+            points = {"linestyle": "none", "color": shades[i], "clip_on": False, "zorder": 3}
+            if len(measured) > MANY_POINTS:  # a cloud of points under the lines of the model
+                points |= {"markersize": 1.5, "alpha": 0.3, "zorder": 1.5}
+            axes.plot(across * measured["contraction"][rows], up * measured["force"][rows], **{**marker, **points})
+            axes.plot([], [], linestyle="-", **marker, **style)  # line and marker in the legend
+            style["label"], dashes = "_nolegend_", "-"
+            if len(measured) > MANY_POINTS:
+                style |= {"path_effects": [withStroke(linewidth=3.0, foreground="white")], "zorder": 4}
+        axes.plot(across * curves.contractions, up * mask_slack(forces), linestyle=dashes, **style)
     axes.set(
         xlabel=f"contraction [{'-' if unit == '1' else unit}]",
         ylabel=f"force [{force_unit}]",
         xlim=(across * curves.contractions[0], across * curves.contractions[-1]),
-        ylim=(0.0, 1.06 * up * force_axis_limit(curves)),
+        ylim=(0.0, 1.06 * up * _force_axis_limit(curves, point, measured)),
     )
     axes.set_title(title, fontsize=9)
-    plotting.legend_outside(axes, title="gauge pressure")
 
 
 def mask_slack(forces: Array) -> Array:
@@ -84,11 +112,13 @@ def mask_slack(forces: Array) -> Array:
     return np.where(after & (forces == 0.0), np.nan, forces)
 
 
-def force_axis_limit(curves: Isobars) -> float:
-    """The maximum of the force axis [N]: all curves unless a law diverges."""
+def _force_axis_limit(curves: Isobars, point: WorkingPoint | None, measured: Recording | None) -> float:
+    """The maximum of the force axis [N]: all curves unless a law diverges, and all points."""
     pulling = curves.forces[curves.forces > 0]
     limit = MAX_FORCE_RATIO * float(np.median(pulling)) if pulling.size else 1.0
-    return max(1e-9, min(limit, float(pulling.max(initial=0.0))))
+    points = [point.force] if point is not None else []
+    points += [float(np.nanmax(measured["force"]))] if measured is not None else []
+    return max(1e-9, min(limit, float(pulling.max(initial=0.0))), *points)
 
 
 def _isobar_pressures(
