@@ -9,7 +9,7 @@ import pytest
 from joints import chosen_muscle
 from widths import widened
 
-from airmuscle import Status
+from airmuscle import Status, load
 from airmuscle.core import Columns, DiagnosticCode
 from airmuscle.engine import (
     PiecewiseLinear,
@@ -289,6 +289,20 @@ def test_a_part_of_a_mechanism_is_one(make, message):
 def test_the_response_at_a_pole_is_infinite():
     with pytest.raises(AirmuscleError, match="there is a pole at 0 Hz"):
         linearise(isothermal(), {**STATE, "speed": 0.0}).frequency_response([0.0])
+
+
+def test_a_run_from_an_end_of_the_range_where_the_law_is_singular_says_so():
+    """The force of straight fibres grows beyond all bounds towards a contraction of zero."""
+    plant = replace(isothermal(), muscle=load("saga2007-circle").muscle)
+    state = {**STATE, "position": 0.0, "speed": 0.0}
+    message = (
+        r"At a contraction of 0\.00 %, an end of the geometry of muscle, the force of CircleVirtualWork is singular: no run "
+        r"begins there .* Begin inside the range, 0\.00 % to 50\.00 %, at a distance of 0\.05 % or more"
+    )
+    with pytest.raises(SimulationError, match=message):
+        simulate(plant, Schedule({"fill": ((0, 1),)}), duration=0.1, initial_state=state)
+    inside = simulate(plant, Schedule({"fill": ((0, 1),)}), duration=0.001, initial_state={**state, "position": 1e-4})
+    assert inside["time"][-1] == 0.001
 
 
 def test_a_run_says_where_no_muscle_can_be():

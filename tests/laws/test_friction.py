@@ -287,6 +287,10 @@ def test_unequal_lengths_and_active_dead_zones_are_errors():
         ParameterError, match="MaxwellSlip: 2 stiffnesses and 1 limits; give one stiffness and one limit per element"
     ):
         MaxwellSlip((1.0, 2.0), (1e-3,))
+    with pytest.raises(
+        ParameterError, match=r"deflection limit of each element\) is 25 m; allowed range: 1e-09 to 1 m"
+    ):
+        MaxwellSlip((2e4,), (25.0,))
     with pytest.raises(ParameterError, match="PrandtlIshlinskii: 1 thresholds and 0 weights"):
         PrandtlIshlinskii((1.0,), (1e-3,), (5.0,))
     with pytest.raises(ParameterError, match=r"weight -0.9 at 12 N the force would decrease.*must not be less than -1"):

@@ -464,7 +464,7 @@ def test_the_report_of_a_run_shows_inputs_parameters_sources_and_notes(scenario:
         "Simulation of 0.5 s. All columns are in recording.csv.",
         "was outside the validity range of its characteristic in pressure",
         "Inputs applied to the plant; dashed: commands to the drivers.",
-        "fill 1 from 0.1 s, 0 from 0.3 s; drivers: fill: PWM(frequency=50.0, smallest_pulse=0.0), SolenoidDriver(opening_delay=",
+        "fill 0 before 0.1 s, 1 from 0.1 s, 0 from 0.3 s; drivers: fill: PWM(frequency=50.0, smallest_pulse=0.0), SolenoidDriver(opening_delay=",
         "<td>muscle.contractile.wall_thickness</td>",
         "Rodas4(rtol=1e-06)",
         "Martens",

@@ -19,11 +19,11 @@ EXAMPLE = Path(__file__).parents[2] / "examples" / "fill_discharge.toml"
     ("command", "words"),
     [
         (Schedule({}), "none"),
-        (Schedule({"fill": ((5, 1), (15, 0)), "discharge": ((19, 1),)}), "fill 1 from 5 s, 0 from 15 s; discharge 1 from 19 s"),
+        (Schedule({"fill": ((5, 1), (15, 0)), "discharge": ((19, 1),)}), "fill 0 before 5 s, 1 from 5 s, 0 from 15 s; discharge 0 before 19 s, 1 from 19 s"),
         (SampledSignal({"fill": ((0, 0), (2, 0.5))}), "fill 0 at 0 s, 0.5 at 2 s"),
         (Schedule({"fill": tuple((i, i % 2) for i in range(1000))}), "fill: 1000 values between 0 and 1, 0 to 999 s"),
-        (Periodic(Schedule({"fill": ((1, 1),)}), 2.0), "periodic, 2 s: fill 1 from 1 s"),
-        (WithDrivers(Schedule({"fill": ((1, 0.5),)}), {"fill": PWM(50.0)}), "fill 0.5 from 1 s; drivers: fill: PWM(frequency=50.0, smallest_pulse=0.0)"),
+        (Periodic(Schedule({"fill": ((1, 1),)}), 2.0), "periodic, 2 s: fill 0 before 1 s, 1 from 1 s"),
+        (WithDrivers(Schedule({"fill": ((1, 0.5),)}), {"fill": PWM(50.0)}), "fill 0 before 1 s, 0.5 from 1 s; drivers: fill: PWM(frequency=50.0, smallest_pulse=0.0)"),
     ],
 )  # fmt: skip
 def test_an_input_is_described_in_one_sentence(command, words: str):

@@ -122,17 +122,19 @@ def describe_input(command: InputSignal | ControlLoop) -> str:
     if isinstance(command, Periodic):
         return f"periodic, {command.period:g} s: {describe_input(command.inner)}"
     if isinstance(command, Schedule):
-        return "; ".join(_describe_changes(name, rows, "from") for name, rows in command.changes.items()) or "none"
+        started = ((name, rows, f"0 before {rows[0][0]:g} s, " if rows and rows[0][0] > 0.0 else "")
+                   for name, rows in command.changes.items())  # fmt: skip
+        return "; ".join(_describe_changes(name, rows, "from", before) for name, rows, before in started) or "none"
     if isinstance(command, SampledSignal):
         return "; ".join(_describe_changes(name, rows, "at") for name, rows in command.points.items()) or "none"
     return str(command)
 
 
-def _describe_changes(name: str, rows: Sequence[tuple[float, float]], preposition: str) -> str:
+def _describe_changes(name: str, rows: Sequence[tuple[float, float]], preposition: str, before: str = "") -> str:
     if len(rows) > MAX_LISTED_CHANGES:
         values = [value for _, value in rows]
         return (
-            f"{name}: {len(rows)} values between {min(values):g} and {max(values):g}, "
+            f"{name}: {before}{len(rows)} values between {min(values):g} and {max(values):g}, "
             f"{rows[0][0]:g} to {rows[-1][0]:g} s"
         )
-    return f"{name} {', '.join(f'{value:g} {preposition} {time:g} s' for time, value in rows)}"
+    return f"{name} {before}{', '.join(f'{value:g} {preposition} {time:g} s' for time, value in rows)}"

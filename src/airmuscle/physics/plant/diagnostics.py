@@ -18,6 +18,8 @@ from ..pneumatics import Circuit
 
 MARGIN = 1e-3
 """Fraction of the contraction range of a geometry within which a muscle is at its limit (chosen)."""
+SINGULAR_FACTOR = 1e3
+"""Ratio of the force at an end of the range to that at the margin from which it counts as singular (chosen)."""
 _TOLERANCE = 1e-9
 """Fraction of a range by which a column may exceed it through rounding."""
 _MEANINGS = {
@@ -212,11 +214,27 @@ def geometry_limit_hint(enclosure: Enclosure) -> str:
     margin = MARGIN * (high - low)
     if low + margin < inner < high - margin:
         return ""
+    if _is_singular(muscle, inner, margin):
+        return (
+            f"At a contraction of {100 * inner:.2f} %, an end of the geometry of {muscle.name}, the force of "
+            f"{type(muscle.contractile).__name__} is singular: no run begins there or passes through. Begin inside "
+            f"the range, {100 * low:.2f} % to {100 * high:.2f} %, at a distance of {100 * margin:.2g} % or more, and "
+            "keep the load there: wrap the mechanism in WithEndStops, or choose a higher pressure or a smaller load."
+        )
     return (
         f"{muscle.name} reached a contraction of {100 * inner:.2f} %, a limit of its geometry ({100 * low:.2f} % to "
         f"{100 * high:.2f} %). Keep the load from moving it so far: wrap the mechanism in WithEndStops, or choose a "
         "higher pressure or a smaller load."
     )
+
+
+def _is_singular(muscle: Muscle, contraction: float, margin: float) -> bool:
+    """Whether the force at 1 bar grows beyond all bounds towards this end of the range, or is not finite there."""
+    low, high = muscle.geometry.contraction_range
+    inside = float(np.clip(contraction, low + margin, high - margin))
+    with np.errstate(all="ignore"):
+        there, near = (float(abs(muscle.contractile.force(1e5, each))) for each in (contraction, inside))
+    return not there <= SINGULAR_FACTOR * max(near, 1.0)
 
 
 def first_hint(given: Sequence[Enclosure]) -> str:

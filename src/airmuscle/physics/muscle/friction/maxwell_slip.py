@@ -81,7 +81,7 @@ class MaxwellSlip(Friction):
 
     stiffnesses: tuple[float, ...] = parameter("N/m", "k_i", "stiffness of each element", bounds=(0.0, 1e9))
     limits: tuple[float, ...] = parameter(
-        "m", "Delta_i", "deflection limit of each element", bounds=(1e-9, 10.0), fitted=False
+        "m", "Delta_i", "deflection limit of each element", bounds=(1e-9, 1.0), fitted=False
     )
     transition: float = parameter(
         "1", "eta", "fraction of the deflection over which sliding begins in a plant", bounds=(1e-4, 1.0),

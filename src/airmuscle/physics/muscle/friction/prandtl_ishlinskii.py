@@ -52,9 +52,7 @@ class PrandtlIshlinskii(Friction):
     references: ClassVar[tuple[Reference, ...]] = (KUHNEN2003, AL_JANAIDEH2011)
 
     stiffnesses: tuple[float, ...] = parameter("N/m", "k_i", "stiffness of each stop", bounds=(0.0, 1e9))
-    limits: tuple[float, ...] = parameter(
-        "m", "r_i", "deflection limit of each stop", bounds=(1e-9, 10.0), fitted=False
-    )
+    limits: tuple[float, ...] = parameter("m", "r_i", "deflection limit of each stop", bounds=(1e-9, 1.0), fitted=False)
     thresholds: tuple[float, ...] = parameter(
         "N", "d_j", "threshold force of each dead zone", bounds=(-1e5, 1e5), fitted=False, default=()
     )
