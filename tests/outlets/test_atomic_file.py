@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
 import pytest
 
-from airmuscle.core import atomic_file
+from airmuscle.core import atomic_file, atomic_folder, check_writable, exclusive_folders
 from airmuscle.files.library import write_text
 
 
@@ -50,3 +52,42 @@ def test_a_file_whose_name_is_as_long_as_the_system_allows_is_written(tmp_path: 
     path = tmp_path / ("m" * 250 + ".toml")
     write_text(path, "text")
     assert path.read_text(encoding="utf-8") == "text"
+
+
+SECOND = """
+import sys
+from airmuscle.core.atomic_output import check_writable, exclusive_folders
+from airmuscle.errors import FileError
+try:
+    with exclusive_folders():
+        check_writable(sys.argv[1])
+except FileError as error:
+    print(error)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no locks of folders")
+def test_the_second_of_two_commands_that_write_to_one_folder_is_refused(tmp_path):
+    """The lock ends with the block, and what was created for it is removed where nothing was written."""
+    folder = tmp_path / "deep" / "out"
+
+    def second(name: Path) -> str:
+        done = subprocess.run([sys.executable, "-c", SECOND, name], capture_output=True, text=True, check=True)
+        return done.stdout
+
+    with exclusive_folders():
+        check_writable(folder)
+        check_writable(folder)
+        assert second(folder) == (
+            f"{folder}: another command is writing to this folder. Wait until it ends, or specify another folder.\n"
+        )
+        assert second(tmp_path / "other") == ""
+        check_writable(tmp_path, shared=True)
+        assert second(tmp_path) == ""
+    assert second(folder) == ""
+    assert list(tmp_path.iterdir()) == []
+    with exclusive_folders():
+        check_writable(folder)
+        with atomic_folder(folder) as place:
+            (place / "a.csv").touch()
+    assert [path.name for path in folder.iterdir()] == ["a.csv"]

@@ -7,6 +7,7 @@ from .arrays import Array as Array
 from .atomic_output import atomic_file as atomic_file
 from .atomic_output import atomic_folder as atomic_folder
 from .atomic_output import check_writable as check_writable
+from .atomic_output import exclusive_folders as exclusive_folders
 from .declaration import Parameter as Parameter
 from .declaration import model as model
 from .declaration import parameter as parameter

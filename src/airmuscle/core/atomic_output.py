@@ -14,8 +14,17 @@ from pathlib import Path
 
 from .errors import FileError
 
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
+
 _MAX_NAME = 100
 """Number of characters of the name of a file that its temporary file has (chosen); file systems limit names to 255."""
+
+
+_held: dict[Path, tuple[int, list[Path]]] | None = None
+"""Descriptors of the folders that are kept from other processes, and the folders that were created for it."""
 
 
 @contextlib.contextmanager
@@ -90,16 +99,59 @@ def is_running(process: int) -> bool:
     return True
 
 
-def check_writable(folder: Path | str) -> None:
-    """Raise FileError before a long computation if `atomic_folder` cannot write to `folder`; leaves no files."""
+def check_writable(folder: Path | str, *, shared: bool = False) -> None:
+    """Raise FileError before a long computation if `atomic_folder` cannot write to `folder`; leaves no files.
+
+    Within `exclusive_folders`, no other process may check the same folder until the block ends, unless it is `shared`.
+    """
     target = Path(folder)
     with _raise_file_errors(target):
         created = _missing_folders(target)
     try:
         with atomic_folder(target):
-            return
+            pass
+        if _held is not None and not shared:
+            _hold(target, created)
+            created = []
     finally:
         _remove_empty_folders(created)
+
+
+@contextlib.contextmanager
+def exclusive_folders() -> Iterator[None]:
+    """Keep other processes from the folders that `check_writable` checks in the block, so that no files are mixed.
+
+    The lock is that of the operating system, which also ends with the process; Windows has none for folders.
+    """
+    global _held
+    outer, _held = _held, {}
+    try:
+        yield
+    finally:
+        held, _held = _held, outer
+        for descriptor, created in held.values():
+            os.close(descriptor)
+            _remove_empty_folders(created)
+
+
+def _hold(target: Path, created: list[Path]) -> None:
+    """Lock a folder until the end of the block; `created` are removed then, where they are empty."""
+    if fcntl is None or _held is None or target.resolve() in _held:
+        return
+    with _raise_file_errors(target):
+        target.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(target, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(descriptor)
+        raise FileError(
+            f"{target}: another command is writing to this folder. Wait until it ends, or specify another folder."
+        ) from None
+    except OSError:  # a file system without locks
+        os.close(descriptor)
+        return
+    _held[target.resolve()] = descriptor, created
 
 
 @contextlib.contextmanager

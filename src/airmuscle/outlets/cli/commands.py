@@ -15,6 +15,7 @@ from typing import Annotated, Any, NamedTuple
 import typer
 from typer.core import TyperGroup
 
+from ...core.atomic_output import exclusive_folders
 from ...core.errors import AirmuscleError, AirmuscleWarning, quotable, suggestion
 from .completion import install_completion_classes, print_completion_script
 from .interruption import INTERRUPTED, check_interrupted, deferred_sigint
@@ -105,7 +106,7 @@ class LazyCommands(TyperGroup):
         with warnings.catch_warnings():
             warnings.simplefilter("always", AirmuscleWarning)
             warnings.showwarning = functools.partial(_show_warning, ctx, warnings.showwarning)
-            with _exit_codes(ctx), _printable_usage_errors(), deferred_sigint():
+            with _exit_codes(ctx), _printable_usage_errors(), deferred_sigint(), exclusive_folders():
                 return super().invoke(ctx)
 
 

@@ -27,7 +27,7 @@ def export_fmu(
 ) -> None:  # fmt: skip
     """Write an FMU into a folder, or to a file that ends in .fmu."""
     path = out if out.suffix == ".fmu" else out / f"{name}.fmu"
-    check_writable(path.parent)
+    check_writable(path.parent, shared=True)
     scenario = load_scenario(source)
     written = write_fmu(
         scenario.problem, path, fmi=fmi, name=name, title=scenario.title, tunable=tunable, binary=binary,
