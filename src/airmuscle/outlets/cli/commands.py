@@ -64,7 +64,9 @@ COMMANDS = (
     CommandRow("study", "study", "study", "Run a parameter study of a scenario."),
     CommandRow("tune", "tune", "tune", "Tune the controller of a scenario for a family of plants."),
     CommandRow("benchmark", "benchmark", "benchmark", "Benchmark controllers of a joint on common tasks."),
-    CommandRow("export", "export", "export", "Export to C, JavaScript, MATLAB, FMU, MuJoCo or Modelica."),
+    CommandRow(
+        "export", "export", "export", "Export to C, JavaScript, MATLAB, FMU, MuJoCo, Modelica, PyTorch, Warp or ONNX."
+    ),
     CommandRow("studio", "studio", "studio", "Show muscles and plants in the browser."),
     CommandRow("schema", "schema", "schema", "Print the JSON schema of scenario or muscle files."),
 )
