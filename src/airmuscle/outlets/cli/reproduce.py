@@ -82,7 +82,8 @@ def _print_chapter(chapter: Chapter) -> None:
     """Print one line for each statement; the readings of a statement are in the report."""
     echo(f"\n{chapter.title}")
     for question, answer in chapter.answers:
-        echo(textwrap.fill(f"{question} {to_plain(answer)}", table_width(), subsequent_indent="  "))
+        text = f"{question} {to_plain(answer)}"
+        echo(textwrap.fill(text, table_width(), subsequent_indent="  ", break_on_hyphens=False))
     found = [(kind, each) for kind in Kind for each in statements(chapter.claims, kind)]
     values = [(_expected(each), _reproduced(each), _verdict(each.verdict)) for _, each in found]
     columns = zip(HEADERS[1:], *values, strict=True)
