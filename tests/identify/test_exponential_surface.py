@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from airmuscle.bench.identify import (
-    FALLS_WITH_PRESSURE,
     RISES_WITH_FORCE,
     Chebyshev,
     LoadRange,
@@ -25,6 +24,7 @@ from airmuscle.bench.identify import (
     slope_constraints,
 )
 from airmuscle.bench.identify.correlation_index import correlation_index
+from airmuscle.bench.identify.surface.monotone import FALLS_WITH_PRESSURE
 from airmuscle.core import autodiff
 from airmuscle.errors import IdentificationError
 from airmuscle.papers.borzikova_surfaces import sample

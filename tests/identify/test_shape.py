@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import approximate, find_shape_violations, fit, fit_shape_constrained
-from airmuscle.bench.identify import FALLS_WITH_PRESSURE, RISES_WITH_CONTRACTION, blank_surface, shape_constraints
+from airmuscle.bench.identify import RISES_WITH_CONTRACTION, blank_surface, shape_constraints
+from airmuscle.bench.identify.surface.shape import FALLS_WITH_PRESSURE
 from airmuscle.errors import IdentificationError, SolveError
 from airmuscle.physics import Braid, ContractileSurface, Sarosi2012, TonduLopez2000, ValidityRange
 from airmuscle.recording import Recording

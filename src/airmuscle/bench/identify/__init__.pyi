@@ -91,7 +91,6 @@ from .surface.monotone import RISES_WITH_FORCE as RISES_WITH_FORCE
 from .surface.monotone import find_monotonicity_violations as find_monotonicity_violations
 from .surface.monotone import fit_monotone as fit_monotone
 from .surface.monotone import slope_constraints as slope_constraints
-from .surface.shape import FALLS_WITH_PRESSURE as FALLS_WITH_PRESSURE
 from .surface.shape import RISES_WITH_CONTRACTION as RISES_WITH_CONTRACTION
 from .surface.shape import ShapeConstrainedFit as ShapeConstrainedFit
 from .surface.shape import find_shape_violations as find_shape_violations
