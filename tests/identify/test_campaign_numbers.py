@@ -135,7 +135,7 @@ def test_creep_under_a_load_uses_the_stiffness_by_length_after_a_motion_of_three
     creep = 0.01 * -np.expm1(-np.maximum(time - 5.0 - motion, 0.0) / 10.0)
     pressure, contraction = np.full(time.size, 3e5), 0.05 + 0.08 * moved + creep
     run = recording(time=time, pressure=pressure, contraction=contraction, force=np.full(time.size, 100.0))
-    result = fit_held_creep([run], LAW)
+    result = fit_held_creep([run], law=LAW)
     assert bool(result.elements.stiffnesses) == found
     if found:
         rows = run.rows(time >= 5.0 + motion)

@@ -24,8 +24,8 @@ from airmuscle.bench.identify import (
     find_initial_values,
     fitted_quantity_of,
     refit,
-    solve,
     solve_iteratively,
+    solve_least_squares,
 )
 from airmuscle.bench.identify.gauss_newton import gauss_newton
 from airmuscle.core import autodiff, tree
@@ -168,7 +168,7 @@ def test_refits_without_a_group_are_searches_on_the_other_rows(name):
     for left_out in (1, 6):
         found = refits.refit(1.0 - np.eye(8)[left_out])
         training = problem.rows(group != left_out)
-        plain = solve(training, fit.loss).values
+        plain = solve_least_squares(training, fit.loss).values
         assert found is not None
         assert training.predict(found) == pytest.approx(
             training.predict(plain), rel=1e-5, abs=1e-5 * problem.target.max()
@@ -185,7 +185,7 @@ def test_a_refit_follows_the_rows_whose_bound_becomes_violated_or_kept():
     refits, gained, lost = GroupRefits(fit.problem, solution, group, 8), 0, 0
     for repeats in np.random.default_rng(2).multinomial(8, np.full(8, 1 / 8), size=24):
         drawn = fit.problem.rows(np.repeat(np.arange(480), repeats[group]))
-        refitted, plain = refits.refit(repeats.astype(float)), solve(drawn, fit.loss).values
+        refitted, plain = refits.refit(repeats.astype(float)), solve_least_squares(drawn, fit.loss).values
         assert refitted is not None
         assert drawn.predict(refitted) == pytest.approx(drawn.predict(plain), abs=1e-6 * fit.problem.target.max())
         after = fit.problem.active_rows(fit.problem.predict(plain))[repeats[group] > 0]

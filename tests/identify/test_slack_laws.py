@@ -35,7 +35,7 @@ from airmuscle.bench.identify import (
     odd_specimen_notes,
     recommend,
     slack_pull,
-    solve,
+    solve_least_squares,
 )
 from airmuscle.core import tree
 from airmuscle.errors import IdentificationError
@@ -117,7 +117,7 @@ def test_a_law_of_any_length_pulls_less_where_a_length_that_was_not_measured_is_
     law = LogarithmicLength(ContractileSurface.blank(3), ContractileSurface.blank(1), 0.2, 0.2)
     others = [run for run in measured if run.constants["resting_length"] != 0.083]
     problem = FitPoints.from_recordings(others).problem(law)
-    values = solve(problem, LeastSquares()).values
+    values = solve_least_squares(problem, LeastSquares()).values
     laws = fit(law, others).model, tree.with_parameters(problem.law, problem.leaf_values(values))
     pulls = [float(each.with_resting_length(0.083).force(8e3, 0.12)) for each in laws]
     assert pulls[0] < 0.7 * pulls[1]

@@ -54,7 +54,7 @@ VALUES = {
     "units": {"pressure": ...}, "columns": {1: "pressure [kPa]"}, "decimal": ",", "resting_length": ...,
     "constants": {"length": "73.2 mm"}, "file_name": "held{length [mm]}", "time_base": NoTime(), "ordered": False,
     "degree": 2, "skip_rows": 1, "drop_outliers": True, "loss": Huber(10.0), "missing": DropMissing((-999.0,)), "displacement_zero": "12 mm",
-    "all_rows": True, "characteristic": ..., "censoring": ..., "free": ("circuit.fill.conductance",), "": ...,
+    "all_rows": True, "law": ..., "censoring": ..., "free": ("circuit.fill.conductance",), "": ...,
 }  # fmt: skip
 """A value of every argument that a hint of the source names."""
 
@@ -271,7 +271,7 @@ CASES: dict[str, tuple[Callable[[Path], Path], Callable[[Path], Any], tuple[Any,
         "use all_rows=True.", "To fit all rows, if only the length changes quickly, use --all-rows."),
     "pressure and length together": (
         lambda path: sweep(path, RISE_AND_FALL, (1e5, 6e5, 1e5)), loops, ("hysteresis",),
-        "use characteristic=....", "use --muscle NAME with --use-characteristic."),
+        "use law=....", "use --muscle NAME with --use-characteristic."),
 }  # fmt: skip
 """File, call in Python, arguments of the command; the remedy in Python and on the command line."""
 

@@ -147,9 +147,11 @@ def test_a_hold_that_determines_no_stiffness_gives_none_and_the_reason():
     creeping = 0.1 + 0.01 * (1.0 - np.exp(-seconds / 5.0))
     loaded = made_hold(np.concatenate([np.full(20, 0.04), creeping]), np.full(320, 200.0))
     assert "needs the stiffness of the muscle" in fit_held_creep([loaded]).verdict
-    assert fit_held_creep([loaded], load(MUSCLE).characteristic).elements.stiffnesses[0] > 0.0
+    assert fit_held_creep([loaded], law=load(MUSCLE).characteristic).elements.stiffnesses[0] > 0.0
     slow = made_hold(np.concatenate([np.full(20, 0.04), np.linspace(0.04, 0.1, 25), creeping]), np.full(345, 200.0))
-    assert "not short compared with the time constant" in fit_held_creep([slow], load(MUSCLE).characteristic).verdict
+    assert (
+        "not short compared with the time constant" in fit_held_creep([slow], law=load(MUSCLE).characteristic).verdict
+    )
     lengthless = made_hold(np.concatenate([np.full(20, 0.04), np.full(300, 0.1)]), np.r_[np.full(20, 400.0), relaxing],
                            length=None)  # fmt: skip
     assert "need the resting length" in fit_held_creep([lengthless]).verdict

@@ -71,8 +71,8 @@ from .slack_rows import Slackness as Slackness
 from .slack_rows import SlackPull as SlackPull
 from .slack_rows import slack_pull as slack_pull
 from .solver import LeastSquaresSolution as LeastSquaresSolution
-from .solver import solve as solve
 from .solver import solve_iteratively as solve_iteratively
+from .solver import solve_least_squares as solve_least_squares
 from .specimen_effects import predict_effects as predict_effects
 from .specimen_errors import SpecimenErrors as SpecimenErrors
 from .specimen_errors import odd_specimen_notes as odd_specimen_notes

@@ -43,28 +43,26 @@ class ModelApproximation(ShortRepr):
         )
 
 
-def approximate(
-    characteristic: Characteristic, other: Characteristic, validity_range: ValidityRange
-) -> ModelApproximation:
-    """Approximate `characteristic` by the model of `other` on a validity range, by least squares in force.
+def approximate(law: Characteristic, other: Characteristic, validity_range: ValidityRange) -> ModelApproximation:
+    """Approximate `law` by the model of `other` on a validity range, by least squares in force.
 
-    `other` gives the structure and the initial values, as in `fit`. Only points where `characteristic` gives a positive
+    `other` gives the structure and the initial values, as in `fit`. Only points where `law` gives a positive
     force are used. Raises IdentificationError where the validity range does not determine the parameters of `other`,
-    SolveError where `characteristic` gives no positive force on it.
+    SolveError where `law` gives no positive force on it.
     """
-    data = sample_on_grid(characteristic, validity_range, GRID_POINTS)
-    law: Any = other
-    if hasattr(law, "max_force") and law.max_force <= float(data["force"].max()):
-        law = dataclasses.replace(law, max_force=2.0 * float(data["force"].max()))
-    model = fit(law, data, censoring=UNCENSORED).model
-    check_points = sample_on_grid(characteristic, validity_range, GRID_POINTS + 1)
+    data = sample_on_grid(law, validity_range, GRID_POINTS)
+    target: Any = other
+    if hasattr(target, "max_force") and target.max_force <= float(data["force"].max()):
+        target = dataclasses.replace(target, max_force=2.0 * float(data["force"].max()))
+    model = fit(target, data, censoring=UNCENSORED).model
+    check_points = sample_on_grid(law, validity_range, GRID_POINTS + 1)
     difference = _evaluate_force(model, check_points["pressure"], check_points["contraction"]) - check_points["force"]
     missing = np.flatnonzero(~np.isfinite(difference))
     if missing.size:
         p, c = check_points["pressure"][missing[0]], check_points["contraction"][missing[0]]
         raise IdentificationError(
             f"the fitted {type(other).__name__} has no force at {missing.size} of {len(check_points)} points where "
-            f"{type(characteristic).__name__} has one, the first at {p / 1e3:.4g} kPa and {100 * c:.2f} %. Choose a "
+            f"{type(law).__name__} has one, the first at {p / 1e3:.4g} kPa and {100 * c:.2f} %. Choose a "
             "smaller validity range."
         )
     worst = int(np.argmax(np.abs(difference)))

@@ -21,7 +21,7 @@ from .group_refits import GroupRefits, KnownMinima, RowIndices
 from .loss import LeastSquares
 from .problem import FitProblem
 from .result import Fit
-from .solver import LeastSquaresSolution, design_matrix, is_linear, solve, solve_iteratively
+from .solver import LeastSquaresSolution, design_matrix, is_linear, solve_iteratively, solve_least_squares
 
 MIN_GROUPS = 5
 """Minimum number of groups. G groups give (2G - 1)!/(G! (G - 1)!) different samples, 35 with G = 4; an end of a 95 %
@@ -185,6 +185,6 @@ def _search(fit: Fit, repeats: Array, tried: bool = False) -> Array:
     problem = fit.problem.rows(drawn)
     problem = dataclasses.replace(problem, weights=problem.weights * np.sqrt(repeats[drawn]))
     try:
-        return (solve_iteratively if tried else solve)(problem, fit.loss, fit.values).values
+        return (solve_iteratively if tried else solve_least_squares)(problem, fit.loss, fit.values).values
     except (IdentificationError, np.linalg.LinAlgError):
         return np.full(len(fit.estimates), np.nan)

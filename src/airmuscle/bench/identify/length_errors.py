@@ -24,7 +24,7 @@ from .loss import LeastSquares
 from .model_evidence import effective_sample_size
 from .pooling import population_of
 from .problem import evaluate
-from .solver import solve
+from .solver import solve_least_squares
 from .static_fit import refit
 
 PRIOR_STD = 2e-3
@@ -111,15 +111,15 @@ def corrected_length(run: Recording, offset: float) -> Recording:
 
 
 def estimate_length_error(
-    model: Characteristic, recordings: Sequence[Recording], specimen: str, prior_std: float = PRIOR_STD,
+    law: Characteristic, recordings: Sequence[Recording], specimen: str, prior_std: float = PRIOR_STD,
     min_reduction: float = 0.0,
 ) -> LengthError:  # fmt: skip
     """The error of the resting length of one specimen, estimated together with the parameters of a law.
 
-    model       the law fitted to all recordings, as initial values; of a PooledLengthLaw its population law, because
-                effects of the specimens take up an error of their length
-    specimen    name as SpecimenSplit gives it: the constant `specimen`, or the resting length in mm
-    prior_std   standard deviation [m] of the normal prior of the error, whose mean is 0
+    law            fitted to all recordings, as initial values; of a PooledLengthLaw its population law, because effects
+                   of the specimens take up an error of their length
+    specimen       name as SpecimenSplit gives it: the constant `specimen`, or the resting length in mm
+    prior_std      standard deviation [m] of the normal prior of the error, whose mean is 0
     min_reduction  reduction of the mean square residual below half of which, by its derivative, the search is ended
 
     Rows are correlated, so that the squares are divided by the ratio of rows to effective rows. Raises
@@ -130,7 +130,7 @@ def estimate_length_error(
         known = ", ".join(dict.fromkeys(specimen_name(run) for run in recordings))
         raise ParameterError(f"no recording is of specimen '{specimen}'; the specimens are {known}.")
     recorded = float(recordings[members.index(True)].constants["resting_length"])
-    model = population_of(model)
+    model = population_of(law)
     offset, first, state = 0.0, np.nan, None
     for _ in range(_ITERATIONS):
         state = _State.at(model, recordings, members, offset)
@@ -147,7 +147,7 @@ def estimate_length_error(
     return LengthError(specimen, recorded, offset, state.standard_error(prior_std), first, state.rmse, model)
 
 
-def find_length_errors(model: Characteristic, recordings: Sequence[Recording]) -> tuple[LengthError, ...]:
+def find_length_errors(law: Characteristic, recordings: Sequence[Recording]) -> tuple[LengthError, ...]:
     """The errors of one resting length that explain why one law does not fit all specimens; the smallest first.
 
     Each specimen is corrected alone. Several entries are alternatives: a law with free parameters for the effect of the
@@ -155,7 +155,7 @@ def find_length_errors(model: Characteristic, recordings: Sequence[Recording]) -
     specimens with resting lengths or more.
     """
     names = list(dict.fromkeys(specimen_name(run) for run in recordings))
-    model = population_of(model)
+    model = population_of(law)
     complete = all("resting_length" in run.constants for run in recordings)
     if len(names) < 3 or not complete or not hasattr(model, "with_resting_length"):
         return ()
@@ -183,7 +183,7 @@ def _separate_rmse(recordings: Sequence[Recording], names: Sequence[str]) -> flo
     for name in names:
         points = FitPoints.from_recordings([run for run in recordings if specimen_name(run) == name])
         problem = points.problem(blank_surface(_SEPARATE_DEGREE))
-        residuals.append(problem.residuals(solve(problem, LeastSquares()).modelled))
+        residuals.append(problem.residuals(solve_least_squares(problem, LeastSquares()).modelled))
     return float(np.sqrt(np.mean(np.concatenate(residuals) ** 2)))
 
 

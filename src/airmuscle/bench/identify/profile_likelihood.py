@@ -10,7 +10,7 @@ from ...core.errors import IdentificationError
 from .loss import LeastSquares
 from .problem import FitProblem
 from .result import Fit
-from .solver import is_linear, solve
+from .solver import is_linear, solve_least_squares
 
 _HIGH_CORRELATION = 0.99
 """Absolute correlation above which the standard error of a parameter is not trusted (chosen)."""
@@ -116,4 +116,6 @@ def _constrained_sum_of_squares(problem: FitProblem, others: tuple[int, ...], le
     leaves = list(problem.leaves)
     leaves[leaf] = dataclasses.replace(leaves[leaf], value=value)
     constrained = dataclasses.replace(problem, leaves=tuple(leaves), free=others)
-    return _sum_of_squares(constrained, solve(constrained, LeastSquares()).values if others else np.zeros(0))
+    return _sum_of_squares(
+        constrained, solve_least_squares(constrained, LeastSquares()).values if others else np.zeros(0)
+    )

@@ -20,7 +20,7 @@ from .fit_points import FitPoints
 from .loss import Loss
 from .problem import FORCE, RESTING_LENGTH, FitProblem
 from .slack_rows import MIN_PULL, Slackness
-from .solver import LeastSquaresSolution, is_linear, solve
+from .solver import LeastSquaresSolution, is_linear, solve_least_squares
 
 LENGTH_FACTORS = (0.4, 0.63, 1.0, 1.6, 2.5)
 """Lengths of the bounds as multiples of a measured length (chosen: from one measured length to beyond its neighbours in
@@ -80,8 +80,8 @@ def with_slack_bounds(problem: FitProblem, points: FitPoints) -> BoundedProblem:
 def solve_bounded(
     problem: FitProblem, points: FitPoints, loss: Loss, start: Array | None = None
 ) -> LeastSquaresSolution:
-    """As `solve`, with the slack bounds of further lengths; the solution is that at the rows of the problem."""
-    solution, count = solve(with_slack_bounds(problem, points).problem, loss, start), len(problem.data)
+    """As `solve_least_squares`, with the slack bounds of further lengths; the solution at the rows of the problem."""
+    solution, count = solve_least_squares(with_slack_bounds(problem, points).problem, loss, start), len(problem.data)
     return LeastSquaresSolution(solution.values, solution.modelled[:count], solution.jacobian[:count])
 
 

@@ -35,7 +35,7 @@ class LeastSquaresSolution(NamedTuple):
     jacobian: Array
 
 
-def solve(problem: FitProblem, loss: Loss, start: Array | None = None) -> LeastSquaresSolution:
+def solve_least_squares(problem: FitProblem, loss: Loss, start: Array | None = None) -> LeastSquaresSolution:
     """The free parameters that minimise the loss. Raises IdentificationError where the search does not converge.
 
     The search starts at `start`, if possible by Gauss-Newton steps; by default at the initial values found by variable

@@ -32,38 +32,37 @@ from .variable_projection import find_initial_values
 
 
 def fit(
-    characteristic: Characteristic,
-    recording: Recording | Sequence[Recording],
+    law: Characteristic,
+    recordings: Recording | Sequence[Recording],
     *,
     loss: Loss = LeastSquares(),
     censoring: Censoring | None = None,
     sigma: npt.ArrayLike | None = None,
     fixed: Collection[str] = (),
 ) -> Fit:
-    """Estimate the parameters of a characteristic from measured points.
+    """Estimate the parameters of a law from measured points.
 
-    characteristic  structure and initial values; parameters declared as not fitted keep their value
-    recording       one recording or several, with the columns pressure [Pa], contraction [1] and force [N]
-    loss            LeastSquares(), Huber(scale) or SoftL1(scale), the scale in the unit of the fitted quantity
-    censoring       the range of force within which rows are measured values. By default rows at zero force, at the
-                    clamp of the law, or at the limit of the force sensor are censored: they contribute only where the
-                    law violates their bound. `UNCENSORED` treats all rows as measured values
-    sigma           standard deviations of the rows, of which only the ratios matter. By default the rows of different
-                    test rigs are weighted by the standard deviations of their sensors; `sigma=1.0` weights all rows
-                    equally
-    fixed           names of further parameters that keep their value
+    law         structure and initial values; parameters declared as not fitted keep their value
+    recordings  one recording or several, with the columns pressure [Pa], contraction [1] and force [N]
+    loss        LeastSquares(), Huber(scale) or SoftL1(scale), the scale in the unit of the fitted quantity
+    censoring   the range of force within which rows are measured values. By default rows at zero force, at the clamp of
+                the law, or at the limit of the force sensor are censored: they contribute only where the law violates
+                their bound. `UNCENSORED` treats all rows as measured values
+    sigma       standard deviations of the rows, of which only the ratios matter. By default the rows of different test
+                rigs are weighted by the standard deviations of their sensors; `sigma=1.0` weights all rows equally
+    fixed       names of further parameters that keep their value
 
     Residuals are taken in the quantity that the law gives (force, contraction or pressure), and the parameters stay
     within their declared bounds. Raises IdentificationError where the data do not determine the parameters, and names
     these.
     """
-    check_arguments(characteristic, recording)
-    points = FitPoints.from_recordings(recording)
-    return fit_to_points(characteristic, points, loss=loss, censoring=censoring, sigma=sigma, fixed=fixed)
+    check_arguments(law, recordings)
+    points = FitPoints.from_recordings(recordings)
+    return fit_to_points(law, points, loss=loss, censoring=censoring, sigma=sigma, fixed=fixed)
 
 
 def fit_to_points(
-    characteristic: Characteristic,
+    law: Characteristic,
     points: FitPoints,
     *,
     loss: Loss = LeastSquares(),
@@ -74,17 +73,17 @@ def fit_to_points(
     """As `fit`, for points whose sensors and runs are estimated once for several laws."""
     if np.nanmax(points.joined["contraction"], initial=0.0) > MAX_CONTRACTION:
         _ = points.checks  # raises ColumnError where no muscle is so short
-    if not isinstance(characteristic, PooledLengthLaw):
-        return _fit_law(characteristic, points, loss, censoring, sigma, fixed)
-    check_poolable(characteristic, points)
-    return pool(characteristic, _fit_law(characteristic.population, points, loss, censoring, sigma, fixed), points)
+    if not isinstance(law, PooledLengthLaw):
+        return _fit_law(law, points, loss, censoring, sigma, fixed)
+    check_poolable(law, points)
+    return pool(law, _fit_law(law.population, points, loss, censoring, sigma, fixed), points)
 
 
 def _fit_law(
-    characteristic: Characteristic, points: FitPoints, loss: Loss, censoring: Censoring | None,
+    law: Characteristic, points: FitPoints, loss: Loss, censoring: Censoring | None,
     sigma: npt.ArrayLike | None, fixed: Collection[str],
 ) -> Fit:  # fmt: skip
-    problem = points.problem(characteristic, censoring=censoring, sigma=sigma, fixed=fixed)
+    problem = points.problem(law, censoring=censoring, sigma=sigma, fixed=fixed)
     solution = solve_bounded(problem, points, loss)
     statistics = compute_statistics(problem, solution, loss, points.runs)
     check_determined_by_levels(problem, solution, points.at_levels)
@@ -96,16 +95,16 @@ def _fit_law(
 
 
 def refit(
-    characteristic: Characteristic, points: FitPoints, *, loss: Loss = LeastSquares(), fixed: Collection[str] = ()
+    law: Characteristic, points: FitPoints, *, loss: Loss = LeastSquares(), fixed: Collection[str] = ()
 ) -> Characteristic:
-    """The law that `fit` finds for these points if its search starts at the parameters of `characteristic`.
+    """The law that `fit` finds for these points if its search starts at the parameters of `law`.
 
     Other initial values are tried only where the search does not converge, and nothing but the rank is computed of the
     solution. Raises IdentificationError where the points do not determine the parameters.
     """
-    if isinstance(characteristic, PooledLengthLaw):
-        return refit_pooled(characteristic, refit(characteristic.population, points, loss=loss, fixed=fixed), points)
-    problem = points.problem(characteristic, fixed=fixed)
+    if isinstance(law, PooledLengthLaw):
+        return refit_pooled(law, refit(law.population, points, loss=loss, fixed=fixed), points)
+    problem = points.problem(law, fixed=fixed)
     near = None if is_linear(problem) or loss != LeastSquares() else gauss_newton(problem, problem.initial_values)
     try:
         solution = (

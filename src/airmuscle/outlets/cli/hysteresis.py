@@ -87,8 +87,8 @@ def hysteresis(
     entry = None if muscle is None else load_law(muscle)
     law = entry.characteristic if entry is not None and use_characteristic else None
     held = _fit_creep(recordings, entry) if creep else None
-    freed = recordings if held is None else free_of_creep(recordings, held.elements)
-    loops = find_loops(freed, characteristic=law, degree=degree, all_rows=all_rows)
+    freed = recordings if held is None else free_of_creep(held.elements, recordings)
+    loops = find_loops(freed, law=law, degree=degree, all_rows=all_rows)
     check_writable(out)
     progress = None if json else lambda name: echo(f"  {name}", err=True)
     fits = [_with_option_names(fit_loop(loop, elements=elements, progress=progress)) for loop in loops]
@@ -119,7 +119,7 @@ def _loops_to_dict(fits: Sequence[LoopFit], joint: Sequence[JointFit]) -> dict[s
 
 def _fit_creep(recordings: Sequence[Recording], entry: Entry | None) -> HeldCreep:
     law = None if entry is None else entry.characteristic
-    return fit_held_creep(recordings, law if isinstance(law, ForceLaw) else None)
+    return fit_held_creep(recordings, law=law if isinstance(law, ForceLaw) else None)
 
 
 def _print_files(written: Mapping[str, Path], out: Path, *, creep: bool, of_all_runs: bool) -> None:

@@ -99,7 +99,7 @@ INSTRUCTIONS: Mapping[str, Mapping[str, Instruction]] = {
     "hysteresis": {
         **_FILES,
         "all_rows": lambda hint: "use --all-rows",
-        "characteristic": lambda hint: "use --muscle NAME with --use-characteristic",
+        "law": lambda hint: "use --muscle NAME with --use-characteristic",
     },
     "campaign": _FILES,
     "predict": _FILES,

@@ -36,7 +36,7 @@ class HeldCreep(ShortRepr):
     """Of the stiffnesses [N/m], then of the relaxation times [s], shape (2 E,); NaN for a hold under a load."""
 
 
-def fit_held_creep(recordings: Sequence[Recording], law: ForceLaw | None = None) -> HeldCreep:
+def fit_held_creep(recordings: Sequence[Recording], *, law: ForceLaw | None = None) -> HeldCreep:
     """Fit creep to the longest hold of each recording, and the Maxwell elements that the holds have in common.
 
     law  the static characteristic, whose stiffness a hold under a constant load needs
@@ -61,7 +61,7 @@ def fit_held_creep(recordings: Sequence[Recording], law: ForceLaw | None = None)
     return _select(tuple(sentences), held, loaded, reasons)
 
 
-def free_of_creep(recordings: Sequence[Recording], elements: CreepElements) -> list[Recording]:
+def free_of_creep(elements: CreepElements, recordings: Sequence[Recording]) -> list[Recording]:
     """The recordings with the force of the creep elements along their motion added to the measured force."""
     return [
         with_force(each, creep_force(elements, each)) if elements.stiffnesses and _has_path(each) else each

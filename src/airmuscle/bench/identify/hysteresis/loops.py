@@ -86,7 +86,7 @@ class LoopFit(ShortRepr):
 def find_loops(
     recordings: Sequence[Recording],
     *,
-    characteristic: Characteristic | None = None,
+    law: Characteristic | None = None,
     degree: int = 3,
     all_rows: bool = False,
 ) -> tuple[HysteresisLoop, ...]:
@@ -97,7 +97,7 @@ def find_loops(
     another specimen gives no repeat. A recording without a usable run is left out with an AirmuscleWarning if another
     one has a loop.
 
-    The static curve is a polynomial of `degree` in the swept quantity, fitted with the friction, or `characteristic`
+    The static curve is a polynomial of `degree` in the swept quantity, fitted with the friction, or `law`
     with an offset. The fitted rows have a positive force below the limit of the sensor and, unless `all_rows`, are
     quasi-static. Raises IdentificationError if no run gives a loop: each has one branch, or is neither isobaric nor
     isometric while no characteristic is given.
@@ -108,7 +108,7 @@ def find_loops(
     each_run = [part for recording in recordings if len(recording) for part in _separate_runs(recording, sensors)]
     for recording, run in each_run:
         try:
-            loop = _make_loop(recording, run, sensors, characteristic, degree, all_rows)
+            loop = _make_loop(recording, run, sensors, law, degree, all_rows)
         except IdentificationError as error:
             failed.append(error)
             continue
@@ -178,7 +178,7 @@ def _make_loop(
         raise IdentificationError(
             f"{recording.origin}: the run is {run.kind.name}, so pressure and contraction change together and the "
             "static curve cannot be a polynomial in one of them.",
-            hint=Hint("To take the muscle's characteristic as the static curve", "characteristic"),
+            hint=Hint("To take the muscle's characteristic as the static curve", "law"),
         )
     rows = _select_rows(recording, sensors, all_rows)
     direction = _directions(recording, friction_path)

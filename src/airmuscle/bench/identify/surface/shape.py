@@ -69,8 +69,8 @@ class ShapeConstrainedFit(ShortRepr):
 
 
 def fit_shape_constrained(
-    surface: ContractileSurface,
-    recording: Recording | Sequence[Recording],
+    law: ContractileSurface,
+    recordings: Recording | Sequence[Recording],
     *,
     free: Recording | None = None,
     cells: tuple[int, int] = (6, 6),
@@ -82,25 +82,26 @@ def fit_shape_constrained(
     more cells are slower and less conservative. The rows are those that are active in the unconstrained fit. Raises
     IdentificationError where no surface of this degree satisfies the constraints.
     """
-    runs = [recording] if isinstance(recording, Recording) else list(recording)
+    runs = [recordings] if isinstance(recordings, Recording) else list(recordings)
     if free is not None:  # as censored rows they only extend the validity range
         runs.append(free.with_columns(force=np.zeros(len(free))))
-    unconstrained = fit(surface, runs)
-    law = unconstrained.model
-    assert isinstance(law, ContractileSurface)
+    unconstrained = fit(law, runs)
+    surface = unconstrained.model
+    assert isinstance(surface, ContractileSurface)
     active = unconstrained.problem.active_rows(unconstrained.problem.predict(unconstrained.values))
     data = unconstrained.recording.rows(active)
-    matrix = np.array(law.basis(data["pressure"], data["contraction"])).T
+    matrix = np.array(surface.basis(data["pressure"], data["contraction"])).T
     target = unconstrained.problem.target[active]
-    rows = shape_constraints(law.degree, cells)
+    rows = shape_constraints(surface.degree, cells)
     scale = float(np.abs(target).max())
-    basis = _free_contraction_basis(law, free)
+    basis = _free_contraction_basis(surface, free)
     minimum = _MIN_SLOPE if free is None else 0.0
     scaled = basis @ solve_constrained_least_squares(matrix @ basis, target / scale, rows @ basis, minimum)
-    model = dataclasses.replace(law, coefficients=tuple(float(a) for a in scale * scaled))
+    model = dataclasses.replace(surface, coefficients=tuple(float(a) for a in scale * scaled))
     residuals = matrix @ (scale * scaled) - target
     rmse = float(np.sqrt(np.mean(residuals**2)))
-    return ShapeConstrainedFit(model, rmse, unconstrained.rmse, find_shape_violations(law, law.validity_range))
+    violations = find_shape_violations(surface, surface.validity_range)
+    return ShapeConstrainedFit(model, rmse, unconstrained.rmse, violations)
 
 
 def _free_contraction_basis(law: ContractileSurface, free: Recording | None) -> Array:
