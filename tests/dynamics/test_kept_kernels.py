@@ -9,6 +9,7 @@ import ctypes
 import dataclasses
 import math
 import os
+import sys
 import warnings
 
 import casadi
@@ -352,3 +353,34 @@ def test_codes_that_were_not_used_for_the_longest_time_are_removed(empty, monkey
     assert kept.load("a", ()) == b"code"  # now b is the one that was not used for the longest time
     kept.save("c", (), b"code")
     assert [kept.load(name, ()) for name in "abc"] == [b"code", None, b"code"]
+
+
+def test_the_code_of_another_kernel_is_compiled_anew(empty):
+    """The checksum contains the name of the file, so that files that exchanged their names are not run."""
+    for name in ("one", "other"):
+        kept.save(name, ("d",), f"code of {name}".encode())
+    one, other = files(empty)
+    assert kept.load("one", ("d",)) == b"code of one"
+    one.write_bytes(other.read_bytes())
+    assert kept.load("one", ("d",)) is None
+    assert kept.load("other", ("d",)) == b"code of other"
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="Windows has no such pipes")
+def test_a_pipe_under_the_name_of_a_code_is_not_waited_for(empty):
+    kept.save("evaluate", ("d",), b"code")
+    (path,) = files(empty)
+    path.unlink()
+    os.mkfifo(path)
+    assert kept.load("evaluate", ("d",)) is None
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the specification is that of Linux")
+def test_a_relative_cache_folder_of_the_user_is_ignored(tmp_path, monkeypatch):
+    monkeypatch.delenv("AIRMUSCLE_CACHE_DIR", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", "relative")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    assert kept.cache_folder() == tmp_path / ".cache" / "airmuscle" / "kernels"
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "own"))
+    assert kept.cache_folder() == tmp_path / "own" / "airmuscle" / "kernels"

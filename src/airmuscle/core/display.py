@@ -221,12 +221,23 @@ def config_folder() -> pathlib.Path | None:
     named = os.environ.get("AIRMUSCLE_CONFIG_DIR")
     if named:
         return pathlib.Path(named)
-    import platformdirs
-
     try:
-        return pathlib.Path(platformdirs.user_config_dir("airmuscle", appauthor=False))
+        return user_folder("config")
     except RuntimeError:
         return None
+
+
+def user_folder(kind: str) -> pathlib.Path:
+    """The folder of the user for "cache" or "config" files of the program. Raises RuntimeError without a home folder.
+
+    A relative path in XDG_CACHE_HOME or XDG_CONFIG_HOME is ignored, as the XDG base directory specification demands: it
+    would be another folder in each working folder.
+    """
+    import platformdirs
+
+    folders = {"cache": platformdirs.user_cache_dir, "config": platformdirs.user_config_dir}
+    folder = pathlib.Path(folders[kind]("airmuscle", appauthor=False))
+    return folder if folder.is_absolute() else pathlib.Path.home() / f".{kind}" / "airmuscle"
 
 
 @functools.cache

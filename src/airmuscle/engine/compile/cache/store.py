@@ -1,7 +1,8 @@
 """Kernel cache: machine code as files in the private cache folder of the user, verified before it is used.
 
 Without such a folder, kernels are compiled anew in every process. A file begins with a hash of what it was compiled
-from and a hash of its contents, so that code of other sources or versions, or a damaged file, is compiled anew.
+from and a hash of its name and contents, so that code of other sources or versions, of another kernel, or a damaged
+file, is compiled anew.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ....core.atomic_output import atomic_file
+from ....core.display import user_folder
 from ....core.errors import AirmuscleWarning
 from ..llvm.jit import engine_of, object_code
 
@@ -53,15 +55,14 @@ def cache_folder() -> pathlib.Path | None:
 def _chosen_folder() -> pathlib.Path:
     if named := os.environ.get("AIRMUSCLE_CACHE_DIR"):
         return pathlib.Path(named)
-    import platformdirs
-
-    return pathlib.Path(platformdirs.user_cache_dir("airmuscle", appauthor=False)) / "kernels"
+    return user_folder("cache") / "kernels"
 
 
 def read_private(path: pathlib.Path) -> bytes | None:
     """The contents of a regular file that belongs to the user and that nobody else may write to."""
+    flags = [getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_BINARY", "O_NONBLOCK")]  # a pipe is not waited for
     try:
-        with open(os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)), "rb") as file:
+        with open(os.open(path, os.O_RDONLY | sum(flags)), "rb") as file:
             state = os.fstat(file.fileno())
             private = not _POSIX or (state.st_uid == os.getuid() and not state.st_mode & (stat.S_IWGRP | stat.S_IWOTH))
             return file.read() if private and stat.S_ISREG(state.st_mode) else None
@@ -92,7 +93,7 @@ def load(name: str, kinds: Sequence[str]) -> bytes | None:
     with contextlib.suppress(OSError):  # the time of its last use, for `_remove_oldest`
         os.utime(path)
     origin, checksum, code = content[:_HASH], content[_HASH : 2 * _HASH], content[2 * _HASH :]
-    return code if origin == _origin() and checksum == hashlib.sha256(code).digest() else None
+    return code if origin == _origin() and checksum == _checksum(path.name, code) else None
 
 
 def save(name: str, kinds: Sequence[str], code: bytes) -> bytes:
@@ -102,11 +103,16 @@ def save(name: str, kinds: Sequence[str], code: bytes) -> bytes:
         return code
     try:
         with atomic_file(folder / _file_name(name, kinds)) as unfinished:
-            unfinished.write_bytes(_origin() + hashlib.sha256(code).digest() + code)
+            unfinished.write_bytes(_origin() + _checksum(_file_name(name, kinds), code) + code)
         _remove_oldest(folder)
     except OSError as error:
         warn_not_stored(f"{folder} cannot be written to ({error.strerror or error})")
     return code
+
+
+def _checksum(name: str, code: bytes) -> bytes:
+    """Hash of a code and of the name of its file, because the code of another kernel would read other arguments."""
+    return hashlib.sha256(name.encode() + b"\0" + code).digest()
 
 
 def _remove_oldest(folder: pathlib.Path) -> None:
