@@ -493,9 +493,14 @@ def test_a_contraction_below_a_thousandth_is_found_with_its_note():
     assert "200 N is reached" in claim.note
 
 
-def test_claim_5_is_not_testable_and_compared_with_the_exact_meridian_on_every_line():
+@pytest.fixture(scope="module")
+def whole():
+    return chapter()
+
+
+def test_the_accuracy_is_not_testable_and_compared_with_the_exact_meridian_on_every_line(whole):
     assert [claims.claim(row).verdict for row in ("accurate", "deviates", "cause")] == [NOT_TESTABLE] * 3
-    found = {c.case: c for c in claims.all_claims() if c.claim.startswith("Maximum pressure error up to 20 %")}
+    found = {c.case: c for c in whole.claims if c.claim.startswith("Maximum pressure error up to 20 %")}
     errors = {case: round(c.reproduced, 1) for case, c in found.items()}
     assert errors["exact mechanics, line A, 100 N"] == 10.9
     assert errors["exact mechanics, line B, 100 N"] == 16.9
@@ -620,8 +625,7 @@ def test_the_printed_fibre_sum_is_a_reading():
     assert sums == sorted(sums)
 
 
-def test_the_chapter_judges_each_claim_and_names_its_place():
-    whole = chapter()
+def test_the_chapter_judges_each_claim_and_names_its_place(whole):
     assert all(claim.place for claim in whole.claims if claim.kind is Kind.CLAIM)
     assert {claim.verdict for claim in whole.claims} <= {HOLDS, DIFFERS, NOT_PRINTED, NOT_TESTABLE}
     assert len(whole.plots) == 9
