@@ -18,6 +18,7 @@ from scipy.optimize import brentq
 from airmuscle.core import autodiff, flatten, structure
 from airmuscle.errors import GeometryLimitError, ParameterError, SolveError
 from airmuscle.files import load
+from airmuscle.papers import chapter_texts
 from airmuscle.papers import saga2007_claims as claims
 from airmuscle.papers import saga2007_joint as joining
 from airmuscle.papers import saga2007_pairs as pairs
@@ -33,7 +34,6 @@ from airmuscle.papers.saga2007_muscle import (
 )
 from airmuscle.papers.saga2007_previous import PREVIOUS_MODEL, Ferraresi2001
 from airmuscle.papers.saga2007_tables import virtual_work
-from airmuscle.papers.texts import chapter_texts
 from airmuscle.physics import (
     AxialIntegral,
     CircularArc,

@@ -1,8 +1,5 @@
 """Reproduction of three papers, claim by claim."""
 
-from .run import PAPERS, reproduce
+from .run import PAPERS, chapter_texts, reproduce
 
-__all__ = [
-    "PAPERS",
-    "reproduce",
-]
+__all__ = ["PAPERS", "chapter_texts", "reproduce"]

@@ -11,7 +11,7 @@ from .borzikova_claims import PAPER, claims
 from .borzikova_figures import plots
 from .borzikova_surfaces import surfaces
 from .borzikova_tables import tables
-from .texts import chapter_texts
+from .run import chapter_texts
 
 CHOSEN = (
     ("maximum pressure", "3.5 bar", "inferred: the catalogue pressure; the range is not printed"),

@@ -28,7 +28,7 @@ from .hosovsky_plant import (
     surface,
     surface_fit,
 )
-from .texts import chapter_texts
+from .run import chapter_texts
 
 
 def coefficient_table() -> Table:

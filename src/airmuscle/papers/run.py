@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import importlib
 import time
+import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, as_completed
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -84,3 +87,16 @@ def select_papers(papers: Sequence[str] | None) -> list[str]:
     """Return the full names of the given papers in the order of the report, each once; all if none is given."""
     requested = {complete_name(paper, PAPERS, "paper") for paper in papers or PAPERS}
     return [name for name in PAPERS if name in requested]
+
+
+@functools.cache
+def _all_texts() -> dict[str, Any]:
+    return tomllib.loads(resources.files(__package__).joinpath("texts.toml").read_text(encoding="utf-8"))
+
+
+def chapter_texts(paper: str) -> dict[str, Any]:
+    """Return the texts of a chapter as arguments of `Chapter`; line breaks within a paragraph are spaces."""
+    texts = _all_texts()[paper]
+    tables = {key: tuple((k, " ".join(v.split())) for k, v in value.items())
+              for key, value in texts.items() if isinstance(value, dict)}  # fmt: skip
+    return {**texts, **tables}

@@ -6,6 +6,7 @@ from ..physics.muscle.geometry.meridian import SAGA_2007
 from ..physics.muscle.geometry.meridian_shapes import FERRARESI_2001
 from ..physics.muscle.geometry.pleated import DAERDEN_LEFEBER_2001
 from ..report.chapter import Chapter
+from .run import chapter_texts
 from .saga2007_claims import (
     ACCURACY_LIMIT,
     FIRST_PERCENT,
@@ -19,7 +20,6 @@ from .saga2007_joint import LIMIT
 from .saga2007_muscle import PAPER
 from .saga2007_tables import tables
 from .saga2007_values import THICK_WALL
-from .texts import chapter_texts
 
 CHOSEN = (
     ("wall thickness, fibres, fibre length, end diameter", "2 mm, 16, 72 mm, 12 mm", "Table 1"),
