@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+import tempfile
 import threading
 from pathlib import Path
 
 import pytest
 
-from airmuscle.core import atomic_file, atomic_folder, check_writable, exclusive_folders
+from airmuscle.core import atomic_file, atomic_folder, check_writable, exclusive_folders, temporary_folder
 from airmuscle.files.library import write_text
 
 
@@ -91,3 +93,18 @@ def test_the_second_of_two_commands_that_write_to_one_folder_is_refused(tmp_path
         with atomic_folder(folder) as place:
             (place / "a.csv").touch()
     assert [path.name for path in folder.iterdir()] == ["a.csv"]
+
+
+def test_what_a_killed_process_has_left_in_the_temporary_folder_is_removed_by_the_next_one(tmp_path, monkeypatch):
+    code = (
+        "import os, signal; from airmuscle.core.atomic_output import temporary_folder\n"
+        "with temporary_folder() as folder:\n    (folder / 'a.c').touch(); os.kill(os.getpid(), signal.SIGTERM)"
+    )
+    environment = {**os.environ, "TMPDIR": str(tmp_path)}
+    subprocess.run([sys.executable, "-c", code], check=False, env=environment)
+    assert len(list(tmp_path.iterdir())) == 1
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    (tmp_path / "airmuscle-of-somebody").mkdir()
+    with temporary_folder() as mine, temporary_folder() as other:
+        assert {path.name for path in tmp_path.iterdir()} == {mine.name, other.name, "airmuscle-of-somebody"}
+    assert [path.name for path in tmp_path.iterdir()] == ["airmuscle-of-somebody"]

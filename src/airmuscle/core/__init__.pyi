@@ -8,6 +8,7 @@ from .atomic_output import atomic_file as atomic_file
 from .atomic_output import atomic_folder as atomic_folder
 from .atomic_output import check_writable as check_writable
 from .atomic_output import exclusive_folders as exclusive_folders
+from .atomic_output import temporary_folder as temporary_folder
 from .declaration import Parameter as Parameter
 from .declaration import model as model
 from .declaration import parameter as parameter

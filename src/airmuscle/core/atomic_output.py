@@ -45,6 +45,8 @@ def atomic_file(path: Path) -> Iterator[Path]:
 
 _UNFINISHED = f".unfinished-{socket.gethostname().replace('/', '')}-"
 """Beginning of the name of a temporary folder, with the machine, because folders may be shared; a process follows."""
+_TEMPORARY = f"airmuscle-{socket.gethostname().replace('/', '')}-"
+"""The same for a folder in that of the system."""
 FULL = (errno.ENOSPC, errno.EDQUOT)
 """Numbers of the errors of a full disk and of an exhausted quota."""
 REMEDY_WHERE_FULL = "Free space there, or specify another folder."
@@ -78,12 +80,25 @@ def atomic_folder(folder: Path | str) -> Iterator[Path]:
         raise
 
 
-def _remove_abandoned(target: Path) -> None:
-    """Remove the temporary folders of processes of this machine that were killed."""
-    for folder in target.glob(f"{_UNFINISHED}*"):
-        process = folder.name.removeprefix(_UNFINISHED).partition("-")[0]
-        if process.isdecimal() and not folder.is_symlink() and not is_running(int(process)):
-            shutil.rmtree(folder, ignore_errors=True)
+@contextlib.contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """Yield an empty folder for the block, in that of the system; what a killed process has left there is removed."""
+    target = Path(tempfile.gettempdir())
+    _remove_abandoned(target, _TEMPORARY)
+    with tempfile.TemporaryDirectory(
+        prefix=f"{_TEMPORARY}{os.getpid()}-", dir=target, ignore_cleanup_errors=True
+    ) as name:
+        yield Path(name)
+
+
+def _remove_abandoned(target: Path, prefix: str = _UNFINISHED) -> None:
+    """Remove the temporary folders of processes of this machine, and of this user, that were killed."""
+    for folder in target.glob(f"{prefix}*"):
+        process = folder.name.removeprefix(prefix).partition("-")[0]
+        with contextlib.suppress(OSError):  # removed by another process
+            own = not hasattr(os, "getuid") or folder.lstat().st_uid == os.getuid()
+            if own and process.isdecimal() and not folder.is_symlink() and not is_running(int(process)):
+                shutil.rmtree(folder, ignore_errors=True)
 
 
 def is_running(process: int) -> bool:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import dataclasses
 import re
 import shutil
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
+from ...core.atomic_output import temporary_folder
 from .compiler import find_compiler, run_command
 
 
@@ -40,11 +40,11 @@ def build_and_run(sources: Sequence[Path]) -> BuiltProgram:
         f". The sources are in {sources[0].parent}; install gcc or clang, or compile them elsewhere: cc -O2 {files} "
         "-lm -o program. JavaScript and Octave need no compiler."
     )
-    with tempfile.TemporaryDirectory(prefix="airmuscle-") as folder:
-        program, units = Path(folder) / "program", [str(p) for p in sources if p.suffix == ".c"]
+    with temporary_folder() as folder:
+        program, units = folder / "program", [str(p) for p in sources if p.suffix == ".c"]
         run_command([compiler, "-std=c99", "-O2", "-ffp-contract=off", *units, "-o", str(program), "-lm"])
         done = run_command([str(program)])
-        code, _ = measure_sizes([compiler], shutil.which("size"), sources, Path(folder))
+        code, _ = measure_sizes([compiler], shutil.which("size"), sources, folder)
         return BuiltProgram(done.stdout, done.stderr, code)
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from ...core.atomic_output import temporary_folder
 from ...core.errors import FileError, ParameterError
 
 COMPILERS = ("gcc", "clang", "cc")
@@ -31,11 +31,11 @@ def compile_with(
     command: Sequence[str], sources: Mapping[str, bytes], units: Sequence[str], name: str, more: Sequence[str] = ()
 ) -> bytes:
     """The same with a compiler and its first arguments."""
-    with tempfile.TemporaryDirectory(prefix="airmuscle-") as folder:
+    with temporary_folder() as folder:
         for file, text in sources.items():
-            (Path(folder) / file).write_bytes(text)
+            (folder / file).write_bytes(text)
         run_command([*command, *OPTIONS, *units, "-o", name, *more, "-lm"], folder)
-        return (Path(folder) / name).read_bytes()
+        return (folder / name).read_bytes()
 
 
 def find_compiler(remedy: str = "; install the package gcc or clang") -> str:
@@ -47,7 +47,7 @@ def find_compiler(remedy: str = "; install the package gcc or clang") -> str:
     raise ParameterError(f"no C compiler ({', '.join(COMPILERS)}) was found{remedy}")
 
 
-def run_command(command: Sequence[str], folder: str | None = None) -> subprocess.CompletedProcess[str]:
+def run_command(command: Sequence[str], folder: Path | None = None) -> subprocess.CompletedProcess[str]:
     """Run a compiler or a program in a folder. Raises FileError with its message if it fails or takes too long."""
     name = command[3] if list(command[1:3]) == ["-P", "-m"] else Path(command[0]).name  # a program that is a package
     try:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import shutil
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
+from ...core.atomic_output import temporary_folder
 from ...core.errors import ParameterError
 from .building import BuiltProgram, measure_sizes
 from .compiler import run_command
@@ -45,8 +45,8 @@ def run_in_emulator(sources: Sequence[Path], processor: Processor) -> BuiltProgr
                 f"microcontroller install the packages {PACKAGES} (names of Debian)."
             )
     command = [COMPILER, "-mthumb", "-mfloat-abi=hard", *processor.options]
-    with tempfile.TemporaryDirectory(prefix="airmuscle-") as name:
-        folder, units = Path(name), [str(p) for p in sources if p.suffix == ".c"]
+    with temporary_folder() as folder:
+        units = [str(p) for p in sources if p.suffix == ".c"]
         for file in ("cortex_m_startup.c", "cortex_m.ld"):
             (folder / file).write_text(template(file), encoding="utf-8")
         run_command([
