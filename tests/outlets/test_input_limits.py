@@ -74,3 +74,12 @@ def test_a_table_of_more_columns_than_any_test_rig_has_is_refused(tmp_path: Path
         read(wide(tmp_path, 200_000))
     assert len(list(read(wide(tmp_path, 2000))[0])) == 2000
     assert time.process_time() - start < LIMIT
+
+
+def test_a_run_of_more_rows_than_a_command_writes_is_refused(tmp_path: Path):
+    text = (Path(__file__).parents[2] / "examples" / "fill_discharge.toml").read_text(encoding="utf-8")
+    (tmp_path / "s.toml").write_text(text.replace('"10 ms"', '"0.11 us"'), encoding="utf-8")
+    with pytest.raises(
+        ParameterError, match=r"s\.toml, \[run\]: output_times of 1\.1e-07 s gives 2\.27e\+08 rows in 25 s"
+    ):
+        load_scenario(tmp_path / "s.toml")

@@ -49,6 +49,8 @@ from .inputs import build_input_signal
 from .plant_uncertainty import read_plant_uncertainty
 from .values import Number, read_observed, read_table, required_table, table_reader
 
+MAX_ROWS = 2_000_000
+"""Maximum number of rows of a run that a command writes (chosen): 300 MB of a plant with one muscle."""
 DEFAULT_INITIAL_STATE: Mapping[str, Any] = MappingProxyType({"pressure": 0.0})
 """Default initial state of a run: equilibrium at ambient pressure."""
 
@@ -64,6 +66,14 @@ class RunTable:
         read_initial_table, "pressures or states", default_factory=lambda: DEFAULT_INITIAL_STATE
     )
     integrator: Integrator | None = None
+
+    def __post_init__(self) -> None:
+        rows = 0.0 if self.output_times is None else self.duration / self.output_times
+        if rows > MAX_ROWS:
+            raise ParameterError(
+                f"output_times of {self.output_times:g} s gives {rows:.3g} rows in {self.duration:g} s; at most "
+                f"{MAX_ROWS} are written. Choose a longer sample time."
+            )
 
 
 @dataclasses.dataclass(frozen=True)
