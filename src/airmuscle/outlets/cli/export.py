@@ -37,7 +37,7 @@ TARGETS: dict[str, Target] = {"c": C99(), "js": JavaScript(), "octave": Octave()
 """Languages by the names of the option --to."""
 STACKS: dict[str, Stack] = {"torch": TorchStack(), "warp": WarpStack(), "onnx": OnnxStack()}
 """Learning stacks by the names of the option --to."""
-NAMES = (*TARGETS, "arduino", "fmu", "mujoco", "modelica", *STACKS)
+NAMES = (*TARGETS, "arduino", "fmu", "ssp", "mujoco", "modelica", *STACKS)
 """All values of the option --to."""
 DEFAULT_FOLDER = Path("export")
 
@@ -55,7 +55,7 @@ ProgramName = Annotated[
 ]
 Law = Annotated[bool, typer.Option("--law", help="Export only the static characteristic of a muscle.")]
 ControllerOnly = Annotated[
-    bool, typer.Option("--controller", help="Export only the controller of a scenario, to C for a microcontroller.")
+    bool, typer.Option("--controller", help="Export only the controller of a scenario: c, arduino, fmu.")
 ]
 Build = Annotated[
     bool, typer.Option("--build", help="Compile the C program with the compiler of this machine, and run it.")
@@ -77,11 +77,13 @@ ProcessorName = Annotated[
         help=f"With --controller --build: run in the emulator QEMU as {' or '.join(PROCESSORS)}, not on this machine.",
     ),
 ]  # fmt: skip
-Fmi = Annotated[int | None, typer.Option("--fmi", metavar="2|3", help="Version of FMI for --to fmu. Default: 3.")]
+Fmi = Annotated[
+    int | None, typer.Option("--fmi", metavar="2|3", help="Version of FMI for --to fmu and ssp. Default: 3.")
+]
 MuscleName = Annotated[
     str, typer.Option("--muscle", metavar="NAME", help="One muscle of the plant; --to mujoco, torch, warp, onnx.")
 ]
-SourcesOnly = Annotated[bool, typer.Option("--sources-only", help="An FMU without a binary; --to fmu.")]
+SourcesOnly = Annotated[bool, typer.Option("--sources-only", help="An FMU without a binary; --to fmu, ssp.")]
 
 
 Platforms = Annotated[
@@ -100,7 +102,7 @@ def export(
     sources_only: SourcesOnly = False, platforms: Platforms = None, muscle: MuscleName = "",
     precision: PrecisionName = "double", processor: ProcessorName = "", json: Json = False,
 ) -> None:  # fmt: skip
-    """Export to C, JavaScript, MATLAB, FMU, MuJoCo, Modelica, PyTorch, Warp or ONNX.
+    """Export to C, JavaScript, MATLAB, FMU, SSP, MuJoCo, Modelica, PyTorch, Warp or ONNX.
 
     \b
     The program contains the equations of the plant, the integrator, and a run of the scenario that writes CSV; in C,
@@ -118,15 +120,18 @@ def export(
       airmuscle export examples/pressure_loop.toml --controller --to c --precision float --build --processor cortex-m4
       airmuscle export examples/pressure_loop.toml --controller --to arduino --precision float --out pressure_loop
       airmuscle export examples/fill_discharge.toml --to fmu --fmi 2 --out fill.fmu
+      airmuscle export examples/pressure_loop.toml --controller --to fmu --out controller.fmu
+      airmuscle export examples/pressure_loop.toml --to ssp --out loop.ssp
     """
     _check_options(to, law, controller, build, tunable, fmi is not None or sources_only or bool(platforms))
     _check_controller_options(controller, build, precision, processor)
     name = name or make_identifier(Path(source).stem)
-    if to == "fmu":
+    if to in ("fmu", "ssp"):
         if sources_only and platforms:
             raise typer.BadParameter("--sources-only and --platforms exclude each other.")
         targets = [find_platform(each) for each in dict.fromkeys(platforms or ())]
-        export_fmu(source, out, name, tunable, 3 if fmi is None else fmi, not sources_only, targets, json)
+        part = "ssp" if to == "ssp" else "controller" if controller else "plant"
+        export_fmu(source, out, name, tunable, 3 if fmi is None else fmi, not sources_only, targets, part, json)
         return
     if muscle and to not in ("mujoco", *STACKS):
         raise typer.BadParameter(f"--muscle belongs to --to mujoco, {', '.join(STACKS)}.")
@@ -205,10 +210,12 @@ def _check_options(
     """Raise BadParameter for options that do not fit together."""
     if to not in NAMES:
         raise typer.BadParameter(f"--to {to}: there are {', '.join(NAMES)}.")
-    if controller and (law or to not in ("c", "arduino")):
+    if controller and (law or to not in ("c", "arduino", "fmu")):
         raise typer.BadParameter(
-            "--controller: a controller is exported to C, and without --law; write --to c, or --to arduino."
+            "--controller: a controller is exported to C, and without --law; write --to c, --to arduino or --to fmu."
         )
+    if controller and to == "fmu" and tunable:
+        raise typer.BadParameter("--tunable: all parameters of a controller in an FMU can be changed; leave it out.")
     if to == "arduino" and not controller:
         raise typer.BadParameter("--to arduino: an Arduino library contains a controller; add --controller.")
     if build and (law or to != "c"):
@@ -219,8 +226,8 @@ def _check_options(
         raise typer.BadParameter("--tunable: all parameters of an actuator can be changed; leave it out.")
     if law and tunable:
         raise typer.BadParameter("--tunable: all parameters of a law can be changed; leave it out.")
-    if of_an_fmu and to != "fmu":
-        raise typer.BadParameter("--fmi, --sources-only and --platforms belong to --to fmu.")
+    if of_an_fmu and to not in ("fmu", "ssp"):
+        raise typer.BadParameter("--fmi, --sources-only and --platforms belong to --to fmu and ssp.")
 
 
 def _instruction(to: str, paths: tuple[Path, ...], law: bool, controller: bool) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from ...core.atomic_output import check_writable
 from ...files import list_plants
@@ -13,9 +14,11 @@ from ..export import (
     Stack,
     regulated_plant,
     write_actuator,
+    write_controller_fmu,
     write_fmu,
     write_modelica,
     write_mujoco_plugin,
+    write_ssp,
 )
 from ..export.platforms import Platform
 from .terminal import echo, print_json
@@ -23,26 +26,33 @@ from .terminal import echo, print_json
 
 def export_fmu(
     source: str, out: Path, name: str, tunable: list[str] | None, fmi: int, binary: bool, platforms: list[Platform],
-    json: bool,
+    part: str, json: bool,
 ) -> None:  # fmt: skip
-    """Write an FMU into a folder, or to a file that ends in .fmu."""
-    path = out if out.suffix == ".fmu" else out / f"{name}.fmu"
+    """Write the FMU of a plant or of its controller, or both as an SSP package, into a folder or to a file.
+
+    part  plant, controller, or ssp
+    """
+    suffix = ".ssp" if part == "ssp" else ".fmu"
+    path = out if out.suffix == suffix else out / f"{name}{suffix}"
     check_writable(path.parent, shared=True)
     scenario = load_scenario(source)
-    written = write_fmu(
-        scenario.problem, path, fmi=fmi, name=name, title=scenario.title, tunable=tunable, binary=binary,
-        platforms=platforms,
-    )  # fmt: skip
+    common: dict[str, Any] = {
+        "fmi": fmi, "name": name, "title": scenario.title, "binary": binary, "platforms": platforms,
+    }  # fmt: skip
+    if part == "controller":
+        written = write_controller_fmu(scenario.problem, path, **common)
+    else:
+        write = write_ssp if part == "ssp" else write_fmu
+        written = write(scenario.problem, path, tunable=tunable, **common)
     if json:
         print_json({"files": [str(path)], "platforms": list(written.platforms), "remark": written.remark})
         return
     echo(f"file: {path}")
-    if written.platforms:
-        names = ", ".join(written.platforms)
-        echo(f"FMI {fmi}.0, Model Exchange and Co-Simulation, with sources and a binary for {names}")
-    else:
-        echo(f"FMI {fmi}.0, Model Exchange and Co-Simulation, sources without a binary: {written.remark}")
-    echo(f"run: fmpy simulate {path}")
+    names = ", ".join(written.platforms)
+    binaries = f"with sources and a binary for {names}" if names else f"sources without a binary: {written.remark}"
+    echo(f"FMI {fmi}.0, {'Model Exchange and ' if part == 'plant' else ''}Co-Simulation, {binaries}")
+    echo(f"run: fmpy simulate {path}" if part == "plant" else f"inputs: fmpy info {path}" if part == "controller" else
+         "open: SystemStructure.ssd joins plant and controller")  # fmt: skip
 
 
 def export_mujoco(source: str, out: Path, name: str, muscle: str, json: bool) -> None:

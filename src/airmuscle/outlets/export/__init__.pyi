@@ -1,8 +1,10 @@
 from .building import build_and_run as build_and_run
 from .controller import PRECISIONS as PRECISIONS
 from .controller import write_controller as write_controller
-from .fmu import WrittenFmu as WrittenFmu
+from .fmi_package import WrittenFmu as WrittenFmu
 from .fmu import write_fmu as write_fmu
+from .fmu_controller import write_controller_fmu as write_controller_fmu
+from .fmu_controller import write_ssp as write_ssp
 from .identifiers import make_identifiers as make_identifiers
 from .learning import OnnxStack as OnnxStack
 from .learning import Stack as Stack

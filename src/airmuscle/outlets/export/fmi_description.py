@@ -9,18 +9,24 @@ from collections.abc import Mapping, Sequence
 from importlib import metadata
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from ...engine.compile.jacobians import Place
-from ...engine.run.integrators import Rodas4
 from .fmi_units import add_units, has_unit
-from .fmi_variables import Variable, references_of
-from .printed_system import ExportedSystem
+from .fmi_variables import Variable
 from .provenance import LICENCE
-from .run_data import RunData
 
 _WORD = r"[A-Za-z_][A-Za-z0-9_]*(\[\d+\])?"
 _STRUCTURED = re.compile(rf"{_WORD}(\.{_WORD})*|der\({_WORD}(\.{_WORD})*\)")
 CATEGORIES = ("logStatusWarning", "logStatusError")
 """Categories of messages: a validity range that was left, and a failure."""
+
+
+@dataclasses.dataclass(frozen=True)
+class FmuExperiment:
+    """The default experiment: times [s], relative tolerance, and the step of a sampled controller [s]; 0: none."""
+
+    start: float
+    stop: float
+    tolerance: float = 0.0
+    step: float = 0.0
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -29,18 +35,25 @@ class FmuDescription:
 
     name       identifier of the model
     token      text that an importer passes on, so that description and binary belong together
-    places     places of the partial derivatives that are not zero
+    dependencies  the value references of the states and inputs on which an unknown depends, by its value reference
     indicators  number of event indicators
+    sources    C sources next to that of the functions of FMI
+    has_states  whether it has states and derivatives, and can be used in Model Exchange
     """
 
     name: str
     title: str
     token: str
-    system: ExportedSystem
-    run: RunData
     variables: Sequence[Variable]
-    places: Sequence[Place]
+    dependencies: Mapping[int, Sequence[int]]
     indicators: int
+    experiment: FmuExperiment
+    sources: tuple[str, ...] = ()
+    has_states: bool = True
+
+    def units(self, version: int) -> tuple[str, ...]:
+        """The C sources that a compiler is given."""
+        return (f"fmi{version}.c", *self.sources)
 
     def text(self, version: int) -> str:
         """The file for FMI 2 or 3."""
@@ -58,9 +71,9 @@ class FmuDescription:
         return Element("fmiModelDescription", {**attributes, **common})
 
     def _experiment(self, root: Element) -> None:
-        times = self.run.times
-        tolerance = self.run.integrator.rtol if isinstance(self.run.integrator, Rodas4) else 1e-6
-        attributes = {"startTime": self.run.start, "stopTime": float(times[-1]), "tolerance": tolerance}
+        given = self.experiment
+        attributes = {"startTime": given.start, "stopTime": given.stop}
+        attributes |= {key: x for key, x in (("tolerance", given.tolerance), ("stepSize", given.step)) if x}
         SubElement(root, "DefaultExperiment", {key: repr(float(x)) for key, x in attributes.items()})
 
     def _categories(self, root: Element) -> None:
@@ -72,12 +85,14 @@ class FmuDescription:
         root = self._root({"fmiVersion": "2.0", "guid": self.token, "numberOfEventIndicators": str(self.indicators)})
         can = {
             "modelIdentifier": self.name, "canNotUseMemoryManagementFunctions": "true", "canGetAndSetFMUstate": "true",
-            "canSerializeFMUstate": "true", "providesDirectionalDerivative": "true",
+            "canSerializeFMUstate": "true",
         }  # fmt: skip
-        stepping = {"canHandleVariableCommunicationStepSize": "true", "canInterpolateInputs": "true"}
-        for kind, more in (("ModelExchange", {}), ("CoSimulation", stepping)):
-            files = SubElement(SubElement(root, kind, {**can, **more}), "SourceFiles")
-            for file in ("fmi2.c", f"{self.name}.c"):
+        derivatives = {"providesDirectionalDerivative": "true"} if self.has_states else {}
+        interpolation = {"canInterpolateInputs": "true"} if self.has_states else {}
+        stepping = {"canHandleVariableCommunicationStepSize": "true", **interpolation}
+        for kind, more in (("ModelExchange", {}), ("CoSimulation", stepping))[0 if self.has_states else 1 :]:
+            files = SubElement(SubElement(root, kind, {**can, **derivatives, **more}), "SourceFiles")
+            for file in self.units(2):
                 SubElement(files, "File", name=file)
         add_units(root, [v.unit for v in self.variables])
         self._categories(root)
@@ -101,9 +116,10 @@ class FmuDescription:
         root = self._root({"fmiVersion": "3.0", "instantiationToken": self.token})
         can = {
             "modelIdentifier": self.name, "canGetAndSetFMUState": "true", "canSerializeFMUState": "true",
-            "providesDirectionalDerivatives": "true", "providesAdjointDerivatives": "true",
         }  # fmt: skip
-        SubElement(root, "ModelExchange", can)
+        if self.has_states:
+            can |= {"providesDirectionalDerivatives": "true", "providesAdjointDerivatives": "true"}
+            SubElement(root, "ModelExchange", can)
         SubElement(root, "CoSimulation", {**can, "canHandleVariableCommunicationStepSize": "true"})
         add_units(root, [v.unit for v in self.variables])
         self._categories(root)
@@ -138,10 +154,8 @@ class FmuDescription:
 
     def _dependencies(self, reference: int, offset: int) -> dict[str, str]:
         """The states and inputs on which an unknown depends; of a state, itself."""
-        if reference <= len(self.system.state_names):
-            return {"dependencies": str(reference + offset)}
-        pairs = [references_of(self.system, place) for place in self.places]
-        return {"dependencies": " ".join(str(k + offset) for k in sorted(b for a, b in pairs if a == reference))}
+        known = self.dependencies.get(reference, ())
+        return {"dependencies": " ".join(str(k + offset) for k in sorted(known))}
 
 
 def _kind(v: Variable) -> dict[str, str]:

@@ -78,7 +78,7 @@ def make_variables(system: ExportedSystem, run: RunData, indicators: int = 0) ->
     for i in range(1, indicators + 1):
         about = "changes its sign where the rates are not smooth"
         add(f"event_indicator[{i}]", "local", is_indicator=True, description=about)
-    return _checked(variables)
+    return checked(variables)
 
 
 def _stated(v: Variable) -> Variable:
@@ -105,7 +105,8 @@ def references_of(system: ExportedSystem, place: Place) -> tuple[int, int]:
     return unknown, 1 + column if column < n else 1 + 2 * n + column - n
 
 
-def _checked(variables: list[Variable]) -> list[Variable]:
+def checked(variables: list[Variable]) -> list[Variable]:
+    """The variables with stated units. Raises ParameterError for two of one name."""
     seen: set[str] = set()
     for variable in variables:
         if variable.name in seen:

@@ -2,17 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
-import hashlib
-import html
-import io
-import json
-import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from ...core.atomic_output import atomic_folder
-from ...core.errors import ParameterError
 from ...engine.compile.functions import Printer
 from ...engine.compile.jacobians import EventIndicators, Partials, event_indicators, partials
 from ...engine.run import Problem
@@ -21,27 +13,16 @@ from ...physics.plant.diagnostics import column_limits, describe_limit
 from ...physics.plant.plant import Plant
 from .c_source import CSource
 from .c_text import c_array, c_number, c_string, c_strings
-from .fmi_description import FmuDescription
+from .fmi_description import FmuExperiment, FmuDescription
+from .fmi_package import FmuPackage, WrittenFmu, check_target, token_of
 from .fmi_units import has_unit
-from .fmi_variables import first_inputs, make_variables
-from .platforms import Platform, this_platform
+from .fmi_variables import first_inputs, make_variables, references_of
+from .platforms import Platform
 from .printed_system import acting_parameters
-from .provenance import block_comment
 from .targets import ExportedRun
-from .templates import filled, template
+from .templates import filled
 from .write import make_run
 
-VERSIONS = (2, 3)
-HEADERS = {
-    2: ("fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h"),
-    3: ("fmi3FunctionTypes.h", "fmi3Functions.h", "fmi3PlatformTypes.h"),
-}
-"""Headers of the standard by version, with its 2-clause BSD licence in each."""
-PAGE = """<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8"><title>{0}</title></head>
-<body><pre>{1}</pre></body></html>
-"""
-"""The documentation of an FMU."""
 SLACK = 1e-10
 """Distance of an event from the change of sign of its indicator, relative to the scale of the indicator; chosen."""
 NOTE = (
@@ -50,19 +31,6 @@ NOTE = (
     "of an input; the ranges are those of the exported parameters. Remarks of valves and tubes on their own validity "
     "are not in it."
 )
-
-
-@dataclasses.dataclass(frozen=True)
-class WrittenFmu:
-    """An FMU that has been written.
-
-    platforms  the folders of its binaries, such as `linux64`; none for an FMU that contains sources only
-    remark     why there is no binary; empty if there is one
-    """
-
-    path: Path
-    platforms: tuple[str, ...]
-    remark: str
 
 
 def write_fmu(
@@ -82,73 +50,41 @@ def write_fmu(
     The FMU contains no Python. The same arguments and version give the same file on one machine and compiler. Raises
     ParameterError for what cannot be exported, which it names, and FileError.
     """
-    if fmi not in VERSIONS:
-        raise ParameterError(f"write_fmu: FMI {fmi} is not supported; allowed: 2 or 3.")
-    target = Path(path)
-    if target.suffix != ".fmu":
-        raise ParameterError(f"write_fmu: '{target.name[:80]}' must end in .fmu, as importers expect.")
+    target = check_target(path, fmi)
+    return fmu_package(problem, fmi, name, title, tunable).write(target, fmi, binary, platforms)
+
+
+def fmu_package(
+    problem: Problem, fmi: int, name: str = "", title: str = "", tunable: Sequence[str] | None = None
+) -> FmuPackage:
+    """The FMU of a problem without its binary; arguments as for `write_fmu`."""
     chosen = acting_parameters(problem.compiled) if tunable is None else tunable
-    program = make_run(problem, name=name, title=title, tunable=chosen, notes=[NOTE])
-    files = fmu_files(program, fmi)
-    folders, remark = list[str](), "none was requested"
-    if binary:
-        folders, libraries, remark = _binaries(program.name, fmi, files, platforms)
-        files |= libraries
-    with atomic_folder(target.parent) as staging:
-        (staging / target.name).write_bytes(_archive(files))
-    return WrittenFmu(target, tuple(folders), remark)
+    return _package(make_run(problem, name=name, title=title, tunable=chosen, notes=[NOTE]), fmi)
 
 
-def fmu_files(program: ExportedRun, fmi: int) -> dict[str, bytes]:
-    """The files of an FMU without its binary, by their paths in it."""
-    derivatives, indicators = partials(program.system.traced), event_indicators(program.system.traced)
+def _package(program: ExportedRun, fmi: int) -> FmuPackage:
+    """The FMU of a system."""
+    system, run = program.system, program.run
+    derivatives, indicators = partials(system.traced), event_indicators(system.traced)
 
     def extend(printer: Printer) -> None:
         derivatives.extend(printer)
         indicators.extend(printer)
 
-    source = CSource(program.name, program.system, program.run.integrator, program.provenance, extend).files()
-    variables = make_variables(program.system, program.run, indicators.count if fmi == 3 else 0)
-    content = json.dumps([*source.values(), *map(repr, variables), fmi]).encode()
-    token = f"{{{hashlib.sha256(content).hexdigest()[:32]}}}"
-    title = program.provenance[0]
+    source = CSource(program.name, system, run.integrator, program.provenance, extend).files()
+    variables = make_variables(system, run, indicators.count if fmi == 3 else 0)
+    token = token_of(*source.values(), *variables, fmi)
+    dependencies: dict[int, list[int]] = {i: [i] for i in range(1, len(system.state_names) + 1)}
+    for place in derivatives.places:
+        unknown, known = references_of(system, place)
+        dependencies.setdefault(unknown, []).append(known)
+    tolerance = run.integrator.rtol if isinstance(run.integrator, Rodas4) else 1e-6
     about = FmuDescription(
-        program.name,
-        title,
-        token,
-        program.system,
-        program.run,
-        variables,
-        derivatives.places,
-        indicators.count,
-    )
-    places = {"provenance": block_comment(program.provenance), "file": program.name}
-    if fmi == 3:
-        places["adjoint"] = filled("adjoint.h", {}, program.name)
-    texts = {
-        **source,
-        f"{program.name}_instance.h": filled(
-            "instance.h", _instance(program, derivatives, indicators, token), program.name
-        ),
-        f"fmi{fmi}.c": filled(f"fmi{fmi}.c", places, program.name),
-        **{file: template(f"fmi/{file}") for file in HEADERS[fmi]},
-    }
-    if fmi == 3:
-        texts["fmi3_absent.h"] = filled("fmi3_absent.h", {}, program.name)
-        texts["buildDescription.xml"] = _build_description(program.name)
-    page = PAGE.format(html.escape(title), html.escape("\n".join(program.provenance)))
-    files = {"modelDescription.xml": about.text(fmi), "documentation/index.html": page}
-    files |= {f"sources/{file}": text for file, text in texts.items()}
-    return {file: text.encode("utf-8", "replace") for file, text in files.items()}
-
-
-def _build_description(name: str) -> str:
-    return (
-        '<?xml version="1.0" encoding="UTF-8"?>\n<fmiBuildDescription fmiVersion="3.0">\n'
-        f'  <BuildConfiguration modelIdentifier="{name}">\n    <SourceFileSet language="C99">\n'
-        f'      <SourceFile name="fmi3.c"/>\n      <SourceFile name="{name}.c"/>\n    </SourceFileSet>\n'
-        "  </BuildConfiguration>\n</fmiBuildDescription>\n"
-    )
+        program.name, program.provenance[0], token, variables, dependencies, indicators.count,
+        FmuExperiment(run.start, float(run.times[-1]), tolerance), (f"{program.name}.c",),
+    )  # fmt: skip
+    instance = filled("instance.h", _instance(program, derivatives, indicators, token), program.name)
+    return FmuPackage(about, program.provenance, {**source, f"{program.name}_instance.h": instance}, adjoint=True)
 
 
 def _instance(
@@ -207,32 +143,3 @@ def _limits(system: object, columns: Sequence[str]) -> list[tuple[int, float, fl
         text = f"the input {given.name} is outside its range, {given.minimum:.4g} to {given.maximum:.4g}{unit}"
         limits.append((columns.index(given.name), given.minimum - slack, given.maximum + slack, text))
     return limits
-
-
-def _binaries(
-    name: str, fmi: int, files: Mapping[str, bytes], platforms: Sequence[Platform]
-) -> tuple[list[str], dict[str, bytes], str]:
-    """Folders and files of the binaries; without platforms that of this machine, or none and the reason."""
-    sources = {file.removeprefix("sources/"): text for file, text in files.items() if file.startswith("sources/")}
-    units, folders, libraries = [f"fmi{fmi}.c", f"{name}.c"], list[str](), dict[str, bytes]()
-    for target in platforms or [this_platform()]:
-        try:
-            library = target.compile(sources, units, name)
-        except ParameterError as reason:
-            if platforms:
-                raise
-            return [], {}, str(reason)
-        folders.append(target.folder(fmi))
-        libraries[f"binaries/{folders[-1]}/{name}{target.suffix}"] = library
-    return folders, libraries, ""
-
-
-def _archive(files: Mapping[str, bytes]) -> bytes:
-    """A ZIP file of these files, with the description first; all times are those that ZIP begins with."""
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for file in sorted(files, key=lambda file: (file != "modelDescription.xml", file)):
-            entry = zipfile.ZipInfo(file)
-            entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
-            archive.writestr(entry, files[file])
-    return buffer.getvalue()

@@ -60,7 +60,7 @@ def check_open_loop(problem: Problem) -> None:
     if isinstance(problem.input, ControlLoop):
         raise ParameterError(
             f"the controller {type(problem.input.controller).__name__} cannot be exported to this target; export the "
-            "plant with input signals, or the loop to C, JavaScript or Octave."
+            "plant with input signals, or the loop to C, JavaScript, Octave, or as FMUs of an SSP package."
         )
 
 

@@ -173,7 +173,7 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
 {
   size_t i;
   for (i = 0; i < n; i++) {
-    if (order[i] != 1 || v[i] < MODEL_FIRST_INPUT || v[i] >= MODEL_FIRST_OUTPUT || !isfinite(values[i]))
+    if (order[i] != 1 || v[i] < MODEL_FIRST_INPUT || v[i] >= MODEL_FIRST_INPUT + MODEL_LINEAR_INPUTS || !isfinite(values[i]))
       return refuse(c, "derivatives are accepted of inputs, of order one, and finite");
     C->m.w[v[i] - MODEL_FIRST_INPUT] = values[i];
   }
@@ -249,7 +249,7 @@ fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) { C->m.s.t = time; return
 fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t n)
 {
   if (n != MODEL_STATES) return refuse(c, "the number of states is another one");
-  memcpy(C->m.s.x, x, sizeof C->m.s.x);
+  memcpy(C->m.s.x, x, sizeof(double) * MODEL_STATES);
   C->m.old_rates = C->m.old_outputs = 1;
   return fmi2OK;
 }
@@ -272,7 +272,7 @@ fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real z[], size_t n)
 fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t n)
 {
   if (n != MODEL_STATES) return refuse(c, "the number of states is another one");
-  memcpy(x, C->m.s.x, sizeof C->m.s.x);
+  memcpy(x, C->m.s.x, sizeof(double) * MODEL_STATES);
   return fmi2OK;
 }
 

@@ -283,7 +283,7 @@ fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 cont
                                    size_t nContinuousStates)
 {
   if (nContinuousStates != MODEL_STATES) return refuse(instance, "the number of states is another one");
-  memcpy(C->m.s.x, continuousStates, sizeof C->m.s.x);
+  memcpy(C->m.s.x, continuousStates, sizeof(double) * MODEL_STATES);
   C->m.old_rates = C->m.old_outputs = 1;
   return fmi3OK;
 }
@@ -307,7 +307,7 @@ fmi3Status fmi3GetEventIndicators(fmi3Instance instance, fmi3Float64 eventIndica
 fmi3Status fmi3GetContinuousStates(fmi3Instance instance, fmi3Float64 continuousStates[], size_t nContinuousStates)
 {
   if (nContinuousStates != MODEL_STATES) return refuse(instance, "the number of states is another one");
-  memcpy(continuousStates, C->m.s.x, sizeof C->m.s.x);
+  memcpy(continuousStates, C->m.s.x, sizeof(double) * MODEL_STATES);
   return fmi3OK;
 }
 

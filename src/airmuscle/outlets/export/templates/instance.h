@@ -23,6 +23,8 @@
 #define MODEL_TOLERANCE (MODEL_FIRST_PARAMETER + MODEL_PARAMETERS)
 /* Event indicators have value references in FMI 3.0. */
 #define MODEL_FIRST_INDICATOR (MODEL_TOLERANCE + (MODEL_RTOL_START > 0.0 ? 1u : 0u))
+/* Inputs of which derivatives by time can be given. */
+#define MODEL_LINEAR_INPUTS MODEL_INPUTS
 #define MODEL_ROWS (MODEL_STATES + MODEL_OUTPUTS)
 
 /* d(rates, outputs)/d(states, inputs): values of the non-zeros, whose places are in model_rows and model_columns. */

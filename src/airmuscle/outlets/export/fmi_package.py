@@ -1,0 +1,149 @@
+"""Packages of Functional Mock-up Units: description, sources and binaries in one ZIP file."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import html
+import io
+import json
+import zipfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from ...core.atomic_output import atomic_folder
+from ...core.errors import ParameterError
+from .fmi_description import FmuDescription
+from .platforms import Platform, this_platform
+from .provenance import block_comment
+from .templates import filled, template
+
+VERSIONS = (2, 3)
+HEADERS = {
+    2: ("fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h"),
+    3: ("fmi3FunctionTypes.h", "fmi3Functions.h", "fmi3PlatformTypes.h"),
+}
+"""Headers of the standard by version, with its 2-clause BSD licence in each."""
+PAGE = """<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8"><title>{0}</title></head>
+<body><pre>{1}</pre></body></html>
+"""
+"""The documentation of an FMU."""
+
+
+@dataclasses.dataclass(frozen=True)
+class WrittenFmu:
+    """An FMU that has been written.
+
+    platforms  the folders of its binaries, such as `linux64`; none for an FMU that contains sources only
+    remark     why there is no binary; empty if there is one
+    """
+
+    path: Path
+    platforms: tuple[str, ...]
+    remark: str
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class FmuPackage:
+    """An FMU without its binary.
+
+    provenance  lines of the comment at the beginning of each file
+    sources     C sources and headers by name, without those of the standard
+    adjoint     whether the instance has adjoint derivatives
+    """
+
+    about: FmuDescription
+    provenance: Sequence[str]
+    sources: Mapping[str, str]
+    adjoint: bool = False
+
+    def files(self, fmi: int) -> dict[str, bytes]:
+        """The files by their paths in the FMU."""
+        name, places = self.about.name, {"provenance": block_comment(self.provenance), "file": self.about.name}
+        if fmi == 3:
+            places["adjoint"] = filled("adjoint.h", {}, name) if self.adjoint else ""
+        texts = {
+            **self.sources,
+            f"fmi{fmi}.c": filled(f"fmi{fmi}.c", places, name),
+            **{file: template(f"fmi/{file}") for file in HEADERS[fmi]},
+        }
+        if fmi == 3:
+            texts["fmi3_absent.h"] = filled("fmi3_absent.h", {}, name)
+            texts["buildDescription.xml"] = _build_description(name, self.about.units(fmi))
+        page = PAGE.format(html.escape(self.about.title), html.escape("\n".join(self.provenance)))
+        files = {"modelDescription.xml": self.about.text(fmi), "documentation/index.html": page}
+        files |= {f"sources/{file}": text for file, text in texts.items()}
+        return {file: text.encode("utf-8", "replace") for file, text in files.items()}
+
+    def write(
+        self, path: str | Path, fmi: int, binary: bool = True, platforms: Sequence[Platform] = ()
+    ) -> WrittenFmu:  # fmt: skip
+        """Write the FMU, with binaries for this machine or for platforms. Raises ParameterError and FileError."""
+        target = Path(path)
+        content, folders, remark = self.content(fmi, binary, platforms)
+        with atomic_folder(target.parent) as staging:
+            (staging / target.name).write_bytes(content)
+        return WrittenFmu(target, tuple(folders), remark)
+
+    def content(
+        self, fmi: int, binary: bool = True, platforms: Sequence[Platform] = ()
+    ) -> tuple[bytes, list[str], str]:
+        """The bytes of the FMU, the folders of its binaries, and why there are none."""
+        files, folders, remark = self.files(fmi), list[str](), "none was requested"
+        if binary:
+            folders, libraries, remark = self._binaries(fmi, files, platforms)
+            files |= libraries
+        return archive(files, "modelDescription.xml"), folders, remark
+
+    def _binaries(
+        self, fmi: int, files: Mapping[str, bytes], platforms: Sequence[Platform]
+    ) -> tuple[list[str], dict[str, bytes], str]:
+        """Folders and files of the binaries; without platforms that of this machine, or none and the reason."""
+        sources = {file.removeprefix("sources/"): text for file, text in files.items() if file.startswith("sources/")}
+        name, folders, libraries = self.about.name, list[str](), dict[str, bytes]()
+        for target in platforms or [this_platform()]:
+            try:
+                library = target.compile(sources, self.about.units(fmi), name)
+            except ParameterError as reason:
+                if platforms:
+                    raise
+                return [], {}, str(reason)
+            folders.append(target.folder(fmi))
+            libraries[f"binaries/{folders[-1]}/{name}{target.suffix}"] = library
+        return folders, libraries, ""
+
+
+def check_target(path: str | Path, fmi: int, suffix: str = ".fmu") -> Path:
+    """The path of a file to write. Raises ParameterError for a version that FMI has not, and for another suffix."""
+    target = Path(path)
+    if fmi not in VERSIONS:
+        raise ParameterError(f"FMI {fmi} is not supported; allowed: 2 or 3.")
+    if target.suffix != suffix:
+        raise ParameterError(f"'{target.name[:80]}' must end in {suffix}, as importers expect.")
+    return target
+
+
+def token_of(*content: object) -> str:
+    """The text that an importer passes on, so that description and binary belong together: a hash of the content."""
+    return f"{{{hashlib.sha256(json.dumps([str(each) for each in content]).encode()).hexdigest()[:32]}}}"
+
+
+def archive(files: Mapping[str, bytes], first: str) -> bytes:
+    """A ZIP file of these files, with the description first; all times are those that ZIP begins with."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as zipped:
+        for file in sorted(files, key=lambda file: (file != first, file)):
+            entry = zipfile.ZipInfo(file)
+            entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
+            zipped.writestr(entry, files[file])
+    return buffer.getvalue()
+
+
+def _build_description(name: str, units: Sequence[str]) -> str:
+    lines = "".join(f'      <SourceFile name="{unit}"/>\n' for unit in units)
+    return (
+        '<?xml version="1.0" encoding="UTF-8"?>\n<fmiBuildDescription fmiVersion="3.0">\n'
+        f'  <BuildConfiguration modelIdentifier="{name}">\n    <SourceFileSet language="C99">\n{lines}'
+        "    </SourceFileSet>\n  </BuildConfiguration>\n</fmiBuildDescription>\n"
+    )

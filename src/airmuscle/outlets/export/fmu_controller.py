@@ -1,0 +1,240 @@
+"""Controllers as FMUs for Co-Simulation, and a control loop as an SSP package: FMUs of plant and controller, joined."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+import numpy as np
+
+from ...core.atomic_output import atomic_folder
+from ...core.errors import ParameterError
+from ...engine.compile.text.c import CLanguage
+from ...engine.loop.control_loop import MEASURED, SETPOINT, ControlLoop
+from ...engine.loop.controller import named_signal_units
+from ...engine.loop.inputs import Schedule
+from ...engine.run import Problem, solve
+from ...engine.run.sampled_loop import SampledLoop, prepare_loop
+from ...engine.state import column_units
+from .c_text import c_array, c_number, c_strings
+from .fmi_description import FmuExperiment, FmuDescription
+from .fmi_package import FmuPackage, WrittenFmu, archive, check_target, token_of
+from .fmi_units import base_powers, has_unit
+from .fmi_variables import PARAMETERS, Variable, checked
+from .fmu import fmu_package
+from .platforms import Platform
+from .printed_controller import PrintedController, check_control_law, print_controller
+from .provenance import block_comment
+from .targets import program_name
+from .templates import filled
+from .write import checked_name
+
+STRUCTURE, COMMON = (f"http://ssp-standard.org/SSP1/SystemStructure{kind}" for kind in ("Description", "Common"))
+"""Namespaces of SSP 1.0."""
+FMU_TYPE = "application/x-fmu-sharedlibrary"
+
+
+def write_controller_fmu(
+    problem: Problem, path: str | Path, *, fmi: int = 3, name: str = "", title: str = "", binary: bool = True,
+    platforms: Sequence[Platform] = (),
+) -> WrittenFmu:  # fmt: skip
+    """Write the control law of a problem as an FMU for Co-Simulation, without the plant.
+
+    problem  a plant with a ControlLoop, whose sample time, ranges and set points at its start are those of the FMU;
+             drivers between commands and openings are not in the FMU, which its documentation states
+
+    Inputs are the measured columns and `setpoint.NAME`, outputs the commands; all parameters of the law are tunable. At
+    a sampling instant the commands follow from the inputs at once; the step that begins there holds them. Other
+    arguments and errors are those of `write_fmu`.
+    """
+    target = check_target(path, fmi)
+    return controller_package(problem, fmi, name, title).write(target, fmi, binary, platforms)
+
+
+def controller_package(problem: Problem, fmi: int, name: str = "", title: str = "") -> FmuPackage:
+    """The FMU of the control law of a problem, without its binary."""
+    loop = check_control_law(problem)
+    prepared = prepare_loop(problem, loop.init(problem.start_time))
+    chosen = checked_name(name) or program_name(title or type(loop.controller).__name__)
+    printed = print_controller(prepared, chosen, title, None)
+    variables = _variables(problem, loop, printed, prepared)
+    start = [float(v.start or 0.0) for v in variables if v.causality == "input"]
+    token = token_of(*variables, *printed.source_files().values(), fmi)
+    outputs = [v.reference for v in variables if v.causality == "output"]
+    known = [v.reference for v in variables if v.causality == "input"]
+    about = FmuDescription(
+        chosen, printed.provenance[0], token, variables, dict.fromkeys(outputs, known), 0,
+        FmuExperiment(problem.start_time, float(prepared.instants[-1]), step=loop.sample_time), has_states=False,
+    )  # fmt: skip
+    instance = _instance(printed, token, problem.start_time, loop.sample_time, start)
+    return FmuPackage(about, printed.provenance, {f"{chosen}_instance.h": instance})
+
+
+def _variables(
+    problem: Problem, loop: ControlLoop, printed: PrintedController, prepared: SampledLoop
+) -> list[Variable]:
+    """Time, measurements, set points, commands and parameters, in the order of the template `controller_instance.h`."""
+    law, known = printed.law, problem.compiled.description
+    units = {
+        **named_signal_units(law), **{n: u for n, u in column_units(problem.system, known.output_names).items() if u},
+    }  # fmt: skip
+    first = _first_row(problem)
+    variables = [Variable("time", 0, "independent", unit="s", description="time")]
+
+    def add(name: str, causality: str, **attributes: object) -> None:
+        variables.append(Variable(name, len(variables), causality, **attributes))  # type: ignore[arg-type]
+
+    for column in law.measured_columns:
+        add(
+            column,
+            "input",
+            start=first[f"{MEASURED}{column}"],
+            unit=units.get(column, ""),
+            description=f"{column}, measured",
+        )
+    for signal, value in zip(law.setpoints, prepared.setpoint_values[0].tolist(), strict=True):
+        add(f"{SETPOINT}{signal}", "input", start=value, unit=units.get(signal, ""), description=f"{signal} wanted")
+    for command, (low, high) in zip(law.inputs, printed.ranges, strict=True):
+        about = f"command of {command}, held for {loop.sample_time:g} s"
+        add(
+            command, "output", variability="discrete", initial="calculated", minimum=low, maximum=high,
+            unit=units.get(command, ""), description=about,
+        )  # fmt: skip
+    for leaf in printed.tunable:
+        low, high = leaf.declared.bounds
+        about = f"{leaf.declared.symbol}: {leaf.declared.meaning}"
+        add(
+            f"{PARAMETERS}.{leaf.path}", "parameter", variability="tunable", initial="exact", start=float(leaf.value),
+            minimum=low, maximum=high, unit=leaf.declared.unit, description=about,
+        )  # fmt: skip
+    return checked(variables)
+
+
+def _first_row(problem: Problem) -> dict[str, float]:
+    """All columns at the first sample of a loop."""
+    loop = check_control_law(problem)
+    short = dataclasses.replace(problem, duration=min(problem.duration, loop.sample_time), output_times=None)
+    recording = solve(short).raise_if_incomplete().recording
+    return {name: float(recording[name][0]) for name in recording}
+
+
+def _instance(
+    printed: PrintedController, token: str, start: float, sample_time: float, inputs: Sequence[float]
+) -> str:  # fmt: skip
+    """The C source of an instance."""
+    name, law = printed.name, printed.law
+    bounds = [leaf.declared.bounds for leaf in printed.tunable]
+    parameters = f"[{name.upper()}_PARAMETERS + 1]"
+    memory = np.array([float(v) for v in law.initial_memory.values()])
+    constants = (
+        c_array(f"static const double {name}_initial_memory[{name.upper()}_MEMORY + 1]", memory, 1),
+        c_array(f"static const double {name}_start_inputs[]", inputs, 1),
+        c_array(f"static const double {name}_defaults{parameters}", [float(leaf.value) for leaf in printed.tunable], 1),
+        c_array(f"static const double {name}_lowest{parameters}", [low for low, _ in bounds], 1),
+        c_array(f"static const double {name}_highest{parameters}", [high for _, high in bounds], 1),
+        c_strings(
+            f"static const char *const {name}_parameter_names{parameters}", [leaf.path for leaf in printed.tunable]
+        ),
+    )
+    counts = {
+        "memory": len(law.initial_memory), "measurements": len(law.measured_columns),
+        "setpoints": len(law.setpoints), "commands": len(law.inputs), "parameters": len(printed.tunable),
+    }  # fmt: skip
+    places = {key: str(count) for key, count in counts.items()} | {
+        "provenance": block_comment(printed.provenance), "token": token, "period": c_number(sample_time),
+        "start": c_number(start), "constants": "".join(constants),
+        "functions": printed.sample_in(CLanguage("double", f"{name}_")),
+    }  # fmt: skip
+    return filled("controller_instance.h", places, name)
+
+
+def write_ssp(
+    problem: Problem, path: str | Path, *, fmi: int = 3, name: str = "", title: str = "",
+    tunable: Sequence[str] | None = None, binary: bool = True, platforms: Sequence[Platform] = (),
+) -> WrittenFmu:  # fmt: skip
+    """Write a plant with its control loop as an SSP 1.0 package: two FMUs, and how they are joined.
+
+    The inputs of the package are the set points and the inputs of the plant that the loop does not command; their start
+    values are those of the problem. The step of the default experiment is the sample time. Raises ParameterError for a
+    loop with drivers, which would stand between the FMUs; other arguments and errors are those of `write_fmu`.
+    """
+    target = check_target(path, fmi, ".ssp")
+    loop = check_control_law(problem)
+    if loop.drivers:
+        raise ParameterError(
+            f"an SSP package joins plant and controller directly; there are drivers of {', '.join(loop.drivers)}. "
+            "Leave drivers out, or export the loop to C, JavaScript or Octave, which have them."
+        )
+    base = checked_name(name) or program_name(title or type(problem.system).__name__)
+    first = _first_row(problem)
+    inputs = {n: ((problem.start_time, first[n]),) for n in problem.compiled.description.input_names}
+    open_loop = dataclasses.replace(problem, input=Schedule(inputs), control_state=None)
+    packages = {
+        "plant": fmu_package(open_loop, fmi, f"{base}_plant", title, tunable),
+        "controller": controller_package(problem, fmi, f"{base}_controller", title),
+    }
+    files, folders, remark = dict[str, bytes](), list[str](), ""
+    for part, package in packages.items():
+        files[f"resources/{part}.fmu"], folders, remark = package.content(fmi, binary, platforms)
+    files["SystemStructure.ssd"] = _structure(base, {part: p.about for part, p in packages.items()}).encode()
+    with atomic_folder(target.parent) as staging:
+        (staging / target.name).write_bytes(archive(files, "SystemStructure.ssd"))
+    return WrittenFmu(target, tuple(folders), remark)
+
+
+def _structure(name: str, parts: dict[str, FmuDescription]) -> str:
+    """The file SystemStructure.ssd of a plant and a controller."""
+    root = Element("ssd:SystemStructureDescription", {
+        "xmlns:ssd": STRUCTURE, "xmlns:ssc": COMMON, "version": "1.0", "name": name,
+    })  # fmt: skip
+    system = SubElement(root, "ssd:System", name=name)
+    inside = {part: _ports(about) for part, about in parts.items()}
+    joined = [
+        (a, signal, b) for a, b in (("plant", "controller"), ("controller", "plant"))
+        for signal, v in inside[a].items() if v.causality == "output"
+        and signal in inside[b] and inside[b][signal].causality == "input"
+    ]  # fmt: skip
+    taken = {(b, signal) for _, signal, b in joined}
+    outside = [
+        (part, v) for part, ports in inside.items() for v in ports.values()
+        if v.causality == "input" and (part, v.name) not in taken
+    ]  # fmt: skip
+    _connectors(system, [v for _, v in outside])
+    elements = SubElement(system, "ssd:Elements")
+    for part, ports in inside.items():
+        component = SubElement(
+            elements, "ssd:Component", name=part, type=FMU_TYPE, source=f"resources/{part}.fmu"
+        )  # fmt: skip
+        _connectors(component, list(ports.values()))
+    connections = SubElement(system, "ssd:Connections")
+    for part, v in outside:
+        SubElement(connections, "ssd:Connection", startConnector=v.name, endElement=part, endConnector=v.name)
+    for a, signal, b in joined:
+        ends = {"startElement": a, "startConnector": signal, "endElement": b, "endConnector": signal}
+        SubElement(connections, "ssd:Connection", ends)
+    _units(root, sorted({v.unit for ports in inside.values() for v in ports.values() if has_unit(v.unit)}))
+    experiment = parts["controller"].experiment
+    SubElement(root, "ssd:DefaultExperiment", startTime=repr(experiment.start), stopTime=repr(experiment.stop))
+    indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, encoding="unicode") + "\n"
+
+
+def _ports(about: FmuDescription) -> dict[str, Variable]:
+    """Inputs and outputs of an FMU by name."""
+    return {v.name: v for v in about.variables if v.causality in ("input", "output")}
+
+
+def _connectors(parent: Element, variables: Sequence[Variable]) -> None:
+    connectors = SubElement(parent, "ssd:Connectors")
+    for v in variables:
+        connector = SubElement(connectors, "ssd:Connector", name=v.name, kind=v.causality)
+        SubElement(connector, "ssc:Real", {"unit": v.unit} if has_unit(v.unit) else {})
+
+
+def _units(root: Element, names: Sequence[str]) -> None:
+    units = SubElement(root, "ssd:Units")
+    for name in names:
+        powers = base_powers(name) or {}
+        SubElement(SubElement(units, "ssc:Unit", name=name), "ssc:BaseUnit", {b: str(p) for b, p in powers.items()})
