@@ -65,7 +65,10 @@ COMMANDS = (
     CommandRow("tune", "tune", "tune", "Tune the controller of a scenario for a family of plants."),
     CommandRow("benchmark", "benchmark", "benchmark", "Benchmark controllers of a joint on common tasks."),
     CommandRow(
-        "export", "export", "export", "Export to C, JavaScript, MATLAB, FMU, SSP, MuJoCo, Modelica, PyTorch, Warp or ONNX."
+        "export",
+        "export",
+        "export",
+        "Export to C, JavaScript, MATLAB, FMU, SSP, MuJoCo, Modelica, PyTorch, Warp or ONNX.",
     ),
     CommandRow("studio", "studio", "studio", "Show muscles and plants in the browser."),
     CommandRow("schema", "schema", "schema", "Print the JSON schema of scenario or muscle files."),

@@ -13,7 +13,7 @@ from ...physics.plant.diagnostics import column_limits, describe_limit
 from ...physics.plant.plant import Plant
 from .c_source import CSource
 from .c_text import c_array, c_number, c_string, c_strings
-from .fmi_description import FmuExperiment, FmuDescription
+from .fmi_description import FmuDescription, FmuExperiment
 from .fmi_package import FmuPackage, WrittenFmu, check_target, token_of
 from .fmi_units import has_unit
 from .fmi_variables import first_inputs, make_variables, references_of

@@ -19,7 +19,7 @@ from ...engine.run import Problem, solve
 from ...engine.run.sampled_loop import SampledLoop, prepare_loop
 from ...engine.state import column_units
 from .c_text import c_array, c_number, c_strings
-from .fmi_description import FmuExperiment, FmuDescription
+from .fmi_description import FmuDescription, FmuExperiment
 from .fmi_package import FmuPackage, WrittenFmu, archive, check_target, token_of
 from .fmi_units import base_powers, has_unit
 from .fmi_variables import PARAMETERS, Variable, checked
