@@ -68,7 +68,7 @@ COMMANDS = (
         "export",
         "export",
         "export",
-        "Export to C, JavaScript, MATLAB, FMU, MuJoCo, Modelica, PyTorch, Warp or ONNX.",
+        "Export to C, MATLAB, FMU, MuJoCo, PyTorch and other targets.",
     ),
     CommandRow("studio", "studio", "studio", "Show muscles and plants in the browser."),
     CommandRow("schema", "schema", "schema", "Print the JSON schema of scenario or muscle files."),

@@ -102,7 +102,7 @@ def export(
     sources_only: SourcesOnly = False, platforms: Platforms = None, muscle: MuscleName = "",
     precision: PrecisionName = "double", processor: ProcessorName = "", json: Json = False,
 ) -> None:  # fmt: skip
-    """Export to C, JavaScript, MATLAB, FMU, MuJoCo, Modelica, PyTorch, Warp or ONNX.
+    """Export to C, MATLAB, FMU, MuJoCo, PyTorch and other targets.
 
     \b
     The program contains the equations of the plant, the integrator, and a run of the scenario that writes CSV; in C,
