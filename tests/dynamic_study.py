@@ -56,3 +56,14 @@ def noisy_run(scenario: Path, rng: np.random.Generator, deviations: Mapping[str,
     run = load_scenario(scenario).simulate()
     noisy = {name: run[name] + deviation * rng.standard_normal(len(run)) for name, deviation in deviations.items()}
     return {"time": run["time"], **noisy}
+
+
+def variant(folder: Path, **changes: str) -> Path:
+    """The study with pieces of its text replaced, in a file of its own beside the records."""
+    text = (folder / "study.toml").read_text(encoding="utf-8")
+    for was, becomes in changes.values():
+        assert was in text
+        text = text.replace(was, becomes)
+    path = folder / "variant.toml"
+    path.write_text(text, encoding="utf-8")
+    return path

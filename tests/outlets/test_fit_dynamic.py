@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import airmuscle
-from dynamic_study import VALVES, noisy_run, plant_table, run_table
+from dynamic_study import VALVES, noisy_run, plant_table, run_table, variant
 
 from airmuscle.bench import CrossPrediction, InitialValue, StartTime, describe_cross_predictions, read_csv, write_csv
 from airmuscle.core import leaves
@@ -56,17 +56,6 @@ def folder(tmp_path_factory) -> Path:
     study = plant_table(WEIGHT, **START) + INPUT + ASKED + RECORD.format("run1.csv") + RECORD.format("run2.csv")
     (place / "study.toml").write_text(study, encoding="utf-8")
     return place
-
-
-def variant(folder: Path, **changes: str) -> Path:
-    """The study with pieces of its text replaced, in a file of its own beside the records."""
-    text = (folder / "study.toml").read_text(encoding="utf-8")
-    for was, becomes in changes.values():
-        assert was in text
-        text = text.replace(was, becomes)
-    path = folder / "variant.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
 
 
 def test_what_the_records_were_made_with_is_found_written_and_simulated(folder, tmp_path):

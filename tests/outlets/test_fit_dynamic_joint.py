@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import airmuscle
-from dynamic_study import noisy_run
+from dynamic_study import noisy_run, variant
 
 import airmuscle as am
 from airmuscle.bench import InitialConditions, write_csv
@@ -154,29 +154,18 @@ def test_the_scenario_begins_at_the_initial_pressure_of_each_muscle(folder, fitt
     assert outputs["right.pressure"] == pytest.approx(found["initial right.pressure of record 1"])
 
 
-def study_with(folder: Path, **changes: str) -> Path:
-    """The study with pieces of its text replaced, in a file of its own."""
-    text = (folder / "study.toml").read_text(encoding="utf-8")
-    for was, becomes in changes.values():
-        assert was in text
-        text = text.replace(was, becomes)
-    path = folder / "variant.toml"
-    path.write_text(text, encoding="utf-8")
-    return path
-
-
 def test_every_muscle_begins_at_its_own_recorded_pressure_unless_its_own_is_stated(folder):
     (default,) = load_dynamic_fit(folder / "study.toml").experiments
     known = default.initial_conditions.known
     assert known["left.pressure"] == pytest.approx(1.5e5, abs=1500.0)
     assert known["right.pressure"] == pytest.approx(3e5, abs=1500.0)
     state = '"first.csv"\ninitial_state = { "left.pressure" = "1.4 bar", angle = "5 deg" }'
-    (stated,) = load_dynamic_fit(study_with(folder, state=('"first.csv"', state))).experiments
+    (stated,) = load_dynamic_fit(variant(folder, state=('"first.csv"', state))).experiments
     assert stated.initial_conditions.known["left.pressure"] == 1.4e5
     assert stated.initial_conditions.known["right.pressure"] == known["right.pressure"]
     assert stated.initial_conditions.known["angle"] == pytest.approx(np.radians(5.0))
     both = '"first.csv"\ninitial_state = { pressure = "2 bar" }'
-    (equal,) = load_dynamic_fit(study_with(folder, state=('"first.csv"', both))).experiments
+    (equal,) = load_dynamic_fit(variant(folder, state=('"first.csv"', both))).experiments
     assert [equal.initial_conditions.known[f"{side}.pressure"] for side in ("left", "right")] == [2e5, 2e5]
 
 
@@ -192,7 +181,7 @@ def test_every_muscle_begins_at_its_own_recorded_pressure_unless_its_own_is_stat
     ],
 )  # fmt: skip
 def test_an_initial_state_that_is_none_is_refused(folder, tmp_path, was, becomes, message):
-    done = airmuscle("fit-dynamic", study_with(folder, it=(was, becomes)), "--out", tmp_path / "out")
+    done = airmuscle("fit-dynamic", variant(folder, it=(was, becomes)), "--out", tmp_path / "out")
     assert done.exit_code == 1
     assert message in " ".join(done.stderr.split())
     assert not (tmp_path / "out").exists()
@@ -233,7 +222,7 @@ def test_two_muscles_that_lift_one_load_begin_at_their_own_pressures(folder):
 
 
 def test_an_unknown_of_a_record_on_its_bound_is_noted_in_the_fit_and_in_the_prediction(folder, fitted, tmp_path):
-    narrow = study_with(
+    narrow = variant(
         folder, margin=('"3 kPa"', '"0.2 kPa"'),
         state=('"first.csv"', '"first.csv"\ninitial_state = { "left.pressure" = "1.45 bar" }'),
     )  # fmt: skip
