@@ -23,8 +23,8 @@ from airmuscle.bench.identify import (
     fit_nonlinear,
     slope_constraints,
 )
-from airmuscle.bench.identify.correlation_index import correlation_index
-from airmuscle.bench.identify.surface.monotone import FALLS_WITH_PRESSURE
+from airmuscle.bench.identify.statistics import correlation_index
+from airmuscle.bench.identify.surface.monotonicity import FALLS_WITH_PRESSURE
 from airmuscle.core import autodiff
 from airmuscle.errors import IdentificationError
 from airmuscle.papers.borzikova_surfaces import sample

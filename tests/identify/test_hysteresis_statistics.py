@@ -31,8 +31,7 @@ from airmuscle.bench.identify.hysteresis import (
     force_amplitude,
     parameters_on_bounds,
 )
-from airmuscle.bench.identify.hysteresis.creep import _fit_elements
-from airmuscle.bench.identify.hysteresis.holds import _drifts
+from airmuscle.bench.identify.hysteresis.creep import _drifts, _fit_elements
 from airmuscle.errors import AirmuscleWarning, ColumnError, IdentificationError
 from airmuscle.physics import Dahl, IdentifiedFriction, MaxwellSlip
 from airmuscle.recording import Recording

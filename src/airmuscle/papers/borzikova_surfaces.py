@@ -9,9 +9,9 @@ import numpy as np
 
 import airmuscle as am
 
-from ..bench.identify.correlation_index import CorrelationIndex, correlation_index
+from ..bench.identify.statistics import CorrelationIndex, correlation_index
 from ..bench.identify.surface.basis import LoadRange
-from ..bench.identify.surface.monotone import fit_monotone
+from ..bench.identify.surface.monotonicity import fit_monotone
 from ..core.errors import AirmuscleWarning
 from ..files.library.entry_file import load_law
 from ..physics.muscle.characteristic.borzikova import SAM_30X290, PlaneCurves

@@ -11,7 +11,7 @@ import airmuscle as am
 
 from ..bench.identify.surface.basis import Basis, Chebyshev, LoadRange, Monomials, conditioning
 from ..bench.identify.surface.exponential import SurfaceFit, fit_linearised, fit_nonlinear
-from ..bench.identify.surface.monotone import find_monotonicity_violations
+from ..bench.identify.surface.monotonicity import find_monotonicity_violations
 from ..core.units import bar, percent
 from ..physics.muscle.characteristic.borzikova import PlaneCurves
 from ..report.chapter import Table

@@ -13,8 +13,8 @@ from ...core.short_repr import ShortRepr
 from ...physics.muscle.characteristic.base import Characteristic
 from ...physics.muscle.characteristic.validity_range import ValidityRange
 from ...recording import Recording
-from .censoring import UNCENSORED
 from .static_fit import fit
+from .weighting import UNCENSORED
 
 GRID_POINTS = 24
 """Grid points in pressure and in contraction for the fit; the error is evaluated on a grid with one more of each."""

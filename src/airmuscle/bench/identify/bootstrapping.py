@@ -18,10 +18,10 @@ from ...recording import Recording
 from .cross_validation import GroupSplit, LevelSplit, default_split
 from .fit_points import FitPoints
 from .group_refits import GroupRefits, KnownMinima, RowIndices
-from .loss import LeastSquares
 from .problem import FitProblem
 from .result import Fit
 from .solver import LeastSquaresSolution, design_matrix, is_linear, solve_iteratively, solve_least_squares
+from .weighting import LeastSquares
 
 MIN_GROUPS = 5
 """Minimum number of groups. G groups give (2G - 1)!/(G! (G - 1)!) different samples, 35 with G = 4; an end of a 95 %

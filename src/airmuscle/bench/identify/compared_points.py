@@ -21,14 +21,13 @@ from .cross_validation import Labels, specimen_name
 from .fit_points import FitPoints
 from .force_evaluation import evaluate_force, slack_rows
 from .group_refits import GroupRefits
-from .loss import LeastSquares, Loss
 from .pooling import Pooling, make_pooling
 from .problem import FitProblem
 from .result import Fit
-from .slack_bounds import with_slack_bounds
-from .slack_rows import SlackPull, pull_limit, slack_pull
+from .slack import SlackPull, pull_limit, slack_pull, with_slack_bounds
 from .solver import LeastSquaresSolution, design_matrix, is_linear
 from .static_fit import refit
+from .weighting import LeastSquares, Loss
 
 FORCE_MARGIN = 3.0
 """Limit of the force of laws that give contraction or pressure, in maxima of the measured force (chosen)."""

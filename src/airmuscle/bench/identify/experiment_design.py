@@ -20,9 +20,9 @@ from ...core.errors import IdentificationError, ParameterError
 from ...physics.muscle.characteristic.base import Characteristic
 from ...physics.muscle.characteristic.validity_range import ValidityRange
 from ...recording import Recording
-from .censoring import UNCENSORED
 from .identifiability import EXACT_RANK_TOLERANCE, UndeterminedCombination, analyse_identifiability
 from .problem import make_problem
+from .weighting import UNCENSORED
 
 LEVEL_COUNT = 13
 """Levels of pressure, and of contraction, of the candidate runs; chosen."""

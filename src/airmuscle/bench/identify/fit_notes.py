@@ -9,15 +9,14 @@ import numpy as np
 from ...core.arrays import Array
 from ...core.errors import Hint, HintedText
 from .branch_residuals import branch_distance, branch_notes
-from .censoring import UNCENSORED, Censoring, default_censoring
-from .data_checks.scatter import Remarks, Scatter
+from .data_checks import Remarks, Scatter
 from .fit_points import FitPoints
-from .loss import LeastSquares, Loss
 from .problem import FORCE, FitProblem
 from .result import Fit
 from .solver import LeastSquaresSolution
 from .specimen_effects import SpecimenEffects
 from .statistics import FitStatistics
+from .weighting import UNCENSORED, Censoring, LeastSquares, Loss, default_censoring
 
 NO_EFFECT = 0.05
 """Effective number of parameters of the specimen effects below which the specimens do not differ (chosen)."""

@@ -17,13 +17,12 @@ from ...physics.muscle.characteristic.base import Characteristic, ForceLaw
 from ...recording import Recording
 from ..segment import ISOBARIC, ISOMETRIC, find_runs
 from ..segment.runs import RELATIVE_BAND
-from .censoring import Censoring, default_censoring, force_limits
+from .contradictions import RepeatedRows, find_repeated_rows
 from .cross_validation import specimen_name
 from .data_checks import DataChecks
 from .parameter_covariance import Runs
 from .problem import RESTING_LENGTH, FitProblem, fitted_quantity_of, make_problem
-from .repeated_rows import RepeatedRows, find_repeated_rows
-from .weights import sensor_deviations
+from .weighting import Censoring, default_censoring, force_limits, sensor_deviations
 
 LEVEL_BAND = 0.1
 """Maximum range of a pressure that counts as constant in a run, as a fraction of its maximum (chosen)."""

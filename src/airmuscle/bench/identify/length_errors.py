@@ -20,12 +20,12 @@ from ...recording import Recording
 from .candidates import blank_surface
 from .cross_validation import specimen_name
 from .fit_points import FitPoints
-from .loss import LeastSquares
 from .model_evidence import effective_sample_size
 from .pooling import population_of
 from .problem import evaluate
 from .solver import solve_least_squares
 from .static_fit import refit
+from .weighting import LeastSquares
 
 PRIOR_STD = 2e-3
 """Standard deviation [m] of the error of a resting length before the fit (chosen: a ruler between two fittings)."""

@@ -14,9 +14,7 @@ from ...core.arrays import Array
 from ...core.errors import IdentificationError
 from ...physics.muscle.characteristic import Characteristic, ContractileSurface, PooledLengthLaw
 from ...recording import Recording
-from .bounded_effects import BoundedRows, bounded_coefficients
 from .candidates import UNREACHED_FORCE
-from .correlation_index import correlation_index
 from .cross_validation import specimen_name
 from .fit_points import FitPoints
 from .model_evidence import batch_sample_size
@@ -24,10 +22,10 @@ from .parameter_covariance import Runs
 from .pooled_covariance import EffectRows, PooledCovariance, estimate_pooled_covariance
 from .problem import RESTING_LENGTH, SPECIMEN, FitProblem, evaluate, of_length
 from .result import Fit
-from .row_errors import WorstPoint, rms_of_rows, row_errors
-from .slack_rows import PULL_RATIO, Slackness
+from .slack import PULL_RATIO, Slackness
 from .solver import design_matrix
-from .specimen_effects import SpecimenEffects, predict_effects
+from .specimen_effects import BoundedRows, SpecimenEffects, bounded_coefficients, predict_effects
+from .statistics import WorstPoint, correlation_index, rms_of_rows, row_errors
 
 Rows = npt.NDArray[np.bool_]
 DECAY_RANGE = 0.05

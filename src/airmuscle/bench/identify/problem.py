@@ -18,7 +18,7 @@ from ...physics.muscle.characteristic import PooledLengthLaw
 from ...physics.muscle.characteristic.base import Characteristic, ContractionLaw, ForceLaw, PressureLaw
 from ...recording import Recording
 from ...recording.columns import QUANTITIES
-from .censoring import UNCENSORED, Censoring
+from .weighting import UNCENSORED, Censoring
 
 RESTING_LENGTH = "resting_length"
 """Column with the resting length [m] of every row, in data of several specimens."""

@@ -18,14 +18,13 @@ from ...physics.muscle.characteristic.base import Characteristic
 from ...physics.muscle.characteristic.validity_range import ValidityRange
 from ...recording import Recording
 from ...recording.notebook import Card, NotebookDisplay
-from .correlation_index import CorrelationIndex
-from .data_checks.scatter import Remarks, Scatter
-from .loss import Loss
+from .data_checks import Remarks, Scatter
 from .parameter_covariance import ParameterCovariance
 from .plot import plot_fit
 from .problem import CONTRACTION, FORCE, FitProblem, FittedQuantity, evaluate
-from .row_errors import WorstPoint
 from .specimen_effects import SpecimenEffects
+from .statistics import CorrelationIndex, WorstPoint
+from .weighting import Loss
 
 
 @dataclasses.dataclass(frozen=True)

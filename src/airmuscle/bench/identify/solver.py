@@ -12,9 +12,9 @@ from ...core.errors import Hint, IdentificationError
 from ...core.tree import Leaf
 from .censored_least_squares import is_determined_without_censored, solve_censored_least_squares
 from .gauss_newton import gauss_newton
-from .loss import LeastSquares, Loss
 from .problem import FitProblem
 from .variable_projection import find_initial_values, is_linear_parameter
+from .weighting import LeastSquares, Loss
 
 SEARCH_STAGES = (("trf", 100), ("dogbox", 500), ("trf", 500))
 """Methods and maximum evaluations; each starts where the previous one stopped without convergence (chosen).

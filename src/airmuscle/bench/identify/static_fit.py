@@ -9,26 +9,59 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import tree
-from ...core.errors import IdentificationError
+from ...core.annotation import one_line
+from ...core.errors import IdentificationError, ParameterError
 from ...physics.muscle.characteristic import PooledLengthLaw
 from ...physics.muscle.characteristic.base import Characteristic
 from ...recording import Recording
 from ..checks.contractions import MAX_CONTRACTION
-from .censoring import Censoring
-from .correlation_index import correlation_index
-from .fit_arguments import check_arguments
 from .fit_notes import Examination, collect_notes, loss_scale_notes, weighting_notes
 from .fit_points import FitPoints
 from .gauss_newton import gauss_newton
-from .loss import LeastSquares, Loss
 from .pooling import check_poolable, pool, refit_pooled
 from .problem import FitProblem, evaluate
 from .result import Estimate, Fit
-from .row_errors import WorstPoint, rms_of_rows, row_errors
-from .slack_bounds import solve_bounded
+from .slack import solve_bounded
 from .solver import LeastSquaresSolution, is_linear
-from .statistics import FitStatistics, check_determined, check_determined_by_levels, compute_statistics
+from .statistics import (
+    FitStatistics,
+    WorstPoint,
+    check_determined,
+    check_determined_by_levels,
+    compute_statistics,
+    correlation_index,
+    rms_of_rows,
+    row_errors,
+)
 from .variable_projection import find_initial_values
+from .weighting import Censoring, LeastSquares, Loss
+
+
+def check_arguments(characteristic: object, recording: object) -> None:
+    """Raise ParameterError for a characteristic or a recording of another type."""
+    if not isinstance(characteristic, Characteristic):
+        raise ParameterError(
+            f"fit: {_describe_argument(characteristic)} is not a characteristic. Give one, for example "
+            f"{_initial_law(characteristic)}."
+        )
+    runs = recording if isinstance(recording, Sequence) and not isinstance(recording, str) else [recording]
+    for run in runs:
+        if not isinstance(run, Recording):
+            raise ParameterError(
+                f"fit: {one_line(run)} is not a Recording. Give one, as returned by read, read_csv or simulate."
+            )
+
+
+def _describe_argument(argument: object) -> str:
+    return f"the class {argument.__name__}" if isinstance(argument, type) else one_line(argument)
+
+
+def _initial_law(argument: object) -> str:
+    """A characteristic to fit as an expression, of the class of the argument if that is a class of characteristics."""
+    if isinstance(argument, type) and issubclass(argument, Characteristic):
+        values = ".blank(degree=5)" if hasattr(argument, "blank") else "(...) with initial values"
+        return f"an object of the class, {argument.__name__}{values}"
+    return "load(...).characteristic"
 
 
 def fit(

@@ -11,7 +11,7 @@ from ...bench.identify.compared_points import law_of_length
 from ...bench.identify.cross_validation import specimen_name
 from ...bench.identify.left_out import widening
 from ...bench.identify.prediction import RecordPrediction, predict_static
-from ...bench.identify.prediction.fitted_range import length_notes
+from ...bench.identify.prediction.result import length_notes
 from ...bench.identify.problem import fitted_quantity_of
 from ...bench.readers.plausibility import CONTRACTION_RANGE
 from ...core.errors import ColumnError, Hint, ParameterError

@@ -11,7 +11,7 @@ import typer
 
 from ...bench.identify.dynamic import CrossPrediction, DynamicFit, describe_cross_predictions
 from ...bench.identify.dynamic.dynamic_chapter import dynamic_chapters
-from ...bench.identify.dynamic.profile import DynamicProfile
+from ...bench.identify.dynamic.problem import DynamicProfile
 from ...bench.segment import inspect
 from ...core.atomic_output import atomic_folder, check_writable
 from ...files.scenario.identification import DynamicFitSetup, load_dynamic_fit

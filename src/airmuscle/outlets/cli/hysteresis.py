@@ -9,11 +9,11 @@ from typing import Annotated, Any
 
 import typer
 
+from ...bench.identify.branch_residuals import delay_notes, find_delay
 from ...bench.identify.campaign import HeldCreep, fit_held_creep, free_of_creep
-from ...bench.identify.data_checks import delay_notes, find_delay
 from ...bench.identify.hysteresis import JointFit, LoopFit, find_loops, fit_jointly, fit_loop, loops_not_joined
 from ...bench.identify.hysteresis.hysteresis_chapter import hysteresis_chapters
-from ...bench.identify.hysteresis.selection import SelectedFriction, select_friction
+from ...bench.identify.hysteresis.joint import SelectedFriction, select_friction
 from ...bench.readers.reading_chapter import reading_chapters
 from ...core.atomic_output import atomic_folder, check_writable
 from ...files.library.entry import Entry

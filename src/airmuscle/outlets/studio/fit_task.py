@@ -21,7 +21,7 @@ import airmuscle as am
 from ...bench.identify.compare_chapter import compare_chapters
 from ...bench.identify.hysteresis import LoopFit, find_loops, fit_jointly, fit_loop, loops_not_joined, preferred_fit
 from ...bench.identify.hysteresis.hysteresis_chapter import hysteresis_chapters
-from ...bench.identify.hysteresis.selection import select_friction
+from ...bench.identify.hysteresis.joint import select_friction
 from ...bench.identify.law_selection import LawSelection, select_law
 from ...bench.identify.specimen_errors import odd_specimen_notes, ranked_specimen_errors
 from ...bench.segment import check_contents, motion_direction

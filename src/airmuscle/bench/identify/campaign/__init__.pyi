@@ -26,9 +26,9 @@ from .record import classify_records as classify_records
 from .release_stage import ReleaseStage as ReleaseStage
 from .release_stage import fit_release_stage as fit_release_stage
 from .rig import check_one_rig as check_one_rig
+from .rows import LeftOutStage as LeftOutStage
 from .rows import held_steady as held_steady
 from .rows import with_force as with_force
-from .stage import LeftOutStage as LeftOutStage
 from .static_stage import StaticStage as StaticStage
 from .static_stage import fit_static_stage as fit_static_stage
 from .transient import count_pulses as count_pulses

@@ -15,8 +15,7 @@ from ....recording import Recording
 from ..hysteresis import fit_creep
 from ..hysteresis.creep import MIN_RATIO, CreepFit
 from .record import CampaignRecord
-from .rows import displacement, thin
-from .stage import LeftOutStage
+from .rows import LeftOutStage, displacement, thin
 from .transient import find_motion
 
 NAME = "creep"

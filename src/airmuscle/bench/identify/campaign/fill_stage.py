@@ -15,21 +15,24 @@ from ....physics.muscle.geometry import Geometry
 from ....physics.plant.plant import Plant
 from ....physics.pneumatics import FillDischarge
 from ..dynamic import CommandInstants, DynamicFit, Experiment, StartTime, fit_dynamic
-from ..dynamic.ambient import describe_ambient
+from ..dynamic.experiment import describe_ambient
 from .fill_records import (
+    CONDUCTANCE,
+    DISCHARGE,
     HEAT_TRANSFER_BOUNDS,
+    ValveUnknowns,
     at_record,
     detected_experiment,
     held_contraction,
     instant_margin,
+    poor_ratios,
     pressure_deviation,
     rescaled,
     vessel_plant,
     with_instants,
 )
 from .record import CampaignRecord
-from .stage import LeftOutStage
-from .valve_unknowns import CONDUCTANCE, DISCHARGE, ValveUnknowns, poor_ratios
+from .rows import LeftOutStage
 from .volume import VolumeChange, VolumeEstimate, relate_volumes
 
 NAME = "fills and volume"

@@ -1,9 +1,10 @@
-"""Friction of all loops of a campaign together, with its dependence on the pressure."""
+"""Friction of all loops of a campaign together, with its dependence on the pressure, and the force along a record."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from ....physics.muscle import CreepElements
 from ....physics.muscle.friction import Friction, NoFriction
 from ....recording import Recording
 from ...segment.sensor import estimate_noise
+from ..force_evaluation import evaluate_force
 from ..hysteresis import (
     HysteresisLoop,
     JointFit,
@@ -26,8 +28,7 @@ from ..hysteresis import (
 )
 from .creep_stage import creep_force
 from .record import CampaignRecord, RecordKind
-from .rows import PREDICTED_ROWS, displacement, held_steady, path_rows, with_force
-from .stage import LeftOutStage
+from .rows import PREDICTED_ROWS, LeftOutStage, displacement, held_steady, path_rows, with_force
 
 NAME = "hysteresis"
 CURVE_DEGREE = 5
@@ -145,3 +146,17 @@ def friction_along(friction: Friction, recording: Recording) -> Array:
     force = np.asarray(friction.force_along(path, None if time is None else time[rows]))
     factor = np.asarray(friction.pressure_factor(recording["pressure"][rows]))
     return np.asarray(np.interp(np.arange(len(recording)), rows, factor * force))
+
+
+def predicted_force(
+    law: Any, recording: Recording, friction: Friction, creep: CreepElements, max_force: float
+) -> Array:
+    """The force [N] along the pressure and the motion of a recording, negative where the muscle is slack; shape (N,).
+
+    Friction and creep are relaxed at the first row; they need the constant `resting_length`, and are left out without
+    it. `max_force` [N] limits the force of laws that give contraction or pressure. Raises ColumnError.
+    """
+    force = evaluate_force(law, recording["pressure"], recording["contraction"], max_force)
+    if recording.constants.get("resting_length") is None:
+        return force
+    return force - friction_along(friction, recording) - creep_force(creep, recording)

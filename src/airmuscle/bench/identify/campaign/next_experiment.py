@@ -14,7 +14,7 @@ from ..experiment_design import BenchLimits, ExperimentPlan, PlannedRun, optimal
 from .creep_stage import CreepStage
 from .fill_stage import FillStage
 from .record import CampaignRecord
-from .stage import LeftOutStage
+from .rows import LeftOutStage
 from .static_stage import StaticStage
 
 PLANNED_RUNS, PLANNED_POINTS = 4, 15

@@ -18,8 +18,7 @@ from ....physics.pneumatics import ClosedChamber
 from ....physics.pneumatics.gas import Polytropic
 from ..dynamic import DynamicFit, Experiment, InitialConditions, StartTime, fit_dynamic, stated_ambient
 from .record import CampaignRecord
-from .rows import displacement, thin
-from .stage import LeftOutStage
+from .rows import LeftOutStage, displacement, thin
 from .transient import find_motion
 
 NAME = "release"

@@ -1,4 +1,5 @@
-"""Rows of a record for fits: thinned along the time, with steps of the displacement beyond its noise."""
+"""Common parts of the stages of a campaign: rows of a record for fits, thinned along the time, with steps of the
+displacement beyond its noise; a stage without a result."""
 
 from __future__ import annotations
 
@@ -11,6 +12,21 @@ from ....core.arrays import Array
 from ....recording import Recording
 from ...segment.runs import CONTRACTION_BAND
 from ...segment.sensor import estimate_noise
+
+
+@dataclasses.dataclass(frozen=True)
+class LeftOutStage:
+    """A stage without a result: its name, the reason, and what to measure, as phrases."""
+
+    name: str
+    reason: str
+    remedy: str
+
+    @property
+    def verdict(self) -> str:
+        """The reason and what to measure, as sentences."""
+        return f"Not identified: {self.reason.rstrip('.')}. To identify it, {self.remedy.rstrip('.')}."
+
 
 MAX_ROWS = 160
 """Maximum number of rows of a record for a fit of friction (chosen)."""

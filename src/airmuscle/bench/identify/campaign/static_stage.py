@@ -18,8 +18,7 @@ from .creep_stage import creep_force
 from .error_band import ErrorBand, calibrate, calibrate_held
 from .friction_stage import friction_along
 from .record import CampaignRecord, slow_rows, static_levels
-from .rows import is_held, thin, with_force
-from .stage import LeftOutStage
+from .rows import LeftOutStage, is_held, thin, with_force
 
 NAME = "static characteristic"
 FIT_ROWS, MIN_FIT_ROWS = 1000, 25

@@ -14,7 +14,7 @@ from ....recording.recording import column_heading
 from ....report.chapter import Chapter, Plot, Table
 from ..uncertainty_chapter import NORMAL_QUANTILE, UNBOUNDED
 from . import CrossPrediction, DynamicFit, describe_cross_predictions
-from .profile import DynamicProfile
+from .problem import DynamicProfile
 
 MAX_OPTIMA = 8
 """Maximum number of optima in a table; the lowest are shown."""

@@ -17,8 +17,7 @@ from ....physics.muscle.characteristic.base import Characteristic
 from ....physics.muscle.friction import Friction, LoopScales
 from ....recording import Recording
 from ...segment import motion_direction
-from .axis import MILLIMETRES, Axis
-from .limits import data_limits, resolved_stiffness
+from .limits import MILLIMETRES, Axis, data_limits, resolved_stiffness
 from .result import HysteresisFit, assess_fit
 from .search import free_parameters, search_parameters
 from .series import LoopSeries

@@ -1,8 +1,10 @@
-"""Joint fit of one friction law to the loops of several runs, with a force scale that depends on the pressure."""
+"""Joint fit of one friction law to the loops of several runs, with a force scale that depends on the pressure, and
+selection of the friction that is written."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,7 +15,7 @@ from ..identifiability import UndeterminedCombination
 from ..model_evidence import aicc, effective_sample_size, f_test_p_value
 from .agreement import agreement_of_run, force_amplitude
 from .fit import make_loop_series
-from .joint_result import JointFit
+from .joint_result import JointFit, preferred_fit
 from .limits import combine_limits
 from .loops import LoopFit
 from .result import SIGNIFICANCE_LEVEL, HysteresisFit
@@ -172,3 +174,26 @@ def _assess(
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
+
+
+class SelectedFriction(NamedTuple):
+    """The friction to write, with the range of its data, the file or files it is from, and its verdict."""
+
+    friction: Friction
+    origin: str
+    verdict: str
+
+
+def select_friction(fits: Sequence[LoopFit], joint: Sequence[JointFit]) -> SelectedFriction | None:
+    """The friction to write: of all runs together or, if they are not several, of the only run a plant can use."""
+    if joint:
+        best = preferred_fit(joint)
+        if best is None:
+            return None
+        origin = f"{len(best.series)} runs"
+        return SelectedFriction(identified_friction(best.friction, best.series), origin, best.verdict)
+    usable = [fit.recommended for fit in fits if fit.recommended is not None and fit.usable_in_plant]
+    if not usable:
+        return None
+    only = max(usable, key=lambda fit: fit.effective_sample_size)
+    return SelectedFriction(identified_friction(only.friction, (only.series,)), only.series.origin, only.verdict)

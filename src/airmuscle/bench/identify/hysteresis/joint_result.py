@@ -1,9 +1,11 @@
-"""JointFit: one friction law for several runs, its dependence on pressure, and whether it holds for each run."""
+"""JointFit: one friction law for several runs, its dependence on pressure, and whether it holds for each run;
+preference among justified laws."""
 
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -12,11 +14,10 @@ from ....physics.muscle.friction import Friction, PressureScaledFriction
 from ....recording.notebook import Card, NotebookDisplay
 from ..identifiability import UndeterminedCombination
 from ..model_evidence import format_p_value
-from .agreement import RunAgreement
-from .amplitude_plot import plot_amplitudes
-from .axis import MILLIMETRES
-from .limits import DataLimits, combine_limits, limit_reservations, undetermined_parameters
-from .result import SIGNIFICANCE_LEVEL
+from .agreement import RunAgreement, plot_amplitudes
+from .limits import MILLIMETRES, DataLimits, combine_limits, limit_reservations, undetermined_parameters
+from .result import SIGNIFICANCE_LEVEL, HysteresisFit
+from .search import free_parameters
 from .series import LoopSeries
 
 
@@ -145,3 +146,26 @@ class JointFit(NotebookDisplay):
 def _unit_text(leaf: Leaf) -> str:
     """The unit of a parameter, empty for a dimensionless one."""
     return "" if leaf.declared.unit == "1" else leaf.declared.unit
+
+
+SIMILAR_RMSE = 1.02
+"""Maximum ratio of the rms errors of two laws that describe the data equally well (chosen)."""
+AnyFit = TypeVar("AnyFit", HysteresisFit, JointFit)
+
+
+def preferred_fit(fits: Sequence[AnyFit]) -> AnyFit | None:
+    """The fit to use of several laws, lowest AICc first; None where the data justify none.
+
+    It is the justified one with the lowest AICc. Where the data do not determine all of its parameters, or do not judge
+    them one by one because it consists of elements, it is the one with the fewest parameters among those whose rms
+    error is at most 2 % greater.
+    """
+    justified = [fit for fit in fits if fit.justified]
+    if not justified or not _is_open(justified[0]):
+        return justified[0] if justified else None
+    similar = [fit for fit in justified if fit.rmse <= SIMILAR_RMSE * justified[0].rmse]
+    return min(similar, key=lambda fit: free_parameters(fit.friction))
+
+
+def _is_open(fit: HysteresisFit | JointFit) -> bool:
+    return bool(fit.undetermined) or any("[" in leaf.path for leaf in leaves(fit.friction))

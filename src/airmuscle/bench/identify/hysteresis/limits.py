@@ -14,7 +14,6 @@ from ....core.tree import Leaf, leaves
 from ....physics.muscle.friction import Friction
 from ...segment.sensor import estimate_noise
 from ..identifiability import UndeterminedCombination
-from .axis import Axis
 
 SPEED_INTERVALS = 40
 """Intervals of the path over each of which a speed is measured, so that noise of the path has no effect (chosen)."""
@@ -30,6 +29,35 @@ MAX_REPEATED = 0.1
 """Share of the rows that repeat a reading during the motion, above which a step is that of a reading (chosen)."""
 AMPLITUDE_QUANTILE = 0.95
 """Quantile of the forces without the static curve that counts as the amplitude of the hysteresis (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Axis:
+    """The axis on which a path [m] is plotted: its label, and the factor from metres to its unit.
+
+    `si_unit` is the SI unit of the driving quantity, of which `si_factor` correspond to a metre.
+    """
+
+    label: str
+    factor: float
+    si_unit: str = "m"
+    si_factor: float = 1.0
+
+    def display(self, value: float, unit: str) -> tuple[float, str]:
+        """The value and unit of a parameter of the friction with the driving quantity in place of the displacement."""
+        if self.si_unit == "m":
+            return value, "" if unit == "1" else unit
+        conversions = {
+            "m": (value * self.si_factor, self.si_unit),
+            "m/s": (value * self.si_factor, f"{self.si_unit}/s"),
+            "N/m": (value / self.si_factor, f"N/{self.si_unit}"),
+            "N s/m": (value / self.si_factor, f"N s/{self.si_unit}"),
+            "1": (value, ""),
+        }
+        return conversions.get(unit, (value, unit))
+
+
+MILLIMETRES = Axis("displacement [mm]", 1e3)
 
 
 @dataclasses.dataclass(frozen=True)

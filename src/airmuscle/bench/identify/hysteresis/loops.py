@@ -35,8 +35,8 @@ from .fit import (
     initial_friction_laws,
     make_loop_series,
 )
+from .joint_result import preferred_fit
 from .limits import speed_reservation
-from .preference import preferred_fit
 from .result import HysteresisFit
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from ....core.arrays import Array
 from ....core.plotting import DASHES, LINES, given_axes, legend_below, new_figure, relabel_in_display_units
 from ....physics.muscle.friction import Friction
-from .axis import MILLIMETRES, Axis
+from .limits import MILLIMETRES, Axis
 from .series import LoopSeries
 
 TURNING_POINTS = (2.0, -2.0, -0.6, -1.1, -0.6, 0.5, -0.3, 0.5, 2.0)

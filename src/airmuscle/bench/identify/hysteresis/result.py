@@ -13,10 +13,9 @@ from ....physics.muscle.friction import Friction
 from ....recording.notebook import Card, NotebookDisplay
 from ..identifiability import UndeterminedCombination
 from ..model_evidence import aicc, effective_sample_size, f_test_p_value, format_p_value
-from . import branches
 from .limits import limit_reservations, parameters_on_bounds, undetermined_parameters
 from .plot import plot_hysteresis
-from .series import LoopSeries
+from .series import LoopSeries, branch_gap, repeat_difference
 
 SIGNIFICANCE_LEVEL = 0.01
 """p-value below which an F test is significant (chosen)."""
@@ -181,14 +180,14 @@ def assess_fit(
         plain_repeat_rmse = _rms(repeat.fitted_residuals(None))
         values = repeat.residuals(None, static)[repeat.fitted_rows]
         second_run = (repeat.path[repeat.fitted_rows], values, repeat.direction[repeat.fitted_rows])
-        repeatability = branches.repeat_difference(path, plain, direction, *second_run).rms / np.sqrt(2)
+        repeatability = repeat_difference(path, plain, direction, *second_run).rms / np.sqrt(2)
     return HysteresisFit(
         friction=friction,
         coefficients=coefficients,
         rmse=float(np.sqrt(square)),
         rmse_without_friction=float(np.sqrt(plain_square)),
-        gap=branches.branch_gap(path, plain, direction).rms,
-        residual_gap=branches.branch_gap(path, residuals, direction).rms,
+        gap=branch_gap(path, plain, direction).rms,
+        residual_gap=branch_gap(path, residuals, direction).rms,
         effective_sample_size=sample_size,
         aicc_reduction=aicc(plain_square, sample_size, base) - aicc(square, sample_size, base + free),
         p_value=f_test_p_value(plain_square, square, sample_size, base + free, free),

@@ -13,14 +13,28 @@ from ....core.errors import IdentificationError, ParameterError
 from ....core.short_repr import ShortRepr
 from ....engine.compile import System
 from ....engine.run.integrators import Integrator, Rodas4
-from ..dynamic.ambient import describe_other_ambient
-from ..dynamic.experiment import Experiment, InitialValue, ParameterPaths, RecordUnknown, Unknown, make_unknowns
+from ..dynamic.experiment import (
+    Experiment,
+    InitialValue,
+    ParameterPaths,
+    RecordUnknown,
+    Unknown,
+    describe_other_ambient,
+    make_unknowns,
+)
 from ..dynamic.fit import fit_dynamic
 from ..dynamic.record_model import ModelOutputs, RecordModel
 from ..dynamic.reliability import RECORD_CONSEQUENCE
 from ..dynamic.result import DynamicFit
-from .fitted_range import NOISY_MARGIN, range_notes, rate_notes, rows_outside, with_band_notes
-from .result import QuantityPrediction, RecordPrediction
+from .result import (
+    NOISY_MARGIN,
+    QuantityPrediction,
+    RecordPrediction,
+    range_notes,
+    rate_notes,
+    rows_outside,
+    with_band_notes,
+)
 
 NORMAL_QUANTILE = 1.959963984540054
 """97.5 % quantile of the normal distribution."""

@@ -1,15 +1,129 @@
-"""Predicted quantities of a record beside the measured ones, with their errors and 95 % bands."""
+"""Predicted quantities of a record beside the measured ones, with errors and 95 % bands, and where the record leaves
+the ranges of those of the fit: pressure, contraction, resting length and rates."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from ....core.arrays import Array
 from ....core.short_repr import ShortRepr
+from ....physics.muscle.characteristic.validity_range import ValidityRange
 from ....recording import Recording
+from ....recording.display_units import displayed
+from ...segment import rate_of_change
+
+LIMIT_MARGIN = 1e-3
+"""Noise of the sensors at the limits of the range of a law, relative to the range (chosen)."""
+NOISY_MARGIN = 0.05
+"""The same for the range of a noisy measured quantity (chosen)."""
+RATE_MARGIN = 1.25
+"""Ratio of the rate of a record to that of the fit from which it is outside (chosen)."""
+LENGTH_MARGIN = 1e-3
+"""Relative difference of two resting lengths that are the same (chosen)."""
+Ends = Mapping[str, tuple[float, float]]
+"""Lower and upper end of quantities [SI], by name."""
+NOT_THERE = "the stated band does not apply there"
+MIN_SHARE = 0.8
+"""Share of the rows within a 95 % band below which the band does not hold for a record (chosen)."""
+MIN_ROWS = 5
+"""Minimum number of compared rows for that statement (chosen)."""
+
+
+def ends_of(limits: ValidityRange | None) -> Ends:
+    """The ends of pressure [Pa] and contraction of a range; empty without one."""
+    return {} if limits is None else {"pressure": limits.pressure, "contraction": limits.contraction}
+
+
+def rows_outside(recording: Recording, ends: Ends, margin: float = LIMIT_MARGIN) -> npt.NDArray[np.bool_] | None:
+    """The mask (N,) of the rows with a quantity outside its ends; None without ends."""
+    masks = [_beyond(recording[name], *each, margin) for name, each in ends.items() if name in recording]
+    return np.asarray(np.logical_or.reduce(masks)) if masks else None
+
+
+def range_notes(recording: Recording, ends: Ends, margin: float = LIMIT_MARGIN) -> list[str]:
+    """The number of rows outside the range of the fit, with both ranges of each quantity that leaves it."""
+    outside = rows_outside(recording, ends, margin)
+    if outside is None or not outside.any():
+        return []
+    parts = [
+        f"{name} {_span(name, np.nanmin(recording[name]), np.nanmax(recording[name]))}, fitted {_span(name, *each)}"
+        for name, each in ends.items()
+        if name in recording and _beyond(recording[name], *each, margin).any()
+    ]
+    return [
+        f"{int(outside.sum())} of {len(recording)} rows are outside the range of the measurements of the fit "
+        f"({'; '.join(parts)}); {NOT_THERE}"
+    ]
+
+
+def rate_notes(recording: Recording, fitted: Mapping[str, float | None]) -> list[str]:
+    """The rates of change that exceed those of the fit [SI per s], by quantity; None where the fit has none."""
+    parts = []
+    for name, rate in fitted.items():
+        own = rate_of_change(recording, name)
+        if rate is not None and own > RATE_MARGIN * rate:
+            parts.append(f"{name} changes by up to {_per_second(name, own)}, in the fit by {_per_second(name, rate)}")
+    return [f"the record is faster than those of the fit: {'; '.join(parts)}; {NOT_THERE}"] if parts else []
+
+
+def length_notes(length: float | None, fitted: Sequence[float]) -> list[str]:
+    """A resting length [m] outside the range of those of the fit [m]."""
+    if length is None or not fitted:
+        return []
+    low, high = min(fitted), max(fitted)
+    if low * (1 - LENGTH_MARGIN) <= length <= high * (1 + LENGTH_MARGIN):
+        return []
+    span = displayed("length", low) if low == high else f"{displayed('length', low)} to {displayed('length', high)}"
+    return [f"the resting length, {displayed('length', length)}, is outside that of the fit, {span}; {NOT_THERE}"]
+
+
+def with_band_notes(prediction: RecordPrediction, differences: Sequence[str], usual: str) -> RecordPrediction:
+    """The prediction with a note for each quantity whose band does not hold: by how much, and the likely reason.
+
+    `differences` name what of the record lies outside the fit; where there are none, `usual` names the usual causes.
+    """
+    notes = []
+    for each in prediction.quantities:
+        if each.share is None or each.share >= MIN_SHARE or each.compared.sum() < MIN_ROWS:
+            continue
+        mean = float(np.mean(each.errors[each.compared]))
+        known = [*differences]
+        if prediction.outside is not None and (each.compared & prediction.outside).any():
+            known.insert(0, "rows outside the range of the fit" + _share_inside(each, prediction.outside))
+        reason = (
+            f"likely because of {', '.join(known)}" if known else f"nothing recorded explains it; usual are {usual}"
+        )
+        notes.append(
+            f"the 95 % band of the {each.name} does not hold for this record: {100 * each.share:.3g} % of the rows are "
+            f"within it, and the predicted {each.name} is {displayed(each.name, abs(mean))} too "
+            f"{'high' if mean > 0 else 'low'} on average; {reason}"
+        )
+    return dataclasses.replace(prediction, notes=(*prediction.notes, *notes))
+
+
+def _share_inside(quantity: QuantityPrediction, outside: npt.NDArray[np.bool_]) -> str:
+    rows = quantity.compared & ~outside
+    if quantity.half_width is None or not rows.any():
+        return ""
+    share = np.mean(np.abs(quantity.errors[rows]) <= quantity.half_width[rows])
+    return f" (inside it {100 * share:.3g} % are within the band)"
+
+
+def _beyond(values: Array, low: float, high: float, margin: float) -> npt.NDArray[np.bool_]:
+    allowed = margin * (high - low)
+    return np.asarray((values < low - allowed) | (values > high + allowed))
+
+
+def _span(name: str, low: float, high: float) -> str:
+    return f"{displayed(name, float(low))} to {displayed(name, float(high))}"
+
+
+def _per_second(name: str, rate: float) -> str:
+    return f"{displayed(name, rate)}/s"
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)

@@ -14,11 +14,18 @@ from ....physics.muscle.characteristic.base import Characteristic, ForceLaw
 from ....physics.muscle.characteristic.validity_range import ValidityRange
 from ....physics.muscle.friction import Friction, NoFriction
 from ....recording import Recording
-from ..campaign.predicted_force import predicted_force
+from ..campaign.friction_stage import predicted_force
 from ..compared_points import FORCE_MARGIN
 from ..problem import FORCE, evaluate, fitted_quantity_of
-from .fitted_range import ends_of, range_notes, rate_notes, rows_outside, with_band_notes
-from .result import QuantityPrediction, RecordPrediction
+from .result import (
+    QuantityPrediction,
+    RecordPrediction,
+    ends_of,
+    range_notes,
+    rate_notes,
+    rows_outside,
+    with_band_notes,
+)
 
 COLUMNS = ("pressure", "contraction", "force")
 """Columns that a static law relates."""

@@ -14,7 +14,7 @@ from ....core.arrays import Array
 from ....core.errors import IdentificationError
 from ....physics.muscle.characteristic.borzikova import BorzikovaExponential
 from ....recording import Recording
-from ..correlation_index import CorrelationIndex, correlation_index
+from ..statistics import CorrelationIndex, correlation_index
 from .basis import Chebyshev, Conditioning, LoadRange
 
 

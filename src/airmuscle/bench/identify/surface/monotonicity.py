@@ -1,15 +1,70 @@
-"""Monotonicity violations of a static law: regions where force or contraction has a slope of the wrong sign."""
+"""Monotonicity of static laws: regions with a slope of the wrong sign, and fits without them.
+
+On an interval (cell) a polynomial lies between its minimum and maximum Bernstein coefficient. Slopes whose Bernstein
+coefficients have the required sign on every cell therefore have it everywhere, not only on a grid.
+
+A muscle cannot become shorter under more load, nor longer under more pressure. In the exponential surface
+k = k_max (1 - exp v) decreases with v, and v is linear in its coefficients, so that these conditions are linear
+inequalities. They are imposed on the Bernstein coefficients of the slopes of v on a few cells.
+"""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+import itertools
+import math
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.polynomial import chebyshev
 
 from ....core import autodiff
 from ....core.arrays import Array
+from ....core.errors import IdentificationError
+from ....physics.muscle.characteristic.base import ContractionLaw
+from ....recording import Recording
+from .basis import LoadRange
+from .exponential import SurfaceFit, SurfaceProblem
+
+
+def bernstein_coefficients(columns: Callable[[Array], Array], size: int, cells: int) -> Array:
+    """Bernstein coefficients, on equal cells of -1..1, of polynomials of degree below `size`, one column each.
+
+    `columns` gives the values of the polynomials at N points, shape (N, polynomials).
+    """
+    t = np.linspace(0.0, 1.0, size) if size > 1 else np.array([0.5])
+    order = np.arange(size)
+    binomials = np.array([math.comb(size - 1, int(j)) for j in order])
+    bernstein = binomials * t[:, None] ** order * (1.0 - t[:, None]) ** (size - 1 - order)
+    edges = np.linspace(-1.0, 1.0, cells + 1)
+    by_cell = [np.linalg.solve(bernstein, columns(a + (b - a) * t)) for a, b in itertools.pairwise(edges)]
+    return np.asarray(np.vstack(by_cell))
+
+
+def solve_constrained_least_squares(matrix: Array, right: Array, rows: Array, minimum: float) -> Array:
+    """The x that minimises |matrix x - right| subject to rows x >= minimum.
+
+    With matrix = Q R and z = R x - Q^T right it is the shortest z with rows R^-1 z >= minimum - rows R^-1 Q^T right,
+    which Lawson and Hanson, Solving Least Squares Problems (1974), chapter 23, reduce to non-negative least squares.
+    Raises IdentificationError where no x satisfies the constraints.
+    """
+    from scipy.linalg import solve_triangular
+    from scipy.optimize import nnls
+
+    q, r = np.linalg.qr(matrix)
+    inner = solve_triangular(r, rows.T, trans="T").T
+    unconstrained = q.T @ right
+    bound = minimum - inner @ unconstrained
+    target = np.zeros(r.shape[0] + 1)
+    target[-1] = 1.0
+    dual, remainder = nnls(np.vstack([inner.T, bound]), target, maxiter=50 * len(rows))
+    residual = np.vstack([inner.T, bound]) @ dual - target
+    if remainder < 1e-12:
+        raise IdentificationError("no surface of this degree satisfies the shape constraints. Choose a higher degree.")
+    shortest = -residual[:-1] / residual[-1]
+    return np.asarray(solve_triangular(r, shortest + unconstrained))
+
 
 Range = tuple[float, float]
 _ROUNDING = 1e-9
@@ -92,3 +147,90 @@ def _connected_regions(
             MonotonicityViolation(rule, limits, second_limits, float(inside.mean()), worst_point, worst_slope)
         )
     return regions
+
+
+MIN_SLOPE = 1e-9
+"""Minimum slope of v on the validity range scaled to -1..1, so that rounding cannot change the sign; chosen."""
+
+
+RISES_WITH_FORCE = MonotonicityRule("contraction rises with force", "contraction", 1, 1.0)
+FALLS_WITH_PRESSURE = MonotonicityRule("contraction falls with pressure", "contraction", 0, -1.0)
+
+
+def find_monotonicity_violations(
+    law: ContractionLaw, validity_range: LoadRange | None = None, points: tuple[int, int] = (201, 201)
+) -> tuple[MonotonicityViolation, ...]:
+    """The regions of a validity range where k rises with F or falls with p, largest first.
+
+    `validity_range` is by default that of the law. Exact slopes are evaluated on an even grid of `points` pressures and
+    forces, edges included.
+    """
+    validity_range = validity_range or LoadRange.from_law(law)
+    return find_violations(law, (RISES_WITH_FORCE, FALLS_WITH_PRESSURE), *validity_range.grid(*points))
+
+
+def fit_monotone(
+    recording: Recording,
+    saturation: float,
+    *,
+    pressure_degree: int = 4,
+    force_degree: int = 2,
+    cells: tuple[int, int] = (16, 12),
+) -> SurfaceFit:
+    """Fit k by least squares with the constraint that it never rises with F and never falls with p.
+
+    `recording` has pressure [Pa], force [N] and contraction [1]; `saturation` is k_max [1]. The slopes are enclosed on
+    `cells` in pressure and force; more cells are slower and less conservative. The method is Gauss-Newton; each step
+    solves a least-squares problem with linear inequalities. Raises IdentificationError.
+    """
+    problem = SurfaceProblem.from_recording(recording, saturation, pressure_degree, force_degree)
+    constraints = slope_constraints(pressure_degree, force_degree, cells)
+    targets, weights = problem.linear_targets()
+    coefficients = solve_constrained_least_squares(
+        weights[:, None] * problem.design_matrix, weights * targets, constraints, MIN_SLOPE
+    )
+    for _ in range(200):
+        residuals = problem.predict(coefficients) - problem.contraction
+        jacobian = problem.jacobian(coefficients)
+        right = jacobian @ coefficients - residuals
+        step = solve_constrained_least_squares(jacobian, right, constraints, MIN_SLOPE) - coefficients
+        # where no fraction of the step reduces the sum of squares, only rounding errors are left
+        shorter = (t * step for t in 0.5 ** np.arange(20))
+        accepted = (s for s in shorter if _sum_of_squares(problem, coefficients + s) <= residuals @ residuals)
+        step = next(accepted, 0.0 * step)
+        coefficients = coefficients + step
+        if np.abs(step).max() < 1e-10:
+            return problem.build_fit(coefficients, "nonlinear least squares, monotone on the validity range")
+    raise IdentificationError(
+        f"{recording.origin}: the monotone fit did not converge in 200 steps. Choose a lower degree or fewer cells."
+    )
+
+
+def _sum_of_squares(problem: SurfaceProblem, coefficients: Array) -> float:
+    residuals = problem.predict(coefficients) - problem.contraction
+    return float(residuals @ residuals)
+
+
+def slope_constraints(pressure_degree: int, force_degree: int, cells: tuple[int, int]) -> Array:
+    """Rows g: v with Chebyshev coefficients c falls with p and rises with F on the validity range if all g @ c >= 0.
+
+    The rows are the Bernstein coefficients of -dv/dx and dv/dy on every cell. A polynomial lies between its minimum and
+    maximum Bernstein coefficient, so the condition is sufficient; on small cells it is nearly necessary.
+    """
+    falls_with_p = -np.kron(
+        _bernstein_matrix(pressure_degree, cells[0], slope=True), _bernstein_matrix(force_degree, cells[1], slope=False)
+    )
+    rises_with_f = np.kron(
+        _bernstein_matrix(pressure_degree, cells[0], slope=False), _bernstein_matrix(force_degree, cells[1], slope=True)
+    )
+    return np.vstack([falls_with_p, rises_with_f])
+
+
+def _bernstein_matrix(degree: int, cells: int, *, slope: bool) -> Array:
+    """Bernstein coefficients, on equal cells of -1..1, of T_0..T_degree or their slopes, one column each."""
+    if not slope:
+        return bernstein_coefficients(lambda x: np.asarray(chebyshev.chebvander(x, degree)), degree + 1, cells)
+    derivatives = [chebyshev.chebder(unit) for unit in np.eye(degree + 1)]
+    return bernstein_coefficients(
+        lambda x: np.column_stack([chebyshev.chebval(x, d) for d in derivatives]), degree, cells
+    )

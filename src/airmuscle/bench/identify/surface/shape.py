@@ -22,8 +22,13 @@ from ....physics.muscle.characteristic.validity_range import ValidityRange
 from ....recording import Recording
 from ..result import Fit
 from ..static_fit import fit
-from .bernstein import bernstein_coefficients, solve_constrained_least_squares
-from .monotonicity import MonotonicityRule, MonotonicityViolation, find_violations
+from .monotonicity import (
+    MonotonicityRule,
+    MonotonicityViolation,
+    bernstein_coefficients,
+    find_violations,
+    solve_constrained_least_squares,
+)
 
 _MIN_SLOPE = 1e-9
 """Minimum slope relative to the maximum force, on the validity range scaled to -1..1, so that rounding cannot change

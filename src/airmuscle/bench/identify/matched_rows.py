@@ -14,11 +14,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ....core.arrays import Array
-from ....recording import Recording
-from ....recording.columns import quantity_of
-from ...segment import branch_directions, find_branches, find_runs
-from ..cross_validation import specimen_name
+from ...core.arrays import Array
+from ...recording import Recording
+from ...recording.columns import quantity_of
+from ..segment import branch_directions, find_branches, find_runs
+from .cross_validation import specimen_name
 
 PRESSURE_REACH, CONTRACTION_REACH = 0.015, 0.004
 """Maximum distance of matched rows: in pressure, as a fraction of the highest, and in contraction (chosen)."""

@@ -1,0 +1,149 @@
+"""Checks of the data of a static fit: contradictions, outliers, sensor delays and scatter, as notes with their cause.
+
+They need no law. `DataChecks` joins them with the checks of `bench.checks`, for every static fit.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...core.errors import Hint, HintedText
+from ...recording import Recording
+from ..checks import find_suspicious, without_missing_codes
+from ..segment import Outlier, estimate_sensors, find_outliers
+from ..segment.remembered import remembered
+from ..segment.sensor import estimate_noise
+from .branch_residuals import SensorDelay, delay_notes, find_delay
+from .contradictions import contradiction_notes, repeatability
+from .matched_rows import match_rows
+from .weighting import Huber
+
+MAX_MISFIT = 3.0
+"""Ratio of the residual to the scatter of the data above which the law does not follow them (chosen)."""
+MIN_MISFIT = 0.02
+"""Minimum residual that is reported, as a fraction of the maximum force (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Scatter:
+    """Standard deviations of the force: of noise, and of runs at equal pressure, contraction and direction [N]; None
+    where the data do not show them. `branches` is the distance of the branches that the residuals follow [N]."""
+
+    noise: float | None
+    repeatability: float | None
+    branches: float = 0.0
+
+    @classmethod
+    def of(cls, recordings: Sequence[Recording], repeatability: float | None) -> Scatter:
+        """The scatter of recordings; the noise only where the rows are in order of time."""
+        timed = [run["force"] for run in recordings if "time" in run and "force" in run]
+        noise = [estimate_noise(force[np.isfinite(force)]) for force in timed]
+        return cls(float(np.median(noise)) if noise and np.median(noise) > 0 else None, repeatability)
+
+    def __str__(self) -> str:
+        """Both as text; empty if neither is known."""
+        parts = [] if self.noise is None else [f"noise {self.noise:.3g} N"]
+        if self.repeatability is not None:
+            parts.append(f"repeated runs differ by {np.sqrt(2.0) * self.repeatability:.3g} N")
+        if self.branches:
+            parts.append(f"branches {self.branches:.3g} N apart")
+        return ", ".join(parts)
+
+    def misfit_notes(self, rmse: float, greatest: float, lengths: int = 1) -> list[str]:
+        """The remark that a residual [N] is greater than the scatter explains.
+
+        A static law follows the middle of two branches. `greatest` is the maximum force of the data [N], `lengths` the
+        number of resting lengths that a law without an effect of the length is fitted to.
+        """
+        known = [each for each in (self.noise, self.repeatability) if each is not None]
+        expected = max([*known, 0.5 * self.branches], default=0.0)
+        if not known or rmse <= MAX_MISFIT * expected or rmse <= MIN_MISFIT * greatest:
+            return []
+        return [
+            f"The rms error, {rmse:.3g} N, is {rmse / expected:.2g} times the scatter of the data ({self}): the "
+            "law does not follow them. "
+            + (f"It is one law for {lengths} resting lengths. " if lengths > 1 else "")
+            + "Compare other laws, and check the remarks on contradicting or suspicious data."
+        ]
+
+
+@dataclasses.dataclass(frozen=True)
+class Remarks:
+    """Notes on a fit and its data, as sentences, and the scatter of the data."""
+
+    notes: tuple[str, ...]
+    scatter: Scatter | None
+
+
+MIN_DISTANCE = 0.02
+"""Minimum distance of an outlier of the force from its neighbours, as a fraction of the maximum force (chosen)."""
+MIN_SHARE = 0.002
+"""Minimum share of rows with such outliers that a fit reports (chosen)."""
+HUBER = 3.0
+"""Threshold of the proposed Huber loss, in standard deviations of the sensor."""
+
+
+def outlier_notes(recordings: Sequence[Recording]) -> list[str]:
+    """The remark on outliers of the force; empty where there are few, or where the rows are in no order of time."""
+    timed = [run for run in recordings if "time" in run and "force" in run and len(run)]
+    if not timed:
+        return []
+    sensors = estimate_sensors(timed)
+    greatest = float(np.nanquantile(np.concatenate([run["force"] for run in timed]), 0.99))
+    found = [
+        (run, outlier)
+        for run in timed
+        for outlier in find_outliers(run, {"force": sensors["force"]})
+        if abs(outlier.value - outlier.expected) > MIN_DISTANCE * greatest
+    ]
+    if len(found) < MIN_SHARE * sum(map(len, timed)):
+        return []
+    files = len({run.origin for run, _ in found})
+    examples = "; ".join(_describe_outlier(run, outlier) for run, outlier in found[:3])
+    return [
+        HintedText(
+            f"{len(found)} rows of {files} {'file' if files == 1 else 'files'} are suspected outliers of the force, "
+            f"which pull the law: {examples}.",
+            Hint("To leave them out", "drop_outliers", True, "read"),
+            Hint("To reduce their weight", "loss", Huber(_rounded(HUBER * sensors["force"].std))),
+        )
+    ]
+
+
+def _describe_outlier(run: Recording, outlier: Outlier) -> str:
+    return f"{run.origin}, row {outlier.row + 1} ({outlier.value:.4g} N, neighbours {outlier.expected:.4g} N)"
+
+
+def _rounded(scale: float) -> float:
+    """A scale with two significant digits."""
+    return float(f"{scale:.2g}")
+
+
+@dataclasses.dataclass(frozen=True)
+class DataChecks:
+    """What the recordings of a bench show without a law.
+
+    notes    what contradicts a static characteristic, as sentences with files and remedy
+    scatter  noise of the force sensor and repeatability of the force
+    delay    delay of the force after the pressure; None without one
+    """
+
+    notes: tuple[str, ...]
+    scatter: Scatter
+    delay: SensorDelay | None
+
+    @classmethod
+    def of(cls, recordings: Sequence[Recording]) -> DataChecks:
+        """The checks of recordings, without the rows in which a code stands for a missing value."""
+        return _check(recordings)
+
+
+@remembered
+def _check(recordings: Sequence[Recording]) -> DataChecks:
+    measured = without_missing_codes([recording for recording in recordings if len(recording)])
+    matches, delay = match_rows(measured), find_delay(measured)
+    found = (*contradiction_notes(matches), *outlier_notes(measured), *delay_notes(delay))
+    return DataChecks((*find_suspicious(recordings), *found), Scatter.of(measured, repeatability(matches)), delay)
