@@ -253,9 +253,8 @@ def stated_ambient(recording: Recording, default: Ambient | None = None) -> Ambi
 
     What it does not state is that of `default`, by default the standard atmosphere at 20 degC.
     """
-    stated = {
-        field: float(recording.constants[name]) for name, field in CONSTANTS.items() if name in recording.constants
-    }
+    known = recording.constants
+    stated = {field: float(known[name]) for name, field in CONSTANTS.items() if name in known}
     return dataclasses.replace(default or Ambient(), **stated)
 
 
