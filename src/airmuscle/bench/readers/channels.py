@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core.arrays import Array
 from ...core.errors import ColumnError
-from ...recording.heading import find_quantity_name
+from ...recording.heading import find_quantity_name, split_unit
 from .table import Cells, RawTable
 
 
@@ -134,8 +134,9 @@ def _make_table(
     has_time = any(find_quantity_name(c.name.partition(" ")[0].partition("_")[0]) == "time" for c in channels)
     if time is not None and not has_time:
         channels = [Channel("time", time - time[0], unit="s"), *channels]
-    headings = tuple(c.name for c in channels)
-    units = tuple("s" if np.asarray(c.values).dtype.kind in "Mm" else c.unit for c in channels)  # see `to_cells`
+    dated = [np.asarray(c.values).dtype.kind in "Mm" for c in channels]  # `to_cells` makes seconds of them
+    headings = tuple(split_unit(c.name)[0] if d else c.name for c, d in zip(channels, dated, strict=True))
+    units = tuple("s" if d else c.unit for c, d in zip(channels, dated, strict=True))
     columns = tuple(to_cells(c.values) for c in channels)
     rows = np.arange(1, len(channels[0].values) + 1)
     fields = frozenset(c.name for c in channels if not c.is_quantity)

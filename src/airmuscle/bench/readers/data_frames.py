@@ -31,11 +31,13 @@ def from_pandas(
         raise ParameterError(f"from_pandas: {type(frame).__name__} is not a pandas.DataFrame.")
     if any(name is not None for name in frame.index.names):
         frame = frame.reset_index()
-    headings = tuple(str(name) for name in frame.columns)
-    if not headings or not len(frame):
+    if not len(frame.columns) or not len(frame):
         raise ParameterError(f"from_pandas: {origin} has no columns or no rows.")
-    series = [frame.iloc[:, i] for i in range(len(headings))]
+    series = [frame.iloc[:, i] for i in range(len(frame.columns))]
     dates = [each.dtype.kind in "Mm" for each in series]
+    headings = tuple(
+        split_unit(str(name))[0] if dated else str(name) for name, dated in zip(frame.columns, dates, strict=True)
+    )  # dates become seconds whatever unit the heading states
     row = tuple("s" if each else "" for each in dates) if any(dates) else None
     columns = tuple(map(_cells, series))
     table = RawTable(origin, headings, row, columns, np.arange(len(frame)), "row", {}, _notes_on_dates(series))
