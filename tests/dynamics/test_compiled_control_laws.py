@@ -197,6 +197,10 @@ def test_lqg_gains_are_those_of_python_control():
         ({"measurement_noise": {"position": 1.0}}, "measurement_noise has no number for 'pressure'"),
         ({"process_noise": {"air_mas": 1.0}}, "process_noise names 'air_mas'.*Did you mean 'air_mass'"),
         ({"permitted_integral": {"position": -1.0}}, "'position' is -1.0; it must be positive"),
+        ({"permitted_integral": None}, "give either permitted_integral, for integral action, or disturbed"),
+        ({"disturbed": ("speed",)}, "give either permitted_integral, for integral action, or disturbed"),
+        ({"disturbed": ("sped",)}, "disturbed names 'sped'.*Did you mean 'speed'"),
+        ({"disturbed": ("speed",), "permitted_integral": None}, "process_noise has no number for 'speed.disturbance'"),
         (
             {"measured": ("mass_flow", "position"), "measurement_noise": {"mass_flow": 1.0, "position": 1.0}},
             "'mass_flow' depends on the inputs at once",
@@ -212,6 +216,26 @@ def test_an_incomplete_design_is_refused(changes, message):
     }  # fmt: skip
     with pytest.raises(ParameterError, match=message):
         design_lqg(model, 0.01, **{**given, **changes})
+
+
+def test_an_observed_disturbance_leaves_no_offset_at_any_set_point():
+    """A load that the model does not know, and steps of the set point: the observer replaces integral action."""
+    start = am.find_equilibrium(LIFT, pressure=2e5)
+    model = linearise(LIFT, start, {"fill": 0.05, "discharge": 0.05})
+    law = design_lqg(
+        model, 0.01, measured=("pressure", "position"), controlled=("position",), disturbed=("speed", "air_mass"),
+        permitted={"position": 5e-4, "fill": 0.5, "discharge": 0.5},
+        process_noise={"air_mass": 1e-5, "speed": 0.1, "speed.disturbance": 10.0, "air_mass.disturbance": 1e-4},
+        measurement_noise={"pressure": 500.0, "position": 1e-5},
+    )  # fmt: skip
+    assert law.integral_gain == ()
+    assert law.state_names[-2:] == ("speed.disturbance", "air_mass.disturbance")
+    heavier = dataclasses.replace(LIFT, mechanism=dataclasses.replace(LIFT.mechanism, mass=1.1 * LIFT.mechanism.mass))
+    y = start["position"]
+    aims = Schedule({"position": ((0.0, y), (1.0, y + 1e-3), (3.0, y - 1e-3))})
+    run = am.simulate(heavier, ControlLoop(law, 0.01, aims), duration=5.0, initial_state=start, output_times=0.01)
+    for time, aim in ((2.99, y + 1e-3), (4.99, y - 1e-3)):
+        assert np.interp(time, run["time"], run["position"]) == pytest.approx(aim, abs=2e-6)
 
 
 def test_the_seed_of_the_noise_varies_in_a_batch_and_each_row_is_its_own_run():

@@ -6,6 +6,7 @@ from .estimation import StateEstimate as StateEstimate
 from .estimation import StateEstimator as StateEstimator
 from .estimation import UnscentedKalmanFilter as UnscentedKalmanFilter
 from .estimation import consistency_band as consistency_band
+from .estimation import design_adrc as design_adrc
 from .estimation import design_lqg as design_lqg
 from .estimation import design_predictive as design_predictive
 from .estimation import normalised_error_squared as normalised_error_squared

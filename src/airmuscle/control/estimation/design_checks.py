@@ -6,6 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from ...core.errors import ParameterError, suggestion
 
+DISTURBANCE = ".disturbance"
+"""End of the name of an estimated disturbance, after that of its state."""
+
 
 def check_known(owner: str, argument: str, names: Iterable[str], known: Sequence[str]) -> None:
     """Raise ParameterError, with the nearest name, for a name that is not known."""

@@ -1,23 +1,44 @@
-"""Linear-quadratic Gaussian design: a sampled state feedback with observer for a linearised plant."""
+"""Designs of a sampled state feedback with observer: linear-quadratic Gaussian, active disturbance rejection."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ...core.arrays import Array
 from ...core.errors import ParameterError
+from ...core.reference import Reference
 from ...physics.analysis.linear_model import LinearModel
 from ..laws.state_feedback import StateFeedback
-from .design_checks import check_numbers
-from .riccati import discretised, observer_gain, regulator
+from .design_checks import DISTURBANCE, check_known, check_numbers
+from .riccati import discretised, disturbance_observer, place_observer, regulator, sampled_plant, steady_target
+
+HAN2009 = Reference(
+    key="han-2009",
+    authors="Han, J.",
+    title="From PID to active disturbance rejection control",
+    where="IEEE Transactions on Industrial Electronics 56(3):900-906",
+    year=2009,
+    doi="10.1109/TIE.2008.2011621",
+    note="extended state observer",
+)
+GAO2003 = Reference(
+    key="gao-2003",
+    authors="Gao, Z.",
+    title="Scaling and bandwidth-parameterization based controller tuning",
+    where="Proceedings of the American Control Conference, Denver, 4989-4996",
+    year=2003,
+    doi="10.1109/ACC.2003.1242516",
+    note="bandwidths of controller and observer as parameters",
+)
 
 
 def design_lqg(
     model: LinearModel, sample_time: float, *, measured: Sequence[str], controlled: Sequence[str],
-    permitted: Mapping[str, float], permitted_integral: Mapping[str, float], process_noise: Mapping[str, float],
-    measurement_noise: Mapping[str, float],
+    permitted: Mapping[str, float], process_noise: Mapping[str, float], measurement_noise: Mapping[str, float],
+    permitted_integral: Mapping[str, float] | None = None, disturbed: Sequence[str] = (),
 ) -> StateFeedback:  # fmt: skip
     """The state feedback with observer that minimises a quadratic cost of a linearised plant at a sample time [s].
 
@@ -25,48 +46,132 @@ def design_lqg(
     permitted               maximum permitted deviation of states and inputs, for Bryson's rule: weight 1/d^2; every
                             input needs one, a state without one has the weight 0
     permitted_integral      the same for the integral of the error of every controlled column [unit s]
-    process_noise           standard deviation of states after 1 s of noise; states without one have none
+    disturbed               instead of integrals: states to whose rate an unknown constant is added, which the observer
+                            estimates ("speed.disturbance") and the command compensates; the set point has a gain
+    process_noise           standard deviation of states after 1 s of noise, also of disturbances; others have none
     measurement_noise       standard deviation of every measured column
 
     The plant is discretised exactly for held inputs; cost and process noise are discretised to first order in the
     sample time. The gains are those of the discrete algebraic Riccati equations. Raises ParameterError for an unknown
-    name, a number that is not positive, a measured column with direct feedthrough, or a plant that these inputs do not
-    stabilise or these columns do not detect.
-    Reference: Franklin, Powell and Workman (1998), chapters 8 and 9.
+    name, a number that is not positive, a measured column with direct feedthrough, a plant that these inputs do not
+    stabilise or these columns do not detect, and for both or none of `permitted_integral` and `disturbed`.
+    References: Franklin, Powell and Workman (1998), chapters 8 and 9; Rawlings, Mayne and Diehl (2017), chapter 1, for
+    the disturbances.
     """
-    selected = model.select(outputs=list(measured))
+    extra = tuple(f"{name}{DISTURBANCE}" for name in disturbed)
+    _check(model, measured, controlled, permitted, permitted_integral, disturbed)
+    _check_noise(model, measured, extra, process_noise, measurement_noise)
+    scale = _scales(model, permitted, process_noise)
+    n = len(model.states)
+    a, b, by_disturbance = sampled_plant(model, sample_time, scale, np.ones(len(model.inputs)), disturbed)
+    c = model.select(outputs=list(measured)).C * scale
+    z = c[[list(measured).index(name) for name in controlled]]
+    weights = [(s / permitted[i]) ** 2 if i in permitted else 0.0 for i, s in zip(model.states, scale, strict=True)]
+    integrals = {name: 1.0 / value**2 for name, value in (permitted_integral or {}).items()}
+    costs = np.diag([1.0 / permitted[name] ** 2 for name in model.inputs])
+    by_state, by_integral = _regulator_gains(
+        (a, b, z[: len(integrals)]), [*weights, *(integrals[name] for name in controlled if integrals)], costs,
+        sample_time,
+    )  # fmt: skip
+    setpoint = np.zeros((len(b.T), 0))
+    if disturbed:
+        from_disturbance, from_setpoint = steady_target("design_lqg", a, b, by_disturbance, z)
+        setpoint = from_setpoint[n:] + by_state @ from_setpoint[:n]
+        by_state = np.hstack([by_state, -(from_disturbance[n:] + by_state @ from_disturbance[:n])])
+    sizes = np.concatenate([scale, np.ones(len(extra))])
+    noise = [(process_noise.get(i, 0.0) / s) ** 2 for i, s in zip((*model.states, *extra), sizes, strict=True)]
+    deviations = np.array([measurement_noise[name] for name in measured])
+    a, b, c, observer = disturbance_observer(
+        "design_lqg", (a, b, by_disturbance, c), np.diag(noise) * sample_time, deviations
+    )
+    return StateFeedback(
+        tuple(measured), tuple(controlled), model.inputs, (*model.states, *extra),
+        _flat(a * sizes[:, None] / sizes), _flat(b * sizes[:, None]), _flat(c / sizes),
+        _flat(observer * sizes[:, None]), _flat(by_state / sizes), _flat(by_integral),
+        tuple(model.output_values[name] for name in measured), tuple(model.input_values[name] for name in model.inputs),
+        _flat(setpoint),
+    )  # fmt: skip
+
+
+def _regulator_gains(
+    sampled: tuple[Array, Array, Array], weights: Sequence[float], costs: Array, sample_time: float
+) -> tuple[Array, Array]:
+    """Gains of the states and of the integrals of columns, from the sampled matrices of states, inputs and columns."""
+    a, b, columns = sampled
+    (n, m), q = b.shape, len(columns)
+    wide = np.block([[a, np.zeros((n, q))], [sample_time * columns, np.eye(q)]])
+    gains, _ = regulator(
+        "design_lqg", wide, np.vstack([b, np.zeros((q, m))]), np.diag(weights) * sample_time, costs * sample_time,
+        "inputs do not stabilise",
+    )  # fmt: skip
+    return gains[:, :n], gains[:, n:]
+
+
+def design_adrc(
+    measured: str, commanded: str, sample_time: float, *, order: int, gain: float, bandwidth: float,
+    observer_bandwidth: float, operating_point: tuple[float, float] = (0.0, 0.0),
+) -> StateFeedback:  # fmt: skip
+    """Active disturbance rejection control (ADRC) of y^(n) = b_0 u + f with an unknown f, at a sample time [s].
+
+    order                n, 1 to 4
+    gain                 b_0, n-th derivative of the measured column by the command
+    bandwidth            omega_c [rad/s] of the controller: poles of the closed loop at -omega_c
+    observer_bandwidth   omega_o [rad/s] of the observer of y, its derivatives and f: poles at exp(-omega_o h)
+    operating_point      measured column and command that belong together
+
+        u = (k_1 (r - x_1) - k_2 x_2 - ... - k_n x_n - f)/b_0,    k_i coefficients of (s + omega_c)^n
+
+    Raises ParameterError for another order, a gain of 0, or a bandwidth that is not positive.
+    References: Han (2009); Gao (2003) for the bandwidths as parameters.
+    """
+    if not 1 <= order <= 4:
+        raise ParameterError(f"design_adrc: order is {order}; allowed range: 1 to 4.")
+    for name, value in (("gain", abs(gain)), ("bandwidth", bandwidth), ("observer_bandwidth", observer_bandwidth)):
+        if not 0 < value < math.inf:
+            raise ParameterError(f"design_adrc: {name} is {value!r}; it must be finite, and not 0 or negative.")
+    chain = np.diag(np.ones(order), 1)
+    inputs = np.zeros((order + 1, 1))
+    inputs[order - 1] = gain
+    a, b = discretised(chain, inputs, sample_time)
+    c = np.eye(1, order + 1)
+    observer = place_observer(a, c[0], math.exp(-observer_bandwidth * sample_time))
+    k = [math.comb(order, i) * bandwidth ** (order - i) for i in range(order)]
+    names = (measured, *(f"derivative{i}" for i in range(1, order)), "disturbance")
+    return StateFeedback(
+        (measured,), (measured,), (commanded,), names, _flat(a), _flat(b), _flat(c), _flat(observer),
+        tuple(v / gain for v in (*k, 1.0)), (), (operating_point[0],), (operating_point[1],), (k[0] / gain,),
+    )  # fmt: skip
+
+
+def _check(
+    model: LinearModel, measured: Sequence[str], controlled: Sequence[str], permitted: Mapping[str, float],
+    permitted_integral: Mapping[str, float] | None, disturbed: Sequence[str],
+) -> None:  # fmt: skip
+    """Raise ParameterError for names or numbers that make no design."""
     check_numbers("design_lqg", "permitted", permitted, (*model.states, *model.inputs), model.inputs)
-    check_numbers("design_lqg", "permitted_integral", permitted_integral, controlled, controlled)
-    check_numbers("design_lqg", "process_noise", process_noise, model.states, ())
-    check_numbers("design_lqg", "measurement_noise", measurement_noise, measured, measured)
-    for name, row in zip(measured, selected.D, strict=True):
+    check_known("design_lqg", "disturbed", disturbed, model.states)
+    if bool(permitted_integral) == bool(disturbed):
+        raise ParameterError(
+            "design_lqg: give either permitted_integral, for integral action, or disturbed, for an observer of "
+            "disturbances."
+        )
+    check_numbers(
+        "design_lqg", "permitted_integral", permitted_integral or {}, controlled, () if disturbed else controlled
+    )
+    for name, row in zip(measured, model.select(outputs=list(measured)).D, strict=True):
         if row.any():
             raise ParameterError(
                 f"design_lqg: '{name}' depends on the inputs at once; measure states, or outputs of states."
             )
-    n, scale = len(model.states), _scales(model, permitted, process_noise)
-    a, b = discretised(model.A * scale / scale[:, None], model.B / scale[:, None], sample_time)
-    c = selected.C * scale
-    rows = [list(measured).index(name) for name in controlled]
-    wide = np.block([[a, np.zeros((n, len(rows)))], [sample_time * c[rows], np.eye(len(rows))]])
-    wide_inputs = np.vstack([b, np.zeros((len(rows), len(model.inputs)))])
-    weights = [
-        (s / permitted[name]) ** 2 if name in permitted else 0.0 for name, s in zip(model.states, scale, strict=True)
-    ]
-    weights += [1.0 / permitted_integral[name] ** 2 for name in controlled]
-    costs = np.diag([1.0 / permitted[name] ** 2 for name in model.inputs])
-    gains, _ = regulator(
-        "design_lqg", wide, wide_inputs, np.diag(weights) * sample_time, costs * sample_time, "inputs do not stabilise"
-    )
-    noise = [(process_noise.get(name, 0.0) / s) ** 2 for name, s in zip(model.states, scale, strict=True)]
-    covariance = np.diag([measurement_noise[name] ** 2 for name in measured])
-    observer = observer_gain("design_lqg", a, c, np.diag(noise) * sample_time, covariance)
-    return StateFeedback(
-        tuple(measured), tuple(controlled), model.inputs, model.states,
-        _flat(a * scale[:, None] / scale), _flat(b * scale[:, None]), _flat(selected.C),
-        _flat(observer * scale[:, None]), _flat(gains[:, :n] / scale), _flat(gains[:, n:]),
-        tuple(model.output_values[name] for name in measured), tuple(model.input_values[name] for name in model.inputs),
-    )  # fmt: skip
+
+
+def _check_noise(
+    model: LinearModel, measured: Sequence[str], extra: Sequence[str], process: Mapping[str, float],
+    measurement: Mapping[str, float],
+) -> None:  # fmt: skip
+    """Raise ParameterError for noise of unknown names, or numbers that are missing or not positive."""
+    check_numbers("design_lqg", "process_noise", process, (*model.states, *extra), extra)
+    check_numbers("design_lqg", "measurement_noise", measurement, measured, measured)
 
 
 def _scales(model: LinearModel, permitted: Mapping[str, float], noise: Mapping[str, float]) -> Array:

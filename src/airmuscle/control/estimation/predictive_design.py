@@ -6,14 +6,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...core.arrays import Array
 from ...core.errors import ParameterError
 from ...physics.analysis.linear_model import LinearModel
 from ..laws.condensed_problem import condense
 from ..laws.linear_model_predictive import LinearModelPredictive, ObserverModel, TargetMap
-from .design_checks import check_known, check_numbers
-from .riccati import discretised, observer_gain, regulator
-from .state_estimator import DISTURBANCE
+from .design_checks import DISTURBANCE, check_known, check_numbers
+from .riccati import disturbance_observer, regulator, sampled_plant, steady_target
 
 MAX_HORIZON = 200
 """Maximum number of samples of a horizon, whose matrices have the square of it (chosen)."""
@@ -50,22 +48,23 @@ def design_predictive(
     check_numbers(where, "permitted", permitted, (*states, *model.inputs), model.inputs)
     check_numbers(where, "process_noise", process_noise, names, [f"{name}{DISTURBANCE}" for name in disturbed])
     check_numbers(where, "measurement_noise", measurement_noise, measured, measured)
-    n, m, d = len(states), len(model.inputs), len(disturbed)
     scale = np.array([permitted.get(s, process_noise.get(s, max(abs(model.state[s]), 1.0))) for s in states])
     sizes = np.array([permitted[name] for name in model.inputs])
-    entering = np.eye(n)[:, [states.index(name) for name in disturbed]]
-    a, both = discretised(
-        model.A * scale / scale[:, None], np.hstack([model.B * sizes, entering]) / scale[:, None], sample_time
-    )
-    b, by_disturbance = both[:, :m], both[:, m:]
+    a, b, by_disturbance = sampled_plant(model, sample_time, scale, sizes, disturbed)
     c, z, limited = (model.select(outputs=list(part)).C * scale for part in (measured, controlled, limits))
     weights = np.diag([(s / permitted[i]) ** 2 if i in permitted else 0.0 for i, s in zip(states, scale, strict=True)])
-    costs = np.eye(m)
+    costs = np.eye(len(model.inputs))
     _, terminal = regulator(where, a, b, weights, costs, "inputs do not stabilise")
-    noise = [(process_noise.get(i, 0.0) / s) ** 2 for i, s in zip(names, (*scale, *np.ones(d)), strict=True)]
+    noise = [
+        (process_noise.get(i, 0.0) / s) ** 2 for i, s in zip(names, (*scale, *np.ones(len(disturbed))), strict=True)
+    ]
     deviations = np.array([measurement_noise[name] for name in measured])
-    observer = _observer(model, (a, b, by_disturbance, c), measured, sizes, np.diag(noise) * sample_time, deviations)
-    target = _target(a, b, by_disturbance, z, model)
+    observer = ObserverModel(
+        *disturbance_observer(where, (a, b, by_disturbance, c), np.diag(noise) * sample_time, deviations),
+        np.array([model.output_values[name] for name in measured]),
+        np.array([model.input_values[name] for name in model.inputs]), sizes,
+    )  # fmt: skip
+    target = steady_target(where, a, b, by_disturbance, z)
     ranges = np.array([high - low for low, high in limits.values()])
     problem = condense(a, b, weights, costs, terminal, horizon, limited / ranges[:, None], slack_weight)
     at = np.array([model.output_values[name] for name in limits])
@@ -75,39 +74,6 @@ def design_predictive(
         (low - at) / ranges, (high - at) / ranges,
     )  # fmt: skip
     return LinearModelPredictive(tuple(measured), tuple(controlled), model.inputs, observer, maps, problem)
-
-
-def _observer(
-    model: LinearModel, sampled: tuple[Array, Array, Array, Array], measured: Sequence[str], sizes: Array, noise: Array,
-    deviations: Array,
-) -> ObserverModel:  # fmt: skip
-    """The observer, from the sampled matrices of states, inputs, disturbances and measured columns."""
-    a, b, by_disturbance, c = sampled
-    (n, m), d = b.shape, by_disturbance.shape[1]
-    wide = np.block([[a, by_disturbance], [np.zeros((d, n)), np.eye(d)]])
-    seen = np.hstack([c, np.zeros((len(c), d))])
-    gain = observer_gain("design_predictive", wide, seen, noise, np.diag(deviations**2))
-    return ObserverModel(
-        wide, np.vstack([b, np.zeros((d, m))]), seen, gain,
-        np.array([model.output_values[name] for name in measured]),
-        np.array([model.input_values[name] for name in model.inputs]), sizes,
-    )  # fmt: skip
-
-
-def _target(a: Array, b: Array, by_disturbance: Array, z: Array, model: LinearModel) -> tuple[Array, Array]:
-    """The smallest steady state and its inputs, linear in the disturbances (n + m, d) and in the set points (n + m, q);
-    all are scaled."""
-    n, m = b.shape
-    equations = np.block([[a - np.eye(n), b], [z, np.zeros((len(z), m))]])
-    rows = np.maximum(np.abs(equations).max(axis=1), 1e-300)
-    equations = equations / rows[:, None]
-    if np.linalg.matrix_rank(equations, tol=1e-9) < n + len(z):
-        raise ParameterError(
-            f"design_predictive: the inputs {', '.join(model.inputs)} cannot keep every set point at rest against the "
-            "disturbances. Control fewer columns, or command more inputs."
-        )
-    inverse = np.linalg.pinv(equations) / rows
-    return -inverse[:, :n] @ by_disturbance, inverse[:, n:]
 
 
 def _check(

@@ -1,11 +1,14 @@
-"""Discretisation, and gains by the discrete algebraic Riccati equation."""
+"""Discretisation, steady states, and gains by the discrete algebraic Riccati equation or by placed poles."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from ...core.arrays import Array
 from ...core.errors import ParameterError
+from ...physics.analysis.linear_model import LinearModel
 
 
 def discretised(a: Array, b: Array, sample_time: float) -> tuple[Array, Array]:
@@ -15,6 +18,20 @@ def discretised(a: Array, b: Array, sample_time: float) -> tuple[Array, Array]:
     n, m = b.shape
     both = expm(np.block([[a, b], [np.zeros((m, n + m))]]) * sample_time)
     return both[:n, :n], both[:n, n:]
+
+
+def sampled_plant(
+    model: LinearModel, sample_time: float, scale: Array, sizes: Array, disturbed: Sequence[str]
+) -> tuple[Array, Array, Array]:
+    """Matrices of states (n, n), inputs (n, m) and constant disturbances (n, d) of a plant with held inputs.
+
+    States and inputs are divided by `scale` (n,) and `sizes` (m,); a disturbance is added to the rate of its state.
+    """
+    entering = np.eye(len(scale))[:, [model.states.index(name) for name in disturbed]]
+    driving = np.hstack([model.B * sizes, entering]) / scale[:, None]
+    a, both = discretised(model.A * scale / scale[:, None], driving, sample_time)
+    b, by_disturbance = np.hsplit(both, [sizes.size])
+    return a, b, by_disturbance
 
 
 def regulator(owner: str, a: Array, b: Array, weights: Array, costs: Array, reason: str) -> tuple[Array, Array]:
@@ -47,3 +64,53 @@ def observer_gain(owner: str, a: Array, c: Array, noise: Array, covariance: Arra
             "states a process noise, or measure more."
         ) from None
     return np.asarray(np.linalg.solve(c @ p @ c.T + covariance, c @ p).T)
+
+
+def disturbance_observer(
+    owner: str, sampled: tuple[Array, Array, Array, Array], noise: Array, deviations: Array
+) -> tuple[Array, Array, Array, Array]:
+    """State, input and output matrix of a sampled plant with constant disturbances as further states, and the gain of
+    the observer of both.
+
+    sampled     matrices of states (n, n), inputs (n, m), disturbances (n, d) and measured columns (p, n)
+    noise       covariance (n + d, n + d) of the process noise of a sample
+    deviations  standard deviations (p,) of the measured columns
+    """
+    a, b, by_disturbance, c = sampled
+    n, d = by_disturbance.shape
+    wide = np.block([[a, by_disturbance], [np.zeros((d, n)), np.eye(d)]])
+    seen = np.hstack([c, np.zeros((len(c), d))])
+    gain = observer_gain(owner, wide, seen, noise, np.diag(deviations**2))
+    return wide, np.vstack([b, np.zeros((d, b.shape[1]))]), seen, gain
+
+
+def place_observer(a: Array, c: Array, pole: float) -> Array:
+    """Gain (n, 1) of an observer that corrects a prediction by y = c x (n,), all poles of its error at one place.
+
+    The error of the corrected state obeys e' = (I - K c) a e; Ackermann's formula for the pair (a, c a).
+    """
+    n = len(a)
+    seen = np.array([c @ np.linalg.matrix_power(a, i + 1) for i in range(n)])
+    powers = np.linalg.matrix_power(a - pole * np.eye(n), n)
+    return np.asarray(powers @ np.linalg.solve(seen, np.eye(n)[:, -1:]))
+
+
+def steady_target(owner: str, a: Array, b: Array, entering: Array, controlled: Array) -> tuple[Array, Array]:
+    """The smallest steady state and its inputs, linear in disturbances (n + m, d) and set points (n + m, q).
+
+    a, b, entering (n, d)    of the sampled plant x' = a x + b u + entering d
+    controlled               (q, n) matrix of the controlled columns
+
+    Raises ParameterError that begins with `owner` where the inputs cannot keep every controlled column.
+    """
+    n, m = b.shape
+    equations = np.block([[a - np.eye(n), b], [controlled, np.zeros((len(controlled), m))]])
+    rows = np.maximum(np.abs(equations).max(axis=1), 1e-300)
+    equations = equations / rows[:, None]
+    if np.linalg.matrix_rank(equations, tol=1e-9) < n + len(controlled):
+        raise ParameterError(
+            f"{owner}: the inputs cannot keep every set point at rest against the disturbances. Control fewer columns, "
+            "or command more inputs."
+        )
+    inverse = np.linalg.pinv(equations) / rows
+    return -inverse[:, :n] @ entering, inverse[:, n:]

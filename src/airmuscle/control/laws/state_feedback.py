@@ -26,12 +26,14 @@ FRANKLIN1998 = Reference(
 
 @model
 class StateFeedback(MultivariableController, ControlLaw):
-    """u_k = u_0 - L x_k - L_I w_k,   x_k = x^-_k + K (y_k - y_0 - C x^-_k),   w_(k+1) = w_k + h (z_k - r_k).
+    """u_k = u_0 + N (r_k - z_0) - L x_k - L_I w_k,   x_k = x^-_k + K (y_k - y_0 - C x^-_k),   w' = z - r.
 
     x deviation of the states from the operating point, y measured columns, z controlled ones, r their set points. The
     prediction is x^-_(k+1) = A x_k + B (u_k - u_0) with the command as limited to the range of the inputs, which is
     the anti-windup of the observer; w_k is held while a command is limited. The observer starts at the first
-    measurement. Matrices are given row by row; `airmuscle.control.design_lqg` designs them for a linearised plant.
+    measurement. Some of the states may be disturbances that the observer estimates: then no integral action is needed,
+    and `integral_gain` is empty. An empty `setpoint_gain` is 0. Matrices are given row by row; `design_lqg` and
+    `design_adrc` of `airmuscle.control` design them.
     Reference: Franklin, Powell and Workman (1998), chapters 8 and 9.
     """
 
@@ -46,14 +48,16 @@ class StateFeedback(MultivariableController, ControlLaw):
     output_matrix: tuple[float, ...] = parameter("SI", "C", "matrix of the measured columns (p, n)", fitted=False)
     observer_gain: tuple[float, ...] = parameter("SI", "K", "gain of the observer (n, p)")
     feedback_gain: tuple[float, ...] = parameter("SI", "L", "gain of the state feedback (m, n)")
-    integral_gain: tuple[float, ...] = parameter("SI", "L_I", "gain of the integral action (m, q)")
+    integral_gain: tuple[float, ...] = parameter("SI", "L_I", "gain of the integral action (m, q); empty: none")
     measured_offset: tuple[float, ...] = parameter("SI", "y_0", "measured columns at the operating point", fitted=False)
     input_offset: tuple[float, ...] = parameter("SI", "u_0", "inputs at the operating point", fitted=False)
+    setpoint_gain: tuple[float, ...] = parameter("SI", "N", "gain of the set points (m, q); empty: 0", default=())
 
     def check(self) -> None:
         n, m, p, q = map(len, (self.state_names, self.commanded, self.measured, self.controlled))
+        optional = {name: m * q for name in ("integral_gain", "setpoint_gain") if getattr(self, name)}
         sizes = {"transition": n * n, "input_matrix": n * m, "output_matrix": p * n, "observer_gain": n * p,
-                 "feedback_gain": m * n, "integral_gain": m * q, "measured_offset": p, "input_offset": m}  # fmt: skip
+                 "feedback_gain": m * n, "measured_offset": p, "input_offset": m, **optional}  # fmt: skip
         for name, size in sizes.items():
             if len(getattr(self, name)) != size:
                 raise ParameterError(
@@ -70,7 +74,12 @@ class StateFeedback(MultivariableController, ControlLaw):
     def initial_memory(self) -> dict[str, float]:
         """The predicted deviation of each state, `state.pressure`, and the integral of each controlled column."""
         states = with_prefix("state.", dict.fromkeys(self.state_names, 0.0))
-        return {**states, **with_prefix("integral.", dict.fromkeys(self.controlled, 0.0))}
+        return {**states, **with_prefix("integral.", dict.fromkeys(self._integrated, 0.0))}
+
+    @property
+    def _integrated(self) -> tuple[str, ...]:
+        """The controlled columns whose error is integrated."""
+        return self.controlled if self.integral_gain else ()
 
     def step(
         self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
@@ -83,16 +92,20 @@ class StateFeedback(MultivariableController, ControlLaw):
         x = [a + b for a, b in zip(predicted, product(self.observer_gain, innovation), strict=True)]
         by_state = product(self.feedback_gain, x)
         by_integral = product(self.integral_gain, list(integrals.values()), len(self.commanded))
+        at = [self.measured_offset[self.measured.index(name)] for name in self.controlled]
+        aims = [measurement.setpoints[name] - z for name, z in zip(self.controlled, at, strict=True)]
+        by_setpoint = product(self.setpoint_gain, aims if self.setpoint_gain else [], len(self.commanded))
         commands: dict[str, Value] = {}
         limited: Value = 0.0
-        for name, offset, a, b in zip(self.commanded, self.input_offset, by_state, by_integral, strict=True):
-            wanted = offset - a - b
+        parts = zip(self.commanded, self.input_offset, by_setpoint, by_state, by_integral, strict=True)
+        for name, offset, n, a, b in parts:
+            wanted = offset + n - a - b
             commands[name] = ops.clip(wanted, *measurement.ranges[name])
             limited = limited + ops.absolute_value(commands[name] - wanted)
         applied = [commands[name] - offset for name, offset in zip(self.commanded, self.input_offset, strict=True)]
         by_input = product(self.input_matrix, applied, len(x))
         later = [a + b for a, b in zip(product(self.transition, x), by_input, strict=True)]
-        errors = {name: measurement.columns[name] - measurement.setpoints[name] for name in self.controlled}
+        errors = {name: measurement.columns[name] - measurement.setpoints[name] for name in self._integrated}
         kept = {name: w + ops.where(limited > 0.0, 0.0, dt * errors[name]) for name, w in integrals.items()}
         states = dict(zip(self.state_names, later, strict=True))
         return commands, {**with_prefix("state.", states), **with_prefix("integral.", kept)}
