@@ -1,9 +1,11 @@
-"""Control benchmark of the antagonistic joint: all standard controllers, learning, on/off valves, and the targets.
+"""Control benchmark of the antagonistic joint: all standard controllers on all truths, and the page of their results.
 
-    python benchmarks/control_benchmark.py [--budget 2400] [--seed 1] [--processes 1] [--out benchmarks/CONTROL.md]
+    python benchmarks/control_benchmark.py [--quick] [--processes 2] [--results FOLDER] [--out benchmarks/CONTROL.md]
 
-Every controller is tuned with the same optimiser and budget for perturbed models and judged on the truth. Figures and
-verdicts are computed; a reason is printed for a target that is missed.
+Each controller is tuned by three searches, commissioned on every truth and judged there; the sealed truth is one of
+them, so that it is run for the page alone. A search with its runs is a file in the folder of the results: an
+interrupted run goes on where it was, as long as the program and the settings are the same. `--quick` is a smaller form
+with one search on two truths of development, for a look at a change.
 """
 
 from __future__ import annotations
@@ -11,132 +13,163 @@ from __future__ import annotations
 import argparse
 import concurrent.futures
 import dataclasses
+import hashlib
+import os
 import pickle
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-from control_page import FORWARD, ON_OFF, page
-
+import airmuscle
 from airmuscle.design import (
+    SEALED_SEED,
+    STANDARD_TASKS,
+    TRUTH_SEEDS,
     BenchmarkJoint,
+    BenchmarkResult,
+    ContenderResult,
+    LearningCurve,
     benchmark_controllers,
     find_tasks,
-    inverse_dynamics,
     learn,
     on_off_joint,
     proportional_joint,
-    ranking,
     standard_contenders,
 )
+from airmuscle.design.control_benchmark.benchmark import COMMISSIONING_RUNS, SETS_PER_GAIN
 
-JOINTS = {
-    "proportional": proportional_joint,
-    "on/off": on_off_joint,
-}
+JOINTS = {"proportional": proportional_joint, "on/off": on_off_joint}
+ON_OFF = ("PID", "feed-forward + PID", "feed-forward + sliding mode")
+LEARNED = "feed-forward + PID"
+PACKAGES = ("control", "core", "design", "engine", "physics")
 
 
-def measure(budget: int, seed: int, processes: int) -> dict[str, Any]:
-    """All results as plain data; the contenders do not depend on each other, and several are measured at once."""
-    parts = [
-        (kind, each.name, budget, seed)
+@dataclasses.dataclass(frozen=True)
+class Settings:
+    """Truths, seeds of the searches, most sets of gains for each gain, and runs of a commissioning."""
+
+    truths: tuple[int, ...]
+    seeds: tuple[int, ...]
+    sets_per_gain: int
+    commissioning_runs: int
+    slow: bool = True
+    """Whether controllers that are called from Python take part."""
+
+
+FULL = Settings((*TRUTH_SEEDS, SEALED_SEED), (1, 2, 3), SETS_PER_GAIN, COMMISSIONING_RUNS)
+QUICK = Settings((1, 2), (1,), 12, 30, slow=False)
+
+
+@dataclasses.dataclass(frozen=True)
+class Part:
+    """The contenders of one search, one after the other, with the CPU time [s]."""
+
+    kind: str
+    results: tuple[ContenderResult, ...]
+    curve: LearningCurve | None
+    cpu: float
+
+
+def searches(joint: BenchmarkJoint, kind: str, settings: Settings) -> list[tuple[str, ...]]:
+    """The names of the contenders that share a search, the slow ones first."""
+    groups: dict[str, list[str]] = {}
+    for each in standard_contenders(joint):
+        if (kind == "on/off" and each.name not in ON_OFF) or (each.tuned_as and not settings.slow):
+            continue
+        groups.setdefault((each.tuned_as or each).name, []).append(each.name)
+    return sorted(map(tuple, groups.values()), key=len, reverse=True)
+
+
+def measure(settings: Settings, folder: Path, processes: int) -> list[Part]:
+    """All parts, from their files where these exist."""
+    folder.mkdir(parents=True, exist_ok=True)
+    key = fingerprint(settings)
+    jobs = [
+        (
+            kind,
+            names,
+            seed,
+            settings,
+            folder / f"{kind.replace('/', '-')}-{names[0].replace(' ', '-')}-{seed}-{key}.pickle",
+        )
         for kind, joint in JOINTS.items()
-        for each in reversed(standard_contenders(joint()))
-        if kind == "proportional" or each.name in ON_OFF
+        for names in searches(joint(settings.truths[:1]), kind, settings)
+        for seed in settings.seeds
     ]
+    waiting = [job for job in jobs if not job[-1].exists()]
     with concurrent.futures.ProcessPoolExecutor(processes) as pool:
-        pending = [pool.submit(measure_part, *part) for part in parts]
-        for done, _ in enumerate(concurrent.futures.as_completed(pending), 1):
-            _show("contenders", done, len(parts))
-    results: dict[str, Any] = {
-        "budget": budget,
-        "seed": seed,
-        "forward": forward_error(proportional_joint()),
-    }
-    for (kind, *_), each in zip(reversed(parts), (p.result() for p in reversed(pending)), strict=True):
-        results |= each.pop("learning", {})
-        into = results.setdefault(kind, {})
-        for key, value in each.items():
-            into[key] = {**into.get(key, {}), **value} if isinstance(value, dict) else value
-    for kind in JOINTS:
-        metrics, tasks = results[kind]["metrics"], results[kind]["tasks"]
-        errors = {name: [(metrics[name, t] or {"rmse": np.nan})["rmse"] for t in tasks] for name, _ in metrics}
-        results[kind]["scores"] = ranking(errors)
+        pending = [pool.submit(measure_part, *job) for job in waiting]
+        for done, each in enumerate(concurrent.futures.as_completed(pending), 1):
+            each.result()
+            if sys.stderr.isatty():
+                print(f"\rsearches: {done} of {len(waiting)}".ljust(78), end="", file=sys.stderr, flush=True)
+    return [pickle.loads(job[-1].read_bytes()) for job in jobs]
+
+
+def measure_part(kind: str, names: tuple[str, ...], seed: int, settings: Settings, path: Path) -> None:
+    """Write the results of one search, complete or not at all."""
+    started, joint = time.process_time(), JOINTS[kind](settings.truths)
+    contenders = [each for each in standard_contenders(joint) if each.name in names]
+    found = benchmark_controllers(
+        joint, contenders, STANDARD_TASKS, seeds=(seed,), sets_per_gain=settings.sets_per_gain,
+        commissioning_runs=settings.commissioning_runs,
+    ).results  # fmt: skip
+    curve = None
+    if (kind, names[0], seed) == ("proportional", LEARNED, settings.seeds[0]):
+        curve = learn(joint, found[0], find_tasks(("sine 2 Hz",))[0], trials=31, seed=seed)
+    kept = tuple(map(without_recordings, found))
+    staging = path.with_suffix(f".{os.getpid()}.part")
+    staging.write_bytes(pickle.dumps(Part(kind, kept, curve, time.process_time() - started)))
+    staging.replace(path)
+
+
+def without_recordings(result: ContenderResult) -> ContenderResult:
+    """A result whose runs have metrics alone."""
+    return dataclasses.replace(
+        result, runs={key: dataclasses.replace(run, recording=None) for key, run in result.runs.items()}
+    )
+
+
+def fingerprint(settings: Settings) -> str:
+    """A text that changes with the settings and with the program."""
+    digest, source = hashlib.sha256(repr(settings).encode()), Path(airmuscle.__file__).parent
+    for package in PACKAGES:
+        for path in sorted((source / package).rglob("*.py")):
+            digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def collect(parts: list[Part], settings: Settings) -> dict[str, BenchmarkResult]:
+    """The results of both joints."""
+    results = {}
+    for kind, joint in JOINTS.items():
+        order = [each.name for each in standard_contenders(joint(settings.truths[:1]))]
+        found = [each for part in parts if part.kind == kind for each in part.results]
+        found.sort(key=lambda each: (each.seed, order.index(each.name)))
+        results[kind] = BenchmarkResult(joint(settings.truths), STANDARD_TASKS, tuple(found))
     return results
-
-
-def measure_part(kind: str, name: str, budget: int, seed: int) -> dict[str, Any]:
-    """The results of one contender, and for feed-forward and PID those of learning."""
-    joint, started = JOINTS[kind](), time.process_time()
-    (contender,) = (each for each in standard_contenders(joint) if each.name == name)
-    result = benchmark_controllers(joint, [contender], budget=budget, seed=seed)
-    found = _plain(result)
-    if kind == "proportional" and name == FORWARD:
-        curve = learn(joint, result.contenders[0], find_tasks(("sine 2 Hz",))[0], trials=31, seed=seed)
-        errors = curve.errors.tolist()
-        found["learning"] = {"learning": errors, "monotone": curve.is_monotone, "spread": curve.spread}
-    return {**found, "cpu": {name: time.process_time() - started}}
-
-
-def forward_error(joint: BenchmarkJoint) -> float:
-    """Error of the feed-forward pressure [% of the pressure range]: model against truth without friction, slow sine."""
-    (task,) = find_tasks(("sine 0.1 Hz",))
-    time = np.arange(task.begin, task.duration, joint.sample_time)
-    mean = np.full(time.size, joint.mean_pressure)
-    ours, needed = (inverse_dynamics(joint, plant, task.motion, time, mean) for plant in (joint.model, joint.truth))
-    span = joint.max_pressure - joint.min_pressure
-    return 100.0 * float(np.sqrt(np.mean((ours - needed) ** 2))) / span
-
-
-def _plain(result: Any) -> dict[str, Any]:
-    joint: BenchmarkJoint = result.joint
-    return {
-        "valve": joint.valve,
-        "tasks": [task.name for task in result.tasks],
-        "gains": {each.name: {**each.tuning.gains, **each.identified} for each in result.contenders if each.tuning},
-        "on bound": {each.name: dict(each.tuning.on_bound) for each in result.contenders if each.tuning},
-        "limits": (joint.min_pressure / 1e5, joint.max_pressure / 1e5),
-        "pressures": {
-            key: pressure_range(joint, run.recording) for key, run in result.runs.items() if run.recording is not None
-        },
-        "metrics": {key: dataclasses.asdict(run.metrics) if run.metrics else None for key, run in result.runs.items()},
-        "span": joint.pressure_span,
-    }
-
-
-def pressure_range(joint: BenchmarkJoint, recording: Any) -> tuple[float, float]:
-    """Smallest and greatest true gauge pressure [bar] of both muscles in a run."""
-    values = np.concatenate([np.asarray(recording[name]) for name in joint.pressures]) / 1e5
-    return float(values.min()), float(values.max())
-
-
-def _show(step: str, done: int, total: int) -> None:
-    if sys.stderr.isatty():
-        print(f"\r{step}: {done} of {total}".ljust(78), end="", file=sys.stderr, flush=True)
 
 
 def main() -> None:
     """Measure and write the page."""
+    from control_page import page
+
+    here = Path(__file__).parent
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--budget", type=int, default=2400)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--out", type=Path, default=Path(__file__).with_name("CONTROL.md"))
-    parser.add_argument("--processes", type=int, default=1)
-    parser.add_argument("--keep", type=Path, help="file for the results, from which --page writes the page again")
-    parser.add_argument("--page", type=Path, help="such a file: nothing is measured")
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--results", type=Path, default=here.parent / "build" / "control_benchmark")
+    parser.add_argument("--out", type=Path, help="default: CONTROL.md beside this file; of --quick in the results")
     given = parser.parse_args()
-    if given.page:
-        results = pickle.loads(given.page.read_bytes())
-    else:
-        results = measure(given.budget, given.seed, given.processes)
-    if given.keep:
-        given.keep.write_bytes(pickle.dumps(results))
-    staging = given.out.with_name(f".{given.out.name}.part")
-    staging.write_text(page(results), encoding="utf-8")
-    staging.replace(given.out)
-    print(f"wrote {given.out}")
+    settings = QUICK if given.quick else FULL
+    out = given.out or (given.results / "quick.md" if given.quick else here / "CONTROL.md")
+    parts = measure(settings, given.results, given.processes)
+    curve = next(part.curve for part in parts if part.curve)
+    text = page(collect(parts, settings), curve, settings, sum(part.cpu for part in parts))
+    staging = out.with_name(f".{out.name}.part")
+    staging.write_text(text, encoding="utf-8")
+    staging.replace(out)
+    print(f"wrote {out}")
 
 
 if __name__ == "__main__":

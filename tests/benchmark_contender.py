@@ -9,7 +9,8 @@ from airmuscle.core import model, parameter
 from airmuscle.design import Contender, ControlTask, SineMotion, proportional_joint
 from airmuscle.engine import ControlLaw
 
-JOINT = proportional_joint()
+JOINT = proportional_joint((11,))
+"""With one truth: Sarosi2012, LuGre, nozzles, tubes, energy balance."""
 SHORT = ControlTask("short sine", SineMotion(math.radians(10.0), 2.0), 1.0, begin=0.5)
 
 

@@ -1,7 +1,7 @@
-"""Contenders of the control benchmark that are called from Python, and a gain that is identified on the truth.
+"""Contenders of the control benchmark that are called from Python, and gains that are commissioned on a truth.
 
-A controller that is no control law meets the same sensors and the same actuation as one that is compiled. A gain is
-identified by runs of a motion on the truth, judged by the encoder alone.
+A controller that is no control law meets the same sensors and the same actuation as one that is compiled. Gains are
+sought by runs of a motion on the truth, judged by the encoder alone, with the same number of runs for all.
 """
 
 from __future__ import annotations
@@ -13,8 +13,17 @@ import pytest
 from benchmark_contender import JOINT, MINE, SHORT
 from called_controller import Called
 
-from airmuscle.design import Contender, StuckValve, benchmark_controllers, standard_contenders
-from airmuscle.design.control_benchmark import Readings, complete, identify_gains, tracking_error
+from airmuscle.core import leaves
+from airmuscle.design import (
+    Contender,
+    Group,
+    RunKey,
+    StuckValve,
+    benchmark_controllers,
+    commission,
+    standard_contenders,
+)
+from airmuscle.design.control_benchmark import Readings, alike, complete, tracking_errors
 from airmuscle.design.tuning import with_gains
 from airmuscle.engine import Measurement
 from airmuscle.errors import ParameterError
@@ -23,13 +32,14 @@ from airmuscle.errors import ParameterError
 def test_a_controller_that_is_called_meets_the_same_sensors_and_the_same_actuation():
     """The same law, called from Python at each sample: the same run, also with a valve that sticks."""
     called = Contender("called", Called(MINE.law))
-    again = benchmark_controllers(JOINT, [called], [SHORT], budget=10)
-    assert again.contenders[0].tuning is None
-    found = again.metric("called", "short sine", "rmse")
-    mine = benchmark_controllers(JOINT, [MINE], [SHORT], budget=0)
-    assert found == pytest.approx(mine.metric("mine", "short sine", "rmse"), rel=1e-3)
+    again = benchmark_controllers(JOINT, [called], [SHORT], sets_per_gain=10, commissioning_runs=0)
+    assert again.results[0].tuning is None
+    found = again.metric("called", "short sine", "rmse").median
+    mine = benchmark_controllers(JOINT, [MINE], [SHORT], sets_per_gain=0, commissioning_runs=0)
+    assert found == pytest.approx(mine.metric("mine", "short sine", "rmse").median, rel=1e-3)
     stuck = replace(SHORT, name="stuck", stuck=StuckValve("left.discharge", 0.4, 0.1))
-    record = benchmark_controllers(JOINT, [called], [stuck], budget=0).runs["called", "stuck"].recording
+    (result,) = benchmark_controllers(JOINT, [called], [stuck], sets_per_gain=0, commissioning_runs=0).results
+    record = result.runs[RunKey(Group.MODELS, JOINT.truths[0].name, "stuck")].recording
     assert np.unique(record["left.discharge"][record["time"] > 0.401]) == pytest.approx([0.1])
     with pytest.raises(
         ParameterError, match=r"Called has no declared parameter 'gain' to be tuned; there are inner\.gain"
@@ -54,21 +64,51 @@ def test_a_valve_sticks_at_the_first_sample_at_or_after_its_time(late, samples):
     assert found == [False] * samples + [True] * (6 - samples)
 
 
-def test_the_gains_that_are_identified_follow_the_truth_better_than_the_ends_of_their_ranges():
-    contender = next(each for each in standard_contenders(JOINT) if "compensated" in each.name)
-    law = complete(JOINT, contender).law
+def test_commissioned_gains_follow_the_truth_better_than_those_before_and_the_ends_of_their_ranges():
+    contender = next(each for each in standard_contenders(JOINT) if each.name == "feed-forward + PID")
+    completed, truth = complete(JOINT, contender), JOINT.truths[0]
     task = replace(SHORT, begin=0.0, duration=1.2)
-    bounds = {"lead_time": (0.001, 0.1), "amplitude": (10.0, 5e4), "acceleration_gain": (-500.0, 500.0)}
-    assert [(path.rsplit(".", 1)[1], pair) for path, pair in contender.identified.items()] == list(bounds.items())
-    gains, runs = identify_gains(JOINT, law, bounds, task)
-    assert [path.rsplit(".", 1)[1] for path in gains] == list(bounds)
-    assert 6 < runs <= 72
-    best = tracking_error(JOINT, with_gains(law, gains), task)
-    for path, (low, high) in zip(gains, bounds.values(), strict=True):
-        assert low < gains[path] < high
-        ends = [tracking_error(JOINT, with_gains(law, {**gains, path: value}), task) for value in (low, high)]
-        assert best < min(ends), path
-    with pytest.raises(ParameterError, match="no declared parameter 'lag' to be identified; there are gain"):
-        replace(MINE, identified={"lag": (0.0, 1.0)})
-    with pytest.raises(ParameterError, match="0 gains end with 'lead'; give the end of exactly one path"):
-        identify_gains(JOINT, law, {"lead": (0.0, 1.0)}, task)
+    found = commission(JOINT, truth, completed.law, completed.commissioned, [task], runs=25)
+    assert [path.rpartition(".")[2] for path in found.gains] == [
+        "lead_time", "amplitude", "position_gain", "speed_gain", "acceleration_gain",
+    ]  # fmt: skip
+    assert found.runs <= 25
+    assert found.after < 0.5 * found.before
+
+    def error(gains):
+        errors = tracking_errors(JOINT, truth, with_gains(completed.law, gains), task)
+        return np.sqrt(np.mean(errors**2))
+
+    assert error(found.gains) == pytest.approx(found.after)
+    for path, (low, high) in completed.commissioned.items():
+        assert low <= found.gains[path] <= high
+        assert found.after < min(error({**found.gains, path: value}) for value in (low, high)), path
+
+
+def test_a_commissioning_has_no_more_runs_than_it_is_given():
+    contender = next(each for each in standard_contenders(JOINT) if each.name == "PID")
+    completed = complete(JOINT, contender)
+    task = replace(SHORT, begin=0.0, duration=0.9)
+    for runs in (1, 3, 7):
+        found = commission(JOINT, JOINT.truths[0], completed.law, completed.commissioned, [task], runs=runs)
+        assert found.runs == runs
+        assert found.after <= found.before
+
+
+def test_a_contender_takes_the_gains_of_another_one_by_the_ends_of_their_paths():
+    by_name = {each.name: complete(JOINT, each).law for each in standard_contenders(JOINT)}
+    lqg, mpc = by_name["feed-forward + LQG"], by_name["feed-forward + MPC"]
+    tuned = complete(
+        JOINT, next(each for each in standard_contenders(JOINT) if each.name == "feed-forward + LQG")
+    ).bounds
+    paths = dict(zip(tuned, alike(mpc, dict.fromkeys(tuned, 1.0)), strict=True))
+    assert {path.rpartition(".")[2]: other for path, other in paths.items()} == {
+        "lead_time": "controller.feed_forward.feed_forward.lead_time",
+        "amplitude": "controller.feed_forward.feedback.feed_forward.amplitude",
+        "permitted_angle": "controller.design.permitted_angle",
+        "speed_noise": "controller.design.speed_noise",
+        "disturbance_noise": "controller.design.disturbance_noise",
+        "pressure_time": "controller.design.pressure_time",
+        "gain": "actuation.inner.gain",
+    }  # fmt: skip
+    assert {leaf.path for leaf in leaves(lqg)} >= set(tuned)

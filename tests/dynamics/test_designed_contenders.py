@@ -19,7 +19,6 @@ from airmuscle.design import (
     ControlTask,
     SineMotion,
     StepMotion,
-    TunedContender,
     proportional_joint,
     standard_contenders,
 )
@@ -38,9 +37,9 @@ from airmuscle.errors import ParameterError
 from airmuscle.physics import find_equilibrium
 
 pytest.importorskip("daqp", reason="the package daqp is not installed")
-JOINT = proportional_joint()
-LQG, MPC = "feed-forward + LQG, compensated", "feed-forward + MPC, compensated"
-CONTENDERS = {each.name: each for each in standard_contenders(JOINT) if each.name in (LQG, MPC)}
+JOINT = proportional_joint((11,))
+LQG, MPC, ADRC = "feed-forward + LQG", "feed-forward + MPC", "feed-forward + ADRC"
+CONTENDERS = {each.name: each for each in standard_contenders(JOINT) if each.name in (LQG, MPC, ADRC)}
 
 
 def test_the_design_model_has_the_accelerations_of_the_joint():
@@ -66,7 +65,7 @@ def measured(angle: float, wanted: float, forward: float) -> Measurement:
     return Measurement({"angle": angle}, setpoints, {"difference": (-JOINT.pressure_span, JOINT.pressure_span)})
 
 
-@pytest.mark.parametrize("name", [LQG, MPC])
+@pytest.mark.parametrize("name", [LQG, MPC, ADRC])
 def test_without_deviation_the_command_is_the_feed_forward(name: str):
     law = CONTENDERS[name].law
     memory = law.init()
@@ -75,7 +74,7 @@ def test_without_deviation_the_command_is_the_feed_forward(name: str):
         assert command["difference"] == pytest.approx(3e4 + k, abs=1e-6)
 
 
-@pytest.mark.parametrize("name", [LQG, MPC])
+@pytest.mark.parametrize("name", [LQG, MPC, ADRC])
 def test_the_sum_of_both_commands_keeps_its_range(name: str):
     law, rng = CONTENDERS[name].law, np.random.default_rng(3)
     memory, found = law.init(), []
@@ -87,15 +86,14 @@ def test_the_sum_of_both_commands_keeps_its_range(name: str):
     assert np.abs(found).max() > 0.99 * JOINT.pressure_span
 
 
-@pytest.mark.parametrize("name", [LQG, MPC])
+@pytest.mark.parametrize("name", [LQG, MPC, ADRC])
 def test_a_disturbance_leaves_no_offset_and_the_pressures_keep_their_limits(name: str):
     """A torque that the model does not know, and a step that saturates the command."""
-    contender = CONTENDERS[name]
-    tuned = TunedContender(contender, complete(JOINT, contender).law, None)
+    law, truth = complete(JOINT, CONTENDERS[name]).law, JOINT.truths[0]
     pushed = ControlTask("pushed", StepMotion(0.0, 0.1), 1.5, begin=1.2, torque=((0.0, 0.0), (0.2, 0.0), (0.21, -1.0)))
-    run = run_task(JOINT, tuned, pushed)
+    run = run_task(JOINT, truth, law, pushed)
     assert run.metrics.rmse < 0.25
-    stepped = run_task(JOINT, tuned, ControlTask("step", StepMotion(math.radians(40.0), 0.1), 0.6))
+    stepped = run_task(JOINT, truth, law, ControlTask("step", StepMotion(math.radians(40.0), 0.1), 0.6))
     for column in JOINT.pressures:
         pressure = stepped.recording[column]
         assert JOINT.min_pressure - 5e3 < pressure.min()
@@ -104,22 +102,22 @@ def test_a_disturbance_leaves_no_offset_and_the_pressures_keep_their_limits(name
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [LQG, MPC])
+@pytest.mark.parametrize("name", [LQG, MPC, ADRC])
 def test_the_weights_of_a_design_are_tuned_like_gains(name: str):
     alone = dataclasses.replace(JOINT, family={"nominal": JOINT.model})
-    law = complete(alone, CONTENDERS[name])
-    assert {path.rpartition(".")[2] for path in law.bounds} >= {"permitted_angle", "lead_time", "gain"}
-    tuned = tune_contender(alone, CONTENDERS[name], law, budget=32, seed=1, progress=lambda *_: None)
-    assert tuned.tuning.objective < tuned.tuning.present_objective
-    (path,) = (path for path in tuned.tuning.gains if path.endswith("permitted_angle"))
-    assert {leaf.path: leaf.value for leaf in leaves(tuned.law)}[path] == tuned.tuning.gains[path]
+    law, tuning = tune_contender(alone, CONTENDERS[name], seed=1, sets_per_gain=3, progress=lambda *_: None)
+    assert tuning.objective < tuning.present_objective
+    (path,) = (path for path in tuning.gains if path.endswith(("permitted_angle", ".bandwidth")))
+    name = path.rpartition(".")[2]
+    values = [leaf.value for leaf in leaves(law) if leaf.path.endswith(f".{name}")]
+    assert values == [tuning.gains[path]]
 
 
 def test_bounds_of_a_parameter_that_a_controller_does_not_have_are_refused():
     with pytest.raises(
         ParameterError, match=r"AlongMotion has no declared parameter 'design\.weight' to be tuned; there"
     ):
-        dataclasses.replace(CONTENDERS[MPC], bounds={"design.weight": (1.0, 2.0)}, identified={})
+        dataclasses.replace(CONTENDERS[MPC], bounds={"design.weight": (1.0, 2.0)}, commissioned={})
     with pytest.raises(ParameterError, match=r"AlongMotion: delay is -1; allowed range: 0 to 1000 samples"):
         dataclasses.replace(CONTENDERS[MPC].law, delay=-1)
 
@@ -145,9 +143,9 @@ def test_a_called_contender_can_be_sent_to_another_process():
         {name: ((0.0, 0.0),) for name in sensed.setpoints if name != "mean_pressure"}
         | {"mean_pressure": ((0.0, 2.5e5),)}
     )
-    start = JOINT.start(JOINT.truth)
+    start = JOINT.start(JOINT.truths[0].plant)
     first, second = (
-        simulate(JOINT.truth, ControlLoop(law, 2e-3, wanted), duration=task.duration, initial_state=start)
+        simulate(JOINT.truths[0].plant, ControlLoop(law, 2e-3, wanted), duration=task.duration, initial_state=start)
         for law in (sensed, again)
     )
     assert np.array_equal(first["angle"], second["angle"])

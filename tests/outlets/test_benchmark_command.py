@@ -7,7 +7,7 @@ import json
 import pytest
 from command_line import airmuscle
 
-FAST = ["benchmark", "--controller", "PID", "--task", "step", "--budget", "0"]
+FAST = ["benchmark", "--controller", "PID", "--task", "step", "--budget", "0", "--truths", "1", "--runs", "2"]
 
 
 def run(*arguments):
@@ -19,9 +19,16 @@ def test_a_benchmark_writes_its_report_tables_and_figures(tmp_path):
     assert result.exit_code == 0, result.output
     assert "PID" in result.stdout
     names = {path.relative_to(tmp_path / "benchmark").as_posix() for path in (tmp_path / "benchmark").rglob("*.*")}
-    tables = {f"data/{name}.csv" for name in ("ranking", "rmse", "max_error", "metrics")}
-    assert {"report.html", "figures/errors.png", "figures/runs.png", *tables} <= names
-    assert "data/gains.csv" not in names, "nothing was tuned"
+    kinds = ("ranking_models", "ranking_commissioned", "rmse_models", "rmse_commissioned", "metrics", "gains", "truths")
+    tables = {f"data/{name}.csv" for name in kinds}
+    assert {
+        "report.html",
+        "figures/errors_models.png",
+        "figures/errors_commissioned.png",
+        "figures/runs.png",
+        *tables,
+    } <= names
+    assert "data/searches.csv" not in names, "nothing was tuned"
     page = (tmp_path / "benchmark" / "report.html").read_text(encoding="utf-8")
     for text in ("LuGre", "12-bit encoder", "1e-08 m3/(s Pa)", "weight x 2"):
         assert text in page, text
@@ -30,12 +37,19 @@ def test_a_benchmark_writes_its_report_tables_and_figures(tmp_path):
 def test_json_contains_every_metric_of_every_run(tmp_path):
     result = run(*FAST, "--json", "--out", str(tmp_path / "benchmark"))
     content = json.loads(result.stdout)
-    assert content["scores"] == {"PID": 1.0}
-    (row,) = content["runs"]
-    assert (row["controller"], row["task"], row["reason"]) == ("PID", "step", "")
+    assert content["scores"]["models only"] == {"PID": {"median": 1.0, "low": 1.0, "high": 1.0}}
+    assert [row["group"] for row in content["runs"]] == ["models only", "commissioned"]
+    row = content["runs"][0]
+    assert (row["controller"], row["truth"], row["task"], row["reason"]) == ("PID", "truth 23", "step", "")
     assert 0 < row["rmse"] < row["max_error"] < 30
     assert row["settling"] is None or row["settling"] >= 0
-    assert content["gains"] == {}, "nothing was tuned"
+    (found,) = content["controllers"]
+    assert found["gains"] == {}, "nothing was tuned"
+    assert {path.rpartition(".")[2] for path in found["commissioned"]["truth 23"]} == {
+        "gain",
+        "integral_time",
+        "derivative_time",
+    }
 
 
 @pytest.mark.parametrize(
@@ -45,7 +59,7 @@ def test_json_contains_every_metric_of_every_run(tmp_path):
         (["--task", "steps"], "there is no task 'steps'"),
         (["--controller", "PID", "--trials", "3"], "--trials needs at least 2 trials and the controller"),
         (["--trials", "1"], "--trials needs at least 2 trials"),
-        (["--controller", "PID", "--task", "step", "--budget", "20"], "budget is 20"),
+        (["--controller", "PID", "--task", "step", "--budget", "1"], "budget is 56"),
     ],
 )
 def test_an_impossible_benchmark_is_rejected_in_one_line(arguments, message, tmp_path):

@@ -94,7 +94,7 @@ def test_the_command_writes_the_same_file_with_other_gains_and_a_report(scenario
     assert {path.stem for path in (out / "figures").glob("*.png")} == {"convergence", "pareto", "response"}
     report = (out / "report.html").read_text(encoding="utf-8")
     for text in (
-        "Storn",
+        "Hansen",
         "Skogestad",
         "drawn 1",
         "load x 0.5",

@@ -29,6 +29,7 @@ from airmuscle.design import (
     perturbed_family,
     tune,
 )
+from airmuscle.design.tuning.evolution import EvolutionStrategy
 from airmuscle.engine import ColumnSensor, ControlLaw, ControlLoop, Schedule, WithSensors
 from airmuscle.errors import ColumnError, ParameterError, SimulationError
 from airmuscle.files.library import ParameterUncertainty
@@ -97,9 +98,36 @@ def test_the_same_seed_gives_the_same_search_and_another_seed_another_one():
 def test_the_budget_is_an_upper_bound_and_progress_counts_loops():
     seen = []
     tuning = small(budget=90, progress=lambda done, total: seen.append((done, total)))
-    assert seen == [(16 * n, 90) for n in range(1, 6)]
+    assert seen == [(32, 90), (48, 90), (64, 90), (80, 90)], "a first generation of 16 sets, then 8 sets each"
     assert tuning.simulated_loops == 80 == 2 * len(tuning.history)
     assert not tuning.interrupted
+    assert not tuning.converged
+
+
+def test_a_search_ends_where_two_descents_agree():
+    tuning = tune([regulated()], {"scale": (0.3, 8.0)}, duration=0.1, budget=4000)
+    assert tuning.converged
+    assert tuning.simulated_loops < 600
+    assert tuning.gains["scale"] == pytest.approx(1.0, rel=1e-3)
+
+
+def test_the_evolution_strategy_finds_the_minimum_of_a_rotated_narrow_valley():
+    """A condition of 1e4, and an optimum on the surface of the cube."""
+    rotation, _ = np.linalg.qr(np.random.default_rng(2).standard_normal((4, 4)))
+    optimum, scales = np.array([0.3, 0.6, 0.5, 0.4]), np.array([1.0, 4.6, 21.5, 100.0])
+    strategy = EvolutionStrategy(np.full(4, 0.9), np.random.default_rng(1))
+    for _ in range(150):
+        points = strategy.ask()
+        strategy.tell(points, (((points - optimum) @ rotation * scales) ** 2).sum(axis=1))
+    assert strategy.mean == pytest.approx(optimum, abs=1e-4)
+    assert strategy.width < 1e-3
+    outside = EvolutionStrategy(np.full(2, 0.5), np.random.default_rng(1))
+    for _ in range(40):
+        points = outside.ask()
+        assert points.min() >= 0.0
+        assert points.max() <= 1.0
+        outside.tell(points, points @ [1.0, -1.0])
+    assert outside.mean == pytest.approx([0.0, 1.0], abs=1e-2)
 
 
 def test_the_result_is_never_worse_than_the_present_gains_or_a_start():
@@ -179,8 +207,16 @@ def test_metrics_are_those_of_the_single_run():
     assert metrics.index[5, 1] == pytest.approx(np.sqrt(np.trapezoid(error**2, time) / 0.3), rel=1e-9)
     grown = np.diff(run["air_mass"][first])
     assert metrics.air[5, 1] == pytest.approx(grown[grown > 0].sum() / 0.3, rel=1e-9)
-    switched = sum(np.count_nonzero(np.diff(run[f"command.{name}"][first] != 0)) for name in ("fill", "discharge"))
-    assert metrics.switchings[5, 1] == pytest.approx(switched / 0.3)
+    travel = sum(np.abs(np.diff(run[f"command.{name}"][first])).sum() for name in ("fill", "discharge"))
+    assert metrics.travel[5, 1] == pytest.approx(travel / 0.3)
+
+
+def test_the_travel_of_a_set_point_is_counted_in_its_range():
+    case = dataclasses.replace(regulated(1.0), initial_state=None)
+    steps = Schedule({"pressure": ((0, 0.0), (0.05, 2e5), (0.15, 1e5))})
+    case = dataclasses.replace(case, loop=dataclasses.replace(case.loop, setpoint=steps))
+    metrics = tune([case], {"scale": (0.3, 8.0)}, duration=0.3, budget=8).history.metrics
+    assert metrics.travel[0, 0] == pytest.approx((2e5 + 1e5) / REGULATOR.max_setpoint / 0.3)
 
 
 def test_cases_of_several_kinds_share_one_controller():
@@ -319,7 +355,7 @@ def test_bad_bounds_are_refused(bounds, message):
         ({"seed": -1}, "seed is -1"),
         ({"index": "rmse"}, "give a TrackingIndex"),
         ({"objective": "robust"}, "give RobustObjective"),
-        ({"objective": lambda metrics: 1.0}, r"the objective returned \(\); it must return \(8,\)"),
+        ({"objective": lambda metrics: 1.0}, r"the objective returned \(\); it must return \(16,\)"),
         ({"start": [{"gian": 1.0}]}, "start 0 names 'gian'"),
         ({"start": [{"gain": 1.0}]}, "start 0 is outside the bounds"),
         ({"start": [{"gain": 1e-5}] * 20}, "20 starts; at most"),

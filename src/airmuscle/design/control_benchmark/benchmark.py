@@ -1,47 +1,91 @@
-"""Control benchmark: contenders are tuned for a family of models and judged on the truth, task by task."""
+"""Control benchmark: contenders are tuned for a family of models and judged on truths, task by task."""
 
 from __future__ import annotations
 
 import dataclasses
+import enum
+import functools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from ...control.laws.stuck_valve import WithStuckValve
-from ...core.errors import AirmuscleError, ParameterError
+from ...core.arrays import Array
+from ...core.errors import ParameterError, PhysicsError, SimulationError
 from ...core.short_repr import ShortRepr
-from ...engine.loop.control_law import ControlLaw
-from ...engine.loop.control_loop import ControlLoop
-from ...engine.loop.controller import Controller
-from ...engine.run.run import simulate
+from ...engine.loop import Controller
+from ...engine.run import RungeKutta4
 from ...recording import Recording
 from ..tuning import LoopCase, RootMeanSquareError, Tuning, tune
 from ..tuning.case import with_gains
-from .called_contender import SensedController
-from .commissioning import identify_gains
-from .contenders import CompleteLaw, Contender, complete
+from .commissioning import Commissioning, alike, commission, run_loop
+from .contenders import Contender, complete
 from .joints import BenchmarkJoint
-from .task_signals import disturbance, task_signals
+from .signals import task_loop, task_signals
 from .tasks import DEGREE, STANDARD_TASKS, TUNING_BEGIN, TUNING_TASKS, ControlTask
 from .tracking_metrics import TrackingMetrics, track
+from .truths import BenchmarkTruth
 
-DEFAULT_BUDGET = 4800
-"""Loops that are simulated to tune each contender (chosen)."""
+SETS_PER_GAIN, COMMISSIONING_RUNS = 100, 60
+"""Most sets of gains for each gain of a search, and most runs of a commissioning (chosen)."""
+TUNING_INTEGRATOR = RungeKutta4(5e-4)
+"""Integrator of the searches (chosen); the median tracking index differs by less than 1e-6 from Rodas4(1e-6)."""
+SEARCH_SPREAD = 0.05
+"""Relative difference of the objectives of two searches that have converged, which a test holds (chosen)."""
+REST_TASK, REST_LIFE = "hold", 10_000.0
+"""Task at whose end the joint rests, and life [h] of the busiest valve that an engineer requires there (chosen)."""
 Progress = Callable[[str, int, int], None]
 
 
-@dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class TunedContender(ShortRepr):
-    """A contender with the law that commands the valves through the sensors; `tuning` is None if it was not tuned.
+class Group(enum.StrEnum):
+    """What a contender knows: the models alone, or also a number of runs on the truth on which it is judged."""
 
-    identified  the gains that were identified on the truth, by path
+    MODELS = "models only"
+    COMMISSIONED = "commissioned"
+
+
+class Spread(NamedTuple):
+    """Median, smallest and largest value of a number over searches and truths."""
+
+    median: float
+    low: float
+    high: float
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class BenchmarkRun(ShortRepr):
+    """One task done on a truth: its metrics and recording, or the reason why the run ended early."""
+
+    metrics: TrackingMetrics | None
+    recording: Recording | None
+    reason: str = ""
+
+
+class RunKey(NamedTuple):
+    """What a run is of."""
+
+    group: Group
+    truth: str
+    task: str
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class ContenderResult(ShortRepr):
+    """A contender with the gains of one search, and its runs.
+
+    law            tuned controller of the valves behind the sensors
+    tuning         the search; None if nothing was tuned
+    commissionings by truth; empty for a contender that is not commissioned
+    runs           of both groups on all truths; only those of the first truth keep their recordings
     """
 
     contender: Contender
+    seed: int
     law: Controller
     tuning: Tuning | None
-    identified: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    commissionings: Mapping[str, Commissioning]
+    runs: Mapping[RunKey, BenchmarkRun]
 
     @property
     def name(self) -> str:
@@ -49,51 +93,78 @@ class TunedContender(ShortRepr):
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class BenchmarkRun(ShortRepr):
-    """One task done by one contender: its metrics and recording, or the reason why the run ended early."""
-
-    task: ControlTask
-    contender: str
-    metrics: TrackingMetrics | None
-    recording: Recording | None
-    reason: str = ""
-
-
-@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class BenchmarkResult(ShortRepr):
-    """The runs of all contenders on all tasks of a joint, by names (contender, task)."""
+    """The results of contenders on the tasks of a joint: one for each contender and search."""
 
     joint: BenchmarkJoint
     tasks: tuple[ControlTask, ...]
-    contenders: tuple[TunedContender, ...]
-    runs: Mapping[tuple[str, str], BenchmarkRun]
-    budget: int
-    seed: int
+    results: tuple[ContenderResult, ...]
 
-    def metric(self, contender: str, task: str, name: str) -> float:
-        """A metric of a run; NaN if the run ended early."""
-        metrics = self.runs[contender, task].metrics
-        return math.nan if metrics is None else float(getattr(metrics, name))
+    @property
+    def seeds(self) -> tuple[int, ...]:
+        """The seeds of the searches."""
+        return tuple(dict.fromkeys(each.seed for each in self.results))
 
-    def scores(self) -> dict[str, float]:
-        """Geometric mean over the tasks of the ratio of the rms error to the smallest of all contenders, ascending.
+    @property
+    def truths(self) -> tuple[str, ...]:
+        """The names of the truths."""
+        return tuple(truth.name for truth in self.joint.truths)
 
-        1 is a contender that is best in every task; infinite one that did not complete a task.
+    @functools.cached_property
+    def _by_name(self) -> dict[tuple[str, int], ContenderResult]:
+        return {(each.name, each.seed): each for each in self.results}
+
+    @property
+    def groups(self) -> tuple[Group, ...]:
+        """The groups that have contenders."""
+        return tuple(group for group in Group if self.contenders(group))
+
+    def contenders(self, group: Group) -> tuple[str, ...]:
+        """The names of the contenders of a group."""
+        names = (each.name for each in self.results if group is Group.MODELS or each.commissionings)
+        return tuple(dict.fromkeys(names))
+
+    def values(self, contender: str, task: str, metric: str, group: Group = Group.MODELS) -> Array:
+        """A metric of a contender in a task, (searches, truths); infinite where a run ended early."""
+        runs = [
+            [self._by_name[contender, seed].runs[RunKey(group, truth, task)].metrics for truth in self.truths]
+            for seed in self.seeds
+        ]
+        return np.array([[math.inf if m is None else float(getattr(m, metric)) for m in row] for row in runs])
+
+    def metric(self, contender: str, task: str, metric: str, group: Group = Group.MODELS) -> Spread:
+        """A metric of a contender in a task, over searches and truths."""
+        return spread(self.values(contender, task, metric, group))
+
+    def ratios(self, group: Group) -> dict[str, Array]:
+        """The score of each contender of a group, (searches, truths).
+
+        It is the geometric mean over the tasks of the ratio of the rms error to the smallest of the group in the same
+        search, truth and task, times how much the life of the busiest valve at rest falls short of REST_LIFE. 1 is best
+        in every task; infinite is a contender that did not complete a task.
         """
-        return ranking(
-            {c.name: [self.metric(c.name, task.name, "rmse") for task in self.tasks] for c in self.contenders}
-        )
+        names = self.contenders(group)
+        errors = np.array([[self.values(n, task.name, "rmse", group) for task in self.tasks] for n in names])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            logarithms = np.log(errors / errors.min(axis=0))
+        scores = np.exp(np.where(np.isfinite(errors), logarithms, math.inf).mean(axis=1))
+        return {name: scores[i] * self.wear(name, group) for i, name in enumerate(names)}
+
+    def wear(self, contender: str, group: Group) -> Array:
+        """By which factor a valve at rest lives shorter than REST_LIFE (searches, truths); 1 where it lives longer."""
+        if REST_TASK not in [task.name for task in self.tasks]:
+            return np.ones((len(self.seeds), len(self.truths)))
+        return np.asarray(np.maximum(1.0, REST_LIFE / self.values(contender, REST_TASK, "valve_life", group)))
+
+    def scores(self, group: Group = Group.MODELS) -> dict[str, Spread]:
+        """The scores of a group over searches and truths, ascending by their medians."""
+        scores = {name: spread(values) for name, values in self.ratios(group).items()}
+        return dict(sorted(scores.items(), key=lambda item: item[1].median))
 
 
-def ranking(errors: Mapping[str, Sequence[float]]) -> dict[str, float]:
-    """The scores of `BenchmarkResult.scores`, ascending, from the rms errors of each contender, task by task."""
-    table = np.array(list(errors.values()), dtype=float)
-    table = np.where(np.isfinite(table), table, math.inf)
-    best = table.min(axis=0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratios = np.where(np.isfinite(best), table / best, 1.0)
-        scores = np.exp(np.mean(np.log(ratios), axis=1)).tolist()
-    return dict(sorted(zip(errors, scores, strict=True), key=lambda item: item[1]))
+def spread(values: Array) -> Spread:
+    """Median, smallest and largest of some numbers; NaN where one of them is NaN."""
+    return Spread(float(np.median(values)), float(values.min()), float(values.max()))
 
 
 def benchmark_controllers(
@@ -101,86 +172,110 @@ def benchmark_controllers(
     contenders: Sequence[Contender],
     tasks: Sequence[ControlTask] = STANDARD_TASKS,
     *,
-    budget: int = DEFAULT_BUDGET,
-    seed: int = 1,
+    seeds: Sequence[int] = (1,),
+    sets_per_gain: int = SETS_PER_GAIN,
+    commissioning_runs: int = COMMISSIONING_RUNS,
     progress: Progress | None = None,
 ) -> BenchmarkResult:
-    """Tune every contender with the same optimiser and budget, and run every task on the truth.
+    """Tune every contender for the models of a joint, commission it on each truth, and run every task on the truths.
 
-    joint       model, truth, sensors
-    contenders  their gains are tuned for the joint's family of models, not for the truth
-    tasks       STANDARD_TASKS unless given
-    budget      loops that are simulated to tune each contender; 0: none is tuned
-    seed        of the optimiser and of the noise
-    progress    called with the name of the present step, the number done and their number
+    joint               model, family, truths, sensors
+    tasks               STANDARD_TASKS unless given
+    seeds               of the searches and of the noise: one search each
+    sets_per_gain       sets of gains that a search evaluates at most for each gain; it ends before where it has
+                        converged. 0: none is tuned
+    commissioning_runs  runs of each contender on a truth for the group `commissioned`; 0: there is none
+    progress            called with the name of the present step, the number done and their number
 
     A run that fails has a reason and no metrics. Raises ParameterError for a contender that does not suit the joint.
     """
     _check_names("contender", [each.name for each in contenders])
     _check_names("task", [each.name for each in tasks])
     show = progress or (lambda text, done, total: None)
-    completed = [complete(joint, each, seed) for each in contenders]
-    tuned = []
-    for each, law in zip(contenders, completed, strict=True):
-        tuned.append(tune_contender(joint, each, law, budget=budget, seed=seed, progress=show))
-    runs: dict[tuple[str, str], BenchmarkRun] = {}
-    total = len(tuned) * len(tasks)
-    for task in tasks:
-        for contender in tuned:
-            show(f"{contender.name}: {task.name}", len(runs), total)
-            runs[contender.name, task.name] = run_task(joint, contender, task)
-    return BenchmarkResult(joint, tuple(tasks), tuple(tuned), runs, budget, seed)
+    results: list[ContenderResult] = []
+    for i, (seed, contender) in enumerate((s, c) for s in seeds for c in contenders):
+        show(contender.name, i, len(seeds) * len(contenders))
+        same = [each for each in results if each.seed == seed and each.contender is contender.tuned_as]
+        found = benchmark_contender(
+            joint, contender, tasks, seed=seed, sets_per_gain=sets_per_gain, commissioning_runs=commissioning_runs,
+            progress=show, tuned_as=same[0] if same else None,
+        )  # fmt: skip
+        results.append(found)
+    return BenchmarkResult(joint, tuple(tasks), tuple(results))
+
+
+def benchmark_contender(
+    joint: BenchmarkJoint, contender: Contender, tasks: Sequence[ControlTask] = STANDARD_TASKS, *, seed: int = 1,
+    sets_per_gain: int = SETS_PER_GAIN, commissioning_runs: int = COMMISSIONING_RUNS, progress: Progress | None = None,
+    tuned_as: ContenderResult | None = None,
+) -> ContenderResult:  # fmt: skip
+    """A contender with one search: tuned, commissioned on each truth, and its runs.
+
+    tuned_as  the result, with the same seed, of the contender whose gains it takes; otherwise that one is tuned here
+    """
+    progress = progress or (lambda text, done, total: None)
+    law, tuning = tune_contender(
+        joint, contender, seed=seed, sets_per_gain=sets_per_gain, progress=progress,
+        tuning=tuned_as.tuning if tuned_as else None,
+    )  # fmt: skip
+    bounds = complete(joint, contender).commissioned
+    found: dict[str, Commissioning] = {}
+    runs: dict[RunKey, BenchmarkRun] = {}
+    for i, truth in enumerate(joint.truths):
+        progress(f"{contender.name}: {truth.name}", i, len(joint.truths))
+        laws = {Group.MODELS: law}
+        if bounds and commissioning_runs:
+            found[truth.name] = commission(joint, truth, law, bounds, TUNING_TASKS, runs=commissioning_runs)
+            laws[Group.COMMISSIONED] = with_gains(law, found[truth.name].gains)
+        for group, each in laws.items():
+            for task in tasks:
+                run = run_task(joint, truth, each, task)
+                kept = run if truth is joint.truths[0] else dataclasses.replace(run, recording=None)
+                runs[RunKey(group, truth.name, task.name)] = kept
+    return ContenderResult(contender, seed, law, tuning, found, runs)
 
 
 def tune_contender(
-    joint: BenchmarkJoint, contender: Contender, law: CompleteLaw, *, budget: int, seed: int, progress: Progress
-) -> TunedContender:
-    """A contender with the gains that are best for the tuning tasks in the joint's family of models."""
-    if not law.bounds or not budget:
-        return TunedContender(contender, law.law, None)
-    cases = []
-    for task in TUNING_TASKS:
-        loop = loop_of(joint, law.law, task, truth=False)
-        for name, plant in joint.family.items():
-            cases.append(LoopCase(f"{task.name}, {name}", plant, loop, joint.start(plant)))
+    joint: BenchmarkJoint, contender: Contender, *, seed: int, sets_per_gain: int, progress: Progress,
+    tuning: Tuning | None = None,
+) -> tuple[Controller, Tuning | None]:  # fmt: skip
+    """The completed law of a contender with the gains that are best for the tuning tasks in the family of models.
+
+    tuning  the search of the contender whose gains it takes, if that is known
+    """
+    completed, other = complete(joint, contender, seed), contender.tuned_as
+    if other is not None and tuning is None:
+        _, tuning = tune_contender(joint, other, seed=seed, sets_per_gain=sets_per_gain, progress=progress)
+    if other is not None:
+        return with_gains(completed.law, alike(completed.law, tuning.gains if tuning else {})), tuning
+    if not completed.bounds or not sets_per_gain:
+        return completed.law, None
+    cases = list(_cases(joint, completed.law))
     tuning = tune(
-        cases, law.bounds, duration=TUNING_TASKS[0].duration,
-        index=RootMeanSquareError({"angle": DEGREE}, TUNING_BEGIN),
-        objective=joint.objective, budget=budget, seed=seed,
+        cases, completed.bounds, duration=TUNING_TASKS[0].duration,
+        index=RootMeanSquareError({"angle": DEGREE}, TUNING_BEGIN), objective=joint.objective,
+        budget=sets_per_gain * len(completed.bounds) * len(cases), seed=seed,
+        integrator=None if joint.switching else TUNING_INTEGRATOR,
         progress=lambda done, total: progress(f"tuning {contender.name}", done, total),
     )  # fmt: skip
-    tuned = with_gains(law.law, tuning.gains)
-    if not contender.identified:
-        return TunedContender(contender, tuned, tuning)
-    progress(f"identifying gains of {contender.name}", 0, 1)
-    gains, _ = identify_gains(joint, tuned, contender.identified, TUNING_TASKS[0])
-    return TunedContender(contender, with_gains(tuned, gains), tuning, gains)
+    return with_gains(completed.law, tuning.gains), tuning
 
 
-def loop_of(joint: BenchmarkJoint, law: Controller, task: ControlTask, *, truth: bool) -> ControlLoop:
-    """The control loop of a task, with the drivers of the truth or those of the model."""
-    signals = task_signals(joint, task)
-    plant, drivers = (joint.truth, joint.truth_drivers) if truth else (joint.model, joint.model_drivers)
-    if task.stuck is not None and isinstance(law, SensedController):
-        law = dataclasses.replace(law, stuck=task.stuck)
-    elif task.stuck is not None:
-        assert isinstance(law, ControlLaw)
-        law = WithStuckValve(law, task.stuck.input, task.stuck.time, task.stuck.opening)
-    setpoint = signals.setpoint(law.setpoints)
-    return ControlLoop(law, joint.sample_time, setpoint, disturbance(task, plant.inputs), drivers)
+def _cases(joint: BenchmarkJoint, law: Controller) -> Iterator[LoopCase]:
+    """The tuning tasks on all models."""
+    for task in TUNING_TASKS:
+        loop = task_loop(joint, law, task, joint.model, joint.drivers)
+        for name, plant in joint.family.items():
+            yield LoopCase(f"{task.name}, {name}", plant, loop, joint.start(plant))
 
 
-def run_task(joint: BenchmarkJoint, contender: TunedContender, task: ControlTask) -> BenchmarkRun:
-    """A task on the truth, with rows at the sampling instants."""
-    loop = loop_of(joint, contender.law, task, truth=True)
+def run_task(joint: BenchmarkJoint, truth: BenchmarkTruth, law: Controller, task: ControlTask) -> BenchmarkRun:
+    """A task on a truth, with rows at the sampling instants."""
     try:
-        record = simulate(
-            joint.truth, loop, duration=task.duration, initial_state=joint.start(joint.truth),
-            output_times=joint.sample_time,
-        )  # fmt: skip
-    except AirmuscleError as error:
-        return BenchmarkRun(task, contender.name, None, None, str(error))
-    return BenchmarkRun(task, contender.name, track(joint, task, task_signals(joint, task), record), record)
+        record = run_loop(joint, truth, law, task)
+    except (PhysicsError, SimulationError) as error:
+        return BenchmarkRun(None, None, str(error))
+    return BenchmarkRun(track(joint, truth.plant, task, task_signals(joint, task), record), record)
 
 
 def _check_names(kind: str, names: Sequence[str]) -> None:

@@ -1,16 +1,16 @@
-"""Report chapter of the control benchmark: ranking, tables of the metrics, tuned gains, figures."""
+"""Report chapter of the control benchmark: rankings of both groups, errors, searches, truths, figures."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from ...core.reference import Reference, cite
 from ...report.chapter import Chapter, Table
 from ...report.write import write_report
-from ..tuning import Tuning
-from .benchmark import BenchmarkResult, TunedContender
+from .benchmark import REST_LIFE, REST_TASK, BenchmarkResult, Group
 from .learning import LearningCurve
 from .plots import benchmark_plots
 from .tracking_metrics import BONE2019, RATED_STROKES, SETTLING_BAND, STEADY_TIME, TrackingMetrics
@@ -28,6 +28,7 @@ HEADERS = {
     "stiffness_error": "stiffness error [%]",
 }
 """Headers of the metrics, by the fields of TrackingMetrics."""
+Columns = dict[str, list[str] | list[float]]
 
 
 def write_benchmark(result: BenchmarkResult, folder: Path | str, curves: Sequence[LearningCurve] = ()) -> Path:
@@ -36,10 +37,11 @@ def write_benchmark(result: BenchmarkResult, folder: Path | str, curves: Sequenc
 
 
 def benchmark_chapter(result: BenchmarkResult, curves: Sequence[LearningCurve] = ()) -> Chapter:
-    """The chapter of a benchmark: ranking, errors, all metrics, gains, figures."""
-    tables = [ranking_table(result), error_table(result, "rmse"), error_table(result, "max_error")]
-    tables += [metrics_table(result)]
-    tables += [gains] if (gains := gains_table(result)) else []
+    """The chapter of a benchmark: for each group ranking and errors, then searches, gains, truths and all metrics."""
+    groups = result.groups
+    tables = [table for group in groups for table in group_tables(result, group)]
+    tables += [table for table in (search_table(result), gains_table(result)) if table]
+    tables += [truth_table(result), metrics_table(result)]
     tables += [learning_table(curves)] if curves else []
     tables += [failures] if (failures := failure_table(result)) else []
     return Chapter(
@@ -53,131 +55,226 @@ def benchmark_chapter(result: BenchmarkResult, curves: Sequence[LearningCurve] =
     )
 
 
-def ranking_table(result: BenchmarkResult) -> Table:
-    """The contenders by score, with mean air and strokes over the tasks."""
-    scores = result.scores()
+def group_tables(result: BenchmarkResult, group: Group) -> list[Table]:
+    """Ranking, order on each truth, and errors of one group."""
+    tables = [ranking_table(result, group), error_table(result, "rmse", group)]
+    if len(result.contenders(group)) > 1 and len(result.truths) > 1:
+        tables.insert(1, order_table(result, group))
+    return tables
+
+
+def ranking_table(result: BenchmarkResult, group: Group) -> Table:
+    """The contenders of a group by score, with what they cost."""
+    scores = result.scores(group)
+    rest = {name: _at_rest(result, name, group) for name in scores}
     return Table(
-        "ranking",
-        "Ranking",
+        f"ranking_{_key(group)}",
+        f"Ranking, {group}",
         {
             "controller": list(scores),
-            "score": list(scores.values()),
-            "air, mean [l/s (ANR)]": [_mean(result, name, "air") for name in scores],
-            "valve strokes, mean [1/s]": [_mean(result, name, "strokes") for name in scores],
-            "tasks completed": [_completed(result, name) for name in scores],
+            "score": [each.median for each in scores.values()],
+            "lowest": [each.low for each in scores.values()],
+            "highest": [each.high for each in scores.values()],
+            "air, mean [l/s (ANR)]": [_mean(result, name, "air", group) for name in scores],
+            "strokes at rest [1/s]": [strokes for strokes, _ in rest.values()],
+            "valve life at rest [h]": [life for _, life in rest.values()],
+            "runs completed [%]": [_completed(result, name, group) for name in scores],
         },
-        "Score: geometric mean over the tasks of the rms error, divided by the smallest of all controllers; 1 is the "
-        "best in every task.",
+        "Score: geometric mean over the tasks of the rms error, divided by the smallest of the group on the same "
+        f"truth, times {REST_LIFE:g} h over the life of the busiest valve in the task '{REST_TASK}' where it is "
+        f"shorter; 1 is the best in every task. {_spread_note(result)}",
     )  # fmt: skip
 
 
-def _completed(result: BenchmarkResult, name: str) -> int:
-    return sum(result.runs[name, task.name].metrics is not None for task in result.tasks)
-
-
-def _mean(result: BenchmarkResult, name: str, metric: str) -> float:
-    values = [result.metric(name, task.name, metric) for task in result.tasks]
-    return sum(values) / len(values)
-
-
-def error_table(result: BenchmarkResult, metric: str) -> Table:
-    """One metric of all controllers, one row for each task."""
-    names = [each.name for each in result.contenders]
-    columns: dict[str, list[str] | list[float]] = {"task": [task.name for task in result.tasks]}
-    columns |= {name: [result.metric(name, task.name, metric) for task in result.tasks] for name in names}
-    return Table(metric, _title(HEADERS[metric]), columns, "From the beginning of the judged time of each task.")
-
-
-def _title(heading: str) -> str:
-    return heading[0].upper() + heading[1:] if not heading.startswith("rms") else f"RMS{heading[3:]}"
-
-
-def metrics_table(result: BenchmarkResult) -> Table:
-    """All metrics, one row for each task and controller."""
-    keys = list(result.runs)
-    columns: dict[str, list[str] | list[float]] = {
-        "controller": [name for name, _ in keys],
-        "task": [task for _, task in keys],
-    }
-    for field in dataclasses.fields(TrackingMetrics):
-        columns[HEADERS[field.name]] = [result.metric(*key, field.name) for key in keys]
+def order_table(result: BenchmarkResult, group: Group) -> Table:
+    """On how many truths one contender is better than another one in every search."""
+    ratios = result.ratios(group)
+    names = list(result.scores(group))
+    rows = {a: [int((ratios[a].max(axis=0) < ratios[b].min(axis=0)).sum()) for b in names] for a in names}
+    columns: Columns = {"better": list(names)}
+    columns |= {f"than {b}": [float(rows[a][j]) if a != b else math.nan for a in names] for j, b in enumerate(names)}
     return Table(
-        "metrics",
-        "All metrics",
-        columns,
-        f"Settling: until the error remains within {SETTLING_BAND:g} degrees. Steady-state error: mean of the last "
-        f"{STEADY_TIME:g} s. Valve life: of the busiest valve at {RATED_STROKES:g} openings (chosen). Stiffness error: "
-        "of the true stiffness of the muscles against that wanted.",
-    )
+        f"order_{_key(group)}", f"Order, {group}", columns,
+        f"Number of truths, of {len(result.truths)}, on which every search of a controller has a smaller score than "
+        "every search of another one.",
+    )  # fmt: skip
+
+
+def error_table(result: BenchmarkResult, metric: str, group: Group) -> Table:
+    """The median of one metric of all contenders of a group, one row for each task."""
+    columns: Columns = {"task": [task.name for task in result.tasks]}
+    for name in result.contenders(group):
+        columns[name] = [result.metric(name, task.name, metric, group).median for task in result.tasks]
+    title = HEADERS[metric]
+    title = f"{title[0].upper()}{title[1:]}" if not title.startswith("rms") else f"RMS{title[3:]}"
+    return Table(
+        f"{metric}_{_key(group)}", f"{title}, {group}", columns,
+        f"Median over searches and truths, from the beginning of the judged time of each task. {_spread_note(result)}",
+    )  # fmt: skip
+
+
+def search_table(result: BenchmarkResult) -> Table | None:
+    """The searches for the models: sets of gains, agreement of their descents, objective and its spread."""
+    tuned = [each for each in result.results if each.tuning is not None and each.contender.tuned_as is None]
+    names = list(dict.fromkeys(each.name for each in tuned))
+    if not names:
+        return None
+    searches = {name: [each.tuning for each in tuned if each.name == name and each.tuning] for name in names}
+    best = {name: [tuning.objective for tuning in found] for name, found in searches.items()}
+    columns: Columns = {
+        "controller": names,
+        "gains": [float(len(found[0].ranges)) for found in searches.values()],
+        "sets of gains": [max(float(len(each.history)) for each in found) for found in searches.values()],
+        "converged": [f"{sum(each.converged for each in found)} of {len(found)}" for found in searches.values()],
+        "objective [deg]": [sorted(values)[len(values) // 2] for values in best.values()],
+        "spread [%]": [100.0 * (max(values) / min(values) - 1.0) for values in best.values()],
+    }
+    return Table(
+        "searches", "Searches", columns,
+        f"For {len(result.joint.family)} models, none of which is a truth; seeds {_listed(result.seeds)}. Objective: "
+        f"{result.joint.objective}, median over the seeds; spread: largest over smallest. A search has converged where "
+        "its two best descents agree.",
+    )  # fmt: skip
 
 
 def gains_table(result: BenchmarkResult) -> Table | None:
-    """The gains that tuning found, in SI units; None if nothing was tuned."""
+    """The gains of the searches and of the commissionings, in SI units."""
     rows = [
-        (
-            each.name,
-            path,
-            each.identified.get(path, value),
-            _remark(each, each.tuning, path),
-            each.tuning.objective,
-        )
-        for each in result.contenders
+        (each.name, each.seed, "models", path, value, "on a bound" if path in each.tuning.on_bound else "")
+        for each in result.results
         if each.tuning is not None
         for path, value in each.tuning.gains.items()
     ]
-    if not rows:
-        return None
-    names = ("controller", "gain", "value [SI]", "remark", "objective [deg]")
+    rows += [
+        (each.name, each.seed, truth, path, value, f"{found.runs} runs")
+        for each in result.results
+        for truth, found in each.commissionings.items()
+        for path, value in found.gains.items()
+    ]
+    return _rows(
+        "gains", "Gains", ("controller", "seed", "found on", "gain", "value [SI]", "remark"), rows, shown=False
+    )
+
+
+def truth_table(result: BenchmarkResult) -> Table:
+    """The truths."""
+    truths = result.joint.truths
+    columns: Columns = {"truth": [truth.name for truth in truths]}
+    described = [result.joint.describe(truth) for truth in truths]
+    columns |= {key: [each[key] for each in described] for key in described[0]}
+    return Table("truths", "Truths", columns, "Flow, inertia, weight and offset relative to the model.")
+
+
+def metrics_table(result: BenchmarkResult) -> Table:
+    """All metrics, one row for each run."""
+    keys = [(each, key) for each in result.results for key in each.runs]
+    columns: Columns = {
+        "controller": [each.name for each, _ in keys],
+        "seed": [float(each.seed) for each, _ in keys],
+        "group": [str(key.group) for _, key in keys],
+        "truth": [key.truth for _, key in keys],
+        "task": [key.task for _, key in keys],
+    }
+    for field in dataclasses.fields(TrackingMetrics):
+        found = (each.runs[key].metrics for each, key in keys)
+        columns[HEADERS[field.name]] = [math.nan if m is None else float(getattr(m, field.name)) for m in found]
     return Table(
-        "gains", "Tuned gains", {name: [row[i] for row in rows] for i, name in enumerate(names)},
-        f"Found by the same optimiser with {result.budget} simulated loops for each controller, seed {result.seed}, "
-        f"for {len(result.joint.family)} perturbed models. The truth is not among them, "
-        "except for a gain that is identified: it is sought afterwards by runs on the truth, judged by its encoder.",
+        "metrics", "All metrics", columns,
+        f"Settling: until the error remains within {SETTLING_BAND:g} degrees. Steady-state error: mean of the last "
+        f"{STEADY_TIME:g} s. Valve life: of the busiest valve at {RATED_STROKES:g} openings (chosen). Stiffness error: "
+        "of the true stiffness of the muscles against that wanted.",
+        shown=False,
     )  # fmt: skip
-
-
-def _remark(contender: TunedContender, tuning: Tuning, path: str) -> str:
-    if path in contender.identified:
-        return "identified"
-    return "on a bound" if path in tuning.on_bound else ""
 
 
 def learning_table(curves: Sequence[LearningCurve]) -> Table:
     """The rms errors of repeated trials."""
-    columns: dict[str, list[int] | list[float]] = {"trial": list(range(1, max(c.errors.size for c in curves) + 1))}
+    columns: Columns = {"trial": [float(i + 1) for i in range(max(c.errors.size for c in curves))]}
     columns |= {f"{curve.contender}, {curve.task.name} [deg]": curve.errors.tolist() for curve in curves}
     return Table("learning", "Iterative learning", columns, "rms error of each trial; the first is without learning.")
 
 
 def failure_table(result: BenchmarkResult) -> Table | None:
     """The runs that ended early, with their reasons; None if there are none."""
-    failed = [(name, task, run.reason) for (name, task), run in result.runs.items() if run.metrics is None]
-    if not failed:
-        return None
-    names = ("controller", "task", "reason")
-    return Table("failed", "Runs that ended early", {n: [row[i] for row in failed] for i, n in enumerate(names)})
+    rows = [
+        (each.name, each.seed, *key, run.reason)
+        for each in result.results
+        for key, run in each.runs.items()
+        if run.metrics is None
+    ]
+    return _rows("failed", "Runs that ended early", ("controller", "seed", "group", "truth", "task", "reason"), rows)
+
+
+def _rows(
+    key: str, title: str, names: Sequence[str], rows: Sequence[tuple[object, ...]], shown: bool = True
+) -> Table | None:
+    """A table of rows; None if there are none."""
+    columns = {name: [row[i] for row in rows] for i, name in enumerate(names)}
+    return Table(key, title, columns, shown=shown) if rows else None
+
+
+def _key(group: Group) -> str:
+    return group.name.lower()
+
+
+def _at_rest(result: BenchmarkResult, name: str, group: Group) -> tuple[float, float]:
+    """Median strokes [1/s] and valve life [h] at rest; NaN without the task."""
+    if REST_TASK not in [task.name for task in result.tasks]:
+        return math.nan, math.nan
+    strokes, life = (result.metric(name, REST_TASK, metric, group).median for metric in ("strokes", "valve_life"))
+    return strokes, life
+
+
+def _mean(result: BenchmarkResult, name: str, metric: str, group: Group) -> float:
+    values = [result.metric(name, task.name, metric, group).median for task in result.tasks]
+    return sum(values) / len(values)
+
+
+def _completed(result: BenchmarkResult, name: str, group: Group) -> float:
+    runs = [
+        run.metrics is not None
+        for each in result.results
+        if each.name == name
+        for key, run in each.runs.items()
+        if key.group is group
+    ]
+    return 100.0 * sum(runs) / len(runs)
+
+
+def _spread_note(result: BenchmarkResult) -> str:
+    searches, truths = len(result.seeds), len(result.truths)
+    return f"Over {searches} search{'es' if searches != 1 else ''} on {truths} truth{'s' if truths != 1 else ''}."
+
+
+def _listed(items: Iterable[object]) -> str:
+    return ", ".join(map(str, items))
+
+
+def _summary(result: BenchmarkResult) -> list[str]:
+    joint = result.joint
+    names = dict.fromkeys(each.name for each in result.results)
+    best = (f"Smallest score, {group}: {next(iter(result.scores(group)))}." for group in result.groups)
+    return [
+        f"{_counted(len(names), 'controller')}, {_counted(len(result.tasks), 'task')}, "
+        f"{_counted(len(joint.truths), 'truth')}. {' '.join(best)} Valves: {joint.valve}. Sampled every "
+        f"{joint.sample_time * 1e3:g} ms.",
+        "Every controller is tuned by the same optimiser, with at most the same number of sets of gains for each "
+        "gain, for perturbed models. In the group 'commissioned' it has then as many runs on the truth as every other "
+        "one. The truths are drawn at random from a family that has no characteristic, friction law, valve or gas of "
+        "the models. The measurements have the resolution of a 12-bit encoder, noise and dead time, of which a part "
+        "is unknown.",
+    ]
 
 
 def _counted(number: int, noun: str) -> str:
     return f"{number} {noun}{'s' if number != 1 else ''}"
 
 
-def _summary(result: BenchmarkResult) -> list[str]:
-    joint, best = result.joint, next(iter(result.scores()))
-    return [
-        f"{_counted(len(result.contenders), 'controller')}, {_counted(len(result.tasks), 'task')}. "
-        f"Smallest score: {best}. Valves: {joint.valve}. Sampled every {joint.sample_time * 1e3:g} ms.",
-        "Every controller was tuned by the same optimiser with the same budget for perturbed models. The plant on "
-        "which it is judged differs from these models in kind: another characteristic, LuGre friction, tubes, heat "
-        "transfer, another valve law, and other numbers. The measurements have the resolution of a 12-bit encoder, "
-        "noise and dead time.",
-    ]
-
-
 def _references(result: BenchmarkResult) -> tuple[Reference, ...]:
-    sources = [result.joint.model, result.joint.truth, *(each.law for each in result.contenders)]
-    references = {reference.key: reference for reference in (*cite(tuple(sources)), BONE2019)}
-    for each in result.contenders:
+    plants = (result.joint.model, *(truth.plant for truth in result.joint.truths))
+    sources = cite((*plants, *(each.law for each in result.results)))
+    references = {reference.key: reference for reference in (*sources, BONE2019)}
+    for each in result.results:
         references |= {reference.key: reference for reference in (each.tuning.references if each.tuning else ())}
     return tuple(references.values())
 

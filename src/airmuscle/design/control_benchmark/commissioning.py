@@ -1,81 +1,180 @@
-"""Commissioning in the control benchmark: gains of a tuned controller, identified by runs on the truth."""
+"""Commissioning in the control benchmark: gains of a tuned controller, sought by runs on a truth with its sensors."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import contextlib
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import TypeVar
 
 import numpy as np
 
-from ...core.errors import AirmuscleError, ParameterError
+from ...core.arrays import Array
+from ...core.errors import PhysicsError, SimulationError
 from ...core.tree import leaves
-from ...engine.loop.control_loop import ControlLoop
-from ...engine.loop.controller import Controller
-from ...engine.run.run import simulate
+from ...engine.loop import Controller, WithSensors
+from ...engine.run import simulate
+from ...recording import Recording
 from ..tuning.case import with_gains
+from ..tuning.gain_ranges import GainRange
+from .called_contender import SensedController
 from .joints import ENCODER_STEP, BenchmarkJoint
-from .task_signals import disturbance, task_signals
+from .signals import task_loop, task_signals
 from .tasks import TUNING_BEGIN, ControlTask
+from .truths import BenchmarkTruth
 
-RUNS, SWEEPS = 12, 2
-"""Runs on the truth for each gain at most, and how often all gains are sought one after the other (chosen)."""
-RESOLUTION = 0.01
-"""Accuracy of an identified gain as a part of its range (chosen)."""
+SensedLaw = TypeVar("SensedLaw", bound=Controller)
+PROBE, DAMPING, FIRST_REGION = 0.04, 1e-4, 0.5
+"""Step of a difference quotient and first radius of the trusted region, in parts of the ranges, and relative damping of
+the least squares (chosen)."""
 
 
-def identify_gains(
-    joint: BenchmarkJoint, law: Controller, bounds: Mapping[str, tuple[float, float]], task: ControlTask
-) -> tuple[dict[str, float], int]:
-    """The gains within their bounds with which the truth follows a task best, by path [SI], and the number of runs.
+@dataclasses.dataclass(frozen=True)
+class Commissioning:
+    """The gains that follow the tasks best on a truth, by path [SI]; rms errors [rad] before and after; the runs."""
 
-    law     controller of the valves behind the sensors
-    bounds  minimum and maximum [SI] of each gain; a name is the end of the path of one parameter of the law
+    gains: Mapping[str, float]
+    before: float
+    after: float
+    runs: int
 
-    Each run is judged by the rms difference of set point and reading of the encoder, whose dead time is known
-    afterwards. One gain after the other is sought by Brent's method without derivatives, in SWEEPS sweeps. A run that
-    fails is the worst. Nothing but the sensors of the truth is used. Raises ParameterError for a gain that the law does
-    not have.
+
+class _Spent(Exception):
+    """All runs are used."""
+
+
+class _Rig:
+    """A truth on which sets of gains are tried; it counts the runs and keeps the best."""
+
+    def __init__(
+        self, joint: BenchmarkJoint, truth: BenchmarkTruth, law: Controller, ranges: list[GainRange],
+        tasks: Sequence[ControlTask], limit: int,
+    ) -> None:  # fmt: skip
+        self.joint, self.truth, self.law, self.ranges, self.tasks, self.limit = joint, truth, law, ranges, tasks, limit
+        self.runs, self.best, self.point = 0, np.inf, np.zeros(len(ranges))
+
+    def gains(self, point: Array) -> dict[str, float]:
+        """The gains at a point (D,) within 0 and 1."""
+        return {each.path: float(each.from_unit(value)) for each, value in zip(self.ranges, point, strict=True)}
+
+    def errors(self, point: Array) -> Array | None:
+        """The errors of the encoder (N,) [rad] in all tasks; None if a run fails. Raises _Spent without runs left."""
+        if self.runs + len(self.tasks) > self.limit:
+            raise _Spent
+        self.runs += len(self.tasks)
+        law = with_gains(self.law, self.gains(point))
+        found = [tracking_errors(self.joint, self.truth, law, task) for task in self.tasks]
+        complete = [each for each in found if each is not None]
+        if len(complete) < len(found):
+            return None
+        errors = np.concatenate(complete)
+        if _rms(errors) < self.best:
+            self.best, self.point = _rms(errors), point
+        return errors
+
+
+def commission(
+    joint: BenchmarkJoint, truth: BenchmarkTruth, law: Controller, bounds: Mapping[str, tuple[float, float]],
+    tasks: Sequence[ControlTask], *, runs: int,
+) -> Commissioning:  # fmt: skip
+    """The gains within their bounds with which a truth follows some tasks best, with at most so many runs.
+
+    law     tuned controller of the valves behind the sensors, whose gains are the first point
+    bounds  minimum and maximum [SI] of each gain by its path
+
+    Each set of gains is tried in all tasks. Each run is judged by the error of set point and reading of the encoder,
+    whose dead time is known afterwards: Gauss-Newton steps with difference quotients, in a trusted region that shrinks
+    where a step does not help. Nothing but the sensors of the truth is used.
     """
-    from scipy.optimize import minimize_scalar
+    known = {leaf.path: leaf.value for leaf in leaves(law)}
+    ranges = [GainRange(path, *pair) for path, pair in bounds.items()]
+    point = np.array([
+        float(each.to_unit(np.array(min(max(known[each.path], each.low), each.high)))) for each in ranges
+    ])  # fmt: skip
+    rig = _Rig(joint, truth, law, ranges, tasks, runs)
+    before = np.inf
+    with contextlib.suppress(_Spent):
+        errors = rig.errors(point)
+        before = rig.best
+        _descend(rig, point, errors)
+    if not np.isfinite(rig.best):
+        return Commissioning(rig.gains(point), before, before, rig.runs)
+    return Commissioning(rig.gains(rig.point), before, rig.best, rig.runs)
 
+
+def _descend(rig: _Rig, point: Array, errors: Array | None) -> None:
+    """Gauss-Newton steps until all runs are used."""
+    from scipy.optimize import lsq_linear
+
+    region = FIRST_REGION
+    while errors is not None:
+        slopes = np.array([_slope(rig, point, errors, i) for i in range(point.size)]).T
+        damping = DAMPING * np.linalg.norm(slopes) * np.eye(point.size)
+        improved = False
+        while not improved and region > 1e-3:
+            low, high = (np.clip(point + side * region, 0.0, 1.0) - point for side in (-1.0, 1.0))
+            step = lsq_linear(
+                np.vstack([slopes, damping]), np.append(-errors, np.zeros(point.size)), (low - 1e-12, high + 1e-12)
+            ).x
+            tried = np.clip(point + step, 0.0, 1.0)
+            found = rig.errors(tried)
+            improved = found is not None and _rms(found) < _rms(errors)
+            region *= 1.5 if improved else 0.4
+        if not improved:
+            return
+        point, errors = tried, found
+
+
+def _slope(rig: _Rig, point: Array, errors: Array, index: int) -> Array:
+    """The derivative (N,) of the errors by one coordinate; 0 where the run fails."""
+    probe = point.copy()
+    probe[index] += PROBE if point[index] + PROBE <= 1.0 else -PROBE
+    found = rig.errors(probe)
+    return np.zeros_like(errors) if found is None else (found - errors) / (probe[index] - point[index])
+
+
+def _rms(errors: Array) -> float:
+    return float(np.sqrt(np.mean(errors**2)))
+
+
+def alike(law: Controller, gains: Mapping[str, float]) -> dict[str, float]:
+    """Gains of another law under the paths of this one that have most of their last names in common."""
     known = [leaf.path for leaf in leaves(law)]
-    paths = {name: _path(known, name) for name in bounds}
-    gains: dict[str, float] = {}
-    runs = 0
-    for _ in range(SWEEPS if len(bounds) > 1 else 1):
-        for name, (low, high) in bounds.items():
-
-            def error(value: float, path: str = paths[name]) -> float:
-                return tracking_error(joint, with_gains(law, {**gains, path: float(value)}), task)
-
-            options = {"maxiter": RUNS, "xatol": RESOLUTION * (high - low)}
-            optimum = minimize_scalar(error, bounds=(low, high), method="bounded", options=options)
-            gains[paths[name]], runs = float(optimum.x), runs + int(optimum.nfev)
-    return gains, runs
+    return {max(known, key=lambda path, of=name: _common(path, of)): value for name, value in gains.items()}  # type: ignore[misc]
 
 
-def _path(known: list[str], name: str) -> str:
-    """The only path that ends with a name."""
-    paths = [path for path in known if f".{path}".endswith(f".{name}")]
-    if len(paths) != 1:
-        raise ParameterError(f"identify_gains: {len(paths)} gains end with '{name}'; give the end of exactly one path.")
-    return paths[0]
+def _common(path: str, other: str) -> int:
+    """The number of last names that two paths have in common."""
+    pairs = zip(reversed(path.split(".")), reversed(other.split(".")), strict=False)
+    return next((i for i, (a, b) in enumerate(pairs) if a != b), len(path))
 
 
-def tracking_error(joint: BenchmarkJoint, law: Controller, task: ControlTask) -> float:
-    """The rms difference [rad] of set point and reading of the encoder in a run on the truth; infinite if it fails."""
-    signals, start = task_signals(joint, task), joint.start(joint.truth)
-    time = signals.time[signals.time <= task.duration + 1e-9]
-    judged = time >= TUNING_BEGIN
-    loop = ControlLoop(
-        law, joint.sample_time, signals.setpoint(law.setpoints), disturbance(task, joint.truth.inputs),
-        joint.truth_drivers,
+def run_loop(joint: BenchmarkJoint, truth: BenchmarkTruth, law: Controller, task: ControlTask) -> Recording:
+    """A task on a truth, whose sensors have their unknown dead time, with rows at the sampling instants."""
+    loop = task_loop(joint, on_truth(law, truth.extra_delay), task, truth.plant, truth.drivers)
+    return simulate(
+        truth.plant, loop, duration=task.duration, initial_state=joint.start(truth.plant),
+        output_times=joint.sample_time,
     )  # fmt: skip
+
+
+def on_truth(law: SensedLaw, delay: int) -> SensedLaw:
+    """The controller with so many samples of dead time more in its sensors."""
+    if isinstance(law, SensedController):
+        return dataclasses.replace(law, sensors=on_truth(law.sensors, delay))
+    assert isinstance(law, WithSensors)
+    late = tuple(dataclasses.replace(each, delay=each.delay + delay) for each in law.sensors)
+    return dataclasses.replace(law, sensors=late)
+
+
+def tracking_errors(joint: BenchmarkJoint, truth: BenchmarkTruth, law: Controller, task: ControlTask) -> Array | None:
+    """The difference (N,) [rad] of set point and reading of the encoder in a run on a truth; None if it fails."""
     try:
-        record = simulate(
-            joint.truth, loop, duration=task.duration, initial_state=start, output_times=joint.sample_time
-        )
-    except AirmuscleError:
-        return float("inf")
+        record = run_loop(joint, truth, law, task)
+    except (PhysicsError, SimulationError):
+        return None
+    signals = task_signals(joint, task)
+    time = signals.time[signals.time <= task.duration + 1e-9]
     angle = np.interp(time, record["time"], record["angle"])
     reading = ENCODER_STEP * np.round(angle / ENCODER_STEP)
-    return float(np.sqrt(np.mean((signals.angle[: time.size] - reading)[judged] ** 2)))
+    return np.asarray((signals.angle[: time.size] - reading)[time >= TUNING_BEGIN])

@@ -1,34 +1,22 @@
-"""Contenders of the control benchmark: control laws with the ranges of their gains, and the standard ones."""
+"""Contenders of the control benchmark: control laws with the ranges of their gains, completed to command the valves."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from pathlib import Path
 from typing import NamedTuple
 
-from ...control.laws.angle_and_stiffness import AngleAndStiffness
-from ...control.laws.antagonistic_inverse import AntagonisticInverse
-from ...control.laws.cascade import Cascade
-from ...control.laws.co_contraction import DIFFERENCE, CoContraction
-from ...control.laws.friction_feed_forward import FrictionFeedForward
-from ...control.laws.motion_feed_forward import MotionFeedForward
-from ...control.laws.pid import PID
-from ...control.laws.proportional_feedback import ProportionalFeedback
-from ...control.laws.setpoint_command import SetpointCommand
-from ...control.laws.setpoint_delay import WithSetpointDelay
-from ...control.laws.setpoint_lead import SetpointLead
-from ...control.laws.sliding_mode import SlidingMode
-from ...control.laws.super_twisting import SuperTwisting
-from ...control.laws.with_feed_forward import WithFeedForward
+from ...control.laws import Cascade, CoContraction, ProportionalFeedback, SetpointCommand
+from ...control.laws.co_contraction import DIFFERENCE
 from ...core.annotation import check_field_types, one_line
 from ...core.errors import ParameterError
 from ...core.tree import leaves
-from ...engine.loop.control_law import ControlLaw, SigmaDelta, SplitRange
-from ...engine.loop.controller import Controller
-from ...engine.loop.sensors import WithSensors
+from ...engine.loop import ControlLaw, Controller, SigmaDelta, SplitRange, WithSensors
+from ..tuning import load_scenario_loop
 from .called_contender import COMMANDED, SensedController, sensed
-from .designed_controllers import AlongMotion, DeviationLaw, PredictiveDesign, QuadraticDesign, joint_design_model
-from .joints import SIDES, BenchmarkJoint
+from .joints import BenchmarkJoint
+from .truths import SIDES
 
 BAR = 1e5
 Bounds = Mapping[str, tuple[float, float]]
@@ -44,19 +32,20 @@ class Contender:
     law      a ControlLaw, which is compiled with the plant, or another Controller, which is called at each sample. It
              commands half the pressure difference (`difference`), both pressures (`left.pressure`,
              `right.pressure`) or the valves. It may measure the angle, the angular speed and both pressures. Its set
-             points are names of
-             TaskSignals: `angle`, `angular_speed`, `angular_acceleration`, `mean_pressure`, `stiffness`,
-             `feed_forward`, `feed_forward_rate`
+             points are names of TaskSignals: `angle`, `angular_speed`, `angular_acceleration`, `mean_pressure`,
+             `stiffness`, `feed_forward`, `feed_forward_rate`
     bounds   minimum and maximum [SI] of the gains of the law that are tuned, by path. Without bounds, and with a law
              that commands the valves, nothing is tuned
-    identified  minimum and maximum [SI] of gains that are identified after the tuning, by runs on the truth with its
-             sensors; none unless given
+    commissioned  the same of the gains that are sought afterwards on each truth, by the same routine and number of runs
+             for all contenders; none: the contender is not commissioned
+    tuned_as  a contender whose tuned gains it takes, by the ends of their paths, in place of its own tuning
     """
 
     name: str
     law: Controller
     bounds: Bounds = dataclasses.field(default_factory=dict)
-    identified: Bounds = dataclasses.field(default_factory=dict)
+    commissioned: Bounds = dataclasses.field(default_factory=dict)
+    tuned_as: Contender | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.law, Controller):
@@ -66,7 +55,7 @@ class Contender:
             )
         check_field_types(self)
         known = [leaf.path for leaf in leaves(self.law)]
-        for purpose, bounds in (("tuned", self.bounds), ("identified", self.identified)):
+        for purpose, bounds in (("tuned", self.bounds), ("commissioned", self.commissioned)):
             if unknown := [path for path in bounds if path not in known]:
                 raise ParameterError(
                     f"contender '{self.name}': {type(self.law).__name__} has no declared parameter '{unknown[0]}' to "
@@ -75,10 +64,12 @@ class Contender:
 
 
 class CompleteLaw(NamedTuple):
-    """A law that commands the valves of a joint through its sensors, and the ranges of all gains that are tuned."""
+    """A law that commands the valves of a joint through its sensors, and the ranges of the gains that are tuned, and of
+    those that are commissioned."""
 
     law: WithSensors | SensedController
-    bounds: dict[str, tuple[float, float]]
+    bounds: Bounds
+    commissioned: Bounds
 
 
 def complete(joint: BenchmarkJoint, contender: Contender, seed: int = 1) -> CompleteLaw:
@@ -87,19 +78,22 @@ def complete(joint: BenchmarkJoint, contender: Contender, seed: int = 1) -> Comp
     Raises ParameterError for a law that commands other inputs, or measures a column without a sensor.
     """
     _check_columns(joint, contender)
+    ranges = contender.bounds, contender.commissioned
     if isinstance(contender.law, ControlLaw):
-        law, bounds = _actuated(joint, contender.law, dict(contender.bounds), contender.name)
+        law, prefix, own = _actuated(joint, contender.law, contender.name)
         known = {sensor.column: sensor for sensor in joint.sensors}
         sensors = tuple(known[name] for name in law.measured_columns)
-        return CompleteLaw(WithSensors(law, sensors, float(seed)), _within("law.", bounds))
+        tuned, commissioned = (_within(f"law.{prefix}", bounds) for bounds in ranges)
+        return CompleteLaw(WithSensors(law, sensors, float(seed)), {**tuned, **_within("law.", own)}, commissioned)
     inputs = contender.law.inputs
     stand_in = SetpointCommand(inputs, tuple(f"{COMMANDED}{name}" for name in inputs))
-    law, own = _actuated(joint, stand_in, {}, contender.name)
-    bounds = {**_within("controller.", contender.bounds), **_within("actuation.", own)} if contender.bounds else {}
+    law, _, own = _actuated(joint, stand_in, contender.name)
+    tuned, commissioned = (_within("controller.", bounds) for bounds in ranges)
     span = joint.pressure_span
     limits = dict.fromkeys(joint.pressures, (joint.min_pressure, joint.max_pressure)) | {DIFFERENCE: (-span, span)}
-    ranges = {name: limits[name] for name in inputs if name in limits}
-    return CompleteLaw(sensed(contender.law, law, ranges, joint.sensors, seed), bounds)
+    limited = {name: limits[name] for name in inputs if name in limits}
+    tuned = {**tuned, **_within("actuation.", own)} if tuned else {}
+    return CompleteLaw(sensed(contender.law, law, limited, joint.sensors, seed), tuned, commissioned)
 
 
 def _check_columns(joint: BenchmarkJoint, contender: Contender) -> None:
@@ -111,163 +105,53 @@ def _check_columns(joint: BenchmarkJoint, contender: Contender) -> None:
         )
 
 
-def _actuated(
-    joint: BenchmarkJoint, law: ControlLaw, bounds: dict[str, tuple[float, float]], name: str
-) -> tuple[ControlLaw, dict[str, tuple[float, float]]]:
-    """A law with the parts from its commands to the valves, and its ranges."""
+def _actuated(joint: BenchmarkJoint, law: ControlLaw, name: str) -> tuple[ControlLaw, str, Bounds]:
+    """A law with the parts from its commands to the valves, the prefix of its parameters, and ranges of the parts."""
+    prefix, ranges = "", dict[str, tuple[float, float]]()
     if law.inputs == (DIFFERENCE,):
         span = (joint.pressure_span,)
         law = Cascade(law, CoContraction(joint.pressures, 0.0, "mean_pressure"), (-span[0],), span)
-        bounds = _within("outer.", bounds)
+        prefix = "outer."
     if set(law.inputs) == set(joint.pressures):
-        law, bounds = _with_pressure_control(joint, law, bounds)
+        valves = tuple(SplitRange(f"{side}.fill", f"{side}.discharge") for side in SIDES)
+        start = (10.0 / BAR, 0.02 * BAR) if joint.switching else (2.0 / BAR, 0.0)
+        inner = ProportionalFeedback(joint.pressures, valves, *start)
+        law = Cascade(law, inner, (joint.min_pressure,) * 2, (joint.max_pressure,) * 2)
+        prefix, ranges = f"outer.{prefix}", {"inner.gain": PRESSURE_GAIN}
+        if joint.switching:
+            law = SigmaDelta(law)
+            prefix, ranges = f"law.{prefix}", _within("law.", {**ranges, "inner.zone": ZONE})
     if set(law.inputs) != set(joint.model.inputs) - {"external_torque"}:
         raise ParameterError(
             f"contender '{name}' commands {', '.join(law.inputs)}; allowed are '{DIFFERENCE}', the pressures "
             f"{', '.join(joint.pressures)}, or all valves."
         )
-    return law, bounds
-
-
-def _with_pressure_control(
-    joint: BenchmarkJoint, law: ControlLaw, bounds: dict[str, tuple[float, float]]
-) -> tuple[ControlLaw, dict[str, tuple[float, float]]]:
-    """A law that commands pressures with the inner pressure control of a joint, and its ranges."""
-    valves = tuple(SplitRange(f"{side}.fill", f"{side}.discharge") for side in SIDES)
-    inner = ProportionalFeedback(joint.pressures, valves, 10.0 / BAR, 0.02 * BAR if joint.switching else 0.0)
-    limits = (joint.min_pressure,) * 2, (joint.max_pressure,) * 2
-    cascade = Cascade(law, inner, *limits)
-    bounds = {**_within("outer.", bounds), "inner.gain": PRESSURE_GAIN}
-    if not joint.switching:
-        return cascade, bounds
-    return SigmaDelta(cascade), _within("law.", {**bounds, "inner.zone": ZONE})
+    return law, prefix, ranges
 
 
 def _within(prefix: str, bounds: Bounds) -> dict[str, tuple[float, float]]:
     return {f"{prefix}{path}": pair for path, pair in bounds.items()}
 
 
-_GAIN, _INTEGRAL, _DERIVATIVE, _LEAD = (2e4, 2e6), (0.02, 3.0), (1e-3, 0.2), (1e-3, 0.1)
-_FRICTION, _INERTIA = (10.0, 5e4), (-500.0, 500.0)
-PID_BOUNDS: Bounds = {"gain": _GAIN, "integral_time": _INTEGRAL, "derivative_time": _DERIVATIVE}
+def scenario_contender(joint: BenchmarkJoint, path: str | Path) -> Contender:
+    """The contender of a scenario file: its control law, with the ranges of its gains that `airmuscle tune` has.
 
-
-def _pid() -> PID:
-    return PID("angle", DIFFERENCE, gain=2e5, integral_time=0.3, derivative_time=0.02, derivative_filter=5.0)
-
-
-def _feed_forward() -> SetpointLead:
-    return SetpointLead("feed_forward", "feed_forward_rate", DIFFERENCE, 0.02)
-
-
-def _friction() -> FrictionFeedForward:
-    return FrictionFeedForward("angular_speed", DIFFERENCE, 1e3, boundary_speed=0.1)
-
-
-def _compensated() -> WithFeedForward:
-    """Feed-forward of the model with compensation of friction and of inertia."""
-    inertia = MotionFeedForward("angular_speed", "angular_acceleration", DIFFERENCE)
-    return WithFeedForward(_feed_forward(), WithFeedForward(_friction(), inertia))
-
-
-_COMPENSATION: Bounds = {
-    "feed_forward.feed_forward.lead_time": _LEAD,
-    "feed_forward.feedback.feed_forward.amplitude": _FRICTION,
-}
-_IDENTIFIED: Bounds = {**_COMPENSATION, "feed_forward.feedback.feedback.acceleration_gain": _INERTIA}
-"""Gains of the compensated feed-forward that are tuned, and those that are identified."""
-
-
-def pid_contender() -> Contender:
-    """PID of the angle without a model of the muscles."""
-    return Contender("PID", _pid(), PID_BOUNDS)
-
-
-def open_loop_contender() -> Contender:
-    """Feed-forward by the static inverse of the model, without feedback of the angle."""
-    without = WithFeedForward(_feed_forward(), PID("angle", DIFFERENCE, gain=0.0))
-    return Contender("feed-forward", without, {"feed_forward.lead_time": _LEAD})
-
-
-def feed_forward_contender() -> Contender:
-    """Feed-forward by the static inverse of the model, and PID."""
-    bounds = {"feed_forward.lead_time": _LEAD, **_within("feedback.", PID_BOUNDS)}
-    return Contender("feed-forward + PID", WithFeedForward(_feed_forward(), _pid()), bounds)
-
-
-def compensated_contender(joint: BenchmarkJoint) -> Contender:
-    """Feed-forward with compensation of friction and inertia, and PID whose set point has the dead time of the encoder.
-
-    The PID differentiates the error. The dead time is that of the data sheet of the sensors, the same for model and
-    truth.
+    The benchmark has its own sensors and, for a law that commands pressures, its own pressure control: `WithSensors`
+    around the law is removed, and of a `Cascade` whose inputs the joint does not have the outer law is taken. Raises
+    FileError, ParameterError, UnitError or UnknownNameError with the location; ParameterError for a law that commands
+    none of half the pressure difference, the pressures and the valves of the joint.
     """
-    feedback = WithSetpointDelay(dataclasses.replace(_pid(), derivative_weight=1.0), _delay(joint))
-    bounds = {**_COMPENSATION, **_within("feedback.law.", PID_BOUNDS)}
-    law = WithFeedForward(_compensated(), feedback)
-    return Contender("feed-forward + PID, compensated", law, bounds, _IDENTIFIED)
-
-
-def _delay(joint: BenchmarkJoint) -> int:
-    """Dead time of the encoder [samples]."""
-    return next(sensor.delay for sensor in joint.sensors if sensor.column == "angle")
-
-
-def sliding_mode_contender() -> Contender:
-    """Sliding mode with a boundary layer beside the feed-forward."""
-    law = SlidingMode("angle", DIFFERENCE, 5e4, sliding_time=0.05, boundary_layer=0.1, filter_time=0.004)
-    bounds = {
-        "feed_forward.lead_time": _LEAD, "feedback.amplitude": (5e3, 2e5), "feedback.sliding_time": (3e-3, 0.3),
-        "feedback.boundary_layer": (3e-3, 1.0),
-    }  # fmt: skip
-    return Contender("feed-forward + sliding mode", WithFeedForward(_feed_forward(), law), bounds)
-
-
-def super_twisting_contender() -> Contender:
-    """Super-twisting beside the feed-forward."""
-    law = SuperTwisting("angle", DIFFERENCE, 1e5, 1e5, sliding_time=0.05, filter_time=0.004)
-    bounds = {
-        "feed_forward.lead_time": _LEAD, "feedback.proportional": (1e4, 1e6), "feedback.integral": (1e4, 3e6),
-        "feedback.sliding_time": (3e-3, 0.3),
-    }  # fmt: skip
-    return Contender("feed-forward + super-twisting", WithFeedForward(_feed_forward(), law), bounds)
-
-
-def angle_and_stiffness_contender(joint: BenchmarkJoint) -> Contender:
-    """Angle and stiffness by the inverse of the model for torque and stiffness."""
-    inverse = AntagonisticInverse(
-        joint.model.muscles, joint.model.mechanism, joint.min_pressure, joint.max_pressure, steps=2
-    )
-    law = AngleAndStiffness(
-        inverse, joint.pressures, gain=20.0, integral_time=0.3, speed_gain=0.3, speed_column="angular_speed",
-        acceleration_setpoint="angular_acceleration",
-    )  # fmt: skip
-    bounds = {"gain": (2.0, 300.0), "integral_time": (0.01, 3.0), "speed_gain": (0.01, 10.0)}
-    return Contender("angle and stiffness", law, bounds)
-
-
-_DESIGN: Bounds = {"permitted_angle": (2e-3, 0.2), "speed_noise": (0.1, 100.0), "pressure_time": (3e-3, 0.1)}
-
-
-def quadratic_contender(joint: BenchmarkJoint) -> Contender:
-    """Linear-quadratic Gaussian control (LQG) of the deviation beside the feed-forward; its weights are tuned."""
-    design = QuadraticDesign(joint_design_model(joint), 0.02, 0.005, 5.0, 0.01)
-    law = WithFeedForward(_compensated(), WithSetpointDelay(DeviationLaw(design), _delay(joint)))
-    weights = _within("feedback.law.law.", {**_DESIGN, "permitted_integral": (5e-4, 0.5)})
-    return Contender("feed-forward + LQG, compensated", law, {**_COMPENSATION, **weights}, _IDENTIFIED)
-
-
-def predictive_contender(joint: BenchmarkJoint) -> Contender:
-    """Linear model predictive control (MPC) of the deviation beside the feed-forward; its weights are tuned."""
-    design = PredictiveDesign(joint_design_model(joint), 0.02, 5.0, 200.0, 0.01)
-    law = AlongMotion(_compensated(), design, _delay(joint))
-    weights = _within("design.", {**_DESIGN, "disturbance_noise": (10.0, 1e4)})
-    return Contender("feed-forward + MPC, compensated", law, {**_COMPENSATION, **weights}, _IDENTIFIED)
-
-
-def standard_contenders(joint: BenchmarkJoint) -> tuple[Contender, ...]:
-    """The contenders of the package for a joint; all ranges of gains are chosen."""
-    return (
-        pid_contender(), open_loop_contender(), feed_forward_contender(), compensated_contender(joint),
-        sliding_mode_contender(), super_twisting_contender(), angle_and_stiffness_contender(joint),
-        quadratic_contender(joint), predictive_contender(joint),
-    )  # fmt: skip
+    scenario = load_scenario_loop(path)
+    law, prefix = scenario.loop.controller, ""
+    allowed = {DIFFERENCE}, set(joint.pressures), set(joint.model.inputs) - {"external_torque"}
+    while isinstance(law, WithSensors | Cascade) and (isinstance(law, WithSensors) or set(law.inputs) not in allowed):
+        name, law = ("law", law.law) if isinstance(law, WithSensors) else ("outer", law.outer)
+        prefix = f"{prefix}{name}."
+    if not isinstance(law, ControlLaw) or set(law.inputs) not in allowed:
+        raise ParameterError(
+            f"{scenario.location.inside('input').inside('controller')}: the law commands {', '.join(law.inputs)}; "
+            f"allowed are '{DIFFERENCE}', the pressures {', '.join(joint.pressures)}, or all valves "
+            f"{', '.join(sorted(allowed[2]))}."
+        )
+    bounds = {key.removeprefix(prefix): pair for key, pair in scenario.bounds().items() if key.startswith(prefix)}
+    return Contender(Path(path).stem, law, bounds)

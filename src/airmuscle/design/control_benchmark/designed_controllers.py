@@ -1,15 +1,14 @@
-"""Controllers of the benchmark that are designed for the linearised model: linear-quadratic and model predictive."""
+"""Controllers of the benchmark that are designed for the linearised model: LQG, ADRC and model predictive."""
 
 from __future__ import annotations
 
-import abc
 import functools
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ...control.estimation.lqg import design_lqg
+from ...control.estimation.lqg import GAO2003, HAN2009, design_adrc, design_lqg
 from ...control.estimation.predictive_design import design_predictive
 from ...control.laws.co_contraction import DIFFERENCE
 from ...control.laws.linear_model_predictive import RAWLINGS2017, LinearModelPredictive
@@ -23,12 +22,13 @@ from ...engine.loop.control_loop import LawDesign
 from ...engine.loop.controller import Controller, Measurement
 from ...physics.analysis.linear_model import LinearModel
 from .joints import ENCODER_STEP, BenchmarkJoint
-from .motion_dynamics import angular_acceleration
+from .signals import angular_acceleration
 
 READING = "reading"
 """Name of the delayed angle, the measured column of a design."""
-PERMITTED_DIFFERENCE = 1e5
-"""Permitted deviation of the command [Pa], to which the permitted errors are relative (chosen)."""
+PERMITTED_DIFFERENCE, PRESSURE_SPREAD = 1e5, 1e3
+"""Permitted deviation of the command [Pa], to which the permitted errors are relative, and deviation of the present
+pressure difference after 1 s [Pa] (chosen)."""
 HORIZON = 40
 """Samples of the horizon of the predictive controller (chosen)."""
 STEPS = (1e-3, 1e-2, 1e3)
@@ -83,54 +83,15 @@ def joint_design_model(joint: BenchmarkJoint) -> JointDesignModel:
     return JointDesignModel(-slopes[0], -slopes[1], slopes[2], dead_time, joint.sample_time)
 
 
-class JointDesign(abc.ABC):
-    """Weights of a design of a controller of the reading, which commands the half pressure difference (base)."""
-
-    plant: JointDesignModel
-    permitted_angle: float
-    speed_noise: float
-    pressure_time: float
-
-    def designed(self, design: Callable[..., Any], noise: Mapping[str, float], **further: Any) -> Any:
-        """What a function of `analysis` designs with the weights of the angle, the command and the noise.
-
-        noise    further process noise by state
-        further  arguments of this function alone
-        """
-        return design(
-            self.plant.linear_model(self.pressure_time), self.plant.sample_time,
-            measured=(READING,), controlled=(READING,),
-            permitted={"angle": self.permitted_angle, DIFFERENCE: PERMITTED_DIFFERENCE},
-            process_noise={"angular_speed": self.speed_noise, "half_difference": 1e3, **noise},
-            measurement_noise={READING: ENCODER_STEP}, **further,
-        )  # fmt: skip
-
-
 @model
-class QuadraticDesign(JointDesign, LawDesign):
-    """`control.design_lqg`: weights 1/d^2 of angle and integral, noise of the speed; references there."""
+class JointDesign(LawDesign):
+    """Design of a controller of the reading with an observer of a disturbance torque, from weights.
 
-    references: ClassVar[tuple[Reference, ...]] = (FRANKLIN1998,)
-    from_file: ClassVar[bool] = False
+    `law` is that of `control.design_lqg`, `predictive` that of `control.design_predictive` with the same weights and
+    the range of the command as a limit; references there.
+    """
 
-    plant: JointDesignModel
-    permitted_angle: float = parameter("rad", "d_theta", "permitted error", bounds=(1e-5, 10.0))
-    permitted_integral: float = parameter("rad s", "d_I", "permitted integral of the error", bounds=(1e-6, 10.0))
-    speed_noise: float = parameter("rad/s", "q_omega", "deviation of the speed after 1 s", bounds=(1e-4, 1e4))
-    pressure_time: float = parameter("s", "T", "time constant of the pressures", bounds=(1e-4, 1.0))
-
-    @functools.cached_property
-    def law(self) -> ControlLaw:
-        """The state feedback with its observer."""
-        feedback: StateFeedback = self.designed(design_lqg, {}, permitted_integral={READING: self.permitted_integral})
-        return feedback
-
-
-@model
-class PredictiveDesign(JointDesign):
-    """`control.design_predictive`: weight 1/d^2 of the angle, noise of speed and disturbance; references there."""
-
-    references: ClassVar[tuple[Reference, ...]] = (RAWLINGS2017,)
+    references: ClassVar[tuple[Reference, ...]] = (FRANKLIN1998, RAWLINGS2017)
     from_file: ClassVar[bool] = False
 
     plant: JointDesignModel
@@ -140,13 +101,55 @@ class PredictiveDesign(JointDesign):
     pressure_time: float = parameter("s", "T", "time constant of the pressures", bounds=(1e-4, 1.0))
 
     @functools.cached_property
-    def controller(self) -> LinearModelPredictive:
-        """The predictive controller with its observer of the disturbance."""
-        disturbance = {"angular_speed.disturbance": self.disturbance_noise}
-        predictive: LinearModelPredictive = self.designed(
-            design_predictive, disturbance, disturbed=("angular_speed",), horizon=HORIZON
-        )
-        return predictive
+    def law(self) -> ControlLaw:
+        """The state feedback with its observer."""
+        return _quadratic(self)
+
+    @functools.cached_property
+    def predictive(self) -> LinearModelPredictive:
+        """The predictive controller with its observer."""
+        controller: LinearModelPredictive = self.designed(design_predictive, horizon=HORIZON)
+        return controller
+
+    def designed(self, design: Callable[..., Any], **further: Any) -> Any:
+        """What a function of `control` designs with these weights."""
+        noise = {
+            "angular_speed": self.speed_noise, "half_difference": PRESSURE_SPREAD,
+            "angular_speed.disturbance": self.disturbance_noise,
+        }  # fmt: skip
+        return design(
+            self.plant.linear_model(self.pressure_time), self.plant.sample_time, measured=(READING,),
+            controlled=(READING,), disturbed=("angular_speed",), process_noise=noise,
+            permitted={"angle": self.permitted_angle, DIFFERENCE: PERMITTED_DIFFERENCE},
+            measurement_noise={READING: ENCODER_STEP}, **further,
+        )  # fmt: skip
+
+
+@functools.lru_cache(maxsize=64)
+def _quadratic(design: JointDesign) -> StateFeedback:
+    """Equal designs, which a search makes once for each of its tasks and models, are computed once."""
+    feedback: StateFeedback = design.designed(design_lqg)
+    return feedback
+
+
+@model
+class RejectionDesign(LawDesign):
+    """Active disturbance rejection by `control.design_adrc`: theta'' = g d + f, with f estimated; references there."""
+
+    references: ClassVar[tuple[Reference, ...]] = (HAN2009, GAO2003)
+    from_file: ClassVar[bool] = False
+
+    plant: JointDesignModel
+    bandwidth: float = parameter("rad/s", "omega_c", "bandwidth of the controller", bounds=(0.1, 1e4))
+    observer_bandwidth: float = parameter("rad/s", "omega_o", "bandwidth of the observer", bounds=(0.1, 1e4))
+
+    @functools.cached_property
+    def law(self) -> ControlLaw:
+        """The state feedback with its observer."""
+        return design_adrc(
+            READING, DIFFERENCE, self.plant.sample_time, order=2, gain=self.plant.gain, bandwidth=self.bandwidth,
+            observer_bandwidth=self.observer_bandwidth,
+        )  # fmt: skip
 
 
 @model
@@ -194,7 +197,7 @@ class AlongMotion(Controller):
     from_file: ClassVar[bool] = False
 
     feed_forward: ControlLaw
-    design: PredictiveDesign
+    design: JointDesign
     delay: int
 
     def check(self) -> None:
@@ -214,7 +217,7 @@ class AlongMotion(Controller):
         return self.feed_forward.inputs
 
     def init(self) -> MotionMemory:
-        return MotionMemory(self.feed_forward.init(), self.design.controller.init(), ())
+        return MotionMemory(self.feed_forward.init(), self.design.predictive.init(), ())
 
     def step(
         self, memory: MotionMemory, measurement: Measurement, dt: float
@@ -227,9 +230,9 @@ class AlongMotion(Controller):
         seen = Measurement(
             {READING: deviation}, {READING: 0.0}, {DIFFERENCE: (low - forward_command, high - forward_command)}
         )
-        back, later = self.design.controller.step(memory.controller, seen, dt)
+        back, later = self.design.predictive.step(memory.controller, seen, dt)
         return {DIFFERENCE: forward_command + back[DIFFERENCE]}, MotionMemory(forward, later, angles)
 
     def notes(self, memory: MotionMemory) -> tuple[str, ...]:
         """The remarks of the designed controller."""
-        return self.design.controller.notes(memory.controller)
+        return self.design.predictive.notes(memory.controller)

@@ -1,44 +1,34 @@
-"""Joints of the control benchmark: the model of the controllers, and a truth that differs from it in kind."""
+"""Joints of the control benchmark: model of the controllers, its family, and truths on which they are judged."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from ...core.annotation import check_field_types
 from ...core.errors import ParameterError
 from ...core.short_repr import ShortRepr
-from ...engine.loop.driver import Driver, SolenoidDriver
-from ...engine.loop.sensors import ColumnSensor
+from ...core.tree import leaves
+from ...engine.loop import ColumnSensor, Driver, SolenoidDriver
 from ...files.library.entry_file import load_law
 from ...physics.equilibrium import find_equilibrium
-from ...physics.mechanism import AntagonisticJoint, JointWithExternalTorque
-from ...physics.muscle import LinearDamper, Muscle
-from ...physics.muscle.friction import Dahl, Friction, LuGre
+from ...physics.mechanism import JointWithExternalTorque
+from ...physics.muscle import LinearDamper
+from ...physics.muscle.friction import Dahl
 from ...physics.plant.plant import Plant
-from ...physics.pneumatics import (
-    EnergyBalance,
-    FillDischarge,
-    Orifice,
-    Polytropic,
-    SubsonicIndexValve,
-    Supply,
-    Tube,
-    TubeOrifice,
-    Valve,
-    WithTubes,
-)
+from ...physics.pneumatics import FillDischarge, Orifice, Polytropic, Supply, TubeOrifice, Valve
 from ..tuning import RobustObjective
+from .truths import JOINT, SIDES, SUPPLY, TRUTH_SEEDS, BenchmarkTruth, random_truth
 
-SIDES = ("left", "right")
-SUPPLY = 6e5
 ENCODER_STEP = 2.0 * math.pi / 4096
 PRESSURE_NOISE, PRESSURE_STEP = 500.0, 1e6 / 4096
 DEAD_TIME = 6e-3
 PROPORTIONAL_CONDUCTANCE, MATRIX_CONDUCTANCE = 1e-8, 2.6167e-9
+AIR_WEIGHT, TRAVEL_WEIGHT = 500.0, 2e-3
+"""Weights of the objective of tuning [degree s/kg], [degree s/stroke] (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -46,38 +36,40 @@ class BenchmarkJoint(ShortRepr):
     """An antagonistic joint of the benchmark.
 
     model           the plant as the controllers know it: feed-forward, inverse, tuning
-    truth           the plant on which they are judged, of other kinds of characteristic, valve and friction
     family          perturbed models with their names, for which controllers are tuned
+    truths          on which they are judged, of other classes of characteristic, valve, friction and gas
     sensors         sensors of the columns that controllers may measure, with their dead time
     sample_time     [s]
     mean_pressure   mean gauge pressure of the pair [Pa]
     min_pressure, max_pressure    range of the commanded pressures [Pa]
-    model_drivers, truth_drivers  drivers of the valves as assumed in tuning, and as they are
+    drivers         of the valves as assumed in tuning
     switching       whether the valves are on/off valves
-    objective       of tuning: rms error [degree] over the family with weights of air [kg/s] and switchings [1/s]
+    objective       of tuning: rms error [degree] over the family with weights of air [kg/s] and travel [strokes/s]
     valve           description of the valves with their size
     """
 
     name: str
     model: Plant
-    truth: Plant
     family: Mapping[str, Plant]
+    truths: tuple[BenchmarkTruth, ...]
     sensors: tuple[ColumnSensor, ...]
     sample_time: float
     valve: str
     mean_pressure: float = 2.5e5
     min_pressure: float = 0.1e5
     max_pressure: float = 5.5e5
-    model_drivers: Mapping[str, Driver] = dataclasses.field(default_factory=dict)
-    truth_drivers: Mapping[str, Driver] = dataclasses.field(default_factory=dict)
+    drivers: Mapping[str, Driver] = dataclasses.field(default_factory=dict)
     switching: bool = False
-    objective: RobustObjective = RobustObjective(air_weight=100.0)
+    objective: RobustObjective = RobustObjective(air_weight=AIR_WEIGHT, travel_weight=TRAVEL_WEIGHT)
 
     def __post_init__(self) -> None:
         check_field_types(self)
-        check_truth_differs(self.model, self.truth)
-        if not self.family:
-            raise ParameterError(f"joint '{self.name}': the family of models is empty; give at least the model.")
+        for name, values in (("family of models", self.family), ("tuple of truths", self.truths)):
+            if not values:
+                raise ParameterError(f"joint '{self.name}': the {name} is empty; give at least one.")
+        for truth in self.truths:
+            for plant in (self.model, *self.family.values()):
+                check_truth_differs(plant, truth)
 
     @property
     def pressures(self) -> tuple[str, str]:
@@ -90,27 +82,50 @@ class BenchmarkJoint(ShortRepr):
         """Maximum half difference of the pressures [Pa] at the mean pressure."""
         return min(self.mean_pressure - self.min_pressure, self.max_pressure - self.mean_pressure)
 
+    def describe(self, truth: BenchmarkTruth) -> dict[str, str]:
+        """The kinds of a truth, and its numbers relative to the model."""
+        inner, ours = (plant.mechanism.inner for plant in (truth.plant, self.model))  # type: ignore[attr-defined]
+        circuit = truth.plant.circuits[0]
+        tube = next((f"{value:.2g} m" for path, value in _numbers(circuit) if path.endswith("orifice.length")), "–")
+        flow, nominal = (
+            next(value for path, value in _numbers(plant) if path.endswith("fill.conductance"))
+            for plant in (truth.plant, self.model)
+        )
+        ratios = {name: getattr(inner, name) / getattr(ours, name) for name in ("inertia", "weight_torque", "offset")}
+        kinds = {kind: ", ".join(sorted(names)) for kind, names in kinds_of(truth.plant).items()}
+        further = {name.replace("_", " "): f"{ratio:.2f}" for name, ratio in ratios.items()}
+        return {
+            **kinds, "flow": f"{flow / nominal:.2f}", "tube": tube, **further,
+            "unknown dead time": f"{1e3 * truth.extra_delay * self.sample_time:g} ms",
+        }  # fmt: skip
+
     def start(self, plant: Plant) -> dict[str, float]:
         """The initial state of a plant: its equilibrium at the mean pressure in both muscles."""
         return find_equilibrium(plant, pressure=self.mean_pressure)
 
 
+def _numbers(part: Any) -> list[tuple[str, float]]:
+    return [(leaf.path, leaf.value) for leaf in leaves(part)]
+
+
 def kinds_of(plant: Plant) -> dict[str, set[str]]:
-    """Class names of the characteristics, valves and friction laws in a plant, without wrappers of a characteristic."""
-    laws = {type(_innermost(muscle.contractile)).__name__ for muscle in plant.muscles}
-    friction = {type(muscle.friction).__name__ for muscle in plant.muscles}
-    valves = {name for circuit in plant.circuits for name in _valves(circuit)}
-    return {"characteristic": laws, "valve": valves, "friction": friction}
+    """Class names of the characteristics, valves, friction laws and gas in a plant, without wrappers."""
+    return {
+        "characteristic": {type(_innermost(muscle.contractile)).__name__ for muscle in plant.muscles},
+        "valve": {name for circuit in plant.circuits for name in _valves(circuit)},
+        "friction": {type(muscle.friction).__name__ for muscle in plant.muscles},
+        "gas": {type(plant.gas).__name__},
+    }
 
 
-def check_truth_differs(model: Plant, truth: Plant) -> None:
-    """Raise ParameterError where model and truth have a class of characteristic, valve or friction in common."""
-    ours, theirs = kinds_of(model), kinds_of(truth)
+def check_truth_differs(plant: Plant, truth: BenchmarkTruth) -> None:
+    """Raise ParameterError where a truth shares a class with a plant that is known to the controllers."""
+    ours, theirs = kinds_of(plant), kinds_of(truth.plant)
     for kind, names in ours.items():
         if common := sorted(names & theirs[kind]):
             raise ParameterError(
-                f"model and truth of the benchmark have the same {kind}, {common[0]}; a controller would then be "
-                "judged on the model that it was designed with. Give the truth another one."
+                f"'{truth.name}' of the benchmark has the same {kind} as a model, {common[0]}; a controller would then "
+                "be judged on the model that it was designed with. Give the truth another one."
             )
 
 
@@ -129,43 +144,16 @@ def _valves(part: Any) -> set[str]:
     return {name for f in dataclasses.fields(part) for name in _valves(getattr(part, f.name))}
 
 
-def _pair(muscle: Muscle, **changes: Any) -> tuple[Muscle, ...]:
-    return tuple(replace(muscle, name=name, **changes) for name in SIDES)
-
-
-def _joint(**changes: float) -> JointWithExternalTorque:
-    joint = AntagonisticJoint(radius=0.04, inertia=0.05, damping=0.2, weight_torque=2.0, offset=0.11)
-    return JointWithExternalTorque(replace(joint, **changes))  # type: ignore[arg-type]
-
-
-def model_plant(
-    conductance: float, *, damping: float = 200.0, supply: float = SUPPLY, **joint: float
-) -> Plant:  # fmt: skip
+def model_plant(conductance: float, *, damping: float = 200.0, supply: float = SUPPLY, **joint: Any) -> Plant:
     """The model of the benchmark: MartensBoblan2017, Valve after ISO 6358, Polytropic(1.2), no tube, no friction.
 
     Sonic conductance [m3/(s Pa)] of each valve, damping of a muscle [N s/m], supply pressure [Pa], and parameters of
     AntagonisticJoint.
     """
-    valve = Valve(conductance, 0.35)
+    valve, muscle = Valve(conductance, 0.35), load_law("dmsp-20-300").muscle
     circuit = FillDischarge(Supply(supply), valve, valve)
-    muscle = load_law("dmsp-20-300").muscle
-    pair = _pair(muscle, damper=LinearDamper(damping))
-    return Plant(pair, (circuit, circuit), _joint(**joint), Polytropic(1.2))
-
-
-def true_plant(conductance: float) -> Plant:
-    """The truth of the benchmark: Sarosi2012, LuGre friction, tubes, heat, and other numbers (all chosen).
-
-    Valves with 80 % of the conductance and a subsonic index, inertia 20 % and weight 30 % greater, damper 50 %
-    stronger.
-    """
-    valve = SubsonicIndexValve(0.8 * conductance, 0.3, 0.55)
-    circuit = WithTubes(FillDischarge(Supply(SUPPLY), valve, valve), Tube.from_dimensions(0.3, 6e-3))
-    friction: Friction = LuGre(3e4, 15.0, 5.0, 0.01, 50.0)
-    muscle = load_law("dmsp-20-300").muscle
-    law = load_law("sarosi-dmsp-20-400n").characteristic
-    pair = _pair(muscle, contractile=law, friction=friction, damper=LinearDamper(300.0))
-    return Plant(pair, (circuit, circuit), _joint(inertia=0.06, weight_torque=2.6), EnergyBalance(1.0))
+    pair = tuple(replace(muscle, name=name, damper=LinearDamper(damping)) for name in SIDES)
+    return Plant(pair, (circuit, circuit), JointWithExternalTorque(replace(JOINT, **joint)), Polytropic(1.2))
 
 
 def perturbed_models(conductance: float) -> dict[str, Plant]:
@@ -195,25 +183,24 @@ def benchmark_sensors(sample_time: float) -> tuple[ColumnSensor, ...]:
     )
 
 
-def proportional_joint() -> BenchmarkJoint:
-    """DMSP-20-300 pair with proportional valves of 1e-8 m3/(s Pa), sampled at 500 Hz."""
+def proportional_joint(seeds: Sequence[int] = TRUTH_SEEDS) -> BenchmarkJoint:
+    """DMSP-20-300 pair with proportional valves of 1e-8 m3/(s Pa), sampled at 500 Hz, and the truths of these seeds."""
     conductance = PROPORTIONAL_CONDUCTANCE
     return BenchmarkJoint(
-        "proportional valves", model_plant(conductance), true_plant(conductance), perturbed_models(conductance),
-        benchmark_sensors(2e-3), 2e-3,
-        f"four proportional valves, C = {conductance:g} m3/(s Pa) each, -20 % in the truth",
+        "proportional valves", model_plant(conductance), perturbed_models(conductance),
+        tuple(random_truth(seed, conductance) for seed in seeds), benchmark_sensors(2e-3), 2e-3,
+        f"four proportional valves, C = {conductance:g} m3/(s Pa) each",
     )  # fmt: skip
 
 
-def on_off_joint() -> BenchmarkJoint:
+def on_off_joint(seeds: Sequence[int] = TRUTH_SEEDS) -> BenchmarkJoint:
     """DMSP-20-300 pair with on/off valves of the size of MATRIX 821, sampled at 500 Hz, with delays of the valves."""
     conductance = MATRIX_CONDUCTANCE
     inputs = [f"{side}.{edge}" for side in SIDES for edge in ("fill", "discharge")]
-    assumed, actual = SolenoidDriver(1e-3, 1e-3), SolenoidDriver(1.5e-3, 1.5e-3)
     return BenchmarkJoint(
-        "on/off valves", model_plant(conductance), true_plant(conductance), perturbed_models(conductance),
-        benchmark_sensors(2e-3), 2e-3,
-        f"four on/off valves, C = {conductance:g} m3/(s Pa) each, -20 % in the truth, delays 1 ms, 1.5 ms in the truth",
-        model_drivers=dict.fromkeys(inputs, assumed), truth_drivers=dict.fromkeys(inputs, actual), switching=True,
-        objective=RobustObjective(switching_weight=0.01),
+        "on/off valves", model_plant(conductance), perturbed_models(conductance),
+        tuple(random_truth(seed, conductance, switching=True) for seed in seeds), benchmark_sensors(2e-3), 2e-3,
+        f"four on/off valves, C = {conductance:g} m3/(s Pa) each, delays of 1 ms",
+        drivers=dict.fromkeys(inputs, SolenoidDriver(1e-3, 1e-3)), switching=True,
+        objective=RobustObjective(travel_weight=0.01),
     )  # fmt: skip

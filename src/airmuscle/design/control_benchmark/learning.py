@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -12,13 +13,13 @@ from ...core.arrays import Array
 from ...core.errors import ParameterError
 from ...core.short_repr import ShortRepr
 from ...core.tree import leaves
-from ...engine.loop.control_loop import ControlLoop
-from ...engine.loop.sensors import WithSensors
-from ...engine.run.run import simulate
+from ...engine.loop import ControlLoop, Driver, WithSensors
+from ...engine.run import simulate
 from ...physics.plant.plant import Plant
-from .benchmark import TunedContender
+from .benchmark import ContenderResult
+from .commissioning import on_truth
 from .joints import ENCODER_STEP, BenchmarkJoint
-from .task_signals import TaskSignals, disturbance, task_signals
+from .signals import TaskSignals, disturbance, task_signals
 from .tasks import ControlTask
 
 SIGNAL, RATE = "feed_forward", "feed_forward_rate"
@@ -49,15 +50,16 @@ class LearningCurve(ShortRepr):
 
 
 def learn(
-    joint: BenchmarkJoint, contender: TunedContender, task: ControlTask, *, trials: int = 31, cutoff: float = 12.0,
-    change_weight: float = 0.03, seed: int = 1,
+    joint: BenchmarkJoint, contender: ContenderResult, task: ControlTask, *, trials: int = 31, cutoff: float = 12.0,
+    change_weight: float = 0.03, seed: int = 1, truth: int = 0,
 ) -> LearningCurve:  # fmt: skip
-    """Repeat a task on the truth and improve the feed-forward of a tuned contender by `IterativeLearning`.
+    """Repeat a task on a truth and improve the feed-forward of a contender, tuned for the models alone.
 
-    The impulse response is that of the nominal model with the contender's feedback; the error is that of the encoder,
-    whose dead time is known afterwards. Each trial begins at the same state with other noise. `cutoff` [Hz] of the
-    filter and `change_weight` are chosen. Raises ParameterError for a contender without the set points `feed_forward`
-    and `feed_forward_rate`, or fewer than two trials.
+    The law is `IterativeLearning`. The impulse response is that of the nominal model with the contender's feedback; the
+    error is that of the encoder, whose dead time is known afterwards. Each trial begins at the same state with other
+    noise. `cutoff` [Hz] of the filter and `change_weight` are chosen; `truth` is the place of the truth. Raises
+    ParameterError for a contender without the set points `feed_forward` and `feed_forward_rate`, or fewer than two
+    trials.
     """
     law = contender.law
     if not {SIGNAL, RATE} <= set(law.setpoints) or not isinstance(law, WithSensors):
@@ -71,12 +73,14 @@ def learn(
     count = round(task.duration / joint.sample_time)
     signal = _present_signal(contender, signals)[:count]
     learning = _learning(joint, law, task, signals, count, cutoff, change_weight)
-    start, wanted = joint.start(joint.truth), signals.angle[1 : count + 1]
+    true, wanted = joint.truths[truth], signals.angle[1 : count + 1]
+    start, sensed = joint.start(true.plant), on_truth(law, true.extra_delay)
     judged = signals.time[1 : count + 1] >= task.begin
 
     def tried(number: int, signal: Array) -> tuple[Array, float]:
         """The angle (N,) [rad] of a trial with its own noise, and its rms error [degree]."""
-        angle = _trial(joint, joint.truth, replace(law, seed=float(seed + number)), task, signals, signal, start)
+        noisy = replace(sensed, seed=float(seed + number))
+        angle = _trial(joint, (true.plant, true.drivers), noisy, task, signals, signal, start)
         return angle, float(np.degrees(np.sqrt(np.mean((wanted - angle)[judged] ** 2))))
 
     errors, last = [], signal
@@ -89,7 +93,7 @@ def learn(
     return LearningCurve(task, contender.name, np.array(errors), last, float(np.ptp(repeated)))
 
 
-def _present_signal(contender: TunedContender, signals: TaskSignals) -> Array:
+def _present_signal(contender: ContenderResult, signals: TaskSignals) -> Array:
     """The feed-forward signal of a contender before learning, with its lead time."""
     lead = next((leaf.value for leaf in leaves(contender.law) if leaf.path.endswith("lead_time")), 0.0)
     return np.asarray(signals.feed_forward + lead * signals.feed_forward_rate)
@@ -105,7 +109,8 @@ def _learning(
     silent = replace(law, sensors=tuple(replace(s, noise=0.0, resolution=0.0) for s in law.sensors))
     quiet = replace(task, torque=(), stiffening=(), stuck=None)
     with_step, without = (
-        _trial(joint, joint.model, silent, quiet, rest, np.full(count, value), start) for value in (STEP, 0.0)
+        _trial(joint, (joint.model, joint.drivers), silent, quiet, rest, np.full(count, value), start)
+        for value in (STEP, 0.0)
     )
     span = joint.pressure_span
     return IterativeLearning.from_step_response(
@@ -115,13 +120,13 @@ def _learning(
 
 
 def _trial(
-    joint: BenchmarkJoint, plant: Plant, law: WithSensors, task: ControlTask, signals: TaskSignals, signal: Array,
-    start: dict[str, float],
+    joint: BenchmarkJoint, driven: tuple[Plant, Mapping[str, Driver]], law: WithSensors, task: ControlTask,
+    signals: TaskSignals, signal: Array, start: dict[str, float],
 ) -> Array:  # fmt: skip
-    """The angle (N,) [rad] one sample after each element of a feed-forward signal (N,) [Pa]."""
+    """The angle (N,) [rad] one sample after each element of a feed-forward signal (N,) [Pa], of a plant and drivers."""
+    plant, drivers = driven
     padded = np.append(signal, np.full(signals.time.size - signal.size, signal[-1]))
     further = {SIGNAL: padded, RATE: np.zeros_like(padded)}
-    drivers = joint.truth_drivers if plant is joint.truth else joint.model_drivers
     loop = ControlLoop(
         law, joint.sample_time, signals.setpoint(law.setpoints, further), disturbance(task, plant.inputs), drivers
     )

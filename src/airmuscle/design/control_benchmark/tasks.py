@@ -110,6 +110,7 @@ TUNING_TASKS: tuple[ControlTask, ...] = (
                 MinimumJerkMotion(-14.0 * DEGREE, 1.0, 0.5),
                 SineMotion(8.0 * DEGREE, 0.8),
                 SineMotion(8.0 * DEGREE, 1.7),
+                SineMotion(2.0 * DEGREE, 3.7),
             )
         ),
         3.0,
@@ -117,7 +118,7 @@ TUNING_TASKS: tuple[ControlTask, ...] = (
     ),
     ControlTask("tuning: step", StepMotion(18.0 * DEGREE, 0.1), 3.0),
 )
-"""What all controllers are tuned for (chosen): smooth motions up to 1.7 Hz with a step of the torque, and a step of the
+"""What all controllers are tuned for (chosen): smooth motions up to 3.7 Hz with a step of the torque, and a step of the
 angle that must have settled; none of the tasks that are judged. Their durations are equal."""
 TUNING_BEGIN = 0.7
 """Time from which on errors count in tuning [s] (chosen): 0.6 s after the step."""

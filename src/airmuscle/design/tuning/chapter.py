@@ -37,7 +37,9 @@ def tuning_chapter(
             "convergence", "Objective over the budget; a failed set of gains is not drawn.", convergence_figure(tuning)
         )
     ]
-    caption = "Mean tracking index over the cases against mean air drawn and mean switchings, with the Pareto fronts."
+    caption = (
+        "Mean tracking index over the cases against mean air drawn and travel of the commands, with the Pareto fronts."
+    )
     plots.append(Plot("pareto", caption, pareto_figure(tuning, tuning.index.unit(unit))))
     if runs:
         plots.append(
@@ -118,7 +120,7 @@ def case_table(tuning: Tuning, units: Mapping[str, str]) -> Table:
         columns[f"index, present gains{shown}"] = metrics.index[0].tolist()
     columns[f"index, tuned gains{shown}"] = metrics.index[best].tolist()
     columns["air drawn [g/s]"] = (1e3 * metrics.air[best]).tolist()
-    columns["switchings [1/s]"] = metrics.switchings[best].tolist()
+    columns["travel [strokes/s]"] = metrics.travel[best].tolist()
     return Table("cases", "Cases", columns, f"Index: {type(tuning.index).__name__}.")
 
 
@@ -128,7 +130,7 @@ def history_table(tuning: Tuning) -> Table:
     columns: dict[str, Any] = {"set": list(range(len(history)))}
     columns |= {path: history.gains[:, i] for i, path in enumerate(history.paths)}
     columns["objective"] = history.objective
-    columns |= {f"mean {name}": history.means(name) for name in ("index", "air", "switchings")}
+    columns |= {f"mean {name}": history.means(name) for name in ("index", "air", "travel")}
     return Table("history", "Sets of gains", columns, shown=False)
 
 
@@ -150,6 +152,6 @@ def _settings(tuning: Tuning) -> tuple[tuple[str, str, str], ...]:
         ("controller", type(controller).__name__, "scenario"),
         ("index", str(tuning.index), "chosen"),
         ("objective", str(tuning.criterion), "chosen"),
-        ("optimiser", f"differential evolution, seed {tuning.seed}, budget {tuning.budget} loops", "chosen"),
+        ("optimiser", f"CMA-ES, seed {tuning.seed}, budget {tuning.budget} loops", "chosen"),
         ("duration of a run", f"{tuning.duration:g} s", "scenario"),
     )

@@ -158,7 +158,7 @@ class Evaluator:
         completed = (batch.status == 0) & np.isfinite(index)
         metrics.index[at] = np.where(completed, index, np.inf).reshape(shape)
         metrics.air[at] = _air_drawn(batch, group).reshape(shape) / self.duration
-        metrics.switchings[at] = _switchings(batch, group).reshape(shape) / self.duration
+        metrics.travel[at] = _travel(batch, group).reshape(shape) / self.duration
         metrics.completed[at] = completed.reshape(shape)
 
     def _simulate(self, group: CaseGroup, gains: Array) -> BatchSolution:
@@ -188,8 +188,12 @@ def _air_drawn(batch: BatchSolution, group: CaseGroup) -> Array:
     return np.sum(grown, axis=0) if grown else np.full(len(batch), np.nan)
 
 
-def _switchings(batch: BatchSolution, group: CaseGroup) -> Array:
-    """The number (N,) of changes of the commands between zero and not zero; NaN for a run that ended early."""
-    commands = [batch[f"{COMMAND}{name}"] for name in group.loop.controller.inputs]
-    counts = np.sum([np.count_nonzero(np.diff(values != 0.0, axis=1), axis=1) for values in commands], axis=0)
-    return np.where(batch.status == 0, counts, np.nan)
+def _travel(batch: BatchSolution, group: CaseGroup) -> Array:
+    """The sum (N,) of the changes of the commands from sample to sample, in strokes; NaN for a run that ended early."""
+    known = {each.name: (each.minimum, each.maximum) for each in group.plant.input_variables}
+    known |= dict.fromkeys(group.loop.drivers, (0.0, 1.0))
+    strokes = [
+        np.abs(np.diff(batch[f"{COMMAND}{name}"], axis=1)).sum(axis=1) / (known[name][1] - known[name][0])
+        for name in group.loop.controller.inputs
+    ]
+    return np.where(batch.status == 0, np.sum(strokes, axis=0), np.nan)

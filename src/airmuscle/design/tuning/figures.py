@@ -14,7 +14,7 @@ from .result import Tuning
 
 DISPLAY = {"Pa": (1e-5, "bar"), "m": (1e3, "mm"), "rad": (180 / np.pi, "deg")}
 """Factor and unit in which the controlled column is displayed."""
-COSTS = {"air": (1e3, "mean air drawn [g/s]"), "switchings": (1.0, "mean switchings [1/s]")}
+COSTS = {"air": (1e3, "mean air drawn [g/s]"), "travel": (1.0, "mean travel [strokes/s]")}
 """Factor and axis label of the metrics that are compared with the error."""
 
 
@@ -35,7 +35,7 @@ def convergence_figure(tuning: Tuning) -> Any:
 
 
 def pareto_figure(tuning: Tuning, unit: str) -> Any:
-    """Mean index against mean air drawn and mean switchings of all sets of gains, with the Pareto fronts."""
+    """Mean index against mean air drawn and travel of the commands of all sets of gains, with the Pareto fronts."""
     history = tuning.history
     factor, shown = _display(unit)
     shown_metrics = [name for name in COSTS if np.isfinite(history.means(name)).any()]

@@ -1,9 +1,9 @@
-"""Optimisation of gains: differential evolution whose generations are batches of control loops."""
+"""Optimisation of gains: evolution strategies whose generations are batches of control loops."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,13 +14,20 @@ from ...core.tree import leaves
 from ...engine.run.integrators import Integrator
 from .case import LoopCase, check_cases
 from .evaluation import Evaluator, Interrupted, group_cases
+from .evolution import EvolutionStrategy
 from .gain_ranges import GainRange, gain_ranges, to_coordinates, to_gains
 from .objective import CaseMetrics, Objective, RobustObjective
 from .result import Tuning, TuningHistory
 from .tracking import RootMeanSquareError, TrackingIndex
 
 MIN_SETS = 8
-"""Smallest population, and smallest number of sets of gains of a budget (chosen)."""
+"""Smallest first generation, and smallest number of sets of gains of a budget (chosen)."""
+PATIENCE, TOLERANCE = 8, 0.005
+"""A descent ends where so many generations lower the objective by less than this part of it (chosen)."""
+AGREEMENT = 0.02
+"""Relative difference of the objectives within which two descents agree (chosen)."""
+APART = 0.25
+"""Distance of the starts of two descents in the unit cube, relative to its diagonal (chosen)."""
 Progress = Callable[[int, int], None]
 
 
@@ -52,12 +59,12 @@ def tune(
     start_time, integrator  as in simulate_batch
     progress    called with the number of loops simulated so far, and the budget
 
-    The optimiser is differential evolution (Storn and Price 1997) as implemented by SciPy, with the same settings for
-    every controller: best/1/bin, mutation 0.5 to 1, recombination 0.7 (SciPy's defaults), a population of Sobol points
-    whose size is the power of two from 5 D on, no polish and no stopping rule but the budget. It requires bounds alone,
-    accepts a discontinuous objective (saturation, switchings, failed runs), and evaluates a generation at once, which
-    is one batch on all cores. A set of gains that fails in a share p of the cases ranks behind all that do not, in the
-    order of p; its objective is infinite.
+    The optimiser is the evolution strategy CMA-ES (Hansen 2016), with the same settings for every controller. The first
+    generation are Sobol points, from whose best one a descent begins; further descents begin at other points of it. The
+    search ends as converged where the two best descents agree (`Tuning.converged`), otherwise with the budget. It
+    requires bounds alone, accepts a discontinuous objective (saturation, switchings, failed runs), and evaluates a
+    generation at once, which is one batch on all cores. A set of gains that fails in a share p of the cases ranks
+    behind all that do not, in the order of p; its objective is infinite.
 
     If the user interrupts, the best gains so far are returned (`Tuning.interrupted`), unless there are none. Raises
     ParameterError for impossible cases, bounds or options, SimulationError if every set of gains fails.
@@ -81,7 +88,7 @@ def tune(
         raise KeyboardInterrupt
     result = Tuning(
         family, ranges, index, evaluator.groups[0].scales, objective, duration, start_time, seed, budget,
-        search.history(), search.present_count, interrupted,
+        search.history(), search.present_count, search.converged, interrupted,
     )  # fmt: skip
     if not math.isfinite(result.objective):
         raise SimulationError(_nothing_found(evaluator, len(result.history)))
@@ -118,16 +125,16 @@ class _Search:
     ) -> None:
         self.evaluator, self.ranges, self.objective, self.progress = evaluator, ranges, objective, progress
         self.budget, self.sets = budget, budget // len(evaluator.cases)
-        self.present_count = 0
+        self.present_count, self.converged = 0, False
         self.gains: list[Array] = []
         self.metrics: list[CaseMetrics] = []
         self.values: list[Array] = []
 
     @property
     def population(self) -> int:
-        """The power of two from 5 D on, smaller where the budget has not four generations of it."""
-        size = max(MIN_SETS, 1 << math.ceil(math.log2(5 * len(self.ranges))))
-        while size > MIN_SETS and 4 * size > self.sets:
+        """The number of points of the first generation: the power of two from 8 D on, at most half the budget."""
+        size = max(MIN_SETS, 1 << math.ceil(math.log2(8 * len(self.ranges))))
+        while size > MIN_SETS and 2 * size > self.sets:
             size //= 2
         return size
 
@@ -150,25 +157,42 @@ class _Search:
         return points
 
     def run(self, given: list[Array], seed: int) -> bool:
-        """Search until the budget is used; whether the user interrupted."""
-        from scipy.optimize import differential_evolution
+        """Search until two descents agree or the budget is used; whether the user interrupted."""
         from scipy.stats import qmc
 
-        size, dimension = self.population, len(self.ranges)
-        first = qmc.Sobol(d=dimension, scramble=True, seed=np.random.default_rng(seed)).random(size)
+        first = qmc.Sobol(d=len(self.ranges), scramble=True, seed=np.random.default_rng(seed)).random(self.population)
         first[: len(given)] = given if given else first[:0]
+        random, ends = np.random.default_rng([seed, 1]), list[float]()
         try:
-            differential_evolution(
-                self._energies, [(0.0, 1.0)] * dimension, init=first, maxiter=self.sets // size - 1, vectorized=True,
-                updating="deferred", polish=False, tol=0.0, atol=0.0, seed=np.random.default_rng([seed, 1]),
-            )  # fmt: skip
+            for start in _starts(first, self._energies(first)):
+                ends.append(self._descend(EvolutionStrategy(start, random)))
+                best, *others = sorted(ends)
+                self.converged = bool(others) and others[0] - best <= AGREEMENT * abs(best)
+                if self.converged or not self._has_budget(MIN_SETS):
+                    break
         except (Interrupted, KeyboardInterrupt):
             return True
         return False
 
+    def _has_budget(self, sets: int) -> bool:
+        return sum(map(len, self.values)) + sets <= self.sets
+
+    def _descend(self, strategy: EvolutionStrategy) -> float:
+        """The smallest energy of one descent; infinite where the budget ended it."""
+        best: list[float] = []
+        while self._has_budget(strategy.size):
+            points = strategy.ask()
+            energies = self._energies(points)
+            strategy.tell(points, energies)
+            best.append(min([*best[-1:], float(energies.min())]))
+            recent = best[-PATIENCE - 1 :]
+            if len(recent) > PATIENCE and recent[0] - recent[-1] <= TOLERANCE * abs(recent[-1]):
+                return best[-1]
+        return math.inf
+
     def _energies(self, coordinates: Array) -> Array:
-        """The energies (S,) of a population (D, S): the objective, or a large number by the share of failed runs."""
-        gains = to_gains(self.ranges, np.clip(coordinates.T, 0.0, 1.0))
+        """The energies (S,) of points (S, D): the objective, or a large number by the share of failed runs."""
+        gains = to_gains(self.ranges, np.clip(coordinates, 0.0, 1.0))
         metrics = self.evaluator.metrics(gains)
         values = np.asarray(self.objective(metrics), dtype=float)
         if values.shape != (len(gains),):
@@ -183,8 +207,17 @@ class _Search:
 
     def history(self) -> TuningHistory:
         """All that was simulated."""
-        fields = ("index", "air", "switchings", "completed")
+        fields = ("index", "air", "travel", "completed")
         joined = (np.concatenate([getattr(each, name) for each in self.metrics]) for name in fields)
         return TuningHistory(
             self.evaluator.paths, np.concatenate(self.gains), np.concatenate(self.values), CaseMetrics(*joined)
         )
+
+
+def _starts(points: Array, energies: Array) -> Iterator[Array]:
+    """The points (S, D) by their energies, the smallest first, that are apart from those before."""
+    used: list[Array] = []
+    for point in points[np.argsort(energies, kind="stable")]:
+        if all(float(np.linalg.norm(point - other)) >= APART * math.sqrt(point.size) for other in used):
+            used.append(point)
+            yield point

@@ -14,17 +14,10 @@ from ...core.reference import Reference, cite
 from ...core.short_repr import ShortRepr
 from ...engine.loop.control_loop import ControlLoop
 from .case import LoopCase, loop_with_gains
+from .evolution import HANSEN2016
 from .gain_ranges import GainRange
 from .objective import CaseMetrics, Objective
 from .tracking import TrackingIndex
-
-STORN_PRICE1997 = Reference(
-    key="storn-price-1997",
-    authors="Storn, R., Price, K.",
-    title="Differential evolution – a simple and efficient heuristic for global optimization over continuous spaces",
-    where="Journal of Global Optimization 11, 341-359",
-    year=1997,
-)
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -45,8 +38,8 @@ class TuningHistory(ShortRepr):
         return np.asarray(np.minimum.accumulate(self.objective))
 
     def means(self, metric: str) -> Array:
-        """The mean (E,) of a metric over the cases: `index`, `air` or `switchings`."""
-        names = ("index", "air", "switchings")
+        """The mean (E,) of a metric over the cases: `index`, `air` or `travel`."""
+        names = ("index", "air", "travel")
         if metric not in names:
             raise ColumnError(
                 f"history: no metric '{metric}'; there are {', '.join(names)}.{suggestion(metric, names)}"
@@ -71,7 +64,8 @@ class Tuning(ShortRepr):
     criterion        the objective, a function of CaseMetrics
     history          every set of gains that was simulated
     start            1 if the history begins with the present gains of the controller, otherwise 0
-    interrupted      whether the user stopped before the budget was used
+    converged        whether the two best descents of the search agree
+    interrupted      whether the user stopped the search
     """
 
     cases: tuple[LoopCase, ...]
@@ -85,6 +79,7 @@ class Tuning(ShortRepr):
     budget: int
     history: TuningHistory
     start: int
+    converged: bool
     interrupted: bool = False
 
     @property
@@ -130,4 +125,4 @@ class Tuning(ShortRepr):
     @property
     def references(self) -> list[Reference]:
         """Sources of the optimiser, of the index, the controller and the plants."""
-        return [STORN_PRICE1997, *cite((self.index, *((case.loop.controller, case.plant) for case in self.cases)))]
+        return [HANSEN2016, *cite((self.index, *((case.loop.controller, case.plant) for case in self.cases)))]

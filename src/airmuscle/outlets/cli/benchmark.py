@@ -24,9 +24,10 @@ from ...design.control_benchmark import (
     scenario_contender,
     standard_contenders,
 )
-from ...design.control_benchmark.benchmark import DEFAULT_BUDGET
+from ...design.control_benchmark.benchmark import COMMISSIONING_RUNS
 from ...design.control_benchmark.chapter import error_table, ranking_table, write_benchmark
 from ...design.control_benchmark.tasks import find_tasks
+from ...design.control_benchmark.truths import TRUTH_SEEDS
 from ...files.library.files import is_path
 from ...report.chapter import Table
 from ...report.formatting import format_number, table_rows
@@ -34,6 +35,8 @@ from .interruption import check_interrupted
 from .options import Folder, Json
 from .terminal import echo, print_json, print_table
 
+DEFAULT_BUDGET = 60
+"""Sets of gains for each gain (chosen)."""
 LEARNED = "feed-forward + PID"
 """The controller whose feed-forward is learned from trial to trial."""
 
@@ -50,56 +53,71 @@ Seed = Annotated[
 ]  # fmt: skip
 
 
+Names = Annotated[
+    list[str] | None,
+    typer.Option(metavar="NAME", help="A controller, or a scenario file with one; repeat it for more. Default: all."),
+]  # fmt: skip
+Tasks = Annotated[
+    list[str] | None, typer.Option(metavar="NAME", help="A task; repeat it for several. Default: all.")
+]  # fmt: skip
+Truths = Annotated[
+    int, typer.Option(min=1, max=len(TRUTH_SEEDS), metavar="N", help="Plants on which controllers are judged.")
+]  # fmt: skip
+Searches = Annotated[
+    int, typer.Option(min=1, max=100, metavar="N", help="Searches of gains with different seeds.")
+]  # fmt: skip
+Budget = Annotated[
+    int, typer.Option(min=0, max=100_000, metavar="N", help="Most sets of gains for each gain; 0: no search.")
+]  # fmt: skip
+Runs = Annotated[
+    int, typer.Option(min=0, max=1000, metavar="N", help="Runs to commission a controller on a plant; 0: none.")
+]  # fmt: skip
+Trials = Annotated[
+    int, typer.Option(min=0, max=1000, metavar="N", help="Trials of iterative learning at 2 Hz; 0: none.")
+]  # fmt: skip
+
+
 def benchmark(
     valves: Annotated[Valves, typer.Option(help="Valves of the joint.")] = Valves.PROPORTIONAL,
-    controller: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME", help="A controller, or a scenario file with one; repeat it for several. Default: all."
-        ),
-    ] = None,
-    task: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="A task; repeat it for several. Default: all.")
-    ] = None,
-    budget: Annotated[
-        int, typer.Option(min=0, max=1_000_000, metavar="N", help="Simulated loops to tune each controller; 0: none.")
-    ] = DEFAULT_BUDGET,
-    seed: Seed = 1,
-    trials: Annotated[
-        int, typer.Option(min=0, max=1000, metavar="N", help="Trials of iterative learning at 2 Hz; 0: none.")
-    ] = 0,
-    out: Folder = Path("benchmark"),
-    json: Json = False,
-) -> None:
-    """Benchmark controllers of a joint on common tasks.
+    controller: Names = None, task: Tasks = None, truths: Truths = len(TRUTH_SEEDS), searches: Searches = 1,
+    budget: Budget = DEFAULT_BUDGET, runs: Runs = COMMISSIONING_RUNS, seed: Seed = 1, trials: Trials = 0,
+    out: Folder = Path("benchmark"), json: Json = False,
+) -> None:  # fmt: skip
+    """Compare controllers of an antagonistic joint on common tasks.
 
     \b
-    Every controller is tuned by the same optimiser and budget for perturbed models, and judged on a plant of another
-    kind: characteristic, friction, valves, tubes and heat differ, and the sensors have resolution, noise and dead time.
-    Writes DIR/report.html with the ranking, DIR/figures/ and DIR/data/ with all metrics.
+    Every controller is tuned by the same optimiser for perturbed models, and judged on plants of other kinds, drawn at
+    random: characteristic, friction, valves, tubes and heat differ, and the sensors have resolution, noise and dead
+    time. Group "commissioned": the same number of runs on each plant before. Writes DIR/report.html with the rankings,
+    DIR/figures/ and DIR/data/ with all metrics.
 
     \b
     Examples:
       airmuscle benchmark --out benchmark
       airmuscle benchmark --controller PID --controller "feed-forward + PID" --task "sine 1 Hz" --trials 10
-      airmuscle benchmark --valves on-off --budget 2000
-      airmuscle benchmark --controller PID --controller examples/joint_cascade.toml
+      airmuscle benchmark --valves on-off --truths 2 --budget 40
+      airmuscle benchmark --controller PID --controller examples/joint_cascade.toml --runs 0
     """
-    joint = proportional_joint() if valves is Valves.PROPORTIONAL else on_off_joint()
+    joint = (proportional_joint if valves is Valves.PROPORTIONAL else on_off_joint)(TRUTH_SEEDS[:truths])
     contenders, tasks = _contenders(joint, controller or []), find_tasks(tuple(task or ()))
     if trials and (trials < 2 or LEARNED not in [each.name for each in contenders]):
         raise InputError(f"--trials needs at least 2 trials and the controller '{LEARNED}'.")
     with _progress() as show:
-        result = benchmark_controllers(joint, contenders, tasks, budget=budget, seed=seed, progress=show)
+        result = benchmark_controllers(
+            joint, contenders, tasks, seeds=range(seed, seed + searches), sets_per_gain=budget,
+            commissioning_runs=runs, progress=show,
+        )  # fmt: skip
     curves = _learned(result, trials, seed) if trials else []
     page = write_benchmark(result, out, curves)
     if json:
         print_json(_to_dict(result, curves))
     else:
-        _print(ranking_table(result))
-        _print(error_table(result, "rmse"), titled=True)
-    if not any(run.metrics for run in result.runs.values()):
-        raise SimulationError(f"all runs failed; reason of the first: {next(iter(result.runs.values())).reason}")
+        for group in result.groups:
+            _print(ranking_table(result, group), titled=True)
+            _print(error_table(result, "rmse", group), titled=True)
+    found = [run for each in result.results for run in each.runs.values()]
+    if not any(run.metrics for run in found):
+        raise SimulationError(f"all runs failed; reason of the first: {found[0].reason}")
     if not json:
         for curve in curves:
             echo(f"learning: {curve.errors[0]:.3g} degrees in trial 1, {curve.errors[-1]:.3g} in trial {trials}")
@@ -118,7 +136,7 @@ def _contenders(joint: BenchmarkJoint, names: list[str]) -> tuple[Contender, ...
 
 def _learned(result: BenchmarkResult, trials: int, seed: int) -> list[LearningCurve]:
     """The trials of iterative learning with the tuned controller."""
-    tuned = next(each for each in result.contenders if each.name == LEARNED)
+    tuned = next(each for each in result.results if each.name == LEARNED)
     return [learn(result.joint, tuned, find_tasks(("sine 2 Hz",))[0], trials=trials, seed=seed)]
 
 
@@ -153,14 +171,21 @@ def _to_dict(result: BenchmarkResult, curves: list[LearningCurve]) -> dict[str, 
     return {
         "joint": result.joint.name,
         "valves": result.joint.valve,
-        "budget": result.budget,
-        "seed": result.seed,
-        "scores": result.scores(),
-        "gains": {each.name: each.tuning.gains for each in result.contenders if each.tuning},
+        "seeds": result.seeds,
+        "truths": {truth.name: result.joint.describe(truth) for truth in result.joint.truths},
+        "scores": {group: {n: s._asdict() for n, s in result.scores(group).items()} for group in result.groups},
+        "controllers": [
+            {
+                "controller": each.name, "seed": each.seed, "gains": each.tuning.gains if each.tuning else {},
+                "commissioned": {truth: found.gains for truth, found in each.commissionings.items()},
+            }
+            for each in result.results
+        ],
         "runs": [
-            {"controller": name, "task": task, "reason": run.reason}
+            {"controller": each.name, "seed": each.seed, **key._asdict(), "reason": run.reason}
             | (dataclasses.asdict(run.metrics) if run.metrics else {})
-            for (name, task), run in result.runs.items()
+            for each in result.results
+            for key, run in each.runs.items()
         ],
         "learning": {curve.task.name: curve.errors for curve in curves},
-    }
+    }  # fmt: skip

@@ -45,7 +45,7 @@ from .tune_options import (
     ScenarioFile,
     Seed,
     Supplies,
-    SwitchingWeight,
+    TravelWeight,
     read_factors,
     read_index,
 )
@@ -80,7 +80,7 @@ def tune(
     quantile: Quantile = 0.9,
     quantile_weight: QuantileWeight = 1.0,
     air_weight: AirWeight = 0.0,
-    switching_weight: SwitchingWeight = 0.0,
+    travel_weight: TravelWeight = 0.0,
     loads: Loads = "0.5,2",
     supplies: Supplies = "0.8",
     leak: Leak = 0.01,
@@ -112,7 +112,7 @@ def tune(
         check_writable(folder)
     loaded.check_target(target)
     factors = read_factors(loads, "--loads"), read_factors(supplies, "--supplies")
-    objective = RobustObjective(quantile, quantile_weight, air_weight, switching_weight)
+    objective = RobustObjective(quantile, quantile_weight, air_weight, travel_weight)
     request = TuneRequest(
         read_index(index), objective, Perturbations(*factors, leak, delay, draws), budget, seed, rules
     )  # fmt: skip

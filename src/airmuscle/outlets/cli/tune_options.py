@@ -31,7 +31,9 @@ Quantile = Annotated[
 ]
 QuantileWeight = Annotated[float, typer.Option(metavar="NUMBER", help="Weight of the quantile; that of the mean is 1.")]
 AirWeight = Annotated[float, typer.Option(metavar="NUMBER", help="Weight of the mean air drawn [kg/s].")]
-SwitchingWeight = Annotated[float, typer.Option(metavar="NUMBER", help="Weight of the mean switchings [1/s].")]
+TravelWeight = Annotated[
+    float, typer.Option(metavar="NUMBER", help="Weight of the mean travel of the commands [strokes/s].")
+]  # fmt: skip
 Loads = Annotated[str, typer.Option(metavar="FACTORS", help="Factors of the load; '' for none.")]
 Supplies = Annotated[str, typer.Option(metavar="FACTORS", help="Factors of the supply pressure; '' for none.")]
 Leak = Annotated[

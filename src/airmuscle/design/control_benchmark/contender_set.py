@@ -1,0 +1,107 @@
+"""Standard contenders of the control benchmark: feedback laws beside one feed-forward, and two without it."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+from ...control.laws import (
+    PID,
+    AngleAndStiffness,
+    AntagonisticInverse,
+    FrictionFeedForward,
+    MotionFeedForward,
+    SetpointLead,
+    SlidingMode,
+    SuperTwisting,
+    WithFeedForward,
+    WithSetpointDelay,
+)
+from ...control.laws.co_contraction import DIFFERENCE
+from ...engine.loop import ControlLaw
+from .contenders import Bounds, Contender
+from .designed_controllers import AlongMotion, DeviationLaw, JointDesign, RejectionDesign, joint_design_model
+from .joints import BenchmarkJoint
+
+MAX_LEAD = 0.03
+"""Greatest lead time [s] of a feed-forward (chosen): it replaces the lag of the pressures, never damping or inertia."""
+PID_BOUNDS: Bounds = {"gain": (2e4, 2e6), "integral_time": (0.02, 3.0), "derivative_time": (1e-3, 0.2)}
+_SLIDING = (3e-3, 0.3)
+_LEAD, _FRICTION = "feed_forward.lead_time", "feedback.feed_forward.amplitude"
+FEED_FORWARD: Bounds = {_LEAD: (0.0, MAX_LEAD), _FRICTION: (0.0, 3e4)}
+"""Gains of the feed-forward that are tuned for the models."""
+COMMISSIONED: Bounds = {
+    **FEED_FORWARD,
+    "feedback.feedback.position_gain": (-1e5, 1e5),
+    "feedback.feedback.speed_gain": (-1e4, 3e4),
+    "feedback.feedback.acceleration_gain": (-1e3, 1e3),
+}
+"""Gains of the feed-forward that are sought on a truth."""
+
+
+def _inside(prefix: str, bounds: Bounds) -> Bounds:
+    return {f"{prefix}{path}": pair for path, pair in bounds.items()}
+
+
+def _feed_forward() -> WithFeedForward:
+    """Inverse of the model with a lead, and compensation of friction, stiffness, damping and inertia that it lacks."""
+    lead = SetpointLead("feed_forward", "feed_forward_rate", DIFFERENCE, 0.02)
+    friction = FrictionFeedForward("angular_speed", DIFFERENCE, 1e3, boundary_speed=0.1)
+    motion = MotionFeedForward("angular_speed", "angular_acceleration", DIFFERENCE, position="angle")
+    return WithFeedForward(lead, WithFeedForward(friction, motion))
+
+
+def _beside_feed_forward(joint: BenchmarkJoint, name: str, feedback: ControlLaw, bounds: Bounds) -> Contender:
+    """A feedback of the angle beside the feed-forward; its set points have the dead time of the encoder."""
+    law = WithFeedForward(_feed_forward(), WithSetpointDelay(feedback, _delay(joint)))
+    known = {**_inside("feed_forward.", FEED_FORWARD), **_inside("feedback.law.", bounds)}
+    return Contender(name, law, known, _inside("feed_forward.", COMMISSIONED))
+
+
+def _delay(joint: BenchmarkJoint) -> int:
+    """Stated dead time of the encoder [samples]."""
+    return next(sensor.delay for sensor in joint.sensors if sensor.column == "angle")
+
+
+def _angle_and_stiffness(joint: BenchmarkJoint) -> Contender:
+    """Angle and stiffness by the inverse of the model for torque and stiffness."""
+    inverse = AntagonisticInverse(
+        joint.model.muscles, joint.model.mechanism, joint.min_pressure, joint.max_pressure, steps=2
+    )
+    law = AngleAndStiffness(
+        inverse, joint.pressures, gain=20.0, integral_time=0.3, speed_gain=0.3, speed_column="angular_speed",
+        acceleration_setpoint="angular_acceleration",
+    )  # fmt: skip
+    bounds = {"gain": (2.0, 300.0), "integral_time": (0.01, 3.0), "speed_gain": (0.01, 10.0)}
+    return Contender("angle and stiffness", law, bounds, bounds)
+
+
+def standard_contenders(joint: BenchmarkJoint) -> tuple[Contender, ...]:
+    """The contenders of the package for a joint; all ranges of gains are chosen."""
+    pid = PID("angle", DIFFERENCE, gain=2e5, integral_time=0.3, derivative_time=0.02, derivative_filter=5.0)
+    sliding = SlidingMode("angle", DIFFERENCE, 5e4, sliding_time=0.05, boundary_layer=0.1, filter_time=0.004)
+    twisting = SuperTwisting("angle", DIFFERENCE, 1e5, 1e5, sliding_time=0.05, filter_time=0.004)
+    model, ours = joint_design_model(joint), functools.partial(_beside_feed_forward, joint)
+    design = JointDesign(model, 0.1, 7.0, 200.0, 0.005)
+    quadratic = ours(
+        "feed-forward + LQG", DeviationLaw(design),
+        _inside("law.", {
+            "permitted_angle": (2e-3, 0.2), "speed_noise": (0.1, 100.0), "disturbance_noise": (10.0, 1e4),
+            "pressure_time": (3e-3, 0.1),
+        }),
+    )  # fmt: skip
+    return (
+        Contender("PID", pid, PID_BOUNDS, PID_BOUNDS),
+        ours("feed-forward", PID("angle", DIFFERENCE, gain=0.0), {}),
+        ours("feed-forward + PID", dataclasses.replace(pid, derivative_weight=1.0), PID_BOUNDS),
+        ours("feed-forward + sliding mode", sliding,
+             {"amplitude": (5e3, 2e5), "sliding_time": _SLIDING, "boundary_layer": (3e-3, 1.0)}),
+        ours("feed-forward + super-twisting", twisting,
+             {"proportional": (1e4, 1e6), "integral": (1e4, 3e6), "sliding_time": _SLIDING}),
+        ours("feed-forward + ADRC", DeviationLaw(RejectionDesign(model, 20.0, 60.0)),
+             _inside("law.", {"bandwidth": (3.0, 100.0), "observer_bandwidth": (10.0, 500.0)})),
+        quadratic,
+        Contender("feed-forward + MPC", AlongMotion(_feed_forward(), design, _delay(joint)), {},
+                  _inside("feed_forward.", COMMISSIONED), quadratic),
+        _angle_and_stiffness(joint),
+    )  # fmt: skip

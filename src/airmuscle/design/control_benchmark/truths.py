@@ -1,0 +1,178 @@
+"""Truths of the control benchmark: joints drawn at random from a stated family, of other classes than the model."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ...core import ops
+from ...core.declaration import model, parameter
+from ...core.ops import Value
+from ...core.reference import Reference
+from ...core.short_repr import ShortRepr
+from ...engine.loop import Driver, SolenoidDriver
+from ...files.library.entry_file import load_law
+from ...physics.mechanism import AntagonisticJoint, JointWithExternalTorque
+from ...physics.muscle import LinearDamper
+from ...physics.muscle.characteristic import ForceLaw, TonduLopez2000
+from ...physics.muscle.friction import BoucWen, Friction, LuGre, MaxwellSlip
+from ...physics.plant.plant import Plant
+from ...physics.pneumatics import (
+    EnergyBalance,
+    FillDischarge,
+    Gas,
+    Isothermal,
+    Orifice,
+    SubsonicIndexValve,
+    Supply,
+    Tube,
+    WallHeatTransfer,
+    WithTubes,
+)
+from ...physics.pneumatics.gas import HEAT_CAPACITY_RATIO, REFERENCE_DENSITY, REFERENCE_TEMPERATURE
+
+SIDES = ("left", "right")
+SUPPLY = 6e5
+TRUTH_SEEDS = tuple(range(23, 29))
+"""Seeds of the truths of a benchmark: the first row of six after 20 in which every class of the family occurs."""
+DEVELOPMENT_SEEDS = tuple(range(1, 7))
+"""Seeds of the truths for which the controllers of the package were developed."""
+SEALED_SEED = 20_270_319
+"""Seed of the truth that no tuning has seen; it is drawn for the published page alone."""
+LAWS = ("sarosi-dmsp-20-200n", "sarosi-dmsp-20-400n", "tondu-lopez")
+JOINT = AntagonisticJoint(radius=0.04, inertia=0.05, damping=0.2, weight_torque=2.0, offset=0.11)
+"""The joint of the model (chosen)."""
+MAX_EXTRA_DELAY = 2
+"""Greatest unknown part of the dead time [samples] (chosen)."""
+PRESLIDING = 5e-4
+"""Deflection of a muscle at which its friction slides [m] (chosen)."""
+SAINT_VENANT1839 = Reference(
+    key="saint-venant-wantzel-1839",
+    authors="de Saint-Venant, B., Wantzel, L.",
+    title="Mémoire et expériences sur l'écoulement de l'air",
+    where="Journal de l'École Polytechnique 16(27), 85-122",
+    year=1839,
+    note="isentropic flow through a nozzle; cited after textbooks, not read",
+)
+
+
+@model
+class IsentropicNozzle(Orifice):
+    """Isentropic nozzle: qm = C rho0 p1 sqrt(T0/T1) psi(p2/p1)/psi(r*),   psi(r) = sqrt(r^(2/g) - r^(1 + 1/g)).
+
+    r* = (2/(g + 1))^(g/(g - 1)) = 0.528 for g = 1.4, below which the flow is that at r*; C sonic conductance. Above the
+    pressure ratio `laminar_ratio` the flow is linear in the pressure difference. Reference: Saint-Venant and Wantzel
+    (1839).
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (SAINT_VENANT1839,)
+    from_file: ClassVar[bool] = False
+
+    conductance: float = parameter("m3/(s Pa)", "C", "sonic conductance, fully open", bounds=(0.0, 1e-5))
+    laminar_ratio: float = parameter(
+        "1", "r", "pressure ratio above which the flow is laminar", bounds=(0.9, 0.99999), fitted=False, default=0.999
+    )
+
+    def mass_flow(self, upstream: Value, downstream: Value, opening: Value, temperature: Value) -> Value:
+        high, low = ops.maximum(upstream, downstream), ops.minimum(upstream, downstream)
+        ratio, critical = (
+            low / high,
+            (2.0 / (HEAT_CAPACITY_RATIO + 1.0)) ** (HEAT_CAPACITY_RATIO / (HEAT_CAPACITY_RATIO - 1.0)),
+        )
+        laminar = _psi(self.laminar_ratio) * (1.0 - ratio) / (1.0 - self.laminar_ratio)
+        isentropic = _psi(ops.clip(ratio, critical, self.laminar_ratio))
+        part = ops.where(ratio > self.laminar_ratio, laminar, isentropic) / _psi(critical)
+        flow = self.conductance * REFERENCE_DENSITY * ops.sqrt(REFERENCE_TEMPERATURE / temperature) * high * part
+        return opening * ops.where(upstream >= downstream, flow, -flow)
+
+
+def _psi(ratio: Value) -> Value:
+    return ops.sqrt(ratio ** (2.0 / HEAT_CAPACITY_RATIO) - ratio ** (1.0 + 1.0 / HEAT_CAPACITY_RATIO))
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class BenchmarkTruth(ShortRepr):
+    """A plant on which controllers are judged.
+
+    name         of the truth in tables
+    plant        with classes of characteristic, friction, valve and gas that neither the model nor its family has
+    drivers      of the valves
+    extra_delay  dead time of all sensors that nobody knows, in samples, beside the stated one
+    """
+
+    name: str
+    plant: Plant
+    drivers: Mapping[str, Driver] = dataclasses.field(default_factory=dict)
+    extra_delay: int = 0
+
+
+def random_truth(seed: int, conductance: float, *, switching: bool = False) -> BenchmarkTruth:
+    """The truth of a seed, with valves of about this sonic conductance [m3/(s Pa)].
+
+    All ranges are chosen; numbers are uniform within them, and logarithmic where the ends differ by more than 3:
+
+        characteristic   Sarosi2012 (two fits) or TonduLopez2000 (end correction 1.1 to 1.35, radius 9.5 to 10.5 mm)
+        friction         LuGre (static friction up to 40 % more), BoucWen or MaxwellSlip, 4 to 25 N for each muscle
+        valve            SubsonicIndexValve (b 0.2 to 0.45, m 0.45 to 0.65) or IsentropicNozzle, flow factor 0.55 to 1.1
+        gas              EnergyBalance (0.3 to 3 W/K), WallHeatTransfer (10 to 60 W/(m2 K)) or Isothermal
+        tube             none, or 0.2 to 1 m with an inner diameter of 4 to 6 mm
+        joint            inertia 0.8 to 1.6, weight 0.6 to 1.5, offset of the pulleys 0.9 to 1.1 of the model's
+        damper           150 to 400 N s/m
+        dead time        0 to 2 samples more than stated; on/off valves 1 to 2 ms in place of 1 ms
+    """
+    random = np.random.default_rng(seed)
+    friction, gas = _friction(random), _gas(random)
+    muscle, law = load_law("dmsp-20-300").muscle, _characteristic(random)
+    damper = LinearDamper(random.uniform(150.0, 400.0))
+    pair = tuple(replace(muscle, name=n, contractile=law, friction=friction, damper=damper) for n in SIDES)
+    circuit: Any = FillDischarge(Supply(SUPPLY), *[_valve(random, conductance)] * 2)
+    if random.random() < 0.7:
+        circuit = WithTubes(circuit, Tube.from_dimensions(_logarithmic(random, 0.2, 1.0), random.uniform(4e-3, 6e-3)))
+    factors = {"inertia": (0.8, 1.6), "weight_torque": (0.6, 1.5), "offset": (0.9, 1.1)}
+    joint = replace(JOINT, **{name: getattr(JOINT, name) * random.uniform(*ends) for name, ends in factors.items()})
+    extra, delay = int(random.integers(0, MAX_EXTRA_DELAY + 1)), random.uniform(1e-3, 2e-3)
+    plant = Plant(pair, (circuit, circuit), JointWithExternalTorque(joint), gas)
+    inputs = [name for name in plant.inputs if name != "external_torque"]
+    drivers: dict[str, Driver] = dict.fromkeys(inputs, SolenoidDriver(delay, delay)) if switching else {}
+    return BenchmarkTruth(f"truth {seed}" if seed != SEALED_SEED else "sealed truth", plant, drivers, extra)
+
+
+def _logarithmic(random: np.random.Generator, low: float, high: float) -> float:
+    return math.exp(random.uniform(math.log(low), math.log(high)))
+
+
+def _characteristic(random: np.random.Generator) -> ForceLaw:
+    name = LAWS[random.integers(len(LAWS))]
+    correction, radius = random.uniform(1.1, 1.35), random.uniform(9.5e-3, 10.5e-3)
+    law = load_law(name).characteristic
+    assert isinstance(law, ForceLaw)
+    if not isinstance(law, TonduLopez2000):
+        return law
+    return replace(law, geometry=replace(law.geometry, radius=radius), end_correction=correction)
+
+
+def _friction(random: np.random.Generator) -> Friction:
+    kind, force, more = random.integers(3), _logarithmic(random, 4.0, 25.0), random.uniform(0.0, 0.4)
+    if kind == 0:
+        return LuGre(force / PRESLIDING, force, more * force, 0.01, 50.0)
+    if kind == 1:
+        return BoucWen(force / PRESLIDING, force, 1.0 + more, 0.75)
+    shares, limits = (0.5, 0.3, 0.2), (0.2 * PRESLIDING, PRESLIDING, 3.0 * PRESLIDING)
+    return MaxwellSlip(tuple(s * force / limit for s, limit in zip(shares, limits, strict=True)), limits)
+
+
+def _valve(random: np.random.Generator, conductance: float) -> Orifice:
+    factor, ratio, index = random.uniform(0.55, 1.1), random.uniform(0.2, 0.45), random.uniform(0.45, 0.65)
+    if random.random() < 0.5:
+        return SubsonicIndexValve(factor * conductance, ratio, index)
+    return IsentropicNozzle(factor * conductance)
+
+
+def _gas(random: np.random.Generator) -> Gas:
+    kind, heat, coefficient = random.integers(3), _logarithmic(random, 0.3, 3.0), _logarithmic(random, 10.0, 60.0)
+    return (EnergyBalance(heat), WallHeatTransfer(coefficient), Isothermal())[kind]
