@@ -1,6 +1,6 @@
 from .extended_kalman_filter import ExtendedKalmanFilter as ExtendedKalmanFilter
-from .filter_consistency import consistency_band as consistency_band
-from .filter_consistency import normalised_error_squared as normalised_error_squared
+from .extended_kalman_filter import consistency_band as consistency_band
+from .extended_kalman_filter import normalised_error_squared as normalised_error_squared
 from .finite_control_set import FiniteControlSet as FiniteControlSet
 from .lqg import design_adrc as design_adrc
 from .lqg import design_lqg as design_lqg

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import enum
-import functools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
@@ -110,7 +109,7 @@ class BenchmarkResult(ShortRepr):
         """The names of the truths."""
         return tuple(truth.name for truth in self.joint.truths)
 
-    @functools.cached_property
+    @property
     def _by_name(self) -> dict[tuple[str, int], ContenderResult]:
         return {(each.name, each.seed): each for each in self.results}
 

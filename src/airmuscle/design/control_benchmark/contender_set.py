@@ -17,7 +17,7 @@ from ...control.laws import (
     WithFeedForward,
     WithSetpointDelay,
 )
-from ...control.laws.co_contraction import DIFFERENCE
+from ...control.laws.pressures import DIFFERENCE
 from ...engine.loop import ControlLaw
 from .contenders import Bounds, Contender
 from .designed_controllers import AlongMotion, DeviationLaw, JointDesign, RejectionDesign, joint_design_model

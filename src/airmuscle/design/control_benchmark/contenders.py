@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ...control.laws import Cascade, CoContraction, ProportionalFeedback, SetpointCommand
-from ...control.laws.co_contraction import DIFFERENCE
+from ...control.laws.pressures import DIFFERENCE
 from ...core.annotation import check_field_types, one_line
 from ...core.errors import ParameterError
 from ...core.tree import leaves

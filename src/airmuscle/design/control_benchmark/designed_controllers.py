@@ -10,8 +10,8 @@ import numpy as np
 
 from ...control.estimation.lqg import GAO2003, HAN2009, design_adrc, design_lqg
 from ...control.estimation.predictive_design import design_predictive
-from ...control.laws.co_contraction import DIFFERENCE
 from ...control.laws.linear_model_predictive import RAWLINGS2017, LinearModelPredictive
+from ...control.laws.pressures import DIFFERENCE
 from ...control.laws.state_feedback import FRANKLIN1998, StateFeedback
 from ...core.declaration import model, parameter
 from ...core.errors import ParameterError

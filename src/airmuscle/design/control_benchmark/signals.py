@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...control.laws.antagonistic_inverse import AntagonisticInverse
+from ...control.laws.enclosing import WithStuckValve
 from ...control.laws.static_inverse import static_force
-from ...control.laws.stuck_valve import WithStuckValve
 from ...core.arrays import Array
 from ...core.errors import ParameterError, suggestion
 from ...engine.loop import ControlLaw, Controller, ControlLoop, Driver, SampledSignal
