@@ -11,11 +11,12 @@ from . import physics as physics
 from . import recording as recording
 from . import report as report
 from . import units as units
+from .bench import ColumnMapping as ColumnMapping
 from .bench import Fit as Fit
 from .bench import fit as fit
 from .bench import read as read
 from .bench import read_csv as read_csv
-from .bench import write_csv as write_csv
+from .bench import write as write
 from .control import PID as PID
 from .core import Reference as Reference
 from .core import System as System

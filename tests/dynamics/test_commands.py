@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airmuscle import Recording, read_csv
+from airmuscle import ColumnMapping, Recording, read_csv
 from airmuscle.engine import Periodic, PiecewiseLinear, SampledSignal, Schedule
 from airmuscle.errors import ColumnError, ParameterError
 
@@ -38,7 +38,7 @@ def test_a_schedule_holds_its_last_value_whenever_the_run_begins(given_changes, 
 def test_a_measured_column_is_a_command(tmp_path):
     file = tmp_path / "bench.csv"
     file.write_text("time [ms],fill [%],pressure [kPa]\n0,0,0\n100,40,20\n300,80,50\n", encoding="utf-8")
-    recording = read_csv(file, units={"pressure": "kPa(g)"})
+    recording = read_csv(file, ColumnMapping(units={"pressure": "kPa(g)"}))
     signal = SampledSignal.recorded(recording, {"fill": "fill"})
     assert signal == SampledSignal({"fill": ((0.0, 0.0), (0.1, 0.4), (0.3, 0.8))})
     assert course(signal, 0.0, 0.4, np.array([0.05, 0.2, 0.35])) == pytest.approx([0.2, 0.6, 0.8])

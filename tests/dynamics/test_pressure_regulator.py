@@ -162,7 +162,7 @@ def test_the_command_writes_a_regulator_that_a_scenario_takes(tmp_path):
         "setpoint [kPa]": 1e-3 * made["setpoint"],
         "pressure [kPa]": 1e-3 * made["pressure"],
     }
-    am.write_csv(Recording(kilopascal, "bench"), tmp_path / "bench.csv")
+    am.write(Recording(kilopascal, "bench"), tmp_path / "bench.csv")
     given = [tmp_path / "bench.csv", "--supply", "5.78 bar", "--starts", "1", "--out", out]
     done = airmuscle("fit-regulator", *map(str, given))
     assert done.exit_code == 0, done.output

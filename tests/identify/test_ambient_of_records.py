@@ -9,7 +9,7 @@ import pytest
 from dynamic_study import plant_table
 
 from airmuscle import load
-from airmuscle.bench import Campaign, LeftOutStage, RowReader, classify_records, read
+from airmuscle.bench import Campaign, ColumnMapping, LeftOutStage, RowReader, classify_records, read
 from airmuscle.bench.identify.campaign import fit_fill_stage
 from airmuscle.errors import ColumnError, ParameterError, UnitError
 from airmuscle.files import load_dynamic_fit, load_plant_model, load_scenario
@@ -42,7 +42,9 @@ def study(folder, text):
 def test_pressure_and_temperature_are_constants_of_a_file(tmp_path):
     (recording,) = read(write(tmp_path))
     assert (recording.constants["ambient"], recording.constants["ambient_temperature"]) == pytest.approx((8e4, 303.15))
-    (recording,) = read(write(tmp_path, ""), ambient="95 kPa", constants={"ambient_temperature": "25 degC"})
+    (recording,) = read(
+        write(tmp_path, ""), ColumnMapping(ambient="95 kPa", constants={"ambient_temperature": "25 degC"})
+    )
     assert (recording.constants["ambient"], recording.constants["ambient_temperature"]) == pytest.approx(
         (9.5e4, 298.15)
     )
@@ -108,7 +110,7 @@ def test_a_prediction_has_the_ambient_air_of_its_record_and_says_so(tmp_path):
 
 def test_the_scenarios_of_a_campaign_have_the_ambient_air_of_their_records(tmp_path, monkeypatch):
     muscle = load("dmsp-20-300").muscle
-    (filled,) = read(write(tmp_path), constants={"contraction": "0.1", "resting_length": "300 mm"})
+    (filled,) = read(write(tmp_path), ColumnMapping(constants={"contraction": "0.1", "resting_length": "300 mm"}))
     columns = {"time": np.linspace(0.0, 60.0, 200), "pressure": np.full(200, 2e5)}
     columns |= {"contraction": np.linspace(0.0, 0.1, 200), "force": np.linspace(500.0, 100.0, 200)}
     slow = Recording(columns, "slow.csv", {"resting_length": 0.3, "ambient": 9e4})

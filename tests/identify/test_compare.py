@@ -29,7 +29,7 @@ from airmuscle.bench import (
     compare,
     select_for_both,
     standard_candidates,
-    write_csv,
+    write,
 )
 from airmuscle.bench.identify import (
     ALWAYS_FITTED,
@@ -268,7 +268,7 @@ def test_the_command_writes_a_muscle_that_loads_back(tmp_path: Path):
     files = []
     for i, run in enumerate(bench()):
         files.append(tmp_path / f"run{i}.csv")
-        write_csv(run, files[-1])
+        write(run, files[-1])
     out = tmp_path / "out"
     options = ["--compare", "--leave-out", "run", "--resting-length", "300 mm", "--out", str(out), "--json"]
     done = airmuscle("fit", *map(str, files), *options)

@@ -33,7 +33,7 @@ from laboratories import (
     write,
 )
 
-from airmuscle.bench import Candidate, Fit, StaticStage, classify_records, compare, fit, read
+from airmuscle.bench import Candidate, ColumnMapping, Fit, StaticStage, classify_records, compare, fit, read
 from airmuscle.bench.identify import blank_surface
 from airmuscle.bench.identify.campaign import fit_static_stage
 from airmuscle.bench.identify.data_checks import DataChecks
@@ -48,7 +48,7 @@ FRICTIONLESS = dataclasses.replace(MUSCLE, friction=0.0)
 def read_all(folder: Path, tables: dict[str, Table]) -> tuple[Recording, ...]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AirmuscleWarning)
-        return read(write(tables, folder), resting_length=RESTING_LENGTH)
+        return read(write(tables, folder), ColumnMapping(resting_length=RESTING_LENGTH))
 
 
 def notes_of(folder: Path, tables: dict[str, Table]) -> str:
@@ -73,7 +73,9 @@ def test_two_muscles_in_one_file_are_named_with_the_column_that_tells_them_apart
     notes = notes_of(tmp_path, one_file(sweeps(), sweeps(OTHER, seed=90), column="muscle", values=values))
     assert "Rows contradict each other" in notes
     assert "both.csv, row" in notes
-    assert "To state it as the specimen, use columns={'muscle': 'specimen'} of read. Fit each specimen" in notes
+    assert (
+        "To state it as the specimen, use columns={'muscle': 'specimen'} of ColumnMapping. Fit each specimen" in notes
+    )
 
 
 def force_map(muscle, shift):
@@ -94,7 +96,7 @@ def test_force_maps_of_two_muscles_without_time_and_without_a_common_point_contr
 
 def test_a_column_that_names_the_specimen_divides_the_file(tmp_path):
     tables = one_file(sweeps(), sweeps(OTHER, seed=90), column="muscle", values=("A", "B"))
-    found = read(write(tables, tmp_path), columns={"muscle": "specimen"}, resting_length=RESTING_LENGTH)
+    found = read(write(tables, tmp_path), ColumnMapping(columns={"muscle": "specimen"}, resting_length=RESTING_LENGTH))
     assert [run.constants["specimen"] for run in found] == ["A", "B"]
     assert [run.origin for run in found] == ["both.csv, specimen A", "both.csv, specimen B"]
     assert found[1]["force"].max() > 1.3 * found[0]["force"].max()
@@ -164,7 +166,7 @@ def test_a_code_for_missing_values_is_named_and_nothing_else_is_blamed(tmp_path,
     (note,) = DataChecks.of(read_all(tmp_path, with_code(sweeps(), column, code))).notes
     assert f"is {code:g} in 72 rows" in note
     assert "a code for a missing value" in note
-    assert f"use missing=DropMissing(codes=({code},)) of read" in note
+    assert f"use missing=DropMissing(codes=({code},)) of ColumnMapping" in note
 
 
 def test_an_elongation_under_contraction_is_named(tmp_path):
@@ -199,7 +201,7 @@ def test_friction_is_not_called_a_delay(tmp_path):
 def test_outliers_are_carried_into_the_notes_with_the_remedy(tmp_path):
     notes = notes_of(tmp_path, with_glitches(sweeps(), 0.01, (100.0, 400.0)))
     assert "suspected outliers of the force" in notes
-    assert "To leave them out, use drop_outliers=True of read." in notes
+    assert "To leave them out, use drop_outliers=True of ColumnMapping." in notes
     assert "To reduce their weight, use loss=Huber(" in notes
 
 
@@ -235,8 +237,8 @@ def test_a_ramp_held_at_rest_is_not_taken_for_ratios_as_percent(tmp_path):
         tables[name] = {**table, "contraction [%]": np.round(percent, 4)}
     with warnings.catch_warnings():
         warnings.simplefilter("error", AirmuscleWarning)
-        read(write(tables, tmp_path), resting_length=RESTING_LENGTH)
-        read([tmp_path / "held_0.csv"], resting_length=RESTING_LENGTH)
+        read(write(tables, tmp_path), ColumnMapping(resting_length=RESTING_LENGTH))
+        read([tmp_path / "held_0.csv"], ColumnMapping(resting_length=RESTING_LENGTH))
 
 
 def test_a_repeated_run_within_the_tolerance_of_a_bench_is_no_contradiction(tmp_path):

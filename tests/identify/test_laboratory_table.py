@@ -35,7 +35,7 @@ from laboratories import (
     write,
 )
 
-from airmuscle.bench import Fit, fit, read
+from airmuscle.bench import ColumnMapping, Fit, fit, read
 from airmuscle.bench.identify import blank_surface
 from airmuscle.errors import AirmuscleError, AirmuscleWarning
 
@@ -223,7 +223,7 @@ def texts_and_error(variant: Variant, folder: Path) -> tuple[str, float]:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", AirmuscleWarning)
         try:
-            runs = read(write(variant.tables(), folder, variant.above), **options)
+            runs = read(write(variant.tables(), folder, variant.above), ColumnMapping(**options))
             result = fit(
                 blank_surface(2 if len(variant.tables()) == 1 and "points" in variant.tables() else 4, 1e5), runs
             )

@@ -15,7 +15,7 @@ import pytest
 from command_line import airmuscle
 from scipy.stats import t as student
 
-from airmuscle.bench import Fit, RunSplit, bootstrap, confidence_band, fit, profile, write_csv
+from airmuscle.bench import Fit, RunSplit, bootstrap, confidence_band, fit, profile, write
 from airmuscle.bench.identify import NORMAL_QUANTILE, RELIABLE_GROUPS, Uncertainty, blank_surface
 from airmuscle.bench.identify.parameter_covariance import _degrees_of_freedom
 from airmuscle.bench.identify.uncertainty_chapter import uncertainty_chapter
@@ -228,7 +228,7 @@ def test_the_command_and_the_report_state_what_standard_errors_are_from(tmp_path
     files = []
     for i, run in enumerate(runs_of("zero of each run", np.random.default_rng(6))):
         files.append(tmp_path / f"{i}.csv")
-        write_csv(run, files[-1])
+        write(run, files[-1])
     arguments = ["fit", *map(str, files), "--characteristic", "ContractileSurface", "--degree", "1"]
     done = airmuscle(*arguments, "--resting-length", "300 mm", "--out", tmp_path / "fit", "--json")
     assert done.exit_code == 0, done.output

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from command_line import airmuscle
 
-from airmuscle.bench import estimate_sensors, fit, write_csv
+from airmuscle.bench import estimate_sensors, fit, write
 from airmuscle.bench.identify import sensor_deviations
 from airmuscle.physics import Braid, ContractileSurface, TonduLopez2000
 from airmuscle.recording import Recording
@@ -100,7 +100,7 @@ def test_the_command_line_weighs_by_sensor_unless_told(tmp_path):
     files = []
     for run in rigs(3):
         files.append(str(tmp_path / f"{run.origin}.csv"))
-        write_csv(run, files[-1])
+        write(run, files[-1])
     law = ("--characteristic", "ContractileSurface", "--degree", "3", "--json", "--out", str(tmp_path / "fit"))
     notes = [json.loads(airmuscle("fit", *files, *law, *more).stdout)["notes"] for more in ((), ("--equal-weights",))]
     assert [any("test rigs with different sensors" in note for note in each) for each in notes] == [True, False]

@@ -421,7 +421,7 @@ def test_the_rate_of_rounded_time_stamps_is_that_of_the_rows():
     assert seen.rate == pytest.approx(20.0, rel=0.01)
     assert [gap.row for gap in seen.gaps] == [199]
     texts = [f.text for f in inspect(timed(np.linspace(0, 6e5, 400)).with_columns(time=rounded)).findings]
-    assert "For stamps that the logger rounded, use time_base=UniformTime() of read." in texts[0]
+    assert "For stamps that the logger rounded, use time=UniformTime() of ColumnMapping." in texts[0]
 
 
 def test_a_record_shorter_than_its_dynamics_is_reported():

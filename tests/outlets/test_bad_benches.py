@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from command_line import airmuscle
 
-from airmuscle.bench import UNCENSORED, fit, read, write_csv
+from airmuscle.bench import UNCENSORED, ColumnMapping, fit, read, write
 from airmuscle.files import load
 from airmuscle.physics import Braid, ContractileSurface, TonduLopez2000
 from airmuscle.recording import Recording
@@ -31,7 +31,7 @@ def ramp(path: Path, pressure: float, *, ceiling: float = np.inf, seed: int = 1,
         "time": 0.1 * np.arange(count), "pressure": np.full(count, pressure) + 20.0 * rng.standard_normal(count),
         "contraction": contraction, "force": np.minimum(0.5 * np.round(force / 0.5), ceiling),
     }  # fmt: skip
-    write_csv(Recording(columns, path.name), path)
+    write(Recording(columns, path.name), path)
     return path
 
 
@@ -79,7 +79,7 @@ def at_rest(path: Path, pressure: float, contraction: float, seed: int) -> Path:
     rng = np.random.default_rng(seed)
     force = float(MUSCLE.force(pressure, contraction)) + 0.05 * rng.standard_normal(50)
     columns = {"time": 0.1 * np.arange(50), "pressure": np.full(50, pressure), "contraction": np.full(50, contraction)}
-    write_csv(Recording({**columns, "force": force}, path.name), path)
+    write(Recording({**columns, "force": force}, path.name), path)
     return path
 
 
@@ -113,7 +113,7 @@ def test_a_saturated_force_sensor_gives_bounds_not_values(tmp_path):
     true = float(MUSCLE.force(4e5, 0.02))
     assert true > 850.0
     assert law.unclamped_force(4e5, 0.02) == pytest.approx(true, rel=0.01)
-    runs = read(files, resting_length=0.3)
+    runs = read(files, ColumnMapping(resting_length=0.3))
     found = fit(ContractileSurface.blank(3, max_force=1e5), runs)
     high = np.concatenate([run["force"] for run in runs]) >= 500.0
     assert high.sum() > 100
@@ -125,7 +125,9 @@ def test_a_saturated_force_sensor_gives_bounds_not_values(tmp_path):
 
 
 def test_a_sensor_without_limits_changes_nothing(tmp_path):
-    runs = read([ramp(tmp_path / f"run{i}.csv", p, seed=i) for i, p in enumerate((2e5, 3e5))], resting_length=0.3)
+    runs = read(
+        [ramp(tmp_path / f"run{i}.csv", p, seed=i) for i, p in enumerate((2e5, 3e5))], ColumnMapping(resting_length=0.3)
+    )
     assert (fit(ContractileSurface.blank(1, max_force=1e5), runs).censoring <= 0).sum() == sum(
         (run["force"] > 0).sum() for run in runs
     )
@@ -146,7 +148,7 @@ def filling(path: Path, *, rows: int = 200, constant: float = 1.0, jump: bool = 
     if jump:
         time[rows // 2 :] += 3.0
     pressure = 6e5 * (1.0 - np.exp(-time / constant)) + 100.0 * np.random.default_rng(1).standard_normal(rows)
-    write_csv(Recording({"time": time, "pressure": pressure}, path.name), path)
+    write(Recording({"time": time, "pressure": pressure}, path.name), path)
     return path
 
 

@@ -12,7 +12,7 @@ import pytest
 from command_line import airmuscle
 from made_campaign import TrueMuscle
 
-from airmuscle import Recording, load, load_data, write_csv
+from airmuscle import Recording, load, load_data, write
 from airmuscle.files import load_scenario
 from airmuscle.physics import Braid
 
@@ -21,7 +21,7 @@ from airmuscle.physics import Braid
 def written(tmp_path_factory):
     folder = tmp_path_factory.mktemp("map")
     whole = load_data("dmsp-20-300")
-    write_csv(whole.rows(np.isin(whole["pressure"], np.unique(whole["pressure"])[4::4])), folder / "bench.csv")
+    write(whole.rows(np.isin(whole["pressure"], np.unique(whole["pressure"])[4::4])), folder / "bench.csv")
     words = [
         "campaign",
         folder / "bench.csv",
@@ -53,7 +53,7 @@ def test_the_map_is_one_static_record_with_a_band_of_its_levels(written):
 def test_fills_alone_give_their_scenarios_with_the_braid_and_say_why_there_is_no_muscle(tmp_path):
     columns = TrueMuscle(0.3).fill(0.08, np.random.default_rng(1))
     del columns["force"]
-    write_csv(Recording(columns, "fill", {"resting_length": 0.3}), tmp_path / "fill.csv")
+    write(Recording(columns, "fill", {"resting_length": 0.3}), tmp_path / "fill.csv")
     braid = ("--braid", "radius=10 mm, angle=24.4 deg", "--resting-length", "300 mm")
     words = ["campaign", str(tmp_path / "fill.csv"), *braid, "--out", str(tmp_path / "out")]
     done = airmuscle(*words)

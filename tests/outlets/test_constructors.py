@@ -175,10 +175,10 @@ def test_junk_in_a_setting_is_accepted_or_refused_but_never_a_foreign_exception(
         assert names or isinstance(setting, engine.InputSignal), said
 
 
-def test_the_mappings_of_a_row_reader_are_checked():
+def test_the_mapping_of_a_row_reader_is_checked():
     for junk in (3, "time", [1], object()):
-        with pytest.raises(ParameterError, match="RowReader: units must be a mapping or None"):
-            bench.RowReader("log.csv", units=junk)  # type: ignore[arg-type]
+        with pytest.raises(ParameterError, match="RowReader: mapping must be a ColumnMapping"):
+            bench.RowReader("log.csv", junk)  # type: ignore[arg-type]
 
 
 def test_an_array_without_dimension_is_no_list_of_numbers():

@@ -201,7 +201,7 @@ def test_tables_of_the_command_line_are_in_the_chosen_units_and_json_in_si():
 
 def test_files_keep_their_declared_units(tmp_path: Path):
     display("bar", "1")
-    text = am.write_csv(run(), tmp_path / "run.csv").read_text(encoding="utf-8")
+    text = am.write(run(), tmp_path / "run.csv").read_text(encoding="utf-8")
     assert "pressure [Pa]" in text
     assert "bar" not in text
 

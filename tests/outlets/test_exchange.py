@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from command_line import airmuscle
 
-from airmuscle.bench import Decimation, from_pandas, read, read_csv, to_xarray, write, write_csv
+from airmuscle.bench import ColumnMapping, Decimation, from_pandas, read, read_csv, to_xarray, write
 from airmuscle.bench.readers import large_csv
 from airmuscle.errors import AirmuscleError, ColumnError, FileError, ParameterError
 from airmuscle.recording import Recording
@@ -30,13 +30,13 @@ def check_equal(found, expected=RUN):
 
 
 def test_a_data_frame_is_read_back_bit_by_bit():
-    check_equal(from_pandas(RUN.to_pandas(), constants=RUN.constants))
+    check_equal(from_pandas(RUN.to_pandas(), ColumnMapping(constants=RUN.constants)))
     check_equal(from_pandas(RUN.to_pandas().set_index("time [s]")))
 
 
 def test_units_of_a_data_frame_are_converted():
     frame = pd.DataFrame({"time [ms]": [0, 10], "pressure [bar]": [1.0, 2.0], "force": [3.0, 4.0]})
-    found = from_pandas(frame, units={"force": "kN"})
+    found = from_pandas(frame, ColumnMapping(units={"force": "kN"}))
     assert found["time"].tolist() == [0.0, 0.01]
     assert found["pressure"].tolist() == [1e5, 2e5]
     assert found["force"].tolist() == [3000.0, 4000.0]
@@ -74,7 +74,7 @@ def test_xarray_has_units_and_constants():
 
 
 def test_pandas_reads_plain_csv_as_it_is(tmp_path):
-    frame = pd.read_csv(write_csv(RUN, tmp_path / "run.csv", comments=False), float_precision="round_trip")
+    frame = pd.read_csv(write(RUN, tmp_path / "run.csv", comments=False), float_precision="round_trip")
     assert list(frame) == ["time [s]", "pressure [Pa]", "contraction [1]", "left.force [N]", "fill [1]"]
     assert (frame["left.force [N]"].to_numpy() == RUN["left.force"]).all()
     check_equal(read_csv(tmp_path / "run.csv"))
@@ -136,7 +136,7 @@ def test_an_unknown_extension_and_an_unwritable_folder_are_named(tmp_path):
 
 def test_the_command_converts_one_file_and_several(tmp_path):
     for k in range(2):
-        write_csv(RUN, tmp_path / f"run{k}.csv")
+        write(RUN, tmp_path / f"run{k}.csv")
     done = airmuscle("convert", tmp_path / "run0.csv", tmp_path / "out.parquet")
     assert done.exit_code == 0, done.output
     assert "5 rows of time, pressure" in done.output

@@ -16,7 +16,7 @@ import pytest
 from command_line import airmuscle
 from dynamic_study import VALVES, noisy_run, plant_table, run_table, variant
 
-from airmuscle.bench import CrossPrediction, InitialValue, StartTime, describe_cross_predictions, read_csv, write_csv
+from airmuscle.bench import CrossPrediction, InitialValue, StartTime, describe_cross_predictions, read_csv, write
 from airmuscle.core import leaves
 from airmuscle.files import load_dynamic_fit, load_scenario
 from airmuscle.physics import HangingMass
@@ -52,7 +52,7 @@ def folder(tmp_path_factory) -> Path:
     for name, shift, heading, factor in (("run1", 0.213, "height", 1.0), ("run2", 0.196, "height [mm]", 1e3)):
         run = noisy_run(place / "truth.toml", rng, {"pressure": 500.0, "position": 5e-5})
         columns = {"time": run["time"] + shift, "pressure": run["pressure"], heading: factor * run["position"]}
-        write_csv(Recording(columns, name), place / f"{name}.csv")
+        write(Recording(columns, name), place / f"{name}.csv")
     study = plant_table(WEIGHT, **START) + INPUT + ASKED + RECORD.format("run1.csv") + RECORD.format("run2.csv")
     (place / "study.toml").write_text(study, encoding="utf-8")
     return place

@@ -14,7 +14,7 @@ from command_line import airmuscle
 from dynamic_study import noisy_run, variant
 
 import airmuscle as am
-from airmuscle.bench import InitialConditions, write_csv
+from airmuscle.bench import InitialConditions, write
 from airmuscle.errors import EquilibriumError, ParameterError
 from airmuscle.files import load_dynamic_fit, load_scenario
 from airmuscle.files.library import Location
@@ -101,7 +101,7 @@ def folder(tmp_path_factory) -> Path:
             "p1 [kPa]": 1e-3 * run["left.pressure"],
             "p2 [bar]": 1e-5 * run["right.pressure"],
         }
-        write_csv(Recording({**columns, "angle": run["angle"]}, name), place / f"{name}.csv")
+        write(Recording({**columns, "angle": run["angle"]}, name), place / f"{name}.csv")
     study = joint(**START) + INPUT + STUDY + '[[record]]\nfile = "first.csv"\n'
     (place / "study.toml").write_text(study, encoding="utf-8")
     later = f'{LATER_INPUT}[fit]\ninitial_state = {{ pressure = "3 kPa" }}\n[[record]]\nfile = "later.csv"\n'

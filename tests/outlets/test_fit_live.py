@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from command_line import airmuscle
 
-from airmuscle.bench import RowReader, follow_lines, read_csv
+from airmuscle.bench import ColumnMapping, RowReader, follow_lines, read_csv
 from airmuscle.bench.readers import MAX_UNREADABLE
 from airmuscle.errors import ColumnError, FileError
 from airmuscle.files import load
@@ -90,8 +90,7 @@ def test_a_growing_file_is_read_as_it_comes_and_a_partial_line_waits_for_its_res
 
 
 def test_damaged_rows_of_a_serial_log_are_left_out_and_counted():
-    reader = RowReader("port", columns={"1": "pressure [bar]", "2": "length [mm]", "3": "force [N]"},
-                       constants={"resting_length": "200 mm"})  # fmt: skip
+    reader = RowReader("port", ColumnMapping(columns={"1": "pressure [bar]", "2": "length [mm]", "3": "force [N]"}, constants={"resting_length": "200 mm"}))  # fmt: skip
     rows = [
         reader.read(line)
         for line in (
@@ -114,7 +113,9 @@ def test_damaged_rows_of_a_serial_log_are_left_out_and_counted():
     [("-0.94,0.1", True), ("-0.96,0.1", False), ("1,1.01", False), ("1,-0.51", False), ("1e30,0.1", False)],
 )
 def test_a_row_of_numbers_that_no_sensor_measures_is_left_out(row: str, is_read: bool):
-    reader = RowReader("port", columns={"1": "pressure [barg]", "2": "contraction"}, constants={"ambient": "950 mbar"})
+    reader = RowReader(
+        "port", ColumnMapping(columns={"1": "pressure [barg]", "2": "contraction"}, constants={"ambient": "950 mbar"})
+    )
     rows = [reader.read("1,0.1"), reader.read(row)]
     assert [each is not None for each in rows] == [True, is_read]
     assert reader.skipped == (0 if is_read else 1)
@@ -129,7 +130,7 @@ def test_a_stream_of_noise_is_refused():
     with pytest.raises(ColumnError, match=r"successive lines are no rows of 3 numbers. Check the baud rate"):
         reader.read("garbage,")
     with pytest.raises(ColumnError, match="no column '7'; the columns are 1, 2"):
-        RowReader("port", columns={"1": "pressure [bar]", "7": "force [N]"}).read("1,2")
+        RowReader("port", ColumnMapping(columns={"1": "pressure [bar]", "7": "force [N]"})).read("1,2")
     with pytest.raises(FileError, match="cannot be read"):
         list(follow_lines("no/such.csv", idle=0))
 

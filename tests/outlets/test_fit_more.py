@@ -22,7 +22,7 @@ from airmuscle.bench import (
     fit_shape_constrained,
     profile,
     weakly_determined,
-    write_csv,
+    write,
 )
 from airmuscle.bench.identify import blank_surface, levels_of
 from airmuscle.bench.identify.band_plot import band_plot
@@ -44,7 +44,7 @@ def bench(path: Path, noise: float = 5.0, count: int = 120, seed: int = 1) -> Re
     force = SAROSI.force(pressure, contraction) + noise * rng.standard_normal(pressure.size)
     columns = {"pressure": pressure, "contraction": contraction, "force": np.maximum(force, 0.0)}
     recording = Recording(columns, path.name)
-    write_csv(recording, path)
+    write(recording, path)
     return recording
 
 

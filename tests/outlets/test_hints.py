@@ -36,7 +36,7 @@ from airmuscle.bench import (
     read,
     read_csv,
     standard_candidates,
-    write_csv,
+    write,
 )
 from airmuscle.bench.identify import blank_surface
 from airmuscle.core import Diagnostic, DiagnosticCode, Hint, HintedText
@@ -52,7 +52,7 @@ SURFACE = ("--characteristic", "ContractileSurface", "--degree")
 VALUES = {
     "fixed": ("wall_thickness",), "sigma": 1.0, "by": LevelSplit("contraction"), "leave_out": LevelSplit("pressure"),
     "units": {"pressure": ...}, "columns": {1: "pressure [kPa]"}, "decimal": ",", "resting_length": ...,
-    "constants": {"length": "73.2 mm"}, "file_name": "held{length [mm]}", "time_base": NoTime(), "ordered": False,
+    "constants": {"length": "73.2 mm"}, "file_name": "held{length [mm]}", "time": NoTime(),
     "degree": 2, "skip_rows": 1, "drop_outliers": True, "loss": Huber(10.0), "missing": DropMissing((-999.0,)), "displacement_zero": "12 mm",
     "all_rows": True, "law": ..., "censoring": ..., "free": ("circuit.fill.conductance",), "": ...,
 }  # fmt: skip
@@ -185,7 +185,7 @@ def test_a_diagnostic_may_have_a_hint_of_either_kind():
 
 def table(path: Path, *, resting_length: float | None = None, **columns: np.ndarray) -> Path:
     constants = {} if resting_length is None else {"resting_length": resting_length}
-    write_csv(Recording(columns, path.name, constants), path)
+    write(Recording(columns, path.name, constants), path)
     return path
 
 
@@ -251,21 +251,21 @@ CASES: dict[str, tuple[Callable[[Path], Path], Callable[[Path], Any], tuple[Any,
         "To leave out levels of pressure, use --leave-out pressure."),
     "no unit": (
         lambda path: text_file(path, NO_UNIT), read_csv, ("fit", *SURFACE, 1),
-        "use units={'pressure': ...}.", "To state the unit, use --unit 'pressure=...'."),
+        "use units={'pressure': ...} of ColumnMapping.", "To state the unit, use --unit 'pressure=...'."),
     "no headings": (
         lambda path: text_file(path, NO_HEADINGS), read, ("hysteresis",),
-        "use columns={1: 'pressure [kPa]', 2: 'force [N]'} of read.",
+        "use columns={1: 'pressure [kPa]', 2: 'force [N]'} of ColumnMapping.",
         'use --column "1=pressure [kPa]" --column "2=force [N]".'),
     "no headings, inspected": (
         lambda path: text_file(path, NO_HEADINGS), read, ("inspect",),
-        "use columns={1: 'pressure [kPa]', 2: 'force [N]'} of read.",
+        "use columns={1: 'pressure [kPa]', 2: 'force [N]'} of ColumnMapping.",
         'use --column "1=pressure [kPa]" --column "2=force [N]".'),
     "ambiguous decimal sign": (
         lambda path: text_file(path, THOUSANDS), read, ("fit", *SURFACE, 1),
-        "use decimal=',' of read.", "To specify the decimal sign, use --decimal ','."),
+        "use decimal=',' of ColumnMapping.", "To specify the decimal sign, use --decimal ','."),
     "no resting length": (
         lambda path: sweep(path, RISE_AND_FALL, (3e5, 3e5, 3e5)), loops, ("hysteresis",),
-        "use resting_length=... of read.", 'To state it, use --resting-length "...".'),
+        "use resting_length=... of ColumnMapping.", 'To state it, use --resting-length "...".'),
     "one branch": (
         lambda path: sweep(path, (0.0, 0.15), (3e5, 3e5), 0.3), loops, ("hysteresis",),
         "use all_rows=True.", "To fit all rows, if only the length changes quickly, use --all-rows."),

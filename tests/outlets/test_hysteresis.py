@@ -16,6 +16,7 @@ import pytest
 from command_line import airmuscle
 
 from airmuscle.bench import (
+    ColumnMapping,
     PressurePath,
     find_holds,
     find_loops,
@@ -23,7 +24,7 @@ from airmuscle.bench import (
     fit_loop,
     motion_direction,
     read,
-    write_csv,
+    write,
 )
 from airmuscle.bench.identify.campaign import creep_force
 from airmuscle.bench.identify.hysteresis import hysteresis_chapters, plot_loops
@@ -51,7 +52,7 @@ def loop(path: Path, seed: int, friction: MaxwellSlip | None = SLIP, turns=TURNS
         "time": 0.2 * np.arange(count), "pressure": pressure + 50.0 * rng.standard_normal(count),
         "contraction": contraction, "force": force,
     }  # fmt: skip
-    write_csv(Recording(columns, path.name), path)
+    write(Recording(columns, path.name), path)
     return path
 
 
@@ -98,12 +99,12 @@ def crept(folder: Path) -> list[Path]:
         force = load(MUSCLE).characteristic.force(3e5, contraction) - creep_force(MAXWELL, run)
         force = force - SLIP.force_along((contraction - contraction[0]) * 0.3) + 0.2 * rng.standard_normal(time.size)
         files.append(folder / f"{name}.csv")
-        write_csv(run.with_columns(force=force), files[-1])
+        write(run.with_columns(force=force), files[-1])
     return files
 
 
 def test_creep_elements_of_a_hold_come_back_from_a_muscle_file(tmp_path):
-    recordings = read(crept(tmp_path), resting_length=0.3)
+    recordings = read(crept(tmp_path), ColumnMapping(resting_length=0.3))
     held = fit_held_creep(recordings)
     assert "Maxwell elements of" in held.verdict
     save(dataclasses.replace(load(MUSCLE), creep=held.elements), tmp_path / "muscle.toml")
@@ -211,7 +212,7 @@ def test_friction_that_does_not_hold_for_all_runs_is_not_written(tmp_path):
 
 
 def test_a_branch_with_very_few_rows_is_remarked_once(tmp_path):
-    found = find_loops([read(loop(tmp_path / "loop.csv", 1), resting_length=0.3)[0]])[0]
+    found = find_loops([read(loop(tmp_path / "loop.csv", 1), ColumnMapping(resting_length=0.3))[0]])[0]
     few = (
         np.where(
             motion_direction(found.recording["contraction"]) < 0, np.arange(len(found.fitted_rows)) % 60 == 0, True
@@ -240,7 +241,7 @@ def test_friction_on_the_pressure_is_reported_and_not_written(tmp_path):
     rng = np.random.default_rng(5)
     force = 2e-3 * pressure - SLIP.force_along(1e-8 * (pressure - pressure[0])) + 0.1 * rng.standard_normal(600)
     columns = {"time": 0.2 * np.arange(600), "pressure": pressure, "contraction": np.full(600, 0.05), "force": force}
-    write_csv(Recording(columns, "ramp"), tmp_path / "ramp.csv")
+    write(Recording(columns, "ramp"), tmp_path / "ramp.csv")
     result = airmuscle("hysteresis", tmp_path / "ramp.csv", *LENGTH, "--degree", 1, "--out", tmp_path / "out")
     assert "isometric at 5.00 %" in result.stdout
     slightly_negative = columns | {"contraction": np.full(600, -6e-6)}
@@ -258,7 +259,7 @@ def test_figures_of_it_stand_over_the_pressure():
 
 
 def test_a_second_run_at_another_level_is_a_loop_of_its_own(two):
-    first, second = read(two, resting_length=0.3)
+    first, second = read(two, ColumnMapping(resting_length=0.3))
     assert [found.repeat is not None for found in find_loops([first, second])] == [True]
     other = second.with_columns(pressure=second["pressure"] + 5e4)
     assert [found.repeat for found in find_loops([first, other])] == [None, None]
@@ -293,7 +294,7 @@ def test_quick_rows_do_not_count_unless_told_to(tmp_path):
 
 
 def test_a_hold_begins_where_the_length_has_arrived(two):
-    (recording,) = read(two[0], resting_length=0.3)
+    (recording,) = read(two[0], ColumnMapping(resting_length=0.3))
     (found,) = find_holds(recording)
     assert (found.interval.start, found.interval.stop, found.quantity) == (899, 940, "force")
     weight = recording.with_columns(force=np.full(len(recording), 200.0))

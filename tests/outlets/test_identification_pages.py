@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from airmuscle import read
-from airmuscle.bench import Experiment, InitialConditions, write_csv
+from airmuscle.bench import Experiment, InitialConditions, write
 from airmuscle.engine import Schedule, simulate
 from airmuscle.files import load
 from airmuscle.papers.hosovsky_plant import UnpublishedParameters, hanging_load
@@ -40,7 +40,7 @@ def test_the_code_on_static_identification_runs(tmp_path, monkeypatch, capsys):
         rng = np.random.default_rng(seed)
         p, eps = (side.ravel() for side in np.meshgrid(np.linspace(1e5, 6e5, 6), np.linspace(0.02, 0.2, 7)))
         force = LAW.force(p, eps) + rng.normal(0.0, 1.0, p.size)
-        write_csv(Recording({"pressure": p, "contraction": eps, "force": force}, "bench"), Path(f"run{seed}.csv"))
+        write(Recording({"pressure": p, "contraction": eps, "force": force}, "bench"), Path(f"run{seed}.csv"))
     found = run("identification.md")
     assert found["fit"].model == found["found"].recommended.fit.model
     assert "recommend" in capsys.readouterr().out.lower()

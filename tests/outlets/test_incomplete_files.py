@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 from command_line import airmuscle
 
-from airmuscle.bench import ColumnMapping, NoTime, UniformTime, find_runs, inspect, read
-from airmuscle.bench.readers import FileNamePattern
-from airmuscle.errors import AirmuscleError, ColumnError
+from airmuscle.bench import ColumnMapping, NoTime, RecordedTime, UniformTime, find_runs, inspect, read
+from airmuscle.bench.readers import FileNamePattern, read_mapping
+from airmuscle.errors import AirmuscleError, ColumnError, ParameterError
 from airmuscle.recording import Recording
 
 RATE, ROWS = 530.0, 1061
@@ -36,20 +36,20 @@ def a_log(folder: Path, name: str, contraction: float = 0.0, digits: int = 3) ->
 
 def refusal(*arguments: Any, **options: Any) -> str:
     with pytest.raises(AirmuscleError) as caught:
-        read(*arguments, **options)
+        read(*arguments, ColumnMapping(**options))
     return str(caught.value)
 
 
 def test_rounded_time_stamps_are_refused_with_each_way_out(tmp_path: Path) -> None:
     message = refusal(a_log(tmp_path, "log.csv"))
     assert "repeats the time" in message
-    assert all(way in message for way in ("time_base=UniformTime()", "ordered=False", "time_base=NoTime()"))
+    assert all(way in message for way in ("time=UniformTime()", "time=RecordedTime(ordered=False)", "time=NoTime()"))
     shown = airmuscle("fit", tmp_path / "log.csv", "--characteristic", "ContractileSurface").stderr
     assert all(way in shown for way in ("--time uniform", "--time unordered", "--time none"))
 
 
 def test_uniform_time_is_that_of_the_logger_within_its_rounding(tmp_path: Path) -> None:
-    (recording,) = read(a_log(tmp_path, "log.csv"), time_base=UniformTime())
+    (recording,) = read(a_log(tmp_path, "log.csv"), ColumnMapping(time=UniformTime()))
     assert recording["time"] == pytest.approx(np.arange(ROWS) / RATE, abs=1e-6)
     assert np.ptp(np.diff(recording["time"])) < 1e-12
     note = next(note for note in recording.notes if "uniform" in note)
@@ -60,12 +60,12 @@ def test_uniform_time_is_that_of_the_logger_within_its_rounding(tmp_path: Path) 
 
 def test_rows_without_time_and_with_the_stamps_as_they_are(tmp_path: Path) -> None:
     path = a_log(tmp_path, "log.csv")
-    (timeless,) = read(path, time_base=NoTime())
+    (timeless,) = read(path, ColumnMapping(time=NoTime()))
     assert "time" not in timeless
     assert len(timeless) == ROWS
-    (mapped,) = read(path, mapping=ColumnMapping(time="none"))
+    (mapped,) = read(path, mapping=ColumnMapping(time=NoTime()))
     assert "time" not in mapped
-    (unordered,) = read(path, ordered=False)
+    (unordered,) = read(path, ColumnMapping(time=RecordedTime(ordered=False)))
     assert (np.diff(unordered["time"]) == 0).any()
 
 
@@ -79,18 +79,23 @@ def test_time_that_is_not_uniform_is_not_made_so(tmp_path: Path, change: Any, me
     time = change(np.round(np.arange(ROWS) / RATE, 3))
     lines = [f"{t:.3f},{100 + i % 50}" for i, t in enumerate(time)]
     (tmp_path / "gap.csv").write_text("time [s],pressure [kPa]\n" + "\n".join(lines), encoding="utf-8")
-    assert message in refusal(tmp_path / "gap.csv", time_base=UniformTime())
+    assert message in refusal(tmp_path / "gap.csv", time=UniformTime())
 
 
-def test_a_mapping_names_its_time_base_and_refuses_others() -> None:
-    with pytest.raises(ColumnError, match="allowed range: recorded, uniform, unordered, none"):
-        ColumnMapping(time="equal")
+def test_a_mapping_names_its_time_base_and_refuses_others(tmp_path: Path) -> None:
+    (tmp_path / "rig.toml").write_text('time = "equal"\n')
+    with pytest.raises(
+        ColumnError, match=r"rig\.toml: time is 'equal'; allowed range: recorded, uniform, unordered, none"
+    ):
+        read_mapping(tmp_path / "rig.toml")
+    with pytest.raises(ParameterError, match="time must be an instance of TimeBase; it is 'equal'"):
+        ColumnMapping(time="equal")  # type: ignore[arg-type]
 
 
 def test_the_held_length_and_the_specimen_are_read_from_the_name(tmp_path: Path) -> None:
     path = a_log(tmp_path, "festo10_cut10cm_held7.325cm_test8.csv")
     pattern = "cut{specimen}_held{length [cm]}cm_test{}"
-    (recording,) = read(path, file_name=pattern, resting_length="83 mm", time_base=UniformTime())
+    (recording,) = read(path, ColumnMapping(file_name=pattern, resting_length="83 mm", time=UniformTime()))
     assert recording["length"] == pytest.approx(0.07325)
     assert recording["contraction"] == pytest.approx((0.083 - 0.07325) / 0.083)
     assert recording.constants["specimen"] == "10cm"
@@ -122,12 +127,12 @@ def test_a_pattern_without_a_quantity_and_its_unit_is_refused(pattern: str) -> N
 
 
 def test_a_name_that_does_not_match_its_pattern_is_refused(tmp_path: Path) -> None:
-    message = refusal(a_log(tmp_path, "run1.csv"), file_name="held{length [cm]}cm", time_base=UniformTime())
+    message = refusal(a_log(tmp_path, "run1.csv"), file_name="held{length [cm]}cm", time=UniformTime())
     assert message.startswith("run1.csv: the name does not match the pattern 'held{length [cm]}cm'")
 
 
 def test_a_constant_that_a_column_contains_is_refused(tmp_path: Path) -> None:
-    message = refusal(a_log(tmp_path, "log.csv"), constants={"pressure": "3 bar"}, time_base=UniformTime())
+    message = refusal(a_log(tmp_path, "log.csv"), constants={"pressure": "3 bar"}, time=UniformTime())
     assert "pressure is stated as a constant, but a column contains it" in message
     assert "'lenght' is no constant" in refusal(tmp_path / "log.csv", constants={"lenght": "3 mm"})
 
@@ -143,12 +148,12 @@ def test_a_mapping_file_states_constants_pattern_and_time(tmp_path: Path) -> Non
 
 def test_a_run_without_a_measured_motion_is_not_isotonic(tmp_path: Path) -> None:
     slack = a_log(tmp_path, "slack.csv", contraction=0.19)
-    (recording,) = read(slack, time_base=UniformTime())
+    (recording,) = read(slack, ColumnMapping(time=UniformTime()))
     assert np.mean(recording["force"] == 0) > 0.9
     assert {run.kind.name for run in find_runs(recording)} == {"free"}
     findings = " ".join(finding.text for finding in inspect(recording).findings)
     assert "no length or contraction was recorded" in findings
-    (held,) = read(slack, time_base=UniformTime(), constants={"length": "70 mm"})
+    (held,) = read(slack, ColumnMapping(time=UniformTime(), constants={"length": "70 mm"}))
     assert {run.kind.name for run in find_runs(held)} == {"isometric"}
 
 
@@ -195,7 +200,7 @@ def a_matrix() -> np.ndarray:
 def test_matrices_of_different_height_are_read_by_the_mapping(tmp_path: Path) -> None:
     path = mat_file(tmp_path / "run.mat", data=a_matrix(), calibration=np.ones((3, 2)), offsets=np.array([1.0, 2.0]))
     columns = {"data(:,1)": "time [s]", "data(:,2)": "pressure [barg]", "data(:,3)": "force [N]"}
-    (recording,) = read(path, columns=columns)
+    (recording,) = read(path, ColumnMapping(columns=columns))
     assert recording["force"] == pytest.approx(a_matrix()[:, 2])
     note = next(note for note in recording.notes if "Not read" in note)
     assert "calibration(:,1) (3 rows)" in note

@@ -72,8 +72,8 @@ def _cell(cell: str) -> float | str | None:
     return float(number) if re.fullmatch(r"-?[\d.]+", number) and number.count(".") < 2 else cell or None
 
 
-def only(source: Path, **options: Any) -> Recording:
-    (recording,) = read(source, **options)
+def only(source: Path, mapping: Any = None, **options: Any) -> Recording:
+    (recording,) = read(source, mapping or ColumnMapping(**options))
     return recording
 
 
@@ -114,7 +114,7 @@ def test_the_number_of_lines_above_the_headings_may_be_stated(tmp_path, write):
     assert recording["pressure"][0] == pytest.approx(2e5)
     assert only(path, mapping=ColumnMapping(skip_rows=4))["pressure"].tolist() == recording["pressure"].tolist()
     with pytest.raises(FileError, match=r"no table below the 99 (lines|rows)"):
-        read(path, skip_rows=99)
+        read(path, ColumnMapping(skip_rows=99))
 
 
 def test_the_heading_row_of_a_large_file_is_found_in_the_same_way(tmp_path, monkeypatch):
@@ -165,7 +165,7 @@ def test_the_zero_of_a_displacement_may_stand_in_the_file_or_its_name(tmp_path):
 @pytest.mark.parametrize("zero", ["5", "2 kg", "30 m"])
 def test_an_impossible_zero_of_a_displacement_is_refused(tmp_path, zero: str):
     with pytest.raises(am.AirmuscleError, match="displacement_zero"):
-        read(text(tmp_path, [HEADINGS, UNITS, *ROWS]), columns=SHORTENING, displacement_zero=zero)
+        read(text(tmp_path, [HEADINGS, UNITS, *ROWS]), ColumnMapping(columns=SHORTENING, displacement_zero=zero))
 
 
 @pytest.mark.parametrize("heading", ["Weg", "Hub", "Stroke", "Traversenweg"])
@@ -199,8 +199,8 @@ def test_all_missing_values_are_reported_at_once(tmp_path):
     said = str(caught.value)
     assert "bench.csv: 8 cells in 8 of 12 lines are no finite numbers" in said
     assert "line 3 (pressure '---'), line 4 (force empty), line 5 (pressure '#N/A')" in said
-    assert "use missing=DropMissing() of read" in said
-    assert "use missing=InterpolateMissing() of read" in said
+    assert "use missing=DropMissing() of ColumnMapping" in said
+    assert "use missing=InterpolateMissing() of ColumnMapping" in said
 
 
 def test_many_missing_values_are_counted(tmp_path):
@@ -245,7 +245,7 @@ def test_missing_times_are_never_interpolated(tmp_path):
     assert recording["force"] == pytest.approx([1, 3, 4])
     untimed = text(tmp_path, ("pressure [kPa];force [N]", "0;1", "1;", "2;3"))
     with pytest.raises(ColumnError, match=r"interpolated in time, but there is no time column\. .*DropMissing"):
-        read(untimed, missing=InterpolateMissing())
+        read(untimed, ColumnMapping(missing=InterpolateMissing()))
 
 
 def test_clock_times_may_be_missing(tmp_path):
@@ -261,20 +261,20 @@ def test_codes_stand_for_missing_values(tmp_path, code: float | str):
     path = text(tmp_path, ("time [s];force [N];remark", "0;1;a", f"1;{cell};b", "2;3;c"))
     assert only(path, missing=DropMissing((code,)))["force"].tolist() == [1, 3]
     with pytest.raises(ColumnError, match=r"line 3: force "):
-        read(path, missing=RefuseMissing((code,)))
+        read(path, ColumnMapping(missing=RefuseMissing((code,))))
 
 
 def test_a_text_that_is_no_marker_is_refused_with_the_code_as_its_remedy(tmp_path):
     path = text(tmp_path, ("time [s];force [N]", "0;1", "1;OL", "2;OL"))
-    with pytest.raises(ColumnError, match=r"2 cells .* use missing=DropMissing\(codes=\('OL',\)\) of read"):
-        read(path, missing=DropMissing())
+    with pytest.raises(ColumnError, match=r"2 cells .* use missing=DropMissing\(codes=\('OL',\)\) of ColumnMapping"):
+        read(path, ColumnMapping(missing=DropMissing()))
     said = airmuscle("inspect", path).stderr
     assert "use --missing drop --missing-code 'OL'" in " ".join(said.split())
 
 
 def test_numbers_with_separated_thousands_are_reported_at_once(tmp_path):
     path = text(tmp_path, ("time [s];force [N]", "0;1.300,00", "1;1.301,50", "2;3"))
-    with pytest.raises(ColumnError, match=r"2 cells in 2 of 3 lines .* use decimal=',' of read"):
+    with pytest.raises(ColumnError, match=r"2 cells in 2 of 3 lines .* use decimal=',' of ColumnMapping"):
         read(path)
     assert only(path, decimal=",")["force"].tolist() == [1300, 1301.5, 3]
 
@@ -282,7 +282,7 @@ def test_numbers_with_separated_thousands_are_reported_at_once(tmp_path):
 def test_a_recording_without_a_complete_row_is_refused(tmp_path):
     path = text(tmp_path, ("time [s];force [N]", "0;", "1;---"))
     with pytest.raises(ColumnError, match="every row contains a missing value"):
-        read(path, missing=DropMissing())
+        read(path, ColumnMapping(missing=DropMissing()))
 
 
 @pytest.mark.parametrize("write", [text, workbook])
@@ -350,7 +350,7 @@ def test_a_mapping_file_states_all_of_it(tmp_path):
     path = text(
         tmp_path, ("a;1;2", "b;2;3", "time [s];shortening [mm];force [N]", "0;5;1", "1;-999;2", "2;7;OL", "3;8;1")
     )
-    assert only(path, mapping=rig)["contraction"] == pytest.approx([0.0, 0.03])
+    assert only(path, rig)["contraction"] == pytest.approx([0.0, 0.03])
 
 
 @pytest.mark.parametrize(
@@ -378,7 +378,9 @@ def test_the_commands_that_name_columns_are_those_with_all_options_and_the_follo
 
 
 def test_a_stream_has_lines_above_its_headings_and_a_displacement():
-    reader = RowReader("stream", constants={"resting_length": "100 mm", "displacement_zero": "5 mm"}, skip_rows=2)
+    reader = RowReader(
+        "stream", ColumnMapping(constants={"resting_length": "100 mm", "displacement_zero": "5 mm"}, skip_rows=2)
+    )
     lines = ("1;2;3", "4;5;6", "pressure [kPa];shortening [mm];force [N]", "100;7;20")
     (row,) = [row for row in map(reader.read, lines) if row]
     assert row["contraction"] == pytest.approx(0.02)
@@ -407,7 +409,7 @@ def test_the_mapping_of_a_record_may_be_a_table(tmp_path):
 
 @pytest.mark.parametrize("command", ["hysteresis", "predict"])
 def test_reports_name_the_rows_that_were_left_out(tmp_path, command: str):
-    am.write_csv(loops(spike=True), tmp_path / "loops.csv")
+    am.write(loops(spike=True), tmp_path / "loops.csv")
     model = ("dmsp-20-300",) if command == "predict" else ()
     result = airmuscle(command, *model, tmp_path / "loops.csv", "--outliers", "drop", "--out", tmp_path / "out")
     assert result.exit_code == 0, result.output
@@ -470,7 +472,7 @@ def test_without_outliers_the_errors_of_a_robust_comparison_are_hardly_changed()
 
 
 def test_fit_compares_with_a_robust_loss_and_without_outliers(tmp_path):
-    am.write_csv(loops(spike=True), tmp_path / "loops.csv")
+    am.write(loops(spike=True), tmp_path / "loops.csv")
     command = ("fit", tmp_path / "loops.csv", "--compare", "--leave-out", "pressure", "--json", "--out", tmp_path / "o")
     errors = {}
     for name, more in {"plain": (), "robust": ("--robust", "15 N"), "dropped": ("--outliers", "drop")}.items():
@@ -499,7 +501,7 @@ def test_the_greatest_degree_of_a_surface_is_proposed(tmp_path):
     assert "the coefficient of the powers i of the contraction and j of the pressure" in said
     assert said.endswith("use degree=2 of characteristic.ContractileSurface.blank.")
     assert fit(ContractileSurface.blank(2), loops(spike=False)).rank == 6
-    am.write_csv(loops(spike=False), tmp_path / "loops.csv")
+    am.write(loops(spike=False), tmp_path / "loops.csv")
     result = airmuscle("fit", tmp_path / "loops.csv", "--characteristic", "ContractileSurface", "--out", tmp_path / "o")
     assert "use --degree 2." in " ".join(result.stderr.split())
 
@@ -508,7 +510,7 @@ def test_the_greatest_degree_of_a_surface_is_proposed(tmp_path):
 def test_all_cells_with_an_ambiguous_comma_are_named(tmp_path, decimal: str | None, cells: tuple[str, ...]):
     rows = [f"{i};{cell}" for i, cell in enumerate(cells)]
     with pytest.raises(ColumnError, match=r"line 2: .*there are 2 such cells \(lines 2 and 3\)"):
-        read(text(tmp_path, ("time [s];force [N]", *rows)), decimal=decimal)
+        read(text(tmp_path, ("time [s];force [N]", *rows)), ColumnMapping(decimal=decimal))
 
 
 def test_the_file_of_the_guide_is_read_as_the_guide_says(tmp_path):
@@ -518,7 +520,7 @@ def test_the_file_of_the_guide_is_read_as_the_guide_says(tmp_path):
     rig = tmp_path / "rig.toml"
     toml = guide.partition('    resting_length = "173 mm"\n    missing = "drop"')[2].partition("\n\n### ")[0]
     rig.write_text(('resting_length = "173 mm"\nmissing = "drop"' + toml).replace("\n    ", "\n"), encoding="utf-8")
-    recording = only(path, mapping=rig)
+    recording = only(path, rig)
     assert recording["force"].tolist() == [61.2, 60.8, 9999.0]
     assert recording["contraction"] == pytest.approx(np.array([0.0, 0.04, 0.13]) / 173.0)
     asked = ("--column", "Weg=shortening [mm]", "--resting-length", "173 mm")

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle.bench import read
+from airmuscle.bench import ColumnMapping, read
 from airmuscle.bench.readers import MatlabObject, find_objects, mat_objects, read_mat_tables_here
 from airmuscle.errors import FileError
 
@@ -104,8 +104,8 @@ def test_tables_are_read_with_their_units(tmp_path, version):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         matio.save_to_mat(str(path), {"T": frame}, version=version)
-    (recording,) = read(path, units={"time": "s", "pressure": "kPa", "force": "N"})
+    (recording,) = read(path, ColumnMapping(units={"time": "s", "pressure": "kPa", "force": "N"}))
     assert recording["pressure"] == pytest.approx(1e4 * FORCE)
     assert recording["force"] == pytest.approx(FORCE)
-    (alone,) = read(path, units={"time": "s", "pressure": "kPa", "force": "N"}, group="T")
+    (alone,) = read(path, ColumnMapping(units={"time": "s", "pressure": "kPa", "force": "N"}, group="T"))
     assert len(alone) == 12

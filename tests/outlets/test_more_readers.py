@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle.bench import read
+from airmuscle.bench import ColumnMapping, read
 from airmuscle.errors import ColumnError, FileError, InputError
 from airmuscle.recording import Recording
 
@@ -44,7 +44,7 @@ def same(recording: Recording) -> None:
 
 def refusal(kind: type[InputError], path: Path, **options) -> str:
     with pytest.raises(kind) as caught:
-        read(path, **options)
+        read(path, ColumnMapping(**options))
     return str(caught.value)
 
 
@@ -87,7 +87,7 @@ def test_an_ods_spreadsheet_gives_each_sheet_with_a_table(tmp_path: Path):
     first, second = read(path)
     same(first)
     assert (first.origin, len(second)) == ("runs.ods, sheet 'First'", 41)
-    same(read(path, sheet="Second")[0])
+    same(read(path, ColumnMapping(sheet="Second"))[0])
     assert "no sheet 'Third'; the sheets are Notes, First, Second" in refusal(FileError, path, sheet="Third")
 
 
@@ -119,7 +119,7 @@ def test_parquet_with_units_in_the_metadata_or_in_the_names(tmp_path: Path):
     same(read(tmp_path / "run.parquet")[0])
     named = pyarrow.table({f"{n} [{UNITS[n]}]": values for n, values in COLUMNS.items()})
     parquet.write_table(named, tmp_path / "named.parquet")
-    same(read(tmp_path / "named.parquet", resting_length="310 mm")[0])
+    same(read(tmp_path / "named.parquet", ColumnMapping(resting_length="310 mm"))[0])
 
 
 def hdf5(path: Path) -> Path:
@@ -139,13 +139,13 @@ def hdf5(path: Path) -> Path:
 
 def test_hdf5_groups_matrices_and_records_are_runs(tmp_path: Path):
     path = hdf5(tmp_path / "runs.h5")
-    recordings = read(path, resting_length="310 mm")
+    recordings = read(path, ColumnMapping(resting_length="310 mm"))
     assert sorted(r.origin for r in recordings) == [
         f"runs.h5, group '{n}'" for n in ("/matrix", "/records", "/rig/run1")
     ]
     for recording in recordings:
         same(recording)
-    same(read(path, group="/rig/run1")[0])
+    same(read(path, ColumnMapping(group="/rig/run1"))[0])
     assert "no group '/rig/run2'" in refusal(FileError, path, group="/rig/run2")
 
 

@@ -23,7 +23,7 @@ from airmuscle.bench import (
     StartTime,
     predict_dynamic,
     predict_static,
-    write_csv,
+    write,
 )
 from airmuscle.core import leaves, with_parameters
 from airmuscle.engine import Rodas4
@@ -55,7 +55,7 @@ def muscle(tmp_path_factory) -> Path:
     """A muscle fitted to three isobars, with its stated band."""
     folder = tmp_path_factory.mktemp("static")
     for bar in (2.0, 3.5, 5.0):
-        write_csv(sweep(bar * 1e5, int(bar)), folder / f"isobar{bar:g}.csv")
+        write(sweep(bar * 1e5, int(bar)), folder / f"isobar{bar:g}.csv")
     files = sorted(folder.glob("*.csv"))
     options = ("--characteristic", "chou-hannaford", "--resting-length", "300 mm")
     done = airmuscle("fit", *files, *options, "--out", folder / "fit")
@@ -77,7 +77,7 @@ def study(tmp_path_factory) -> Path:
                                   ("again", text, 0.03), ("other", other, 0.0)):  # fmt: skip
         (place / "truth.toml").write_text(scenario, encoding="utf-8")
         run = noisy_run(place / "truth.toml", rng, {"pressure": 500.0})
-        write_csv(Recording({**run, "time": run["time"] + shift}, name), place / f"{name}.csv")
+        write(Recording({**run, "time": run["time"] + shift}, name), place / f"{name}.csv")
     start = plant_table(HELD, exponent=1.1, conductance=4e-9)
     (place / "study.toml").write_text(
         start + STUDY + RECORD.format("run1.csv") + RECORD.format("run2.csv"), encoding="utf-8"
@@ -88,7 +88,7 @@ def study(tmp_path_factory) -> Path:
 
 
 def test_a_fitted_muscle_predicts_another_run_within_its_stated_band(muscle, tmp_path):
-    write_csv(sweep(4e5, 9), tmp_path / "later.csv")
+    write(sweep(4e5, 9), tmp_path / "later.csv")
     done = airmuscle("predict", muscle, tmp_path / "later.csv", "--resting-length", "300 mm", "--out", tmp_path / "p",
                      "--json")  # fmt: skip
     assert done.exit_code == 0, done.stderr
@@ -117,7 +117,7 @@ def test_rows_outside_the_range_of_the_law_are_counted(muscle):
 
 
 def test_a_muscle_without_a_band_gives_errors_and_no_share(tmp_path):
-    write_csv(sweep(3e5, 1), tmp_path / "run.csv")
+    write(sweep(3e5, 1), tmp_path / "run.csv")
     done = airmuscle(
         "predict", "dmsp-20-300", tmp_path / "run.csv", "--resting-length", "300 mm", "--out", tmp_path / "p"
     )
@@ -256,7 +256,7 @@ def test_a_model_that_does_not_fit_the_options_is_refused(words, message, tmp_pa
 
 
 def test_a_record_without_a_quantity_of_the_plant_is_refused(study, tmp_path):
-    write_csv(Recording({"time": np.arange(5.0), "force": np.arange(5.0)}, "x"), tmp_path / "x.csv")
+    write(Recording({"time": np.arange(5.0), "force": np.arange(5.0)}, "x"), tmp_path / "x.csv")
     done = airmuscle("predict", study / "fit" / "scenario-1.toml", tmp_path / "x.csv", "--out", tmp_path / "p")
     assert done.exit_code == 1
     assert "no column can be predicted; the plant gives pressure" in done.stderr

@@ -15,7 +15,7 @@ from command_line import airmuscle
 from dynamic_study import HELD, STUDY, noisy_run, plant_table, run_table
 
 import airmuscle as am
-from airmuscle.bench import predict_static, rate_of_change, write_csv
+from airmuscle.bench import predict_static, rate_of_change, write
 from airmuscle.errors import ParameterError
 from airmuscle.files import load_scenario
 from airmuscle.files.library import PLANT_READER, Location, StatedBand
@@ -38,7 +38,7 @@ def muscle(tmp_path_factory) -> Path:
     """A muscle fitted to three isobars of 0.6 % contraction per second."""
     folder = tmp_path_factory.mktemp("static")
     for bar in (2.0, 3.5, 5.0):
-        write_csv(sweep(bar * 1e5, int(bar)), folder / f"isobar{bar:g}.csv")
+        write(sweep(bar * 1e5, int(bar)), folder / f"isobar{bar:g}.csv")
     files = sorted(folder.glob("*.csv"))
     options = ("--characteristic", LAW, "--resting-length", "300 mm", "--out", folder / "fit")
     assert airmuscle("fit", *files, *options).exit_code == 0
@@ -47,7 +47,7 @@ def muscle(tmp_path_factory) -> Path:
 
 def predicted(muscle: Path, record: Recording, tmp_path: Path, length: str = "300 mm") -> dict:
     """The prediction of a record by the command, with the folder of its files."""
-    write_csv(record, tmp_path / "run.csv")
+    write(record, tmp_path / "run.csv")
     done = airmuscle(
         "predict", muscle, tmp_path / "run.csv", "--resting-length", length, "--out", tmp_path / "p", "--json"
     )
@@ -131,7 +131,7 @@ def plants(tmp_path_factory) -> Path:
     for name, conductance in (("a", 3e-9), ("b", 3.1e-9), ("c", 2.9e-9), ("later", 3.05e-9), ("far", 6e-9)):
         truth = plant_table(HELD, exponent=1.25, conductance=conductance) + run_table("0.2 bar") + text
         (place / "truth.toml").write_text(truth, encoding="utf-8")
-        write_csv(Recording(noisy_run(place / "truth.toml", rng, {"pressure": 500.0}), name), place / f"{name}.csv")
+        write(Recording(noisy_run(place / "truth.toml", rng, {"pressure": 500.0}), name), place / f"{name}.csv")
     start = plant_table(HELD, exponent=1.2, conductance=4e-9) + STUDY
     for name, files in (("one", "a"), ("three", "abc")):
         records = "".join(f'[[record]]\nfile = "{each}.csv"\n' for each in files)

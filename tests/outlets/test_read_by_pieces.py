@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle.bench import BlockMeans, Decimation, read
+from airmuscle.bench import BlockMeans, ColumnMapping, Decimation, read
 from airmuscle.bench.readers import pieces, raw_columnar, raw_mat, raw_mdf, read_contents
 from airmuscle.errors import AirmuscleError, ColumnError
 
@@ -113,7 +113,7 @@ def test_a_large_file_gives_every_nth_row_as_measured_with_a_note(tmp_path, smal
 
 
 def test_a_reading_of_the_user_is_reduced_as_well(tmp_path):
-    (recording,) = read(hdf5(tmp_path / "run.h5"), group="/log", downsampling=Decimation(500))
+    (recording,) = read(hdf5(tmp_path / "run.h5"), ColumnMapping(group="/log"), downsampling=Decimation(500))
     assert len(recording) == 477
     assert recording["force"][1] == FORCE[21]
     assert recording["time"][-1] == TIME[::21][-1]

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle.bench import read_csv
+from airmuscle.bench import ColumnMapping, read_csv
 from airmuscle.errors import ColumnError, FileError, InputError, UnitError
 from airmuscle.recording import Recording
 
@@ -44,7 +44,7 @@ def same(recording: Recording, expected: dict[str, list[float]] = EXPECTED) -> N
 
 def refusal(path: Path, kind: type[InputError], **options) -> str:
     with pytest.raises(kind) as caught:
-        read_csv(path, **options)
+        read_csv(path, ColumnMapping(**options))
     return str(caught.value)
 
 
@@ -137,7 +137,7 @@ def test_columns_of_several_muscles_keep_their_prefix(bench):
 def test_absolute_pressure_becomes_gauge(bench, unit: str):
     path = bench(f"p [{unit}]\n3\n4\n")
     assert read_csv(path)["pressure"] == pytest.approx([3e5 - 101325, 4e5 - 101325])
-    recording = read_csv(path, ambient="950 mbar")
+    recording = read_csv(path, ColumnMapping(ambient="950 mbar"))
     assert recording["pressure"] == pytest.approx([3e5 - 95000, 4e5 - 95000])
     assert recording.constants["ambient"] == 95000.0
     assert not recording.notes
@@ -177,8 +177,8 @@ def test_unknown_numeric_columns_are_kept_and_texts_ignored_with_a_note(bench):
 
 def test_a_resting_length_gives_the_contraction(bench):
     path = bench(PLAIN)
-    assert read_csv(path, resting_length="300 mm")["contraction"] == pytest.approx([0, 1 / 30, 2 / 30])
-    assert read_csv(path, resting_length=0.4)["contraction"] == pytest.approx([0.25, 0.275, 0.3])
+    assert read_csv(path, ColumnMapping(resting_length="300 mm"))["contraction"] == pytest.approx([0, 1 / 30, 2 / 30])
+    assert read_csv(path, ColumnMapping(resting_length=0.4))["contraction"] == pytest.approx([0.25, 0.275, 0.3])
     with pytest.raises(ColumnError, match="Specify the resting length"):
         read_csv(path)["contraction"]
 
@@ -187,7 +187,7 @@ def test_a_resting_length_gives_the_contraction(bench):
 def test_the_file_may_state_the_resting_length(bench, remark: str):
     recording = read_csv(bench(f'{remark}\n# specimen = "DMSP-20"\n# by: Bob = the operator\n{PLAIN}'))
     assert recording.constants == {"resting_length": 0.3, "specimen": "DMSP-20"}
-    assert read_csv(bench(f"{remark}\n{PLAIN}"), resting_length=0.4).constants["resting_length"] == 0.4
+    assert read_csv(bench(f"{remark}\n{PLAIN}"), ColumnMapping(resting_length=0.4)).constants["resting_length"] == 0.4
 
 
 @pytest.mark.parametrize("number", ["1013.", "+1013", "01013", "1013"])
@@ -197,7 +197,7 @@ def test_the_unit_of_a_constant_counts_however_its_number_is_written(bench, numb
 
 def test_missing_units_may_be_given(bench):
     path = bench("p,eps,F\n1,0,3\n2,0.1,4\n")
-    recording = read_csv(path, units={"pressure": "bar", "F": "kN"}, specimen="old one")
+    recording = read_csv(path, ColumnMapping(units={"pressure": "bar", "F": "kN"}, specimen="old one"))
     same(recording, {"pressure": [1e5, 2e5], "contraction": [0, 0.1], "force": [3e3, 4e3]})
     assert recording.constants == {"specimen": "old one"}
     assert "The contraction has no unit and is read as a ratio." in recording.notes
@@ -248,7 +248,7 @@ def test_text_in_a_column_of_numbers(bench, cell: str):
     assert said.startswith(
         f"bench.csv, line 41: pressure '{cell}' is not a number. Correct the cell or delete the line."
     )
-    assert ("missing=DropMissing() of read" in said) == (cell in ("n/a", "--"))
+    assert ("missing=DropMissing() of ColumnMapping" in said) == (cell in ("n/a", "--"))
 
 
 def test_an_empty_cell_is_named_with_its_line_in_the_file(bench):
@@ -382,10 +382,12 @@ def test_the_fast_parser_equals_the_parser_by_cell(bench):
 def test_a_given_unit_overrides_that_of_the_file_with_a_note(tmp_path):
     path = tmp_path / "bench.csv"
     path.write_text("pressure [bar],force [N]\n30,1\n60,2\n", encoding="utf-8")
-    recording = read_csv(path, units={"pressure": "psig"})
+    recording = read_csv(path, ColumnMapping(units={"pressure": "psig"}))
     assert recording["pressure"][0] == pytest.approx(30 * 6894.757293168361)
     assert "The pressure is read in psig, as specified by the user; the file states bar." in recording.notes
-    assert not any("specified by the user" in note for note in read_csv(path, units={"pressure": "bar"}).notes)
+    assert not any(
+        "specified by the user" in note for note in read_csv(path, ColumnMapping(units={"pressure": "bar"})).notes
+    )
 
 
 @pytest.mark.parametrize(("unit", "factor"), [("Hz", 2 * np.pi), ("rpm", np.pi / 30), ("deg/s", np.pi / 180)])

@@ -17,10 +17,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle.bench import BlockMeans, ColumnMapping, Decimation, read
+from airmuscle.bench import BlockMeans, ColumnMapping, Decimation, RecordedTime, read
 from airmuscle.bench.readers import (
     call_in_separate_process,
     large_csv,
+    mapping_of_tables,
     read_mapping,
     seconds_from_clock,
     separate_process,
@@ -49,7 +50,7 @@ def only(recordings: tuple[Recording, ...]) -> Recording:
 
 def refusal(kind: type[InputError], source, **options) -> str:
     with pytest.raises(kind) as caught:
-        read(source, **options)
+        read(source, ColumnMapping(**options))
     return str(caught.value)
 
 
@@ -104,7 +105,7 @@ def test_every_sheet_with_a_table_is_a_run_and_one_can_be_selected(tmp_path: Pat
     path = excel(tmp_path / "runs.xlsx", {"First": rows, "Second": [rows[0], *rows[3:]]})
     first, second = read(path)
     assert (first.origin, len(second)) == ("runs.xlsx, sheet 'First'", 38)
-    assert len(only(read(path, sheet="Second"))) == 38
+    assert len(only(read(path, ColumnMapping(sheet="Second")))) == 38
     assert "no sheet 'Secnd'; the sheets are First, Second. Did you mean 'Second'?" in refusal(
         FileError, path, sheet="Secnd"
     )
@@ -153,7 +154,7 @@ def save_v73(path: Path, content: dict[str, object]) -> Path:
 
 @pytest.mark.parametrize("save", [save_v5, save_v73])
 def test_matlab_vectors(tmp_path: Path, save):
-    recording = only(read(save(tmp_path / "run.mat", mat_content()), units={"time": "s"}))
+    recording = only(read(save(tmp_path / "run.mat", mat_content()), ColumnMapping(units={"time": "s"})))
     same(recording)
     assert recording.constants["resting_length"] == pytest.approx(0.31)
 
@@ -163,14 +164,14 @@ def test_matlab_structs_matrices_and_simulink(tmp_path: Path):
     first, second = read(save_v5(tmp_path / "two.mat", struct))
     same(first)
     assert (first.origin, second.origin) == ("two.mat, run1", "two.mat, run2")
-    assert len(only(read(tmp_path / "two.mat", group="run2"))) == 9
+    assert len(only(read(tmp_path / "two.mat", ColumnMapping(group="run2")))) == 9
     said = refusal(FileError, tmp_path / "two.mat", group="run3")
     assert "no struct 'run3' with vectors; the structs are run1, run2" in said
 
     named = {"data": TABLE, "colheaders": np.array(HEADINGS, dtype=object)}
     same(only(read(save_v5(tmp_path / "import.mat", named))))
     bare = {f"data(:,{j})": heading for j, heading in enumerate(HEADINGS, 1)}
-    same(only(read(save_v5(tmp_path / "bare.mat", {"data": TABLE}), columns=bare)))
+    same(only(read(save_v5(tmp_path / "bare.mat", {"data": TABLE}), ColumnMapping(columns=bare))))
 
     signals = [{"values": TABLE[:, j], "label": HEADINGS[j]} for j in (1, 2, 3)]
     simulink = {"out": {"time": TIME, "signals": np.array(signals, dtype=object)}}
@@ -210,7 +211,7 @@ def test_tdms_waveforms(tmp_path: Path):
     same(two)
     assert one.origin == "run.tdms, group 'one'"
     assert one.constants["resting_length"] == pytest.approx(0.31)
-    same(only(read(tmp_path / "run.tdms", group="two")))
+    same(only(read(tmp_path / "run.tdms", ColumnMapping(group="two"))))
     assert "no group 'tow'; the groups are one, two. Did you mean 'two'?" in refusal(
         FileError, tmp_path / "run.tdms", group="tow"
     )
@@ -259,7 +260,7 @@ def test_mdf_groups_with_different_time_vectors_are_resampled_to_common_rows(tmp
         "Channel 'L' has its own time vector: its 14 rows are interpolated to the 40 rows of 'pressure'."
         in recording.notes
     )
-    assert len(only(read(tmp_path / "run.mf4", group="slow"))) == 14
+    assert len(only(read(tmp_path / "run.mf4", ColumnMapping(group="slow")))) == 14
     assert "no group 'fats'; the groups are fast, slow" in refusal(FileError, tmp_path / "run.mf4", group="fats")
 
 
@@ -351,17 +352,18 @@ def test_a_mapping_file_names_columns_units_and_constants(tmp_path: Path):
     assert "Column 'spare' is ignored, according to the mapping." in said
 
 
-def test_a_keyword_overrides_the_mapping(tmp_path: Path):
-    mapping = ColumnMapping(columns={"F": "force [N]"}, constants={"resting_length": "300 mm"})
+def test_an_option_overrides_the_mapping_file(tmp_path: Path):
+    stated = ColumnMapping(columns={"F": "force [N]"}, constants={"resting_length": "300 mm"})
+    mapping = mapping_of_tables({"columns": {"F": "force [kN]"}, "resting_length": 0.4}, "options", stated)
     (tmp_path / "run.csv").write_text("F,L [mm]\n1,290\n2,280\n")
-    recording = only(read(tmp_path / "run.csv", mapping=mapping, columns={"F": "force [kN]"}, resting_length=0.4))
+    recording = only(read(tmp_path / "run.csv", mapping))
     assert recording["force"] == pytest.approx([1e3, 2e3])
     assert recording.constants["resting_length"] == 0.4
 
 
 def test_a_mapping_overrides_the_unit_row(tmp_path: Path):
     (tmp_path / "run.csv").write_text("p,F\nbar,N\n1,2\n3,4\n")
-    recording = only(read(tmp_path / "run.csv", columns={"p": "pressure [kPa(g)]", "F": "force"}))
+    recording = only(read(tmp_path / "run.csv", ColumnMapping(columns={"p": "pressure [kPa(g)]", "F": "force"})))
     assert recording["pressure"] == pytest.approx([1e3, 3e3])
     assert recording["force"] == pytest.approx([2.0, 4.0])
     assert recording.units == {"pressure": "kPa(g)", "force": "N"}
@@ -369,24 +371,27 @@ def test_a_mapping_overrides_the_unit_row(tmp_path: Path):
 
 def test_a_table_without_headings_is_mapped_by_numbers(tmp_path: Path):
     np.savetxt(tmp_path / "run.txt", TABLE, delimiter="\t")
-    assert "To map columns by their numbers, use columns={1: 'pressure [kPa]', 2: 'force [N]'} of read." in refusal(
-        ColumnError, tmp_path / "run.txt"
+    assert (
+        "To map columns by their numbers, use columns={1: 'pressure [kPa]', 2: 'force [N]'} of ColumnMapping."
+        in refusal(ColumnError, tmp_path / "run.txt")
     )
-    same(only(read(tmp_path / "run.txt", columns=dict(enumerate(HEADINGS, 1)))))
+    same(only(read(tmp_path / "run.txt", ColumnMapping(columns=dict(enumerate(HEADINGS, 1))))))
     np.savetxt(tmp_path / "blanks.txt", TABLE)
-    same(only(read(tmp_path / "blanks.txt", columns=dict(enumerate(HEADINGS, 1)), delimiter=" ")))
-    same(only(read(tmp_path / "blanks.txt", columns=dict(enumerate(HEADINGS, 1)))))
+    same(only(read(tmp_path / "blanks.txt", ColumnMapping(columns=dict(enumerate(HEADINGS, 1)), delimiter=" "))))
+    same(only(read(tmp_path / "blanks.txt", ColumnMapping(columns=dict(enumerate(HEADINGS, 1))))))
 
 
 def test_a_given_decimal_sign_resolves_thousands_separators(tmp_path: Path):
     (tmp_path / "run.csv").write_text("force [N];length [mm]\n1.234,5;290,5\n2.000;280\n")
-    assert "To specify the decimal sign, use decimal=',' of read." in refusal(ColumnError, tmp_path / "run.csv")
-    assert only(read(tmp_path / "run.csv", decimal=","))["force"] == pytest.approx([1234.5, 2000.0])
+    assert "To specify the decimal sign, use decimal=',' of ColumnMapping." in refusal(
+        ColumnError, tmp_path / "run.csv"
+    )
+    assert only(read(tmp_path / "run.csv", ColumnMapping(decimal=",")))["force"] == pytest.approx([1234.5, 2000.0])
 
 
 def test_points_separate_thousands_next_to_a_given_decimal_comma_also_where_no_comma_occurs(tmp_path: Path):
     (tmp_path / "run.csv").write_text("force [N];length [mm]\n1.234;290\n2.000;280\n")
-    assert only(read(tmp_path / "run.csv", decimal=","))["force"] == pytest.approx([1234.0, 2000.0])
+    assert only(read(tmp_path / "run.csv", ColumnMapping(decimal=",")))["force"] == pytest.approx([1234.0, 2000.0])
 
 
 @pytest.mark.parametrize(
@@ -401,7 +406,7 @@ def test_a_sign_that_cannot_separate_thousands_contradicts_the_given_decimal_sig
 def test_commas_in_quoted_cells_are_ambiguous_next_to_a_decimal_point(tmp_path: Path):
     (tmp_path / "run.csv").write_text('time [s],force [N]\n0.5,"1,234"\n1.5,"2,345"\n')
     assert "the comma in '1,234' is ambiguous" in refusal(ColumnError, tmp_path / "run.csv")
-    forces = only(read(tmp_path / "run.csv", decimal="."))["force"]
+    forces = only(read(tmp_path / "run.csv", ColumnMapping(decimal=".")))["force"]
     assert forces == pytest.approx([1234.0, 2345.0])
 
 
@@ -450,7 +455,7 @@ def test_a_constant_column_states_the_resting_length(tmp_path: Path):
     recording = only(read(path))
     same(recording)
     assert recording.constants["resting_length"] == pytest.approx(0.31)
-    assert only(read(path, resting_length="32 cm")).constants["resting_length"] == pytest.approx(0.32)
+    assert only(read(path, ColumnMapping(resting_length="32 cm"))).constants["resting_length"] == pytest.approx(0.32)
     csv(path, (*HEADINGS, "rest_length [cm]"), np.column_stack([TABLE, np.where(TIME < 1, 31.0, 32.0)]))
     assert "a.csv, line 22: rest_length [cm] changes from 31 to 32" in refusal(ColumnError, path)
 
@@ -511,7 +516,9 @@ def test_other_texts_are_not_clock_times():
 def test_time_out_of_order_is_rejected_unless_ordered_is_false(tmp_path: Path):
     path = csv(tmp_path / "run.csv", table=TABLE[[0, 2, 1, 3]])
     assert "is less than the time of the previous row" in refusal(ColumnError, path)
-    assert only(read(path, ordered=False))["time"] == pytest.approx(TIME[[0, 2, 1, 3]])
+    assert only(read(path, ColumnMapping(time=RecordedTime(ordered=False))))["time"] == pytest.approx(
+        TIME[[0, 2, 1, 3]]
+    )
 
 
 # Very long files
@@ -664,10 +671,10 @@ def test_a_damaged_matlab_file_does_not_end_the_process(tmp_path: Path, save):
         damaged[position] ^= 64
         (tmp_path / "damaged.mat").write_bytes(damaged)
         with contextlib.suppress(InputError):  # a flipped bit of a number cannot be detected
-            read(tmp_path / "damaged.mat", units={"time": "s"})
+            read(tmp_path / "damaged.mat", ColumnMapping(units={"time": "s"}))
     (tmp_path / "damaged.mat").write_bytes(content[: len(content) // 2])
     assert "damaged" in refusal(FileError, tmp_path / "damaged.mat")
-    same(only(read(tmp_path / "run.mat", units={"time": "s"})))
+    same(only(read(tmp_path / "run.mat", ColumnMapping(units={"time": "s"}))))
 
 
 def test_a_file_whose_reader_ends_or_takes_too_long_is_damaged(tmp_path: Path, monkeypatch):

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle.bench import UniformTime, read, read_csv
+from airmuscle.bench import ColumnMapping, UniformTime, read, read_csv
 from airmuscle.bench.readers import check_bench, parse_unit_row
 from airmuscle.errors import AirmuscleWarning, ColumnError, UnitError
 from airmuscle.recording import Recording
@@ -124,7 +124,7 @@ def test_a_contraction_of_less_than_a_hundredth_of_a_per_cent_range_may_be_a_rat
 def test_a_held_absolute_pressure_counts_from_the_stated_ambient_pressure(tmp_path: Path):
     (tmp_path / "run.csv").write_text("force [N],length [mm]\n1,290\n2,280\n")
     constants = {"pressure": "3 bara"}
-    (recording,) = read(tmp_path / "run.csv", constants=constants, ambient="950 hPa")
+    (recording,) = read(tmp_path / "run.csv", ColumnMapping(constants=constants, ambient="950 hPa"))
     assert recording["pressure"] == pytest.approx([2.05e5, 2.05e5])
 
 
@@ -133,9 +133,9 @@ def test_vacuum_is_that_of_the_stated_ambient_pressure(tmp_path: Path, kilopasca
     (tmp_path / "run.csv").write_text(f"pressure [kPag],force [N]\n100,2\n{kilopascals},1\n")
     if refused:
         with pytest.raises(ColumnError, match=r"not above absolute vacuum \(-95 kPa gauge\)"):
-            read(tmp_path / "run.csv", ambient="95 kPa")
+            read(tmp_path / "run.csv", ColumnMapping(ambient="95 kPa"))
     else:
-        assert read(tmp_path / "run.csv", ambient="95 kPa")[0]["pressure"][1] == pytest.approx(-94e3)
+        assert read(tmp_path / "run.csv", ColumnMapping(ambient="95 kPa"))[0]["pressure"][1] == pytest.approx(-94e3)
 
 
 def test_a_resting_length_that_changes_between_rows_is_no_constant(tmp_path: Path):
@@ -160,9 +160,9 @@ def test_rounded_stamps_deviate_by_at_most_their_rounding_and_five_sample_times(
     (tmp_path / "run.csv").write_text(f"time [s],force [N]\n{rows}")
     if refused:
         with pytest.raises(ColumnError, match="The file has gaps"):
-            read(tmp_path / "run.csv", time_base=UniformTime())
+            read(tmp_path / "run.csv", ColumnMapping(time=UniformTime()))
     else:
-        (recording,) = read(tmp_path / "run.csv", time_base=UniformTime())
+        (recording,) = read(tmp_path / "run.csv", ColumnMapping(time=UniformTime()))
         assert recording["time"] == pytest.approx(time)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from command_line import airmuscle
 
-from airmuscle.bench import read
+from airmuscle.bench import ColumnMapping, read
 from airmuscle.errors import FileError
 
 pytestmark = pytest.mark.tool
@@ -38,7 +38,7 @@ def bag(tmp_path):
 
 
 def test_topics_become_columns_with_common_rows(bag):
-    (run,) = read(bag, units={"pressure": "Pa"})
+    (run,) = read(bag, ColumnMapping(units={"pressure": "Pa"}))
     assert run["time"] == pytest.approx(0.01 * np.arange(21), abs=1e-12)
     assert run["pressure"].tolist() == [1000.0 * k for k in range(21)]
     assert run["arm.joints.position.wrist"] == pytest.approx(-0.02 * np.arange(21), abs=1e-12)
@@ -58,7 +58,7 @@ def test_a_valve_of_a_slower_topic_switches_between_two_values(tmp_path, kind):
             writer.write(forces, stamp, store.serialize_cdr(force(1.0 * k), force.__msgtype__))
             if k % 10 == 0:
                 writer.write(valves, stamp, store.serialize_cdr(valve(k == 10), valve.__msgtype__))
-    (run,) = read(tmp_path / "bag", units={"force": "N"})
+    (run,) = read(tmp_path / "bag", ColumnMapping(units={"force": "N"}))
     assert run["valve"].tolist() == [0.0] * 10 + [1.0] * 10 + [0.0]
 
 
@@ -105,7 +105,9 @@ def test_a_note_proposes_the_mapping_of_a_field_with_the_unit_of_its_message(sta
     text = " ".join(run.notes)
     assert "Column 'ft.force.y' in N is a field of a message" in text
     assert "[columns] 'joints.effort.y' = 'torque [N m]' maps it" in text
-    (mapped,) = read(standard_messages, columns={"joints.effort.y": "torque", "joints.position.y": "angle [deg]"})
+    (mapped,) = read(
+        standard_messages, ColumnMapping(columns={"joints.effort.y": "torque", "joints.position.y": "angle [deg]"})
+    )
     assert mapped["torque"].tolist() == [0.1] * 5
     assert mapped["angle"] == pytest.approx(np.radians(np.full(5, 0.1)))
 
@@ -117,11 +119,11 @@ def test_the_command_converts_a_bag_of_standard_messages(standard_messages, tmp_
 
 
 def test_one_topic_can_be_chosen(bag):
-    (run,) = read(bag, group="/arm/joints")
+    (run,) = read(bag, ColumnMapping(group="/arm/joints"))
     assert list(run) == ["time", "arm.joints.position.elbow", "arm.joints.position.wrist"]
     assert len(run) == 11
     with pytest.raises(FileError, match="there is no topic nothing"):
-        read(bag, group="nothing")
+        read(bag, ColumnMapping(group="nothing"))
 
 
 def test_the_command_converts_a_bag(bag, tmp_path):

@@ -21,7 +21,7 @@ from studio_tasks import WorkerHere, fail, write_slowly
 pytest.importorskip("starlette", reason="needs starlette")
 
 import airmuscle as am
-from airmuscle.bench import Candidate, LevelSplit, compare, read, standard_candidates
+from airmuscle.bench import Candidate, ColumnMapping, LevelSplit, compare, read, standard_candidates
 from airmuscle.bench.identify import model_selection
 from airmuscle.outlets.studio import (
     FIT_WORKERS,
@@ -316,7 +316,7 @@ def result(tmp_path_factory):
     rules = [{"recordings": ["Messung.csv"], "rows": [0, 2]}, {"ranges": {"contraction": [0.159, 0.2]}}]
     settings = {"columns": COLUMNS, "rules": rules, "leave_out": "contraction"}
     (folder / "Messung.csv").write_bytes(german_table())
-    (recording,) = read(folder / "Messung.csv", columns=HEADINGS)
+    (recording,) = read(folder / "Messung.csv", ColumnMapping(columns=HEADINGS))
     kept = (np.arange(len(recording)) >= 2) & (recording["contraction"] < 0.159)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(model_selection, "standard_candidates", lambda runs: standard_candidates(runs)[1:4])
@@ -626,10 +626,7 @@ def test_the_page_has_the_reading_settings_of_the_command_line(app, tmp_path):
     name = upload(app, "a.csv", content).json()["set"]
     (recording,) = post(app, "read", set=name, settings=LOGGED).json()["recordings"]
     (tmp_path / "a.csv").write_bytes(content)
-    (expected,) = read(
-        tmp_path / "a.csv", resting_length="300 mm", displacement_zero="12 mm", skip_rows=1,
-        missing=am.bench.DropMissing((-999.0, "OL")),
-    )  # fmt: skip
+    (expected,) = read(tmp_path / "a.csv", ColumnMapping(resting_length="300 mm", displacement_zero="12 mm", skip_rows=1, missing=am.bench.DropMissing((-999.0, "OL"))))  # fmt: skip
     assert recording["rows"] == len(expected) == 78
     assert recording["points"]["contraction"] == pytest.approx(expected["contraction"], abs=1e-8)
     assert recording["points"]["contraction"][0] == 0
@@ -663,8 +660,8 @@ def test_outliers_are_left_out_as_by_the_command_line(app, tmp_path):
     (tmp_path / "a.csv").write_bytes(content)
     stated = {"resting_length": "300 mm", "displacement_zero": "12 mm", "skip_rows": 1}
     missing = am.bench.DropMissing((-999.0, "OL"))
-    (complete,) = read(tmp_path / "a.csv", **stated, missing=missing)
-    (expected,) = read(tmp_path / "a.csv", **stated, missing=missing, drop_outliers=True)
+    (complete,) = read(tmp_path / "a.csv", am.ColumnMapping(**stated, missing=missing))
+    (expected,) = read(tmp_path / "a.csv", am.ColumnMapping(**stated, missing=missing, drop_outliers=True))
     left_out = np.flatnonzero(~np.isin(complete["time"], expected["time"]))
     assert recording["outliers"] == len(left_out) > 5
     assert recording["left_out"] == list(left_out)

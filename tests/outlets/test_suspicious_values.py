@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle.bench import read
+from airmuscle.bench import ColumnMapping, read
 from airmuscle.errors import AirmuscleWarning, ColumnError
 from airmuscle.physics import Braid, TonduLopez2000
 
@@ -36,7 +36,7 @@ def write(path: Path, values: dict[str, np.ndarray], head: str = HEAD) -> Path:
 def warned(files: list[Path]) -> list[str]:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", AirmuscleWarning)
-        read(files, resting_length=0.3)
+        read(files, ColumnMapping(resting_length=0.3))
     return [str(each.message) for each in caught]
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from command_line import airmuscle
 
-from airmuscle.bench import DropMissing, inspect, read
+from airmuscle.bench import ColumnMapping, DropMissing, inspect, read
 from airmuscle.errors import ColumnError, FileError
 
 HEAD = "time [s],pressure [kPa],force [N]\n"
@@ -118,7 +118,7 @@ def test_a_formula_that_was_never_computed_and_one_with_an_error_have_no_value(t
     book.save(tmp_path / "bench.xlsx")
     with pytest.raises(ColumnError, match=r"2 cells in 2 of 9 rows .* row 9 \(force empty\), row 10 \(force empty\)"):
         read(tmp_path / "bench.xlsx")
-    assert len(read(tmp_path / "bench.xlsx", missing=DropMissing())[0]) == 7
+    assert len(read(tmp_path / "bench.xlsx", ColumnMapping(missing=DropMissing()))[0]) == 7
 
 
 @pytest.mark.parametrize("userblock", [0, 512])
@@ -184,7 +184,7 @@ def test_a_struct_with_time_and_signals_that_simulink_did_not_save(tmp_path, sig
     scipy_io = pytest.importorskip("scipy.io")
     out = {"time": np.arange(9.0), "force_N": np.arange(9.0), "signals": signals}
     scipy_io.savemat(tmp_path / "bench.mat", {"out": out})
-    (recording,) = read(tmp_path / "bench.mat", units={"time": "s"})
+    (recording,) = read(tmp_path / "bench.mat", ColumnMapping(units={"time": "s"}))
     assert recording["force"].tolist() == [*range(9)]
 
 
@@ -206,7 +206,7 @@ def test_a_unit_row_that_contradicts_a_heading_is_refused(tmp_path, heading: str
         return
     with pytest.raises(ColumnError, match=message):
         read(path)
-    (recording,) = read(path, units={"pressure": "kPa"})
+    (recording,) = read(path, ColumnMapping(units={"pressure": "kPa"}))
     assert recording["pressure"][0] == 1e5
 
 

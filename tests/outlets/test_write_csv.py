@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airmuscle.bench import read_csv, write_csv
+from airmuscle.bench import read_csv, write
 from airmuscle.errors import FileError
 from airmuscle.recording import QUANTITIES, Recording
 
@@ -33,7 +33,7 @@ def run(rows: int = 50) -> Recording:
 
 def test_a_written_recording_is_read_back_bit_identical(tmp_path: Path):
     written = run()
-    back = read_csv(write_csv(written, tmp_path / "run.csv"))
+    back = read_csv(write(written, tmp_path / "run.csv"))
     assert list(back) == list(written)
     for name in written:
         assert np.array_equal(back[name], written[name]), name
@@ -47,7 +47,7 @@ def test_a_written_recording_is_read_back_bit_identical(tmp_path: Path):
 def test_any_number_is_read_back_bit_identical(tmp_path_factory, force: list[float], rest: float):
     path = tmp_path_factory.getbasetemp() / "any.csv"
     recording = Recording({"force": np.array(force)}, "any", {"resting_length": rest})
-    back = read_csv(write_csv(recording, path))
+    back = read_csv(write(recording, path))
     assert np.array_equal(back["force"], force)
     assert back.constants["resting_length"] == rest
 
@@ -55,14 +55,14 @@ def test_any_number_is_read_back_bit_identical(tmp_path_factory, force: list[flo
 def test_every_quantity_is_written_in_a_unit_that_is_read(tmp_path: Path):
     """But an elongation, which is read as a shortening of the opposite sign."""
     names = [name for name in QUANTITIES if name != "elongation"]
-    back = read_csv(write_csv(Recording({name: np.array([0.25, 0.5]) for name in names}, "all"), tmp_path / "all.csv"))
+    back = read_csv(write(Recording({name: np.array([0.25, 0.5]) for name in names}, "all"), tmp_path / "all.csv"))
     assert all(np.array_equal(back[name], [0.25, 0.5]) for name in names)
     stretched = Recording({"force": np.array([1.0, 2.0]), "elongation": np.array([0.25, 0.5])}, "stretched")
-    assert read_csv(write_csv(stretched, tmp_path / "stretched.csv"))["shortening"].tolist() == [-0.25, -0.5]
+    assert read_csv(write(stretched, tmp_path / "stretched.csv"))["shortening"].tolist() == [-0.25, -0.5]
 
 
 def test_the_file_shows_units_origin_constants_and_notes(tmp_path: Path):
-    lines = write_csv(run(1), tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()
+    lines = write(run(1), tmp_path / "run.csv").read_text(encoding="utf-8").splitlines()
     assert lines[0] == "# a simulation"
     assert "# resting_length [m] = 0.30000000000000004" in lines
     assert "# Note: The second." in lines
@@ -75,7 +75,7 @@ def test_the_file_shows_units_origin_constants_and_notes(tmp_path: Path):
 def test_a_folder_that_cannot_be_written(tmp_path: Path, place: str):
     (tmp_path / "a file").write_text("here")
     with pytest.raises(FileError) as caught:
-        write_csv(run(), tmp_path / place)
+        write(run(), tmp_path / place)
     assert str(tmp_path / place) in str(caught.value)
     assert "cannot be written" in str(caught.value)
     assert "Choose an existing folder" in str(caught.value)
@@ -83,7 +83,7 @@ def test_a_folder_that_cannot_be_written(tmp_path: Path, place: str):
 
 
 def test_a_failed_write_leaves_the_existing_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    path = write_csv(run(3), tmp_path / "run.csv")
+    path = write(run(3), tmp_path / "run.csv")
     before = path.read_bytes()
 
     def full(*_: object) -> None:
@@ -91,7 +91,7 @@ def test_a_failed_write_leaves_the_existing_file(tmp_path: Path, monkeypatch: py
 
     monkeypatch.setattr(Path, "replace", full)
     with pytest.raises(FileError, match="No space left on device"):
-        write_csv(run(30), path)
+        write(run(30), path)
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from airmuscle import cite, fit, load, load_data, read, read_csv, save, write_csv
+from airmuscle import cite, fit, load, load_data, read, read_csv, save, write
 from airmuscle.engine import PWM, Periodic, SampledSignal, Schedule, WithDrivers, advance, simulate, spline_trajectory
 from airmuscle.engine.run import integrators
 from airmuscle.errors import AirmuscleError, ColumnError, FileError, ParameterError, UnknownNameError
@@ -108,7 +108,7 @@ CASES = {
     "fit to a file": (lambda: fit(MUSCLE.contractile, "run.csv"), "fit: run.csv is not a Recording"),
     "fit to nothing": (lambda: fit(MUSCLE.contractile, None), "fit: None is not a Recording. Give one, as returned by read"),
     "save a plant": (lambda: save(PLANT, "muscle.toml"), "save: Plant.* is not a muscle, a characteristic, a fit or an entry of the library.*save_scenario"),
-    "write a plant": (lambda: write_csv(PLANT, "run.csv"), "write_csv: Plant.* is not a Recording"),
+    "write a plant": (lambda: write(PLANT, "run.csv"), "write: Plant.* is not a Recording"),
 }  # fmt: skip
 
 
@@ -125,7 +125,7 @@ def test_a_wrong_type_is_refused_in_words(wrong, message, tmp_path: Path, monkey
     [
         (lambda: read_csv(5), FileError, "read_csv: 5 is not a path"),
         (lambda: read(None), FileError, "read: None is not a path. Pass a file, a folder"),
-        (lambda: write_csv(RUN, None), FileError, "write_csv: None is not a path"),
+        (lambda: write(RUN, None), FileError, "write: None is not a path"),
         (lambda: save(ENTRY, None), FileError, "save: None is not a path"),
         (lambda: load_data(5), UnknownNameError, "no data set '5'; there are"),
         (lambda: RUN[3], ColumnError, "a bench: no column '3'; the columns are time, fill"),

@@ -117,7 +117,6 @@ from .readers import read as read
 from .readers import read_csv as read_csv
 from .readers import to_xarray as to_xarray
 from .readers import write as write
-from .readers import write_csv as write_csv
 from .segment import AT_REST as AT_REST
 from .segment import FREE as FREE
 from .segment import ISOBARIC as ISOBARIC

@@ -14,9 +14,14 @@ PROPOSALS = ("weg", "hub", "stroke", "travel", "extension", "displacement", "ver
 
 ZERO_NOT_STATED = HintedText(
     "A displacement has no stated zero and direction.",
-    Hint("If it is the shortening from the resting length", "columns", {"displacement": "shortening [mm]"}, "read"),
-    Hint("If it is the elongation", "columns", {"displacement": "elongation [mm]"}, "read"),
-    Hint("To state its reading at the resting length", "displacement_zero", "12 mm", "read"),
+    Hint(
+        "If it is the shortening from the resting length",
+        "columns",
+        {"displacement": "shortening [mm]"},
+        "ColumnMapping",
+    ),
+    Hint("If it is the elongation", "columns", {"displacement": "elongation [mm]"}, "ColumnMapping"),
+    Hint("To state its reading at the resting length", "displacement_zero", "12 mm", "ColumnMapping"),
 )
 """Reason and remedies where a contraction is needed and only a displacement was recorded."""
 

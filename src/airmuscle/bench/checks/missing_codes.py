@@ -61,7 +61,7 @@ def check_missing_codes(recordings: Sequence[Recording]) -> Iterator[HintedText]
         yield HintedText(
             f"{file_list([origin for origin, _ in places])}: the {name} is {value:g} in {count}, far from all "
             "other readings: this is a code for a missing value, which is read as a number.",
-            Hint("To leave these rows out", "missing", DropMissing((value,)), "read"),
+            Hint("To leave these rows out", "missing", DropMissing((value,)), "ColumnMapping"),
         )
 
 

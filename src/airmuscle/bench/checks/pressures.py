@@ -30,7 +30,7 @@ MIN_LEVELS, MIN_RANGE = 3, 0.05
 ZERO_FORCE_PRESSURES, SMALL_CONTRACTIONS = (93e3, 130e3), 0.4
 """Range of the pressures of zero force of isobars that are absolute [Pa], at contractions below this fraction of the
 greatest (chosen): from the atmosphere to what the wall adds. Gauge pressures of zero force begin near 0 and rise."""
-_STATE = Hint("To state the unit", "units", {"pressure": ...}, "read")
+_STATE = Hint("To state the unit", "units", {"pressure": ...}, "ColumnMapping")
 
 
 def check_lowest_pressures(recordings: Sequence[Recording]) -> Iterator[HintedText]:

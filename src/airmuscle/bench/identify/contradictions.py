@@ -154,7 +154,12 @@ def _cause(contradicting: Sequence[MatchedRuns], matches: Matches) -> list[str |
     if column is not None:
         return [
             f" Column '{column}' tells the contradicting rows apart: it probably names the specimen.",
-            Hint("To state it as the specimen", "columns", {re.sub(r"\s*[\[(].*", "", column): "specimen"}, "read"),
+            Hint(
+                "To state it as the specimen",
+                "columns",
+                {re.sub(r"\s*[\[(].*", "", column): "specimen"},
+                "ColumnMapping",
+            ),
             " Fit each specimen by itself, or at least three together with --compare.",
         ]
     shifts = np.array([each.pressure_shift for each in contradicting])

@@ -107,7 +107,7 @@ def outlier_notes(recordings: Sequence[Recording]) -> list[str]:
         HintedText(
             f"{len(found)} rows of {files} {'file' if files == 1 else 'files'} are suspected outliers of the force, "
             f"which pull the law: {examples}.",
-            Hint("To leave them out", "drop_outliers", True, "read"),
+            Hint("To leave them out", "drop_outliers", True, "ColumnMapping"),
             Hint("To reduce their weight", "loss", Huber(_rounded(HUBER * sensors["force"].std))),
         )
     ]

@@ -1,8 +1,6 @@
 from .channels import Channel as Channel
 from .channels import merge_channels as merge_channels
 from .clock import seconds_from_clock as seconds_from_clock
-from .csv_reader import read_csv as read_csv
-from .csv_writer import write_csv as write_csv
 from .data_frames import from_pandas as from_pandas
 from .data_frames import to_xarray as to_xarray
 from .downsampling import BlockMeans as BlockMeans
@@ -26,6 +24,7 @@ from .optional_dependency import is_installed as is_installed
 from .raw_mat import read_mat_tables_here as read_mat_tables_here
 from .reader import check_bench as check_bench
 from .reader import read as read
+from .reader import read_csv as read_csv
 from .separate_process import call_in_separate_process as call_in_separate_process
 from .time_base import NoTime as NoTime
 from .time_base import RecordedTime as RecordedTime

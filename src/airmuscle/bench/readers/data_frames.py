@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,17 +12,12 @@ from ...recording.heading import split_unit
 from ...recording.recording import Recording, column_heading
 from .channels import to_cells
 from .interpret import interpret
+from .mapping import ColumnMapping, apply_mapping
 from .table import Cells, RawTable
 
 
-def from_pandas(
-    frame: Any, *, origin: str = "data frame", units: Mapping[str, str] | None = None,
-    constants: Mapping[str, float | str] | None = None,
-) -> Recording:  # fmt: skip
+def from_pandas(frame: Any, mapping: ColumnMapping = ColumnMapping(), *, origin: str = "data frame") -> Recording:
     """A recording of a pandas.DataFrame, by the rules for files: `pressure [bar]` is converted to SI units.
-
-    units      units of columns whose headings state none, {"pressure": "bar"}
-    constants  constants of the run, such as resting_length
 
     An index with a name, or each named level, becomes a column, such as `time [s]`. Dates are counted in seconds from
     the first. Raises ParameterError for another type, ColumnError or UnitError as `read`.
@@ -41,7 +36,7 @@ def from_pandas(
     row = tuple("s" if each else "" for each in dates) if any(dates) else None
     columns = tuple(map(_cells, series))
     table = RawTable(origin, headings, row, columns, np.arange(len(frame)), "row", {}, _notes_on_dates(series))
-    return interpret(table, units=units or {}, constants=constants or {})
+    return interpret(apply_mapping(table, mapping), mapping)
 
 
 def _notes_on_dates(columns: Sequence[Any]) -> tuple[str, ...]:

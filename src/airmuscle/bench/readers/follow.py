@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import csv
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -18,6 +18,7 @@ from ...recording.displacement import displacement_columns
 from ...recording.heading import find_quantity_name
 from .header import is_number
 from .interpret import interpret, resolve_headings, unit_conversion
+from .mapping import ColumnMapping
 from .plausibility import CONTRACTION_RANGE, MAX_MAGNITUDE
 from .table import RawTable
 from .text_format import TextFormat, TextHeader, has_content, is_comment, parse_header, split_cells
@@ -33,25 +34,18 @@ MAX_LINE = 65536
 class RowReader:
     """Reader of one row at a time: the header first, then each row of numbers as quantities in SI units.
 
-    columns    headings by number (from 1) or by the heading in the stream, such as {"1": "pressure [bar]"}
-    units      units by quantity, as in `read_csv`
-    constants  resting_length, ambient, displacement_zero, or quantities that are held, as in `read`
-    skip_rows  number of lines above the headings, or above the first row of numbers without headings
+    mapping  columns, units, constants and `skip_rows` of the stream; nothing else of a mapping applies to one
 
     `skipped` counts rows that could not be read: a damaged or incomplete line of a serial log is left out. `notes` are
     the assumptions on units, as of `read_csv`.
     """
 
-    def __init__(
-        self, origin: str, *, columns: Mapping[str, str] | None = None, units: Mapping[str, str] | None = None,
-        constants: Mapping[str, float | str] | None = None, skip_rows: int = 0,
-    ) -> None:  # fmt: skip
-        for name, given in (("columns", columns), ("units", units), ("constants", constants)):
-            if not (given is None or isinstance(given, Mapping)):
-                raise ParameterError(f"RowReader: {name} must be a mapping or None; it is {abridged(given)}.")
-        self.origin, self.skipped, self.skip_rows = origin, 0, skip_rows
+    def __init__(self, origin: str, mapping: ColumnMapping = ColumnMapping()) -> None:
+        if not isinstance(mapping, ColumnMapping):
+            raise ParameterError(f"RowReader: mapping must be a ColumnMapping; it is {abridged(mapping)}.")
+        self.origin, self.mapping, self.skipped = origin, mapping, 0
         self.notes: tuple[str, ...] = ()
-        self._names, self._units, self._constants = dict(columns or {}), dict(units or {}), dict(constants or {})
+        self._names = {str(key): heading for key, heading in mapping.columns.items()}
         self._head: list[tuple[int, str]] = []
         self._conversions: list[tuple[int, str, UnitConversion]] | None = None
         self._line = self._unreadable = 0
@@ -63,7 +57,7 @@ class RowReader:
         rows in succession.
         """
         self._line += 1
-        if not has_content(line) or self._line <= self.skip_rows:
+        if not has_content(line) or self._line <= (self.mapping.skip_rows or 0):
             return None
         if self._conversions is None:
             return self._read_header(line.rstrip("\r\n"))
@@ -98,15 +92,15 @@ class RowReader:
         cells = tuple(np.array([value]) for value in first)
         rows = np.array([self._line], dtype=np.int64)
         table = RawTable(self.origin, headings, header.units, cells, rows, constants=header.constants)
-        recording = interpret(table, units=self._units, constants=self._constants)
+        recording = interpret(table, self.mapping)
         self._first, self.notes = recording, recording.notes
         self._ambient = ambient = float(recording.constants.get("ambient", AMBIENT_PRESSURE))
-        held = {find_quantity_name(name) for name in self._constants}
+        held = {find_quantity_name(name) for name in self.mapping.constants}
         self._held = {name: float(recording[name][0]) for name in recording if name in held}
         self._width = len(headings)
         self._conversions = [
             (i, heading.name, unit_conversion(table, heading, ambient))
-            for i, heading in enumerate(resolve_headings(table, self._units))
+            for i, heading in enumerate(resolve_headings(table, self.mapping.units))
             if heading.known
         ]
 

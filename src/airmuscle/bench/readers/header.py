@@ -69,7 +69,7 @@ def missing_header_error(location: str) -> ColumnError:
     return ColumnError(
         f"{location}: the heading row is missing. Insert a row above the numbers with name and unit of each column, "
         "such as 'pressure [kPa], contraction [%], force [N]'.",
-        hint=Hint("To map columns by their numbers", "columns", {1: "pressure [kPa]", 2: "force [N]"}, "read"),
+        hint=Hint("To map columns by their numbers", "columns", {1: "pressure [kPa]", 2: "force [N]"}, "ColumnMapping"),
     )
 
 

@@ -20,12 +20,12 @@ from ...recording.heading import UNIT_SPELLINGS, Heading, find_quantity_name, pa
 from ...recording.recording import Recording
 from .clock import seconds_from_clock
 from .constants import check_constants, collect_constants, constant_from_column, parse_constant_name
-from .missing_values import MissingValues, RefuseMissing
+from .mapping import ColumnMapping
 from .plausibility import check_plausible
 from .repeated_columns import check_unique, check_width, without_repeated_columns
 from .specimens import label_texts
 from .table import Cells, RawTable
-from .time_base import RecordedTime, TimeBase
+from .time_base import TimeBase
 
 MAX_LABELS = 8
 """Maximum number of different texts of a column that is kept (chosen), such as the names of specimens."""
@@ -33,21 +33,21 @@ MIN_LABEL_ROWS = 3
 """Minimum number of rows of each of these texts (chosen)."""
 
 
-def interpret(
-    table: RawTable, *, units: Mapping[str, str], constants: Mapping[str, float | str],
-    time_base: TimeBase = RecordedTime(), missing: MissingValues = RefuseMissing(),
-) -> Recording:  # fmt: skip
-    """Convert a table to a Recording; `units` and `constants` given by the user override those of the file.
+def interpret(table: RawTable, mapping: ColumnMapping, constants: Mapping[str, float | str] | None = None) -> Recording:
+    """Convert a table with the headings of a mapping to a Recording; what the mapping states overrides the file.
 
-    A constant that is the name of a quantity, `length`, gives a column with this value in every row.
+    constants  constants of this table, by default those of the mapping; the name of a quantity, `length`, gives a
+               column with this value in every row
+
     Raises ColumnError or UnitError; the message names file, row, value and remedy.
     """
+    constants = mapping.constants_of() if constants is None else constants
     check_width(table)
     table = without_repeated_columns(table)
     held = {name: value for name, value in constants.items() if _is_quantity(name)}
     run_constants = collect_constants(table, {n: value for n, value in constants.items() if n not in held})
-    headings = resolve_headings(table, units)
-    table = missing.treat(table, headings)
+    headings = resolve_headings(table, mapping.units)
+    table = mapping.missing.treat(table, headings)
     for heading, cells in zip(headings, table.columns, strict=True):
         if not heading.known and not isinstance(cells, list):
             constant = constant_from_column(table, heading.text, heading.unit, cells)
@@ -66,8 +66,8 @@ def interpret(
     notes += _add_held(table, columns, held, ambient)
     columns, displaced = displacement_columns(columns, run_constants)
     notes += displaced
-    notes += _apply_time_base(table, columns, time_base)
-    check_plausible(table, columns, run_constants.get("resting_length"), ambient, ordered=time_base.ordered)
+    notes += _apply_time_base(table, columns, mapping.time)
+    check_plausible(table, columns, run_constants.get("resting_length"), ambient, ordered=mapping.time.ordered)
     written = {h.name: h.unit for h in headings if h.known and h.unit and h.name in columns}
     return Recording(columns, table.origin, run_constants, tuple(notes), written)
 
@@ -160,7 +160,7 @@ def _check_unit_row(table: RawTable, heading: Heading, below: str) -> None:
             raise ColumnError(
                 f"{table.origin}: the heading '{heading.text}' states {heading.unit}, but the row of units below it "
                 f"{below}. Correct one of them.",
-                hint=Hint("To state the unit", "units", {heading.name: ...}),
+                hint=Hint("To state the unit", "units", {heading.name: ...}, "ColumnMapping"),
             )
 
 
@@ -182,7 +182,7 @@ def _no_known_column(table: RawTable, headings: list[Heading]) -> ColumnError:
     return ColumnError(
         f"{table.origin}: no column is a known quantity ({', '.join(names)}); known quantities are "
         f"{', '.join(QUANTITIES)}.{hint}",
-        hint=Hint("To state the number of lines above the headings", "skip_rows", 1, "read"),
+        hint=Hint("To state the number of lines above the headings", "skip_rows", 1, "ColumnMapping"),
     )
 
 
@@ -216,7 +216,7 @@ def unit_conversion(table: RawTable, heading: Heading, ambient: float) -> UnitCo
         raise UnitError(
             f"{where}: no unit is stated. State that of the values in the column header, for example "
             f"'{example}'; usual units are {usual}.",
-            hint=Hint("To state the unit", "units", {heading.name: ...}),
+            hint=Hint("To state the unit", "units", {heading.name: ...}, "ColumnMapping"),
         )
     try:
         if target == "N" and _is_mass(heading.unit):

@@ -12,6 +12,9 @@ outliers = "drop"
 file_name = "cut{specimen}_held{length [cm]}cm"
 time = "uniform"
 
+[units]
+pressure = "bara"
+
 [constants]
 temperature = "20 °C"
 
@@ -37,17 +40,23 @@ from .constants import parse_constant_name
 from .file_kind import read_toml
 from .file_name import FileNamePattern
 from .header import bare_heading
-from .missing_values import MISSING_VALUES, MissingValues
+from .missing_values import MISSING_VALUES, MissingValues, RefuseMissing, parse_code
 from .specimens import SPECIMEN
 from .table import RawTable
 from .text_format import TextFormat
-from .time_base import TIME_BASES, TimeBase
+from .time_base import TIME_BASES, RecordedTime, TimeBase
 
-CONSTANT_NAMES = ("resting_length", "ambient", "ambient_temperature", "displacement_zero", "specimen", "run")
-"""Constants of a run that a mapping may state."""
-OUTLIERS = ("keep", "drop")
-"""Treatments of suspected outliers."""
-_TEXTS = ("delimiter", "decimal", "sheet", "group", "file_name", "time", "missing", "outliers")
+STATED = ("resting_length", "ambient", "displacement_zero", "specimen")
+"""Constants of a run that are fields of a mapping."""
+OTHERS = ("ambient_temperature", "run")
+"""Further constants of a run, beside the quantities that were held."""
+CONSTANT_NAMES = (*STATED, *OTHERS)
+OUTLIERS = {"keep": False, "drop": True}
+"""Whether suspected outliers are left out, by the words of mapping files and of the command line."""
+_TEXTS = ("delimiter", "decimal", "sheet", "group", "file_name")
+_WORDS: Mapping[str, Mapping[str, Any]] = {"time": TIME_BASES, "missing": MISSING_VALUES, "outliers": OUTLIERS}
+_TABLES = ("columns", "units", "constants")
+_KEYS = (*_TABLES, *CONSTANT_NAMES, *_TEXTS, *_WORDS, "skip_rows", "missing_codes")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -56,40 +65,52 @@ class ColumnMapping:
 
     columns    by heading, or by number from 1, a heading with quantity and unit, `pressure [bara]`; `specimen` for
                the names of the specimens, each of which is a recording; an empty text excludes the column
-    constants  constants of the run, such as resting_length
+    units      units by quantity or heading: {"pressure": "kPa(a)"}
+    resting_length, ambient, displacement_zero  constants of the runs, lengths [m] and a pressure [Pa], or texts with a
+               unit: the length L0 without pressure and load, which allows conversion between length and contraction;
+               the ambient pressure, which is subtracted from absolute pressures; and the reading of a displacement at
+               the resting length
+    specimen   name of the specimen
+    constants  further constants of the runs; a quantity, {"length": "7.3 cm"}, was held and becomes a column
+    file_name  pattern of values in the names of the files, `held{length [cm]}cm`, as in FileNamePattern
     delimiter, decimal  of text files
+    skip_rows  number of lines above the headings of a text file or worksheet; by default they are detected, or found
+               by the headings that `columns` names
     sheet      worksheet of an Excel file
     group      group of a TDMS or MDF file, struct of a MAT file
-    file_name  pattern of values in the names of the files, `held{length [cm]}cm`, as in FileNamePattern
-    time       time base: recorded, uniform (for rounded stamps), unordered or none
-    skip_rows  number of lines above the headings of a text file or worksheet; by default they are detected
-    missing    missing values: error, drop (leave out the rows) or interpolate (short gaps in time)
-    missing_codes  numbers and texts that stand for missing values, such as -999
-    outliers   suspected outliers: keep or drop (leave out the rows)
+    time       RecordedTime(ordered=True), UniformTime() for stamps that the logger rounded, or NoTime()
+    missing    RefuseMissing(codes), DropMissing(codes) or InterpolateMissing(codes), with the numbers and texts that
+               stand for missing values, such as -999
+    drop_outliers  whether the rows of suspected outliers are left out
     """
 
-    columns: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    columns: Mapping[str | int, str] = dataclasses.field(default_factory=dict)
+    units: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    resting_length: float | str | None = None
+    ambient: float | str | None = None
+    displacement_zero: float | str | None = None
+    specimen: str | None = None
     constants: Mapping[str, float | str] = dataclasses.field(default_factory=dict)
+    file_name: str | None = None
     delimiter: str | None = None
     decimal: str | None = None
+    skip_rows: int | None = None
     sheet: str | None = None
     group: str | None = None
-    file_name: str | None = None
-    time: str | None = None
-    skip_rows: int | None = None
-    missing: str | None = None
-    missing_codes: tuple[float | str, ...] = ()
-    outliers: str | None = None
+    time: TimeBase = RecordedTime()
+    missing: MissingValues = RefuseMissing()
+    drop_outliers: bool = False
 
     def __post_init__(self) -> None:
         check_field_types(self)
-        for key, allowed in (("time", TIME_BASES), ("missing", MISSING_VALUES), ("outliers", OUTLIERS)):
-            value = getattr(self, key)
-            if value is not None and value not in allowed:
-                raise ColumnError(f"mapping: {key} is '{value}'; allowed range: {', '.join(allowed)}.")
+        for name in set(STATED) & set(self.constants):
+            object.__setattr__(self, name, self.constants[name])
+        others = {name: value for name, value in self.constants.items() if name not in STATED}
+        object.__setattr__(self, "constants", others)
+        _ = self.text_format  # checks delimiter and decimal mark
         if self.skip_rows is not None and self.skip_rows < 0:
             raise ColumnError(f"mapping: skip_rows is {self.skip_rows}; it must be 0 or more.")
-        for name in self.constants:
+        for name in others:
             if name not in CONSTANT_NAMES and not (parse_constant_name(name) or parse_heading(name).known):
                 raise ColumnError(
                     f"mapping: '{name}' is no constant of a run; allowed range: {', '.join(CONSTANT_NAMES)}, or a "
@@ -108,75 +129,67 @@ class ColumnMapping:
     @property
     def text_format(self) -> TextFormat:
         """The part of the mapping that applies to text files."""
-        names = tuple(name for name in self.columns if not name.isdecimal())
+        names = tuple(name for name in map(str, self.columns) if not name.isdecimal())
         return TextFormat(self.delimiter, self.decimal, len(names) < len(self.columns), names, self.skip_rows)
 
-    @property
-    def time_base(self) -> TimeBase:
-        """The time base of the files."""
-        return TIME_BASES[self.time or "recorded"]
-
-    @property
-    def missing_values(self) -> MissingValues:
-        """The treatment of missing values."""
-        return MISSING_VALUES[self.missing or "error"](self.missing_codes)
-
-    def constants_of(self, path: Path) -> dict[str, float | str]:
+    def constants_of(self, path: Path | None = None) -> dict[str, float | str]:
         """The constants of one file: those in its name take precedence over those of all files."""
-        values = FileNamePattern(self.file_name).values(path) if self.file_name else {}
-        return {**self.constants, **values}
-
-    def with_overrides(self, **values: Any) -> ColumnMapping:
-        """A copy in which all values other than None replace those of the mapping; columns and constants are merged."""
-        stated = {name: value for name, value in values.items() if value is not None}
-        columns = {**self.columns, **{str(k): v for k, v in stated.pop("columns", {}).items()}}
-        constants = {
-            **self.constants,
-            **stated.pop("constants", {}),
-            **{name: stated.pop(name) for name in CONSTANT_NAMES if name in stated},
-        }
-        return dataclasses.replace(self, columns=columns, constants=constants, **stated)
+        stated = {name: value for name in STATED if (value := getattr(self, name)) is not None}
+        values = FileNamePattern(self.file_name).values(path) if self.file_name and path else {}
+        return {**self.constants, **stated, **values}
 
 
-def read_mapping(path: str | Path) -> ColumnMapping:
-    """Read a mapping from a TOML file. Raises FileError, ParameterError or ColumnError."""
+def read_mapping(path: str | Path, base: ColumnMapping = ColumnMapping()) -> ColumnMapping:
+    """Read a mapping from a TOML file, which completes `base`. Raises FileError, ParameterError or ColumnError."""
     path = Path(path)
-    return mapping_of_tables(read_toml(path), path.name)
+    return mapping_of_tables(read_toml(path), path.name, base)
 
 
-def mapping_of_tables(content: Mapping[str, Any], where: str) -> ColumnMapping:
-    """The mapping that the keys of a TOML table describe; `where` begins the messages. Raises as `read_mapping`."""
-    content = dict(content)
-    known = ("columns", "constants", *CONSTANT_NAMES, *_TEXTS, "skip_rows", "missing_codes")
-    for key, value in content.items():
-        if key not in known:
+def mapping_of_tables(content: Mapping[str, Any], where: str, base: ColumnMapping = ColumnMapping()) -> ColumnMapping:
+    """The mapping `base` with what the keys of a TOML table state; tables are merged, and None states nothing.
+
+    `where` begins the messages. Raises as `read_mapping`.
+    """
+    given = {key: value for key, value in content.items() if value is not None}
+    for key, value in given.items():
+        if key not in _KEYS:
             raise ParameterError(
-                f"{where}: unknown key '{key}'; allowed range: {', '.join(known)}.{suggestion(key, known)}"
+                f"{where}: unknown key '{key}'; allowed range: {', '.join(_KEYS)}.{suggestion(key, _KEYS)}"
             )
-        if key in _TEXTS and not isinstance(value, str):
+        if key in (*_TEXTS, *_WORDS) and not isinstance(value, str):
             raise ParameterError(f"{where}: {key} = {abridged(value)}; it must be a quoted text.")
-    _check_numbers(content, where)
-    columns = content.pop("columns", {})
-    if not isinstance(columns, dict):
-        raise ParameterError(f"{where}: columns must be a table: [columns], followed by one line per column.")
-    if not isinstance(content.get("constants", {}), dict):
-        raise ParameterError(f"{where}: constants must be a table: [constants], followed by one line per constant.")
-    headings = {name: _parse_entry(where, name, value) for name, value in columns.items()}
+        if key in _WORDS and value not in _WORDS[key]:
+            raise ColumnError(f"{where}: {key} is {abridged(value)}; allowed range: {', '.join(_WORDS[key])}.")
+        if key in _TABLES and not isinstance(value, Mapping):
+            raise ParameterError(
+                f"{where}: {key} must be a table: [{key}], followed by one line per {key.removesuffix('s')}."
+            )
+    _check_numbers(given, where)
+    columns = {name: _parse_entry(where, name, value) for name, value in given.pop("columns", {}).items()}
+    codes = tuple(parse_code(each) for each in given.pop("missing_codes", base.missing.codes))
+    treatment = MISSING_VALUES.get(given.pop("missing", ""))
+    values = {
+        "columns": {**{str(key): heading for key, heading in base.columns.items()}, **columns},
+        "units": {**base.units, **given.pop("units", {})},
+        "constants": base.constants | given.pop("constants", {}) | {n: given.pop(n) for n in OTHERS if n in given},
+        "time": TIME_BASES.get(given.pop("time", ""), base.time),
+        "missing": treatment(codes) if treatment else dataclasses.replace(base.missing, codes=codes),
+        "drop_outliers": OUTLIERS.get(given.pop("outliers", ""), base.drop_outliers),
+    }
     try:
-        return ColumnMapping().with_overrides(columns=headings, **content)
+        return dataclasses.replace(base, **values, **given)
     except AirmuscleError as error:
         raise error.located(where) from None
 
 
-def _check_numbers(content: dict[str, Any], where: str) -> None:
-    """Check `skip_rows` and `missing_codes`, which becomes a tuple. Raises ParameterError."""
-    skip, codes = content.get("skip_rows", 0), content.get("missing_codes", [])
+def _check_numbers(content: Mapping[str, Any], where: str) -> None:
+    """Check `skip_rows` and `missing_codes`. Raises ParameterError."""
+    skip, codes = content.get("skip_rows", 0), content.get("missing_codes", ())
     if not isinstance(skip, int) or isinstance(skip, bool):
         raise ParameterError(f"{where}: skip_rows = {abridged(skip)}; it must be a number of lines, such as 7.")
-    if not isinstance(codes, list) or not all(isinstance(c, float | int | str) and c is not True for c in codes):
+    allowed = (float, int, str)
+    if not isinstance(codes, list | tuple) or any(not isinstance(c, allowed) or isinstance(c, bool) for c in codes):
         raise ParameterError(f'{where}: missing_codes = {abridged(codes)}; it must be a list, such as [-999, "OL"].')
-    if codes:
-        content["missing_codes"] = tuple(code if isinstance(code, str) else float(code) for code in codes)
 
 
 def _parse_entry(where: str, column: str, value: Any) -> str:
@@ -196,7 +209,7 @@ def apply_mapping(table: RawTable, mapping: ColumnMapping) -> RawTable:
 
     Raises ColumnError if the mapping names a column that does not exist.
     """
-    mapped = {_column_index(table, column): heading for column, heading in mapping.columns.items()}
+    mapped = {_column_index(table, str(column)): heading for column, heading in mapping.columns.items()}
     headings, units = list(table.headings), list(table.units or ("",) * len(table.headings))
     notes = list(table.notes)
     for index, heading in mapped.items():

@@ -25,6 +25,7 @@ _GROUPED = re.compile(r"[-+]?\d{1,3}(\.\d{3})+,\d*|[-+]?\d{1,3}(,\d{3})+\.\d*")
 _HELD = ("branch", "fill", "discharge", "latched")
 
 
+@dataclasses.dataclass(frozen=True)
 class MissingValues(abc.ABC):
     """Treatment of missing values in the columns of known quantities.
 
@@ -33,6 +34,9 @@ class MissingValues(abc.ABC):
     """
 
     codes: tuple[float | str, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
 
     @abc.abstractmethod
     def treat(self, table: RawTable, headings: Sequence[Heading]) -> RawTable:
@@ -44,11 +48,6 @@ class MissingValues(abc.ABC):
 class RefuseMissing(MissingValues):
     """Missing values are an error, which lists them."""
 
-    codes: tuple[float | str, ...] = ()
-
-    def __post_init__(self) -> None:
-        check_field_types(self)
-
     def treat(self, table: RawTable, headings: Sequence[Heading]) -> RawTable:
         cells = examine(table, headings, self.codes)
         _refuse(table, cells, missing=True)
@@ -58,11 +57,6 @@ class RefuseMissing(MissingValues):
 @dataclasses.dataclass(frozen=True)
 class DropMissing(MissingValues):
     """Rows with a missing value are left out; a note reports them."""
-
-    codes: tuple[float | str, ...] = ()
-
-    def __post_init__(self) -> None:
-        check_field_types(self)
 
     def treat(self, table: RawTable, headings: Sequence[Heading]) -> RawTable:
         cells = examine(table, headings, self.codes)
@@ -78,11 +72,7 @@ class InterpolateMissing(MissingValues):
     commands, branches and latches keep the value before the gap. Requires time.
     """
 
-    codes: tuple[float | str, ...] = ()
     max_gap: float = MAX_GAP
-
-    def __post_init__(self) -> None:
-        check_field_types(self)
 
     def treat(self, table: RawTable, headings: Sequence[Heading]) -> RawTable:
         cells = examine(table, headings, self.codes)
@@ -93,7 +83,7 @@ class InterpolateMissing(MissingValues):
         if timed is None:
             raise ColumnError(
                 f"{table.origin}: missing values are interpolated in time, but there is no time column.",
-                hint=Hint("To leave out the rows", "missing", DropMissing(self.codes), "read"),
+                hint=Hint("To leave out the rows", "missing", DropMissing(self.codes), "ColumnMapping"),
             )
         table, cells, time = _with_time(table, cells, timed)
         columns, filled = list(table.columns), np.zeros(len(time), dtype=bool)
@@ -111,18 +101,18 @@ class InterpolateMissing(MissingValues):
         return _without_rows(table, left)
 
 
-MISSING_VALUES: dict[str, type[RefuseMissing] | type[DropMissing] | type[InterpolateMissing]] = {
+MISSING_VALUES: dict[str, type[MissingValues]] = {
     "error": RefuseMissing, "drop": DropMissing, "interpolate": InterpolateMissing,
 }  # fmt: skip
 """Treatments by their names in mapping files and on the command line."""
 
 
-def parse_code(text: str) -> float | str:
-    """The code of a missing value that a text states: a number, or else the text without outer blanks."""
+def parse_code(code: float | str) -> float | str:
+    """The code of a missing value: the number that a text states, or else the text without outer blanks."""
     try:
-        return float(text)
+        return float(code)
     except ValueError:
-        return text.strip()
+        return str(code).strip()
 
 
 def _refuse(table: RawTable, columns: Sequence[ExaminedColumn], *, missing: bool = False) -> None:
@@ -137,12 +127,12 @@ def _remedies(found: Sequence[tuple[int, ExaminedColumn]]) -> Iterator[Hint]:
     if any(isinstance(text, str) and _GROUPED.fullmatch(text) for text in texts):
         text = next(text for text in texts if isinstance(text, str) and _GROUPED.fullmatch(text))
         sign = "," if text.rfind(",") > text.rfind(".") else "."
-        yield Hint("To specify the decimal sign", "decimal", sign, "read")
+        yield Hint("To specify the decimal sign", "decimal", sign, "ColumnMapping")
     elif not texts:
-        yield Hint("To leave out the rows with missing values", "missing", DropMissing(), "read")
-        yield Hint("To interpolate short gaps", "missing", InterpolateMissing(), "read")
+        yield Hint("To leave out the rows with missing values", "missing", DropMissing(), "ColumnMapping")
+        yield Hint("To interpolate short gaps", "missing", InterpolateMissing(), "ColumnMapping")
     elif len(set(texts)) == 1 and isinstance(texts[0], str) and not any(map(str.isdigit, texts[0])):
-        yield Hint("If it stands for a missing value", "missing", DropMissing((texts[0],)), "read")
+        yield Hint("If it stands for a missing value", "missing", DropMissing((texts[0],)), "ColumnMapping")
 
 
 def _without_rows(table: RawTable, left_out: Mask) -> RawTable:

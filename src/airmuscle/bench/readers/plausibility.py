@@ -83,7 +83,7 @@ def _check_above_vacuum(table: RawTable, pressure: Array, ambient: float) -> Non
 def _code_hint(value: float) -> Hint | None:
     """The remedy where an impossible value is a code for a missing value."""
     code = code_of(float(value))
-    return None if code is None else Hint(CODE_PURPOSE.format(code), "missing", DropMissing((code,)), "read")
+    return None if code is None else Hint(CODE_PURPOSE.format(code), "missing", DropMissing((code,)), "ColumnMapping")
 
 
 def _check_contraction(table: RawTable, contraction: Array, label: str, remedy: str) -> None:

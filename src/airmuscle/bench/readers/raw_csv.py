@@ -124,7 +124,7 @@ def _check_decimal_sign(origin: str, body: NumberedLines, rows: list[list[str]])
             f"{origin}, line {line}: the comma in '{cell}' is ambiguous, because line {other} contains a decimal point "
             f"('{example}'){_further(commas)}. Write all numbers with the same decimal sign and without thousands "
             "separators.",
-            hint=Hint("To specify the decimal sign", "decimal", ",", function="read"),
+            hint=Hint("To specify the decimal sign", "decimal", ",", function="ColumnMapping"),
         )
 
 

@@ -171,7 +171,7 @@ def _of_one_length(
         raise ColumnError(
             f"{origin}: the vectors have different lengths ({sizes}). Name the columns of one length; the others are "
             "then not read.",
-            hint=Hint("To map a column", "columns", {f"{channels[0].name}": "time [s]"}, function="read"),
+            hint=Hint("To map a column", "columns", {f"{channels[0].name}": "time [s]"}, function="ColumnMapping"),
         )
     (length,) = selected
     left_out = [f"{c.name} ({len(c.values)} rows)" for c in channels if len(c.values) != length]

@@ -89,9 +89,9 @@ class NoTime(TimeBase):
         return None, "The time column is not used, as specified by the user."
 
 
-UNIFORM = Hint("For stamps that the logger rounded", "time_base", UniformTime(), function="read")
-AS_RECORDED = Hint("To keep the stamps as they are", "ordered", False, function="read")
-WITHOUT_TIME = Hint("To read without time", "time_base", NoTime(), function="read")
+UNIFORM = Hint("For stamps that the logger rounded", "time", UniformTime(), "ColumnMapping")
+AS_RECORDED = Hint("To keep the stamps as they are", "time", RecordedTime(ordered=False), "ColumnMapping")
+WITHOUT_TIME = Hint("To read without time", "time", NoTime(), "ColumnMapping")
 TIME_BASES: dict[str, TimeBase] = {
     "recorded": RecordedTime(), "uniform": UniformTime(), "unordered": RecordedTime(ordered=False), "none": NoTime(),
 }  # fmt: skip

@@ -63,7 +63,7 @@ def _compare(name: str, first: Recording, second: Recording) -> None:
             f"{first.origin} states the {name} in {unit} and {second.origin} in {other_unit}, but the numbers have the "
             f"same magnitude (up to {written:.4g} and {other_written:.4g}): one of the two units is wrong. Correct it "
             "in the file.",
-            hint=Hint("To state the unit", "units", {name: ...}),
+            hint=Hint("To state the unit", "units", {name: ...}, "ColumnMapping"),
         )
     both = f"{first.origin} (up to {written:.4g} {unit}) and {second.origin} (up to {other_written:.4g} {other_unit})"
     comparable = name.rpartition(".")[2] in ("pressure", "length")

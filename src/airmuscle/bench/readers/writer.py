@@ -1,7 +1,11 @@
-"""Writer of recordings as CSV, Parquet and HDF5; the extension gives the format, and `read` reads them again."""
+"""Writer of recordings as CSV, Parquet and HDF5; the extension gives the format.
+
+Reading a CSV file again returns bit-identical numbers.
+"""
 
 from __future__ import annotations
 
+import csv
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -9,30 +13,39 @@ from typing import Any
 
 import numpy as np
 
+from ...core.annotation import abridged, one_line
 from ...core.atomic_output import atomic_file
-from ...core.errors import AirmuscleError, FileError
+from ...core.errors import AirmuscleError, FileError, ParameterError
 from ...recording.heading import split_unit
 from ...recording.recording import Recording, column_heading
-from .csv_writer import write_csv
+from .constants import CONSTANT_UNITS
 from .header import is_number
 from .optional_dependency import import_lab_package
 
 
-def write(recording: Recording, path: str | Path) -> Path:
+def write(recording: Recording, path: str | Path, *, comments: bool = True) -> Path:
     """Write a recording in SI units as .csv, .parquet, .h5 or .hdf5, and return the path.
 
-    Units are metadata of the columns, constants those of the file; the notes are in CSV only. The file is replaced
-    atomically. Raises FileError for another extension, a missing package, or a file that cannot be written.
+    The headings of a CSV file state the units; comments above them state origin, constants and notes. Without
+    `comments` it has the headings and the rows alone, as other programs expect it (`pandas.read_csv(path)`). In the
+    other formats, units are metadata of the columns, constants those of the file, and the notes are not contained. The
+    file is replaced atomically: an existing file remains unchanged if writing fails.
+
+    Raises ParameterError, or FileError for another extension, a missing package, or a file that cannot be written.
     """
+    if not isinstance(recording, Recording):
+        raise ParameterError(
+            f"write: {one_line(recording)} is not a Recording. Pass the result of simulate, read or read_csv."
+        )
+    if not isinstance(path, str | Path):
+        raise FileError(f"write: {abridged(path)} is not a path. Pass the name of a file.")
     path = Path(path)
-    if path.suffix.lower() == ".csv":
-        return write_csv(recording, path)
     writer = _WRITERS.get(path.suffix.lower())
     if writer is None:
         raise FileError(f"{path}: a recording cannot be written as '{path.suffix}'; allowed: {', '.join(EXTENSIONS)}.")
     try:
         with atomic_file(path) as temporary:
-            writer(recording, temporary, path)
+            writer(recording, temporary, path, comments)
     except AirmuscleError:
         raise
     except Exception as reason:  # each package raises its own exceptions
@@ -41,6 +54,24 @@ def write(recording: Recording, path: str | Path) -> Path:
             f"{path}: cannot be written ({text}). Choose an existing folder with write permission."
         ) from None
     return path
+
+
+def _write_csv(recording: Recording, temporary: Path, path: Path, comments: bool) -> None:
+    with temporary.open("w", encoding="utf-8", newline="") as file:
+        if comments:
+            file.write(f"# {_one_line(recording.origin)}\n")
+            for name, value in recording.constants.items():
+                unit = f" [{CONSTANT_UNITS[name]}]" if name in CONSTANT_UNITS else ""
+                file.write(f"# {name}{unit} = {json.dumps(value, ensure_ascii=False)}\n")
+            for note in recording.notes:
+                file.write(f"# Note: {_one_line(note)}\n")
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow([column_heading(name) for name in recording])
+        table.writerows(zip(*(recording[name].tolist() for name in recording), strict=True))
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
 
 
 def _columns(recording: Recording) -> list[tuple[str, str, Any]]:
@@ -52,7 +83,7 @@ def _columns(recording: Recording) -> list[tuple[str, str, Any]]:
     return columns
 
 
-def _write_parquet(recording: Recording, temporary: Path, path: Path) -> None:
+def _write_parquet(recording: Recording, temporary: Path, path: Path, comments: bool) -> None:
     arrow, parquet = import_lab_package("pyarrow", path), import_lab_package("pyarrow.parquet", path)
     columns = _columns(recording)
     fields = [arrow.field(name, arrow.float64(), metadata={"unit": unit}) for name, unit, _ in columns]
@@ -68,7 +99,7 @@ def _constant_text(value: float | str) -> str:
     return json.dumps(value, ensure_ascii=False) if is_text else str(value)
 
 
-def _write_hdf5(recording: Recording, temporary: Path, path: Path) -> None:
+def _write_hdf5(recording: Recording, temporary: Path, path: Path, comments: bool) -> None:
     h5py = import_lab_package("h5py", path)
     with h5py.File(temporary, "w") as file:
         file.attrs.update(dict(recording.constants))
@@ -76,10 +107,11 @@ def _write_hdf5(recording: Recording, temporary: Path, path: Path) -> None:
             file.create_dataset(name.replace("/", "_"), data=values).attrs["unit"] = unit
 
 
-_WRITERS: Mapping[str, Callable[[Recording, Path, Path], None]] = {
+_WRITERS: Mapping[str, Callable[[Recording, Path, Path, bool], None]] = {
+    ".csv": _write_csv,
     ".parquet": _write_parquet,
     ".h5": _write_hdf5,
     ".hdf5": _write_hdf5,
 }
-EXTENSIONS = (".csv", *_WRITERS)
+EXTENSIONS = tuple(_WRITERS)
 """Extensions of the formats that can be written."""

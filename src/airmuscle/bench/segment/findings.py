@@ -127,8 +127,10 @@ def _motion_findings(recording: Recording) -> Iterator[Finding]:
             HintedText(
                 "no length or contraction was recorded, so the kind of the run is open and no characteristic can be "
                 "identified.",
-                Hint("To state the held length of an isometric run", "constants", {"length": "73.2 mm"}, "read"),
-                Hint("To state its place in the names of the files", "file_name", "held{length [mm]}", "read"),
+                Hint(
+                    "To state the held length of an isometric run", "constants", {"length": "73.2 mm"}, "ColumnMapping"
+                ),
+                Hint("To state its place in the names of the files", "file_name", "held{length [mm]}", "ColumnMapping"),
             )
         )
     elif "pressure" in recording and "force" in recording and "contraction" not in recording:
@@ -140,7 +142,7 @@ def _contraction_missing(moved: str) -> HintedText:
     refused = "a static fit needs the contraction and will refuse this recording."
     if moved == "position":
         return HintedText(f"{refused} ", ZERO_NOT_STATED)
-    return HintedText(f"{refused}", Hint(f"To convert the {moved}", "resting_length", "300 mm", "read"))
+    return HintedText(f"{refused}", Hint(f"To convert the {moved}", "resting_length", "300 mm", "ColumnMapping"))
 
 
 def _pressure_range(recording: Recording) -> str:

@@ -98,9 +98,10 @@ class Record:
         """The recording of the file, with the observed columns under the names of the outputs."""
         if not row.file.strip():
             raise ParameterError(f"{self.location}: 'file' is missing; it must be a text in quotes.")
-        mapping = row.mapping.with_overrides(resting_length=row.resting_length, ambient=row.ambient)
+        stated = {"resting_length": row.resting_length, "ambient": row.ambient}
+        mapping = mapping_of_tables(stated, f"{self.location}", row.mapping)
         with located_errors(self.location):
-            runs = read(self.location.folder / row.file, mapping=mapping)
+            runs = read(self.location.folder / row.file, mapping)
             if len(runs) != 1:
                 raise ParameterError(f"{row.file} contains {len(runs)} runs; give one file for each record.")
             return with_observed(runs[0], observed, self.shared)

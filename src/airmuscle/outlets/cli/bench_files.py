@@ -28,8 +28,8 @@ Files = Annotated[
         autocompletion=complete_data,
     ),
 ]
-_SINGULAR = {"units": "unit", "columns": "column", "constants": "constant", "missing_codes": "missing-code"}
-"""Options that may be repeated, by the names of their fields."""
+_OPTIONS = {"units": "unit", "columns": "column", "constants": "constant", "drop_outliers": "outliers"}
+"""Options by the names of their fields, where these differ."""
 
 
 def print_row_notes(recordings: Iterable[Recording]) -> None:
@@ -44,20 +44,20 @@ def read_recordings(files: list[Path], reading: ReadingOptions) -> list[Recordin
     A name without suffix and folder that is not in the working directory is a data set of the library. Raises
     ParameterError for options that a data set does not take.
     """
-    units, mapping = reading.units, reading.column_mapping()
+    mapping = reading.column_mapping()
     local = {entry.name for entry in Path().iterdir()}
     names = [f for f in files if not f.suffix and len(f.parts) == 1 and f.name not in local]
     paths = [f for f in files if f not in names]
     default = ColumnMapping()
     fields = [f.name for f in dataclasses.fields(mapping) if getattr(mapping, f.name) != getattr(default, f.name)]
-    named = dict.fromkeys([*(["unit"] if units else []), *fields, *mapping.constants])
-    set_options = [f"--{_SINGULAR.get(name, name).replace('_', '-')}" for name in named]
+    named = dict.fromkeys([*fields, *mapping.constants])
+    set_options = [f"--{_OPTIONS.get(name, name).replace('_', '-')}" for name in named]
     if names and set_options:
         raise ParameterError(
             f"{names[0]}: a data set of the library contains its units and constants; omit {', '.join(set_options)}."
         )
     with reading_progress() as progress:
-        recordings = read(paths, mapping=mapping, units=units, progress=progress) if paths else ()
+        recordings = read(paths, mapping, progress=progress) if paths else ()
     check_contents(recordings)
     print_row_notes(recordings)
     return [*recordings, *(load_data(str(name)) for name in names)]

@@ -86,11 +86,11 @@ def campaign(
       airmuscle simulate campaign/scenarios/fill_1.toml
     """
     size = parse_braid(braid)
-    columns, units = reading.column_mapping(), reading.units
+    columns = reading.column_mapping()
     kept_aside = {path.resolve() for path in validate or ()}
     files = [path for path in find_files(folder) if path.resolve() not in kept_aside]
-    recordings, unread = _read_each(files, columns, units)
-    aside = [recording for path in find_files(validate or ()) for recording in read_file(path, columns, units)]
+    recordings, unread = _read_each(files, columns)
+    aside = [recording for path in find_files(validate or ()) for recording in read_file(path, columns)]
     complete = complete_bench([*recordings, *aside], columns)
     print_row_notes(complete)
     recordings, aside = complete[: len(recordings)], complete[len(recordings) :]
@@ -106,16 +106,14 @@ def campaign(
     print_campaign(result, unread, scenarios, validation, out)
 
 
-def _read_each(
-    files: Sequence[Path], mapping: ColumnMapping, units: dict[str, str]
-) -> tuple[list[Recording], list[UnreadFile]]:
+def _read_each(files: Sequence[Path], mapping: ColumnMapping) -> tuple[list[Recording], list[UnreadFile]]:
     """The recordings of the files, and the files that cannot be read. Raises FileError if none can be read."""
     recordings, unread = list[Recording](), list[UnreadFile]()
     with reading_progress("reading") as show:
         for i, path in enumerate(files):
             show("files", i / len(files))
             try:
-                recordings += read_file(path, mapping, units)
+                recordings += read_file(path, mapping)
             except AirmuscleError as error:
                 unread.append(UnreadFile(path.name, in_options(error.message, "campaign")))
     if not recordings:

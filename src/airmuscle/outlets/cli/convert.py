@@ -8,11 +8,9 @@ from typing import Annotated
 import typer
 
 from ...bench.readers import Decimation, read, write
-from ...bench.readers.csv_writer import write_csv
 from ...bench.readers.reader import find_files
 from ...bench.readers.writer import EXTENSIONS
 from ...core.errors import FileError
-from ...recording import Recording
 from .bench_files import print_row_notes
 from .options import Json
 from .reading_options import NO_OPTIONS, ReadingOptions, with_reading_options
@@ -53,12 +51,12 @@ def convert(
     if target.suffix.lower() not in EXTENSIONS:
         raise FileError(f"{target}: the extension must be one of {', '.join(EXTENSIONS)}.")
     rows = Decimation(max_rows or EVERY_ROW)
-    recordings = read(source, mapping=reading.column_mapping(), units=reading.units, downsampling=rows)
+    recordings = read(source, reading.column_mapping(), downsampling=rows)
     print_row_notes(recordings)
     paths = [_path(target, i, len(recordings)) for i in range(len(recordings))]
     _check_no_source(paths, source)
     for recording, path in zip(recordings, paths, strict=True):
-        _write(recording, path, plain)
+        write(recording, path, comments=not plain)
     if json:
         print_json({"files": [{"file": str(p), "rows": len(r)} for r, p in zip(recordings, paths, strict=True)]})
         return
@@ -76,10 +74,3 @@ def _check_no_source(targets: list[Path], source: str) -> None:
 
 def _path(target: Path, number: int, count: int) -> Path:
     return target if count == 1 else target.with_name(f"{target.stem}_{number + 1:03d}{target.suffix}")
-
-
-def _write(recording: Recording, path: Path, plain: bool) -> None:
-    if plain:
-        write_csv(recording, path, comments=False)
-    else:
-        write(recording, path)

@@ -20,7 +20,7 @@ from ...files.library.entry import Entry
 from ...files.library.write import save
 from ...physics.muscle.characteristic import ValidityRange
 from .options import Json, OptionalFolder
-from .reading_options import Columns, Constants, DisplacementZero, Length, SkipRows, Units, parse_pairs
+from .reading_options import Columns, Constants, DisplacementZero, Length, ReadingOptions, SkipRows, Units
 from .terminal import echo, percent
 
 QUANTITIES = ("pressure", "contraction", "force")
@@ -70,12 +70,11 @@ def fit_live(
     limits = BenchLimits(ValidityRange(*pressures, *contractions), quantity(max_force, "N", where="--max-force"))
     if out is not None:
         check_writable(out)
-    constants: dict[str, float | str] = dict(parse_pairs("--constant", constant))
-    stated = {"resting_length": resting_length, "displacement_zero": displacement_zero}
-    constants |= {name: text for name, text in stated.items() if text is not None}
-    reader = RowReader("standard input" if follow == "-" else Path(follow).name,
-                       columns=parse_pairs("--column", column), units=parse_pairs("--unit", unit),
-                       constants=constants, skip_rows=skip_rows or 0)  # fmt: skip
+    options = ReadingOptions(
+        column=column, unit=unit, constant=constant, resting_length=resting_length, skip_rows=skip_rows,
+        displacement_zero=displacement_zero,
+    )  # fmt: skip
+    reader = RowReader("standard input" if follow == "-" else Path(follow).name, options.column_mapping())
     fit = _follow(RecursiveFit(limits, degree, forgetting=forgetting), reader, follow, idle, every, json)
     _finish(fit, reader, out, json)
 

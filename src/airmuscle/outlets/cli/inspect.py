@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ...bench.readers import ColumnMapping, read
+from ...bench.readers import ColumnMapping, RecordedTime, read
 from ...bench.segment import Inspection, Sampling, inspect_all
 from ...core.atomic_output import atomic_folder
 from ...core.plotting import save
@@ -22,6 +22,8 @@ from .progress import reading_progress
 from .reading_options import NO_OPTIONS, ReadingOptions, with_reading_options
 from .terminal import echo, print_json, print_table
 
+UNORDERED = ColumnMapping(time=RecordedTime(ordered=False))
+"""Stamps that repeat or decrease are shown, not refused."""
 Files = Annotated[
     list[str],
     typer.Argument(metavar="FILES", help="Files, folders or glob patterns: CSV, Excel, MAT, TDMS, MDF."),
@@ -49,7 +51,7 @@ def inspect(
       airmuscle inspect log.mat --column "data(:,1)=time [s]" --column "data(:,2)=pressure [bara]"
       airmuscle inspect runs/*.tdms --mapping rig.toml --json
     """
-    inspections = inspect_all(_read(files, reading.column_mapping(), reading.units))
+    inspections = inspect_all(_read(files, reading.column_mapping(UNORDERED)))
     if out:
         _save_figures(inspections, out)
     if json:
@@ -64,9 +66,9 @@ def inspect(
         echo(f"figures: {out}")
 
 
-def _read(files: list[str], mapping: ColumnMapping, units: dict[str, str]) -> tuple[Recording, ...]:
+def _read(files: list[str], mapping: ColumnMapping) -> tuple[Recording, ...]:
     with reading_progress() as progress:
-        return read(files, mapping=mapping, units=units, ordered=False, progress=progress)
+        return read(files, mapping, progress=progress)
 
 
 def _save_figures(inspections: tuple[Inspection, ...], out: Path) -> None:

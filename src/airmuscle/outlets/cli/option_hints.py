@@ -48,9 +48,7 @@ def _constant(hint: Hint) -> str:
 
 
 def _time(hint: Hint) -> str:
-    """The name of a time base; the argument `ordered` stands for the stamps as they are."""
-    name = "unordered" if hint.argument == "ordered" else TIME_BASE_NAMES[hint.value]
-    return f"use --time {name}"
+    return f"use --time {TIME_BASE_NAMES[hint.value]}"
 
 
 def _missing(hint: Hint) -> str:
@@ -64,8 +62,7 @@ _FILES: Mapping[str, Instruction] = {
     "columns": _column,
     "constants": _constant,
     "file_name": lambda hint: f"use --file-name '{hint.value}'",
-    "time_base": _time,
-    "ordered": _time,
+    "time": _time,
     "decimal": lambda hint: f"use --decimal '{hint.value}'",
     "resting_length": lambda hint: 'use --resting-length "..."',
     "displacement_zero": lambda hint: f'use --displacement-zero "{hint.value}"',

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from ...bench.identify.experiment_design import BenchLimits, ExperimentPlan, PlannedRun, optimal_design
-from ...bench.readers import write_csv
+from ...bench.readers import write
 from ...core.atomic_output import atomic_folder, check_writable
 from ...core.display import quantity_text
 from ...core.units import quantity
@@ -114,7 +114,7 @@ def _bench_limits(pressures: tuple[str, str], contractions: tuple[str, str], for
 def _write(design: ExperimentPlan, out: Path) -> None:
     check_writable(out)
     with atomic_folder(out) as folder:
-        write_csv(design.recording(), folder / "plan.csv")
+        write(design.recording(), folder / "plan.csv")
 
 
 def _format(name: str, value: float) -> str:

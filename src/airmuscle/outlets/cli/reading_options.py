@@ -12,8 +12,7 @@ from typing import Annotated, Any, TypeVar, get_type_hints
 import typer
 
 from ...bench.readers import ColumnMapping
-from ...bench.readers.mapping import read_mapping
-from ...bench.readers.missing_values import parse_code
+from ...bench.readers.mapping import mapping_of_tables, read_mapping
 
 Command = TypeVar("Command", bound=Callable[..., None])
 MappingFile = Annotated[
@@ -132,24 +131,20 @@ class ReadingOptions:
     sheet: Sheet = None
     group: Group = None
 
-    @property
-    def units(self) -> dict[str, str]:
-        """The unit of each column that `--unit` names. Raises BadParameter."""
-        return parse_pairs("--unit", self.unit)
-
-    def column_mapping(self) -> ColumnMapping:
-        """The mapping of the file, if any; the options take precedence.
+    def column_mapping(self, default: ColumnMapping = ColumnMapping()) -> ColumnMapping:
+        """The mapping of the file, or else `default`; the options take precedence.
 
         Raises BadParameter for an option that is not NAME=TEXT, FileError and ParameterError for a mapping file that is
         invalid, and ColumnError for contradictory columns.
         """
-        base = read_mapping(self.mapping) if self.mapping else ColumnMapping()
-        return base.with_overrides(
-            columns=parse_pairs("--column", self.column),
-            constants=parse_pairs("--constant", self.constant),
-            missing_codes=tuple(map(parse_code, self.missing_code)) if self.missing_code else None,
+        stated = {
+            "columns": parse_pairs("--column", self.column),
+            "units": parse_pairs("--unit", self.unit),
+            "constants": parse_pairs("--constant", self.constant),
+            "missing_codes": self.missing_code or None,
             **{name: getattr(self, name) for name in _SAME_IN_MAPPING},
-        )
+        }
+        return mapping_of_tables(stated, "mapping", read_mapping(self.mapping, default) if self.mapping else default)
 
 
 NO_OPTIONS = ReadingOptions()

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ...bench.readers import write_csv
+from ...bench.readers import write
 from ...core.atomic_output import atomic_folder, check_writable
 from ...core.errors import SimulationError
 from ...files.scenario.scenario import Scenario, load_scenario
@@ -90,5 +90,5 @@ def _print(scenario: Scenario, recording: Recording) -> None:
 
 def _write(scenario: Scenario, recording: Recording, out: Path) -> None:
     with atomic_folder(out) as folder:
-        write_csv(scenario.select_columns(recording), folder / "recording.csv")
+        write(scenario.select_columns(recording), folder / "recording.csv")
         write_into(folder, [run_chapter(scenario, recording)], title="Simulation")

@@ -121,12 +121,8 @@ def _read_file(path: Path, settings: FitSettings, read: ReadSet) -> None:
             read.complain(problem)
         if problems:
             continue
-        missing = settings.mapping({}).missing_values
         try:
-            parts = [
-                interpret(part, units={}, constants=constants, time_base=_time_base(settings), missing=missing)
-                for part in split_specimens(mapped)
-            ]
+            parts = [interpret(part, settings.mapping({}), constants) for part in split_specimens(mapped)]
         except AirmuscleError as error:
             read.complain(error, field)
             continue
@@ -142,11 +138,6 @@ def without_folder(text: str, folder: Path) -> str:
     for length in range(len(path), len(f"{first_directory}{os.sep}"), -1):
         text = text.replace(path[:length], "…")
     return text
-
-
-def _time_base(settings: FitSettings) -> am.bench.TimeBase:
-    mapping = settings.mapping({})
-    return mapping.time_base if mapping.time else am.bench.RecordedTime(True)
 
 
 def _tables(path: Path, settings: FitSettings) -> tuple[RawTable, ...]:

@@ -12,7 +12,7 @@ from typing import Any
 
 import airmuscle as am
 
-from ...bench.readers.missing_values import parse_code
+from ...bench.readers import mapping_of_tables
 from ...core.errors import AirmuscleError, InputError
 from ...core.units import quantity
 from ...files.library.files import list_laws
@@ -102,12 +102,13 @@ class FitSettings:
             texts["skip_rows"] = _line_count(texts["skip_rows"])
         try:
             chosen = self.columns if columns is None else columns
-            mapping = am.bench.ColumnMapping().with_overrides(
-                columns=chosen, constants=constants,
-                missing_codes=tuple(parse_code(each) for each in codes if each.strip()), **texts,
-            )  # fmt: skip
-            _ = mapping.text_format  # checks delimiter and decimal mark
-            return mapping
+            stated = {
+                "columns": chosen,
+                "missing_codes": [each for each in codes if each.strip()],
+                **constants,
+                **texts,
+            }
+            return mapping_of_tables(stated, "mapping")
         except AirmuscleError as error:
             field = next((name for name in TEXTS if name.split("_")[0] in error.message[:40]), "columns")
             raise FieldError(error.message, field) from None

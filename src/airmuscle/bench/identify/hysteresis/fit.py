@@ -184,6 +184,6 @@ def _resting_length(recording: Recording) -> float:
     if not isinstance(length, float | int):
         raise IdentificationError(
             f"{recording.origin}: friction against shortening needs the resting length.",
-            hint=Hint("To state it", "resting_length", function="read"),
+            hint=Hint("To state it", "resting_length", function="ColumnMapping"),
         )
     return float(length)
