@@ -14,11 +14,14 @@ WORDS = Path(__file__).with_name("words.toml")
 """Main nouns and verbs of the program."""
 
 ARGUMENTS = {
+    "accelerations": "acceleration of each coordinate by its name [rad/s^2]",
+    "axis": "axis of a joint in its frame",
     "column": "name of a column of a recording or of a plant",
     "controlled": "columns that a controller leads to their set points",
     "declared": "declaration of a parameter",
     "delay": "delay of a sensor [samples]",
     "deviate": "normal deviate",
+    "elements": "friction of each joint",
     "first": "gauge pressure of the first of two muscles [Pa]",
     "second": "gauge pressure of the second of two muscles [Pa]",
     "index": "number of an item, from 0",

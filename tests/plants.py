@@ -37,6 +37,7 @@ from airmuscle.physics import (
     JointWithFriction,
     Lever,
     LinearDamper,
+    LinearInPressure,
     LinearSpring,
     LogarithmicLength,
     Muscle,
@@ -54,10 +55,13 @@ from airmuscle.physics import (
     Reynolds2003Damper,
     Reynolds2003Spring,
     RubberLine,
+    SerialArm,
     SeriesSpring,
     Serres2009Damper,
     Serres2009Spring,
+    SpatialLink,
     SpringLoad,
+    StickSlip,
     Supply,
     SwellingWall,
     TrueArcParabola,
@@ -69,6 +73,7 @@ from airmuscle.physics import (
     WithEndStops,
     WithLatch,
     WithOffsets,
+    WithStickSlip,
     as_force_law,
 )
 from airmuscle.physics.muscle.geometry import as_polynomial
@@ -115,6 +120,7 @@ EXAMPLES = {
     "dead length": of(EffectiveLength(SURFACE, 0.2, 0.02, 0.001)),
     "inverse length": of(InverseLength(SURFACE, SURFACE, 0.2, 0.3)),
     "logarithmic length": of(LogarithmicLength(SURFACE, SURFACE, 0.2, 0.3)),
+    "reduced": of(LinearInPressure((6e-4, -2e-3), (-10.0,), 5.0)),
     "pooled": of(PooledLengthLaw(SURFACE, (SURFACE,), ("a",), (0.2,), "a")),
     "circle": of(CircleVirtualWork(FIBRES, RubberLine(3e5, 1e5), 2e-3), FIBRES),
     # geometries
@@ -207,6 +213,16 @@ EXAMPLES = {
              MuscleRoute((2,), (-0.02,), 0.1, (CrankProfile(-0.2),))),
             0.5,
         ), 4
+    ),
+    "arm in space with stick-slip": pulled(
+        WithStickSlip(
+            SerialArm(
+                (SpatialLink((0, 0, 1), rotor_inertia=0.02, damping=0.1),
+                 SpatialLink((0, 1, 0), (0.0, 0.0, 0.1), 1.0, (0.1, 0.0, 0.02), 0.01)),
+                (MuscleRoute((1,), (0.03,), 0.1), MuscleRoute((2,), (-0.03,), 0.1)),
+            ),
+            (StickSlip(0.5, (1e-3, 0.0)), StickSlip(0.3, (), 0.5)),
+        ), 2
     ),
     "muscles in series": pulled(MusclesInSeries(HangingMass(5.0), (0.5,), 1.0), 2),
 }  # fmt: skip

@@ -128,6 +128,9 @@ RESULTS: dict[str, Callable[[], Any]] = {
     "a learning law": lambda: control.IterativeLearning(0.01, (1.0, 0.5)),
     "a predictive law": predictive,
     "tasks of an arm and of a lift": lambda: (*arm_task(), *lift_task()),
+    "a plant along measured pressures": lambda: physics.PressureDriven(
+        control_plants.JOINT.muscles, control_plants.JOINT.mechanism, (0.02, 0.02)
+    ),
     "a reader of rows": lambda: bench.RowReader("log"),
 }
 

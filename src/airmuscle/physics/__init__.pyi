@@ -36,10 +36,14 @@ from .mechanism import PolynomialProfile as PolynomialProfile
 from .mechanism import PrescribedMotion as PrescribedMotion
 from .mechanism import Pulley as Pulley
 from .mechanism import PulleyProfile as PulleyProfile
+from .mechanism import SerialArm as SerialArm
+from .mechanism import SpatialLink as SpatialLink
 from .mechanism import SpringLoad as SpringLoad
+from .mechanism import StickSlip as StickSlip
 from .mechanism import WithEndStops as WithEndStops
 from .mechanism import WithLatch as WithLatch
 from .mechanism import WithOffsets as WithOffsets
+from .mechanism import WithStickSlip as WithStickSlip
 from .muscle import INNER_CONTRACTION as INNER_CONTRACTION
 from .muscle import CreepElements as CreepElements
 from .muscle import CubicSeriesSpring as CubicSeriesSpring
@@ -84,6 +88,7 @@ from .muscle.characteristic import ExactMeridian as ExactMeridian
 from .muscle.characteristic import ForceLaw as ForceLaw
 from .muscle.characteristic import Hunt2017 as Hunt2017
 from .muscle.characteristic import InverseLength as InverseLength
+from .muscle.characteristic import LinearInPressure as LinearInPressure
 from .muscle.characteristic import LogarithmicLength as LogarithmicLength
 from .muscle.characteristic import MartensBoblan2017 as MartensBoblan2017
 from .muscle.characteristic import PolynomialSurrogate as PolynomialSurrogate
@@ -127,6 +132,7 @@ from .muscle.geometry import Vessel as Vessel
 from .muscle.geometry import as_polynomial as as_polynomial
 from .plant import MuscleState as MuscleState
 from .plant import Plant as Plant
+from .plant import PressureDriven as PressureDriven
 from .plant import WithEnergyMeters as WithEnergyMeters
 from .plant import open_plant as open_plant
 from .plant import total_air as total_air

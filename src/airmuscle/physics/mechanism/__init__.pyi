@@ -1,4 +1,5 @@
 from .antagonistic_joint import AntagonisticJoint as AntagonisticJoint
+from .arm import MuscleRoute as MuscleRoute
 from .base import Coordinate as Coordinate
 from .base import Mechanism as Mechanism
 from .end_stops import HuntCrossley as HuntCrossley
@@ -16,12 +17,15 @@ from .loads import Pulley as Pulley
 from .loads import SpringLoad as SpringLoad
 from .muscles_in_series import MusclesInSeries as MusclesInSeries
 from .planar_arm import ArmLink as ArmLink
-from .planar_arm import MuscleRoute as MuscleRoute
 from .planar_arm import PlanarArm as PlanarArm
 from .pulley_profile import ConstantRadius as ConstantRadius
 from .pulley_profile import CrankProfile as CrankProfile
 from .pulley_profile import PolynomialProfile as PolynomialProfile
 from .pulley_profile import PulleyProfile as PulleyProfile
+from .serial_arm import SerialArm as SerialArm
+from .serial_arm import SpatialLink as SpatialLink
+from .stick_slip import StickSlip as StickSlip
+from .stick_slip import WithStickSlip as WithStickSlip
 from .wrapper import JointWithExternalTorque as JointWithExternalTorque
 from .wrapper import JointWithFriction as JointWithFriction
 from .wrapper import MechanismWrapper as MechanismWrapper

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from ...core import autodiff
 from ...core.ops import Value, Values
@@ -64,6 +64,15 @@ class Mechanism(abc.ABC):
     def muscle_count(self) -> int | None:
         """Number of muscles that act on the mechanism; None for any number."""
         return None
+
+    @property
+    def inner_states(self) -> tuple[StateVariable, ...]:
+        """States besides coordinates and speeds, 0 when relaxed, such as the bristles of a friction."""
+        return ()
+
+    def inner_rates(self, q: Values, v: Values, forces: Values) -> Mapping[str, Value]:
+        """Time derivatives of `inner_states`, which are found in q by their names."""
+        return {}
 
     @abc.abstractmethod
     def contractions(self, q: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:

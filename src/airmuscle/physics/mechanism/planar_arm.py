@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ...core import ops
-from ...core.declaration import check_structure, model, parameter
+from ...core.declaration import model, parameter
 from ...core.errors import ParameterError
 from ...core.ops import Value, Values
 from ...core.units import STANDARD_GRAVITY
-from .base import Coordinate, Mechanism
-from .pulley_profile import ConstantRadius, PulleyProfile
-
-Matrix = list[list[Value]]
+from .arm import Arm, Matrix, MuscleRoute, solve_positive_definite
 
 
 @model
@@ -43,39 +40,7 @@ class ArmLink:
 
 
 @model
-class MuscleRoute:
-    """Route of a muscle over the joints of an arm: eps = eps_0 + sum_k r_k F_k(theta_k)/L0.
-
-    `joints` are the numbers of the joints that the muscle crosses, from 1; one for a monoarticular, two for a
-    biarticular muscle. r_k moment arm at joint angle 0, positive if the muscle increases the angle; F_k integral of the
-    pulley profile. `profiles` is empty for circular pulleys, otherwise it has one profile for each joint.
-    """
-
-    joints: tuple[int, ...]
-    radii: tuple[float, ...] = parameter("m", "r_k", "moment arm at each joint at angle 0", bounds=(-10.0, 10.0))
-    offset: float = parameter("1", "eps_0", "contraction with all joints at angle 0", bounds=(-0.5, 0.9), default=0.0)
-    profiles: tuple[PulleyProfile, ...] = ()
-
-    def check(self) -> None:
-        if not self.joints or len(set(self.joints)) < len(self.joints) or min(self.joints) < 1:
-            raise ParameterError(
-                f"MuscleRoute: joints is {self.joints}; it must contain different joint numbers, counted from 1."
-            )
-        if len(self.radii) != len(self.joints) or len(self.profiles) not in (0, len(self.joints)):
-            raise ParameterError(
-                f"MuscleRoute: {len(self.joints)} joints, {len(self.radii)} radii and {len(self.profiles)} profiles "
-                "are given; give one radius for each joint, and one profile for each or no profiles."
-            )
-
-    def shortening(self, angles: Sequence[Value]) -> Value:
-        """Shortening [m] of the muscle from all joints at angle 0, at the joint angles [rad] of the arm."""
-        profiles = self.profiles or (ConstantRadius(),) * len(self.joints)
-        parts = zip(self.joints, self.radii, profiles, strict=True)
-        return sum(radius * profile.integral(angles[joint - 1]) for joint, radius, profile in parts)
-
-
-@model
-class PlanarArm(Mechanism):
+class PlanarArm(Arm):
     """Planar arm of n links: M(theta) theta'' + h(theta, theta') = J^T F - b theta', J from the muscle routes.
 
         phi_i = theta_1 + ... + theta_i,   Q_i of the link angles = tau_i - tau_(i+1)
@@ -94,38 +59,6 @@ class PlanarArm(Mechanism):
     gravity: float = parameter(
         "m/s^2", "g", "acceleration of gravity", bounds=(0.0, 20.0), fitted=False, default=STANDARD_GRAVITY
     )
-
-    def check(self) -> None:
-        check_structure(self)
-        if not self.links or not self.routes:
-            raise ParameterError(
-                f"PlanarArm: {len(self.links)} links and {len(self.routes)} routes are given; give one link for each "
-                "joint and one route for each muscle."
-            )
-        for number, route in enumerate(self.routes, start=1):
-            if max(route.joints) > len(self.links):
-                raise ParameterError(
-                    f"PlanarArm: route {number} crosses joint {max(route.joints)}; allowed range: 1 to "
-                    f"{len(self.links)}. Give another link, or another joint number."
-                )
-
-    @property
-    def muscle_count(self) -> int | None:
-        return len(self.routes)
-
-    @property
-    def coordinates(self) -> tuple[Coordinate, ...]:
-        return tuple(
-            Coordinate(f"joint{i}.angle", f"joint{i}.angular_speed", "rad", 0.1, 1.0, link.min_angle, link.max_angle)
-            for i, link in enumerate(self.links, start=1)
-        )
-
-    def contractions(self, q: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
-        angles = self._angles(q)
-        return tuple(
-            route.offset + route.shortening(angles) / length
-            for route, length in zip(self.routes, resting_lengths, strict=True)
-        )
 
     def mass_matrix(self, q: Values) -> Matrix:
         """Mass matrix M [kg m^2] in the joint angles, n rows of n values; symmetric and positive definite."""
@@ -160,9 +93,6 @@ class PlanarArm(Mechanism):
         joints = [links[0], *(links[i] - links[i - 1] for i in range(1, count))]
         return {c.name: value for c, value in zip(self.coordinates, joints, strict=True)}
 
-    def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
-        return sum(link.damping * v[c.speed] ** 2 for c, link in zip(self.coordinates, self.links, strict=True))
-
     def potential_energy(self, q: Values) -> Value:
         pairs = zip(self._mass_moments(), self._link_angles(q), strict=True)
         return sum(self.gravity * moment * (1.0 - ops.cos(angle)) for moment, angle in pairs)
@@ -171,9 +101,6 @@ class PlanarArm(Mechanism):
         matrix, speeds = self._link_matrix(self._link_angles(q)), self._link_speeds(v)
         count = range(len(speeds))
         return 0.5 * sum(matrix[i][j] * speeds[i] * speeds[j] for i in count for j in count)
-
-    def _angles(self, q: Values) -> list[Value]:
-        return [q[c.name] for c in self.coordinates]
 
     def _link_angles(self, q: Values) -> list[Value]:
         return _running_sums(self._angles(q))
@@ -216,25 +143,3 @@ def _running_sums(values: Sequence[Value]) -> list[Value]:
         total = total + value
         sums.append(total)
     return sums
-
-
-def solve_positive_definite(matrix: Sequence[Sequence[Value]], right: Sequence[Value]) -> list[Value]:
-    """Return x of A x = b by the factorisation A = L D L^T without pivoting; A is symmetric and positive definite.
-
-    The values may be numbers, arrays or symbols.
-    """
-    count = len(right)
-    lower: list[list[Value]] = [[0.0] * count for _ in range(count)]
-    diagonal: list[Value] = []
-    for j in range(count):
-        diagonal.append(matrix[j][j] - sum(lower[j][k] ** 2 * diagonal[k] for k in range(j)))
-        for i in range(j + 1, count):
-            known = sum(lower[i][k] * lower[j][k] * diagonal[k] for k in range(j))
-            lower[i][j] = (matrix[i][j] - known) / diagonal[j]
-    y: list[Value] = []
-    for i in range(count):
-        y.append(right[i] - sum(lower[i][k] * y[k] for k in range(i)))
-    x = [value / pivot for value, pivot in zip(y, diagonal, strict=True)]
-    for i in reversed(range(count)):
-        x[i] = x[i] - sum(lower[k][i] * x[k] for k in range(i + 1, count))
-    return x

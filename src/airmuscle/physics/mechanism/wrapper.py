@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from ...core import ops
 from ...core.declaration import check_structure, model, parameter
 from ...core.errors import ParameterError
 from ...core.ops import Value, Values
-from ...core.system import Input
+from ...core.system import Input, StateVariable
 from .base import Coordinate, Mechanism
 
 
@@ -28,6 +28,13 @@ class MechanismWrapper(Mechanism):
     @property
     def muscle_count(self) -> int | None:
         return self.inner.muscle_count
+
+    @property
+    def inner_states(self) -> tuple[StateVariable, ...]:
+        return self.inner.inner_states
+
+    def inner_rates(self, q: Values, v: Values, forces: Values) -> Mapping[str, Value]:
+        return self.inner.inner_rates(q, v, forces)
 
     def contractions(self, q: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         return self.inner.contractions(q, resting_lengths)

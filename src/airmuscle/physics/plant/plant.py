@@ -101,7 +101,7 @@ class Plant(PlantDisplay, StaticPlant):
         moving = [state for coordinate in self.mechanism.coordinates for state in coordinate.states]
         own = [(prefix, s) for prefix, circuit in self._circuits() for s in circuit.states(self.ambient)]
         circuits = [replace(s, name=name) for prefix, s in own for name in self._outside(prefix, {s.name: s})]
-        return (*air, *moving, *inner, *circuits)
+        return (*air, *moving, *self.mechanism.inner_states, *inner, *circuits)
 
     @functools.cached_property
     def input_variables(self) -> tuple[Input, ...]:
@@ -194,6 +194,7 @@ class Plant(PlantDisplay, StaticPlant):
             rates |= with_prefix(prefix, growth) | with_prefix(prefix, muscle.rates)
         for c in self.mechanism.coordinates:
             rates |= {c.name: state[c.speed], c.speed: at.accelerations[c.name]}
+        rates |= self.mechanism.inner_rates(state, state, at.forces)
         for (prefix, _), circuit in zip(self._circuits(), at.circuits, strict=True):
             rates |= self._outside(prefix, circuit.rates)
         return rates
@@ -243,6 +244,7 @@ class Plant(PlantDisplay, StaticPlant):
     def settle_muscles(self, pressures: Sequence[Value], state: Values) -> tuple[dict[str, Value], list[Value]]:
         """As StaticPlant; nothing is checked, and values and parameters may be arrays that broadcast."""
         contractions = self.mechanism.contractions(state, self.resting_lengths)
+        state = {**{s.name: 0.0 for s in self.mechanism.inner_states}, **state}
         return settle_muscles(self.muscles, self.prefixes, contractions, pressures, state)
 
     def fill_muscles(self, pressures: Sequence[Value], volumes: Sequence[Value], state: Values) -> dict[str, Value]:

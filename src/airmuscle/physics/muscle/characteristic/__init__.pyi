@@ -17,6 +17,7 @@ from .exact_meridian import ExactMeridian as ExactMeridian
 from .hunt2017 import Hunt2017 as Hunt2017
 from .length_family import InverseLength as InverseLength
 from .length_family import LogarithmicLength as LogarithmicLength
+from .linear_in_pressure import LinearInPressure as LinearInPressure
 from .martens_boblan2017 import MartensBoblan2017 as MartensBoblan2017
 from .polynomial_surrogate import PolynomialSurrogate as PolynomialSurrogate
 from .polynomial_surrogate import as_force_law as as_force_law

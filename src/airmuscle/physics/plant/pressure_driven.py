@@ -1,0 +1,117 @@
+"""PressureDriven: muscles on a mechanism whose pressures are inputs, such as measured ones; no air and no circuits."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from typing import ClassVar
+
+from ...core.declaration import model, parameter
+from ...core.errors import ParameterError
+from ...core.ops import Value, Values
+from ...core.system import Input, StateVariable, System, select_prefix, with_prefix
+from ..mechanism import Mechanism
+from ..muscle import Muscle
+from .muscle_state import states_of_muscle
+
+
+@model
+class PressureDriven(System):
+    """Muscles and a mechanism at given pressures: p_i' = (p_m,i - p_i)/T_i for each muscle i.
+
+    p_m,i the input `NAME.measured_pressure` (gauge), p_i the pressure that acts, T_i its lag behind the reading: the
+    time of the air in the muscle, less the delay of the sensor. The equations of muscles and mechanism are those of a
+    Plant. It serves where pressures are recorded: identification of a joint, or its simulation along a record.
+    """
+
+    from_file: ClassVar[bool] = False
+
+    muscle: tuple[Muscle, ...]
+    mechanism: Mechanism
+    lags: tuple[float, ...] = parameter("s", "T_i", "lag of each pressure behind its reading", bounds=(1e-3, 10.0))
+
+    def check(self) -> None:
+        count = self.mechanism.muscle_count
+        if len(self.lags) != len(self.muscle) or count not in (None, len(self.muscle)):
+            raise ParameterError(
+                f"PressureDriven: {len(self.muscle)} muscles, {len(self.lags)} lags and a mechanism for "
+                f"{'any number' if count is None else count} of muscles are given; give as many of each."
+            )
+        if len({m.name for m in self.muscle}) < len(self.muscle):
+            raise ParameterError("PressureDriven: two muscles have the same name; give each one of its own.")
+
+    @functools.cached_property
+    def prefixes(self) -> tuple[str, ...]:
+        """Prefixes of the names of each muscle's quantities."""
+        return ("",) if len(self.muscle) == 1 else tuple(f"{m.name}." for m in self.muscle)
+
+    @property
+    def resting_lengths(self) -> list[Value]:
+        """Resting lengths of the muscles [m]."""
+        return [m.geometry.resting_length for m in self.muscle]
+
+    @functools.cached_property
+    def states(self) -> tuple[StateVariable, ...]:
+        """Coordinates and speeds, states of the mechanism, pressures, states of the muscles."""
+        moving = [state for coordinate in self.mechanism.coordinates for state in coordinate.states]
+        pressures = [StateVariable(f"{p}pressure", "Pa", 1e5, "gauge pressure that acts") for p in self.prefixes]
+        inner = [s for p, m in zip(self.prefixes, self.muscle, strict=True) for s in states_of_muscle(p, m, m.states)]
+        return (*moving, *self.mechanism.inner_states, *pressures, *inner)
+
+    @functools.cached_property
+    def input_variables(self) -> tuple[Input, ...]:
+        """The measured pressures, then the inputs of the mechanism."""
+        infinity = float("inf")
+        measured = (Input(f"{p}measured_pressure", "Pa", -infinity, infinity, "gauge pressure") for p in self.prefixes)
+        return (*measured, *self.mechanism.inputs)
+
+    @functools.cached_property
+    def inputs(self) -> tuple[str, ...]:
+        return tuple(i.name for i in self.input_variables)
+
+    def rates(self, state: Values, inputs: Values) -> dict[str, Value]:
+        contractions = self.mechanism.contractions(state, self.resting_lengths)
+        speeds = self.mechanism.contraction_speeds(state, state, self.resting_lengths)
+        rates: dict[str, Value] = {}
+        tensions: list[Value] = []
+        for prefix, muscle, lag, eps, v in zip(
+            self.prefixes, self.muscle, self.lags, contractions, speeds, strict=True
+        ):
+            own, pressure = select_prefix(prefix, state), state[f"{prefix}pressure"]
+            pull = muscle.compute_force(pressure, muscle.inner_contraction(eps, own), eps, v, own)
+            tensions.append(pull.tension)
+            rates |= with_prefix(prefix, muscle.rates(own, pressure, pull.inner_speed))
+            rates[f"{prefix}pressure"] = (inputs[f"{prefix}measured_pressure"] - pressure) / lag
+        forces = self.mechanism.generalised_forces(state, tensions, self.resting_lengths)
+        accelerations = self.mechanism.acceleration(state, state, forces, inputs)
+        for c in self.mechanism.coordinates:
+            rates |= {c.name: state[c.speed], c.speed: accelerations[c.name]}
+        return {**rates, **self.mechanism.inner_rates(state, state, forces)}
+
+    def outputs(self, state: Values, inputs: Values) -> dict[str, Value]:
+        """Contraction and tension of every muscle."""
+        contractions = self.mechanism.contractions(state, self.resting_lengths)
+        speeds = self.mechanism.contraction_speeds(state, state, self.resting_lengths)
+        outputs: dict[str, Value] = {}
+        for prefix, muscle, eps, v in zip(self.prefixes, self.muscle, contractions, speeds, strict=True):
+            own, pressure = select_prefix(prefix, state), state[f"{prefix}pressure"]
+            pull = muscle.compute_force(pressure, muscle.inner_contraction(eps, own), eps, v, own)
+            outputs |= with_prefix(prefix, {"contraction": eps, "force": pull.tension})
+        return outputs
+
+    def state_at(self, pressures: Sequence[float], **values: float) -> dict[str, float]:
+        """A state by the gauge pressure [Pa] of each muscle and states by name; the others are 0, muscles settled."""
+        if len(pressures) != len(self.muscle):
+            raise ParameterError(
+                f"PressureDriven: {len(pressures)} pressures are given for {len(self.muscle)} muscles; give one each."
+            )
+        known = [s.name for s in self.states]
+        for name in values:
+            if name not in known:
+                raise ParameterError(f"PressureDriven: no state '{name}'; there are {', '.join(known)}.")
+        state: dict[str, Value] = dict.fromkeys(known, 0.0)
+        contractions = self.mechanism.contractions({**state, **values}, self.resting_lengths)
+        for prefix, muscle, p, eps in zip(self.prefixes, self.muscle, pressures, contractions, strict=True):
+            state |= with_prefix(prefix, muscle.steady_state(p, eps))
+            state[f"{prefix}pressure"] = p
+        return {name: float(value) for name, value in {**state, **values}.items()}
