@@ -1,11 +1,11 @@
 """Control benchmark of the antagonistic joint: all standard controllers on all truths, and the page of their results.
 
-    python benchmarks/control_benchmark.py [--quick] [--processes 2] [--results FOLDER] [--out benchmarks/CONTROL.md]
+    python benchmarks/control_benchmark.py [--quick] [--searches 3] [--processes 2] [--results FOLDER] [--out PAGE]
 
 Each controller is tuned by three searches, commissioned on every truth and judged there; the sealed truth is one of
 them, so that it is run for the page alone. A search with its runs is a file in the folder of the results: an
-interrupted run goes on where it was, as long as the program and the settings are the same. `--quick` is a smaller form
-with one search on two truths of development, for a look at a change.
+interrupted run goes on where it was, and one with more searches adds them, as long as the program and the other
+settings are the same. `--quick` is a smaller form with one search on two truths of development, for a look at a change.
 """
 
 from __future__ import annotations
@@ -92,9 +92,9 @@ def measure(settings: Settings, folder: Path, processes: int) -> list[Part]:
             settings,
             folder / f"{kind.replace('/', '-')}-{names[0].replace(' ', '-')}-{seed}-{key}.pickle",
         )
+        for seed in settings.seeds
         for kind, joint in JOINTS.items()
         for names in searches(joint(settings.truths[:1]), kind, settings)
-        for seed in settings.seeds
     ]
     waiting = [job for job in jobs if not job[-1].exists()]
     with concurrent.futures.ProcessPoolExecutor(processes) as pool:
@@ -131,8 +131,9 @@ def without_recordings(result: ContenderResult) -> ContenderResult:
 
 
 def fingerprint(settings: Settings) -> str:
-    """A text that changes with the settings and with the program."""
-    digest, source = hashlib.sha256(repr(settings).encode()), Path(airmuscle.__file__).parent
+    """A text that changes with the settings other than the seeds, and with the program."""
+    alone = repr(dataclasses.replace(settings, seeds=()))
+    digest, source = hashlib.sha256(alone.encode()), Path(airmuscle.__file__).parent
     for package in PACKAGES:
         for path in sorted((source / package).rglob("*.py")):
             digest.update(path.read_bytes())
@@ -157,11 +158,12 @@ def main() -> None:
     here = Path(__file__).parent
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--searches", type=int, default=len(FULL.seeds), help="of each controller (3); 1 for --quick")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--results", type=Path, default=here.parent / "build" / "control_benchmark")
     parser.add_argument("--out", type=Path, help="default: CONTROL.md beside this file; of --quick in the results")
     given = parser.parse_args()
-    settings = QUICK if given.quick else FULL
+    settings = QUICK if given.quick else dataclasses.replace(FULL, seeds=tuple(range(1, given.searches + 1)))
     out = given.out or (given.results / "quick.md" if given.quick else here / "CONTROL.md")
     parts = measure(settings, given.results, given.processes)
     curve = next(part.curve for part in parts if part.curve)
