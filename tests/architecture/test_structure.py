@@ -243,7 +243,7 @@ def test_modules_are_imported_by_name_in_few_files_only():
         "bench/readers/optional_dependency.py",  # readers of laboratory formats
         "bench/readers/separate_process.py",  # readers in native code
         "papers/run.py",  # papers
-        "design/study/executors.py",  # Dask
+        "engine/executors.py",  # Dask
     }
 
 

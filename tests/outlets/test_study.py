@@ -726,7 +726,7 @@ def test_invalid_executors_and_folders_are_rejected(folder: Path):
 
 def test_a_cluster_that_does_not_respond_is_rejected(monkeypatch: pytest.MonkeyPatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("airmuscle.design.study.executors.CONNECT_TIMEOUT", 0.5)
+    monkeypatch.setattr("airmuscle.engine.executors.CONNECT_TIMEOUT", 0.5)
     for address in ("tcp://127.0.0.1:1", "nonsense://here"):
         with (
             pytest.raises(InputError, match=f"no response from a Dask scheduler at '{address}'"),

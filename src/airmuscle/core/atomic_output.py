@@ -12,7 +12,7 @@ import threading
 from collections.abc import Iterator
 from pathlib import Path
 
-from .errors import FileError
+from .errors import FileError, FolderInUseError
 
 try:
     import fcntl
@@ -117,7 +117,8 @@ def is_running(process: int) -> bool:
 def check_writable(folder: Path | str, *, shared: bool = False) -> None:
     """Raise FileError before a long computation if `atomic_folder` cannot write to `folder`; leaves no files.
 
-    Within `exclusive_folders`, no other process may check the same folder until the block ends, unless it is `shared`.
+    Within `exclusive_folders`, no other process may check the same folder until the block ends, unless it is `shared`:
+    it raises FolderInUseError.
     """
     target = Path(folder)
     with _raise_file_errors(target):
@@ -160,7 +161,7 @@ def _hold(target: Path, created: list[Path]) -> None:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         os.close(descriptor)
-        raise FileError(
+        raise FolderInUseError(
             f"{target}: another command is writing to this folder. Wait until it ends, or specify another folder."
         ) from None
     except OSError:  # a file system without locks

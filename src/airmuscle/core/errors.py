@@ -180,6 +180,10 @@ class FileError(InputError):
     """A file or folder cannot be read or written."""
 
 
+class FolderInUseError(FileError):
+    """Another command is writing to the output folder."""
+
+
 class ColumnError(InputError):
     """A recording lacks a column, or a column contains no numbers."""
 

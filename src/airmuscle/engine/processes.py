@@ -22,6 +22,8 @@ from typing import IO, Any
 from ..core.display import current_units, display
 from ..core.errors import AirmuscleError, InputError
 
+Workers = int | Executor
+"""Number of local processes, or an executor of `concurrent.futures`."""
 _stop_event: Any = None
 _BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """Environment variables that limit the threads of linear algebra, which a process reads when it loads the library."""
@@ -33,17 +35,24 @@ def available_cores() -> int:
 
 
 @contextlib.contextmanager
-def process_pool(workers: int, *, one_thread_each: bool = False, terminate: bool = False) -> Iterator[Executor | None]:
+def process_pool(
+    workers: Workers, *, one_thread_each: bool = False, terminate: bool = False, separate: bool = False
+) -> Iterator[Executor | None]:
     """A context manager for an executor with `workers` local processes; None for one worker, the process itself.
 
-    `one_thread_each` limits the linear algebra of each worker to one thread, unless the environment states a number.
+    If `workers` is an executor, such as that of a cluster or of a shared folder, it is yielded and remains open. With
+    `separate`, one worker is also a process of its own. `one_thread_each` limits the linear algebra of each worker to
+    one thread, unless the environment states a number.
     If the block is left by an exception, the workers stop between two runs, or at once with `terminate`, for tasks
     that write nothing; if this process is killed, they exit.
     Raises InputError for a number of workers below 1.
     """
+    if isinstance(workers, Executor):
+        yield workers
+        return
     if workers < 1:
         raise InputError(f"workers is {workers}; it must be at least 1.")
-    if workers == 1:
+    if workers == 1 and not separate:
         yield None
         return
     context = multiprocessing.get_context("spawn")  # a forked copy of a process with threads may deadlock

@@ -4,7 +4,7 @@
 
     AirmuscleError
         InputError                    invalid input
-            FileError, ColumnError, UnitError, ParameterError, UnknownNameError
+            FileError (and FolderInUseError), ColumnError, UnitError, ParameterError, UnknownNameError
         PhysicsError                  the model has no solution
             SolveError, GeometryLimitError, RatingError, EquilibriumError
         TraceError                    a model cannot be compiled
@@ -19,6 +19,7 @@ from ..core.errors import (
     ColumnError,
     EquilibriumError,
     FileError,
+    FolderInUseError,
     GeometryLimitError,
     IdentificationError,
     InputError,
@@ -38,6 +39,7 @@ __all__ = [
     "ColumnError",
     "EquilibriumError",
     "FileError",
+    "FolderInUseError",
     "GeometryLimitError",
     "IdentificationError",
     "InputError",

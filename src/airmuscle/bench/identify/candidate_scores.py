@@ -14,7 +14,7 @@ import numpy as np
 from ...core import tree
 from ...core.arrays import Array
 from ...core.errors import AirmuscleError
-from ...engine.processes import check_running, process_pool
+from ...engine.processes import Workers, check_running, process_pool
 from ...physics.muscle.characteristic import PooledLengthLaw
 from ...physics.muscle.characteristic.base import Characteristic
 from ...recording import Recording
@@ -209,7 +209,7 @@ def score_candidates(
     candidates: Sequence[Candidate],
     splits: Sequence[ComparedPoints],
     loss: Loss,
-    workers: int,
+    workers: Workers,
     progress: Progress | None,
     *,
     can_exclude: bool,

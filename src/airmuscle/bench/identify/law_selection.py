@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from ...core.errors import IdentificationError
 from ...core.short_repr import ShortRepr
+from ...engine.processes import Workers
 from ...recording import Recording
 from .candidate_scores import RankedModel
 from .candidates import MIN_POOLED, Candidate
@@ -49,7 +50,7 @@ def select_for_both(
     candidates: Sequence[Candidate] | None = None,
     *,
     loss: Loss = LeastSquares(),
-    workers: int = 1,
+    workers: Workers = 1,
     progress: Callable[[str, float], None] | None = None,
 ) -> JointSelection:
     """One law for further runs (leave-one-run-out) and for other muscles (leave-one-specimen-out cross-validation).
@@ -107,7 +108,7 @@ def select_law(
     leave_out: GroupSplit | None = None,
     both: bool | None = None,
     loss: Loss = LeastSquares(),
-    workers: int = 1,
+    workers: Workers = 1,
     progress: Callable[[str, float], None] | None = None,
 ) -> LawSelection:
     """The law for the purpose of a split, or one law for further runs and for other muscles.

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...core.errors import HintedText, IdentificationError
 from ...core.short_repr import ShortRepr
+from ...engine.processes import Workers
 from ...recording import Recording
 from .candidate_scores import (
     MAX_RECOMMENDED_EXCESS,
@@ -213,7 +214,7 @@ def compare(
     *,
     leave_out: GroupSplit | None = None,
     loss: Loss = LeastSquares(),
-    workers: int = 1,
+    workers: Workers = 1,
     progress: Callable[[str, float], None] | None = None,
 ) -> Comparison:
     """Fit all candidates, rank them by their cross-validated error in force, and recommend one.
@@ -225,7 +226,8 @@ def compare(
                 ones. By default the first of specimens, runs and levels with three groups or more
     loss        LeastSquares(), or a robust loss such as Huber(scale) with its scale in force [N]; all errors are then
                 rms errors of residuals that are limited to `loss.limit`, and a note states the limit
-    workers     number of processes; a script that asks for several needs `if __name__ == "__main__":`
+    workers     number of processes, or an executor, such as that of `shared_folder`; a script that asks
+                for several needs `if __name__ == "__main__":`
     progress    called with the name of each candidate and the completed fraction, at the end with an empty name
 
     The recommended law is the one with the fewest parameters among those whose error is not larger than the lowest one
@@ -248,7 +250,7 @@ def compare_splits(
     splits: Sequence[GroupSplit],
     *,
     loss: Loss = LeastSquares(),
-    workers: int = 1,
+    workers: Workers = 1,
     progress: Callable[[str, float], None] | None = None,
 ) -> tuple[Comparison, ...]:
     """A comparison for each split, as `compare`; every candidate is fitted once to all rows."""

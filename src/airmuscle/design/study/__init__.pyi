@@ -1,3 +1,5 @@
+from ...engine.executors import dask_cluster as dask_cluster
+from ...engine.executors import shared_folder as shared_folder
 from ...engine.processes import process_pool as process_pool
 from .chapter import study_chapter as study_chapter
 from .chapter import write_study as write_study
@@ -17,7 +19,6 @@ from .distributions import Truncated as Truncated
 from .distributions import Uniform as Uniform
 from .distributions import Variation as Variation
 from .distributions import read_variation as read_variation
-from .executors import dask_cluster as dask_cluster
 from .fields import read_difference as read_difference
 from .metrics import METRICS as METRICS
 from .metrics import Final as Final

@@ -23,9 +23,10 @@ MAX_LISTED_LEVELS = 6
 MAX_LISTED_REASONS = 20
 
 
-def write_study(result: StudyResult, folder: Path | str) -> Path:
+def write_study(result: StudyResult, folder: Path | str, *, execution: str = "") -> Path:
     """Write results.csv, time_series.npz (if the study has time series) and the report; return the path of its page.
 
+    `execution` is a paragraph of the report on the processes that have computed the runs.
     The files are written atomically: all or none. Raises FileError if the folder cannot be written to.
     """
     study = result.study
@@ -34,11 +35,11 @@ def write_study(result: StudyResult, folder: Path | str) -> Path:
         if study.time_series:
             times = {f"{name}_time": course.times for name, course in study.time_series.items()}
             np.savez(place / TIME_SERIES_FILE, **times, **result.time_series)  # type: ignore[arg-type]
-        write_into(place, [study_chapter(result)], title="Parameter study")
+        write_into(place, [study_chapter(result, execution=execution)], title="Parameter study")
     return Path(folder) / "report.html"
 
 
-def study_chapter(result: StudyResult) -> Chapter:
+def study_chapter(result: StudyResult, *, execution: str = "") -> Chapter:
     """The report chapter: design, statistics, sensitivities and figures of a study."""
     study, indices = result.study, result.indices()
     tables = [variation_table(study)]
@@ -48,7 +49,7 @@ def study_chapter(result: StudyResult) -> Chapter:
     return Chapter(
         paper="study",
         title=study.title,
-        summary="\n\n".join(summary(result, indices)),
+        summary="\n\n".join([*summary(result, indices), *([execution] if execution else [])]),
         plots=study_plots(result, indices),
         tables=tuple(tables),
         references=tuple(cite(study.template.scenario.plant)),

@@ -83,7 +83,7 @@ def benchmark(
     budget: Budget = DEFAULT_BUDGET, runs: Runs = COMMISSIONING_RUNS, seed: Seed = 1, trials: Trials = 0,
     out: Folder = Path("benchmark"), json: Json = False,
 ) -> None:  # fmt: skip
-    """Compare controllers of an antagonistic joint on common tasks.
+    """Benchmark controllers of a joint on common tasks.
 
     \b
     Every controller is tuned by the same optimiser for perturbed models, and judged on plants of other kinds, drawn at

@@ -16,6 +16,7 @@ from ...files.library.fitted_entry import fitted_entry, missing_geometry
 from ...files.library.initial_law import find_initial_law
 from ...recording import Recording
 from .bench_files import Files, read_recordings
+from .execution import DaskAddress, Execution, JoinedFolder, WorkerCount
 from .fit_compare import compare_models
 from .fit_geometry import parse_braid, with_braid
 from .fit_options import FitOptions, FitRequest, robust_loss
@@ -135,6 +136,9 @@ def fit(
     robust: Robust = None,
     uncensored: Uncensored = False,
     equal_weights: EqualWeights = False,
+    workers: WorkerCount = None,
+    dask: DaskAddress = None,
+    join: JoinedFolder = None,
     json: Json = False,
 ) -> None:
     """Fit a characteristic to measured points, or compare several.
@@ -153,19 +157,24 @@ def fit(
       airmuscle fit bench.csv --characteristic ContractileSurface --shape --free-contraction "3 bar=18 %"
       airmuscle fit runs/*.xlsx --mapping rig.toml --compare --leave-out run
       airmuscle fit muscles/*.csv --mapping rig.toml --compare --purpose both --length-error "20 cm"
+      airmuscle fit muscles/*.csv --mapping rig.toml --compare --join /shared/fit    (on each machine)
       airmuscle fit log_held*.csv --file-name "held{length [mm]}mm" --time uniform --resting-length "200 mm" --compare
       airmuscle evaluate fit/muscle.toml --pressure "3 bar" --force "100 N"
     """
     if characteristic is None and not compare:
         raise typer.BadParameter("give the characteristic to fit with --characteristic, or rank all with --compare")
     options = FitOptions.parse(bootstrap, profile, leave_out, shape, free_contraction, compare, purpose, length_error)
-    request = FitRequest(options, tuple(fix or ()), degree, robust, uncensored, equal_weights, out, json,
-                         parse_braid(braid))  # fmt: skip
-    recordings = read_recordings(files, reading)
-    if characteristic is None or compare:
-        compare_models(files, recordings, characteristic, request)
-    else:
-        _fit_one(files, recordings, characteristic, request)
+    execution = Execution(workers, dask, join)
+    if (workers, dask, join) != (None, None, None) and not compare:
+        raise typer.BadParameter("--workers, --dask and --join distribute the candidates of --compare")
+    with execution.output(out) as folder:
+        request = FitRequest(options, tuple(fix or ()), degree, robust, uncensored, equal_weights, folder, json,
+                             parse_braid(braid), execution)  # fmt: skip
+        recordings = read_recordings(files, reading)
+        if characteristic is None or compare:
+            compare_models(files, recordings, characteristic, request)
+        else:
+            _fit_one(files, recordings, characteristic, request)
 
 
 def _fit_one(files: list[Path], recordings: list[Recording], characteristic: str, request: FitRequest) -> None:

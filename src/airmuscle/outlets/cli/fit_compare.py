@@ -14,7 +14,6 @@ from ...bench.identify.compare_chapter import compare_chapters
 from ...bench.identify.law_selection import LawSelection, select_law
 from ...bench.identify.specimen_errors import odd_specimen_notes, ranked_specimen_errors
 from ...core.atomic_output import check_writable
-from ...engine.processes import available_cores
 from ...files.library.entry import Entry
 from ...files.library.fitted_entry import fitted_entry, left_out_ratio, missing_geometry
 from ...files.library.initial_law import InitialLaw, find_initial_law, resting_lengths
@@ -63,10 +62,10 @@ def _select(recordings: list[Recording], given: list[Candidate] | None, request:
     """The law for the requested purpose, with reasons of exclusion that name options."""
     options = request.options
     both = True if options.purpose == "both" else None if options.purpose is None else False
-    with computation_progress("comparison") as show:
+    with computation_progress("comparison") as show, request.execution.executor() as workers:
         selection = select_law(
             recordings, given, leave_out=options.split, both=both, loss=robust_loss(request.robust, "N"),
-            workers=available_cores(), progress=lambda name, fraction: show(fraction),
+            workers=workers, progress=lambda name, fraction: show(fraction),
         )  # fmt: skip
     return dataclasses.replace(selection, comparisons=tuple(_with_option_names(selection.comparisons)))
 

@@ -37,6 +37,7 @@ from ...files.library.entry import Entry
 from ...physics.muscle.characteristic import ContractileSurface
 from ...recording import Recording
 from ...report.chapter import Chapter
+from .execution import Execution
 from .fit_geometry import BraidSize
 from .progress import computation_progress
 
@@ -59,6 +60,7 @@ class FitRequest:
     out: Path
     json: bool
     braid: BraidSize | None = None
+    execution: Execution = Execution()
 
 
 @dataclasses.dataclass(frozen=True)

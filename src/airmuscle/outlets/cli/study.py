@@ -5,19 +5,20 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from ...core.errors import AirmuscleError, InputError, SimulationError
-from ...design.study import Study, StudyResult, dask_cluster, load_study, run_study
+from ...core.errors import AirmuscleError, SimulationError
+from ...design.study import Study, StudyResult, load_study, run_study
 from ...design.study.chapter import failure_table, sensitivity_table, write_study
 from ...design.study.run import count_finished_runs
-from ...engine.processes import available_cores, process_pool
+from ...engine.executors import SharedFolder
+from ...engine.processes import process_pool
 from ...report.chapter import Table
 from ...report.formatting import format_number, table_rows
+from .execution import DaskAddress, Execution, JoinedFolder, WorkerCount, contributions
 from .interruption import check_interrupted
 from .options import Folder, Json
 from .terminal import echo, print_json, print_table
@@ -29,12 +30,9 @@ def study(
         typer.Argument(metavar="STUDY.toml", help="A file with scenario, [vary], [design] and [metrics]."),
     ],
     out: Folder = Path("study"),
-    workers: Annotated[
-        int | None, typer.Option(min=1, max=1024, metavar="N", help="Number of local processes; default: one per core.")
-    ] = None,
-    dask: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Use a running Dask cluster, such as tcp://host:8786.")
-    ] = None,
+    workers: WorkerCount = None,
+    dask: DaskAddress = None,
+    join: JoinedFolder = None,
     json: Json = False,
 ) -> None:
     """Run a parameter study of a scenario.
@@ -49,40 +47,41 @@ def study(
       airmuscle study examples/valve_study.toml --out study
       airmuscle study study.toml --workers 8
       airmuscle study study.toml --dask tcp://head-node:8786
+      airmuscle study study.toml --join /shared/study    (on each machine)
     """
-    if workers is not None and dask is not None:
-        raise InputError("--workers and --dask exclude each other: a Dask cluster has its own workers.")
-    result = _run(load_study(file), out, workers, dask)
-    page = write_study(result, out)
+    execution = Execution(workers, dask, join)
+    with execution.output(out) as folder:
+        result, shares = _run(load_study(file), folder, execution)
+        page = write_study(result, folder, execution=shares)
     if json:
         print_json(_to_dict(result))
     else:
         _print(result)
     if result.failed.size == len(result.study):
         raise SimulationError(f"all {len(result.study)} runs failed; reason of the first: {result.failure_reasons[0]}")
-    if not json:
+    if not json and folder == out:
         echo(f"results: {out / 'results.csv'}")
         echo(f"report: {page}")
 
 
-def _run(study: Study, out: Path, workers: int | None, dask: str | None) -> StudyResult:
-    """The result of the study; if it is aborted, a message states how many runs were saved."""
+def _run(study: Study, out: Path, execution: Execution) -> tuple[StudyResult, str]:
+    """The result of the study, and a sentence on the processes that share it.
+
+    If it is aborted, a message states how many runs were saved.
+    """
     try:
-        with _progress(study.title) as show, _executor(study, workers, dask) as executor:
-            return run_study(study, out, executor, show)
+        with (
+            _progress(study.title) as show,
+            execution.executor(len(study.chunks)) as workers,
+            process_pool(workers) as executor,
+        ):
+            result = run_study(study, out, executor, show)
+        return result, f"{contributions(workers)}." if isinstance(workers, SharedFolder) else ""
     except (AirmuscleError, KeyboardInterrupt):
         if done := count_finished_runs(study, out):  # counted on disk: a run may have been completed during the abort
             saved = f"{done} of {len(study)} runs are saved in {out / 'chunks'}"
             echo(f"{saved}; the same command resumes from there", err=True)
         raise
-
-
-def _executor(
-    study: Study, workers: int | None, dask: str | None
-) -> contextlib.AbstractContextManager[Executor | None]:
-    if dask is not None:
-        return dask_cluster(dask)
-    return process_pool(min(workers or available_cores(), len(study.chunks)))
 
 
 @contextlib.contextmanager
