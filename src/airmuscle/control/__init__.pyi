@@ -39,3 +39,8 @@ from .laws import SuperTwisting as SuperTwisting
 from .laws import WithFeedForward as WithFeedForward
 from .laws import WithSetpointDelay as WithSetpointDelay
 from .laws import WithStuckValve as WithStuckValve
+from .linear_loop import LinearLaw as LinearLaw
+from .linear_loop import LinearLoop as LinearLoop
+from .linear_loop import Margins as Margins
+from .linear_loop import linearise_loop as linearise_loop
+from .linear_loop import loop_margins as loop_margins

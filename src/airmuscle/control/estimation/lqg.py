@@ -11,9 +11,10 @@ from ...core.arrays import Array
 from ...core.errors import ParameterError
 from ...core.reference import Reference
 from ...physics.analysis.linear_model import LinearModel
+from ...physics.analysis.sampled_model import held
 from ..laws.state_feedback import StateFeedback
 from .design_checks import DISTURBANCE, check_known, check_numbers
-from .riccati import discretised, disturbance_observer, place_observer, regulator, sampled_plant, steady_target
+from .riccati import disturbance_observer, place_observer, regulator, sampled_plant, steady_target
 
 HAN2009 = Reference(
     key="han-2009",
@@ -132,7 +133,7 @@ def design_adrc(
     chain = np.diag(np.ones(order), 1)
     inputs = np.zeros((order + 1, 1))
     inputs[order - 1] = gain
-    a, b = discretised(chain, inputs, sample_time)
+    a, b = held(chain, inputs, sample_time)
     c = np.eye(1, order + 1)
     observer = place_observer(a, c[0], math.exp(-observer_bandwidth * sample_time))
     k = [math.comb(order, i) * bandwidth ** (order - i) for i in range(order)]

@@ -16,10 +16,11 @@ from ...core.short_repr import ShortRepr
 from ...engine.compile.program import compile_system
 from ...engine.loop.controller import Measurement, MultivariableController, failure_notes
 from ...physics.analysis.linear_model import linearise
+from ...physics.analysis.sampled_model import held
 from ..laws.linear_model_predictive import RAWLINGS2017
 from .design_checks import check_known, check_numbers, check_sample_time
 from .predictive_program import MAX_HORIZON, PredictiveProgram, Programs
-from .riccati import discretised, regulator
+from .riccati import regulator
 from .state_estimator import StateEstimate, StateEstimator
 
 
@@ -172,7 +173,7 @@ class NonlinearModelPredictive(ShortRepr, MultivariableController):
         sizes = np.array([self.permitted[name] for name in self.commanded])
         point = dict(zip(states, self.first.mean.tolist(), strict=False))
         linear = linearise(estimator.plant, point, inputs).select(inputs=list(self.commanded))
-        a, b = discretised(linear.A * scale / scale[:, None], linear.B * sizes / scale[:, None], estimator.sample_time)
+        a, b = held(linear.A * scale / scale[:, None], linear.B * sizes / scale[:, None], estimator.sample_time)
         weights = np.diag([1.0 if name in self.permitted else 0.0 for name in states])
         owner, costs = "NonlinearModelPredictive", np.eye(sizes.size)
         _, terminal = regulator(owner, a, b, weights, costs, "inputs do not stabilise")

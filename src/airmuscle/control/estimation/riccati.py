@@ -1,4 +1,4 @@
-"""Discretisation, steady states, and gains by the discrete algebraic Riccati equation or by placed poles."""
+"""Sampled plants, steady states, and gains by the discrete algebraic Riccati equation or by placed poles."""
 
 from __future__ import annotations
 
@@ -9,15 +9,7 @@ import numpy as np
 from ...core.arrays import Array
 from ...core.errors import ParameterError
 from ...physics.analysis.linear_model import LinearModel
-
-
-def discretised(a: Array, b: Array, sample_time: float) -> tuple[Array, Array]:
-    """State matrix (n, n) and input matrix (n, m) of the sampled plant with held inputs."""
-    from scipy.linalg import expm
-
-    n, m = b.shape
-    both = expm(np.block([[a, b], [np.zeros((m, n + m))]]) * sample_time)
-    return both[:n, :n], both[:n, n:]
+from ...physics.analysis.sampled_model import held
 
 
 def sampled_plant(
@@ -29,7 +21,7 @@ def sampled_plant(
     """
     entering = np.eye(len(scale))[:, [model.states.index(name) for name in disturbed]]
     driving = np.hstack([model.B * sizes, entering]) / scale[:, None]
-    a, both = discretised(model.A * scale / scale[:, None], driving, sample_time)
+    a, both = held(model.A * scale / scale[:, None], driving, sample_time)
     b, by_disturbance = np.hsplit(both, [sizes.size])
     return a, b, by_disturbance
 

@@ -2,6 +2,7 @@ from .joint_plot import plot_reachable_region as plot_reachable_region
 from .linear_model import LinearModel as LinearModel
 from .linear_model import Pole as Pole
 from .linear_model import linearise as linearise
+from .sampled_model import SampledModel as SampledModel
 from .static_stiffness import Stiffness as Stiffness
 from .static_stiffness import StiffnessPair as StiffnessPair
 from .static_stiffness import stiffness as stiffness

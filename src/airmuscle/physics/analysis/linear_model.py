@@ -11,17 +11,29 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.arrays import Array
-from ...core.errors import AirmuscleError, ParameterError, suggestion
+from ...core.errors import ParameterError, suggestion
 from ...core.system import System
 from ...engine.compile.jacobians import derivatives
 from ...engine.compile.program import CompiledSystem, compile_system
 from ...engine.state import check_system, column_units, state_vector
 from ..equilibrium import complete_inputs
 from ..plant.plant import Plant
+from .frequency_plots import bode_figure
+from .sampled_model import (
+    SampledModel,
+    checked_frequencies,
+    control_model,
+    control_names,
+    imported_control,
+    sampled,
+    with_pade,
+)
 from .static_stiffness import Stiffness, stiffness
 
 ROUNDING = 1e-12
 """Part of the fastest pole below which real and imaginary parts are rounding errors."""
+MAX_PADE = 10
+"""Greatest order of a Pade approximation; higher ones lose digits."""
 
 
 class Pole(NamedTuple):
@@ -43,6 +55,7 @@ class LinearModel:
     rates           (n,) rates of the states there: all zero at an equilibrium
     system          the system that was linearised
     stiffness       of a Plant: its stiffness at constant pressure and with closed valves; None for another system
+    delays          dead time [s] of inputs by name, before they act; none unless given (`with_delay`)
     """
 
     A: Array
@@ -59,6 +72,7 @@ class LinearModel:
     stiffness: Stiffness | None = None
     output_values: Mapping[str, float] = dataclasses.field(default_factory=dict)
     system: System | None = None
+    delays: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
     @property
     def poles(self) -> tuple[Pole, ...]:
@@ -78,58 +92,82 @@ class LinearModel:
             D=self.D[np.ix_(rows, columns)],
             inputs=tuple(self.inputs[i] for i in columns),
             outputs=tuple(self.outputs[i] for i in rows),
+            delays={name: self.delays[name] for name in (self.inputs[i] for i in columns) if name in self.delays},
         )
 
-    def frequency_response(self, frequencies: npt.ArrayLike) -> npt.NDArray[np.complex128]:
-        """H(j 2 pi f) = C (j 2 pi f I - A)^-1 B + D at frequencies (F,) [Hz], of shape (F, k, m).
+    def with_delay(self, delay: float | Mapping[str, float]) -> LinearModel:
+        """The model whose inputs act after a dead time [s] more: of all, or by name.
 
-        Raises ParameterError for a frequency that is negative or not finite, and at a pole on the imaginary axis.
+        Raises ParameterError for an unknown input, and for a delay that is negative or not finite.
+        """
+        given = delay if isinstance(delay, Mapping) else dict.fromkeys(self.inputs, delay)
+        _places("input", tuple(given), self.inputs)
+        for name, value in given.items():
+            if not 0 <= value < math.inf:
+                raise ParameterError(
+                    f"with_delay: the delay of '{name}' is {value!r} s; it must be finite and not negative."
+                )
+        total = {name: self.delays.get(name, 0.0) + float(value) for name, value in given.items()}
+        return dataclasses.replace(self, delays={**self.delays, **total})
+
+    def pade(self, order: int = 3) -> LinearModel:
+        """The model with Pade approximations of this order in place of the delays, as further states."""
+        if not 1 <= order <= MAX_PADE:
+            raise ParameterError(f"pade: the order is {order}; allowed range: 1 to {MAX_PADE}.")
+        return dataclasses.replace(self, **with_pade(self, order)) if any(self.delays.values()) else self
+
+    def sampled(self, sample_time: float) -> SampledModel:
+        """The model at sampling instants, exact for inputs that are held over a sample time [s], with their delays."""
+        return sampled(self, sample_time)
+
+    def bode(self, frequencies: npt.ArrayLike) -> Any:
+        """A Matplotlib figure of gain and phase of every output to every input at frequencies (F,) [Hz]."""
+        return bode_figure(self, checked_frequencies(frequencies))
+
+    def frequency_response(self, frequencies: npt.ArrayLike) -> npt.NDArray[np.complex128]:
+        """H(j 2 pi f) = (C (j 2 pi f I - A)^-1 B + D) exp(-j 2 pi f T) at frequencies (F,) [Hz], of shape (F, k, m).
+
+        T are the delays of the inputs. Raises ParameterError for a frequency that is negative or not finite, and at a
+        pole on the imaginary axis.
         """
         responses = []
-        for f in np.atleast_1d(np.asarray(frequencies, dtype=float)):
-            if not (np.isfinite(f) and f >= 0):
-                raise ParameterError(
-                    f"frequency_response: a frequency is {f!r} Hz; it must be finite and not negative."
-                )
+        late = np.array([self.delays.get(name, 0.0) for name in self.inputs])
+        for f in checked_frequencies(frequencies):
             shifted = 2j * math.pi * f * np.eye(len(self.states)) - self.A
             try:
-                responses.append(self.C @ np.linalg.solve(shifted, self.B) + self.D)
+                response = self.C @ np.linalg.solve(shifted, self.B) + self.D
             except np.linalg.LinAlgError:
                 raise ParameterError(
                     f"frequency_response: there is a pole at {f:g} Hz, and the response is infinite (for "
                     "enclosed air at 0 Hz). Choose another frequency."
                 ) from None
+            responses.append(response * np.exp(-2j * math.pi * f * late))
         return np.array(responses, dtype=complex)
 
-    def to_scipy(self) -> Any:
-        """A scipy.signal.StateSpace; it carries no names."""
+    def to_scipy(self, *, pade: int = 3) -> Any:
+        """A scipy.signal.StateSpace, delays as Pade approximations of this order; it carries no names."""
         from scipy.signal import StateSpace
 
-        return StateSpace(self.A, self.B, self.C, self.D)
+        model = self.pade(pade)
+        return StateSpace(model.A, model.B, model.C, model.D)
 
-    def to_control(self, *, nonlinear: bool = False) -> Any:
+    def to_control(self, sample_time: float | None = None, *, nonlinear: bool = False, pade: int = 3) -> Any:
         """A control.StateSpace with the names of states, inputs and outputs. Needs the package `control`.
 
-        nonlinear  instead a control.NonlinearIOSystem of the system itself, with the same names: its states, inputs and
-                   outputs are absolute values, not deviations from the operating point
+        sample_time  of a discrete model [s], exact for held inputs and their delays; None: a continuous one
+        nonlinear    instead a control.NonlinearIOSystem of the system itself, with the same names: its states, inputs
+                     and outputs are absolute values, not deviations from the operating point, without delays
+        pade         order of the Pade approximations of delays in the continuous model
         """
-        try:
-            import control
-        except ImportError:
-            raise AirmuscleError(
-                "to_control needs the package 'control' (python-control); pip install control, or use to_scipy()."
-            ) from None
-        # python-control interprets a dot in a name as the separator of system and signal.
-        names = {
-            kind: [name.replace(".", "_") for name in given]
-            for kind, given in (("states", self.states), ("inputs", self.inputs), ("outputs", self.outputs))
-        }
         if not nonlinear:
-            return control.StateSpace(self.A, self.B, self.C, self.D, **names)
+            return control_model(self.pade(pade)) if sample_time is None else self.sampled(sample_time).to_control()
+        control = imported_control()
         if self.system is None:
             raise ParameterError("to_control: this model has no system; use the result of linearise.")
         response = _Response(compile_system(self.system), self.inputs, self.outputs, dict(self.input_values))
-        return control.NonlinearIOSystem(response.rates, response.outputs, name=type(self.system).__name__, **names)
+        return control.NonlinearIOSystem(
+            response.rates, response.outputs, name=type(self.system).__name__, **control_names(self)
+        )
 
     def __repr__(self) -> str:
         poles = [p.value for p in self.poles]

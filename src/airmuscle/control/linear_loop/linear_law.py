@@ -1,0 +1,169 @@
+"""LinearLaw: the linearisation of a control law at a working point, between its samples."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...core.arrays import Array
+from ...core.errors import ParameterError
+from ...core.tree import flatten
+from ...engine.loop import ColumnSensor, ControlLaw
+from ...engine.run.compiled_law import TracedSample, trace_sample
+
+KINK = 1e-3
+"""Relative difference of the slopes on both sides above which a law is at a kink (chosen)."""
+STEP = 1e-5
+"""Part of the size of a measured column by which the sides of a kink are told apart (chosen)."""
+STEPS = 25
+"""Newton steps for the memory that gives wanted commands (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class LinearLaw:
+    """dm_(k+1) = A dm_k + B dy_k + E dr_k,  du_k = C dm_k + D dy_k + F dr_k: deviations of a law from a working point.
+
+    m memory, as far as commands depend on it, y measured columns, r set points, u commands
+
+    A, B, E, C, D, F    slopes, rows and columns in the order of the names
+    memory, measured, setpoints, inputs    the names
+    """
+
+    A: Array
+    B: Array
+    E: Array
+    C: Array
+    D: Array
+    F: Array
+    memory: tuple[str, ...]
+    measured: tuple[str, ...]
+    setpoints: tuple[str, ...]
+    inputs: tuple[str, ...]
+
+
+class Point(NamedTuple):
+    """The arguments of a sample: measured columns, set points, memory, lower and upper limits of the inputs."""
+
+    measured: Array
+    setpoints: Array
+    memory: Array
+    minimum: Array
+    maximum: Array
+
+
+class _Sample:
+    """A law as a function of a Point, with its slopes."""
+
+    def __init__(self, law: ControlLaw, sample_time: float) -> None:
+        import casadi
+
+        self.law, traced = law, trace_sample(law)
+        by = casadi.vertcat(traced.memory, traced.measured, traced.setpoints)
+        values = casadi.vertcat(traced.later, casadi.fmin(casadi.fmax(traced.commands, traced.minimum), traced.maximum))
+        self._function: Any = casadi.Function("sample", _arguments(traced), [values, casadi.jacobian(values, by)])
+        self._last = [sample_time, flatten(law)]
+        self.count = len(law.initial_memory)
+
+    def __call__(self, point: Point) -> tuple[Array, Array]:
+        """Memory after the sample and commands (n + m,), and their slopes by memory, measurements and set points."""
+        values, slopes = self._function(*point, *self._last)
+        return np.asarray(values, dtype=float)[:, 0], np.asarray(slopes, dtype=float)
+
+
+def _arguments(t: TracedSample) -> list[Any]:
+    return [t.measured, t.setpoints, t.memory, t.minimum, t.maximum, t.sample_time, t.parameters]
+
+
+def ideal(part: Any) -> Any:
+    """A control law whose sensors have neither noise nor steps, which have no slope; lag and delay remain."""
+    if isinstance(part, ColumnSensor):
+        return dataclasses.replace(part, resolution=0.0, noise=0.0)
+    if isinstance(part, tuple):
+        return tuple(ideal(item) for item in part)
+    if not isinstance(part, ControlLaw) or not dataclasses.is_dataclass(part):
+        return part
+    given = {field.name: getattr(part, field.name) for field in dataclasses.fields(part) if field.init}
+    changed = {name: new for name, old in given.items() if (new := ideal(old)) is not old and new != old}
+    return dataclasses.replace(part, **changed) if changed else part
+
+
+def linearise_law(
+    law: ControlLaw, sample_time: float, point: Point, wanted: Mapping[str, float], sizes: Sequence[float], known: bool
+) -> LinearLaw:
+    """A law linearised at a point, with the memory changed as little as possible so that it gives wanted commands.
+
+    sizes    of the measured columns, for the look at both sides of a kink
+    known    whether the memory is that of a run; otherwise one sample is done first
+
+    Raises ParameterError where no memory and no set points give the commands, and where the law has a kink there.
+    """
+    sample = _Sample(ideal(law), sample_time)
+    if not known:
+        point = point._replace(memory=sample(point)[0][: sample.count])
+    point = _moved(sample, point, np.array([wanted[name] for name in law.inputs]))
+    _check_sides(sample, point, sizes)
+    slopes, n, p = sample(point)[1], sample.count, len(law.measured_columns)
+    by_memory, by_measured, by_setpoint = slopes[:, :n], slopes[:, n : n + p], slopes[:, n + p :]
+    kept = _observed(by_memory, n)
+    names = tuple(law.initial_memory)
+    return LinearLaw(
+        by_memory[np.ix_(kept, kept)], by_measured[kept], by_setpoint[kept],
+        by_memory[n:, kept], by_measured[n:], by_setpoint[n:],
+        tuple(names[i] for i in kept), law.measured_columns, law.setpoints, law.inputs,
+    )  # fmt: skip
+
+
+def _moved(sample: _Sample, point: Point, wanted: Array) -> Point:
+    """The point whose commands are the wanted ones, by Newton steps of the memory, then of the set points."""
+    n, p = sample.count, point.measured.size
+    size = 1e-9 * np.maximum(1.0, np.abs(wanted))
+    for field, columns in (("memory", slice(0, n)), ("setpoints", slice(n + p, None))):
+        for _ in range(STEPS):
+            values, slopes = sample(point)
+            miss = wanted - values[n:]
+            if (np.abs(miss) <= size).all():
+                return point
+            moved = getattr(point, field) + np.linalg.lstsq(slopes[n:, columns], miss, rcond=1e-12)[0]
+            point = point._replace(**{field: moved})
+    reached = ", ".join(f"{name} {value:.4g}" for name, value in zip(sample.law.inputs, values[n:], strict=True))
+    raise ParameterError(
+        f"linearise_loop: {type(sample.law).__name__} does not command these inputs at this state, but {reached}. Give "
+        "the control_state of a run that ends there, or inputs that the law can command."
+    )
+
+
+def _check_sides(sample: _Sample, point: Point, sizes: Sequence[float]) -> None:
+    """Raise ParameterError where the slopes of the commands differ on both sides, or nothing reaches the commands."""
+    n, (values, slopes) = sample.count, sample(point)
+    if not np.any(slopes[n:]):
+        raise ParameterError(
+            f"linearise_loop: no command of {type(sample.law).__name__} depends on memory, measurements or set points "
+            "at this working point: it is at a limit, or switches. Choose another one."
+        )
+    for i, size in enumerate(sizes):
+        move = np.zeros(point.measured.size)
+        move[i] = STEP * size
+        after, before = (sample(point._replace(measured=point.measured + side * move))[0] for side in (1.0, -1.0))
+        up, down = after - values, values - before
+        scale = KINK * max(np.abs(up[n:]).max(), np.abs(down[n:]).max(), 1e-300)
+        exact = slopes[:, n + i] * move[i]
+        if np.abs(up - exact)[n:].max() > scale or np.abs(down - exact)[n:].max() > scale:
+            raise ParameterError(
+                f"linearise_loop: the slopes of {type(sample.law).__name__} by '{sample.law.measured_columns[i]}' "
+                "differ on both sides of this working point (a closed valve in split range, a limit, a dead zone). "
+                "Choose one on a side: give inputs that are open by a little, such as {'fill': 0.01}."
+            )
+
+
+def _observed(by_memory: Array, n: int) -> list[int]:
+    """The values of the memory on which commands depend, also over later samples."""
+    reached = np.any(by_memory[n:] != 0, axis=0)
+    for _ in range(n):
+        more = reached | np.any(by_memory[:n][reached] != 0, axis=0)
+        if (more == reached).all():
+            break
+        reached = more
+    return np.flatnonzero(reached).tolist()

@@ -1,0 +1,185 @@
+"""LinearLoop: a control loop at a working point, plant and law linear, with hold, sensors and delays."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ...core.arrays import Array
+from ...core.errors import ParameterError, suggestion
+from ...core.system import System
+from ...engine.loop import ControlLaw, ControlLoop, ControlLoopState, designed_loop
+from ...physics.analysis import LinearModel, linearise
+from ...physics.analysis.frequency_plots import bode_figure, nyquist_figure
+from ...physics.analysis.sampled_model import SampledModel, checked_frequencies, sampled
+from .linear_law import LinearLaw, Point, linearise_law
+from .margins import Margins, frequency_grid, loop_margins
+
+SHOWN = 500
+"""Frequencies of a Bode plot."""
+STABLE = 1e-9
+"""By how much the magnitude of a pole of a stable loop may exceed 1: enclosed air that is not controlled, rounding."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class LinearLoop:
+    """A control loop near a working point, between its samples: the plant for held inputs, and the law.
+
+    plant        linearised, with the delays of its inputs; outputs are the measured columns
+    law          linearised, with the lag and the delay of its sensors in its memory
+    sample_time  [s]
+    """
+
+    plant: LinearModel
+    law: LinearLaw
+    sample_time: float
+
+    @property
+    def closed(self) -> SampledModel:
+        """The closed loop, from the set points to the measured columns."""
+        return self._model(None)
+
+    def open_loop(self, column: str | None = None) -> SampledModel:
+        """The loop opened at a measured column: from the value that the law receives to minus that of the plant.
+
+        Without a column it is the first that is measured. The loops of all other columns remain closed: opened at the
+        pressure, a cascade has the open loop of its pressure control, with that of the position around it. With L the
+        loop is stable where 1 + L(z) has no zero outside the unit circle. Raises ParameterError for a column that the
+        law does not measure.
+        """
+        known = self.law.measured
+        name = known[0] if column is None else column
+        if name not in known:
+            raise ParameterError(
+                f"open_loop: the law does not measure '{name}'; it measures {', '.join(known)}."
+                f"{suggestion(name, known)}"
+            )
+        return self._model(known.index(name))
+
+    @property
+    def poles(self) -> npt.NDArray[np.complex128]:
+        """Poles z of the closed loop, that of the greatest magnitude first; unstable outside the unit circle."""
+        return self.closed.poles
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether no pole of the closed loop is outside the unit circle."""
+        return bool(np.abs(self.poles).max(initial=0.0) <= 1.0 + STABLE)
+
+    def margins(self, column: str | None = None) -> Margins:
+        """Gain, phase and delay margin and sensitivity peak of the loop that is opened at a measured column.
+
+        Raises ParameterError where the closed loop is not stable: its margins would have no meaning.
+        """
+        if not self.is_stable:
+            raise ParameterError(
+                f"margins: the closed loop is not stable, its pole of the greatest magnitude is {self.poles[0]:.4g}. "
+                "Lower the gains, or shorten the sample time."
+            )
+        return loop_margins(self.open_loop(column))
+
+    def bode(self, column: str | None = None, frequencies: npt.ArrayLike | None = None) -> Any:
+        """A Matplotlib figure of gain and phase of the open loop, up to the Nyquist frequency unless given [Hz]."""
+        opened = self.open_loop(column)
+        if frequencies is None:
+            frequencies = np.geomspace(1e-4, 1.0, SHOWN) * opened.nyquist_frequency
+        return bode_figure(opened, checked_frequencies(frequencies))
+
+    def nyquist(self, column: str | None = None) -> Any:
+        """A Matplotlib figure of the open loop in the complex plane, with the circle of its sensitivity peak."""
+        opened = self.open_loop(column)
+        return nyquist_figure(opened.frequency_response(frequency_grid(opened))[:, 0, 0], loop_margins(opened).peak)
+
+    def step_response(self, setpoint: str, duration: float, size: float = 1.0) -> dict[str, Array]:
+        """`time` [s] and the deviations (K,) of all measured columns at the samples after a step of a set point."""
+        known = self.law.setpoints
+        if setpoint not in known:
+            raise ParameterError(
+                f"step_response: the law has no set point '{setpoint}'; there are {', '.join(known)}."
+                f"{suggestion(setpoint, known)}"
+            )
+        time = self.sample_time * np.arange(max(round(duration / self.sample_time), 1) + 1)
+        steps = np.zeros((time.size, len(known)))
+        steps[:, known.index(setpoint)] = size
+        columns = self.closed.response(steps)
+        return {"time": time, **dict(zip(self.law.measured, columns.T, strict=True))}
+
+    def _model(self, opened: int | None) -> SampledModel:
+        """From the set points to the columns, or from the received value of a column to minus its own."""
+        plant, law = sampled(self.plant, self.sample_time, before=True), self.law
+        back = np.eye(len(law.measured))
+        if opened is not None:
+            back[opened, opened] = 0.0
+        seen = back @ plant.C
+        a = np.block([
+            [plant.A + plant.B @ law.D @ seen, plant.B @ law.C],
+            [law.B @ seen, law.A],
+        ])  # fmt: skip
+        by_plant, by_law = (law.F, law.E) if opened is None else (law.D[:, [opened]], law.B[:, [opened]])
+        c = np.hstack([plant.C, np.zeros((len(law.measured), len(law.memory)))])
+        names = (*plant.states, *(f"controller.{name}" for name in law.memory))
+        b = np.vstack([plant.B @ by_plant, by_law])
+        inputs, outputs = law.setpoints, law.measured
+        if opened is not None:
+            c, inputs, outputs = -c[[opened]], (law.measured[opened],), ("open loop",)
+        return SampledModel(a, b, c, np.zeros((len(c), b.shape[1])), self.sample_time, names, inputs, outputs)
+
+
+def linearise_loop(
+    plant: System, loop: ControlLoop, state: Mapping[str, float], inputs: Mapping[str, float] | None = None, *,
+    control_state: ControlLoopState | None = None, delay: float | Mapping[str, float] = 0.0,
+) -> LinearLoop:  # fmt: skip
+    """A control loop linearised at a state, by exact derivatives of plant and law.
+
+    inputs         of the plant at the working point; those of the control_state or 0 unless given. The memory of the
+                   law (if that does not suffice, its set points) is changed so that it commands them
+    control_state  of a run that ends there (`Solution.control_state`): the memory of the law; otherwise it is that
+                   after the first sample, in which integrals are where the law starts them
+    delay          dead time [s] between command and input, of all inputs or by name, such as that of the computer
+
+    Sensors have neither noise nor steps. A driver counts as its mean: the opening is the command. Set points that are
+    measured columns are their values. Raises ParameterError for a controller that is no ControlLaw, a state or input
+    that does not fit, and a working point at a kink of the law.
+    """
+    loop = designed_loop(loop, plant)
+    law = loop.controller
+    if not isinstance(law, ControlLaw):
+        raise ParameterError(
+            f"linearise_loop: {type(law).__name__} is no ControlLaw, its samples have no derivatives. Write the "
+            "controller as a ControlLaw over airmuscle.core.ops."
+        )
+    present = control_state and dict(
+        zip((i.name for i in plant.input_variables), control_state.applied_inputs, strict=False)
+    )
+    given = {**(present or {}), **(inputs or {})}
+    model = linearise(plant, state, given)
+    loop.check_columns(model.outputs, model.inputs)
+    measured = [model.output_values[name] for name in law.measured_columns]
+    ranges = {i.name: (i.minimum, i.maximum) for i in plant.input_variables} | dict.fromkeys(loop.drivers, (0.0, 1.0))
+    limits = np.array([ranges[name] for name in law.inputs])
+    memory = law.initial_memory if control_state is None else control_state.controller
+    values = memory.values() if isinstance(memory, Mapping) else memory
+    point = Point(
+        np.array(measured), _setpoints(loop, law, model.output_values, control_state),
+        np.array([float(value) for value in values]), limits[:, 0], limits[:, 1],
+    )  # fmt: skip
+    sizes = _sizes(plant, law.measured_columns, measured)
+    linear = linearise_law(law, loop.sample_time, point, model.input_values, sizes, control_state is not None)
+    return LinearLoop(model.select(law.inputs, law.measured_columns).with_delay(delay), linear, loop.sample_time)
+
+
+def _setpoints(loop: ControlLoop, law: ControlLaw, columns: Mapping[str, float], at: ControlLoopState | None) -> Array:
+    """The set points of a working point: the values of measured columns, others from the signal of the loop."""
+    time = at.time if at else 0.0
+    signal = loop.setpoint.segments(law.setpoints, time, loop.sample_time).values[0]
+    return np.array([columns.get(name, value) for name, value in zip(law.setpoints, signal.tolist(), strict=True)])
+
+
+def _sizes(plant: System, names: Sequence[str], values: Sequence[float]) -> list[float]:
+    """The sizes of some columns: their values, at least the nominal values of states."""
+    nominal = {state.name: abs(state.nominal) for state in plant.states}
+    return [max(abs(value), nominal.get(name, 1e-3)) for name, value in zip(names, values, strict=True)]
