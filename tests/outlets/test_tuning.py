@@ -29,7 +29,7 @@ from airmuscle.design import (
     perturbed_family,
     tune,
 )
-from airmuscle.design.tuning.evolution import EvolutionStrategy
+from airmuscle.design.tuning.optimisation import EvolutionStrategy
 from airmuscle.engine import ColumnSensor, ControlLaw, ControlLoop, Schedule, WithSensors
 from airmuscle.errors import ColumnError, ParameterError, SimulationError
 from airmuscle.files.library import ParameterUncertainty

@@ -1,7 +1,8 @@
-from .extended_kalman_filter import ExtendedKalmanFilter as ExtendedKalmanFilter
-from .extended_kalman_filter import consistency_band as consistency_band
-from .extended_kalman_filter import normalised_error_squared as normalised_error_squared
 from .finite_control_set import FiniteControlSet as FiniteControlSet
+from .kalman_filters import ExtendedKalmanFilter as ExtendedKalmanFilter
+from .kalman_filters import UnscentedKalmanFilter as UnscentedKalmanFilter
+from .kalman_filters import consistency_band as consistency_band
+from .kalman_filters import normalised_error_squared as normalised_error_squared
 from .lqg import design_adrc as design_adrc
 from .lqg import design_lqg as design_lqg
 from .nonlinear_model_predictive import NonlinearModelPredictive as NonlinearModelPredictive
@@ -9,4 +10,3 @@ from .predictive_design import design_predictive as design_predictive
 from .state_estimator import Innovation as Innovation
 from .state_estimator import StateEstimate as StateEstimate
 from .state_estimator import StateEstimator as StateEstimator
-from .unscented_kalman_filter import UnscentedKalmanFilter as UnscentedKalmanFilter

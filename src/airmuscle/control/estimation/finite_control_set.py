@@ -19,7 +19,7 @@ from ...engine.compile.cache.kernel import Kernel
 from ...engine.compile.function import augmented_rates
 from ...engine.compile.program import compile_system
 from ...engine.loop.controller import Controller, Measurement
-from .design_checks import check_known, check_numbers, check_sample_time
+from .riccati import check_known, check_numbers, check_sample_time
 from .state_estimator import StateEstimate, StateEstimator
 
 QI2019 = Reference(

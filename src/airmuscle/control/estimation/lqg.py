@@ -13,8 +13,16 @@ from ...core.reference import Reference
 from ...physics.analysis.linear_model import LinearModel
 from ...physics.analysis.sampled_model import held
 from ..laws.state_feedback import StateFeedback
-from .design_checks import DISTURBANCE, check_known, check_numbers
-from .riccati import disturbance_observer, place_observer, regulator, sampled_plant, steady_target
+from .riccati import (
+    DISTURBANCE,
+    check_known,
+    check_numbers,
+    disturbance_observer,
+    place_observer,
+    regulator,
+    sampled_plant,
+    steady_target,
+)
 
 HAN2009 = Reference(
     key="han-2009",

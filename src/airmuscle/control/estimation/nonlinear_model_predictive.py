@@ -18,9 +18,8 @@ from ...engine.loop.controller import Measurement, MultivariableController, fail
 from ...physics.analysis.linear_model import linearise
 from ...physics.analysis.sampled_model import held
 from ..laws.linear_model_predictive import RAWLINGS2017
-from .design_checks import check_known, check_numbers, check_sample_time
 from .predictive_program import MAX_HORIZON, PredictiveProgram, Programs
-from .riccati import regulator
+from .riccati import check_known, check_numbers, check_sample_time, regulator
 from .state_estimator import StateEstimate, StateEstimator
 
 

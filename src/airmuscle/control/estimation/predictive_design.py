@@ -8,10 +8,16 @@ import numpy as np
 
 from ...core.errors import ParameterError
 from ...physics.analysis.linear_model import LinearModel
-from ..laws.condensed_problem import condense
-from ..laws.linear_model_predictive import LinearModelPredictive, ObserverModel, TargetMap
-from .design_checks import DISTURBANCE, check_known, check_numbers
-from .riccati import disturbance_observer, regulator, sampled_plant, steady_target
+from ..laws.linear_model_predictive import LinearModelPredictive, ObserverModel, TargetMap, condense
+from .riccati import (
+    DISTURBANCE,
+    check_known,
+    check_numbers,
+    disturbance_observer,
+    regulator,
+    sampled_plant,
+    steady_target,
+)
 
 MAX_HORIZON = 200
 """Maximum number of samples of a horizon, whose matrices have the square of it (chosen)."""

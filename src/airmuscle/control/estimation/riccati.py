@@ -1,15 +1,49 @@
-"""Sampled plants, steady states, and gains by the discrete algebraic Riccati equation or by placed poles."""
+"""Designs of linear controllers: checks of their arguments, sampled plants, steady states and gains."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
 from ...core.arrays import Array
-from ...core.errors import ParameterError
+from ...core.errors import ParameterError, suggestion
 from ...physics.analysis.linear_model import LinearModel
 from ...physics.analysis.sampled_model import held
+
+DISTURBANCE = ".disturbance"
+"""End of the name of an estimated disturbance, after that of its state."""
+
+
+def check_known(owner: str, argument: str, names: Iterable[str], known: Sequence[str]) -> None:
+    """Raise ParameterError, with the nearest name, for a name that is not known."""
+    for name in names:
+        if name not in known:
+            raise ParameterError(
+                f"{owner}: {argument} names '{name}'; there are {', '.join(known)}.{suggestion(name, known)}"
+            )
+
+
+def check_numbers(
+    owner: str, argument: str, given: Mapping[str, float], known: Sequence[str], needed: Sequence[str]
+) -> None:
+    """Raise ParameterError for an unknown name, a number that is not positive and finite, or a missing number."""
+    check_known(owner, argument, given, known)
+    for name, value in given.items():
+        if not 0 < value < float("inf"):
+            raise ParameterError(f"{owner}: {argument} of '{name}' is {value!r}; it must be positive and finite.")
+    for name in needed:
+        if name not in given:
+            raise ParameterError(f"{owner}: {argument} has no number for '{name}'; give one.")
+
+
+def check_sample_time(owner: str, sample_time: float, of_estimator: float) -> None:
+    """Raise ParameterError where the sample time of the loop [s] is not that of the estimator [s]."""
+    if abs(sample_time - of_estimator) > 1e-9 * sample_time:
+        raise ParameterError(
+            f"{owner}: the sample time of the loop is {sample_time:g} s and that of the estimator {of_estimator:g} s; "
+            "they must be equal."
+        )
 
 
 def sampled_plant(

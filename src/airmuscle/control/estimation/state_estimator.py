@@ -22,7 +22,7 @@ from ...engine.compile.program import CompiledSystem, compile_system
 from ...engine.loop.control_loop import COMMAND
 from ...engine.state import check_system, state_vector
 from ...recording.recording import Recording
-from .design_checks import DISTURBANCE, check_known
+from .riccati import DISTURBANCE, check_known
 
 
 class StateEstimate(NamedTuple):

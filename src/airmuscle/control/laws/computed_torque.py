@@ -11,7 +11,7 @@ from ...core.ops import Value
 from ...core.reference import Reference
 from ...engine.loop.control_law import ControlLaw
 from ...engine.loop.controller import Measurement
-from .antagonistic_inverse import AntagonisticInverse
+from .angle_and_stiffness import AntagonisticInverse
 
 SPONG2020 = Reference(
     key="spong-2020",

@@ -12,6 +12,7 @@ from ...core.arrays import Array
 from ...core.errors import ParameterError
 from ...core.tree import flatten
 from ...engine.loop import ColumnSensor, ControlLaw
+from ...engine.loop.control_law import rebuilt
 from ...engine.run.compiled_law import TracedSample, trace_sample
 
 KINK = 1e-3
@@ -78,16 +79,10 @@ def _arguments(t: TracedSample) -> list[Any]:
 
 
 def ideal(part: Any) -> Any:
-    """A control law whose sensors have neither noise nor steps, which have no slope; lag and delay remain."""
-    if isinstance(part, ColumnSensor):
+    """A sensor without noise and steps, which have no slope; any other part itself."""
+    if isinstance(part, ColumnSensor) and (part.resolution or part.noise):
         return dataclasses.replace(part, resolution=0.0, noise=0.0)
-    if isinstance(part, tuple):
-        return tuple(ideal(item) for item in part)
-    if not isinstance(part, ControlLaw) or not dataclasses.is_dataclass(part):
-        return part
-    given = {field.name: getattr(part, field.name) for field in dataclasses.fields(part) if field.init}
-    changed = {name: new for name, old in given.items() if (new := ideal(old)) is not old and new != old}
-    return dataclasses.replace(part, **changed) if changed else part
+    return part
 
 
 def linearise_law(
@@ -100,7 +95,7 @@ def linearise_law(
 
     Raises ParameterError where no memory and no set points give the commands, and where the law has a kink there.
     """
-    sample = _Sample(ideal(law), sample_time)
+    sample = _Sample(rebuilt(law, ideal), sample_time)
     if not known:
         point = point._replace(memory=sample(point)[0][: sample.count])
     point = _moved(sample, point, np.array([wanted[name] for name in law.inputs]))

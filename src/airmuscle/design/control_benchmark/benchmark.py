@@ -21,9 +21,8 @@ from ..tuning.case import with_gains
 from .commissioning import Commissioning, alike, commission, run_loop
 from .contenders import Contender, complete
 from .joints import BenchmarkJoint
-from .signals import task_loop, task_signals
+from .signals import TrackingMetrics, task_loop, task_signals, track
 from .tasks import DEGREE, STANDARD_TASKS, TUNING_BEGIN, TUNING_TASKS, ControlTask
-from .tracking_metrics import TrackingMetrics, track
 from .truths import BenchmarkTruth
 
 SETS_PER_GAIN, COMMISSIONING_RUNS = 100, 60

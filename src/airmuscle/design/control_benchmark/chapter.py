@@ -13,7 +13,7 @@ from ...report.write import write_report
 from .benchmark import REST_LIFE, REST_TASK, BenchmarkResult, Group
 from .learning import LearningCurve
 from .plots import benchmark_plots
-from .tracking_metrics import BONE2019, RATED_STROKES, SETTLING_BAND, STEADY_TIME, TrackingMetrics
+from .signals import BONE2019, RATED_STROKES, SETTLING_BAND, STEADY_TIME, TrackingMetrics
 
 HEADERS = {
     "rmse": "rms error [deg]",

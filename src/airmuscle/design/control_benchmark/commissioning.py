@@ -15,9 +15,8 @@ from ...core.tree import leaves
 from ...engine.loop import Controller, WithSensors
 from ...engine.run import simulate
 from ...recording import Recording
-from ..tuning.case import with_gains
-from ..tuning.gain_ranges import GainRange
-from .called_contender import SensedController
+from ..tuning.case import GainRange, with_gains
+from .contenders import SensedController
 from .joints import ENCODER_STEP, BenchmarkJoint
 from .signals import task_loop, task_signals
 from .tasks import TUNING_BEGIN, ControlTask

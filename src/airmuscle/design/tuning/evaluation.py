@@ -20,7 +20,7 @@ from ...engine.run.batch.thread_pool import hidden_progress
 from ...engine.run.integrators import Integrator
 from ...physics.plant.plant import Plant
 from .case import LoopCase, loop_with_gains, with_gains
-from .objective import CaseMetrics
+from .result import CaseMetrics
 from .tracking import TrackingIndex
 
 MAX_VALUES = 20_000_000

@@ -13,7 +13,7 @@ from ...core.annotation import check_field_types
 from ...core.arrays import Array
 from ...core.errors import ParameterError
 from ...core.reference import Reference
-from .waveform import waveform_amplitude
+from .tracking import waveform_amplitude
 
 SMITH1972 = Reference(
     key="smith-1972",

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ...core import ops
@@ -72,17 +72,26 @@ class EnclosingLaw(ControlLaw):
         return self.law.initial_memory
 
 
+def rebuilt(part: Any, change: Callable[[Any], Any]) -> Any:
+    """A controller with a change of it and of all that is inside it; the same object where nothing changes.
+
+    `change` returns a part itself, or another one, which is changed again.
+    """
+    if (other := change(part)) is not part:
+        return rebuilt(other, change)
+    if isinstance(part, tuple):
+        items = tuple(rebuilt(item, change) for item in part)
+        return part if all(a is b for a, b in zip(items, part, strict=True)) else items
+    if not isinstance(part, Controller) or not dataclasses.is_dataclass(part):
+        return part
+    given = {field.name: getattr(part, field.name) for field in dataclasses.fields(part) if field.init}
+    changed = {name: new for name, old in given.items() if (new := rebuilt(old, change)) is not old}
+    return dataclasses.replace(part, **changed) if changed else part
+
+
 def without_simulated(law: Any) -> Any:
     """A control law without the simulated sensors and faults of the plant, at any depth: that of a real plant."""
-    if isinstance(law, EnclosingLaw) and law.simulated:
-        return without_simulated(law.law)
-    if isinstance(law, tuple):
-        return tuple(without_simulated(item) for item in law)
-    if not isinstance(law, ControlLaw) or not dataclasses.is_dataclass(law):
-        return law
-    given = {field.name: getattr(law, field.name) for field in dataclasses.fields(law) if field.init}
-    changed = {name: value for name, old in given.items() if (value := without_simulated(old)) != old}
-    return dataclasses.replace(law, **changed) if changed else law
+    return rebuilt(law, lambda part: part.law if isinstance(part, EnclosingLaw) and part.simulated else part)
 
 
 @model

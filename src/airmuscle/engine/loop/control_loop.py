@@ -22,7 +22,7 @@ from ...core.short_repr import ShortRepr
 from ...core.system import System
 from ...core.tree import Structure, structure, with_ambient
 from ...recording.recording import Recording
-from .control_law import ControlLaw, EnclosingLaw
+from .control_law import ControlLaw, EnclosingLaw, rebuilt
 from .controller import Controller, Measurement, named_signal_units
 from .driver import Driver, WithDrivers
 from .inputs import ZERO_INPUT, InputSignal, Schedule, check_input_names, check_input_signal
@@ -246,24 +246,10 @@ def with_designed_laws(law: Controller) -> Controller:
     """
     if not isinstance(law, ControlLaw) or structure(law) in _without_design:
         return law
-    designed: Controller = _designed(law)
+    designed: Controller = rebuilt(law, lambda part: part.law if isinstance(part, LawDesign) else part)
     if designed is law:
         _without_design.add(structure(law))
     return designed
-
-
-def _designed(part: Any) -> Any:
-    if isinstance(part, LawDesign):
-        return _designed(part.law)
-    if isinstance(part, tuple):
-        items = tuple(_designed(item) for item in part)
-        return part if all(a is b for a, b in zip(items, part, strict=True)) else items
-    if not isinstance(part, Controller) or not dataclasses.is_dataclass(part):
-        return part
-    fields = {field.name: getattr(part, field.name) for field in dataclasses.fields(part) if field.init}
-    designed_fields = {name: _designed(value) for name, value in fields.items()}
-    changed = {name: value for name, value in designed_fields.items() if value is not fields[name]}
-    return dataclasses.replace(part, **changed) if changed else part
 
 
 def designed_loop(loop: ControlLoop, system: System) -> ControlLoop:

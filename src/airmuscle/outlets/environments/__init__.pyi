@@ -1,9 +1,3 @@
-from .arm import ArmReaching as ArmReaching
-from .default_tasks import arm_task as arm_task
-from .default_tasks import joint_task as joint_task
-from .default_tasks import lift_task as lift_task
-from .joint import JointTracking as JointTracking
-from .lift import LoadLifting as LoadLifting
 from .plant_env import PlantEnv as PlantEnv
 from .plant_vector_env import PlantVectorEnv as PlantVectorEnv
 from .randomisation import FactorRange as FactorRange
@@ -11,5 +5,11 @@ from .randomisation import FitUncertainty as FitUncertainty
 from .randomisation import Randomisation as Randomisation
 from .randomisation import ValueRange as ValueRange
 from .registration import register_environments as register_environments
+from .standard import ArmReaching as ArmReaching
+from .standard import JointTracking as JointTracking
+from .standard import LoadLifting as LoadLifting
+from .standard import arm_task as arm_task
+from .standard import joint_task as joint_task
+from .standard import lift_task as lift_task
 from .task import EnvironmentTask as EnvironmentTask
 from .task import Observation as Observation

@@ -11,9 +11,8 @@ import numpy.typing as npt
 
 from ...core.errors import ParameterError, SimulationError
 from ...engine.run import RungeKutta4, Stepper
-from .default_tasks import arm_task, joint_task, lift_task
-from .episode import EpisodeDraw, whole_steps
-from .randomisation import Randomisation
+from .randomisation import EpisodeDraw, Randomisation, whole_steps
+from .standard import arm_task, joint_task, lift_task
 from .task import EnvironmentTask
 
 STEP = RungeKutta4(1e-3)

@@ -15,11 +15,10 @@ from ...core.errors import ParameterError
 from ...engine.run import RungeKutta4
 from ...engine.run.batch import Double, Precision
 from ...engine.run.batch.stepper import BatchStepper
-from .default_tasks import arm_task, joint_task, lift_task
-from .episode import EpisodeDraw, whole_steps
 from .plant_env import STEP, action_space, observation_space
-from .randomisation import Randomisation
+from .randomisation import EpisodeDraw, Randomisation, whole_steps
 from .registration import EPISODE_PERIODS
+from .standard import arm_task, joint_task, lift_task
 from .task import EnvironmentTask
 
 Booleans = npt.NDArray[np.bool_]

@@ -18,13 +18,14 @@ from ...engine.compile.program import CompiledSystem, compile_system
 from ...engine.state import check_system, column_units, state_vector
 from ..equilibrium import complete_inputs
 from ..plant.plant import Plant
-from .frequency_plots import bode_figure
 from .sampled_model import (
     SampledModel,
+    bode_figure,
     checked_frequencies,
     control_model,
     control_names,
     imported_control,
+    responses_at,
     sampled,
     with_pade,
 )
@@ -130,19 +131,11 @@ class LinearModel:
         T are the delays of the inputs. Raises ParameterError for a frequency that is negative or not finite, and at a
         pole on the imaginary axis.
         """
-        responses = []
+        points = checked_frequencies(frequencies)
         late = np.array([self.delays.get(name, 0.0) for name in self.inputs])
-        for f in checked_frequencies(frequencies):
-            shifted = 2j * math.pi * f * np.eye(len(self.states)) - self.A
-            try:
-                response = self.C @ np.linalg.solve(shifted, self.B) + self.D
-            except np.linalg.LinAlgError:
-                raise ParameterError(
-                    f"frequency_response: there is a pole at {f:g} Hz, and the response is infinite (for "
-                    "enclosed air at 0 Hz). Choose another frequency."
-                ) from None
-            responses.append(response * np.exp(-2j * math.pi * f * late))
-        return np.array(responses, dtype=complex)
+        turns = np.asarray(2j * math.pi * points, dtype=complex)
+        responses: npt.NDArray[np.complex128] = responses_at(self, turns, points) * np.exp(-turns[:, None, None] * late)
+        return responses
 
     def to_scipy(self, *, pade: int = 3) -> Any:
         """A scipy.signal.StateSpace, delays as Pade approximations of this order; it carries no names."""

@@ -1,4 +1,4 @@
-"""SampledModel: a linear model between sampling instants, x_(k+1) = A x_k + B u_k, y_k = C x_k + D u_k."""
+"""Sampled linear models, x_(k+1) = A x_k + B u_k, delays, and figures of frequency responses."""
 
 from __future__ import annotations
 
@@ -12,9 +12,52 @@ import numpy.typing as npt
 
 from ...core.arrays import Array
 from ...core.errors import AirmuscleError, ParameterError
+from ...core.plotting import BLACK, DASHES, LINES, RED, legend_below, new_figure
 
-CHUNK = 500
-"""Frequencies that are solved at once."""
+MAX_CURVES = 7
+"""Curves of one figure that can be told apart."""
+NYQUIST_LIMIT = 3.0
+"""Greatest magnitude that a Nyquist plot shows: around -1, margins are read off (chosen)."""
+
+
+def bode_figure(model: Any, frequencies: Array) -> Any:
+    """A Matplotlib figure of gain and phase of every output to every input of a model at frequencies (F,) [Hz].
+
+    The model is a LinearModel or a SampledModel. Raises ParameterError for more than MAX_CURVES pairs.
+    """
+    pairs = [(i, j) for i in range(len(model.outputs)) for j in range(len(model.inputs))]
+    if not pairs or len(pairs) > MAX_CURVES:
+        raise ParameterError(
+            f"bode: {len(pairs)} pairs of an input and an output; allowed range: 1 to {MAX_CURVES}. Choose them with "
+            "model.select(inputs=[...], outputs=[...])."
+        )
+    response = model.frequency_response(frequencies)
+    figure, (gain, phase) = new_figure(2, 1, height=4.6, sharex=True)
+    for (i, j), colour, dashes in zip(pairs, LINES, DASHES, strict=False):
+        values, label = response[:, i, j], f"{model.outputs[i]} / {model.inputs[j]}"
+        gain.plot(frequencies, np.abs(values), color=colour, linestyle=dashes, label=label)
+        phase.plot(frequencies, np.degrees(np.unwrap(np.angle(values))), color=colour, linestyle=dashes)
+    gain.set(xscale="log", yscale="log", ylabel="gain")
+    phase.set(xscale="log", xlabel="frequency [Hz]", ylabel="phase [deg]")
+    legend_below(figure, gain, columns=2)
+    return figure
+
+
+def nyquist_figure(response: npt.NDArray[np.complex128], sensitivity_peak: float) -> Any:
+    """A Matplotlib figure of an open loop (F,) near -1, with the circle that its sensitivity peak [1] touches."""
+    figure, axes = new_figure(height=4.2, width=4.6)
+    inside = np.abs(response) <= NYQUIST_LIMIT
+    shown = np.where(inside, response, np.nan)
+    axes.plot(shown.real, shown.imag, color=LINES[0], label="open loop")
+    axes.plot(shown.real, -shown.imag, color=LINES[0], linestyle=":", linewidth=1.0, label="negative frequencies")
+    turn = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 181))
+    axes.plot(turn.real, turn.imag, color=BLACK, linestyle="--", linewidth=0.8, label="gain 1")
+    circle = -1.0 + turn / sensitivity_peak
+    axes.plot(circle.real, circle.imag, color=RED, linewidth=0.9, label=f"sensitivity {sensitivity_peak:.3g}")
+    axes.plot([-1.0], [0.0], "+", color=RED, markersize=9)
+    axes.set(xlabel="real part", ylabel="imaginary part", aspect="equal")
+    legend_below(figure, axes, columns=2)
+    return figure
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -51,18 +94,7 @@ class SampledModel:
         Raises ParameterError for a frequency that is negative or not finite, and at a pole on the unit circle.
         """
         points = checked_frequencies(frequencies)
-        z = np.exp(2j * math.pi * points * self.sample_time)
-        parts = []
-        for start in range(0, z.size, CHUNK):
-            shifted = z[start : start + CHUNK, None, None] * np.eye(len(self.A)) - self.A
-            try:
-                parts.append(self.C @ np.linalg.solve(shifted, self.B[None].astype(complex)) + self.D)
-            except np.linalg.LinAlgError:
-                raise ParameterError(
-                    "frequency_response: there is a pole at one of these frequencies, and the response is infinite (of "
-                    "an integrator at 0 Hz). Choose other frequencies."
-                ) from None
-        return np.concatenate(parts) if parts else np.zeros((0, *self.D.shape), dtype=complex)
+        return responses_at(self, np.exp(2j * math.pi * points * self.sample_time), points)
 
     def response(self, inputs: npt.ArrayLike) -> Array:
         """The outputs (K, k) at the samples for inputs (K, m) from rest."""
@@ -75,6 +107,20 @@ class SampledModel:
     def to_control(self) -> Any:
         """A control.StateSpace with this sample time and the names. Needs the package `control`."""
         return control_model(self, self.sample_time)
+
+
+def responses_at(model: Any, points: npt.NDArray[np.complex128], frequencies: Array) -> npt.NDArray[np.complex128]:
+    """C (s I - A)^-1 B + D (F, k, m) of a model at points s (F,), which belong to frequencies (F,) [Hz]."""
+    responses, unit = [], np.eye(len(model.A))
+    for point, f in zip(points, frequencies, strict=True):
+        try:
+            responses.append(model.C @ np.linalg.solve(point * unit - model.A, model.B) + model.D)
+        except np.linalg.LinAlgError:
+            raise ParameterError(
+                f"frequency_response: there is a pole at {f:g} Hz, and the response is infinite (for enclosed air at "
+                "0 Hz). Choose another frequency."
+            ) from None
+    return np.array(responses, dtype=complex).reshape(-1, *model.D.shape)
 
 
 def checked_frequencies(frequencies: npt.ArrayLike) -> Array:

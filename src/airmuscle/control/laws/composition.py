@@ -1,0 +1,224 @@
+"""Laws composed of laws: cascade, feed-forward beside feedback, scheduled parameters."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from typing import ClassVar
+
+from ...core import ops
+from ...core.declaration import Parameter, model, parameter
+from ...core.errors import ParameterError
+from ...core.ops import Value
+from ...core.reference import Reference
+from ...core.system import select_prefix, united, with_prefix
+from ...core.tree import leaves, unflatten
+from ...engine.loop.control_law import ControlLaw, EnclosingLaw
+from ...engine.loop.controller import Measurement, parameter_units
+from .pid import ASTROM_HAGGLUND1995
+
+
+@model
+class Cascade(ControlLaw):
+    """Cascade control: the outer law commands set points of the inner law, which commands the inputs of the plant.
+
+    `Cascade(PID("position", "pressure", ...), PID("pressure", SplitRange("fill", "discharge"), ...), (0.0,), (5e5,))`
+    controls the position by the pressure. `minimum` and `maximum` are the ranges of the outer commands, in the order
+    of `outer.inputs` and in SI units; the outer law sees them as the ranges of its inputs, so that it does not wind up.
+    Both laws are sampled at the same instants, the outer one first.
+    Reference: Åström and Hägglund (1995), chapter 7.
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (ASTROM_HAGGLUND1995,)
+
+    outer: ControlLaw
+    inner: ControlLaw
+    minimum: tuple[float, ...] = parameter("SI", "r_min", "minima of the outer commands", fitted=False)
+    maximum: tuple[float, ...] = parameter("SI", "r_max", "maxima of the outer commands", fitted=False)
+
+    def check(self) -> None:
+        commanded = self.outer.inputs
+        unknown = [name for name in commanded if name not in self.inner.setpoints]
+        if unknown:
+            raise ParameterError(
+                f"Cascade: the outer law commands '{unknown[0]}', which is no set point of the inner law; these are "
+                f"{', '.join(self.inner.setpoints)}."
+            )
+        if not len(self.minimum) == len(self.maximum) == len(commanded):
+            raise ParameterError(
+                f"Cascade: {len(self.minimum)} minima and {len(self.maximum)} maxima for {len(commanded)} outer "
+                f"commands ({', '.join(commanded)}); give one for each."
+            )
+        for name, low, high in zip(commanded, self.minimum, self.maximum, strict=True):
+            if low >= high:
+                raise ParameterError(
+                    f"Cascade: '{name}' has minimum {low:g}; allowed range: below its maximum {high:g}."
+                )
+
+    def unit_of(self, declared: Parameter, index: int, units: Mapping[str, str]) -> str:
+        """The unit of a limit: that of the outer command with the same index."""
+        names = self.outer.inputs
+        return units[names[index]] or "1" if index < len(names) else "1"
+
+    @property
+    def measured_columns(self) -> tuple[str, ...]:
+        return united(self.outer.measured_columns, self.inner.measured_columns)
+
+    @property
+    def setpoints(self) -> tuple[str, ...]:
+        own = tuple(name for name in self.inner.setpoints if name not in self.outer.inputs)
+        return united(self.outer.setpoints, own)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        return self.inner.inputs
+
+    @property
+    def initial_memory(self) -> dict[str, float]:
+        """The values of both laws, with the prefixes `outer.` and `inner.`."""
+        return {**with_prefix("outer.", self.outer.initial_memory), **with_prefix("inner.", self.inner.initial_memory)}
+
+    def step(
+        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
+    ) -> tuple[dict[str, Value], dict[str, Value]]:
+        limits = zip(self.outer.inputs, self.minimum, self.maximum, strict=True)
+        ranges = {name: (low, high) for name, low, high in limits}
+        wanted, first = self.outer.step(select_prefix("outer.", memory), measurement._replace(ranges=ranges), dt)
+        setpoints = {**measurement.setpoints, **{n: ops.clip(wanted[n], *ranges[n]) for n in self.outer.inputs}}
+        commands, second = self.inner.step(
+            select_prefix("inner.", memory), measurement._replace(setpoints=setpoints), dt
+        )
+        return dict(commands), {**with_prefix("outer.", first), **with_prefix("inner.", second)}
+
+
+@model
+class WithFeedForward(ControlLaw):
+    """u = u_ff + u_fb: each input receives the sum of the commands of two control laws.
+
+    The feedback law sees the range of each input less the feed-forward command, so that its anti-windup is that of the
+    sum. It commands no input that the feed-forward law does not command. The initial output of a PID remains 0: the
+    first command is that of the feed-forward.
+    Reference: Åström and Hägglund (1995), chapter 7.
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (ASTROM_HAGGLUND1995,)
+
+    feed_forward: ControlLaw
+    feedback: ControlLaw
+
+    def check(self) -> None:
+        other = [name for name in self.feedback.inputs if name not in self.feed_forward.inputs]
+        if other:
+            raise ParameterError(
+                f"WithFeedForward: the feedback commands '{other[0]}'; the feed-forward law commands "
+                f"{', '.join(self.feed_forward.inputs)}. Both must command the same inputs."
+            )
+
+    @property
+    def measured_columns(self) -> tuple[str, ...]:
+        return united(self.feedback.measured_columns, self.feed_forward.measured_columns)
+
+    @property
+    def setpoints(self) -> tuple[str, ...]:
+        return united(self.feedback.setpoints, self.feed_forward.setpoints)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        return self.feed_forward.inputs
+
+    @property
+    def initial_memory(self) -> dict[str, float]:
+        """The values of both laws, with the prefixes `feed_forward.` and `feedback.`."""
+        parts = ("feed_forward", self.feed_forward), ("feedback", self.feedback)
+        return {
+            name: value
+            for prefix, law in parts
+            for name, value in with_prefix(f"{prefix}.", law.initial_memory).items()
+        }
+
+    def step(
+        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
+    ) -> tuple[dict[str, Value], dict[str, Value]]:
+        ahead, first = self.feed_forward.step(select_prefix("feed_forward.", memory), measurement, dt)
+        ranges = {
+            name: tuple(limit - ahead[name] for limit in measurement.ranges[name]) for name in self.feedback.inputs
+        }
+        back, second = self.feedback.step(select_prefix("feedback.", memory), measurement._replace(ranges=ranges), dt)
+        commands = {name: value + back[name] if name in back else value for name, value in ahead.items()}
+        return commands, {**with_prefix("feed_forward.", first), **with_prefix("feedback.", second)}
+
+
+RUGH_SHAMMA2000 = Reference(
+    key="rugh-shamma-2000",
+    authors="Rugh, W. J., Shamma, J. S.",
+    title="Research on gain scheduling",
+    where="Automatica 36(10):1401-1425",
+    year=2000,
+    doi="10.1016/S0005-1098(00)00058-3",
+    note="gains interpolated between operating points",
+)
+
+
+@model
+class GainSchedule(EnclosingLaw):
+    """theta(z) = theta_i + (theta_(i+1) - theta_i) (z - z_i)/(z_(i+1) - z_i) for z_i <= z <= z_(i+1), constant beyond.
+
+    theta parameter of the law, by its path (`gain`, `outer.gain`), z scheduling variable: a measured column. Both
+    lists are in SI units, z rising. The integral of a PID holds its integrated gain, so that a change of the gain does
+    not make the command jump by it. Several parameters are scheduled by one schedule within another.
+    Reference: Rugh and Shamma (2000).
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (RUGH_SHAMMA2000,)
+
+    law: ControlLaw
+    scheduled: str
+    scheduling_column: str
+    breakpoints: tuple[float, ...] = parameter("SI", "z_i", "values of the scheduling variable", fitted=False)
+    scheduled_values: tuple[float, ...] = parameter("SI", "theta_i", "values of the parameter at the breakpoints")
+
+    def check(self) -> None:
+        if not len(self.breakpoints) == len(self.scheduled_values) >= 2:
+            raise ParameterError(
+                f"GainSchedule: {len(self.breakpoints)} breakpoints and {len(self.scheduled_values)} values; give at "
+                "least two breakpoints and one value for each."
+            )
+        if any(b <= a for a, b in itertools.pairwise(self.breakpoints)):
+            raise ParameterError(f"GainSchedule: the breakpoints {self.breakpoints} must rise.")
+        known = {leaf.path: leaf for leaf in leaves(self.law)}
+        if self.scheduled not in known:
+            raise ParameterError(
+                f"GainSchedule: {type(self.law).__name__} has no parameter '{self.scheduled}'; there are "
+                f"{', '.join(known)}."
+            )
+        low, high = known[self.scheduled].declared.bounds
+        for value in self.scheduled_values:
+            if not low <= value <= high:
+                raise ParameterError(
+                    f"GainSchedule: a value of {self.scheduled} is {value:g}; allowed range: {low:g} to {high:g}."
+                )
+
+    def unit_of(self, declared: Parameter, index: int, units: Mapping[str, str]) -> str:
+        """The unit of a breakpoint is that of the scheduling column, of a value that of the scheduled parameter."""
+        if declared.name == "breakpoints":
+            return units[self.scheduling_column] or "1"
+        return parameter_units(self.law, units).get(self.scheduled, "1")
+
+    @property
+    def measured_columns(self) -> tuple[str, ...]:
+        return united(self.law.measured_columns, (self.scheduling_column,))
+
+    def step(
+        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
+    ) -> tuple[Mapping[str, Value], Mapping[str, Value]]:
+        value = interpolated(measurement.columns[self.scheduling_column], self.breakpoints, self.scheduled_values)
+        numbers = [value if leaf.path == self.scheduled else leaf.value for leaf in leaves(self.law)]
+        return unflatten(self.law, numbers).step(memory, measurement, dt)
+
+
+def interpolated(x: Value, points: tuple[Value, ...], values: tuple[Value, ...]) -> Value:
+    """Piecewise linear function through values at rising points, constant beyond the first and the last."""
+    result = values[0]
+    for (a, b), (c, d) in zip(itertools.pairwise(points), itertools.pairwise(values), strict=True):
+        result = result + (d - c) * ops.clip((x - a) / (b - a), 0.0, 1.0)
+    return result
