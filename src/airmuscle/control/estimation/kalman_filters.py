@@ -23,8 +23,8 @@ BAR_SHALOM2001 = Reference(
     doi="10.1002/0471221279",
     note="extended Kalman filter; consistency by the normalised estimation error squared",
 )
-_predict = Kernel("predict_extended", "kalman_filter")
-_correct = Kernel("correct_extended", "kalman_filter")
+_predict_extended = Kernel("predict_extended", "kalman_filter")
+_correct_extended = Kernel("correct_extended", "kalman_filter")
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -55,11 +55,11 @@ class ExtendedKalmanFilter(StateEstimator):
         n, h = self._compiled.sizes.states, float(self.sample_time)
         x, u, covariance = np.zeros(total), np.zeros(self._compiled.sizes.inputs), np.zeros((total, total))
         transition, values, difference, s = np.zeros((total, total)), np.zeros(p), np.zeros(p), np.zeros((p, p))
-        predict = _predict.bind(
+        predict = _predict_extended.bind(
             functions.rates, functions.constants, self.magnitudes, h, self.noise, x, u, covariance, transition,
             np.zeros(n), np.zeros((n, total)), np.zeros((5, n, total + 1)), np.zeros((total, total)),
         )  # fmt: skip
-        correct = _correct.bind(
+        correct = _correct_extended.bind(
             functions.measured, functions.constants, self.variances, x, u, covariance, values, difference, s,
             np.zeros((p, p)), np.zeros((p, total)), np.zeros((total, p)), np.zeros((total, total)),
             np.zeros((total, total)),
@@ -101,8 +101,8 @@ WAN_VAN_DER_MERWE2000 = Reference(
     doi="10.1109/ASSPCC.2000.882463",
     note="scaled sigma points with alpha, beta and kappa",
 )
-_predict = Kernel("predict_unscented", "kalman_filter")
-_correct = Kernel("correct_unscented", "kalman_filter")
+_predict_unscented = Kernel("predict_unscented", "kalman_filter")
+_correct_unscented = Kernel("correct_unscented", "kalman_filter")
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -149,11 +149,11 @@ class UnscentedKalmanFilter(StateEstimator):
         x, u, covariance = np.zeros(total), np.zeros(self._compiled.sizes.inputs), np.zeros((total, total))
         values, difference, s = np.zeros(p), np.zeros(p), np.zeros((p, p))
         points, root = np.zeros((2 * total + 1, total)), np.zeros((total, total))
-        predict = _predict.bind(
+        predict = _predict_unscented.bind(
             functions.rates, functions.constants, self.magnitudes, h, spread, weights, self.noise, x, u, covariance,
             points, root, np.zeros(n), np.zeros((n, total)), np.zeros((5, n, total + 1)),
         )  # fmt: skip
-        correct = _correct.bind(
+        correct = _correct_unscented.bind(
             functions.measured, functions.constants, spread, weights, self.variances, x, u, covariance, values,
             difference, s, np.zeros((p, p)), points, root, np.zeros((2 * total + 1, p)), np.zeros((p, total)),
             np.zeros((total, p)), np.zeros((total, p)),
