@@ -24,7 +24,7 @@ from airmuscle.bench import (
     standard_candidates,
 )
 from airmuscle.bench.identify import EffectRows, Runs, estimate_pooled_covariance, predict_effects
-from airmuscle.bench.identify.equation_section import equation_section
+from airmuscle.bench.identify.static_fit_chapter import equation_section
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.files import Entry, load, save
 from airmuscle.outlets.cli import parse_split

@@ -18,8 +18,7 @@ from .contractions import (
     check_elongation,
     check_length_and_contraction,
 )
-from .force_zero import check_force_zero
-from .forces import check_force_area, check_force_signs
+from .forces import check_force_area, check_force_signs, check_force_zero
 from .missing_codes import check_missing_codes, without_missing_codes
 from .pressures import check_absolute_isobars, check_lowest_pressures, check_mixed_pressures, check_pressure_limit
 

@@ -1,4 +1,4 @@
-"""Checks of the force: reversed sign, a pushing muscle, and a force that does not fit the pressure."""
+"""Checks of the force: sign, zero of the sensor, and a force that does not fit the pressure."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ...recording.recording import Recording
-from .bench_rows import BenchRows, limits, recordings_with
+from .bench_rows import BenchRows, PressureLine, file_list, limits, pressure_lines, recordings_with
 
 MAX_OFFSET = 0.05
 """Maximum negative force, as a fraction of the maximum force (chosen): a muscle cannot push."""
@@ -60,3 +60,51 @@ def check_force_area(recordings: Sequence[Recording]) -> Iterator[str]:
             f"{area:.3g} m2; allowed range: {AREAS[0]:g} to {AREAS[1]:g} m2 for pneumatic muscles. The unit of force "
             "or pressure is probably wrong."
         )
+
+
+MAX_ZERO = 0.012
+"""Maximum reading of the slack muscle, as a fraction of the maximum force (chosen)."""
+MAX_EXTRAPOLATED = 0.015
+"""Maximum force extrapolated to zero pressure, as a fraction of the maximum force (chosen)."""
+MIN_ROWS = 3
+"""Minimum number of rows without pressure (chosen)."""
+MIN_LEVELS, MIN_RANGE = 3, 0.05
+"""Minimum number of contractions whose lines show the zero, and their minimum range (chosen)."""
+_REMEDY = "Subtract the reading of the slack muscle at zero pressure from the column, or measure it."
+
+
+def check_force_zero(recordings: Sequence[Recording]) -> Iterator[str]:
+    """A sensor that reads a force at zero pressure, measured there or extrapolated to it.
+
+    The force at zero gauge pressure is at most 0 at each contraction: the wall resists contraction and does not pull
+    (Chou and Hannaford, IEEE Trans. Robot. Autom. 12 (1996), with elastic wall: Tondu and Lopez 2000).
+    """
+    given = recordings_with(recordings, *BenchRows._fields)
+    rows = BenchRows.of(given)
+    if not rows.force.size or not rows.greatest > 0:
+        return
+    slack = rows.slack_forces
+    if slack.size >= MIN_ROWS:
+        reading = float(np.median(slack))
+        if reading > MAX_ZERO * rows.greatest:
+            yield (
+                f"{file_list([each.origin for each in given])}: the force is {reading:.3g} N at zero pressure and "
+                "shortened length, where a muscle is slack: the zero of the force sensor is wrong, and all forces by "
+                f"the same amount. {_REMEDY}"
+            )
+        return
+    offset = extrapolated_offset(pressure_lines(rows))
+    if offset > MAX_EXTRAPOLATED * rows.greatest:
+        yield (
+            f"{file_list([each.origin for each in given])}: the force extrapolates to {offset:.3g} N at zero pressure, "
+            "where a muscle does not pull: the zero of the force sensor, or that of the pressure, is probably wrong. "
+            f"{_REMEDY}"
+        )
+
+
+def extrapolated_offset(lines: Sequence[PressureLine]) -> float:
+    """The greatest force [N] at zero pressure of the lines at several contractions; 0 where none is positive by three
+    standard errors."""
+    if len(lines) < MIN_LEVELS or lines[-1].contraction - lines[0].contraction < MIN_RANGE:
+        return 0.0
+    return max(line.intercept if line.intercept > 3.0 * line.error else 0.0 for line in lines)

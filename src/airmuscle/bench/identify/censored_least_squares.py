@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ...core.arrays import Array
@@ -45,12 +47,20 @@ def solve_censored_least_squares(problem: FitProblem, jacobian: Array, constant:
         step = np.linalg.lstsq(rows, right, rcond=_RCOND)[0] - x
         if iteration:
             current = sum_of_squares(x)
-            step = next((t * step for t in 0.5 ** np.arange(30) if sum_of_squares(x + t * step) <= current), 0.0 * step)
+            step = shortened_step(sum_of_squares, x, step, current)
         x, previous = x + step, weights
         weights = row_weights(x)
         if np.array_equal(weights, previous):
             break
     return np.asarray(x / norms)
+
+
+def shortened_step(
+    sum_of_squares: Callable[[Array], float], x: Array, step: Array, limit: float, halvings: int = 30
+) -> Array:
+    """The step from x, halved until the sum of squares is at most `limit`; zero where no part of it is short enough."""
+    parts = (factor * step for factor in 0.5 ** np.arange(halvings))
+    return next((part for part in parts if sum_of_squares(x + part) <= limit), 0.0 * step)
 
 
 def is_determined_without_censored(problem: FitProblem, jacobian: Array) -> bool:

@@ -103,6 +103,17 @@ class Identifiability:
         return np.asarray(inverse)
 
 
+def singular_vectors(matrix: Array) -> tuple[Array, Array]:
+    """The singular values (P,) and the right singular vectors (P, P), one a row, of a matrix (R, P).
+
+    R of the QR factorisation of a tall matrix has the same ones, at less cost; of a wide matrix the last values are 0.
+    """
+    triangle = np.linalg.qr(matrix, mode="r")
+    missing = np.zeros((matrix.shape[1] - len(triangle), matrix.shape[1]))
+    _, singular, vectors = np.linalg.svd(np.vstack([triangle, missing]))
+    return singular, vectors
+
+
 def analyse_identifiability(
     sensitivities: Array,
     names: Sequence[str],
@@ -116,10 +127,7 @@ def analyse_identifiability(
     residual_std  standard deviation of the scaled residuals, if it is not 1
     tolerance     relative singular value below which it counts as zero
     """
-    matrix = sensitivities * scales
-    triangle = np.linalg.qr(matrix, mode="r")
-    missing = matrix.shape[1] - len(triangle)
-    _, singular, vectors = np.linalg.svd(np.vstack([triangle, np.zeros((missing, matrix.shape[1]))]))
+    singular, vectors = singular_vectors(sensitivities * scales)
     nonzero = _is_nonzero(singular, tolerance)
     errors = np.where(nonzero, residual_std / np.where(nonzero, singular, 1.0), np.inf)
     undetermined = [

@@ -18,12 +18,12 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.arrays import Array
+from .censored_least_squares import shortened_step
 from .parameter_covariance import NORMAL_QUANTILE
 from .pooled_covariance import PooledCovariance, Sums
 
 _MAX_ITERATIONS = 100
 """Maximum number of Newton steps; the iteration is finite and took fewer than 10 in all tests."""
-_MAX_REDUCTIONS = 30
 
 
 class BoundedRows(NamedTuple):
@@ -58,14 +58,13 @@ def bounded_coefficients(rows: BoundedRows, ratio: float, start: Array) -> Array
     posterior mode of the coefficients for a normal prior and one-sided normal errors at the bounds.
     """
     coefficients, active = start, rows.active(start)
+    sum_of_squares = functools.partial(rows.sum_of_squares, ratio=ratio)
     for _ in range(_MAX_ITERATIONS):
         weighted = np.where(active, rows.weights**2, 0.0)[:, None] * rows.basis
         normal = weighted.T @ rows.basis + ratio * np.eye(start.size)
         step = np.linalg.solve(normal, weighted.T @ rows.values) - coefficients
-        limit = rows.sum_of_squares(coefficients, ratio) * (1 + 1e-12)
-        factors = 0.5 ** np.arange(_MAX_REDUCTIONS)
-        factor = next((t for t in factors if rows.sum_of_squares(coefficients + t * step, ratio) <= limit), 0.0)
-        coefficients = coefficients + factor * step
+        limit = sum_of_squares(coefficients) * (1 + 1e-12)
+        coefficients = coefficients + shortened_step(sum_of_squares, coefficients, step, limit)
         previous, active = active, rows.active(coefficients)
         if np.array_equal(active, previous):
             break

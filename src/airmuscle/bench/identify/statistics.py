@@ -15,6 +15,7 @@ from ...physics.muscle.characteristic import ContractileSurface
 from ...recording import Recording
 from ..segment.runs import RELATIVE_BAND
 from .censored_least_squares import RANK_TOLERANCE, uncensored_rank
+from .identifiability import singular_vectors
 from .parameter_covariance import ParameterCovariance, Runs, estimate_covariance
 from .problem import FitProblem
 from .solver import LeastSquaresSolution
@@ -173,10 +174,7 @@ class _Design(NamedTuple):
         active = problem.active_rows(solution.modelled)
         matrix = problem.weights[active, None] * solution.jacobian[np.ix_(active, columns)]
         norms = np.linalg.norm(matrix, axis=0)
-        # R of the QR factorisation has the singular values and right singular vectors of the tall matrix, at less cost
-        triangle = np.linalg.qr(matrix / np.where(norms > 0, norms, 1.0), mode="r")
-        _, singular, vectors = np.linalg.svd(np.vstack([triangle, np.zeros((norms.size - len(triangle), norms.size))]))
-        return cls(columns, norms, singular, vectors)
+        return cls(columns, norms, *singular_vectors(matrix / np.where(norms > 0, norms, 1.0)))
 
     @property
     def null(self) -> Mask:

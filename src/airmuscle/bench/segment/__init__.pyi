@@ -16,9 +16,9 @@ from .outliers import without_outliers as without_outliers
 from .plateaus import Plateau as Plateau
 from .plateaus import find_plateaus as find_plateaus
 from .plateaus import plateau_points as plateau_points
+from .quasi_static import maximum_rate as maximum_rate
 from .quasi_static import quasi_static_rows as quasi_static_rows
-from .rates import maximum_rate as maximum_rate
-from .rates import rate_of_change as rate_of_change
+from .quasi_static import rate_of_change as rate_of_change
 from .runs import AT_REST as AT_REST
 from .runs import FREE as FREE
 from .runs import ISOBARIC as ISOBARIC

@@ -6,13 +6,17 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
+from ...core.arrays import Array
+from ...core.plotting import BLUE, GREEN, ORANGE, PURPLE, RED, legend_below, new_figure
 from ...core.short_repr import ShortRepr
+from ...recording.display_units import display_scale
 from ...recording.recording import Recording
 from .branches import Branch, branch_column_agreement, find_branches
 from .findings import Finding, check_swept, collect_findings
 from .outliers import Outlier, find_outliers
 from .plateaus import Plateau, find_plateaus
-from .plot import plot_segments
 from .quasi_static import quasi_static_rows
 from .runs import AT_REST, Run, find_runs
 from .sampling import Sampling, analyse_sampling
@@ -81,3 +85,68 @@ def check_contents(recordings: Sequence[Recording]) -> None:
         runs = find_runs(recording, {name: s for name, s in sensors.items() if name in recording.columns})
         if len(recordings) == 1 or all(run.kind != AT_REST for run in runs):
             check_swept(recording, runs)
+
+
+_PLOTTED = ("pressure", "force", "contraction", "length", "shortening", "position", "temperature")
+_COLOURS = {1: BLUE, -1: RED}
+
+
+def plot_segments(
+    recording: Recording,
+    sensors: Mapping[str, Sensor],
+    branches: Sequence[Branch],
+    plateaus: Sequence[Plateau],
+    outliers: Sequence[Outlier],
+) -> Any:
+    """A Matplotlib figure, one axis per column: readings coloured by branch, plateaus as bars, outliers as crosses."""
+    names = [n for n in _PLOTTED if n in recording] or [n for n in recording if n != "time"]
+    if "contraction" in names and "length" in names:
+        names.remove("length")
+    abscissa: Array = recording["time"] if "time" in recording else np.arange(1.0, len(recording) + 1)
+    figure, axes = new_figure(len(names), 1, height=1.1 + 1.5 * len(names), sharex=True, squeeze=False)
+    for axis, name in zip(axes[:, 0], names, strict=True):
+        factor, unit = display_scale(name)
+        values = recording[name] * factor
+        _draw_branches(axis, branches, abscissa, values)
+        _draw_plateaus(axis, plateaus, name, abscissa, factor)
+        if outliers:  # also in axes without outliers, because the legend is that of the first axis
+            _draw_outliers(axis, [outlier.row for outlier in outliers if outlier.column == name], abscissa, values)
+        if name in sensors:
+            _draw_limits(axis, sensors[name], values, factor)
+        axis.set_ylabel(f"{name}\n[{unit}]")
+    axes[-1, 0].set_xlabel("time [s]" if "time" in recording else "row")
+    figure.align_ylabels()
+    figure.suptitle(recording.origin, fontsize=9)
+    legend_below(figure, axes[0, 0], columns=4)
+    return figure
+
+
+def _draw_branches(axis: Any, branches: Sequence[Branch], abscissa: Array, values: Array) -> None:
+    dots = {"linestyle": "none", "marker": ".", "markersize": 2.5}
+    if not branches:
+        axis.plot(abscissa, values, color=BLUE, label="measured", **dots)
+    for branch in branches:
+        rows = branch.interval.rows
+        colour, label = _COLOURS[branch.direction], branch.name
+        labels = axis.get_legend_handles_labels()[1]
+        axis.plot(abscissa[rows], values[rows], color=colour, label=None if label in labels else label, **dots)
+
+
+def _draw_plateaus(axis: Any, plateaus: Sequence[Plateau], name: str, abscissa: Array, factor: float) -> None:
+    for i, plateau in enumerate(plateaus):
+        ends = abscissa[[plateau.interval.start, plateau.interval.stop - 1]]
+        level = [plateau.values.get(name, np.nan) * factor] * 2
+        axis.plot(ends, level, color=GREEN, linewidth=1.2, label="plateau" if i == 0 else None)
+
+
+def _draw_outliers(axis: Any, rows: list[int], abscissa: Array, values: Array) -> None:
+    style = {"linestyle": "none", "marker": "x", "markersize": 6, "color": PURPLE}
+    axis.plot(abscissa[rows], values[rows], label="suspected outlier", **style)
+
+
+def _draw_limits(axis: Any, sensor: Sensor, values: Array, factor: float) -> None:
+    for limit in (sensor.lower_limit, sensor.upper_limit):
+        if np.isfinite(limit) and values.size:
+            axis.axhline(limit * factor, color=ORANGE, linestyle="--", linewidth=1.0)
+            axis.annotate("sensor limit", (0.995, limit * factor), xycoords=("axes fraction", "data"), ha="right",
+                          va="bottom", fontsize=7, color=ORANGE)  # fmt: skip

@@ -7,9 +7,9 @@ from typing import Any
 
 import airmuscle as am
 
-from ...bench.identify.band_plot import band_curves
-from ...bench.identify.equation_section import equation_section
+from ...bench.identify.curve_plots import band_curves
 from ...bench.identify.law_selection import LawSelection
+from ...bench.identify.static_fit_chapter import equation_section
 from ...report.formula import to_display_mathml
 from .fit_hints import in_page_words
 

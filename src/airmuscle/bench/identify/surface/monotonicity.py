@@ -11,6 +11,7 @@ inequalities. They are imposed on the Bernstein coefficients of the slopes of v 
 from __future__ import annotations
 
 import dataclasses
+import functools
 import itertools
 import math
 from collections.abc import Callable, Sequence
@@ -24,6 +25,7 @@ from ....core.arrays import Array
 from ....core.errors import IdentificationError
 from ....physics.muscle.characteristic.base import ContractionLaw
 from ....recording import Recording
+from ..censored_least_squares import shortened_step
 from .basis import LoadRange
 from .exponential import SurfaceFit, SurfaceProblem
 
@@ -189,15 +191,14 @@ def fit_monotone(
     coefficients = solve_constrained_least_squares(
         weights[:, None] * problem.design_matrix, weights * targets, constraints, MIN_SLOPE
     )
+    sum_of_squares = functools.partial(_sum_of_squares, problem)
     for _ in range(200):
         residuals = problem.predict(coefficients) - problem.contraction
         jacobian = problem.jacobian(coefficients)
         right = jacobian @ coefficients - residuals
         step = solve_constrained_least_squares(jacobian, right, constraints, MIN_SLOPE) - coefficients
         # where no fraction of the step reduces the sum of squares, only rounding errors are left
-        shorter = (t * step for t in 0.5 ** np.arange(20))
-        accepted = (s for s in shorter if _sum_of_squares(problem, coefficients + s) <= residuals @ residuals)
-        step = next(accepted, 0.0 * step)
+        step = shortened_step(sum_of_squares, coefficients, step, float(residuals @ residuals), halvings=20)
         coefficients = coefficients + step
         if np.abs(step).max() < 1e-10:
             return problem.build_fit(coefficients, "nonlinear least squares, monotone on the validity range")
