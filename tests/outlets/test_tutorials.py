@@ -55,3 +55,9 @@ def test_the_controller_on_a_microcontroller(tmp_path: Path, monkeypatch: pytest
     monkeypatch.chdir(tmp_path)
     run_page("tutorial-microcontroller.md", tmp_path)
     assert (tmp_path / "controller" / "pressure.h").stat().st_size > 0
+
+
+@pytest.mark.slow
+def test_from_episodes_to_a_controller(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    check(run_page("tutorial-episodes.md", tmp_path))

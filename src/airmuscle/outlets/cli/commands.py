@@ -54,6 +54,7 @@ COMMANDS = (
     CommandRow(
         "fit-regulator", "fit_regulator", "fit_regulator_command", "Identify a pressure regulator from its response."
     ),
+    CommandRow("fit-joint", "fit_joint", "fit_joint_command", "Identify a joint or an arm from its episodes."),
     CommandRow("campaign", "campaign", "campaign", "Identify a muscle from all files of a test rig."),
     CommandRow("predict", "predict", "predict", "Predict further records by an identified muscle or plant."),
     CommandRow("fit-volume", "fit_volume", "fit_volume_command", "Fit the volume of a muscle over its contraction."),

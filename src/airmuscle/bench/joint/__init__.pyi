@@ -1,0 +1,12 @@
+from .episode_files import read_episodes as read_episodes
+from .episode_inspection import EpisodeInspection as EpisodeInspection
+from .episode_inspection import PressureAction as PressureAction
+from .episode_inspection import inspect_episodes as inspect_episodes
+from .episode_mapping import Channels as Channels
+from .episode_mapping import EpisodeMapping as EpisodeMapping
+from .episode_mapping import read_episode_mapping as read_episode_mapping
+from .episodes import Episode as Episode
+from .episodes import Episodes as Episodes
+from .fit import fit_joint as fit_joint
+from .result import ArmFit as ArmFit
+from .separation import ArmParameter as ArmParameter

@@ -1,0 +1,259 @@
+"""Stochastic Gauss-Newton descent of the free run over windows, joint by joint, with exact gradients."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Mapping, Sequence
+from typing import cast
+
+import numpy as np
+
+from ...core import tree
+from ...core.arrays import Array
+from ...core.declaration import model
+from ...core.ops import Value, Values
+from ...core.system import StateVariable, System
+from ...engine import RungeKutta4, WithSensitivities, sensitivity, simulate_batch
+from ...physics import PressureDriven, SerialArm, WithStickSlip
+from .windows import HISTORY, Windows, WindowSignal, start_of
+
+SUBSTEPS = 3
+"""Steps of the integrator in a row."""
+CLIP, OUTLIER = 0.3, 3.0
+"""Errors [rad] from which a residual counts less, and not at all: contact or a lost sensor (chosen)."""
+MEMORY, RATE, DAMPING, MAX_CHANGE = 0.9, 0.3, 1e-2, 0.4
+"""Share of the past in the running averages, step, damping, greatest relative change of a parameter (chosen)."""
+PRIOR = 30.0
+"""Weight of a prior value, in windows times rows with an error of one standard deviation (chosen)."""
+LOW = {"presliding_angle": 1.5e-3, "lags": 2e-3, "rotor_inertia": 1e-3, "stribeck_speed": 0.1, "slack_width": 0.3}
+"""Lower limits of a search above those of the model, which the step of the integrator resolves (chosen)."""
+SIZES = {
+    "damping": 0.3, "coulomb_torque": 0.5, "load_arms": 4e-3, "presliding_angle": 2e-3, "lags": 0.01, "mass": 0.15,
+    "static_excess": 0.3, "stribeck_speed": 1.0, "zero_angle": 1.0, "rotor_inertia": 0.03, "centre": 0.05,
+    "slack_width": 5.0, "inertia": 0.03,
+}  # fmt: skip
+"""Typical sizes [SI] of parameters that may start at 0 (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class SearchStage:
+    """Iterations with windows of `rows` rows, `batch` windows each; the estimate is the mean of the last ones."""
+
+    rows: int
+    iterations: int
+    batch: int = 240
+    averaged: int = 30
+
+
+@dataclasses.dataclass(eq=False)
+class Descent:
+    """Search for the parameters of an arm; `paths` are, for some of the joints, those that their motion depends on."""
+
+    arm: PressureDriven
+    windows: Windows
+    paths: Mapping[int, Sequence[str]]
+    seed: int = 0
+    prior: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    """Values towards which parameters are drawn that the record hardly determines, by path."""
+
+    def __post_init__(self) -> None:
+        leaves = {leaf.path: leaf for leaf in tree.leaves(self.arm)}
+        self.names = list(dict.fromkeys(path for own in self.paths.values() for path in own))
+        self.values = np.array([float(leaves[path].value) for path in self.names])
+        self.sizes = np.array([typical_size(path, leaves) for path in self.names])
+        self.low = np.array([max(leaves[p].declared.bounds[0], LOW.get(_field(p), -np.inf)) for p in self.names])
+        self.high = np.array([leaves[p].declared.bounds[1] for p in self.names])
+        self.rng = np.random.default_rng(self.seed)
+        self.spread = np.full(len(self.paths), 0.1)
+
+    def run(self, schedule: SearchStage) -> list[Array]:
+        """Descend; returns the rms error [rad] of each joint at every iteration. Afterwards `arm` is the estimate."""
+        count = len(self.names)
+        normal, slope, tail, errors = np.zeros((count, count)), np.zeros(count), [], []
+        for step in range(schedule.iterations):
+            which = self.rng.permutation(len(self.windows))[: schedule.batch]
+            batch = self.windows.part(np.sort(which), schedule.rows)
+            found = [self._of_joint(joint, batch) for joint in self.paths]
+            self.spread = np.array(
+                [0.9 * s + 0.1 * max(e, 1e-3) for s, (*_, e) in zip(self.spread, found, strict=True)]
+            )
+            new_normal, new_slope = self._sum(found)
+            normal, slope = MEMORY * normal + (1 - MEMORY) * new_normal, MEMORY * slope + (1 - MEMORY) * new_slope
+            last = step >= schedule.iterations - schedule.averaged
+            self._step(normal, slope, 0.4 * RATE if last else RATE)
+            errors.append(np.array([e for *_, e in found]))
+            if last:
+                tail.append(self.values.copy())
+        self.values = np.mean(tail, axis=0)
+        self.arm = with_values(self.arm, self.names, self.values)
+        return errors
+
+    def _of_joint(self, joint: int, batch: Windows) -> tuple[Array, Array, float]:
+        """Normal matrix and slope of one joint in its own parameters, and its rms error [rad]."""
+        error, gradient = gradients(self.arm, joint, self.paths[joint], batch)
+        lost = ~np.isfinite(error) | (np.abs(error) > OUTLIER) | ~np.isfinite(gradient).all(axis=-1)
+        error, gradient = np.where(lost, 0.0, error), np.where(lost[..., None], 0.0, gradient)
+        weighted = gradient / np.sqrt(1.0 + (error / CLIP) ** 2)[..., None]
+        count = gradient.shape[-1]
+        flat = weighted.reshape(-1, count).T
+        return flat @ gradient.reshape(-1, count), flat @ error.ravel(), float(np.sqrt(np.mean(error**2)))
+
+    def _sum(self, found: Sequence[tuple[Array, Array, float]]) -> tuple[Array, Array]:
+        place = {name: i for i, name in enumerate(self.names)}
+        normal, slope = np.zeros((len(place), len(place))), np.zeros(len(place))
+        for own, (matrix, vector, _), spread in zip(self.paths.values(), found, self.spread, strict=True):
+            which = [place[path] for path in own]
+            normal[np.ix_(which, which)] += matrix / spread**2
+            slope[which] += vector / spread**2
+        return normal, slope
+
+    def _step(self, normal: Array, slope: Array, rate: float) -> None:
+        pull = np.array([PRIOR * (name in self.prior) for name in self.names]) / self.sizes**2
+        slope = slope + pull * (self.values - [self.prior.get(name, 0.0) for name in self.names])
+        normal = normal + np.diag(pull)
+        scale = np.sqrt(np.diag(normal))
+        scale = scale + 1e-6 * np.max(scale * self.sizes) / self.sizes
+        change = -np.linalg.solve(normal / np.outer(scale, scale) + DAMPING * np.eye(len(slope)), slope / scale) / scale
+        limit = MAX_CHANGE * np.maximum(np.abs(self.values), self.sizes)
+        self.values = np.clip(self.values + np.clip(rate * change, -limit, limit), self.low, self.high)
+        self.arm = with_values(self.arm, self.names, self.values)
+
+
+def gradients(arm: PressureDriven, joint: int, paths: Sequence[str], windows: Windows) -> tuple[Array, Array]:
+    """Errors of the free run of one joint (N, rows) [rad] and their derivatives (N, rows, P) by the parameters.
+
+    The other joints move as measured.
+    """
+    system = OneJoint(arm, joint)
+    columns = tuple((f"arm.{path}",) for path in paths)
+    known = start_of(arm, windows)
+    state, zero = {s.name: known[s.name] for s in system.states}, np.zeros(len(windows))
+    nothing: dict[str, Array] = {}
+    for k, path in enumerate(paths):
+        moved = _start_slope(arm, path, known, windows) if _field(path) in ("presliding_angle", "lags") else nothing
+        state |= {sensitivity(s.name, k): moved.get(s.name, zero) for s in system.states}
+    angle = system.states[0].name
+    observed = WithSensitivities(system, columns, (1.0,) * len(paths), observed=(angle,))
+    keep = [angle, *(sensitivity(angle, k) for k in range(len(paths)))]
+    run = simulate_batch(
+        observed, {}, signals(system, windows), duration=windows.rows * windows.sample_time, initial_states=state,
+        output_times=windows.sample_time * np.arange(windows.rows + 1),
+        integrator=RungeKutta4(windows.sample_time / SUBSTEPS), keep=keep,
+    )  # fmt: skip
+    error = run[angle][:, 1:] - windows.angle[:, HISTORY + 1 :, joint]
+    return error, np.stack([run[name][:, 1:] for name in keep[1:]], axis=-1)
+
+
+def _start_slope(arm: PressureDriven, path: str, known: Mapping[str, Array], windows: Windows) -> dict[str, Array]:
+    """Derivative of the initial state by a parameter on which it depends."""
+    value = next(float(leaf.value) for leaf in tree.leaves(arm) if leaf.path == path)
+    step = 1e-4 * value
+    moved = start_of(with_values(arm, [path], [value + step]), windows)
+    return {name: (moved[name] - known[name]) / step for name in known}
+
+
+def signals(system: OneJoint, windows: Windows) -> list[WindowSignal]:
+    """The inputs of one joint in every window: pressures, and the measured motion of the other joints."""
+    motion = [
+        column[:, HISTORY:, i] for i in system.others for column in (windows.angle, windows.rate, windows.acceleration)
+    ]
+    stacked = np.concatenate([windows.pressure[:, HISTORY:], *(m[..., None] for m in motion)], axis=-1)
+    return [WindowSignal(np.ascontiguousarray(each), windows.sample_time) for each in stacked]
+
+
+def with_values(arm: PressureDriven, paths: Sequence[str], values: Sequence[float] | Array) -> PressureDriven:
+    """The arm with other values of these parameters."""
+    place = {leaf.path: i for i, leaf in enumerate(tree.leaves(arm))}
+    flat = np.array(tree.flatten(arm))
+    flat[[place[path] for path in paths]] = values
+    changed: PressureDriven = tree.unflatten(arm, flat.tolist())
+    return changed
+
+
+def _field(path: str) -> str:
+    return path.rsplit(".", 1)[-1].split("[", maxsplit=1)[0]
+
+
+def typical_size(path: str, leaves: Mapping[str, tree.Leaf]) -> float:
+    """Typical size of a parameter; the coefficients of a polynomial in the contraction grow tenfold with each power."""
+    field = _field(path)
+    if field not in ("area", "passive_force"):
+        return SIZES[field]
+    first = path[: path.rindex("[")] + "[0]"
+    return float(max(abs(leaves[first].value), 1e-9) * 10.0 ** int(path[path.rindex("[") + 1 : -1]))
+
+
+@model
+class OneJoint(System):
+    """Joint j of an arm: M_jj theta_j'' = tau_j - sum_i M_ji theta_i'' - h_j + Q_f, the other joints i as inputs.
+
+    M, h and the friction Q_f are those of the arm, so that a fit of all its joints in this form finds the parameters of
+    the arm, but no system has more states than one joint. Inputs are the measured pressures, and angle, speed and
+    acceleration of the other joints. The muscles of the joint act with their lags; the tensions of the others, which
+    load its friction, follow their readings at once.
+    """
+
+    arm: PressureDriven
+    joint: int
+    """Number of the joint, from 0."""
+
+    @property
+    def mechanism(self) -> SerialArm:
+        """The arm without its friction."""
+        return cast(SerialArm, cast(WithStickSlip, self.arm.mechanism).inner)
+
+    @functools.cached_property
+    def own(self) -> tuple[int, ...]:
+        """Numbers of the muscles that cross the joint."""
+        return tuple(i for i, route in enumerate(self.mechanism.routes) if self.joint + 1 in route.joints)
+
+    @functools.cached_property
+    def others(self) -> tuple[int, ...]:
+        """Numbers of the other joints."""
+        return tuple(i for i in range(len(self.mechanism.links)) if i != self.joint)
+
+    @functools.cached_property
+    def states(self) -> tuple[StateVariable, ...]:
+        c = self.mechanism.coordinates[self.joint]
+        bristle = cast(WithStickSlip, self.arm.mechanism).inner_states[self.joint]
+        lagged = {f"{self.arm.prefixes[i]}pressure" for i in self.own}
+        return (*c.states, bristle, *(s for s in self.arm.states if s.name in lagged))
+
+    @functools.cached_property
+    def inputs(self) -> tuple[str, ...]:
+        motion = [self.mechanism.coordinates[i] for i in self.others]
+        return (*self.arm.inputs, *(n for c in motion for n in (c.name, c.speed, c.acceleration)))
+
+    def rates(self, state: Values, inputs: Values) -> dict[str, Value]:
+        mechanism, c = self.mechanism, self.mechanism.coordinates[self.joint]
+        place = {**inputs, **state}
+        pressures = [
+            state[f"{p}pressure"] if i in self.own else inputs[f"{p}measured_pressure"]
+            for i, p in enumerate(self.arm.prefixes)
+        ]
+        lengths = self.arm.resting_lengths
+        tensions = [
+            muscle.tension(p, eps)
+            for muscle, p, eps in zip(self.arm.muscle, pressures, mechanism.contractions(place, lengths), strict=True)
+        ]
+        others = {mechanism.coordinates[i].name: inputs[mechanism.coordinates[i].acceleration] for i in self.others}
+        needed = mechanism.inverse_dynamics(place, place, {**others, c.name: 0.0})[c.name]
+        torque = mechanism.generalised_forces(place, tensions, lengths)[c.name]
+        element = cast(WithStickSlip, self.arm.mechanism).elements[self.joint]
+        load = sum((mu * tension for mu, tension in zip(element.load_arms, tensions, strict=False)), 0.0)
+        bristle = state[self.states[2].name]
+        friction = element.torque(bristle, load, state[c.speed])
+        rates = {
+            c.name: state[c.speed],
+            c.speed: (torque + friction - needed) / mechanism.mass_matrix(place)[self.joint][self.joint],
+            self.states[2].name: element.bristle_rate(bristle, state[c.speed]),
+        }
+        for i in self.own:
+            prefix = self.arm.prefixes[i]
+            reading = inputs[f"{prefix}measured_pressure"]
+            rates[f"{prefix}pressure"] = (reading - state[f"{prefix}pressure"]) / self.arm.lags[i]
+        return rates
+
+    def outputs(self, state: Values, inputs: Values) -> dict[str, Value]:
+        return {}

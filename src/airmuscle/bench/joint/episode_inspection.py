@@ -1,0 +1,233 @@
+"""Inspection of episodes: rates, ranges, which pressure acts on which angle, and what forbids an identification."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...core.arrays import Array
+from ...core.errors import IdentificationError
+from .episodes import Episode, Episodes, speed_of
+
+MAX_DELAY = 8
+"""Greatest delay of the pressure sensors that is looked for [rows] (chosen)."""
+CERTAIN, CLEAR = 5.0, 1.25
+"""t-value from which a pressure acts on an angle, and its ratio to that of the next joint (chosen)."""
+JUMP = np.pi
+"""Change of an angle between two rows [rad] that no arm makes."""
+SPEED_RATIO = 1.15
+"""Ratio of the slope of the angles to the speeds, or of its inverse, that a wrong sample time explains (chosen)."""
+SATURATED = 0.02
+"""Share of rows exactly at an end of the range of a reading that counts as saturation (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class PressureAction:
+    """Muscle (from 1) and the joint (from 1) on whose acceleration its pressure acts most.
+
+    `sign` of the action, t-value of its regression coefficient, and that of the next joint.
+    """
+
+    muscle: int
+    joint: int
+    sign: int
+    t_value: float
+    next_t_value: float
+
+    @property
+    def certain(self) -> bool:
+        return self.t_value > CERTAIN and self.t_value > CLEAR * self.next_t_value
+
+    def __str__(self) -> str:
+        way = "raises" if self.sign > 0 else "lowers"
+        doubt = "" if self.certain else ", uncertain"
+        t = f"t = {self.t_value:.0f}, next joint {self.next_t_value:.0f}{doubt}"
+        return f"pressure {self.muscle} {way} angle {self.joint} ({t})"
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class EpisodeInspection:
+    """Findings on episodes; `print` it. `errors` forbid a fit, `remarks` do not; `delay` of the pressures [rows]."""
+
+    episodes: Episodes
+    delay: int
+    actions: tuple[PressureAction, ...]
+    errors: tuple[str, ...]
+    remarks: tuple[str, ...]
+
+    @property
+    def pairs(self) -> tuple[tuple[int, int], ...]:
+        """For each joint the muscle that raises its angle and the one that lowers it, from 1.
+
+        Raises IdentificationError where the pressures do not show it with certainty.
+        """
+        found = []
+        for joint in range(1, self.episodes.joints + 1):
+            own = [a for a in self.actions if a.joint == joint and a.certain]
+            up, down = [a.muscle for a in own if a.sign > 0], [a.muscle for a in own if a.sign < 0]
+            if (len(up), len(down)) != (1, 1):
+                raise IdentificationError(
+                    f"joint {joint}: {len(up)} pressures raise its angle and {len(down)} lower it with certainty; "
+                    "one of each is needed. State the muscles of each joint in the mapping file: pairs = [[1, 2], ...]."
+                )
+            found.append((up[0], down[0]))
+        return tuple(found)
+
+    def __str__(self) -> str:
+        e = self.episodes
+        lengths = [len(run) for run in e.runs]
+        total = sum(lengths) * e.sample_time
+        lines = [
+            f"{len(e)} episodes of {min(lengths)} to {max(lengths)} rows at {1 / e.sample_time:.4g} Hz, {total:.4g} s; "
+            f"{e.joints} joints, {e.muscles} pressures that lag the motion by {self.delay} rows",
+            *(_range_line(f"angle {i}", np.degrees(x), "deg") for i, x in enumerate(e.rows("angle").T, 1)),
+            *(_range_line(f"pressure {i}", x / 1e3, "kPa") for i, x in enumerate(e.rows("pressure").T, 1)),
+            *map(str, self.actions),
+            *(f"remark: {each}" for each in self.remarks),
+            *(f"error: {each}" for each in self.errors),
+        ]
+        return "\n".join(lines)
+
+
+def inspect_episodes(episodes: Episodes, pairs: Sequence[tuple[int, int]] = ()) -> EpisodeInspection:
+    """Inspect episodes before a fit; with `pairs`, the muscles that are said to raise and lower each angle."""
+    errors = [*_jumps(episodes), *_constant(episodes), *_sample_time(episodes)]
+    delay, actions = (0, ()) if errors else _actions(episodes)
+    errors += _exchanged(actions, pairs)
+    return EpisodeInspection(episodes, delay, actions, tuple(errors), tuple(_saturated(episodes) + _scale(episodes)))
+
+
+def check_episodes(inspection: EpisodeInspection) -> None:
+    """Raise IdentificationError with the first finding that forbids a fit."""
+    if inspection.errors:
+        raise IdentificationError(inspection.errors[0])
+
+
+def _range_line(name: str, values: Array, unit: str) -> str:
+    low, middle, high = np.quantile(values, (0.01, 0.5, 0.99))
+    return f"{name}: {low:.4g} to {high:.4g} {unit} (1 to 99 %), median {middle:.4g}"
+
+
+def _jumps(episodes: Episodes) -> list[str]:
+    for run in episodes.runs:
+        rows, joints = np.nonzero(np.abs(np.diff(run.angle, axis=0)) > JUMP)
+        if len(rows):
+            a, b = np.degrees(run.angle[rows[0] : rows[0] + 2, joints[0]])
+            return [
+                f"{run.name}: angle {joints[0] + 1} jumps from {a:.4g} to {b:.4g} deg at row {rows[0] + 2}, as an "
+                "encoder does that wraps after a turn. Unwrap the angles (numpy.unwrap) and write the files again."
+            ]
+    return []
+
+
+def _constant(episodes: Episodes) -> list[str]:
+    pressure = episodes.rows("pressure")
+    dead = [i for i, spread in enumerate(np.ptp(pressure, axis=0), start=1) if not spread > 0.0]
+    return [
+        f"pressure {i} never varies, it is {pressure[0, i - 1]:.4g} Pa in all rows: its sensor does not record. Leave "
+        "its joint out, or give commands in its place."
+        for i in dead
+    ]
+
+
+def _sample_time(episodes: Episodes) -> list[str]:
+    """Slope of the angles against the measured speeds, which a wrong sample time multiplies."""
+    slope = np.concatenate([speed_of(run.angle, episodes.sample_time) for run in episodes.runs])
+    speed = episodes.rows("speed")
+    ratio = np.median(np.sum(slope * speed, axis=0) / np.maximum(np.sum(speed**2, axis=0), 1e-12))
+    if 1 / SPEED_RATIO < ratio < SPEED_RATIO:
+        return []
+    return [
+        f"angles move {ratio:.3g} times as fast as the speeds say: the sample time of {1e3 * episodes.sample_time:.4g} "
+        f"ms or the scale of the speeds is wrong. They agree with {1e3 * ratio * episodes.sample_time:.4g} ms, or with "
+        f"speeds multiplied by {ratio:.4g}. State sample_time or speeds.scale in the mapping file."
+    ]
+
+
+def _actions(episodes: Episodes) -> tuple[int, tuple[PressureAction, ...]]:
+    """Delay of the pressures, and what each acts on: regression of accelerations on pressures, angles and speeds."""
+    blocks = [b for b in map(functools.partial(_block, step=episodes.sample_time), episodes.runs) if b is not None]
+    if not blocks:
+        return 0, ()
+    costs = [_regress(blocks, delay)[1] for delay in range(MAX_DELAY + 1)]
+    delay = int(np.argmin(costs))
+    t_values = _regress(blocks, delay)[0]
+    actions = []
+    for m, row in enumerate(t_values, start=1):
+        order = np.argsort(-np.abs(row))
+        following = float(abs(row[order[1]])) if len(row) > 1 else 0.0
+        actions.append(
+            PressureAction(m, int(order[0]) + 1, int(np.sign(row[order[0]])), float(abs(row[order[0]])), following)
+        )
+    return delay, tuple(actions)
+
+
+def _block(run: Episode, step: float) -> tuple[Array, Array, Array] | None:
+    if len(run) < 2 * MAX_DELAY + 8:
+        return None
+    speed = speed_of(run.angle, step)
+    return speed_of(speed, step), np.concatenate([run.angle, speed], axis=1), run.pressure
+
+
+def _regress(blocks: Sequence[tuple[Array, Array, Array]], delay: int) -> tuple[Array, float]:
+    """t-values (M, J) of the pressures, with errors that are independent between episodes only, and the residual."""
+    rows = slice(4, -MAX_DELAY - 1)
+    x = [np.concatenate([p[4 + delay : len(p) - MAX_DELAY - 1 + delay], s[rows]], axis=1) for _, s, p in blocks]
+    y = [a[rows] for a, _, _ in blocks]
+    whole, target = np.concatenate(x), np.concatenate(y)
+    mean, spread = whole.mean(axis=0), whole.std(axis=0) + 1e-12
+    design = np.column_stack([(whole - mean) / spread, np.ones(len(whole))])
+    inverse = np.linalg.pinv(design.T @ design)
+    coefficients = inverse @ (design.T @ target)
+    residual = target - design @ coefficients
+    muscles, ends = blocks[0][2].shape[1], np.cumsum([len(each) for each in x])[:-1]
+    pieces = zip(np.split(design, ends), np.split(residual, ends), strict=True)
+    scores = np.array([a.T @ r for a, r in pieces])
+    t_values = np.empty((muscles, target.shape[1]))
+    for j in range(target.shape[1]):
+        covariance = inverse @ (scores[:, :, j].T @ scores[:, :, j]) @ inverse
+        t_values[:, j] = coefficients[:muscles, j] / np.sqrt(np.maximum(np.diag(covariance)[:muscles], 1e-300))
+    return t_values, float(np.sum(residual.var(axis=0) / target.var(axis=0)))
+
+
+def _exchanged(actions: Sequence[PressureAction], pairs: Sequence[tuple[int, int]]) -> list[str]:
+    by_muscle, found = {a.muscle: a for a in actions}, []
+    for joint, pair in enumerate(pairs, start=1):
+        for muscle, sign in zip(pair, (1, -1), strict=True):
+            action = by_muscle.get(muscle)
+            if action and action.certain and (action.joint != joint or action.sign != sign):
+                said = f"{'raises' if sign > 0 else 'lowers'} angle {joint}"
+                found.append(
+                    f"muscles are exchanged: the mapping says that pressure {muscle} {said}, the record that {action}. "
+                    "Correct pairs in the mapping file."
+                )
+    return found
+
+
+def _saturated(episodes: Episodes) -> list[str]:
+    found = []
+    for i, values in enumerate(episodes.rows("pressure").T, start=1):
+        for edge in (values.min(), values.max()):
+            share = float(np.mean(values == edge))
+            if share > SATURATED and np.ptp(values) > 0.0:
+                found.append(
+                    f"pressure {i} is {edge:.4g} Pa in {100 * share:.0f} % of the rows: its reading saturates there, "
+                    "or the muscle is empty"
+                )
+    return found
+
+
+def _scale(episodes: Episodes) -> list[str]:
+    pressure = episodes.rows("pressure")
+    high = float(np.quantile(np.abs(pressure), 0.99))
+    whole = bool(np.all(pressure == np.round(pressure)))
+    if high < 1e4 or whole:
+        kind = "whole numbers, as counts" if whole else "small, as shares of a range"
+        return [
+            f"pressures look like a scale and not like Pa: they are {kind}, up to {high:.4g}. Zero and gain are "
+            "absorbed by the reduced law; state pressures.scale for forces of the right size"
+        ]
+    return []

@@ -1,0 +1,105 @@
+"""Free run of an arm over windows: errors against the horizon, bands, and the baselines that a model must beat."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from ...core.arrays import Array
+from ...engine import RungeKutta4, simulate_batch
+from ...physics import PressureDriven
+from .descent import SUBSTEPS
+from .episodes import Episode, Episodes
+from .windows import HISTORY, Windows, WindowSignal, cut, start_of
+
+COVERAGE = 0.95
+"""Share of the errors that a band holds."""
+
+
+def free_run(arm: PressureDriven, windows: Windows) -> Array:
+    """Angles (N, rows, J) [rad] from the start of every window and the pressures alone, all joints at once.
+
+    A run that fails keeps the angles of its start.
+    """
+    names = [c.name for c in arm.mechanism.coordinates]
+    inputs = [WindowSignal(np.ascontiguousarray(p), windows.sample_time) for p in windows.pressure[:, HISTORY:]]
+    run = simulate_batch(
+        arm, {}, inputs, duration=windows.rows * windows.sample_time, initial_states=start_of(arm, windows),
+        output_times=windows.sample_time * np.arange(windows.rows + 1),
+        integrator=RungeKutta4(windows.sample_time / SUBSTEPS), keep=names,
+    )  # fmt: skip
+    found = np.stack([run[name] for name in names], axis=-1)[:, 1:]
+    kept = windows.angle[:, HISTORY : HISTORY + 1]
+    return np.where(np.isfinite(found) & (np.abs(found - kept) < 2 * np.pi), found, kept)
+
+
+def rms(errors: Array, axis: tuple[int, ...] = (0, 1)) -> Array:
+    """Root mean square of errors (N, rows, J) over windows and rows, per joint."""
+    return np.asarray(np.sqrt(np.mean(errors**2, axis=axis)))
+
+
+def band(errors: Array) -> Array:
+    """Half-width (rows, J) of the band that holds COVERAGE of these errors at every row, growing with the horizon."""
+    level = min(1.0, COVERAGE * (1 + 1 / len(errors)))  # so that it holds for one further window, too
+    return np.asarray(np.maximum.accumulate(np.quantile(np.abs(errors), level, axis=0, method="higher"), axis=0))
+
+
+def coverage(errors: Array, episode: Array) -> Array:
+    """Share (J,) of errors inside a band that comes from the other half of the episodes, both ways."""
+    odd = np.searchsorted(np.unique(episode), episode) % 2 == 1
+    held = [np.abs(errors[part]) <= band(errors[~part]) for part in (odd, ~odd)]
+    return np.asarray(np.mean(np.concatenate(held), axis=(0, 1)))
+
+
+# Baselines: persistence, and a linear ARX model of all joints
+
+DEPTH, RIDGE = 4, 1e-6
+"""Rows of angles and pressures that the ARX model sees, and its regularisation (chosen)."""
+LIMIT = 9.0
+"""Limit of an angle [rad], so that an unstable prediction ends in a large error and not in infinity."""
+
+Predict = Callable[[Windows], Array]
+
+
+def baseline_errors(train: Episodes, judge: Episodes, rows: int) -> Mapping[str, Array]:
+    """Errors (N, rows, J) [rad] of the free run of each baseline over the windows of `judge`, by its name."""
+    windows = cut(judge, 0, rows)
+    known = {"persistence": persistence, f"ARX of depth {DEPTH}": fit_arx(train)}
+    return {name: predict(windows) - windows.angle[:, HISTORY + 1 :] for name, predict in known.items()}
+
+
+def persistence(windows: Windows) -> Array:
+    """The angles at the start of every window, for all its rows."""
+    return np.repeat(windows.angle[:, HISTORY : HISTORY + 1], windows.rows, axis=1)
+
+
+def fit_arx(train: Episodes) -> Predict:
+    """Linear ARX model of the change of all angles, by least squares from DEPTH rows of all angles and pressures and
+    the pressures of the next row."""
+    pieces = [_regressors(run) for run in train.runs if len(run) > DEPTH + 1]
+    x, y = (np.concatenate(part) for part in zip(*pieces, strict=True))
+    mean, spread = x.mean(axis=0), x.std(axis=0) + 1e-9
+    design = np.column_stack([(x - mean) / spread, np.ones(len(x))])
+    normal = design.T @ design + RIDGE * len(design) * np.eye(design.shape[1])
+    coefficients = np.linalg.solve(normal, design.T @ y)
+
+    def predict(windows: Windows) -> Array:
+        angle = windows.angle[:, : HISTORY + 1].copy()
+        for row in range(HISTORY, HISTORY + windows.rows):
+            past = angle[:, row - DEPTH + 1 : row + 1].reshape(len(angle), -1)
+            pressure = windows.pressure[:, row - DEPTH + 1 : row + 2].reshape(len(angle), -1)
+            scaled = (np.concatenate([past, pressure], axis=1) - mean) / spread
+            following = angle[:, -1] + scaled @ coefficients[:-1] + coefficients[-1]
+            angle = np.concatenate([angle, np.clip(following, -LIMIT, LIMIT)[:, None]], axis=1)
+        return angle[:, HISTORY + 1 :]
+
+    return predict
+
+
+def _regressors(run: Episode) -> tuple[Array, Array]:
+    count = len(run) - DEPTH
+    past = sliding_window_view(run.angle, DEPTH, axis=0)[:count].transpose(0, 2, 1).reshape(count, -1)
+    pressure = sliding_window_view(run.pressure, DEPTH + 1, axis=0).transpose(0, 2, 1).reshape(count, -1)
+    return np.concatenate([past, pressure], axis=1), run.angle[DEPTH:] - run.angle[DEPTH - 1 : -1]

@@ -1,0 +1,91 @@
+"""`airmuscle fit-joint`: a joint or an arm identified from episodes of its pressures and angles."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from ...bench.joint import ArmFit, fit_joint, inspect_episodes, read_episode_mapping, read_episodes
+from ...bench.joint.chapter import joint_chapter
+from ...core.atomic_output import atomic_folder, check_writable
+from ...files.library.write import scenario_toml
+from ...report.write import write_into
+from .options import Folder, Json
+from .terminal import echo, print_json
+
+DURATION = 2.0
+"""Duration [s] of the scenario that is written (chosen)."""
+
+
+def fit_joint_command(
+    source: Annotated[Path, typer.Argument(metavar="EPISODES", help="A folder of episodes, or one file with all.")],
+    mapping: Annotated[Path, typer.Option(metavar="FILE", help="Mapping file (TOML): which column is what.")],
+    inspect: Annotated[bool, typer.Option("--inspect", help="State what the record contains; fit nothing.")] = False,
+    left_out: Annotated[float, typer.Option(metavar="SHARE", help="Share of the episodes that judges the fit.")] = 0.1,
+    horizon: Annotated[int, typer.Option(min=5, max=1000, metavar="ROWS", help="Rows of the free run.")] = 40,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the order of the windows.")] = 0,
+    out: Folder = Path("joint"),
+    json: Json = False,
+) -> None:
+    """Identify a joint or an arm from its episodes.
+
+    \b
+    Episodes are short records with angles of the joints and pressures of their muscles: CSV, NPZ, JSON, HDF5 or
+    Parquet, one file each or one for all. The mapping file says which column is what, in which unit, and may state
+    the muscles of each joint and the axes of the joints. The free run is judged on the last episodes, beside
+    persistence and a linear ARX model. Writes DIR/report.html and DIR/scenario.toml, the arm with a
+    pressure regulator for each muscle, which simulate, tune and export take.
+
+    \b
+    Examples:
+      airmuscle fit-joint episodes/ --mapping arm.toml --inspect
+      airmuscle fit-joint episodes.npz --mapping arm.toml --out arm
+    """
+    check_writable(out)
+    rules = read_episode_mapping(mapping)
+    episodes = read_episodes(source, rules)
+    if inspect:
+        echo(str(inspect_episodes(episodes, rules.pairs)))
+        return
+    fit = fit_joint(
+        episodes, pairs=rules.pairs, axes=rules.axes, left_out=left_out, rows=horizon, seed=seed,
+        progress=lambda text: None if json else echo(text),
+    )  # fmt: skip
+    _write(fit, f"Arm identified from {source.name}", out)
+    if json:
+        print_json(_to_dict(fit))
+        return
+    echo(str(fit))
+    echo(f"plant: {out / 'scenario.toml'}")
+    echo(f"report: {out / 'report.html'}")
+
+
+def _write(fit: ArmFit, title: str, out: Path) -> None:
+    names = [muscle.name for muscle in fit.arm.muscle]
+    middle = np.median(fit.inspection.episodes.rows("pressure"), axis=0)
+    levels = [max(float(middle[muscle - 1]), 0.0) for pair in fit.pairs for muscle in pair]
+    held = {f"{name}.setpoint": [[0.0, level]] for name, level in zip(names, levels, strict=True)}
+    run = {"duration": DURATION, "initial_state": {"pressure": float(np.mean(levels))}}
+    with atomic_folder(out) as folder:
+        text = scenario_toml(title, fit.plant(), held, run, "supply, orifices and volumes are chosen")
+        (folder / "scenario.toml").write_text(text, encoding="utf-8")
+        write_into(folder, [joint_chapter(fit, title)], title="Identified arm")
+
+
+def _to_dict(fit: ArmFit) -> dict[str, Any]:
+    """A fit of an arm as plain data, all numbers SI."""
+    return {
+        "pairs": [list(pair) for pair in fit.pairs],
+        "delay_rows": fit.inspection.delay,
+        "rms": fit.rms.tolist(),
+        "skill": fit.skill.tolist(),
+        "best_baseline": list(fit.best_baseline),
+        "coverage": fit.coverage.tolist(),
+        "horizon": fit.horizon.tolist(),
+        "band": fit.band.tolist(),
+        "parameters": [{"path": e.path, "value": e.value, "standard_error": e.standard_error} for e in fit.estimates],
+        "remarks": list(fit.remarks),
+    }

@@ -1,0 +1,232 @@
+"""Episodes of an arm: every format gives the same numbers, and what a record hides or contradicts is named."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from arm_episodes import STEP, changed, made_episodes
+
+from airmuscle.bench import fit_joint, inspect_episodes, read_episodes
+from airmuscle.bench.joint.windows import cut
+from airmuscle.errors import ColumnError, FileError, IdentificationError, ParameterError
+
+MADE = made_episodes(3)
+JOINT = made_episodes(20, delay=3)
+ONE_FILE = """
+sample_time = "10 ms"
+starts = "start"
+[angles]
+columns = ["q"]
+unit = "deg"
+[speeds]
+columns = "v"
+scale = 10
+[pressures]
+columns = ["counts"]
+divisors = "divisors"
+scale = "1 kPa"
+"""
+COLUMNS = """
+time = "t"
+[angles]
+columns = ["q1"]
+[pressures]
+columns = ["p1", "p2"]
+"""
+
+
+def by_columns(run):
+    return {"t": STEP * np.arange(len(run)), "q1": run.angle[:, 0], "p1": run.pressure[:, 0], "p2": run.pressure[:, 1]}
+
+
+def write_csv(folder, run, number):
+    table = by_columns(run)
+    rows = "\n".join(",".join(map(repr, map(float, row))) for row in zip(*table.values(), strict=True))
+    (folder / f"{number}.csv").write_text(",".join(table) + "\n" + rows + "\n")
+
+
+def write_npz(folder, run, number):
+    np.savez(folder / f"{number}.npz", **by_columns(run))
+
+
+def write_json(folder, run, number):
+    (folder / f"{number}.json").write_text(json.dumps({n: c.tolist() for n, c in by_columns(run).items()}))
+
+
+def write_hdf5(folder, run, number):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(folder / f"{number}.h5", "w") as file:
+        for name, column in by_columns(run).items():
+            file[name] = column
+
+
+def write_parquet(folder, run, number):
+    pyarrow = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    parquet.write_table(pyarrow.table(by_columns(run)), folder / f"{number}.parquet")
+
+
+@pytest.fixture
+def mapping(tmp_path):
+    def write(text):
+        path = tmp_path / "mapping.toml"
+        path.write_text(text)
+        return path
+
+    return write
+
+
+@pytest.mark.parametrize("write", [write_csv, write_npz, write_json, write_hdf5, write_parquet])
+def test_a_folder_with_one_file_for_each_episode(tmp_path, mapping, write):
+    folder = tmp_path / "episodes"
+    folder.mkdir()
+    for number, run in enumerate(MADE.runs):
+        write(folder, run, number)
+    read = read_episodes(folder, mapping(COLUMNS))
+    assert read.sample_time == pytest.approx(STEP)
+    for one, other in zip(read.runs, MADE.runs, strict=True):
+        np.testing.assert_allclose(one.angle, other.angle, rtol=1e-12)
+        np.testing.assert_allclose(one.pressure, other.pressure, rtol=1e-12)
+        np.testing.assert_allclose(one.speed[5:-5], other.speed[5:-5], atol=0.3)
+
+
+def test_one_file_for_all_with_starts_scales_and_divisors(tmp_path, mapping):
+    lengths = np.cumsum([0, *map(len, MADE.runs)])
+    np.savez(
+        tmp_path / "all.npz", start=lengths, q=np.degrees(MADE.rows("angle")), v=MADE.rows("speed") / 10,
+        counts=MADE.rows("pressure") * 2, divisors=np.array([2e3, 2e3]),
+    )  # fmt: skip
+    read = read_episodes(tmp_path / "all.npz", mapping(ONE_FILE))
+    assert [len(run) for run in read.runs] == [len(run) for run in MADE.runs]
+    for name in ("angle", "speed", "pressure"):
+        np.testing.assert_allclose(read.rows(name), MADE.rows(name), rtol=1e-12)
+
+
+def test_json_holds_a_list_of_episodes(tmp_path, mapping):
+    tables = [{n: c.tolist() for n, c in by_columns(run).items()} for run in MADE.runs]
+    (tmp_path / "all.json").write_text(json.dumps(tables))
+    assert len(read_episodes(tmp_path / "all.json", mapping(COLUMNS))) == 3
+    (tmp_path / "all.json").write_text("[1, 2]")
+    with pytest.raises(FileError, match="an object of lists is expected, or a list of such objects"):
+        read_episodes(tmp_path / "all.json", mapping(COLUMNS))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('[angles]\ncolumns=["q1"]\n', r"no table \[pressures\]; name its columns"),
+        (COLUMNS.replace('time = "t"', ""), "state either sample_time"),
+        (COLUMNS + "[arm]\npairs = [[1, 1]]\n", "give for each joint the numbers of two muscles, each muscle once"),
+        (COLUMNS + '[arm]\naxes = ["w"]\n', "arm.axes holds 'w'; allowed: x, "),
+        (COLUMNS.replace("[angles]\n", '[angles]\nunit = "turn"\n'), "angles.unit is 'turn'; it must be"),
+        (COLUMNS.replace('columns = ["q1"]', "columns = 3"), "angles.columns must be a name or a list of names"),
+        ("tim = 3\n" + COLUMNS, "unknown key 'tim'"),
+    ],
+)
+def test_errors_of_a_mapping_file(tmp_path, mapping, text, message):
+    write_npz(tmp_path, MADE.runs[0], 0)
+    with pytest.raises(FileError, match=message):
+        read_episodes(tmp_path / "0.npz", mapping(text))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"q1": None}, "no column 'q1'; there are t, p1, p2"),
+        ({"p1": np.full(95, np.nan)}, "row 1 of p1, p2 .column 1. is not a finite number"),
+        ({"q1": np.zeros(90)}, "pressures have 95 rows, angles 90; they must have as many"),
+        ({"t": np.r_[0:40, 60:115] * STEP}, "the times of column 't' have gaps or do not rise"),
+    ],
+)
+def test_errors_of_an_episode(tmp_path, mapping, change, message):
+    table = {n: c for n, c in {**by_columns(MADE.runs[0]), **change}.items() if c is not None}
+    np.savez(tmp_path / "0.npz", **table)
+    with pytest.raises(ColumnError, match=message):
+        read_episodes(tmp_path / "0.npz", mapping(COLUMNS))
+
+
+def test_a_folder_without_episodes_and_a_foreign_format_are_refused(tmp_path, mapping):
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(FileError, match="the folder holds no file of episodes; supported are"):
+        read_episodes(tmp_path / "empty", mapping(COLUMNS))
+    (tmp_path / "a.doc").write_text("x")
+    with pytest.raises(FileError, match="no format of episodes; supported are"):
+        read_episodes(tmp_path / "a.doc", mapping(COLUMNS))
+
+
+def test_episodes_of_one_arm_have_one_shape():
+    with pytest.raises(ParameterError, match="runs have different numbers of joints and muscles"):
+        replace(MADE, runs=(*MADE.runs, made_episodes(1, joints=2).runs[0]))
+    with pytest.raises(ParameterError, match=r"0 runs at a sample time of 0\.01 s are given"):
+        replace(MADE, runs=())
+
+
+# Inspection
+
+
+def test_an_inspection_finds_the_muscles_of_each_joint_and_that_the_sensors_lag():
+    two = made_episodes(30, joints=2, delay=3)
+    swapped = changed(two, pressure=lambda p: p[:, [3, 0, 2, 1]])
+    found = inspect_episodes(swapped)
+    assert found.pairs == ((2, 4), (3, 1))
+    assert inspect_episodes(two).delay > inspect_episodes(made_episodes(30, joints=2)).delay
+    assert not found.errors
+    assert "pressure 1 lowers angle 2 (t = " in str(found)
+
+
+def test_pressures_without_an_effect_are_not_assigned():
+    rng = np.random.default_rng(1)
+    found = inspect_episodes(changed(JOINT, pressure=lambda p: rng.uniform(0.0, 3e5, p.shape)))
+    with pytest.raises(IdentificationError, match="joint 1: 0 pressures raise its angle and 0 lower it with certainty"):
+        _ = found.pairs
+
+
+def jumped(angle):
+    angle[50:] += 2 * np.pi
+    return angle
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"angle": jumped}, r"episode 1: angle 1 jumps from .* at row 51, as an encoder does that wraps"),
+        ({"pressure": lambda p: p * [1.0, 0.0]}, "pressure 2 never varies, it is 0 Pa in all rows"),
+        ({"speed": lambda v: v / 1.5}, "angles move 1.49 times as fast as the speeds say: the sample time of 10 ms"),
+    ],
+)
+def test_what_forbids_a_fit_is_named(change, message):
+    with pytest.raises(IdentificationError, match=message):
+        fit_joint(changed(JOINT, **change))
+
+
+def test_exchanged_muscles_are_named():
+    found = inspect_episodes(JOINT, pairs=((2, 1),))
+    assert (
+        "the mapping says that pressure 2 raises angle 1, the record that pressure 2 lowers angle 1" in found.errors[0]
+    )
+    assert not inspect_episodes(JOINT, pairs=((1, 2),)).errors
+
+
+def test_saturated_readings_and_counts_are_remarked():
+    (saturated,) = inspect_episodes(changed(JOINT, pressure=lambda p: np.minimum(p, [2e5, 1e9]))).remarks
+    assert "pressure 1 is 2e+05 Pa in" in saturated
+    assert "its reading saturates there" in saturated
+    (counts,) = inspect_episodes(changed(JOINT, pressure=lambda p: np.round(p / 10.0))).remarks
+    assert "they are whole numbers, as counts" in counts
+
+
+def test_episodes_shorter_than_a_window_are_refused():
+    with pytest.raises(IdentificationError, match="the longest has 45 rows, a window needs 52"):
+        fit_joint(made_episodes(20, rows=45))
+    assert len(cut(made_episodes(2, rows=62))) == 2
+
+
+def test_a_window_reads_no_pressure_after_its_end():
+    """With a delay of the sensors the last reading is held, so that a prediction uses nothing from beyond."""
+    ramp = changed(MADE, pressure=lambda p: np.tile(np.arange(len(p), dtype=float)[:, None], 2))
+    windows = cut(ramp, delay=3)
+    assert windows.pressure[0, 10, 0] == windows.first[0] + 3
+    assert windows.pressure[0, -4:, 0].tolist() == [windows.first[0] + 40.0] * 4

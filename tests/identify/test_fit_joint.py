@@ -1,0 +1,90 @@
+"""An arm identified from episodes that the program made: its free run, its bands and its remarks are true.
+
+The reduced arm has not the form of the plant that made the record: gravity enters as a polynomial of the angle.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from arm_episodes import made_episodes
+from command_line import airmuscle
+
+import airmuscle as am
+from airmuscle.bench import fit_joint
+from airmuscle.errors import ParameterError
+
+EPISODES = made_episodes(30)
+
+
+@pytest.fixture(scope="module")
+def fitted():
+    lines = []
+    return fit_joint(EPISODES, left_out=0.2, progress=lines.append), lines
+
+
+def test_the_free_run_is_far_better_than_persistence_and_arx(fitted):
+    fit, lines = fitted
+    assert np.degrees(fit.rms[0]) < 0.6
+    assert fit.skill[0] > 0.8
+    assert fit.best_baseline == ("ARX of depth 4",)
+    assert lines[0].startswith("delay of the pressures: ")
+
+
+def test_the_band_grows_with_the_horizon_and_holds_what_it_says(fitted):
+    fit, _ = fitted
+    assert (np.diff(fit.band[:, 0]) >= 0.0).all()
+    inside = np.abs(fit.errors) <= fit.band
+    assert inside.mean() >= 0.95
+    assert fit.coverage[0] > 0.85
+
+
+def test_the_remarks_name_the_scale_of_the_torques(fitted):
+    fit, _ = fitted
+    assert any("do not contain the scale of the torques" in remark for remark in fit.remarks)
+    assert any("not separated; fix" in remark for remark in fit.remarks)
+
+
+def test_the_gain_of_a_muscle_is_that_of_the_plant_that_made_the_record(fitted):
+    """Torque per pressure over inertia: radius x area / inertia, within the inertia of 0.08 + 0.6 (0.05^2 + 0.1^2)."""
+    fit, _ = fitted
+    found = fit.arm.muscle[0].contractile.area[0] * 0.03 / 0.1
+    assert found == pytest.approx(6e-4 * 0.03 / (0.08 + 0.6 * (0.05**2 + 0.1**2)), rel=0.15)
+
+
+def test_the_identified_arm_is_a_plant_that_settles(fitted):
+    fit, _ = fitted
+    plant = fit.plant()
+    held = am.Schedule({f"{m.name}.setpoint": ((0.0, p),) for m, p in zip(plant.muscles, (2e5, 1e5), strict=True)})
+    solved = am.simulate(plant, held, duration=1.5, initial_state=plant.state_at(pressure=1.5e5))
+    assert 0.1 < solved["joint1.angle"][-1] < 1.2
+    assert abs(solved["joint1.angular_speed"][-1]) < 0.05
+
+
+def test_impossible_arguments_are_refused():
+    with pytest.raises(ParameterError, match="left_out is 1 of 30 episodes; give 4 episodes or more"):
+        fit_joint(EPISODES, left_out=1.0)
+    with pytest.raises(ParameterError, match="2 pairs and 0 axes are given for 1 joints; give one each"):
+        fit_joint(EPISODES, pairs=((1, 2), (3, 4)))
+    with pytest.raises(ParameterError, match="there are pressures 1 to 2, each in one pair"):
+        fit_joint(EPISODES, pairs=((1, 7),))
+
+
+def test_the_command_inspects_and_fits(tmp_path):
+    few = EPISODES[:12]
+    np.savez(
+        tmp_path / "all.npz", start=np.cumsum([0, *map(len, few.runs)]), q=few.rows("angle"), v=few.rows("speed"),
+        p=few.rows("pressure"),
+    )  # fmt: skip
+    (tmp_path / "arm.toml").write_text(
+        'sample_time = "10 ms"\nstarts = "start"\n[angles]\ncolumns = ["q"]\n[speeds]\ncolumns = ["v"]\n'
+        '[pressures]\ncolumns = ["p"]\n[arm]\npairs = [[1, 2]]\n'
+    )
+    names = [str(tmp_path / "all.npz"), "--mapping", str(tmp_path / "arm.toml")]
+    shown = airmuscle("fit-joint", *names, "--inspect").output
+    assert "12 episodes of 95 to 95 rows at 100 Hz" in shown
+    shown = airmuscle("fit-joint", *names, "--out", tmp_path / "out", "--left-out", "0.25").output
+    assert "free run over 0.4 s on 3 episodes left out" in shown
+    assert (tmp_path / "out" / "report.html").exists()
+    plant = am.files.load_scenario(tmp_path / "out" / "scenario.toml")
+    assert len(plant.plant.muscles) == 2
