@@ -156,7 +156,7 @@ def test_a_measurement_that_is_not_finite_is_refused():
     judged = the_filter()
     estimate = judged.start({**START, "air_mass": 1e-4}, {})
     with pytest.raises(SolveError, match="ExtendedKalmanFilter: the measured values must be finite"):
-        judged.correct(estimate, [float("nan")], [0.0, 0.0])
+        judged.correct(estimate, [float("inf")], [0.0, 0.0])
 
 
 def test_the_load_is_estimated_from_position_and_pressure():
@@ -204,6 +204,6 @@ def test_a_recording_whose_time_counts_from_1970_is_estimated_as_one_from_0():
 
 def test_rows_at_other_intervals_are_refused():
     judged = the_filter()
-    record = am.Recording({"time": np.array([0.0, H, 3 * H]), "pressure": np.full(3, 2e5)}, "test")
+    record = am.Recording({"time": np.array([0.0, H, 2.5 * H]), "pressure": np.full(3, 2e5)}, "test")
     with pytest.raises(ParameterError, match=r"the rows must be 0\.005 s apart"):
         judged.estimate(record, judged.start(START, {}))

@@ -1,3 +1,5 @@
+from .estimates import Innovation as Innovation
+from .estimates import StateEstimate as StateEstimate
 from .finite_control_set import FiniteControlSet as FiniteControlSet
 from .kalman_filters import ExtendedKalmanFilter as ExtendedKalmanFilter
 from .kalman_filters import UnscentedKalmanFilter as UnscentedKalmanFilter
@@ -7,6 +9,4 @@ from .lqg import design_adrc as design_adrc
 from .lqg import design_lqg as design_lqg
 from .nonlinear_model_predictive import NonlinearModelPredictive as NonlinearModelPredictive
 from .predictive_design import design_predictive as design_predictive
-from .state_estimator import Innovation as Innovation
-from .state_estimator import StateEstimate as StateEstimate
 from .state_estimator import StateEstimator as StateEstimator

@@ -19,8 +19,9 @@ from ...engine.compile.cache.kernel import Kernel
 from ...engine.compile.function import augmented_rates
 from ...engine.compile.program import compile_system
 from ...engine.loop.controller import Controller, Measurement
+from .estimates import StateEstimate
 from .riccati import check_known, check_numbers, check_sample_time
-from .state_estimator import StateEstimate, StateEstimator
+from .state_estimator import StateEstimator
 
 QI2019 = Reference(
     key="qi-2019",

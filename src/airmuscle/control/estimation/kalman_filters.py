@@ -12,7 +12,9 @@ from ...core.arrays import Array
 from ...core.errors import ParameterError
 from ...core.reference import Reference
 from ...engine.compile.cache.kernel import Kernel
-from .state_estimator import BoundFilter, StateEstimate, StateEstimator
+from ...recording.recording import Recording
+from .estimates import BoundFilter, StateEstimate
+from .state_estimator import StateEstimator
 
 BAR_SHALOM2001 = Reference(
     key="bar-shalom-2001",
@@ -22,6 +24,15 @@ BAR_SHALOM2001 = Reference(
     year=2001,
     doi="10.1002/0471221279",
     note="extended Kalman filter; consistency by the normalised estimation error squared",
+)
+RAUCH1965 = Reference(
+    key="rauch-1965",
+    authors="Rauch, H. E., Tung, F., Striebel, C. T.",
+    title="Maximum likelihood estimates of linear dynamic systems",
+    where="AIAA Journal 3(8):1445-1450",
+    year=1965,
+    doi="10.2514/3.3166",
+    note="smoother by a backward pass over the estimates of the filter",
 )
 _predict_extended = Kernel("predict_extended", "kalman_filter")
 _correct_extended = Kernel("correct_extended", "kalman_filter")
@@ -41,7 +52,7 @@ class ExtendedKalmanFilter(StateEstimator):
     Reference: Bar-Shalom, Li and Kirubarajan (2001), chapters 5 and 10.
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (BAR_SHALOM2001,)
+    references: ClassVar[tuple[Reference, ...]] = (BAR_SHALOM2001, RAUCH1965)
 
     def transition(self, state: Array, inputs: Sequence[float]) -> tuple[Array, Array]:
         """The state (n,) one sample later, and its derivative by the state now (n, n)."""
@@ -50,9 +61,30 @@ class ExtendedKalmanFilter(StateEstimator):
         matrix = bound.transition.copy()
         return self._taken(bound).mean, matrix
 
+    def smooth(self, recording: Recording, first: StateEstimate) -> dict[str, Array]:
+        """The columns of `estimate`, where each row also knows all later measurements: for records, not for control.
+
+            x_k^s = x_k + G (x_(k+1)^s - x_(k+1)^-),   G = P_k F_k^T (P_(k+1)^-)^-1,   backwards from the last row
+
+        For a linear plant it is the estimate with the least squares of all noise.
+        Reference: Rauch, Tung and Striebel (1965).
+        """
+        rows = self._rows(recording)
+        passes = list(self._passes(rows, first))
+        means = [passes[-1].corrected.mean]
+        for now, after in zip(passes[-2::-1], passes[:0:-1], strict=True):
+            _, f = self.transition(now.corrected.mean, after.inputs.tolist())
+            deviations = np.sqrt(np.diag(after.predicted.covariance))
+            scale = np.where(deviations > 0, deviations, 1.0)
+            known = after.predicted.covariance / np.outer(scale, scale)
+            moved = np.linalg.lstsq(known, (means[-1] - after.predicted.mean) / scale, rcond=1e-14)[0] / scale
+            means.append(now.corrected.mean + now.corrected.covariance @ f.T @ moved)
+        kept = [mean for mean, each in zip(reversed(means), passes, strict=True) if each.row is not None]
+        return {"time": rows.time, **self._table(np.array(kept), rows.held)}
+
     def _bind(self) -> BoundFilter:
         functions, total, p = self._functions, len(self.states), len(self.measured)
-        n, h = self._compiled.sizes.states, float(self.sample_time)
+        n, h, variances = self._compiled.sizes.states, float(self.sample_time), self.variances
         x, u, covariance = np.zeros(total), np.zeros(self._compiled.sizes.inputs), np.zeros((total, total))
         transition, values, difference, s = np.zeros((total, total)), np.zeros(p), np.zeros(p), np.zeros((p, p))
         predict = _predict_extended.bind(
@@ -60,11 +92,11 @@ class ExtendedKalmanFilter(StateEstimator):
             np.zeros(n), np.zeros((n, total)), np.zeros((5, n, total + 1)), np.zeros((total, total)),
         )  # fmt: skip
         correct = _correct_extended.bind(
-            functions.measured, functions.constants, self.variances, x, u, covariance, values, difference, s,
+            functions.measured, functions.constants, variances, x, u, covariance, values, difference, s,
             np.zeros((p, p)), np.zeros((p, total)), np.zeros((total, p)), np.zeros((total, total)),
             np.zeros((total, total)),
         )  # fmt: skip
-        return self._bound((x, covariance, u, values, difference, s), transition, predict, correct)
+        return self._bound((x, covariance, u, values, difference, s), transition, variances, predict, correct)
 
 
 def normalised_error_squared(estimate: StateEstimate, state: Any) -> float:
@@ -144,7 +176,7 @@ class UnscentedKalmanFilter(StateEstimator):
 
     def _bind(self) -> BoundFilter:
         functions, total, p = self._functions, len(self.states), len(self.measured)
-        n, h = self._compiled.sizes.states, float(self.sample_time)
+        n, h, variances = self._compiled.sizes.states, float(self.sample_time), self.variances
         spread, weights = float(0.5 / self.weights[2]) ** 0.5, np.array(self.weights)
         x, u, covariance = np.zeros(total), np.zeros(self._compiled.sizes.inputs), np.zeros((total, total))
         values, difference, s = np.zeros(p), np.zeros(p), np.zeros((p, p))
@@ -154,8 +186,8 @@ class UnscentedKalmanFilter(StateEstimator):
             points, root, np.zeros(n), np.zeros((n, total)), np.zeros((5, n, total + 1)),
         )  # fmt: skip
         correct = _correct_unscented.bind(
-            functions.measured, functions.constants, spread, weights, self.variances, x, u, covariance, values,
+            functions.measured, functions.constants, spread, weights, variances, x, u, covariance, values,
             difference, s, np.zeros((p, p)), points, root, np.zeros((2 * total + 1, p)), np.zeros((p, total)),
             np.zeros((total, p)), np.zeros((total, p)),
         )  # fmt: skip
-        return self._bound((x, covariance, u, values, difference, s), np.zeros((0, 0)), predict, correct)
+        return self._bound((x, covariance, u, values, difference, s), np.zeros((0, 0)), variances, predict, correct)

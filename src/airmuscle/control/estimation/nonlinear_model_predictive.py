@@ -18,9 +18,10 @@ from ...engine.loop.controller import Measurement, MultivariableController, fail
 from ...physics.analysis.linear_model import linearise
 from ...physics.analysis.sampled_model import held
 from ..laws.linear_model_predictive import RAWLINGS2017
+from .estimates import StateEstimate
 from .predictive_program import MAX_HORIZON, PredictiveProgram, Programs
 from .riccati import check_known, check_numbers, check_sample_time, regulator
-from .state_estimator import StateEstimate, StateEstimator
+from .state_estimator import StateEstimator
 
 
 class NonlinearMemory(NamedTuple):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -22,46 +22,11 @@ from ...engine.compile.program import CompiledSystem, compile_system
 from ...engine.loop.control_loop import COMMAND
 from ...engine.state import check_system, state_vector
 from ...recording.recording import Recording
+from .estimates import BoundFilter, FilterArrays, Innovation, MeasuredRows, Pass, StateEstimate
 from .riccati import DISTURBANCE, check_known
 
-
-class StateEstimate(NamedTuple):
-    """Mean (n,) and covariance (n, n) of the estimated states of a plant."""
-
-    mean: Array
-    covariance: Array
-
-
-class Innovation(NamedTuple):
-    """Measured minus predicted columns (p,) and their covariance (p, p)."""
-
-    difference: Array
-    covariance: Array
-
-    @property
-    def normalised_square(self) -> float:
-        """nu^T S^-1 nu [1]; its mean is p for a consistent filter."""
-        return float(self.difference @ np.linalg.solve(self.covariance, self.difference))
-
-
-FilterArrays = tuple[Array, Array, Array, Array, Array, Array]
-"""The first six arrays of a BoundFilter."""
-
-
-class BoundFilter(NamedTuple):
-    """The compiled prediction and correction of a filter with the arrays that they read and write."""
-
-    mean: Array
-    covariance: Array
-    inputs: Array
-    values: Array
-    difference: Array
-    difference_covariance: Array
-    transition: Array
-    predict: Any
-    correct: Any
-    outputs: Any
-    output_values: Array
+UNKNOWN = 1e30
+"""Factor of the variance of a missing measurement."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -74,6 +39,8 @@ class StateEstimator(ShortRepr, abc.ABC):
     parameters         parameters of the plant that are estimated as further states, such as "mechanism.mass"
     disturbances       states to whose rate an unknown constant is added and estimated, such as "speed"; the estimated
                        state is "speed.disturbance", in the unit of the rate
+    gate               probability with which a true measurement is used; beyond that quantile of the chi-squared
+                       distribution of its normalised square an innovation is an outlier, which corrects nothing
 
     Parameters and disturbances follow a random walk by their process noise. Calls from several threads are permitted.
     Raises ParameterError for an unknown name or a number that is not positive.
@@ -86,6 +53,7 @@ class StateEstimator(ShortRepr, abc.ABC):
     measurement_noise: Mapping[str, float]
     parameters: tuple[str, ...] = ()
     disturbances: tuple[str, ...] = ()
+    gate: float = 1.0
     _compiled: CompiledSystem = dataclasses.field(init=False, repr=False)
     _functions: AugmentedRates = dataclasses.field(init=False, repr=False)
     _idle: list[BoundFilter] = dataclasses.field(init=False, repr=False)
@@ -111,6 +79,8 @@ class StateEstimator(ShortRepr, abc.ABC):
         for name, value in {**self.process_noise, **self.measurement_noise, "sample_time": self.sample_time}.items():
             if not 0 < value < float("inf"):
                 raise ParameterError(f"{owner}: '{name}' is {value!r}; it must be positive and finite.")
+        if not 0.0 < self.gate <= 1.0:
+            raise ParameterError(f"{owner}: gate is {self.gate!r}; allowed range: above 0, 1 (no gate) at most.")
         seen = [columns.index(name) for name in self.measured]
         object.__setattr__(self, "_functions", augmented_rates(compiled, seen, *self.places))
         object.__setattr__(self, "_idle", [])
@@ -128,14 +98,16 @@ class StateEstimator(ShortRepr, abc.ABC):
     def _bind(self) -> BoundFilter:
         """The compiled filter with new arrays."""
 
-    def _bound(self, arrays: FilterArrays, transition: Array, predict: Any, correct: Any) -> BoundFilter:
+    def _bound(
+        self, arrays: FilterArrays, transition: Array, variances: Array, predict: Any, correct: Any
+    ) -> BoundFilter:
         """The compiled filter of arrays, with the function of the outputs."""
         mean, inputs = arrays[0], arrays[2]
         values = np.zeros((1, len(self._compiled.output_names)))
         outputs = evaluate.bind(
             self._functions.outputs, self._functions.constants, mean.reshape(1, -1), inputs.reshape(1, -1), values
         )
-        return BoundFilter(*arrays, transition, predict, correct, outputs, values)
+        return BoundFilter(*arrays, transition, predict, correct, outputs, values, variances)
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -202,18 +174,32 @@ class StateEstimator(ShortRepr, abc.ABC):
     ) -> tuple[StateEstimate, Innovation]:
         """The estimate after a measurement (p,) under the inputs (m,) at that instant, and the innovation.
 
-        Raises SolveError for a value that is not finite, and where the innovation has no positive definite covariance.
+        A value that is NaN is missing: the others correct the estimate, and the innovation has as many (p' <= p). An
+        innovation beyond the gate leaves the estimate as it was. Raises SolveError for an infinite value, and where the
+        innovation has no positive definite covariance.
         """
-        if not np.isfinite(values).all():
+        given = np.asarray(values, dtype=float)
+        if np.isinf(given).any():
             raise SolveError(
-                f"{type(self).__name__}: the measured values must be finite; {', '.join(self.measured)} are {values}. "
-                "Leave the correction out where a measurement is missing."
+                f"{type(self).__name__}: the measured values must be finite, or NaN where one is missing; "
+                f"{', '.join(self.measured)} are {values}."
             )
+        here = ~np.isnan(given)
         bound = self._filled(estimate, inputs)
-        bound.values[:] = values
+        # a missing value counts with a variance beside which nothing is known
+        bound.values[:], bound.variances[:] = np.where(here, given, 0.0), np.where(here, 1.0, UNKNOWN) * self.variances
         self._run(bound.correct, bound)
-        innovation = Innovation(bound.difference.copy(), bound.difference_covariance.copy())
-        return self._taken(bound), innovation
+        innovation = Innovation(bound.difference[here], bound.difference_covariance[np.ix_(here, here)])
+        corrected = self._taken(bound)
+        return (estimate if self._is_outlier(innovation) else corrected), innovation
+
+    def _is_outlier(self, innovation: Innovation) -> bool:
+        """Whether an innovation is beyond the gate."""
+        if self.gate == 1.0 or not innovation.difference.size:
+            return False
+        from scipy.special import chdtri
+
+        return innovation.normalised_square > float(chdtri(innovation.difference.size, 1.0 - self.gate))
 
     def columns(self, estimate: StateEstimate, inputs: Sequence[float]) -> dict[str, float]:
         """All states and outputs of the plant at an estimate, such as contraction and force."""
@@ -230,26 +216,40 @@ class StateEstimator(ShortRepr, abc.ABC):
     def estimate(self, recording: Recording, first: StateEstimate) -> dict[str, Array]:
         """Columns (N,) that are estimated from a recording, row by row, and `time` [s].
 
-        The rows must be `sample_time` apart. Inputs are the columns of their names, or the commands of a controller;
-        an input without a column is 0. Raises ParameterError for other times.
+        The rows are whole multiples of `sample_time` apart: where samples are lost, nothing corrects the estimate
+        between them, nor does a value that is NaN. Inputs are the columns of their names, or the commands of a
+        controller; an input without a column is 0. Raises ParameterError for other times.
         """
+        rows = self._rows(recording)
+        estimates = [passed.corrected for passed in self._passes(rows, first) if passed.row is not None]
+        return {"time": rows.time, **self._table(np.array([each.mean for each in estimates]), rows.held)}
+
+    def _rows(self, recording: Recording) -> MeasuredRows:
+        """The rows of a recording. Raises ParameterError for times that are no multiples of the sample time apart."""
         time = np.asarray(recording["time"], dtype=float)
         rounding = 1e-6 * self.sample_time + 2.0 * np.spacing(np.abs(time).max(initial=0.0))
-        if time.size < 2 or np.abs(np.diff(time) - self.sample_time).max() > rounding:
+        counts = np.round(np.diff(time) / self.sample_time)
+        if time.size < 2 or (counts < 1).any() or np.abs(np.diff(time) - counts * self.sample_time).max() > rounding:
             raise ParameterError(
-                f"{type(self).__name__}.estimate: the rows must be {self.sample_time:g} s apart; simulate or resample "
-                "with this interval."
+                f"{type(self).__name__}.estimate: the rows must be {self.sample_time:g} s apart, or whole multiples of "
+                "it; simulate or resample with this interval."
             )
         inputs = np.column_stack([_input(recording, name) for name in self._compiled.description.input_names])
         measured = np.column_stack([recording[name] for name in self.measured])
-        held = np.vstack([inputs[:1], inputs[:-1]])
-        means, estimate = np.empty((time.size, len(self.states))), first
-        for k in range(time.size):
-            if k:
-                estimate = self.predict(estimate, held[k])
-            estimate, _ = self.correct(estimate, measured[k], held[k])
-            means[k] = estimate.mean
-        return {"time": time, **self._table(means, held)}
+        return MeasuredRows(time, measured, np.vstack([inputs[:1], inputs[:-1]]), counts.astype(int))
+
+    def _passes(self, rows: MeasuredRows, first: StateEstimate) -> Iterator[Pass]:
+        """Prediction and correction of every sample, also of those without a row."""
+        predicted = first
+        for k, held in enumerate(rows.held):
+            for lost in range(rows.counts[k - 1] - 1 if k else 0, -1, -1):
+                before = predicted
+                predicted = self.predict(before, held) if k else first
+                if lost:
+                    yield Pass(None, predicted, predicted, held)
+            corrected, _ = self.correct(predicted, rows.measured[k], held)
+            yield Pass(k, predicted, corrected, held)
+            predicted = corrected
 
     def _table(self, means: Array, inputs: Array) -> dict[str, Array]:
         known = self._compiled.description
