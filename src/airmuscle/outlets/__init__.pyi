@@ -26,9 +26,11 @@ from .export import write_controller as write_controller
 from .export import write_controller_fmu as write_controller_fmu
 from .export import write_fmu as write_fmu
 from .export import write_law as write_law
+from .export import write_mjcf as write_mjcf
 from .export import write_modelica as write_modelica
 from .export import write_mujoco_plugin as write_mujoco_plugin
 from .export import write_program as write_program
 from .export import write_ssp as write_ssp
+from .export import write_urdf as write_urdf
 from .studio import export_page as export_page
 from .studio import serve as serve

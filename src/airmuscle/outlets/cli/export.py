@@ -28,8 +28,9 @@ from ..export.building import BuiltProgram, build_and_run
 from ..export.identifiers import make_identifier
 from ..export.microcontroller import PROCESSORS, run_in_emulator
 from ..export.platforms import PLATFORMS, find_platform
+from ..export.robot_description import WRITERS
 from .completion import complete_entry
-from .export_models import export_actuator, export_fmu, export_modelica, export_mujoco
+from .export_models import export_actuator, export_fmu, export_modelica, export_mujoco, export_robot
 from .options import Folder, Json
 from .terminal import echo, print_json
 
@@ -37,7 +38,7 @@ TARGETS: dict[str, Target] = {"c": C99(), "js": JavaScript(), "octave": Octave()
 """Languages by the names of the option --to."""
 STACKS: dict[str, Stack] = {"torch": TorchStack(), "warp": WarpStack(), "onnx": OnnxStack()}
 """Learning stacks by the names of the option --to."""
-NAMES = (*TARGETS, "arduino", "fmu", "ssp", "mujoco", "modelica", *STACKS)
+NAMES = (*TARGETS, "arduino", "fmu", "ssp", "mujoco", *WRITERS, "modelica", *STACKS)
 """All values of the option --to."""
 DEFAULT_FOLDER = Path("export")
 
@@ -115,6 +116,7 @@ def export(
       airmuscle export examples/fill_discharge.toml --to octave --tunable mechanism.mass --out fill_m
       airmuscle export dmsp-20-300 --law --to js --out law_js
       airmuscle export dmsp-20-300 --to torch --out actuator
+      airmuscle export joint-dmsp-20-matrix --to mjcf --out robot
       airmuscle export examples/pressure_loop.toml --to c --out loop_c
       airmuscle export examples/pressure_loop.toml --controller --to c --out controller
       airmuscle export examples/pressure_loop.toml --controller --to c --precision float --build --processor cortex-m4
@@ -136,14 +138,8 @@ def export(
     if muscle and to not in ("mujoco", *STACKS):
         raise typer.BadParameter(f"--muscle belongs to --to mujoco, {', '.join(STACKS)}.")
     check_writable(out)
-    if to == "mujoco":
-        export_mujoco(source, out, name, muscle, json)
-        return
-    if to in STACKS:
-        export_actuator(source, out, name, muscle, STACKS[to], json)
-        return
-    if to == "modelica":
-        export_modelica(source, out, name, tunable, json)
+    if to not in TARGETS and to != "arduino":
+        _export_model(source, out, to, name, muscle, tunable, json)
         return
     paths = _write(source, out, to, name, law, controller, tunable, precision)
     built = (run_in_emulator(paths, PROCESSORS[processor]) if processor else build_and_run(paths)) if build else None
@@ -156,6 +152,20 @@ def export(
     if built is not None:
         _print_build(built, controller)
     echo(f"run: {_instruction(to, paths, law, controller)}")
+
+
+def _export_model(
+    source: str, out: Path, to: str, name: str, muscle: str, tunable: list[str] | None, json: bool
+) -> None:
+    """Write a model for a simulator or a learning stack."""
+    if to == "mujoco":
+        export_mujoco(source, out, name, muscle, json)
+    elif to in WRITERS:
+        export_robot(source, out, name, to, json)
+    elif to in STACKS:
+        export_actuator(source, out, name, muscle, STACKS[to], json)
+    else:
+        export_modelica(source, out, name, tunable, json)
 
 
 def _write(
@@ -222,7 +232,7 @@ def _check_options(
         raise typer.BadParameter("--build: there is a program to compile with --to c and without --law.")
     if law and to not in TARGETS:
         raise typer.BadParameter(f"--law: {to} contains a plant; leave --law out, or write --to c.")
-    if to == "mujoco" and tunable:
+    if to in ("mujoco", *WRITERS) and tunable:
         raise typer.BadParameter("--tunable: all parameters of an actuator can be changed; leave it out.")
     if law and tunable:
         raise typer.BadParameter("--tunable: all parameters of a law can be changed; leave it out.")

@@ -1,4 +1,4 @@
-"""Models for simulators by `airmuscle export`: FMUs, MuJoCo plugins, Modelica and batched actuators."""
+"""Models for simulators by `airmuscle export`: FMUs, MuJoCo plugins, robots, Modelica and batched actuators."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from ..export import (
     write_ssp,
 )
 from ..export.platforms import Platform
+from ..export.robot_description import WRITERS
 from .terminal import echo, print_json
 
 
@@ -68,6 +69,20 @@ def export_mujoco(source: str, out: Path, name: str, muscle: str, json: bool) ->
     low, high = made.control_range
     size = f'actdim="{len(made.plant.states)}" dyntype="user" ctrlrange="{low:g} {high:g}"'
     echo(f'MJCF: <plugin plugin="{made.plugin_name}" tendon="NAME" {size}/>')
+
+
+def export_robot(source: str, out: Path, name: str, to: str, json: bool) -> None:
+    """Write the robot description of a joint or an arm into a folder."""
+    written = WRITERS[to](load_scenario(source).plant, out, name=name)
+    plugins = [str(path) for each in written.plugins for path in (each.source, each.library) if path is not None]
+    remarks = list(dict.fromkeys(each.remark for each in written.plugins if each.remark))
+    if json:
+        print_json({"files": [str(written.path), *plugins], "remarks": remarks})
+        return
+    for file in (written.path, *plugins):
+        echo(f"file: {file}")
+    for remark in remarks:
+        echo(f"plugins, source only: {remark}")
 
 
 def export_actuator(source: str, out: Path, name: str, muscle: str, stack: Stack, json: bool) -> None:

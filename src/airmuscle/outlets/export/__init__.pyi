@@ -15,6 +15,9 @@ from .learning import write_actuator as write_actuator
 from .modelica import write_modelica as write_modelica
 from .mujoco_plugin import MuscleActuator as MuscleActuator
 from .mujoco_plugin import write_mujoco_plugin as write_mujoco_plugin
+from .robot_description import WrittenRobot as WrittenRobot
+from .robot_description import write_mjcf as write_mjcf
+from .robot_description import write_urdf as write_urdf
 from .targets import C99 as C99
 from .targets import JavaScript as JavaScript
 from .targets import Octave as Octave

@@ -1,0 +1,263 @@
+"""Robot descriptions of joints and arms: MJCF for MuJoCo, with the muscles as plugin actuators, and URDF."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+from ...core.atomic_output import atomic_folder
+from ...core.errors import ParameterError
+from ...core.units import STANDARD_GRAVITY
+from ...physics.mechanism import AntagonisticJoint, Mechanism, MuscleRoute, PlanarArm, SerialArm
+from ...physics.mechanism.pulley_profile import ConstantRadius
+from ...physics.plant import Plant
+from .mujoco_plugin import REST_LENGTH, MuscleActuator, write_mujoco_plugin
+from .provenance import provenance
+from .targets import program_name
+from .write import checked_name
+
+LEAST = 1e-9
+"""Mass [kg] and moment of inertia [kg m2] that stand for zero, which simulators refuse (chosen)."""
+Vector = tuple[float, float, float]
+
+
+@dataclasses.dataclass(frozen=True)
+class RigidLink:
+    """Link with the joint at its origin; all vectors in the frame of the link, whose z axis points upwards at rest.
+
+    position      of the joint in the frame of the link before [m]
+    axis          unit vector of the joint
+    mass, centre  mass [kg] and centre of mass [m]
+    inertia       moment of inertia about every axis through the centre [kg m2]
+    armature      moment of inertia that turns with the joint alone [kg m2]
+    damping       of the joint [N m s/rad]
+    zero_angle    joint angle [rad] at which the frame has the direction of the frame before
+    """
+
+    joint: str
+    position: Vector
+    axis: Vector
+    mass: float
+    centre: Vector
+    inertia: float
+    armature: float = 0.0
+    damping: float = 0.0
+    zero_angle: float = 0.0
+
+
+@dataclasses.dataclass(frozen=True)
+class RobotModel:
+    """Links in series, the routes of the muscles over their joints, and the acceleration of gravity [m/s2]."""
+
+    links: Sequence[RigidLink]
+    routes: Sequence[MuscleRoute]
+    gravity: float
+
+
+def robot_model(mechanism: Mechanism) -> RobotModel:
+    """The rigid bodies of a mechanism. Raises ParameterError for one that is no joint or arm with circular pulleys."""
+    model = _robot_model(mechanism)
+    for number, route in enumerate(model.routes, start=1):
+        if any(not isinstance(profile, ConstantRadius) for profile in route.profiles):
+            raise ParameterError(
+                f"the pulley of muscle {number} is not circular; a tendon of a robot description has a constant moment "
+                "arm. Use ConstantRadius, or export the plant with --to fmu."
+            )
+    return model
+
+
+@functools.singledispatch
+def _robot_model(mechanism: Mechanism) -> RobotModel:
+    raise ParameterError(
+        f"{type(mechanism).__name__} has no robot description; AntagonisticJoint, PlanarArm and SerialArm have one. "
+        "Export the plant with --to fmu, or one of its muscles with --to mujoco."
+    )
+
+
+@_robot_model.register
+def _joint_model(mechanism: AntagonisticJoint) -> RobotModel:
+    """One link with the inertia and the weight torque of the joint: half of the inertia is that of the mass at its
+    distance from the axis (chosen; only inertia and torque act)."""
+    joint = mechanism
+    distance = 0.5 * joint.inertia * STANDARD_GRAVITY / joint.weight_torque if joint.weight_torque else 0.0
+    mass = joint.weight_torque / (STANDARD_GRAVITY * distance) if distance else 1.0
+    own = joint.inertia - mass * distance**2
+    centre = (distance * math.sin(joint.weight_angle), 0.0, -distance * math.cos(joint.weight_angle))
+    link = RigidLink("angle", (0.0, 0.0, 0.0), (0.0, -1.0, 0.0), mass, centre, own, damping=joint.damping)
+    routes = [MuscleRoute((1,), (sign * joint.radius,), joint.offset, (joint.profile,)) for sign in (1.0, -1.0)]
+    return RobotModel([link], routes, STANDARD_GRAVITY)
+
+
+@_robot_model.register
+def _planar_model(mechanism: PlanarArm) -> RobotModel:
+    links, before = [], 0.0
+    for number, link in enumerate(mechanism.links, start=1):
+        tip = mechanism.payload if number == len(mechanism.links) else 0.0
+        mass = link.mass + tip
+        centre = (link.mass * link.centre + tip * link.length) / mass
+        inertia = (
+            link.inertia + link.mass * (link.centre - centre) ** 2 + tip * (link.length - centre) ** 2
+        )  # parallel axes
+        name, position = f"joint{number}.angle", (0.0, 0.0, -before)
+        links.append(
+            RigidLink(name, position, (0.0, -1.0, 0.0), mass, (0.0, 0.0, -centre), inertia, damping=link.damping)
+        )
+        before = link.length
+    return RobotModel(links, mechanism.routes, mechanism.gravity)
+
+
+@_robot_model.register
+def _spatial_model(mechanism: SerialArm) -> RobotModel:
+    links = [
+        RigidLink(
+            f"joint{number}.angle", _vector(link.position), _vector(link.axis), link.mass, _vector(link.centre),
+            link.inertia, link.rotor_inertia, link.damping, link.zero_angle,
+        )
+        for number, link in enumerate(mechanism.links, start=1)
+    ]  # fmt: skip
+    return RobotModel(links, mechanism.routes, mechanism.gravity)
+
+
+def _vector(values: Sequence[float]) -> Vector:
+    x, y, z = values
+    return float(x), float(y), float(z)
+
+
+@dataclasses.dataclass(frozen=True)
+class WrittenRobot:
+    """The path of a robot description; of MJCF also the plugins of its muscles, which MuJoCo loads before the file."""
+
+    path: Path
+    plugins: tuple[MuscleActuator, ...] = ()
+
+
+def write_mjcf(plant: Plant, folder: str | Path, *, name: str = "robot") -> WrittenRobot:
+    """Write `NAME.xml`, a MuJoCo model of a joint or an arm, and a plugin for each of its muscles beside it.
+
+    Each muscle is a tendon with a plugin actuator that contains its valves, gas and friction (`write_mujoco_plugin`).
+    The qpos of the joints are the angles of the plant. Raises ParameterError for a plant whose mechanism is no joint or
+    arm, whose pulleys are not circular, or whose muscles share a circuit, and FileError.
+    """
+    program = checked_name(name) or program_name(name)
+    robot = robot_model(plant.mechanism)
+    made = [
+        write_mujoco_plugin(plant, folder, name=f"{program}_{program_name(muscle.name)}", muscle=muscle.name)
+        for muscle in plant.muscles
+    ]
+    root = ET.Element("mujoco", model=program)
+    root.append(ET.Comment(_comment(f"Robot {program} for MuJoCo", plant)))
+    ET.SubElement(root, "compiler", angle="radian", autolimits="true")
+    ET.SubElement(root, "option", gravity=f"0 0 {-robot.gravity!r}")
+    extension = ET.SubElement(root, "extension")
+    body = ET.SubElement(root, "worldbody")
+    for number, link in enumerate(robot.links, start=1):
+        body = _mjcf_body(body, link, f"link{number}")
+    tendons, actuators = ET.SubElement(root, "tendon"), ET.SubElement(root, "actuator")
+    for muscle, plugin, route in zip(plant.muscles, made, robot.routes, strict=True):
+        rest = route.offset * muscle.geometry.resting_length
+        element = ET.SubElement(extension, "plugin", plugin=plugin.plugin_name)
+        instance = ET.SubElement(element, "instance", name=muscle.name)
+        ET.SubElement(instance, "config", key=REST_LENGTH, value=repr(rest))
+        tendon = ET.SubElement(tendons, "fixed", name=muscle.name)
+        for joint, radius in zip(route.joints, route.radii, strict=True):
+            ET.SubElement(tendon, "joint", joint=robot.links[joint - 1].joint, coef=repr(-radius))
+        low, high = plugin.control_range
+        ET.SubElement(
+            actuators, "plugin", name=muscle.name, tendon=muscle.name, plugin=plugin.plugin_name, instance=muscle.name,
+            actdim=str(len(plugin.plant.states) + 1), dyntype="user", ctrlrange=f"{low!r} {high!r}",
+        )  # fmt: skip
+    return WrittenRobot(_written(root, folder, f"{program}.xml"), tuple(made))
+
+
+def _mjcf_body(parent: ET.Element, link: RigidLink, name: str) -> ET.Element:
+    body = ET.SubElement(parent, "body", name=name, pos=_numbers(link.position))
+    ET.SubElement(
+        body, "joint", name=link.joint, type="hinge", axis=_numbers(link.axis), ref=repr(link.zero_angle),
+        damping=repr(link.damping), armature=repr(link.armature),
+    )  # fmt: skip
+    ET.SubElement(
+        body, "inertial", pos=_numbers(link.centre), mass=repr(max(link.mass, LEAST)),
+        diaginertia=_numbers((max(link.inertia, LEAST),) * 3),
+    )  # fmt: skip
+    end = link.centre if any(link.centre) else (0.0, 0.0, -0.05)
+    ET.SubElement(
+        body, "geom", type="capsule", fromto=_numbers((0.0, 0.0, 0.0, *end)), size="0.01", contype="0", conaffinity="0",
+        mass="0",
+    )  # fmt: skip
+    return body
+
+
+def write_urdf(plant: Plant, folder: str | Path, *, name: str = "robot") -> WrittenRobot:
+    """Write `NAME.urdf`, the links and joints of a joint or an arm for ROS and simulators.
+
+    URDF has neither tendons nor pneumatics: the muscles are stated in a comment, with their joints, moment arms and
+    lengths; their torques come from an exported program of the plant. The joints are continuous, because the limits of
+    the angles in the plant are no end stops. Raises ParameterError as `write_mjcf`, and for a joint with a rotor
+    inertia, which URDF cannot state.
+    """
+    program = checked_name(name) or program_name(name)
+    robot = robot_model(plant.mechanism)
+    root = ET.Element("robot", name=program)
+    lines = [
+        f"muscle {muscle.name}: resting length {muscle.geometry.resting_length!r} m, contraction {route.offset!r} at "
+        "angles 0, moment arms "
+        + ", ".join(
+            f"{radius!r} m about {robot.links[j - 1].joint}"
+            for j, radius in zip(route.joints, route.radii, strict=True)
+        )
+        for muscle, route in zip(plant.muscles, robot.routes, strict=True)
+    ]
+    root.append(ET.Comment(_comment(f"Robot {program}", plant, lines)))
+    ET.SubElement(root, "link", name="base")
+    parent = "base"
+    for number, link in enumerate(robot.links, start=1):
+        _urdf_link(root, parent, link, f"link{number}")
+        parent = f"link{number}"
+    return WrittenRobot(_written(root, folder, f"{program}.urdf"))
+
+
+def _urdf_link(root: ET.Element, parent: str, link: RigidLink, name: str) -> None:
+    if link.armature:
+        raise ParameterError(
+            f"{link.joint}: URDF cannot state a rotor inertia, {link.armature:g} kg m2. Use --to mjcf, or set "
+            "rotor_inertia to 0."
+        )
+    body = ET.SubElement(root, "link", name=name)
+    inertial = ET.SubElement(body, "inertial")
+    ET.SubElement(inertial, "origin", xyz=_numbers(link.centre))
+    ET.SubElement(inertial, "mass", value=repr(max(link.mass, LEAST)))
+    moment = repr(max(link.inertia, LEAST))
+    ET.SubElement(inertial, "inertia", ixx=moment, iyy=moment, izz=moment, ixy="0", ixz="0", iyz="0")
+    joint = ET.SubElement(root, "joint", name=link.joint, type="continuous")
+    rotation = [-link.zero_angle * component for component in link.axis]  # about one axis of the frame
+    ET.SubElement(joint, "origin", xyz=_numbers(link.position), rpy=_numbers(rotation))
+    ET.SubElement(joint, "parent", link=parent)
+    ET.SubElement(joint, "child", link=name)
+    ET.SubElement(joint, "axis", xyz=_numbers(link.axis))
+    ET.SubElement(joint, "dynamics", damping=repr(link.damping))
+
+
+def _numbers(values: Sequence[float]) -> str:
+    return " ".join(repr(float(value) + 0.0) for value in values)
+
+
+def _comment(title: str, plant: Plant, notes: Sequence[str] = ()) -> str:
+    """The provenance as a comment of XML, which contains no double hyphen."""
+    return "\n" + "\n".join(provenance(title, plant, (), notes)).replace("--", "- -") + "\n"
+
+
+def _written(root: Any, folder: str | Path, file: str) -> Path:
+    ET.indent(root)
+    text: bytes = ET.tostring(root, encoding="utf-8", xml_declaration=True)
+    with atomic_folder(folder) as staging:
+        (staging / file).write_bytes(text + b"\n")
+    return Path(folder) / file
+
+
+WRITERS: dict[str, Callable[..., WrittenRobot]] = {"mjcf": write_mjcf, "urdf": write_urdf}
+"""Writers by the names of the option --to."""
