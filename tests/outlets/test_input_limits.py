@@ -83,3 +83,26 @@ def test_a_run_of_more_rows_than_a_command_writes_is_refused(tmp_path: Path):
         ParameterError, match=r"s\.toml, \[run\]: output_times of 1\.1e-07 s gives 2\.27e\+08 rows in 25 s"
     ):
         load_scenario(tmp_path / "s.toml")
+
+
+def test_a_message_lists_the_first_columns_of_a_wide_table(tmp_path: Path):
+    head = ",".join(f"channel number {i} of the {'long ' * 20} test rig" for i in range(500))
+    (tmp_path / "wide.csv").write_text(f"{head}\n" + ",".join(["1"] * 500) + "\n", encoding="utf-8")
+    with pytest.raises(ColumnError, match=r"channel number 39 .*…, and 460 more\)") as raised:
+        read(tmp_path / "wide.csv")
+    assert len(str(raised.value)) < 3500
+
+
+def test_a_text_of_a_page_is_not_proposed_as_the_code_of_a_missing_value(tmp_path: Path):
+    (tmp_path / "a.csv").write_text("force [N],pressure [kPa]\n" + f"{'a' * 3000},1\n" * 3, encoding="utf-8")
+    with pytest.raises(ColumnError, match="3 cells in 3 of 3 lines are no finite numbers") as raised:
+        read(tmp_path / "a.csv")
+    assert len(str(raised.value)) < 1000
+    assert "missing" not in str(raised.value)
+
+
+def test_a_heading_of_100_000_brackets_is_read_at_once(tmp_path: Path):
+    start = time.process_time()
+    (tmp_path / "a.csv").write_text(f"x = {'[' * 100_000}\nforce [N],pressure [kPa]\n1,2\n2,3\n", encoding="utf-8")
+    assert len(read(tmp_path / "a.csv")[0]) == 2
+    assert time.process_time() - start < LIMIT

@@ -1,26 +1,32 @@
-"""Annotations of fields: whether a value conforms to one, its description in a message, check of a dataclass."""
+"""Annotations of fields and arguments: whether a value conforms, its description, checks of a dataclass and a call."""
 
 from __future__ import annotations
 
 import dataclasses
 import functools
+import inspect
 import numbers
 import types
 import typing
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from .errors import ParameterError
+from .errors import AirmuscleError, FileError, ParameterError
 
 _NAMES = {float: "a number", int: "an integer", str: "a text", types.NoneType: "None"}
 _MAX_INTEGER = 2**63
 """Magnitude below which an integer must be: integers of 64 bits."""
 
 
+_ARRAY_LIKE = frozenset(typing.get_args(npt.ArrayLike))
+
+
 def type_hints(cls: Any) -> dict[str, Any]:
-    """The annotations of a class as types; empty if they contain names imported for type checking only."""
+    """The annotations of a class or function as types; empty if they contain names imported for type checking only."""
     try:
         return _resolved(cls)
     except NameError:
@@ -28,7 +34,7 @@ def type_hints(cls: Any) -> dict[str, Any]:
 
 
 @functools.cache
-def _resolved(cls: type[Any]) -> dict[str, Any]:
+def _resolved(cls: Any) -> dict[str, Any]:
     return typing.get_type_hints(cls)
 
 
@@ -36,10 +42,13 @@ def conforms(value: Any, hint: Any, *, lists: bool = False) -> bool:
     """Whether a value conforms to an annotation of numbers, texts, classes, arrays, unions and collections of these.
 
     Any other annotation is conformed to by every value. With `lists`, a list conforms to the annotation of a tuple. The
-    contents of an array are not seen.
+    contents of an array are seen where the annotation is `ArrayLike` only.
     """
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if origin in (typing.Union, types.UnionType):
+        if set(arguments) >= _ARRAY_LIKE:
+            arguments = tuple(each for each in arguments if each not in _ARRAY_LIKE)
+            return is_numeric(value) or any(conforms(value, each, lists=lists) for each in arguments)
         return any(conforms(value, each, lists=lists) for each in arguments)
     if hint is float:
         return _is_number(value)
@@ -61,7 +70,19 @@ def conforms(value: Any, hint: Any, *, lists: bool = False) -> bool:
         return len(value) == len(of_items) and all(
             conforms(item, of_item, lists=lists) for item, of_item in zip(value, of_items, strict=True)
         )
-    return not isinstance(hint, type) or isinstance(value, hint)
+    if origin in (Collection, Iterable) and isinstance(value, Collection) and np.ndim(value) > 0:  # type: ignore[arg-type]
+        return all(conforms(item, arguments[0], lists=lists) for item in value)
+    if origin in (Callable, Collection, Iterable):
+        return isinstance(value, origin) and not isinstance(value, np.ndarray)
+    return hint is Any or not isinstance(hint, type) or getattr(hint, "_is_protocol", False) or isinstance(value, hint)
+
+
+def is_numeric(value: Any) -> bool:
+    """Whether a value is a number or an array of numbers, or becomes one."""
+    try:
+        return np.asarray(value).dtype.kind in "biuf"
+    except (ValueError, TypeError, OverflowError):  # rows of unequal length, or no array at all
+        return False
 
 
 def _is_number(value: Any) -> bool:
@@ -79,7 +100,13 @@ def describe(hint: Any) -> str:
     """An annotation in words: `a number`, `a text or an instance of SplitRange`."""
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if origin in (typing.Union, types.UnionType):
-        return " or ".join(describe(each) for each in arguments)
+        is_array = set(arguments) >= _ARRAY_LIKE
+        others = [describe(each) for each in arguments if not (is_array and each in _ARRAY_LIKE)]
+        return " or ".join(["an array of numbers"] * is_array + others)
+    if origin is Callable:
+        return "a function"
+    if origin in (Collection, Iterable):
+        return f"several values, each of which is {describe(arguments[0])}"
     if origin is np.ndarray:
         return "an array of numbers"
     if origin is Mapping:
@@ -128,3 +155,55 @@ def check_field_types(obj: Any) -> None:
             raise ParameterError(
                 f"{type(obj).__name__}: {field.name} must be {describe(hint)}; it is {abridged(value)}."
             )
+
+
+def check_whole(owner: str, name: str, value: Any, least: int) -> None:
+    """Raise ParameterError if an argument is no integer of at least `least`."""
+    if not conforms(value, int) or value < least:
+        raise ParameterError(f"{owner}: {name} is {abridged(value)}; it must be a whole number of at least {least}.")
+
+
+def check_arguments(
+    function: Callable[..., Any], given: Sequence[Any], named: Mapping[str, Any], failure: Exception
+) -> None:
+    """Name the argument that is wrong where a call failed: it does not conform to its annotation, is empty, or no path.
+
+    Raises ParameterError or FileError, with function and argument; nothing where the failure has a message of its own,
+    where no argument is the cause, or where one is left out, which Python says.
+    """
+    if isinstance(failure, AirmuscleError):
+        return
+    try:
+        bound = inspect.signature(function).bind(*given, **named)
+    except TypeError:
+        return
+    hints, owner = type_hints(function), function.__name__
+    for name, value in bound.arguments.items():
+        declared, hint = bound.signature.parameters[name], hints.get(name)
+        for each in value if declared.kind is declared.VAR_POSITIONAL else (value,):
+            if not _suits(each, hint):
+                raise ParameterError(f"{owner}: {name} must be {describe(hint)}; it is {abridged(each)}.") from failure
+        if _is_empty(value) and value is not declared.default:
+            raise ParameterError(f"{owner}: {name} is empty; give at least one.") from failure
+        if (
+            Path in typing.get_args(hint)
+            and isinstance(value, str | Path)
+            and isinstance(failure, OSError | ValueError)
+        ):
+            reason = failure.strerror if isinstance(failure, OSError) else failure
+            raise FileError(f"{owner}: {name} is {abridged(value)}, which is no usable path: {reason}.") from failure
+
+
+def _suits(value: Any, hint: Any) -> bool:
+    """Whether a value conforms to the annotation of an argument, as which an array serves for a sequence."""
+    if typing.get_origin(hint) is np.ndarray:
+        return is_numeric(value) and np.ndim(value) > 0
+    if typing.get_origin(hint) is types.UnionType and not set(typing.get_args(hint)) >= _ARRAY_LIKE:
+        return any(_suits(value, each) for each in typing.get_args(hint))
+    return conforms(value, hint, lists=True) or (
+        isinstance(value, np.ndarray) and value.ndim > 0 and conforms(value.tolist(), hint, lists=True)
+    )
+
+
+def _is_empty(value: Any) -> bool:
+    return isinstance(value, Sequence | Mapping) and not isinstance(value, str) and not value

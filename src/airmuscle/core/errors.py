@@ -28,6 +28,8 @@ import unicodedata
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Self
 
+MAX_LISTED, MAX_LISTED_NAME = 40, 60
+"""Number of names of a file that a message lists, and of characters of each (chosen)."""
 MAX_WORD = 200
 """Maximum number of characters of an argument that a message quotes (chosen)."""
 _LONG_WORD = re.compile(rf"\S{{{MAX_WORD + 1},}}")
@@ -125,6 +127,13 @@ def printable(text: str) -> str:
 def quotable(text: str) -> str:
     """The printable text, without the middle of words that are longer than any name, such as the contents of a file."""
     return _LONG_WORD.sub(lambda word: f"{word[0][: MAX_WORD - 40]}…{word[0][-39:]}", printable(text))
+
+
+def listed(names: Iterable[str]) -> str:
+    """Names of a file, such as its headings, for a message: the first ones, and how many more there are."""
+    all_names = [name if len(name) <= MAX_LISTED_NAME else f"{name[: MAX_LISTED_NAME - 1]}…" for name in names]
+    rest = len(all_names) - MAX_LISTED
+    return ", ".join(all_names if rest <= 1 else [*all_names[:MAX_LISTED], f"and {rest} more"])
 
 
 def _is_printable(character: str) -> bool:

@@ -190,9 +190,13 @@ def conversion(unit: str, target: str, *, ambient: float = AMBIENT_PRESSURE, whe
     `ambient` is the absolute ambient pressure [Pa] subtracted from absolute pressures; `where` is the prefix of error
     messages. Raises UnitError for a unit that is unknown or of another dimension.
     """
-    if len(unit) > _MAX_CHARACTERS:
+    if not (isinstance(unit, str) and isinstance(target, str) and isinstance(where, str)):
         raise UnitError(
-            f"{where}{': ' if where else ''}a text of {len(unit)} characters is not a unit; at most {_MAX_CHARACTERS} "
+            f"a unit is a text, such as 'mm', 'kPa' or 'N'; given are {abridged(unit)} and {abridged(target)}."
+        )
+    if (length := max(len(unit), len(target))) > _MAX_CHARACTERS:
+        raise UnitError(
+            f"{where}{': ' if where else ''}a text of {length} characters is not a unit; at most {_MAX_CHARACTERS} "
             "are allowed. Write it like 'mm', 'kPa' or 'N'."
         )
     if target == ABSOLUTE:
@@ -245,6 +249,8 @@ def quantity(value: float | str, target: str, *, ambient: float | None = None, w
     ambient pressure of the plant whose file is read, else by the standard atmosphere. Raises UnitError if the text
     contains no number, or if its unit is unknown or of the wrong dimension.
     """
+    if not (isinstance(target, str) and isinstance(where, str)) or len(target) > _MAX_CHARACTERS:
+        raise UnitError(f"the target of a quantity is a unit in SI, such as 'Pa' or 'm'; given is {abridged(target)}.")
     prefix = f"{where}: " if where else ""
     if isinstance(value, float | int) and not isinstance(value, bool):
         with contextlib.suppress(OverflowError):

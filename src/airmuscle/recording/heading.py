@@ -42,6 +42,8 @@ _MARKED_FORMS = tuple(
         r"(?P<name>.+?)\s*/\s*(?P<unit>.+)",
     )
 )
+MAX_HEADING = 1000
+"""Number of characters of a heading above which it states no quantity and no unit (chosen)."""
 _SUFFIX_FORM = re.compile(r"(?P<name>.+)[_\s](?P<unit>\S+)")
 
 
@@ -80,6 +82,8 @@ def parse_heading(text: str) -> Heading:
 
 def _candidate_splits(text: str) -> Iterator[tuple[str, str]]:
     """Quantity and unit of a heading that states both; after a blank or underscore only a usual unit is accepted."""
+    if len(text) > MAX_HEADING:
+        return
     for form in _MARKED_FORMS:
         match = form.fullmatch(text)
         name = find_quantity_name(match["name"]) if match else None
@@ -93,5 +97,6 @@ def _candidate_splits(text: str) -> Iterator[tuple[str, str]]:
 
 def split_unit(text: str) -> tuple[str, str | None]:
     """Name and unit of a heading with an unknown quantity, such as `height [mm]`; the unit is None if not stated."""
-    match = next((match for form in _MARKED_FORMS if (match := form.fullmatch(text.strip()))), None)
+    forms = _MARKED_FORMS if len(text) <= MAX_HEADING else ()
+    match = next((match for form in forms if (match := form.fullmatch(text.strip()))), None)
     return (match["name"].strip(), match["unit"].strip()) if match else (text.strip(), None)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core.annotation import check_field_types, one_line
 from ..core.arrays import Array
-from ..core.errors import AirmuscleError, ColumnError, HintedText, ParameterError, suggestion
+from ..core.errors import AirmuscleError, ColumnError, HintedText, ParameterError, listed, suggestion
 from ..core.reference import Reference
 from ..core.units import conversion
 from .columns import quantity_of
@@ -81,6 +81,8 @@ class Recording(NotebookDisplay):
     def __getitem__(self, name: str) -> Array:
         """A column by its name, shape (N,). `contraction` and `length` are converted into each other if the resting
         length is known. Raises ColumnError for an unknown column."""
+        if not isinstance(name, str):
+            raise ColumnError(f"{self.origin}: no column '{one_line(name)}'; the columns are {listed(self.columns)}.")
         if name in self.columns:
             return self.columns[name]
         resting_length = self.constants.get("resting_length")
@@ -99,7 +101,7 @@ class Recording(NotebookDisplay):
             remedy = f" Specify the resting length to convert the {moved} to a contraction."
         elif name == "contraction" and "position" in known:
             remedy = HintedText(" ", ZERO_NOT_STATED)
-        text = f"{self.origin}: no column '{name}'; the columns are {', '.join(known)}.{suggestion(name, known)}"
+        text = f"{self.origin}: no column '{name}'; the columns are {listed(known)}.{suggestion(name, known)}"
         raise ColumnError(HintedText(text, remedy))
 
     def __contains__(self, name: str) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import tree
+from ...core.annotation import check_whole
 from ...core.arrays import Array
 from ...core.errors import Hint, IdentificationError
 from ...core.short_repr import ShortRepr
@@ -93,6 +94,8 @@ def bootstrap(
     refitted by one matrix product; any other law is refitted iteratively from the parameters of the original fit, or
     from those of an earlier refit with a smaller sum of squares in this sample. Raises IdentificationError.
     """
+    check_whole("bootstrap", "refits", refits, 1)
+    check_whole("bootstrap", "seed", seed, 0)
     runs = [recordings] if isinstance(recordings, Recording) else list(recordings)
     group, count = _assign_groups(fit, runs, by or default_split(runs, MIN_GROUPS))
     draws = np.random.default_rng(seed).multinomial(count, np.full(count, 1.0 / count), size=refits).astype(float)

@@ -209,7 +209,13 @@ def _range(values: Array) -> float:
 def _row_weights(data: Recording, dropped: npt.NDArray[np.bool_], sigma: npt.ArrayLike | None) -> Array:
     if sigma is None:
         return np.ones(len(data))
-    deviations = np.broadcast_to(np.asarray(sigma, dtype=float), (len(data),))
+    deviations = np.asarray(sigma, dtype=float)
+    if deviations.shape not in ((), (1,), (len(data),)):
+        raise IdentificationError(
+            f"{data.origin}: sigma has the shape {deviations.shape}; give one number, or one for each "
+            f"of the {len(data)} rows."
+        )
+    deviations = np.broadcast_to(deviations, (len(data),))
     if not (np.isfinite(deviations) & (deviations > 0))[~dropped].all():
         raise IdentificationError(f"{data.origin}: every sigma must be finite and positive.")
     weights = 1.0 / deviations

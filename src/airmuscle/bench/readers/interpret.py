@@ -12,7 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...core.arrays import Array
-from ...core.errors import ColumnError, Hint, HintedText, UnitError, suggestion
+from ...core.errors import ColumnError, Hint, HintedText, UnitError, listed, suggestion
 from ...core.units import AMBIENT_PRESSURE, STANDARD_GRAVITY, UnitConversion, conversion, quantity
 from ...recording.columns import QUANTITIES
 from ...recording.displacement import displacement_columns, proposal
@@ -133,7 +133,7 @@ def resolve_headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]
         if key not in keys:
             names = [heading.name for heading in parsed]
             raise ColumnError(
-                f"{table.origin}: a unit is given for '{key}', but the columns are {', '.join(names)}."
+                f"{table.origin}: a unit is given for '{key}', but the columns are {listed(names)}."
                 f"{suggestion(key, names)}"
             )
     row = table.units or ()
@@ -180,7 +180,7 @@ def _no_known_column(table: RawTable, headings: list[Heading]) -> ColumnError:
     near = [n for name in names for n in difflib.get_close_matches(name.lower(), QUANTITIES, n=1)]
     hint = f" Did you mean '{near[0]}'?" if near else ""
     return ColumnError(
-        f"{table.origin}: no column is a known quantity ({', '.join(names)}); known quantities are "
+        f"{table.origin}: no column is a known quantity ({listed(names)}); known quantities are "
         f"{', '.join(QUANTITIES)}.{hint}",
         hint=Hint("To state the number of lines above the headings", "skip_rows", 1, "ColumnMapping"),
     )

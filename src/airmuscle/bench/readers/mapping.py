@@ -33,7 +33,7 @@ from pathlib import Path
 from typing import Any
 
 from ...core.annotation import abridged, check_field_types
-from ...core.errors import AirmuscleError, ColumnError, ParameterError, suggestion
+from ...core.errors import AirmuscleError, ColumnError, ParameterError, listed, suggestion
 from ...recording.columns import QUANTITIES
 from ...recording.heading import parse_heading
 from .constants import parse_constant_name
@@ -241,6 +241,6 @@ def _column_index(table: RawTable, column: str) -> int:
     if column.isdecimal() and 1 <= int(column) <= len(table.headings):
         return int(column) - 1
     raise ColumnError(
-        f"{table.origin}: the mapping names column '{column}', but the columns are {', '.join(table.headings)}."
+        f"{table.origin}: the mapping names column '{column}', but the columns are {listed(table.headings)}."
         f"{suggestion(column, table.headings)}"
     )

@@ -21,6 +21,8 @@ from .table import Cells, RawTable
 
 MAX_GAP = 5.0
 """Longest gap that is interpolated, in sample times between its neighbours (chosen; a longer one is a gap in time)."""
+MAX_CODE = 20
+"""Maximum number of characters of a text that is proposed as the code of a missing value (chosen)."""
 _GROUPED = re.compile(r"[-+]?\d{1,3}(\.\d{3})+,\d*|[-+]?\d{1,3}(,\d{3})+\.\d*")
 _HELD = ("branch", "fill", "discharge", "latched")
 
@@ -131,8 +133,12 @@ def _remedies(found: Sequence[tuple[int, ExaminedColumn]]) -> Iterator[Hint]:
     elif not texts:
         yield Hint("To leave out the rows with missing values", "missing", DropMissing(), "ColumnMapping")
         yield Hint("To interpolate short gaps", "missing", InterpolateMissing(), "ColumnMapping")
-    elif len(set(texts)) == 1 and isinstance(texts[0], str) and not any(map(str.isdigit, texts[0])):
+    elif len(set(texts)) == 1 and isinstance(texts[0], str) and _is_code(texts[0]):
         yield Hint("If it stands for a missing value", "missing", DropMissing((texts[0],)), "ColumnMapping")
+
+
+def _is_code(text: str) -> bool:
+    return len(text) <= MAX_CODE and not any(map(str.isdigit, text))
 
 
 def _without_rows(table: RawTable, left_out: Mask) -> RawTable:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...core.arrays import Array
-from ...core.errors import FileError, suggestion
+from ...core.errors import FileError, listed, suggestion
 from .channels import Channel, merge_channels
 from .downsampling import Decimation, Downsampling
 from .optional_dependency import import_lab_package, run_reader
@@ -46,7 +46,7 @@ def read_mdf_tables_here(path: Path, group: str | None, downsampling: Downsampli
             names = [_group_name(g, i) for i, g in enumerate(file.groups)]
             if group is not None and group not in names:
                 raise FileError(
-                    f"{path.name}: no group '{group}'; the groups are {', '.join(names)}.{suggestion(group, names)}"
+                    f"{path.name}: no group '{group}'; the groups are {listed(names)}.{suggestion(group, names)}"
                 )
             selected = [i for i, name in enumerate(names) if group in (None, name)]
             table = merge_channels(path.name, list(_channels(file, selected, downsampling)), {})

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.errors import ColumnError, FileError, suggestion
+from ...core.errors import ColumnError, FileError, listed, suggestion
 from .clock import seconds_from_clock
 from .header import (
     COMMA_NUMBER,
@@ -56,7 +56,7 @@ def read_workbook_tables_here(path: Path, sheet: str | None, text_format: TextFo
             names = [each.name for each in book.sheets_metadata if each.typ == calamine.SheetTypeEnum.WorkSheet]
             if sheet is not None and sheet not in names:
                 raise FileError(
-                    f"{path.name}: no sheet '{sheet}'; the sheets are {', '.join(names)}.{suggestion(sheet, names)}"
+                    f"{path.name}: no sheet '{sheet}'; the sheets are {listed(names)}.{suggestion(sheet, names)}"
                 )
             return {name: _nonempty_rows(book.get_sheet_by_name(name)) for name in names if sheet in (None, name)}
 
@@ -103,7 +103,7 @@ def _parse_table(origin: str, rows: Rows, text_format: TextFormat) -> RawTable:
     units = parse_unit_row(headings, [_text(body[0][1][j]) for j in used] if body else [])
     body = body[1:] if units else body
     if not body:
-        raise FileError(f"{origin}: no rows of numbers below the headings ({', '.join(headings)}).")
+        raise FileError(f"{origin}: no rows of numbers below the headings ({listed(headings)}).")
     _check_headings_cover(origin, headings, used, body)
     columns = tuple(_column([row[j] for _, row in body]) for j in used)
     return RawTable(origin, tuple(headings), units, columns, np.array([i for i, _ in body]), "row", constants)
@@ -139,7 +139,7 @@ def _check_headings_cover(origin: str, headings: list[str], used: list[int], bod
         if outside:
             raise ColumnError(
                 f"{origin}, row {i}: the cell '{_text(row[outside[0]])}' has no heading (the headings are "
-                f"{', '.join(headings)}). Add a heading to its column, or move the cell outside the rows of the table."
+                f"{listed(headings)}). Add a heading to its column, or move the cell outside the rows of the table."
             )
 
 

@@ -9,7 +9,7 @@ import re
 from collections.abc import Mapping
 
 from ...core.annotation import abridged
-from ...core.errors import FileError, ParameterError
+from ...core.errors import FileError, ParameterError, listed
 from .header import (
     are_headings,
     count_cells,
@@ -140,7 +140,7 @@ def parse_header(origin: str, lines: NumberedLines, text_format: TextFormat) -> 
     units = parse_unit_row(headings, below)
     count += 1 if units else 0
     if len(body) <= count:
-        raise FileError(f"{origin}: no rows of numbers below the headings ({', '.join(headings)}).")
+        raise FileError(f"{origin}: no rows of numbers below the headings ({listed(headings)}).")
     cells = [parse_constant_cells(split_cells(line, delimiter)) for _, line in preamble]
     constants = dict(
         constant for constant in (*cells, *(parse_constant_comment(line) for _, line in comments)) if constant

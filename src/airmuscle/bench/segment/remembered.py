@@ -21,10 +21,13 @@ def remembered(analyse: Analysis) -> Analysis:
     results: weakref.WeakKeyDictionary[Recording, _Known] = weakref.WeakKeyDictionary()
 
     @functools.wraps(analyse)
-    def remembering(recordings: Any, *arguments: Any, **options: Any) -> Any:
+    def remembering(*arguments: Any, **options: Any) -> Any:
+        if options or len(arguments) != 1:
+            return analyse(*arguments, **options)
+        (recordings,) = arguments
         several = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
-        if arguments or options or not several:
-            return analyse(recordings, *arguments, **options)
+        if not several:
+            return analyse(recordings)
         known, key = results.setdefault(several[0], {}), tuple(map(id, several))
         stored = known.get(key)
         if stored is None or any(ref() is not each for ref, each in zip(stored[0], several, strict=True)):

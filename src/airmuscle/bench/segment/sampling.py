@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.arrays import Array
+from ...core.errors import ParameterError
 from ...recording.recording import Recording
 
 GAP_FACTOR = 5.0
@@ -84,6 +85,8 @@ def _rows(irregular_steps: npt.NDArray[np.bool_]) -> tuple[int, ...]:
 
 def count_rows(seconds: float, time: Array | None, min_rows: int) -> int:
     """The number of rows in a time span, at most all; `min_rows` without time or if the rows are far apart."""
+    if not seconds >= 0.0:
+        raise ParameterError(f"a duration is {seconds} s; it must not be negative.")
     if time is None or len(time) < 2:
         return min_rows
     sample_time = _sample_time(np.diff(time))

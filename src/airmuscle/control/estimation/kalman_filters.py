@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ...core.annotation import check_whole
 from ...core.arrays import Array
 from ...core.errors import ParameterError
 from ...core.reference import Reference
@@ -110,6 +111,8 @@ def consistency_band(dimension: int, runs: int, probability: float = 0.95) -> tu
     """Band [1] of the average NEES of independent runs that a consistent filter keeps with this probability."""
     from scipy.stats import chi2
 
+    check_whole("consistency_band", "dimension", dimension, 1)
+    check_whole("consistency_band", "runs", runs, 1)
     tails = ((1.0 - probability) / 2.0, (1.0 + probability) / 2.0)
     low, high = (float(chi2.ppf(tail, dimension * runs)) / runs for tail in tails)
     return low, high

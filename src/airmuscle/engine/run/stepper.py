@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import numbers
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -112,8 +113,8 @@ class Stepper:
         Raises ParameterError for a number of inputs, an input or a time step that is impossible, SimulationError where
         the step fails or leads to an impossible state. The state is then that before the step.
         """
-        if not 0.0 < dt <= LARGEST:
-            raise ParameterError(f"Stepper: dt is {dt!r} s; it must be positive and finite.")
+        if not isinstance(dt, numbers.Real) or not 0.0 < dt <= LARGEST:
+            raise ParameterError(f"Stepper: dt is {one_line(dt)} s; it must be positive and finite.")
         if hasattr(inputs, "keys"):
             inputs = self._by_name(inputs)
         try:

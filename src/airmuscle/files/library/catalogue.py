@@ -39,7 +39,7 @@ def load(name_or_path: str | Path) -> AnyEntry:
     tables = read_toml(path)
     kind = kind_of(tables)
     entry: AnyEntry = build_plant_entry(tables, location) if kind is PlantEntry else build_entry(tables, location, kind)
-    issue_warning(entry.name, entry.warning, stacklevel=2)
+    issue_warning(entry.name, entry.warning, stacklevel=3)
     return entry
 
 

@@ -245,6 +245,7 @@ AnyEntry = Entry | ValveEntry | ProductEntry | PlantEntry
 
 
 def issue_warning(name: str, warning: str, stacklevel: int) -> None:
-    """Issue the warning of an entry, if it has one, as an AirmuscleWarning; `stacklevel` counts from the caller."""
+    """Issue the warning of an entry, if it has one, as an AirmuscleWarning; `stacklevel` counts from the caller;
+    the functions of a room are called by one frame more (core/stubs.py)."""
     if warning:
         warnings.warn(f"{name}: {warning}", AirmuscleWarning, stacklevel=stacklevel + 1)

@@ -26,7 +26,7 @@ def load_law(name_or_path: str | Path) -> Entry:
     tables, location = _tables(name_or_path, Entry)
     check_describes_law(tables, f"{location}: the file")
     entry: Entry = build_entry(tables, location)
-    issue_warning(entry.name, entry.warning, stacklevel=2)
+    issue_warning(entry.name, entry.warning, stacklevel=3)
     return entry
 
 
@@ -38,7 +38,7 @@ def load_valve(name_or_path: str | Path) -> ValveEntry:
     """
     tables, location = _tables(name_or_path, ValveEntry)
     entry: ValveEntry = build_entry(tables, location, ValveEntry)
-    issue_warning(entry.name, entry.warning, stacklevel=2)
+    issue_warning(entry.name, entry.warning, stacklevel=3)
     return entry
 
 

@@ -47,17 +47,22 @@ def allows(kind: Any, cls: type[Any]) -> bool:
     return kind is Any or (inspect.isclass(base) and issubclass(cls, base))
 
 
+MOST_NAMES = 40
+"""Number of names that a message lists (chosen)."""
+
+
 def model_class(name: str, where: str, classes: Mapping[str, type[Any]] | None = None, kind: Any = Any) -> type[Any]:
     """The class of this name in `classes`, by default all models.
 
-    UnknownNameError begins with `where` and lists the classes, of all models only those that `kind` allows.
+    UnknownNameError begins with `where` and lists the classes, of all models only those that `kind` allows, if they are
+    few.
     """
     if not isinstance(name, str):
         raise UnknownNameError(f'{where} is {abridged(name)}; it must be a name in quotes, such as "Braid".')
     known = _registry() if classes is None else classes
     if name not in known:
-        names = tuple(classes) if classes is not None else model_names(kind) or model_names()
-        raise UnknownNameError(
-            f"{where}: no model '{one_line(name)}'; there are {', '.join(names)}.{suggestion(name, known)}"
-        )
+        names = tuple(classes) if classes is not None else model_names(kind)
+        there = f"; there are {', '.join(names)}." if 0 < len(names) <= MOST_NAMES else "."
+        here = "" if names else " A table is due here, not the name of a model."
+        raise UnknownNameError(f"{where}: no model '{one_line(name)}'{there}{here}{suggestion(name, known)}")
     return known[name]

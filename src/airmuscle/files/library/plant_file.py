@@ -64,7 +64,7 @@ def plant_tables(name: str) -> tuple[dict[str, Any], Location]:
     Its warning is issued as an AirmuscleWarning. Raises UnknownNameError.
     """
     tables, location = tables_of_name(name, PlantEntry)
-    issue_warning(Path(location.file).stem, tables.get("warning", ""), stacklevel=2)
+    issue_warning(Path(location.file).stem, tables.get("warning", ""), stacklevel=3)
     return tables, location
 
 

@@ -36,22 +36,31 @@ def accept_quantities(
     unit_of = dict(zip(names, units, strict=False))  # a user's method may have fewer
     place = units.index("1") if check_ratio is not None and "1" in units[: len(names)] else -1
 
+    def owner_of(thing: Any) -> str:
+        return f"{type(thing).__name__}.{method.__name__}"
+
     @functools.wraps(method)
     def converted(self: Any, *given: Any, **named: Any) -> Any:
-        if len(given) == 2 and not named:  # the usual call: as short as it can be
-            a, b = given
-            if (type(a) in NUMBERS or (type(a) is _ARRAY and a.dtype is _DOUBLE)) and (
-                type(b) in NUMBERS or (type(b) is _ARRAY and b.dtype is _DOUBLE)
-            ):
-                if place >= 0 and not (type(given[place]) is float and given[place] <= 1.0):
-                    check_ratio(given[place], self)  # type: ignore[misc]
-                return method(self, a, b)
-        owner = f"{type(self).__name__}.{method.__name__}"
-        values = [_as_number(value, name, unit_of, owner) for value, name in zip(given, names, strict=False)]
-        named = {name: _as_number(value, name, unit_of, owner) for name, value in named.items()}
-        if place >= 0:
-            check_ratio(values[place] if place < len(values) else named.get(names[place], 0.0), self)  # type: ignore[misc]
-        return method(self, *values, *given[len(values) :], **named)
+        try:
+            if len(given) == 2 and not named:  # the usual call: as short as it can be
+                a, b = given
+                if (type(a) in NUMBERS or (type(a) is _ARRAY and a.dtype is _DOUBLE)) and (
+                    type(b) in NUMBERS or (type(b) is _ARRAY and b.dtype is _DOUBLE)
+                ):
+                    if place >= 0 and not (type(given[place]) is float and given[place] <= 1.0):
+                        check_ratio(given[place], self)  # type: ignore[misc]
+                    return method(self, a, b)
+            owner = owner_of(self)
+            values = [_as_number(value, name, unit_of, owner) for value, name in zip(given, names, strict=False)]
+            named = {name: _as_number(value, name, unit_of, owner) for name, value in named.items()}
+            if place >= 0:
+                check_ratio(values[place] if place < len(values) else named.get(names[place], 0.0), self)  # type: ignore[misc]
+            return method(self, *values, *given[len(values) :], **named)
+        except (TypeError, OverflowError):
+            for name, value in (*zip(names, given, strict=False), *named.items()):
+                if name in unit_of and (isinstance(value, int | type) or not hasattr(value, "__add__")):
+                    _as_array(value, name, unit_of[name], owner_of(self))
+            raise
 
     return converted
 

@@ -9,6 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
+from ....core.annotation import check_whole
 from ....core.arrays import Array
 from ....core.errors import AirmuscleError, IdentificationError, ParameterError
 from ....engine.compile import System
@@ -75,6 +76,7 @@ def fit_dynamic(
     models = tuple(RecordModel(plant, e, i, unknowns, observed, method) for i, e in enumerate(experiments))
     problem = DynamicFitProblem(models, unknowns, np.array(list(observed.values()), dtype=float))
     _check_row_count(problem)
+    check_whole("fit_dynamic", "seed", seed, 0)
     outcomes = sorted(_solve_all(problem, initial_guesses(problem, starts, seed)), key=lambda outcome: outcome[1])
     if not np.isfinite(outcomes[0][1]):
         problem.residuals(problem.scaled(np.array([u.value for u in unknowns])))  # raises the cause, if there is one

@@ -44,8 +44,12 @@ class Hold:
     quantity: str
 
 
-def find_holds(recording: Recording) -> Iterator[Hold]:
+def find_holds(recording: Recording) -> tuple[Hold, ...]:
     """The holds among the pressure plateaus of a recording; none without a time column."""
+    return tuple(_holds(recording))
+
+
+def _holds(recording: Recording) -> Iterator[Hold]:
     force, contraction = recording["force"], recording["contraction"]
     for plateau in find_plateaus(recording, columns=("pressure",)):
         rows = plateau.interval.rows

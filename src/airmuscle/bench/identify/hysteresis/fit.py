@@ -9,6 +9,7 @@ import inspect
 import numpy as np
 import numpy.typing as npt
 
+from ....core.annotation import check_whole
 from ....core.arrays import Array
 from ....core.declaration import model, parameter
 from ....core.errors import Hint, IdentificationError
@@ -114,6 +115,7 @@ def initial_friction_laws(path: Array, force: Array, elements: int = 8) -> tuple
     `elements` is the number of elements of MaxwellSlip and PrandtlIshlinskii. Raises IdentificationError for a constant
     path.
     """
+    check_whole("initial_friction_laws", "elements", elements, 1)
     scales = LoopScales.of(path, force, elements)
     classes = (getattr(friction, name) for name in dir(friction))
     started = (cls.guess(scales) for cls in classes if inspect.isclass(cls) and issubclass(cls, Friction))

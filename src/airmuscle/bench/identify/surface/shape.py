@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.polynomial import polynomial
 
+from ....core.annotation import check_whole
 from ....core.arrays import Array
 from ....core.errors import IdentificationError
 from ....core.short_repr import ShortRepr
@@ -46,6 +47,7 @@ def find_shape_violations(
 
     Exact slopes are evaluated on an even grid of `points` pressures and contractions.
     """
+    check_whole("find_shape_violations", "points", points, 2)
     sides = (np.linspace(*validity_range.pressure, points), np.linspace(*validity_range.contraction, points))
     return find_violations(law, (FALLS_WITH_PRESSURE, RISES_WITH_CONTRACTION), *np.meshgrid(*sides, indexing="ij"))
 

@@ -108,7 +108,7 @@ def _with_errors(
             f"{type(law).__name__} has no solution on {100 * (1 - known.mean()):.2g} % of the validity range; the "
             "values of its polynomial surrogate there are meaningless.",
             AirmuscleWarning,
-            stacklevel=3,
+            stacklevel=4,
         )
 
     def magnitude(x: Array, q: Array) -> Array:
