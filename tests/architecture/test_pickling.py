@@ -111,6 +111,7 @@ RESULTS: dict[str, Callable[[], Any]] = {
         design.LiftRequirement(stroke=0.04, mass=10.0), SUPPLY, [PRODUCT]
     ),
     "an environment": environment,
+    "an environment with sensors": lambda: outlets.MeasuredObservations(environment(), noise=0.01, delay=2),
     "a vector environment": vector,
     "contenders and tasks of the benchmark": lambda: (
         *design.standard_contenders(design.on_off_joint()),

@@ -3,7 +3,9 @@ one, seeds repeat episodes, what is impossible is refused, and quantities have t
 
 from __future__ import annotations
 
+import copy
 import dataclasses
+import pickle
 import re
 import subprocess
 import sys
@@ -23,6 +25,7 @@ from airmuscle.outlets import (
     FitUncertainty,
     JointTracking,
     LoadLifting,
+    MeasuredObservations,
     ValueRange,
     register_environments,
 )
@@ -32,6 +35,7 @@ gymnasium = pytest.importorskip("gymnasium", reason="gymnasium is not installed"
 register_environments()
 
 from gymnasium.utils.env_checker import check_env  # noqa: E402
+from gymnasium.vector import AutoresetMode  # noqa: E402
 
 TASK = JointTracking(JOINT)
 VARIED = (ValueRange(("target_frequency",), 0.2, 1.0), FactorRange(("plant.mechanism.inertia",), 0.8, 1.2))
@@ -54,13 +58,30 @@ def test_gymnasium_finds_no_fault(name):
         check_env(gymnasium.make(f"airmuscle/{name}-v0").unwrapped, skip_render_check=True)
 
 
+def pair_of_vectors(name, mode, **options):
+    """The same plants in lanes, and one by one in a vector of Gymnasium."""
+    lanes = gymnasium.make_vec(
+        f"airmuscle/{name}-v0", vectorization_mode="vector_entry_point", cores=2, autoreset_mode=mode, **options
+    )
+    kept = {"vectorization_mode": "sync", "vector_kwargs": {"autoreset_mode": mode}}
+    return lanes, gymnasium.make_vec(f"airmuscle/{name}-v0", **kept, **options)
+
+
+def assert_same_terms(found, expected, count):
+    """The terms of the rewards where Gymnasium's own vector has them."""
+    for term in ("closeness", "effort"):
+        present = expected.get(f"_{term}", np.zeros(count, bool))
+        np.testing.assert_array_equal(found[f"_{term}"], present)
+        exact = expected.get(term, np.zeros(count))
+        np.testing.assert_allclose(found[term], exact, rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
 @pytest.mark.parametrize("name", NAMES)
-def test_a_vector_is_its_plants_one_by_one_also_where_episodes_begin_anew(name):
+def test_a_vector_is_its_plants_one_by_one_also_where_episodes_begin_anew(name, mode):
     """Actions that soon end episodes of the joint, and a truncation after 15 periods; 19 plants fill no block."""
     count, periods = 19, 40
-    options = {"num_envs": count, "max_episode_steps": 15}
-    together = gymnasium.make_vec(f"airmuscle/{name}-v0", vectorization_mode="vector_entry_point", cores=2, **options)
-    apart = gymnasium.make_vec(f"airmuscle/{name}-v0", vectorization_mode="sync", **options)
+    together, apart = pair_of_vectors(name, mode, num_envs=count, max_episode_steps=15)
     assert together.metadata["autoreset_mode"] == apart.metadata["autoreset_mode"]
     first, second = together.reset(seed=5)[0], apart.reset(seed=5)[0]
     np.testing.assert_array_equal(first, second)
@@ -73,6 +94,11 @@ def test_a_vector_is_its_plants_one_by_one_also_where_episodes_begin_anew(name):
         np.testing.assert_array_equal(found[2], expected[2])
         np.testing.assert_array_equal(found[3], expected[3])
         ended += found[2].sum() + found[3].sum()
+        assert_same_terms(found[4], expected[4], count)
+        assert ("final_info" in found[4]) == ("final_info" in expected[4])
+        if "final_info" in expected[4]:
+            np.testing.assert_array_equal(found[4]["_final_info"], expected[4]["_final_info"])
+            assert_same_terms(found[4]["final_info"], expected[4]["final_info"], count)
     assert ended >= 2 * count
     together.close()
 
@@ -95,6 +121,70 @@ def test_an_episode_of_a_vector_ends_where_the_task_ends_it():
     assert not truncated[0]
     assert abs(observations[0, 0]) <= 0.1
     assert observations[0, 1] == 0.0
+
+
+def test_a_mask_chooses_the_plants_that_begin_anew_as_in_the_vectors_of_gymnasium():
+    together, apart = pair_of_vectors("Lift", AutoresetMode.NEXT_STEP, num_envs=5)
+    mask, action = np.array([True, False, True, False, False]), np.full((5, 1), 0.4, np.float32)
+    for env in (together, apart):
+        env.reset(seed=3)
+        env.step(action)
+    first, second = (env.reset(options={"reset_mask": mask.copy()})[0] for env in (together, apart))
+    np.testing.assert_allclose(first, second, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(together.step(action)[0], apart.step(action)[0], rtol=1e-6, atol=1e-9)
+    for wrong, options in ((mask[:2], {}), (mask.astype(int), {}), (mask, {"seed": 1})):
+        with pytest.raises(ParameterError, match="give 5 booleans, no seed"):
+            together.reset(options={"reset_mask": wrong}, **options)
+
+
+def test_the_terms_of_a_reward_add_up_to_it():
+    env = single(dataclasses.replace(TASK, effort_weight=0.3)).unwrapped
+    env.reset(seed=2)
+    _, reward, _, _, terms = env.step(np.array([0.5, -2.0]))
+    assert terms["effort"] == pytest.approx(0.3 * (0.25 + 1.0) / 2)
+    assert reward == pytest.approx(terms["closeness"] - terms["effort"], abs=1e-15)
+    assert 0 < terms["closeness"] <= 1
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+@pytest.mark.parametrize("make", [lambda: single().unwrapped, lambda: vector(3)])
+def test_a_copy_of_an_environment_goes_on_by_itself(make, copied):
+    env = make()
+    env.reset(seed=4)
+    actions = np.full(env.action_space.shape, 0.3)
+    env.step(actions)
+    other = copied(env)
+    for _ in range(3):
+        for first, second in zip(env.step(actions)[:2], other.step(actions)[:2], strict=True):
+            np.testing.assert_array_equal(first, second)
+    for first, second in zip(env.reset()[:1], other.reset()[:1], strict=True):
+        np.testing.assert_array_equal(first, second)
+
+
+def test_the_import_registers_the_environments():
+    """`module:identifier` of Gymnasium imports the module first."""
+    code = 'import gymnasium\nprint(gymnasium.make("airmuscle.outlets.environments:airmuscle/Lift-v0").spec.id)'
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "airmuscle/Lift-v0"
+
+
+def test_observations_pass_through_sensors():
+    plain = single().unwrapped
+    seen = MeasuredObservations(
+        single().unwrapped, noise=(0.01, 0, 0, 0, 0, 0), resolution=(0, 0.05, 0, 0, 0, 0), delay=2
+    )
+    exact, read = [plain.reset(seed=5)[0]], [seen.reset(seed=5)[0]]
+    for k in range(60):
+        action = np.array([np.sin(0.1 * k), -np.sin(0.1 * k)])
+        exact.append(plain.step(action)[0])
+        read.append(seen.step(action)[0])
+    exact, late = np.array(exact)[:-2], np.array(read)[2:]
+    np.testing.assert_array_equal(np.array(read)[:3], np.array(read)[[0, 0, 0]])
+    np.testing.assert_array_equal(late[:, 2:], exact[:, 2:])
+    np.testing.assert_allclose(late[:, 1], 0.05 * np.round(exact[:, 1].astype(float) / 0.05), atol=1e-6)
+    assert np.std(late[:, 0] - exact[:, 0]) == pytest.approx(0.01, rel=0.35)
+    with pytest.raises(ParameterError, match="MeasuredObservations: noise is -1"):
+        MeasuredObservations(plain, noise=-1)
 
 
 def test_seeds_repeat_episodes_and_different_seeds_differ():

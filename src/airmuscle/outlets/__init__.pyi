@@ -4,6 +4,7 @@ from .environments import FactorRange as FactorRange
 from .environments import FitUncertainty as FitUncertainty
 from .environments import JointTracking as JointTracking
 from .environments import LoadLifting as LoadLifting
+from .environments import MeasuredObservations as MeasuredObservations
 from .environments import Observation as Observation
 from .environments import Randomisation as Randomisation
 from .environments import ValueRange as ValueRange

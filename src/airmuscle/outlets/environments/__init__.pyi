@@ -1,3 +1,4 @@
+from .plant_env import MeasuredObservations as MeasuredObservations
 from .plant_env import PlantEnv as PlantEnv
 from .plant_vector_env import PlantVectorEnv as PlantVectorEnv
 from .randomisation import FactorRange as FactorRange

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import collections
 import math
 from typing import Any, ClassVar
 
@@ -70,7 +71,10 @@ class PlantEnv(gymnasium.Env):  # type: ignore[misc, unused-ignore]
         return outputs[: self._count].astype(np.float32), {}
 
     def step(self, action: Any) -> tuple[npt.NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """Hold an action for one period: observation, reward, terminated, truncated (never), an empty dictionary."""
+        """Hold an action for one period: observation, reward, terminated, truncated (never), the terms of the reward.
+
+        The terms are `closeness`, exp(-sum e^2), and `effort`, which is subtracted from it.
+        """
         values = action.tolist() if isinstance(action, np.ndarray) else action
         inputs, self._elapsed = self._inputs, self._elapsed + 1
         try:
@@ -86,9 +90,49 @@ class PlantEnv(gymnasium.Env):  # type: ignore[misc, unused-ignore]
         try:
             outputs = self._stepper.step(inputs, self.task.period)
         except SimulationError:
-            return np.zeros(self._count, np.float32), 0.0, True, False, {}
+            return np.zeros(self._count, np.float32), 0.0, True, False, {"closeness": 0.0, "effort": 0.0}
         reward, terminated = float(outputs[-2]), bool(outputs[-1] > 0.5)
-        return outputs[: self._count].astype(np.float32), reward, terminated, False, {}
+        effort = self.task.effort_weight * sum(u * u for u in inputs[:-1]) / self._actions
+        terms = {"closeness": reward + effort, "effort": effort}
+        return outputs[: self._count].astype(np.float32), reward, terminated, False, terms
+
+
+class MeasuredObservations(gymnasium.ObservationWrapper):  # type: ignore[misc, unused-ignore]
+    """A single environment whose observations pass through sensors: noise, steps, and a dead time.
+
+    noise, resolution  standard deviation and step of the observations, one for all or one for each (k,), in their units
+    delay              periods by which observations are late; until then the first one is repeated
+
+    The noise is drawn from the generator of the environment, which `reset(seed=...)` seeds. Observations remain within
+    their limits. Raises ParameterError for a number that is negative or not finite.
+    """
+
+    def __init__(self, env: Any, *, noise: Any = 0.0, resolution: Any = 0.0, delay: int = 0) -> None:
+        super().__init__(env)
+        size = env.observation_space.shape[0]
+        for name, given in {"noise": noise, "resolution": resolution, "delay": delay}.items():
+            values = np.asarray(given, dtype=float)
+            if values.shape not in ((), (size,)) or not (np.isfinite(values) & (values >= 0)).all() or delay % 1:
+                raise ParameterError(
+                    f"MeasuredObservations: {name} is {given!r}; give numbers from 0 on, one or {size} (delay: one "
+                    "whole number of periods)."
+                )
+        self.noise, self.resolution, self.delay = np.asarray(noise, float), np.asarray(resolution, float), int(delay)
+        self._late: collections.deque[Any] = collections.deque(maxlen=self.delay + 1)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Any:
+        """Begin an episode: its first observation, and an empty dictionary."""
+        self._late.clear()
+        return super().reset(seed=seed, options=options)
+
+    def observation(self, observation: Any) -> npt.NDArray[np.float32]:
+        """The reading of the sensors for an observation (k,)."""
+        noisy = observation + self.noise * self.unwrapped.np_random.normal(size=observation.shape)
+        step = np.where(self.resolution > 0, self.resolution, 1.0)
+        read = np.where(self.resolution > 0, step * np.round(noisy / step), noisy)
+        space = self.observation_space
+        self._late.append(np.clip(read, space.low, space.high).astype(np.float32))
+        return np.array(self._late[0])
 
 
 def make_joint(task: EnvironmentTask | None = None, **options: Any) -> PlantEnv:

@@ -48,7 +48,7 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
     Plant i is what `PlantEnv` with the seed `seed + i` is, to the rounding of the lanes. An episode that is over begins
     anew in the next step (NEXT_STEP): the action of that step is ignored, its reward is 0. With SAME_STEP it begins
     anew at once, and `info["final_obs"]` holds the last observation of each plant whose episode is over, None for
-    others.
+    others, `info["final_info"]` the terms of its reward.
     Beyond the arrays that it returns, a step in which no episode begins allocates some arrays (N,) of time and flags.
     """
 
@@ -89,8 +89,12 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
     ) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
         """Begin an episode of every plant: the first observations (N, k), and an empty dictionary.
 
-        With `seed`, plant i has the seed `seed + i`; a list has one for each. Without it, the generators go on.
+        With `seed`, plant i has the seed `seed + i`; a list has one for each. Without it, the generators go on. With
+        `options={"reset_mask": mask}`, booleans (N,), only the plants of the mask begin anew, and no seed is given.
         """
+        mask = (options or {}).get("reset_mask")
+        if mask is not None:
+            return self._reset_some(mask, seed), {}
         self._seed(seed)
         plants = self._plants
         further = np.arange(self.num_envs, plants.blocks * plants.width)  # plants that fill the last block
@@ -99,10 +103,22 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
         self._over[:] = False
         return self._observed()[0], {}
 
+    def _reset_some(self, mask: Any, seed: Any) -> npt.NDArray[np.float32]:
+        """Begin an episode of the plants of a mask; the observations (N, k) of all."""
+        chosen = np.asarray(mask)
+        if chosen.shape != (self.num_envs,) or chosen.dtype != bool or seed is not None or not self._generators:
+            raise ParameterError(
+                f"reset: reset_mask has the shape {chosen.shape} and the type {chosen.dtype}; give {self.num_envs} "
+                "booleans, no seed, and call reset() without a mask first."
+            )
+        self._begin(np.flatnonzero(chosen))
+        self._over[chosen] = False
+        return self._observed()[0]
+
     def step(self, actions: Any) -> tuple[npt.NDArray[np.float32], Array, Booleans, Booleans, dict[str, Any]]:
         """Hold an action (N, m) of every plant for one period: observations (N, k), rewards, terminated and truncated
-        (N,), and a dictionary, empty with NEXT_STEP. Raises ParameterError for another shape, or an action that is not
-        finite."""
+        (N,), and the terms of the rewards, closeness and effort (N,), as those of PlantEnv. Raises ParameterError for
+        another shape, or an action that is not finite."""
         count = len(self.task.actions)
         if not self._generators:
             raise ParameterError("the environment has no state yet; call reset() before the first step.")
@@ -112,6 +128,7 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
         np.clip(actions, -1.0, 1.0, out=self._inputs[:, :count], casting="same_kind")
         self._elapsed += 1
         np.multiply(self._elapsed, self.task.period, out=self._inputs[:, count], casting="same_kind")
+        effort = self.task.effort_weight * np.mean(np.square(self._inputs[:, :count], dtype=float), axis=1)
         self._plants.inputs[...] = self._given.transpose(0, 2, 1)
         self._plants.advance(self._steps)
         anew = np.flatnonzero(self._over)
@@ -120,12 +137,18 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
         observations, rewards, terminated = self._observed()
         truncated: Booleans = self._elapsed >= self.max_episode_steps
         rewards[anew], terminated[anew] = 0.0, False
+        effort[terminated & ~observations.any(axis=1)] = 0.0  # an impossible state
+        terms = {"closeness": rewards + effort, "effort": effort}
         over: Booleans = terminated | truncated
         if not self._at_once:
+            present = ~self._over
             self._over = over
-        elif over.any():
-            return self._begun_at_once(observations, over), rewards, terminated, truncated, _final(observations, over)
-        return observations, rewards, terminated, truncated, {}
+            return observations, rewards, terminated, truncated, _masked(terms, present)
+        info = _masked(terms, ~over)
+        if over.any():
+            info |= _final(observations, over) | {"final_info": _masked(terms, over), "_final_info": over.copy()}
+            observations = self._begun_at_once(observations, over)
+        return observations, rewards, terminated, truncated, info
 
     @property
     def _inputs(self) -> npt.NDArray[Any]:
@@ -196,6 +219,12 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
             return ParameterError(f"the actions have the shape {actions.shape}; give ({self.num_envs}, {count}).")
         row = int(np.flatnonzero(~np.isfinite(actions).all(axis=1))[0])
         return ParameterError(f"the actions, row {row}: {actions[row]}; give {count} finite numbers from -1 to 1.")
+
+
+def _masked(terms: dict[str, Array], present: Booleans) -> dict[str, Any]:
+    """Terms of the rewards (N,) where they are present, 0 elsewhere, with the masks of Gymnasium's own vectors."""
+    values = {name: np.where(present, value, 0.0) for name, value in terms.items()}
+    return {**values, **{f"_{name}": present.copy() for name in terms}}
 
 
 def _final(observations: npt.NDArray[np.float32], over: Booleans) -> dict[str, Any]:
