@@ -45,17 +45,10 @@ def test_files_have_300_lines_at_most():
     assert {name for name, n in lengths.items() if n > 300} == set()
 
 
-<<<<<<< HEAD
 def test_the_package_has_705_files_and_99_500_lines_at_most():
     """The limits fall with the package; what adds a file joins another one to the file that uses it."""
     assert len(FILES) <= 705
     assert sum(len(path.read_text(encoding="utf-8").splitlines()) for path in FILES) <= 99_500
-=======
-def test_the_package_has_700_files_and_98_800_lines_at_most():
-    """The limits fall with the package; what adds a file joins another one to the file that uses it."""
-    assert len(FILES) <= 700
-    assert sum(len(path.read_text(encoding="utf-8").splitlines()) for path in FILES) <= 98_800
->>>>>>> bcf40b07 (The import registers the environments; terms of the reward, masks of a reset, last terms of an episode, and sensors of observations)
 
 
 def body_length(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
