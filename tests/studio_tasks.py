@@ -7,7 +7,7 @@ from pathlib import Path
 
 from airmuscle.core import atomic_folder
 from airmuscle.errors import InputError
-from airmuscle.outlets.studio import FieldError
+from airmuscle.outlets.studio import RequestError
 
 
 class WorkerHere:
@@ -34,4 +34,4 @@ def write_slowly(folder, out, seconds, report):
 
 def fail(folder, out, field, report):
     """An error of a field, or of none."""
-    raise FieldError("this is wrong.", field) if field else InputError("this is wrong.")
+    raise RequestError("this is wrong.", field) if field else InputError("this is wrong.")

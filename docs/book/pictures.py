@@ -25,7 +25,7 @@ from airmuscle.physics import (
     PulleyProfile,
     ValidityRange,
 )
-from airmuscle.physics.muscle.isobar_plot import isobar_plot
+from airmuscle.physics.muscle.isobar_plot import isobar_figure
 from airmuscle.physics.muscle.isobars import compute_isobars
 
 from .model_pages import components, entries_of, rooms
@@ -93,7 +93,7 @@ def _range_of(cls: type[Any]) -> ValidityRange:
 
 def _isobars(law: Characteristic, title: str, limits: ValidityRange) -> Any:
     try:
-        return isobar_plot(law, title, compute_isobars(law, limits), limits).figure
+        return isobar_figure(law, title, compute_isobars(law, limits), limits)
     except AirmuscleError:
         return None
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import pickle
-import re
 from pathlib import Path
 
 import numpy as np
@@ -43,7 +42,7 @@ from airmuscle.bench.identify import (
 from airmuscle.bench.identify.compare_chapter import compare_chapter
 from airmuscle.core import model, parameter
 from airmuscle.errors import IdentificationError, ParameterError
-from airmuscle.outlets.cli import parse_split
+from airmuscle.outlets.requests import FitRequest, build
 from airmuscle.physics import (
     Braid,
     ContractileSurface,
@@ -91,8 +90,8 @@ def test_the_order_in_sample_is_not_the_order_on_what_was_left_out():
     assert found["surface of degree 5"].cross_validated_rmse > 2 * found["braid"].cross_validated_rmse
     assert found.recommended.candidate.name == "braid"
     assert "3 parameters" in found.reason
-    assert re.search(r"AICc excess$", str(found), re.MULTILINE)
-    assert min(float(line.rpartition(" ")[2]) for line in str(found).splitlines()[3:6]) == 0.0
+    ranking = next(table for table in found.chapter().tables if table.name == "ranking")
+    assert min(ranking.columns["AICc above the lowest"]) == 0.0
     assert [c.cross_validated_rmse for c in found.ranking] == sorted(c.cross_validated_rmse for c in found.ranking)
 
 
@@ -146,7 +145,7 @@ def test_the_figure_of_the_folds_is_sorted_by_level_and_names_the_quantity_once(
     runs = [isometric(contraction, seed=i) for i, contraction in enumerate(levels)]
     comparison = compare(runs, CANDIDATES[:2], leave_out=LevelSplit("contraction"))
     plots = {plot.name: plot for plot in compare_chapter(comparison).plots}
-    (axes,) = plots["left-out"].figure.axes
+    (axes,) = plots["left-out"].draw().axes
     labels = [label.get_text() for label in axes.get_xticklabels()]
     assert labels == ["0 %", "4 %", "8 %", "10 %", "12 %", "16 %", "20 %"]
     assert axes.get_xlabel() == "contraction"
@@ -256,7 +255,7 @@ def test_what_is_left_out_decides_what_the_law_is_for():
     [("run", RunSplit()), ("specimen", SpecimenSplit()), ("block", BlockSplit()), ("pressure", LevelSplit("pressure"))],
 )
 def test_the_command_knows_each_way_by_a_word(word: str, how):
-    assert parse_split(word) == how
+    assert build(FitRequest, {"compare": True, "leave_out": word}, str).split == how
 
 
 def test_each_way_of_leaving_out_has_a_purpose_of_its_own():
@@ -274,17 +273,18 @@ def test_the_command_writes_a_muscle_that_loads_back(tmp_path: Path):
     done = airmuscle("fit", *map(str, files), *options)
     assert done.exit_code == 0, done.output
     printed = json.loads(done.stdout)
-    assert printed["purpose"] == RunSplit().purpose
-    assert printed["recommended"] == printed["ranking"][0]["law"] or "standard error" in printed["reason"]
+    compared = printed["comparison"]
+    assert compared["purpose"] == RunSplit().purpose
+    assert compared["recommended"] == compared["ranking"][0]["law"] or "standard error" in compared["summary"][0]
     entry = am.load(out / "muscle.toml")
-    fitted = {p["name"]: p["value"] for p in printed["fit"]["parameters"]}
+    fitted = {p["parameter"]: p["value"] for p in printed["fit"]["parameters"]}
     from airmuscle.core import tree
 
     loaded = {leaf.path: leaf.value for leaf in tree.leaves(entry.characteristic)}
     assert {name: loaded[name] for name in fitted} == fitted
     names = {path.stem for path in (out / "figures").glob("*.svg")}
     assert {"isobars", "errors", "residuals", "correlations", "left-out"} <= names
-    assert "Model selection" in (out / "report.html").read_text(encoding="utf-8")
+    assert "Ranking by cross-validation error" in (out / "report.html").read_text(encoding="utf-8")
 
 
 def test_the_command_refuses_what_it_cannot_do(tmp_path: Path):
@@ -322,11 +322,14 @@ def test_the_progress_of_a_comparison_has_an_end():
 
 
 def test_each_law_that_is_left_out_has_one_line_with_its_cause():
-    text = str(compare(bench(), CANDIDATES, leave_out=RunSplit()))
-    (line,) = [each for each in text.splitlines() if each.startswith("excluded")]
-    assert line.startswith("excluded: surface of degree 6: without run 0.000, the data cannot separate ")
-    assert line.endswith("(rank 27 of 28).")
-    assert len(line) <= 120
+    found = compare(bench(), CANDIDATES, leave_out=RunSplit())
+    excluded = next(table for table in found.chapter().tables if table.name == "excluded")
+    assert list(excluded.columns["law"]) == ["surface of degree 6"]
+    (cause,) = excluded.columns["cause"]
+    assert cause.startswith("without run 0.000, the data cannot separate ")
+    assert cause.endswith("(rank 27 of 28)")
+    assert len(cause) <= 100
+    assert " ".join(cause.split()[-3:]) in " ".join(str(found).split())
 
 
 @model
@@ -380,7 +383,7 @@ def test_laws_that_need_a_length_are_named_where_none_is_stated():
     found = compare(runs, leave_out=RunSplit())
     causes = {each.name: each.cause for each in found.unavailable}
     assert causes["TonduLopez2000"] == "not every recording states its resting length"
-    (line, family) = [each for each in str(found).splitlines() if each.startswith("not compared: ")]
+    (line, family) = [each for each in str(found).splitlines() if each.startswith("note: not compared: ")]
     assert line.endswith("Serres2009, TonduLopez2000: not every recording states its resting length.")
     assert family.endswith("LogarithmicLength: it needs recordings of two resting lengths or more.")
     assert compare(runs, CANDIDATES[1:2], leave_out=RunSplit()).unavailable == ()
@@ -391,18 +394,20 @@ def test_a_fit_of_another_process_states_its_errors_in_the_unit_of_the_force():
     fit = am.fit(ContractileSurface.blank(2), load_data("dmsp-20-300"))
     copy = pickle.loads(pickle.dumps(fit))
     assert copy.format_residual(12.5) == fit.format_residual(12.5) == "12.5 N"
-    assert copy.summary() == fit.summary()
+    assert copy.goodness() == fit.goodness()
 
 
 def test_the_text_lists_the_first_laws_and_the_recommended_one():
-    """Laws that are excluded by their errors stand in one line; `ranking` and `excluded` contain all."""
+    """Of the excluded laws the first four; `ranking` and `excluded` contain all."""
     comparison = compare(load_data("dmsp-20-300"), leave_out=LevelSplit("contraction"))
-    long = dataclasses.replace(comparison, ranking=comparison.ranking * 3, recommended=comparison.ranking[-1])
+    last = dataclasses.replace(comparison.ranking[0], candidate=Candidate("the recommended law", START))
+    ranking = (*comparison.ranking[:5], *comparison.ranking[:5], *comparison.ranking[:2], last, *comparison.ranking[:3])
+    long = dataclasses.replace(comparison, ranking=ranking, recommended=last)
     lines = str(long).splitlines()
-    more = next(i for i, line in enumerate(lines) if line.startswith("and "))
-    assert more - lines.index(next(line for line in lines if line.startswith("law "))) - 1 <= 11
-    assert f"and {len(long.ranking) - 10} more" in lines[more] or f"and {len(long.ranking) - 11} more" in lines[more]
-    (excluded,) = (line for line in lines if line.startswith("excluded, as the error is too large"))
-    named = [each.name for each in comparison.excluded if each.error is not None]
-    assert named
-    assert all(name in excluded for name in named)
+    at = lines.index(next(line for line in lines if line.startswith("the recommended law  ")))
+    assert (lines[at - 1], lines[at + 1]) == ("... 2 more", "... 3 more in its chapter()")
+    assert lines[at - 11].startswith(f"{ranking[0].candidate.name}  ")
+    excluded = lines[lines.index("Laws that are not ranked") + 3 :]
+    named = [each.name for each in comparison.excluded]
+    assert [name for name in named[:4] if not any(line.startswith(f"{name}  ") for line in excluded)] == []
+    assert f"... {len(named) - 4} more in its chapter()" in excluded

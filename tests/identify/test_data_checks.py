@@ -217,7 +217,7 @@ def test_a_fit_states_the_scatter_of_its_data_and_a_law_that_does_not_follow_the
     assert good.scatter is not None
     assert good.scatter.noise == pytest.approx(1.0, rel=0.5)
     assert 1.0 < good.scatter.repeatability < 2.0, "noise of force, pressure and length, and the distance of the rows"
-    assert "scatter of data" in str(good)
+    assert "noise of the data" in str(good)
     assert not any("does not follow" in note for note in good.notes)
     assert any("times the scatter of the data" in note and "does not follow" in note for note in poor.notes)
 

@@ -84,7 +84,7 @@ def test_the_command_inspects_and_fits(tmp_path):
     shown = airmuscle("fit-joint", *names, "--inspect").output
     assert "12 episodes of 95 to 95 rows at 100 Hz" in shown
     shown = airmuscle("fit-joint", *names, "--out", tmp_path / "out", "--left-out", "0.25").output
-    assert "free run over 0.4 s on 3 episodes left out" in shown
+    assert "free run over 0.4 s on 3 episodes left out" in " ".join(shown.split())
     assert (tmp_path / "out" / "report.html").exists()
     plant = am.files.load_scenario(tmp_path / "out" / "scenario.toml")
     assert len(plant.plant.muscles) == 2

@@ -164,8 +164,10 @@ def test_the_command_ranks_the_records_of_a_study(fill, tmp_path):
     done = airmuscle(*call, "--out", tmp_path / "plan", "--json")
     assert done.exit_code == 0, done.stderr
     said = json.loads(done.stdout)
-    assert said["pair"] == [VALVE, WALL]
-    assert "whose valve is closed" in said["ranking"][0]["description"]
+    named = [key for key in said["ranking"]["ranking"][0] if key.startswith("standard_error_of_")]
+    assert named == [f"standard_error_of_{VALVE}", f"standard_error_of_{WALL}"]
+    assert said["ranking"]["ranking"][0]["record_in_addition"] == "none"
+    assert any("whose valve is closed" in row["record_in_addition"] for row in said["ranking"]["ranking"])
     text = (tmp_path / "plan" / "plan.csv").read_text(encoding="utf-8")
     assert text.splitlines()[1].startswith("none,1.0,")
     assert "To separate them" in (tmp_path / "plan" / "report.html").read_text(encoding="utf-8")

@@ -106,8 +106,9 @@ def test_the_command_prints_a_table_and_writes_points_to_follow(tmp_path):
 def test_the_command_prints_json():
     done = airmuscle(*ARGUMENTS, "--json")
     found = json.loads(done.output)
-    assert len(found["runs"]) == 4
-    assert found["relative_efficiency"] > 1.0
+    assert len(found["plan"]["runs"]) == 4
+    assert found["plan"]["relative_D_efficiency"] > 1.0
+    assert found["plan"]["units"]["runs.pressure"] == "Pa"
 
 
 def test_a_limit_without_its_unit_is_one_line():

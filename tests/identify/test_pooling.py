@@ -27,7 +27,7 @@ from airmuscle.bench.identify import EffectRows, Runs, estimate_pooled_covarianc
 from airmuscle.bench.identify.static_fit_chapter import equation_section
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.files import Entry, load, save
-from airmuscle.outlets.cli import parse_split
+from airmuscle.outlets.requests import FitRequest, build
 from airmuscle.physics import ContractileSurface, LogarithmicLength, PooledLengthLaw
 from airmuscle.recording import Recording
 
@@ -298,8 +298,9 @@ def test_the_report_shows_the_law_of_the_population_and_the_effect_of_each_speci
     equations, (_, effects) = equation_section(fitted)
     titles = [e.title.partition(" (below zero force")[0] for e in equations if "specimen" in e.title]
     assert titles == [f"Effect of specimen {name}, added to the law of the population" for name in NAMES]
-    assert set(effects.columns) == {"term", *(f"{n}{end} [N]" for n in NAMES for end in ("", ", standard error"))}
-    assert effects.columns["muscle 2, standard error [N]"] == list(fitted.effects.standard_errors[1])
+    assert set(effects.columns) == {"term", *(f"{n}{end}" for n in NAMES for end in ("", ", standard error"))}
+    errors = effects.columns["muscle 2, standard error"]
+    assert (list(errors), errors.unit) == (list(fitted.effects.standard_errors[1]), "N")
 
 
 def test_scores_do_not_depend_on_the_number_of_processes():
@@ -322,18 +323,18 @@ def test_the_command_recommends_one_law_for_both_purposes_and_states_the_excess(
     files = sorted(map(str, tmp_path.glob("*.csv")))
     common = ["--file-name", "L{resting_length [mm]}mm", "--compare", "--json", "--out", str(tmp_path / "out")]
     answer = json.loads(answer_of(["fit", *files, *common, "--length-error", "100 mm"]))
-    assert answer["recommended"].startswith("pooled")
-    assert [each["left_out"] for each in answer["purposes"]] == ["run", "specimen"]
-    assert "For other muscles of the same type: rms error" in answer["reason"]
-    assert answer["length_errors"][0]["specimen"] == "100 mm"
+    purposes = [answer[f"comparison_{group}"] for group in ("run", "specimen")]
+    assert purposes[0]["recommended"].startswith("pooled")
+    assert [each["left_out"] for each in purposes] == ["run", "specimen"]
+    assert "For other muscles of the same type: rms error" in purposes[0]["summary"][0]
+    assert answer["length_errors"]["length_errors"][0]["specimen"] == "100 mm"
     law = load(tmp_path / "out" / "muscle.toml").characteristic
     assert law.specimens == ("100 mm", "150 mm", "200 mm", "300 mm")
 
 
 def test_a_purpose_names_the_rows_that_are_left_out():
-    assert parse_split(None, "repeat") == RunSplit()
-    assert parse_split(None, "length") == SpecimenSplit()
-    assert parse_split(None, "both") is None
+    splits = {"repeat": RunSplit(), "length": SpecimenSplit(), "both": None}
+    assert {name: build(FitRequest, {"compare": True, "purpose": name}, str).split for name in splits} == splits
 
 
 @pytest.mark.parametrize(

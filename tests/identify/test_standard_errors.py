@@ -178,7 +178,7 @@ def test_one_run_is_divided_and_says_that_other_runs_are_not_known():
     found = fit(blank_surface(1, 4000), run)
     assert "successive parts of one run" in found.error_basis
     assert "the scatter between runs (zero and gain of the sensors) is not known" in found.error_basis
-    assert ("standard errors", found.error_basis) in found.summary()
+    assert found.error_basis in found.chapter().paragraphs[0]
     assert found.error_basis in str(found)
 
 
@@ -232,7 +232,7 @@ def test_the_command_and_the_report_state_what_standard_errors_are_from(tmp_path
     arguments = ["fit", *map(str, files), "--characteristic", "ContractileSurface", "--degree", "1"]
     done = airmuscle(*arguments, "--resting-length", "300 mm", "--out", tmp_path / "fit", "--json")
     assert done.exit_code == 0, done.output
-    assert json.loads(done.stdout)["standard_errors"].startswith("from the scatter of 6 runs")
+    assert json.loads(done.stdout)["fit"]["summary"][0].startswith("Standard errors from the scatter of 6 runs")
     page = (tmp_path / "fit" / "report.html").read_text(encoding="utf-8").replace("\u00a0", " ")
     assert page.count("from the scatter of 6 runs") >= 2  # the goodness of fit and the caption of the bands
 
@@ -244,8 +244,7 @@ def test_a_bootstrap_of_few_runs_is_refused_or_has_its_caution():
     assert drawn.group_count < RELIABLE_GROUPS
     assert "hold less often than stated" in drawn.caution
     uncertainty = Uncertainty(found, drawn)
-    assert drawn.caution in uncertainty.lines()[0]
-    assert drawn.caution in uncertainty_chapter(uncertainty).summary
+    assert drawn.caution in uncertainty_chapter(uncertainty).paragraphs[0]
     halves = [run.rows(slice(start, None, 2)) for run in runs for start in (0, 1)]
     many = bootstrap(fit(blank_surface(1, 4000), halves), halves, by=RunSplit(), refits=50)
     assert (many.group_count, many.caution) == (RELIABLE_GROUPS, "")

@@ -108,12 +108,13 @@ def test_fit_volume_writes_the_muscle_with_its_volume_and_the_maxwell_defect(tmp
     arguments = ["fit-volume", str(tmp_path / "column.csv"), "--muscle", "dmsp-20-300", "--out", str(tmp_path / "out")]
     result = airmuscle(*arguments, "--json")
     assert result.exit_code == 0, result.output
-    data = json.loads(result.stdout)
-    assert data["model"] == "Braid"
-    assert data["parameters"]["radius"] == pytest.approx(0.01, rel=0.05)
-    assert data["maxwell_defect"]["relative"] > 0.0
+    data = json.loads(result.stdout)["volume"]
+    assert data["law"] == "Braid"
+    parameters = {row["parameter"]: row["value"] for row in data["volume_parameters"]}
+    assert parameters["radius"] == pytest.approx(0.01, rel=0.05)
+    assert data["relative_Maxwell_defect"] > 0.0
     written = load(tmp_path / "out" / "muscle.toml")
-    assert written.geometry.radius == pytest.approx(data["parameters"]["radius"])
+    assert written.geometry.radius == pytest.approx(parameters["radius"])
     assert "standard deviation of the volume at most" in written.note
     assert "Maxwell defect" in (tmp_path / "out" / "report.html").read_text()
     alone = airmuscle("fit-volume", tmp_path / "column.csv", "--resting-length", "300 mm", "--out", tmp_path / "alone")

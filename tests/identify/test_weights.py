@@ -102,7 +102,9 @@ def test_the_command_line_weighs_by_sensor_unless_told(tmp_path):
         files.append(str(tmp_path / f"{run.origin}.csv"))
         write(run, files[-1])
     law = ("--characteristic", "ContractileSurface", "--degree", "3", "--json", "--out", str(tmp_path / "fit"))
-    notes = [json.loads(airmuscle("fit", *files, *law, *more).stdout)["notes"] for more in ((), ("--equal-weights",))]
+    notes = [
+        json.loads(airmuscle("fit", *files, *law, *more).stdout)["fit"]["notes"] for more in ((), ("--equal-weights",))
+    ]
     assert [any("test rigs with different sensors" in note for note in each) for each in notes] == [True, False]
     assert any(note.endswith("To weight all rows equally, use --equal-weights.") for note in notes[0])
     page = (tmp_path / "fit" / "report.html").read_text(encoding="utf-8")

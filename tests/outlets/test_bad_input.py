@@ -123,7 +123,7 @@ def test_what_other_programs_write_is_read(tmp_path: Path, content: bytes):
     arguments = ["fit", str(tmp_path / "bench.csv"), *SURFACE, "--out", str(tmp_path / "fit"), "--json"]
     result = airmuscle(*arguments)
     assert result.exit_code == 0, result.stderr
-    assert json.loads(result.stdout)["rmse"] < 1e-6
+    assert json.loads(result.stdout)["fit"]["rms_error"] < 1e-6
 
 
 @pytest.mark.parametrize(
@@ -146,7 +146,7 @@ def test_a_bad_option_of_fit(tmp_path: Path, option: tuple[str, str], message: s
 def test_a_data_set_is_known_by_a_unique_beginning_and_brings_its_units(tmp_path: Path):
     surface = ("--characteristic", "ContractileSurface", "--degree", "2")
     result = airmuscle("fit", "dmsp-20", *surface, "--out", tmp_path / "fit", "--json")
-    assert json.loads(result.stdout)["rows_used"] == len(load_data(MUSCLE))
+    assert json.loads(result.stdout)["fit"]["rows_used"] == len(load_data(MUSCLE))
     said = refused(tmp_path, "fit", MUSCLE, *surface, "--unit", "pressure=psi", "--out", tmp_path / "other")
     assert said == f"{MUSCLE}: a data set of the library contains its units and constants; omit --unit."
     said = refused(tmp_path, "fit", "dmps-20-300", *surface, "--out", tmp_path / "other")
@@ -159,9 +159,9 @@ def test_a_data_set_is_known_by_a_unique_beginning_and_brings_its_units(tmp_path
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        (("--pressure=3 bar", "--contraction=90 %"), r"--contraction: 90 % is outside the range of MartensBoblan2017, -4.9\d+ to 40 %"),
-        (("--pressure=3 bar", "--contraction=-50 %"), r"--contraction: -50 % is outside the range of "),
-        (("--pressure=3 bar", "--contraction=12"), r"--contraction: 1200 % is outside .* For a percentage, write '12 %'"),
+        (("--pressure=3 bar", "--contraction=90 %"), r"contraction: 90 % is outside the range of MartensBoblan2017, -4.9\d+ to 40 %"),
+        (("--pressure=3 bar", "--contraction=-50 %"), r"contraction: -50 % is outside the range of "),
+        (("--pressure=3 bar", "--contraction=12"), r"contraction: 1200 % is outside .* For a percentage, write '12 %'"),
         (("--pressure=3 bar", "--contraction=12 mm"), "--contraction: unit 'mm' cannot be converted to a ratio"),
         (("--pressure=3 bar", "--contraction=12 deg"), "--contraction: unit 'deg' cannot be converted to a ratio"),
         (("--pressure=3,5 bar", "--force=1 N"), "'3,5 bar' contains a comma; write a decimal point, '3.5 bar'"),
@@ -193,7 +193,7 @@ def test_every_entry_answers_or_refuses_in_one_line(name: str):
         others = [line for line in result.stderr.splitlines() if not line.startswith("warning: ")]
         assert len(others) == result.exit_code, others
         if result.exit_code == 0:
-            solved = json.loads(result.stdout)
+            solved = json.loads(result.stdout)["evaluation"]
             assert -0.5 <= solved["contraction"] < 1.0
             assert all(isinstance(solved[quantity], float) for quantity in ("pressure", "contraction", "force"))
 

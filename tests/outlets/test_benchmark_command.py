@@ -36,20 +36,18 @@ def test_a_benchmark_writes_its_report_tables_and_figures(tmp_path):
 
 def test_json_contains_every_metric_of_every_run(tmp_path):
     result = run(*FAST, "--json", "--out", str(tmp_path / "benchmark"))
-    content = json.loads(result.stdout)
-    assert content["scores"]["models only"] == {"PID": {"median": 1.0, "low": 1.0, "high": 1.0}}
-    assert [row["group"] for row in content["runs"]] == ["models only", "commissioned"]
-    row = content["runs"][0]
-    assert (row["controller"], row["truth"], row["task"], row["reason"]) == ("PID", "truth 23", "step", "")
-    assert 0 < row["rmse"] < row["max_error"] < 30
-    assert row["settling"] is None or row["settling"] >= 0
-    (found,) = content["controllers"]
-    assert found["gains"] == {}, "nothing was tuned"
-    assert {path.rpartition(".")[2] for path in found["commissioned"]["truth 23"]} == {
-        "gain",
-        "integral_time",
-        "derivative_time",
-    }
+    content = json.loads(result.stdout)["benchmark"]
+    (ranked,) = content["ranking_models"]
+    assert [ranked[name] for name in ("controller", "score", "lowest", "highest")] == ["PID", 1.0, 1.0, 1.0]
+    assert [row["group"] for row in content["metrics"]] == ["models only", "commissioned"]
+    row = content["metrics"][0]
+    assert (row["controller"], row["truth"], row["task"]) == ("PID", "truth 23", "step")
+    assert 0 < row["rms_error"] < row["maximum_error"] < 0.5
+    assert content["units"]["metrics.rms_error"] == "rad"
+    assert row["settling_time"] is None or row["settling_time"] >= 0
+    found = {each["gain"].rpartition(".")[2] for each in content["gains"] if each["found_on"] == "truth 23"}
+    assert found == {"gain", "integral_time", "derivative_time"}
+    assert all(each["found_on"] != "models" for each in content["gains"]), "nothing was tuned"
 
 
 @pytest.mark.parametrize(

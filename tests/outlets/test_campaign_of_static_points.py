@@ -45,9 +45,10 @@ def test_the_braid_is_that_of_the_muscle_also_without_a_fill(written):
 
 def test_the_map_is_one_static_record_with_a_band_of_its_levels(written):
     _, data = written
-    assert [record["kind"] for record in data["records"]] == ["static"]
-    static = next(stage for stage in data["stages"] if stage["stage"] == "static characteristic")
-    assert static["bands"][0]["groups"] >= 2
+    assert [record["kind"] for record in data["campaign"]["records"]] == ["static"]
+    stages = {stage["stage"]: stage for stage in data["campaign"]["stages"]}
+    assert stages["static characteristic"]["identified"] is True
+    assert data["campaign"]["bands"][0]["groups_left_out"] >= 2
 
 
 def test_fills_alone_give_their_scenarios_with_the_braid_and_say_why_there_is_no_muscle(tmp_path):

@@ -7,6 +7,7 @@ also while modules are imported. `list` and `--help` import no more than they ne
 from __future__ import annotations
 
 import csv
+import dataclasses
 import importlib
 import json
 import os
@@ -169,18 +170,20 @@ def test_list_names_the_data_sets_that_fit_takes():
 
 
 def test_show_gives_parameters_sources_and_checks():
-    shown = json.loads(airmuscle("show", MUSCLE, "--json").output)
-    parameters = {p["name"]: p for p in shown["parameters"]}
+    shown = json.loads(airmuscle("show", MUSCLE, "--json").output)["entry"]
+    parameters = {p["parameter"]: p for p in shown["parameters"]}
     length = parameters["characteristic.geometry.resting_length"]
     assert (length["value"], length["unit"], length["symbol"]) == (0.3, "m", "L_0")
     assert shown["checks"][0]["source"]
     assert any("Martens" in reference for reference in shown["references"])
     text = airmuscle("show", MUSCLE).output
-    assert all(word in text for word in ("L_0", "0.3", "length between the fittings", "Martens", "provenance: printed"))
+    assert all(word in text for word in ("L_0", "0.3", "length between the fittings", "Martens", "Provenance: printed"))
 
 
 def test_show_leaves_out_the_middle_of_long_lists():
-    long = next(n for n in list_laws() if len(json.loads(airmuscle("show", n, "--json").stdout)["parameters"]) > 60)
+    long = next(
+        n for n in list_laws() if len(json.loads(airmuscle("show", n, "--json").stdout)["entry"]["parameters"]) > 60
+    )
     text = airmuscle("show", long).output
     assert re.search(r"^\.\.\. \d+ more *$", text, re.MULTILINE)
     assert len(text.splitlines()) < 60
@@ -233,18 +236,34 @@ def test_any_two_give_the_third(wanted: str):
         "force": f"{point['force'] / 1e3!r} kN",
     }
     given = [f"--{name}={text}" for name, text in texts.items() if name != wanted]
-    solved = json.loads(airmuscle("evaluate", MUSCLE, *given, "--json").output)
+    solved = json.loads(airmuscle("evaluate", MUSCLE, *given, "--json").output)["evaluation"]
     assert solved["solved"] == wanted
     assert {name: solved[name] for name in point} == pytest.approx(point, rel=1e-9)
-    assert solved["inside_validity_range"] is True
-    assert solved["stiffness"] == pytest.approx(float(law.stiffness(3e5, 0.12)), rel=1e-6)
+    assert solved["inside_the_validity_range"] is True
+    assert solved["stiffness_per_contraction"] == pytest.approx(float(law.stiffness(3e5, 0.12)), rel=1e-6)
+    assert solved["stiffness"] == pytest.approx(float(law.stiffness(3e5, 0.12)) / 0.3, rel=1e-6)
+    assert (solved["units"]["stiffness"], solved["units"]["force"]) == ("N/m", "N")
+
+
+def test_another_value_of_a_parameter_is_set_by_its_path():
+    given = ("saga2007", "--pressure=1 bar", "--contraction=10 %")
+    changed = airmuscle("evaluate", *given, "--set", "characteristic.slope_factor=2", "--json")
+    law = dataclasses.replace(load("saga2007").characteristic, slope_factor=2.0)
+    assert json.loads(changed.stdout)["evaluation"]["force"] == pytest.approx(float(law.force(1e5, 0.1)), rel=1e-12)
+    refused = airmuscle("evaluate", *given, "--set", "characteristic.slope=2")
+    assert refused.exit_code == 1
+    error = refused.stderr.splitlines()[-1]
+    assert error.startswith("error: saga2007 has no parameter 'characteristic.slope'; allowed names: characteristic.")
+    assert error.endswith("Did you mean 'characteristic.slope_factor'?")
+    wrong = airmuscle("evaluate", MUSCLE, "--pressure=1 bar", "--contraction=.1", "--set", "geometry.radius=2 bar")
+    assert "geometry.radius" in wrong.stderr.splitlines()[-1], wrong.stderr
 
 
 def test_plain_bar_is_gauge_and_bara_is_absolute():
     gauge, absolute = (
         json.loads(airmuscle("evaluate", MUSCLE, "--pressure", text, "--contraction", "0.1", "--json").output)[
-            "pressure"
-        ]
+            "evaluation"
+        ]["pressure"]
         for text in ("3 bar", "3 bara")
     )
     assert (gauge, absolute) == (3e5, 3e5 - 101_325.0)
@@ -299,7 +318,7 @@ def test_a_point_outside_the_data_is_a_warning():
     )
     assert inside.stderr == ""
     assert re.match(r"warning: the operating point is outside the validity range .*50 to 600 kPa", outside.stderr)
-    assert json.loads(outside.stdout)["inside_validity_range"] is False
+    assert json.loads(outside.stdout)["evaluation"]["inside_the_validity_range"] is False
 
 
 @pytest.mark.parametrize(
@@ -349,15 +368,15 @@ def test_fit_finds_the_muscle_that_made_the_data_and_writes_it(tmp_path: Path):
     written = {p.relative_to(tmp_path / "fit").as_posix() for p in (tmp_path / "fit").rglob("*") if p.is_file()}
     assert {"report.html", "muscle.toml", "figures/isobars.svg", "figures/errors.png", "data/rows.csv"} <= written
     solved = airmuscle("evaluate", tmp_path / "fit" / "muscle.toml", "--pressure=3 bar", "--contraction=0.1", "--json")
-    assert json.loads(solved.stdout)["force"] == pytest.approx(float(known.force(3e5, 0.1)))
+    assert json.loads(solved.stdout)["evaluation"]["force"] == pytest.approx(float(known.force(3e5, 0.1)))
 
 
 def test_fit_starts_from_a_library_entry_and_keeps_what_is_fixed(tmp_path: Path):
     held = ("--fix", "c0", "--fix", "c3", "--robust", "10 N")
     result = airmuscle("fit", MUSCLE, "--characteristic", MUSCLE, *held, "--out", tmp_path, "--json")
-    fitted = json.loads(result.stdout)
-    assert {p["name"] for p in fitted["parameters"]}.isdisjoint({"c0", "c3"})
-    assert 0.99 < fitted["r2"] <= 1.0
+    fitted = json.loads(result.stdout)["fit"]
+    assert {p["parameter"] for p in fitted["parameters"]}.isdisjoint({"c0", "c3"})
+    assert 0.99 < fitted["R2"] <= 1.0
     before, after = load(MUSCLE).characteristic, load(tmp_path / "muscle.toml").characteristic
     assert (after.c0, after.c3) == (before.c0, before.c3)
     assert after.c1 != before.c1
@@ -461,7 +480,8 @@ def test_the_report_of_a_run_shows_inputs_parameters_sources_and_notes(scenario:
     assert result.exit_code == 0, result.output
     page = (tmp_path / "run" / "report.html").read_text(encoding="utf-8").replace("\u00a0", " ")
     for text in (
-        "Simulation of 0.5 s. All columns are in recording.csv.",
+        "Simulation of 0.5 s. ",
+        " rows; all columns are in recording.csv.",
         "was outside the validity range of its characteristic in pressure",
         "Inputs applied to the plant; dashed: commands to the drivers.",
         "fill 0 before 0.1 s, 1 from 0.1 s, 0 from 0.3 s; drivers: fill: PWM(frequency=50.0, smallest_pulse=0.0), SolenoidDriver(opening_delay=",
@@ -480,9 +500,9 @@ def test_the_report_of_a_run_shows_inputs_parameters_sources_and_notes(scenario:
 
 
 def test_simulate_prints_json(scenario: Path, tmp_path: Path):
-    found = json.loads(airmuscle("simulate", scenario, "--out", tmp_path / "run", "--json").stdout)
+    found = json.loads(airmuscle("simulate", scenario, "--out", tmp_path / "run", "--json").stdout)["simulation"]
     assert found["title"] == "Fill and discharge"
-    assert found["range"]["time"] == {"column": "time [s]", "min": 0.0, "max": 0.5, "last": 0.5}
+    assert found["ranges"][0] == {"column": "time", "min": 0.0, "max": 0.5, "last": 0.5, "unit": "s"}
 
 
 @pytest.mark.parametrize(
@@ -561,7 +581,7 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path):
 def test_a_process_ends_with_the_documented_exit_codes():
     well = shell("evaluate", MUSCLE, "--pressure", "3 bar", "--force", "100 N", "--json")
     assert (well.returncode, well.stderr) == (0, "")
-    assert json.loads(well.stdout)["solved"] == "contraction"
+    assert json.loads(well.stdout)["evaluation"]["solved"] == "contraction"
     failed = shell("show", "no-such-muscle")
     assert (failed.returncode, failed.stdout) == (1, "")
     assert failed.stderr.startswith("error: no library entry 'no-such-muscle'")
@@ -633,7 +653,7 @@ main()
     [
         pytest.param(module, kind, marks=[] if (i - k) % 4 == 0 else pytest.mark.slow)
         for i, module in enumerate(
-            ("typer", "airmuscle.outlets.cli.commands", "airmuscle.outlets.cli.evaluate", "rich.table")
+            ("typer", "airmuscle.outlets.cli.commands", "airmuscle.outlets.cli.evaluate", "airmuscle.report.text")
         )
         for k, kind in enumerate(("module", "extension", "exception discarded", "discarded by a destructor"))
     ],
@@ -737,7 +757,7 @@ def test_printable_keeps_text_and_escapes_the_rest(capsys: pytest.CaptureFixture
     printed = capsys.readouterr().out
     assert_printable(printed)
     assert json.loads(printed) == {"a": "\x1b\x9b\udcff\u202e", "b": None}
-    print_table(("p [kPa]", ":smile:"), [("\x1b[2J", "[red]x[/red]")])
+    print_table({"p [kPa]": ["\x1b[2J"], ":smile:": ["[red]x[/red]"]})
     printed = capsys.readouterr().out
     assert_printable(printed)
     assert all(text in printed for text in ("p [kPa]", ":smile:", "\\x1b[2J", "[red]x[/red]"))

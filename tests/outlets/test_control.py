@@ -344,15 +344,15 @@ def test_the_report_shows_set_point_and_measurement_with_units():
     run = scenario.simulate()
     chapter = run_chapter(scenario, run)
     loop, whole, inputs = chapter.plots
-    lines = {line.get_label(): line.get_xydata() for line in loop.figure.axes[0].lines}
+    lines = {line.get_label(): line.get_xydata() for line in loop.draw().axes[0].lines}
     assert lines["set point"].tolist() == [[0, 100], [1, 100], [1, 300], [3, 300], [3, 150], [5, 150]]
     assert np.array_equal(lines["measured"][:, 1], run["pressure"] * 1e-3)
-    assert loop.figure.axes[0].get_ylabel() == "pressure\n[kPa]"
-    assert all("setpoint" not in axis.get_ylabel() for axis in whole.figure.axes)
-    applied = {line.get_label(): line.get_xydata() for line in inputs.figure.axes[0].lines}
+    assert loop.draw().axes[0].get_ylabel() == "pressure\n[kPa]"
+    assert all("setpoint" not in axis.get_ylabel() for axis in whole.draw().axes)
+    applied = {line.get_label(): line.get_xydata() for line in inputs.draw().axes[0].lines}
     assert set(applied) == {"command", "applied input"}
     assert inputs.caption.endswith("; dashed: commands to the drivers.")
-    table = chapter.tables[1]
+    table = chapter.tables[2]
     assert table.title == "Parameters of the controller, PID"
     assert dict(zip(table.columns["parameter"], table.columns["unit"], strict=True))["gain"] == "1/Pa"
     assert "astrom-hagglund-1995" in [r.key for r in chapter.references]
@@ -366,7 +366,7 @@ def test_a_loop_without_drivers_is_drawn_to_its_end(tmp_path: Path):
     scenario = load_scenario(written(tmp_path, ('sample_time = "5 ms"', 'sample_time = "0.5 ms"')))
     run = scenario.simulate()
     plot = run_chapter(scenario, run).plots[-1]
-    (applied,) = [line.get_xydata() for line in plot.figure.axes[0].lines]
+    (applied,) = [line.get_xydata() for line in plot.draw().axes[0].lines]
     assert plot.caption == "Inputs applied to the plant."
     assert applied[-1, 0] == 0.3
     assert describe_input(scenario.problem.input).endswith("; other inputs: none")
@@ -387,8 +387,9 @@ def test_the_program_runs_the_example(tmp_path: Path):
     done = airmuscle("simulate", EXAMPLE, "--out", tmp_path / "run", "--json")
     assert done.exit_code == 0, done.output
     shown = json.loads(done.stdout)
-    assert shown["range"]["setpoint.pressure"]["column"] == "setpoint.pressure [Pa]"
-    assert shown["range"]["pressure"]["last"] == pytest.approx(1.5e5, rel=0.05)
+    ranges = {row["column"]: row for row in shown["simulation"]["ranges"]}
+    assert ranges["setpoint.pressure"]["unit"] == "Pa"
+    assert ranges["pressure"]["last"] == pytest.approx(1.5e5, rel=0.05)
     with (tmp_path / "run" / "recording.csv").open(encoding="utf-8") as file:
         heading = next(row for row in csv.reader(file) if row[0] == "time [s]")
     assert {"measured.pressure [Pa]", "command.discharge [1]"} <= set(heading)

@@ -120,35 +120,35 @@ def fitted(folder) -> dict:
     """The result of fit-dynamic, in the folder `fit`."""
     done = airmuscle("fit-dynamic", folder / "study.toml", "--out", folder / "fit", "--json")
     assert done.exit_code == 0, done.stderr
-    return json.loads(done.stdout)
+    return json.loads(done.stdout)["dynamic"]
 
 
 def test_a_joint_is_identified_to_the_noise_from_its_measured_initial_pressures(folder, fitted):
-    found = {each["name"]: (each["value"], each["stderr"]) for each in fitted["parameters"]}
+    found = {each["parameter"]: (each["value"], each["standard_error"]) for each in fitted["estimates"]}
     for name, true in ANSWERS.items():
         assert abs(found[name][0] - true) < 3.0 * found[name][1], name
-    assert fitted["records"][0]["rms"] == pytest.approx(noise_of(folder, "first"), rel=0.05)
+    rms = {each["quantity"]: each["rms_residual"] for each in fitted["rms"]}
+    assert rms == pytest.approx(noise_of(folder, "first"), rel=0.05)
 
 
 def test_another_record_of_the_joint_is_predicted_to_the_noise(folder, fitted, tmp_path):
     done = airmuscle("predict", folder / "fit" / "scenario.toml", folder / "later.toml", "--out", tmp_path, "--json")
     assert done.exit_code == 0, done.stderr
-    (record,) = json.loads(done.stdout)["records"]
-    rms = {name: each["rms"] for name, each in record["quantities"].items()}
+    rms = {each["quantity"]: each["rms_error"] for each in json.loads(done.stdout)["prediction"]["predictions"]}
     assert rms == pytest.approx(noise_of(folder, "later"), rel=0.05)
 
 
 def test_the_scenario_keeps_the_measured_columns_so_that_a_file_is_predicted_without_a_table(folder, fitted, tmp_path):
     done = airmuscle("predict", folder / "fit" / "scenario.toml", folder / "first.csv", "--out", tmp_path, "--json")
     assert done.exit_code == 0, done.stderr
-    (record,) = json.loads(done.stdout)["records"]
-    assert set(record["quantities"]) == set(NOISE)
-    assert record["quantities"]["left.pressure"]["rms"] < 1.5 * NOISE["left.pressure"]
+    rms = {each["quantity"]: each["rms_error"] for each in json.loads(done.stdout)["prediction"]["predictions"]}
+    assert set(rms) == set(NOISE)
+    assert rms["left.pressure"] < 1.5 * NOISE["left.pressure"]
 
 
 def test_the_scenario_begins_at_the_initial_pressure_of_each_muscle(folder, fitted):
     scenario = load_scenario(folder / "fit" / "scenario.toml")
-    found = {each["name"]: each["value"] for each in fitted["parameters"]}
+    found = {each["parameter"]: each["value"] for each in fitted["estimates"]}
     outputs = scenario.plant.outputs(scenario.initial_state, dict.fromkeys(scenario.plant.inputs, 0.0))
     assert outputs["left.pressure"] == pytest.approx(found["initial left.pressure of record 1"])
     assert outputs["right.pressure"] == pytest.approx(found["initial right.pressure of record 1"])
@@ -227,11 +227,11 @@ def test_an_unknown_of_a_record_on_its_bound_is_noted_in_the_fit_and_in_the_pred
         state=('"first.csv"', '"first.csv"\ninitial_state = { "left.pressure" = "1.45 bar" }'),
     )  # fmt: skip
     done = airmuscle("fit-dynamic", narrow, "--out", tmp_path / "fit", "--json")
-    (said,) = [note for note in json.loads(done.stdout)["notes"] if note.startswith("initial left.pressure")]
+    (said,) = [note for note in json.loads(done.stdout)["dynamic"]["notes"] if note.startswith("initial left.pressure")]
     assert "is on its bound" in said
     assert "give a wider margin" in said
     later = ("--start-margin", "2 ms", "--start-time", "50 ms", "--out", tmp_path / "p", "--json")
     done = airmuscle("predict", folder / "fit" / "scenario.toml", folder / "first.csv", *later)
-    notes = " ".join(json.loads(done.stdout)["records"][0]["notes"])
+    notes = " ".join(json.loads(done.stdout)["prediction_1"]["notes"])
     assert "on its bound: start time 0.048 s" in notes
     assert "give a wider margin" in notes

@@ -142,7 +142,7 @@ def test_a_muscle_without_a_geometry_says_how_to_give_and_measure_it(tmp_path):
         assert "--braid 'radius=10 mm, angle=24.4 deg'" in said
         assert "from the outer diameter at rest and at full contraction" in said
     again = json.loads(fitted(tmp_path, *SURFACE, "--json").stdout)
-    assert any("lacks a [geometry]" in note for note in again["notes"])
+    assert any("lacks a [geometry]" in note for note in again["fit"]["notes"])
 
 
 @pytest.mark.parametrize(

@@ -429,8 +429,8 @@ def test_an_unknown_treatment_is_refused_by_every_command(tmp_path, arguments: t
 
 def test_inspect_and_convert_say_what_they_left_out(tmp_path):
     path = ramp(tmp_path)
-    (shown,) = json.loads(airmuscle("inspect", path, "--outliers", "drop", "--json").stdout)
-    assert shown["rows"] == 399
+    shown = json.loads(airmuscle("inspect", path, "--outliers", "drop", "--json").stdout)
+    assert shown["inspection"]["rows"] == 399
     converted = airmuscle("convert", path, tmp_path / "plain.csv", "--plain", "--outliers", "drop")
     assert "note: ramp.csv: rows left out as suspected outliers: 1 of 400" in " ".join(converted.stderr.split())
 
@@ -478,7 +478,7 @@ def test_fit_compares_with_a_robust_loss_and_without_outliers(tmp_path):
     for name, more in {"plain": (), "robust": ("--robust", "15 N"), "dropped": ("--outliers", "drop")}.items():
         result = airmuscle(*command, *more)
         assert result.exit_code == 0, result.stderr
-        errors[name] = json.loads(result.stdout)["ranking"][0]["cross_validated"]
+        errors[name] = json.loads(result.stdout)["comparison"]["ranking"][0]["cross_validation_rms_error"]
         assert ("rows left out as suspected outliers: 1 of 240" in result.stderr) == (name == "dropped")
     assert errors["plain"] > 600.0 > 10.0 > max(errors["robust"], errors["dropped"])
     report = (tmp_path / "o" / "report.html").read_text()
@@ -487,7 +487,7 @@ def test_fit_compares_with_a_robust_loss_and_without_outliers(tmp_path):
 
 def test_a_robust_fit_states_its_error_without_the_limited_rows():
     found = fit(ContractileSurface.blank(2), loops(spike=True), loss=Huber(15.0))
-    assert re.search(r"rms error +6\d\d\.?\d* N; \d\d?\.?\d* N with 1 row limited to", str(found))
+    assert re.search(r"rms error +6\d\d\.?\d* N +\(\d\d?\.?\d* N with 1 row limited to", str(found))
 
 
 # Degree of a surface

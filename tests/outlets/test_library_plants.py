@@ -77,7 +77,7 @@ def test_a_plant_is_listed_and_shown_with_its_sources(name):
     shown = airmuscle("show", name)
     assert shown.exit_code == 0
     assert "chosen" in shown.output
-    assert json.loads(airmuscle("show", name, "--json").stdout)["sources"]
+    assert json.loads(airmuscle("show", name, "--json").stdout)["entry"]["sources"]
 
 
 def test_simulate_takes_the_name_of_a_plant(tmp_path):

@@ -92,11 +92,10 @@ def test_a_fitted_muscle_predicts_another_run_within_its_stated_band(muscle, tmp
     done = airmuscle("predict", muscle, tmp_path / "later.csv", "--resting-length", "300 mm", "--out", tmp_path / "p",
                      "--json")  # fmt: skip
     assert done.exit_code == 0, done.stderr
-    (record,) = json.loads(done.stdout)["records"]
-    force = record["quantities"]["force"]
-    assert force["rms"] == pytest.approx(NOISE, rel=0.15)
-    assert 0.92 <= force["share"] <= 0.98
-    assert force["rows"] == 300
+    (record,) = json.loads(done.stdout)["prediction"]["predictions"]
+    assert (record["quantity"], record["unit"], record["rows"]) == ("force", "N", 300)
+    assert record["rms_error"] == pytest.approx(NOISE, rel=0.15)
+    assert 0.92 <= record["rows_within_the_band"] <= 0.98
     page = (tmp_path / "p" / "report.html").read_text(encoding="utf-8")
     assert "later.csv" in page
     assert (tmp_path / "p" / "figures" / "prediction-1.png").exists()
@@ -179,10 +178,10 @@ def test_a_fitted_plant_predicts_a_later_run_of_the_same_input_with_its_own_star
     done = airmuscle("predict", study / "fit" / "scenario-1.toml", study / "again.csv", "--start-margin", "50 ms",
                      "--out", tmp_path / "p", "--json")  # fmt: skip
     assert done.exit_code == 0, done.stderr
-    (record,) = json.loads(done.stdout)["records"]
-    assert record["quantities"]["pressure"]["rms"] == pytest.approx(500.0, rel=0.15)
-    assert 0.91 <= record["quantities"]["pressure"]["share"] <= 0.99
-    assert "start time 0.0" in record["notes"][0]
+    (record,) = json.loads(done.stdout)["prediction"]["predictions"]
+    assert record["rms_error"] == pytest.approx(500.0, rel=0.15)
+    assert 0.91 <= record["rows_within_the_band"] <= 0.99
+    assert "start time 0.0" in record["notes"]
 
 
 def test_a_file_of_records_predicts_a_run_with_another_input(study, tmp_path):
@@ -192,22 +191,22 @@ def test_a_file_of_records_predicts_a_run_with_another_input(study, tmp_path):
         "predict", study / "fit" / "scenario-1.toml", study / "later.toml", "--out", tmp_path / "p", "--json"
     )
     assert done.exit_code == 0, done.stderr
-    (record,) = json.loads(done.stdout)["records"]
-    assert 0.91 <= record["quantities"]["pressure"]["share"] <= 0.99
+    (record,) = json.loads(done.stdout)["prediction"]["predictions"]
+    assert 0.91 <= record["rows_within_the_band"] <= 0.99
 
 
 def test_a_parameter_that_differs_in_the_record_is_seen_and_can_be_estimated_from_it(study, tmp_path):
     (study / "other.toml").write_text(LATER_INPUT + RECORD.format("other.csv"), encoding="utf-8")
     out = ("--out", tmp_path / "p", "--json")
     plain = airmuscle("predict", study / "fit" / "scenario-1.toml", study / "other.toml", *out)
-    (record,) = json.loads(plain.stdout)["records"]
-    assert record["quantities"]["pressure"]["share"] < 0.6
+    (record,) = json.loads(plain.stdout)["prediction"]["predictions"]
+    assert record["rows_within_the_band"] < 0.6
     own = '[fit]\nown = ["circuit.supply.pressure"]\n'
     (study / "other.toml").write_text(own + LATER_INPUT + RECORD.format("other.csv"), encoding="utf-8")
     told = airmuscle("predict", study / "fit" / "scenario-1.toml", study / "other.toml", *out)
-    (record,) = json.loads(told.stdout)["records"]
-    assert record["quantities"]["pressure"]["share"] > 0.9
-    assert "circuit.supply.pressure 5.6" in record["notes"][0]
+    (record,) = json.loads(told.stdout)["prediction"]["predictions"]
+    assert record["rows_within_the_band"] > 0.9
+    assert "circuit.supply.pressure 5.6" in record["notes"]
 
 
 def test_the_band_of_a_plant_grows_with_the_sensitivity_to_its_parameters(study):

@@ -52,8 +52,9 @@ def predicted(muscle: Path, record: Recording, tmp_path: Path, length: str = "30
         "predict", muscle, tmp_path / "run.csv", "--resting-length", length, "--out", tmp_path / "p", "--json"
     )
     assert done.exit_code == 0, done.stderr
-    (each,) = json.loads(done.stdout)["records"]
-    return each
+    said = json.loads(done.stdout)
+    (row,) = said["prediction"]["predictions"]
+    return {**row, "notes": said["prediction_1"]["notes"]}
 
 
 def test_rows_without_tension_where_the_law_pulls_count_as_errors_outside_the_band(muscle, tmp_path):
@@ -61,11 +62,10 @@ def test_rows_without_tension_where_the_law_pulls_count_as_errors_outside_the_ba
     force = run["force"].copy()
     force[:60] = -6.7
     record = predicted(muscle, run.with_columns(force=force), tmp_path)
-    found = record["quantities"]["force"]
-    assert found["rows"] == 300
-    assert found["share"] < 0.81
-    assert found["max_error"] > 300.0
-    assert found["max_error_row"] <= 60
+    assert record["rows"] == 300
+    assert record["rows_within_the_band"] < 0.81
+    assert record["maximum_error"] > 300.0
+    assert record["in_row"] <= 60
     (note,) = [note for note in record["notes"] if "without tension" in note]
     assert "the law pulls at 60 of 60 rows without tension" in note
 
@@ -106,7 +106,7 @@ def test_rows_outside_the_range_are_named_with_both_ranges_and_marked_in_the_csv
 
 def test_another_length_than_that_of_one_muscle_has_no_band_and_says_so(muscle, tmp_path):
     record = predicted(muscle, sweep(), tmp_path, "200 mm")
-    assert record["quantities"]["force"]["share"] is None
+    assert record["rows_within_the_band"] is None
     notes = " ".join(record["notes"])
     assert "specimen 200 mm was not measured (measured: 300 mm); the band is not known" in notes
     done = airmuscle("predict", muscle, tmp_path / "run.csv", "--resting-length", "200 mm", "--out", tmp_path / "p")
@@ -143,9 +143,9 @@ def plants(tmp_path_factory) -> Path:
 
 def test_a_plant_of_one_record_states_no_band_for_another(plants, tmp_path):
     done = airmuscle("predict", plants / "one" / "scenario.toml", plants / "later.csv", "--out", tmp_path, "--json")
-    (record,) = json.loads(done.stdout)["records"]
-    assert record["quantities"]["pressure"]["share"] is None
-    assert record["quantities"]["pressure"]["band"] == "not known from one record"
+    (record,) = json.loads(done.stdout)["prediction"]["predictions"]
+    assert record["rows_within_the_band"] is None
+    assert record["band"] == "not known from one record"
     said = airmuscle("predict", plants / "one" / "scenario.toml", plants / "later.csv", "--out", tmp_path)
     assert "not known from one record" in " ".join(said.stdout.split())
 
@@ -155,15 +155,15 @@ def test_the_band_of_a_plant_of_three_records_is_that_of_the_records_left_out(pl
     assert uncertainty.records == 3
     assert 3.0 < uncertainty.factors["pressure"] <= 4.31
     done = airmuscle("predict", plants / "three" / "scenario-1.toml", plants / "later.csv", "--out", tmp_path, "--json")
-    (record,) = json.loads(done.stdout)["records"]
-    assert record["quantities"]["pressure"]["share"] > 0.9
-    assert "errors of 3 records, each predicted by the others" in record["quantities"]["pressure"]["band"]
+    (record,) = json.loads(done.stdout)["prediction"]["predictions"]
+    assert record["rows_within_the_band"] > 0.9
+    assert "errors of 3 records, each predicted by the others" in record["band"]
 
 
 def test_a_record_of_a_plant_that_is_faster_than_those_of_the_fit_is_named(plants, tmp_path):
     done = airmuscle("predict", plants / "three" / "scenario-1.toml", plants / "far.csv", "--out", tmp_path, "--json")
-    (record,) = json.loads(done.stdout)["records"]
-    assert [note for note in record["notes"] if note.startswith("the record is faster than those of the fit: pressure")]
+    (record,) = json.loads(done.stdout)["prediction"]["predictions"]
+    assert "the record is faster than those of the fit: pressure" in record["notes"]
 
 
 @pytest.mark.parametrize(

@@ -59,10 +59,10 @@ def test_a_measured_point_beyond_the_permitted_pressure_gives_a_warning():
     result = airmuscle("evaluate", DMSP_20, "--pressure", "650 kPa", "--contraction", "10 %", "--json")
     assert result.exit_code == 0
     assert "warning: beyond the values that the maker permits: the pressure 650 kPa" in result.stderr
-    assert json.loads(result.stdout)["permitted"] is False
+    assert json.loads(result.stdout)["evaluation"]["permitted"] is False
     inside = airmuscle("evaluate", DMSP_20, "--pressure", "3 bar", "--contraction", "10 %", "--json")
     assert inside.stderr == ""
-    assert json.loads(inside.stdout)["permitted"] is True
+    assert json.loads(inside.stdout)["evaluation"]["permitted"] is True
 
 
 def test_show_displays_the_ratings_of_a_product_and_of_its_laws():
@@ -70,7 +70,7 @@ def test_show_displays_the_ratings_of_a_product_and_of_its_laws():
     assert all(text in product for text in ("ratings.max_force", "1500", "permitted force", "not known", DMSP_20))
     assert "min_temperature" not in product
     assert "ratings.max_force" in airmuscle("show", DMSP_20).output
-    assert "none; fit one to measurements" in airmuscle("show", "shadow-20-210").output
+    assert "No law of it is published; fit one to measurements." in airmuscle("show", "shadow-20-210").output
 
 
 def test_list_names_each_product_and_each_specimen_once():
@@ -209,6 +209,6 @@ def test_solve_scales_and_shows_the_stroke_of_the_length():
         airmuscle(
             "evaluate", DMSP_20, "--resting-length", "200 mm", "--pressure", "3 bar", "--contraction", "10 %", "--json"
         ).stdout
-    )
+    )["evaluation"]
     assert solved["resting_length"] == pytest.approx(0.2)
     assert np.isfinite(solved["force"])

@@ -23,7 +23,7 @@ from airmuscle.files import Entry
 from airmuscle.files.library import list_files
 from airmuscle.physics import ContractileSurface
 from airmuscle.physics.muscle import compute_isobars
-from airmuscle.physics.muscle.isobar_plot import isobar_plot
+from airmuscle.physics.muscle.isobar_plot import isobar_figure
 from airmuscle.recording import Recording
 
 pytestmark = pytest.mark.drawn
@@ -66,7 +66,7 @@ def is_text(artist: Any) -> bool:
 def test_ramps_are_drawn_as_force_over_pressure_for_each_contraction_and_length(fitted: Fit) -> None:
     plot = ramp_plot(fitted)
     assert plot is not None
-    panels = [axes for axes in plot.figure.axes if axes.get_visible()]
+    panels = [axes for axes in plot.draw().axes if axes.get_visible()]
     assert [axes.get_title() for axes in panels] == [f"resting length {1e3 * x:.4g} mm" for x in LENGTHS]
     for axes in panels:
         assert axes.get_xlabel() == "gauge pressure [kPa]"
@@ -79,14 +79,14 @@ def test_ramps_are_drawn_as_force_over_pressure_for_each_contraction_and_length(
 def test_the_curve_of_a_ramp_is_the_force_of_the_law_at_its_contraction(fitted: Fit) -> None:
     plot = ramp_plot(fitted)
     assert plot is not None
-    curve = next(line for line in plot.figure.axes[1].lines if line.get_label() == "8 %")
+    curve = next(line for line in plot.draw().axes[1].lines if line.get_label() == "8 %")
     expected = fitted.model.force(1e3 * np.asarray(curve.get_xdata()), 0.08)
     assert curve.get_ydata() == pytest.approx(expected)
 
 
 def test_isobars_of_ramps_have_round_pressures_and_neither_the_first_row_nor_a_median(fitted: Fit) -> None:
     plots = {plot.name: plot for plot in fit_chapter(fitted, an_entry(fitted)).plots}
-    labels = texts(plots["isobars"].figure)
+    labels = texts(plots["isobars"].draw())
     assert "100 kPa" in labels
     assert "600 kPa" in labels
     assert "8.18" not in labels
@@ -96,8 +96,8 @@ def test_isobars_of_ramps_have_round_pressures_and_neither_the_first_row_nor_a_m
 def test_bands_of_ramps_are_drawn_over_the_pressure(fitted: Fit) -> None:
     plot = band_plot(fitted)
     assert plot is not None
-    assert plot.figure.axes[0].get_xlabel() == "pressure [kPa]"
-    assert plot.figure.axes[0].lines[0].get_label() == "0 %"
+    assert plot.draw().axes[0].get_xlabel() == "pressure [kPa]"
+    assert plot.draw().axes[0].lines[0].get_label() == "0 %"
 
 
 def test_a_ramp_beside_one_level_has_no_level_at_its_median() -> None:
@@ -117,7 +117,7 @@ def test_a_title_of_many_file_names_leaves_the_axes_their_place(fitted: Fit, tmp
     title = "Law fitted to " + ", ".join(f"festo10_cut40cm_held38.2cm_test{i}" for i in range(24))
     entry = an_entry(fitted)
     curves = compute_isobars(fitted.model, entry.validity_range)
-    figure = isobar_plot(fitted.model, title, curves, entry.validity_range, measured=fitted.recording).figure
+    figure = isobar_figure(fitted.model, title, curves, entry.validity_range, measured=fitted.recording)
     save(figure, tmp_path / "isobars.png")
     assert figure.axes[0].get_position().height > 0.6
     assert figure.axes[0].get_position().width > 0.5

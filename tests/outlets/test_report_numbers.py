@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import types
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ import pytest
 import airmuscle as am
 from airmuscle.bench import (
     Bootstrap,
+    Comparison,
     Experiment,
     InitialConditions,
     LoopFit,
@@ -25,21 +27,17 @@ from airmuscle.bench import (
 )
 from airmuscle.bench.identify import Uncertainty, VolumePoints, fit_volume
 from airmuscle.bench.identify.campaign import ValidationRow
-from airmuscle.bench.identify.campaign.campaign_chapters import _band_table, _plan_table, _validation_table
-from airmuscle.bench.identify.compare_chapter import _ranking
-from airmuscle.bench.identify.dynamic.dynamic_chapter import _estimate_table, _estimates, _optima_table, _record
-from airmuscle.bench.identify.hysteresis import describe_row_counts
-from airmuscle.bench.identify.hysteresis.hysteresis_chapter import _law_table
-from airmuscle.bench.identify.hysteresis.joint_friction_chapter import _run_table
-from airmuscle.bench.identify.prediction import with_unit
-from airmuscle.bench.identify.prediction.prediction_chapter import _overview
-from airmuscle.bench.identify.prediction.prediction_chapter import _record as predicted_record
+from airmuscle.bench.identify.campaign.campaign_chapters import _validation_table
+from airmuscle.bench.identify.dynamic.dynamic_chapter import dynamic_chapters
+from airmuscle.bench.identify.experiment_design import run_table
+from airmuscle.bench.identify.hysteresis.hysteresis_chapter import joint_friction_chapter, loop_chapter
+from airmuscle.bench.identify.prediction.prediction_chapter import prediction_chapters
 from airmuscle.bench.identify.static_fit_chapter import _rows
-from airmuscle.bench.identify.uncertainty_chapter import _table
-from airmuscle.bench.identify.volume_chapter import _compared, _volumes
-from airmuscle.design import LiftRequirement, SizingConditions, choose
-from airmuscle.design.sizing import choice_row, scenario_valves
-from airmuscle.design.sizing.sizing_chapter import _valve_settings
+from airmuscle.bench.identify.uncertainty_chapter import uncertainty_chapter
+from airmuscle.bench.identify.volume_chapter import volume_chapter
+from airmuscle.design import LiftRequirement, SizingConditions, size_muscles
+from airmuscle.design.sizing import scenario_valves
+from airmuscle.design.sizing.chapter import _valve_settings, sizing_chapter
 from airmuscle.engine import Schedule
 from airmuscle.physics import (
     Braid,
@@ -54,22 +52,38 @@ from airmuscle.physics import (
     VirtualWork,
 )
 from airmuscle.recording import Recording
+from airmuscle.report import Chapter, Table, TableColumn, shown_columns
 
 LENGTH = 0.3
 BRAID = Braid(0.01, 0.43, LENGTH)
 SLIP = MaxwellSlip((2e4, 1e4), (4e-4, 2e-3))
 
 
+def cells(table: Table) -> dict[str, Any]:
+    """The cells of a table under their headings with units."""
+    return {each.heading: each.cells for each in shown_columns(table)}
+
+
+def table_of(chapter: Chapter, name: str) -> dict[str, Any]:
+    """The cells of the table of this name."""
+    return next(cells(table) for table in chapter.tables if table.name == name)
+
+
 def test_a_choice_of_a_sizing_is_in_millimetres_bar_per_cent_and_litres():
     lift = LiftRequirement(force=300.0, stroke=0.03)
-    choice = choose(am.load("dmsp-20-300"), lift, SizingConditions(supply=6e5))
-    row, first, last = choice_row(choice), choice.design.extended, choice.design.contracted
-    assert row["length [mm]"] == pytest.approx(1e3 * choice.length)
-    assert (row["pressure, long [bar]"], row["pressure, short [bar]"]) == (first.pressure / 1e5, last.pressure / 1e5)
-    assert row["contraction, long [%]"] == 100 * first.contraction
-    assert row["contraction, short [%]"] == 100 * last.contraction
-    assert row["force, short [N]"] == last.force
+    conditions = SizingConditions(supply=6e5, max_count=1)
+    result = size_muscles(lift, conditions, (am.load("dmsp-20-300"),))
+    choice, chapter = result.best, sizing_chapter(result)
+    row = {name: column[0] for name, column in (table_of(chapter, "choices") | table_of(chapter, "air")).items()}
+    first, last = choice.design.extended, choice.design.contracted
+    assert row["nominal length [mm]"] == pytest.approx(1e3 * choice.length)
+    ends = [row["pressure, long [bar]"], row["pressure, short [bar]"]]
+    assert ends == pytest.approx([first.pressure / 1e5, last.pressure / 1e5])
+    assert row["contraction, long [%]"] == pytest.approx(100 * first.contraction)
+    assert row["contraction, short [%]"] == pytest.approx(100 * last.contraction)
+    assert row["force, short [N]"] == pytest.approx(last.force)
     assert row["air a cycle [l (ANR)]"] == pytest.approx(1e3 * choice.reference_volume)
+    assert row["air a minute [l (ANR)]"] == pytest.approx(60e3 * choice.reference_volume / conditions.cycle_time)
     assert row["efficiency [%]"] == pytest.approx(100 * choice.efficiency)
     assert row["diameter [mm]"] == pytest.approx(1e3 * choice.diameter)
     assert 1.0 < row["diameter [mm]"] < 100.0
@@ -90,28 +104,30 @@ def test_a_dynamic_fit_has_two_standard_errors_and_residuals_as_model_minus_meas
         free=("circuit.fill.conductance",), observed={"pressure": 500.0},
     )  # fmt: skip
     (estimate,) = found.estimates
-    table = _estimate_table(found).columns
-    assert (table["value (SI)"], table["2 standard errors (SI)"]) == ([estimate.value], [2 * estimate.stderr])
-    chapter = _estimates(found, "Fill", (), ())
-    rms = next(each for each in chapter.tables if each.name == "rms").columns["rms residual"]
-    assert rms == [f"{found.rms('pressure') / 1e3:.4g} kPa"]
-    (values,) = _record(found, 0).tables
-    assert values.columns["measured pressure [Pa]"].tolist() == noisy.tolist()
-    assert values.columns["residual of pressure [Pa]"] == pytest.approx(found.modelled()["pressure"] - noisy)
+    chapter, record = dynamic_chapters(found, "Fill")
+    table = table_of(chapter, "estimates")
+    assert (table["value"], table["standard error"]) == ([estimate.value], [estimate.stderr])
+    assert table_of(chapter, "rms")["rms residual"] == pytest.approx([found.rms("pressure") / 1e3])
+    assert table_of(chapter, "rms")["unit"] == ["kPa"]
+    (values,) = record.tables
+    assert values.columns["measured pressure"].unit == "Pa"
+    assert values.columns["measured pressure"].values == noisy.tolist()
+    assert values.columns["residual of pressure"].values == pytest.approx(found.modelled()["pressure"] - noisy)
     worse = dataclasses.replace(found.optima[0], cost=4.0 * found.optima[0].cost)
-    (optima,) = _optima_table(dataclasses.replace(found, optima=(found.optima[0], worse)))
-    assert optima.columns["rms residual relative to the lowest"] == pytest.approx([1.0, 2.0])
+    chapter, _ = dynamic_chapters(dataclasses.replace(found, optima=(found.optima[0], worse)), "Fill")
+    assert table_of(chapter, "optima")["rms residual relative to the lowest"] == pytest.approx([1.0, 2.0])
 
 
 def test_a_volume_is_in_cubic_centimetres_and_its_criterion_counts_from_the_best():
     contraction = np.linspace(0.0, 0.25, 20)
     volume = BRAID.volume(contraction) + 3e-7 * np.random.default_rng(1).standard_normal(20)
     found = fit_volume(VolumePoints(contraction, np.asarray(volume), 0), LENGTH)
-    columns = _volumes(found).columns
-    at = columns["contraction [%]"] / 100
+    chapter = volume_chapter(found, "Volume")
+    columns = table_of(chapter, "volume")
+    at = np.array(columns["contraction [%]"]) / 100
     assert columns["volume [cm3]"] == pytest.approx(1e6 * np.asarray(found.geometry.volume(at)))
     assert columns["standard deviation [cm3]"] == pytest.approx(1e6 * found.standard_deviation(at))
-    compared = _compared(found).columns
+    compared = table_of(chapter, "volume-laws")
     lowest = min(found.aicc.values())
     expected = [found.aicc[name] - lowest for name in compared["law"]]
     assert compared["AICc above the best"] == pytest.approx(expected)
@@ -132,7 +148,8 @@ def test_the_friction_of_loops_is_in_newtons_and_deviations_in_per_cent():
     fits = [
         LoopFit(each, (fit_hysteresis(SLIP, each.recording, static_curve=each.static_curve),), {}) for each in loops
     ]
-    columns, one = _law_table(fits[0], "").columns, fits[0].fits[0]
+    chapter, one = loop_chapter(fits[0]), fits[0].fits[0]
+    columns = table_of(chapter, "laws")
     names = ("rmse_without_friction", "rmse", "gap", "residual_gap", "aicc_reduction")
     headings = (
         "rms error without friction [N]", "rms error [N]", "branch gap without friction [N]",
@@ -142,14 +159,14 @@ def test_the_friction_of_loops_is_in_newtons_and_deviations_in_per_cent():
     rows = loops[0].fitted_rows
     path = loops[0].recording["contraction"]
     rising = int(np.count_nonzero(rows & (np.gradient(path) > 0)))
-    sentence = describe_row_counts(loops[0])
+    sentence = chapter.paragraphs[-1]
     assert int(sentence.split()[0]) == pytest.approx(rising, abs=4)
     assert rising > 1.5 * (rows.sum() - rising)
     (joint,) = fit_jointly(fits)
-    table, runs = _run_table(joint).columns, joint.agreement
+    table, runs = table_of(joint_friction_chapter([joint]), "joint-runs"), joint.agreement
     assert table["from this run [N]"] == [run.amplitude for run in runs]
     assert table["from all runs [N]"] == [run.joint_amplitude for run in runs]
-    assert table["rms deviation [%]"] == [100 * run.deviation for run in runs]
+    assert table["rms deviation [%]"] == pytest.approx([100 * run.deviation for run in runs])
 
 
 def test_a_prediction_has_rows_counted_from_1_shares_in_per_cent_and_display_units():
@@ -157,28 +174,26 @@ def test_a_prediction_has_rows_counted_from_1_shares_in_per_cent_and_display_uni
     compared = np.array([True, True, True, False])
     quantity = QuantityPrediction("pressure", measured, predicted, np.full(4, 2e3), compared)
     record = RecordPrediction(Recording({"pressure": measured}, "a.csv"), (quantity,))
-    columns = _overview("plant.toml", VirtualWork(BRAID), [record]).tables[0].columns
-    rms = np.sqrt((1e3**2 + 5e3**2) / 3)
-    assert columns["rms error"] == [f"{rms / 1e3:.4g} kPa"]
-    assert columns["maximum error"] == ["-5 kPa"]
+    chapter, of_record = prediction_chapters("plant.toml", VirtualWork(BRAID), [record])
+    columns, rms = table_of(chapter, "predictions"), np.sqrt((1e3**2 + 5e3**2) / 3)
+    assert columns["rms error"] == pytest.approx([rms / 1e3])
+    assert columns["maximum error"] == [-5.0]
+    assert columns["unit"] == ["kPa"]
     assert (columns["rows"], columns["rows within the band [%]"]) == ([3], [pytest.approx(200 / 3)])
-    assert columns["95 % band"] == ["±2 kPa"]
-    assert "maximum error -5 kPa in row 3" in predicted_record(1, record).summary
-
-
-def test_a_ratio_has_no_unit_and_a_contraction_is_in_per_cent():
-    assert [with_unit(0.25, name) for name in ("fill", "contraction", "pressure")] == ["0.25", "25 %", "0.00025 kPa"]
+    assert columns["half width of the 95 % band"] == [2.0]
+    assert "maximum error -5 kPa in row 3" in of_record.summary
 
 
 def test_a_ranking_has_each_error_under_its_heading_and_the_criterion_from_the_lowest():
     def model(name: str, inside: float, outside: float, aicc: float) -> types.SimpleNamespace:
         candidate = types.SimpleNamespace(name=name)
         return types.SimpleNamespace(
-            candidate=candidate, parameter_count=3, in_sample_rmse=inside, cross_validated_rmse=outside, aicc=aicc
-        )
+            candidate=candidate, parameter_count=3, in_sample_rmse=inside, cross_validated_rmse=outside, aicc=aicc,
+            slack=types.SimpleNamespace(rows=0, pulling=0),
+        )  # fmt: skip
 
     ranking = (model("a", 1.0, 2.0, -90.0), model("b", 0.5, 3.0, -100.0))
-    columns = _ranking(types.SimpleNamespace(ranking=ranking)).columns
+    columns = cells(Comparison._ranking_table(types.SimpleNamespace(ranking=ranking, recommended=ranking[0])))
     assert columns["in-sample rms error [N]"] == [1.0, 0.5]
     assert columns["cross-validation rms error [N]"] == [2.0, 3.0]
     assert columns["AICc above the lowest"] == [10.0, 0.0]
@@ -191,25 +206,32 @@ def test_the_intervals_of_a_fit_are_those_of_its_standard_errors_and_of_its_boot
                       "force": np.asarray(law.force(3e5, contraction)) + noise}, "a", {"resting_length": LENGTH})  # fmt: skip
     found = fit(law, data)
     draws = Bootstrap(found, found.values * np.linspace(0.9, 1.2, 101)[:, None], 5, 0)
-    columns = _table(Uncertainty(found, draws)).columns
-    assert columns["2.5 %, standard error"] == pytest.approx(found.values - 1.96 * found.standard_errors)
-    assert columns["97.5 %, standard error"] == pytest.approx(found.values + 1.96 * found.standard_errors)
-    assert columns["2.5 %, bootstrap"] == pytest.approx(found.values * 0.9075)
-    assert columns["97.5 %, bootstrap"] == pytest.approx(found.values * 1.1925)
+    chapter = uncertainty_chapter(Uncertainty(found, draws))
+    columns = chapter.tables[0].columns
+    low, high = np.transpose(columns["by standard error"].values)
+    assert low == pytest.approx(found.values - 1.96 * found.standard_errors)
+    assert high == pytest.approx(found.values + 1.96 * found.standard_errors)
+    low, high = np.transpose(columns["by bootstrap"].values)
+    assert low == pytest.approx(found.values * 0.9075)
+    assert high == pytest.approx(found.values * 1.1925)
     rows = _rows(found).columns
-    assert rows["residual [N]"] == pytest.approx(rows["modelled force [N]"] - data["force"])
+    assert np.array(rows["residual"]) == pytest.approx(np.array(rows["modelled force"]) - data["force"])
 
 
 def test_tables_of_a_campaign_have_shares_in_per_cent_and_runs_in_kilopascals():
-    columns = _validation_table([ValidationRow("a", 2.0, 8.0, 0.94, 50)]).columns
+    columns = cells(_validation_table([ValidationRow("a", 2.0, 8.0, 0.94, 50)]))
     assert (columns["rms error [N]"], columns["half width of the 95 % band [N]"]) == ([2.0], [8.0])
     assert columns["rows within the band [%]"] == [94.0]
     force = np.array([10.0, 250.0])
     run = types.SimpleNamespace(
         constant="pressure", level=3e5, swept="contraction", sweep_limits=(0.0, 0.21), force=force
     )
-    plan = types.SimpleNamespace(plan=types.SimpleNamespace(runs=[run]))
-    columns = _plan_table(types.SimpleNamespace(next_experiments=[plan])).columns
-    assert (columns["constant"], columns["swept"]) == (["pressure 300 kPa"], ["contraction 0 % to 21 %"])
-    assert columns["expected force [N]"] == ["10 to 250"]
-    assert _band_table(types.SimpleNamespace(static=None)) is None
+    columns = cells(run_table([run], "plan", "Plan"))
+    assert (columns["constant"], columns["pressure [kPa]"]) == (["pressure"], [300.0])
+    assert columns["contraction [%]"] == [(0.0, 21.0)]
+    assert columns["expected force [N]"] == [(250.0, 10.0)]
+
+
+def test_a_ratio_has_no_unit_and_a_contraction_is_in_per_cent():
+    columns = {"fill": TableColumn([0.25], "1"), "contraction": TableColumn([0.25], "1", "%")}
+    assert cells(Table("t", "t", columns)) == {"fill": [0.25], "contraction [%]": [25.0]}

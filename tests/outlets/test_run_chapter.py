@@ -34,7 +34,7 @@ def drawn(command, duration: float):
     scenario = load_scenario(EXAMPLE)
     scenario = replace(scenario, problem=replace(scenario.problem, input=command, duration=duration))
     plot = run_chapter(scenario, scenario.simulate()).plots[-1]
-    return plot, {line.get_label(): line.get_xydata() for line in plot.figure.axes[0].lines}
+    return plot, {line.get_label(): line.get_xydata() for line in plot.draw().axes[0].lines}
 
 
 def test_a_jump_is_upright():
@@ -57,7 +57,7 @@ def test_a_run_that_ended_at_once_still_shows_what_was_commanded():
     run = scenario.simulate()
     chapter = run_chapter(scenario, run.rows(slice(0, 1)))
     assert chapter.summary.startswith("Simulation of 25 s, ended early at 0 s; the last note gives the reason.")
-    assert chapter.plots[-1].figure.axes[0].lines[0].get_xdata()[-1] == 25.0
+    assert chapter.plots[-1].draw().axes[0].lines[0].get_xdata()[-1] == 25.0
 
 
 def test_a_setting_that_the_scenario_does_not_state_has_the_source_default(tmp_path):
@@ -98,7 +98,7 @@ initial_state = { pressure = "2 bar" }
 def test_a_joint_has_one_panel_for_each_quantity_with_the_angle_and_its_speed_after_those_of_the_muscles(tmp_path):
     (tmp_path / "joint.toml").write_text(JOINT, encoding="utf-8")
     scenario = load_scenario(tmp_path / "joint.toml")
-    axes = run_chapter(scenario, scenario.simulate()).plots[0].figure.axes
+    axes = run_chapter(scenario, scenario.simulate()).plots[0].draw().axes
     names = [axis.get_ylabel().partition("\n")[0] for axis in axes]
     assert names == ["pressure", "contraction", "force", "angle", "angular speed"]
     assert [len(axis.get_lines()) for axis in axes] == [2, 2, 2, 1, 1]

@@ -338,27 +338,44 @@ def fetched(result, name):
     return request(app, "GET", f"/api/fit/task/{task}/{name}")
 
 
+def column_texts(table):
+    """The texts of a table of the page by its headings."""
+    return {each["text"]: [row[i] for row in table["rows"]] for i, each in enumerate(table["headings"])}
+
+
+def numbers(texts):
+    """Numbers of the page, with their typographic signs."""
+    return [
+        float(re.sub(r" × 10", "e", text).translate(str.maketrans("−⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "--0123456789"))) for text in texts
+    ]
+
+
 def test_the_numbers_are_those_of_the_library(result):
     shown, comparison = fetched(result, "result.json").json(), result[2]
-    (ranking,) = (each["ranking"] for each in shown["comparisons"])
-    assert [(row["law"], row["in_sample"], row["left_out"], row["aicc"]) for row in ranking] == [
-        (m.candidate.name, m.in_sample_rmse, m.cross_validated_rmse, m.aicc) for m in comparison.ranking
-    ]
+    tables = shown["comparisons"][0]["tables"]
+    ranking = column_texts(tables["ranking"])
+    assert ranking["law"] == [m.candidate.name for m in comparison.ranking]
+    for heading, attribute in {
+        "in-sample rms error [N]": "in_sample_rmse", "cross-validation rms error [N]": "cross_validated_rmse",
+    }.items():  # fmt: skip
+        assert numbers(ranking[heading]) == pytest.approx([getattr(m, attribute) for m in comparison.ranking], rel=5e-4)
     best = comparison.recommended.fit
     assert shown["recommended"] == comparison.recommended.candidate.name
     assert shown["reason"] == comparison.reason
-    assert [row["value"] for row in shown["fit"]["estimates"]] == list(best.values)
-    assert [row["standard_error"] for row in shown["fit"]["estimates"]] == list(best.standard_errors)
+    estimates = column_texts(shown["fit"]["tables"]["parameters"])
+    factors = [1e-3 if unit.startswith("kPa") else 1.0 for unit in estimates["unit"]]
+    assert len(factors) == len(best.values)
+    assert numbers(estimates["value"]) == pytest.approx(list(best.values), rel=5e-4)
     assert shown["parity"]["residual"] == list(best.residuals)
-    excluded = {row["law"]: row["cause"] for row in shown["comparisons"][0]["excluded"]}
-    assert excluded == {e.name: e.cause for e in (*comparison.excluded, *comparison.unavailable)}
+    excluded = column_texts(tables["excluded"])
+    assert excluded["law"] == [e.name for e in comparison.excluded]
 
 
 def test_the_specimen_that_does_not_follow_the_others_is_named(tmp_path):
     text = "Specimen c does not follow the others."
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(model_selection, "standard_candidates", lambda runs: standard_candidates(runs)[1:3])
-        patch.setattr("airmuscle.outlets.studio.fit_task.odd_specimen_notes", lambda errors: [text])
+        patch.setattr("airmuscle.outlets.requests.fitting.odd_specimen_notes", lambda errors: [text])
         app = make_app(tmp_path)
         task = fit_of(app, {"columns": COLUMNS, "resting_length": "300 mm"})
     notes = request(app, "GET", f"/api/fit/task/{task}/result.json").json()["notes"]
@@ -392,7 +409,7 @@ def test_a_braid_needs_one_resting_length(tmp_path):
     task = post(app, "start", set=name, settings={"columns": COLUMNS, **BRAID}).json()["task"]
     status = finished(app, task)
     assert status["field"] == "resting_length"
-    assert status["error"] == "a braid has exactly one resting length; the files state none."
+    assert status["error"] == "a braid has exactly one resting length; the data state none."
 
 
 def test_bands_and_equation_are_shown(result):
@@ -615,7 +632,7 @@ def logged(outliers=()):
 
 
 LOGGED = {
-    "resting_length": "300 mm", "displacement_zero": "12 mm", "missing": "drop", "missing_codes": "-999; OL",
+    "resting_length": "300 mm", "displacement_zero": "12 mm", "missing": "drop", "missing_code": "-999; OL",
     "skip_rows": "1",
 }  # fmt: skip
 
@@ -645,7 +662,7 @@ def test_reading_settings_that_are_not_possible_name_their_field(app, setting, v
 
 def test_missing_values_name_the_field_that_treats_them(app):
     name = upload(app, "a.csv", logged()).json()["set"]
-    found = problems(post(app, "read", set=name, settings={**LOGGED, "missing": "", "missing_codes": "-999, OL"}))
+    found = problems(post(app, "read", set=name, settings={**LOGGED, "missing": "", "missing_code": "-999, OL"}))
     assert "select 'leave out the rows' in the field 'Missing values'" in found["missing"]
 
 

@@ -17,7 +17,7 @@ from airmuscle.outlets.studio import create_app, joint_names, read_request
 from airmuscle.outlets.studio.size_sheet import size_sheet
 
 pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
-LIFT = {"kind": "lift", "load": "20 kg", "stroke": "40 mm", "supply": "6 bar", "max_length": "400 mm", "max_count": "1", "sort": "length"}  # fmt: skip
+LIFT = {"load": "20 kg", "stroke": "40 mm", "supply": "6 bar", "max_length": "400 mm", "max_count": "1", "sort": "length"}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -30,14 +30,16 @@ def test_the_sheet_contains_the_choices_of_the_library_with_chart_and_scenario()
     conditions = SizingConditions(6e5, max_length=0.4, max_count=1)
     choices = sorted(size_muscles(LiftRequirement(0.04, mass=20.0), conditions).choices, key=lambda c: c.length)
     assert [row["name"] for row in sheet["choices"]] == [choice.entry.name for choice in choices]
+    table = sheet["tables"]["choices"]
+    lengths = [row[[each["text"] for each in table["headings"]].index("nominal length [mm]")] for row in table["rows"]]
+    assert lengths == [f"{1e3 * choice.length:.4g}" for choice in choices]
     for row, choice in zip(sheet["choices"], choices, strict=True):
         chart, last = row["chart"], choice.design.contracted
-        assert row["row"]["length [mm]"] == pytest.approx(1e3 * choice.length, rel=1e-12)
         assert chart["points"][1] == pytest.approx(last._asdict())
         reached = np.interp(last.contraction, chart["capacity"]["contractions"], chart["capacity"]["forces"])
         assert reached == pytest.approx(last.capacity, rel=5e-3)
         assert bool(row["scenario"]) != bool(row["reason"])
-    assert sheet["unsuitable"]
+    assert sheet["tables"]["unsuitable"]["rows"]
     assert json.loads(json.dumps(sheet)) == sheet
 
 
@@ -47,16 +49,16 @@ WRONG = {
     "at most 60 characters": json.dumps(LIFT | {"load": "1" * 61}),
     "must be texts": json.dumps(LIFT | {"load": 20}),
     "no others": json.dumps(LIFT | {"file": "/etc/passwd"}),
-    "lift or joint": json.dumps(LIFT | {"kind": "arm"}),
-    "sort must be one of": json.dumps(LIFT | {"sort": "price"}),
-    "stroke is missing": json.dumps(LIFT | {"stroke": ""}),
+    "or torque and angle for a joint": json.dumps(LIFT | {"torque": "5 N m"}),
+    "sort is 'price'; allowed": json.dumps(LIFT | {"sort": "price"}),
+    "give load and stroke for a lift": json.dumps(LIFT | {"stroke": ""}),
     "has no unit": json.dumps(LIFT | {"stroke": "40"}),
     "load": json.dumps(LIFT | {"load": "20 bar"}),
     "allowed range": json.dumps(LIFT | {"stroke": "0 mm"}),
     "supply": json.dumps(LIFT | {"supply": "nan bar"}),
-    "give a whole number": json.dumps(LIFT | {"max_count": "-1"}),
+    "give a whole number": json.dumps(LIFT | {"max_count": "1.5"}),
     "max_count": json.dumps(LIFT | {"max_count": "21"}),
-    "torque": json.dumps({"kind": "joint", "angle": "60 deg", "torque": "0 N m", "supply": "6 bar", "sort": "air"}),
+    "torque": json.dumps({"angle": "60 deg", "torque": "0 N m", "supply": "6 bar", "sort": "air"}),
 }
 
 

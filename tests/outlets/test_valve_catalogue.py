@@ -244,11 +244,11 @@ def test_the_command_line_lists_shows_and_cites_valves():
 
     listed = {entry["name"]: entry for entry in json.loads(run("list", "--json").output)}
     assert listed["matrix-821"]["kind"] == "valve, Valve"
-    shown = json.loads(run("show", "smc-sx91", "--json").stdout)
-    values = {p["name"]: p["value"] for p in shown["parameters"]}
+    shown = json.loads(run("show", "smc-sx91", "--json").stdout)["entry"]
+    values = {p["parameter"]: p["value"] for p in shown["parameters"]}
     assert values["valve.conductance"] == pytest.approx(2.5e-9)
     assert values["switching_times.opening_delay"] == pytest.approx(0.01)
-    assert shown["checks"][0]["quantity"] == "flow"
+    assert shown["checks"][0]["checked_quantity"] == "flow"
     assert all(word in run("show", "matrix-821").output for word in ("critical pressure ratio", "0.433", "Hošovský"))
     assert "SM-P00077-A/3" in run("cite", "ckd-m4ga1").output
     assert "festo-mh2" in run("show", "festo").output + run("show", "festo").stderr

@@ -13,7 +13,7 @@ from ..bench.identify.surface.exponential import SurfaceFit, SurfaceProblem, fit
 from ..core.arrays import Array
 from ..core.units import STANDARD_GRAVITY
 from ..physics.muscle.characteristic.borzikova import SAM_30X290, PlaneCurves
-from ..report.chapter import AtLeast, Claim, ClaimRow, Equal, Kind
+from ..report.claims import AtLeast, Claim, ClaimRow, Equal, Kind
 from ..report.formatting import format_number, typographic
 from .borzikova_surfaces import (
     AS_EXPONENT,

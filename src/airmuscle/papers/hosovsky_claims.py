@@ -10,7 +10,7 @@ import airmuscle as am
 
 from ..bench.identify.censored_least_squares import uncensored_rank
 from ..physics.muscle.characteristic.contractile_surface import exponents
-from ..report.chapter import AtMost, Claim, ClaimRow, Equal, Kind
+from ..report.claims import AtMost, Claim, ClaimRow, Equal, Kind
 from .hosovsky_effects import Effect
 from .hosovsky_fill import FillRun, end_of_choked_flow
 from .hosovsky_plant import FILLING, PAPER, SUPPLY_PRESSURE, VOLUME_FLOW_RATIO, surface

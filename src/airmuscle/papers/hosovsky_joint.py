@@ -12,7 +12,8 @@ import numpy as np
 
 from ..design.study.design import Sobol
 from ..design.study.distributions import Uniform
-from ..report.chapter import AtLeast, Claim, Table
+from ..report.chapter import Table
+from ..report.claims import AtLeast, Claim
 from ..report.formatting import format_quantity, format_unit
 from .hosovsky_plant import FORCE_MAPS, PAPER, UnpublishedParameters
 from .hosovsky_release import RELEASED_AT, STATEMENTS, Release, agrees, compare_releases, release

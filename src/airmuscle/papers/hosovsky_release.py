@@ -12,7 +12,8 @@ import numpy.typing as npt
 import airmuscle as am
 
 from ..core.plotting import DASHES, LINES, legend_below, new_figure
-from ..report.chapter import AtLeast, AtMost, Claim, ClaimRow, Plot, Table
+from ..report.chapter import Plot, Table
+from ..report.claims import AtLeast, AtMost, Claim, ClaimRow
 from ..report.formatting import format_unit
 from .hosovsky_plant import FORCE_MAPS, PAPER, UnpublishedParameters, latched_load, plant
 

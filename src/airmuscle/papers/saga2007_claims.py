@@ -11,7 +11,7 @@ from typing import Any
 import airmuscle as am
 
 from ..physics.muscle.characteristic.saga2007 import RUBBER_TEST_STRAIN
-from ..report.chapter import AtLeast, AtMost, Claim, ClaimRow, Equal, Kind
+from ..report.claims import AtLeast, AtMost, Claim, ClaimRow, Equal, Kind
 from . import saga2007_values as values
 from .saga2007_joint import FEED_FORWARD
 from .saga2007_muscle import (

@@ -17,7 +17,8 @@ import airmuscle as am
 from ..core.arrays import Array
 from ..core.plotting import BLACK, DASHES, legend_outside, new_figure
 from ..core.plotting import LINES as COLOURS
-from ..report.chapter import AtMost, ClaimRow, Kind, Plot, Table
+from ..report.chapter import Plot, Table
+from ..report.claims import AtMost, ClaimRow, Kind
 from .saga2007_muscle import (
     LENGTH,
     LINES,

@@ -12,7 +12,8 @@ import airmuscle as am
 
 from ..core.errors import ParameterError, SolveError
 from ..core.plotting import BLACK, DASHES, LINES, new_figure
-from ..report.chapter import AtLeast, ClaimRow, Plot, Table
+from ..report.chapter import Plot, Table
+from ..report.claims import AtLeast, ClaimRow
 from . import saga2007_pairs as pairs
 from .saga2007_muscle import DIAMETER, LENGTH, PRESSURE, WALL, exact_meridian
 from .saga2007_muscle import LINES as RUBBER

@@ -1,252 +1,131 @@
-"""Building blocks of a report: chapters with claims, tables and figures; every verdict is computed."""
+"""Building blocks of a report: a chapter describes one result, and every outlet is a renderer of it.
+
+`text` renders the brief view in a terminal, `data` everything as JSON, `html` the page, `notebook` a card. Numbers are
+in SI units; the unit in which a column or quantity is shown is declared with it.
+"""
 
 from __future__ import annotations
 
-import abc
 import dataclasses
-import enum
-import math
-from collections.abc import Callable, Iterable, Mapping
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
-
-import numpy as np
-import numpy.typing as npt
 
 from ..core.reference import Reference
 from ..core.short_repr import ShortRepr
-from .formula import to_plain
+from .claims import Claim
 
-HOLDS, DIFFERS, DEPENDS = "holds", "differs", "depends"
-NOT_TESTABLE, NOT_PRINTED = "not testable", "not printed"
-
-
-class Kind(enum.Enum):
-    """Kind of an entry in the list of claims; each kind is listed and counted apart from the others."""
-
-    CLAIM = "claim"
-    FINDING = "comparison"
-    CHECK = "check"
-
-    @property
-    def description(self) -> str:
-        """Description of the kind for the report."""
-        return _DESCRIPTIONS[self]
-
-    def headline(self, count: int) -> str:
-        """Name of the kind behind the number of its statements."""
-        name, rest = _HEADLINES[self]
-        return f"{name}{'s' * (count != 1)} {rest}"
+DIGITS = 4
+"""Significant digits of a number in a report."""
+BY_ROW = "by row"
+"""Unit of a column whose numbers have the unit in the column "unit" of their row."""
 
 
-_HEADLINES = {
-    Kind.CLAIM: ("claim", "of the papers"),
-    Kind.FINDING: ("comparison", "of this report"),
-    Kind.CHECK: ("check", "of the computation"),
-}
-_DESCRIPTIONS = {
-    Kind.CLAIM: "claims of the paper",
-    Kind.FINDING: "comparisons of this report, which the paper does not make",
-    Kind.CHECK: "checks of the computation",
-}
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class TableColumn(ShortRepr):
+    """A column of a table: numbers in SI units, or texts.
 
-
-@dataclasses.dataclass(frozen=True)
-class PublishedValue(abc.ABC):
-    """The value that a paper prints for a claim, and the criterion for the reproduced number.
-
-    Where a paper says only "low" or "comparable", the bound is `chosen`: then `claims.json` gives no published
-    value, and the bound as the tolerance. A value that follows from printed ones, or from a word such as "higher", is
-    `derived`: it is not published either, and `claims.json` gives it as the expected value.
+    values  numbers, texts, truth values, pairs (first, last) of a range; None where there is no value
+    unit    SI unit of the numbers, "1" of a ratio, BY_ROW; empty for texts and counts
+    shown   unit in which the page, the terminal and the CSV file show them, by default `unit`; of the column "unit", a
+            sequence of the units in which the numbers of each row are shown
+    digits  significant digits that are shown
+    brief   whether the brief view has the column
+    short   heading in the brief view, if the name is too long for a terminal
     """
 
-    value: float
-    tolerance: float = 0.0
-    chosen: bool = False
-    derived: bool = False
+    values: Any
+    unit: str = ""
+    shown: str | Sequence[str] = ""
+    digits: int = DIGITS
+    brief: bool = True
+    short: str = ""
 
-    @property
-    def published(self) -> bool:
-        """Whether the paper prints the value."""
-        return not (self.chosen or self.derived)
+    def __post_init__(self) -> None:
+        values: Any = self.values
+        object.__setattr__(self, "values", values.tolist() if hasattr(values, "tolist") else list(values))
 
-    @abc.abstractmethod
-    def agrees(self, reproduced: float) -> bool:
-        """Whether the reproduced number confirms the claim."""
+    def __len__(self) -> int:
+        return len(self.values)
 
+    def __iter__(self) -> Iterator[Any]:
+        return iter(self.values)
 
-class Equal(PublishedValue):
-    """Criterion: the reproduced number equals the printed one within the tolerance."""
-
-    def agrees(self, reproduced: float) -> bool:
-        return abs(reproduced - self.value) <= self.tolerance
-
-
-class AtLeast(PublishedValue):
-    """Criterion: the reproduced number is not below the printed one minus the tolerance."""
-
-    def agrees(self, reproduced: float) -> bool:
-        return reproduced >= self.value - self.tolerance
-
-
-class AtMost(PublishedValue):
-    """Criterion: the reproduced number is not above the printed one plus the tolerance."""
-
-    def agrees(self, reproduced: float) -> bool:
-        return reproduced <= self.value + self.tolerance
-
-
-@dataclasses.dataclass(frozen=True)
-class Claim:
-    """One statement of a paper, in one case, with the printed and the reproduced value.
-
-    `case` names the interpretation, load or range for which the statement is evaluated; a statement with several cases
-    counts once. `printed` is None if the paper gives no value to compare with, `reproduced` is None if no value can be
-    computed; in both cases the verdict is "not printed". `untestable` marks a statement that no
-    computation can decide, because its measurements are lost, its condition is not printed or every law fulfils it: its
-    verdict is "not testable". `place` is where the paper states it, `note` gives the reason of a difference, or the
-    values chosen.
-    """
-
-    paper: str
-    claim: str
-    printed: PublishedValue | None
-    reproduced: float | None
-    unit: str
-    note: str = ""
-    case: str = ""
-    kind: Kind = Kind.CLAIM
-    untestable: bool = False
-    place: str = ""
-
-    @property
-    def text(self) -> str:
-        """The statement with its case: `accurate below 20 % [line A]`."""
-        return f"{self.claim} [{self.case}]" if self.case else self.claim
-
-    @property
-    def verdict(self) -> str:
-        if self.untestable:
-            return NOT_TESTABLE
-        if self.printed is None or self.reproduced is None or not math.isfinite(self.reproduced):
-            return NOT_PRINTED
-        return HOLDS if self.printed.agrees(self.reproduced) else DIFFERS
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the claim as a record of `claims.json`."""
-        printed = self.printed
-        return {
-            "paper": self.paper,
-            "kind": self.kind.value,
-            "claim": to_plain(self.text),
-            "statement": to_plain(self.claim),
-            "case": to_plain(self.case),
-            "place": to_plain(self.place),
-            "published": printed.value if printed and printed.published else None,
-            "expected": printed.value if printed and printed.derived else None,
-            "reproduced": self.reproduced,
-            "unit": self.unit,
-            "tolerance": None if printed is None else printed.value if printed.chosen else printed.tolerance,
-            "verdict": self.verdict,
-            "note": to_plain(self.note),
-        }
-
-
-@dataclasses.dataclass(frozen=True)
-class ClaimRow:
-    """One row of a table of claims: statement, expected value, unit, function that reproduces the value, note, cases.
-
-    `reproduce` returns the value, or the value with a further sentence of the note; without it these are the arguments,
-    and without arguments no value can be computed. `cases` maps the name of each case to its arguments.
-    """
-
-    text: str
-    printed: PublishedValue | None
-    unit: str
-    reproduce: Callable[..., Any] | None = None
-    note: str = ""
-    cases: Mapping[str, tuple[Any, ...]] = dataclasses.field(default_factory=lambda: {"": ()})
-    kind: Kind = Kind.CLAIM
-    untestable: bool = False
-    place: str = ""
-
-    def claim(self, paper: str, case: str, *arguments: Any) -> Claim:
-        """Return the claim of one paper in one case, evaluated for these arguments."""
-        found = self.reproduce(*arguments) if self.reproduce else arguments or None
-        value, reason = found if isinstance(found, tuple) else (found, "")
-        note = f"{self.note} {reason}".strip()
-        shared = (self.kind, self.untestable, self.place)
-        return Claim(paper, self.text, self.printed, value, self.unit, note, case, *shared)
-
-    def claims(self, paper: str, *subject: Any) -> tuple[Claim, ...]:
-        """Return the claims of all cases; the function is given the subject before the arguments of the case."""
-        return tuple(self.claim(paper, case, *subject, *arguments) for case, arguments in self.cases.items())
-
-
-@dataclasses.dataclass(frozen=True)
-class Statement:
-    """A statement with all the cases for which it is evaluated."""
-
-    claim: str
-    cases: tuple[Claim, ...]
-
-    @property
-    def common_note(self) -> str:
-        """The note of several cases that have the same one; otherwise empty."""
-        notes = {case.note for case in self.cases}
-        return notes.pop() if len(notes) == 1 < len(self.cases) else ""
-
-    @property
-    def reproduced(self) -> list[float]:
-        """The values of the cases that have the expected value and the unit of the first one."""
-        first = self.cases[0]
-        alike = (case.reproduced for case in self.cases if (case.printed, case.unit) == (first.printed, first.unit))
-        return [value for value in alike if value is not None and math.isfinite(value)]
-
-    @property
-    def verdict(self) -> str:
-        """The common verdict of the cases; "depends" if the statement holds in some and differs in others."""
-        verdicts = [case.verdict for case in self.cases]
-        decided = {verdict for verdict in verdicts if verdict in (HOLDS, DIFFERS)}
-        return DEPENDS if len(decided) > 1 else decided.pop() if decided else verdicts[0]
-
-
-def statements(claims: Iterable[Claim], kind: Kind = Kind.CLAIM) -> tuple[Statement, ...]:
-    """Return the statements of one kind in the order of their first case, each with all its cases."""
-    cases: dict[tuple[str, str], list[Claim]] = {}
-    for claim in claims:
-        if claim.kind is kind:
-            cases.setdefault((claim.paper, claim.claim), []).append(claim)
-    return tuple(Statement(text, tuple(group)) for (_, text), group in cases.items())
+    def __getitem__(self, row: int) -> Any:
+        return self.values[row]
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Table(ShortRepr):
-    """A titled table; `columns` maps headers with units, `pressure [MPa]`, to values. Written to data/<name>.csv."""
+    """A titled table, written to data/<name>.csv.
+
+    columns  by name; values alone are a column without unit, whose name may end with one, `pressure [MPa]`
+    shown    whether the page has it
+    series   whether it is a long series, which only its file has
+    folded   whether the page shows its title alone until the reader unfolds it
+    brief    rows of the brief view: the first ones, or the indices of some; 0 for none
+    key      name in JSON, by default `name`; several chapters of a report may have a table of the same key
+    """
 
     name: str
     title: str
-    columns: Mapping[str, npt.NDArray[Any] | list[Any]]
+    columns: Mapping[str, TableColumn]
     note: str = ""
     shown: bool = True
-    """Whether the page shows it; long series are only written to their file."""
+    series: bool = False
     folded: bool = False
-    """Whether the page shows its title alone until the reader unfolds it."""
+    brief: int | Sequence[int] = 0
+    key: str = ""
 
-    def __post_init__(self) -> None:
-        lengths = {
-            header: len(np.atleast_1d(np.asarray(values, dtype=object))) for header, values in self.columns.items()
-        }
+    def __init__(
+        self, name: str, title: str, columns: Mapping[str, Any], note: str = "", *, shown: bool = True,
+        series: bool = False, folded: bool = False, brief: int | Sequence[int] = 0, key: str = "",
+    ) -> None:  # fmt: skip
+        made = {key: each if isinstance(each, TableColumn) else TableColumn(each) for key, each in columns.items()}
+        lengths = {key: len(each.values) for key, each in made.items()}
         if len(set(lengths.values())) > 1:
-            raise ValueError(f"table {self.name}: all columns must have the same length, not {lengths}.")
+            raise ValueError(f"table {name}: all columns must have the same length, not {lengths}.")
+        given = {"name": name, "title": title, "columns": made, "note": note, "shown": shown and not series,
+                 "series": series, "folded": folded, "brief": brief, "key": key or name}  # fmt: skip
+        for key, value in given.items():
+            object.__setattr__(self, key, value)
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values())).values) if self.columns else 0
+
+    @property
+    def brief_rows(self) -> list[int]:
+        """The indices of the rows of the brief view."""
+        return list(range(len(self)))[: self.brief] if isinstance(self.brief, int) else list(self.brief)
+
+
+@dataclasses.dataclass(frozen=True)
+class NamedValue:
+    """A scalar result: a number in SI units, or a text; `remark` is a short addition, such as "solved"."""
+
+    name: str
+    value: Any
+    unit: str = ""
+    shown: str = ""
+    digits: int = DIGITS
+    remark: str = ""
+    brief: bool = True
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Plot:
-    """A Matplotlib figure with its caption. Embedded in the page and written to figures/<name>.svg and .png."""
+    """A figure with its caption. Embedded in the page and written to figures/<name>.svg and .png.
+
+    figure  a Matplotlib figure, a function that draws one, or the files of a rendered one by their format
+    """
 
     name: str
     caption: str
     figure: Any
+
+    def draw(self) -> Any:
+        """The figure, or the files of a rendered one."""
+        return self.figure() if callable(self.figure) else self.figure
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -262,11 +141,18 @@ class DisplayedEquation:
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Chapter(ShortRepr):
-    """A chapter of a report: summary, claims, tables, figures, references and the sources of all values."""
+    """The description of one result: summary, values, tables, figures, notes, references, sources of all values.
 
-    paper: str
+    name      identifier in the page and in JSON
+    summary   paragraphs, as a tuple or separated by blank lines; the first states the result in a sentence or two
+    problems  faults of the data that make results wrong
+    notes     remarks on the data and what to do
+    brief     whether the brief view has the chapter
+    """
+
+    name: str
     title: str
-    summary: str
+    summary: str | tuple[str, ...]
     claims: tuple[Claim, ...] = ()
     tables: tuple[Table, ...] = ()
     plots: tuple[Plot, ...] = ()
@@ -274,9 +160,28 @@ class Chapter(ShortRepr):
     chosen: tuple[tuple[str, str, str], ...] = ()
     """Values used for the figures: (meaning, value with unit, source or "chosen")."""
     equations: tuple[DisplayedEquation, ...] = ()
+    values: tuple[NamedValue, ...] = ()
+    problems: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    brief: bool = True
     answers: tuple[tuple[str, str], ...] = ()
     """Questions of a reader with answers of one sentence or two, before the summary."""
     terms: tuple[tuple[str, str], ...] = ()
     """Terms of the chapter with their definitions, after the answers."""
     commands: tuple[tuple[str, str], ...] = ()
     """Commands that evaluate a model of the chapter with other parameters, each with what it shows."""
+
+    @property
+    def paragraphs(self) -> tuple[str, ...]:
+        """The paragraphs of the summary."""
+        if not isinstance(self.summary, str):
+            return tuple(text for text in self.summary if text)
+        return tuple(" ".join(part.split()) for part in re.split(r"\n\s*\n", self.summary) if part.strip())
+
+    def among(self, prefix: str = "", suffix: str = "") -> Chapter:
+        """The chapter with names of itself, its tables and figures that are unique among others of its kind."""
+        named: dict[str, Any] = {
+            kind: tuple(dataclasses.replace(each, name=f"{prefix}{each.name}{suffix}") for each in getattr(self, kind))
+            for kind in ("tables", "plots")
+        }
+        return dataclasses.replace(self, name=f"{prefix}{self.name}{suffix}", **named)

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ..core.display import heading_scale, in_display_unit, scaled_numbers
-from .chapter import (
+from .chapter import DIGITS
+from .claims import (
     DEPENDS,
     DIFFERS,
     HOLDS,
@@ -22,7 +22,6 @@ from .chapter import (
     Claim,
     Kind,
     Statement,
-    Table,
     statements,
 )
 
@@ -39,14 +38,10 @@ MEANINGS = {
 """Meaning of each verdict."""
 
 MISSING = "–"
-DIGITS = 4
-"""Significant digits of a number in a report."""
 P_VALUE = "p-value"
 """Header of a column of p-values."""
 SMALLEST_P = 1e-3
 """Below it a p-value is shown as a bound."""
-_VALUES = ("value (SI)", "standard error (SI)", "2 standard errors (SI)")
-"""Headers of columns whose numbers have the unit of the row."""
 _RELATIONS = {AtLeast: "≥ ", AtMost: "≤ "}
 _NUMBER = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?")
 _EXPONENT = re.compile(r"(?:\b1|(\d(?:\.\d+)?))e([-+]?)0*(\d+)\b")
@@ -59,11 +54,16 @@ _SUPERSCRIPTS = str.maketrans("0123456789ij", "⁰¹²³⁴⁵⁶⁷⁸⁹ⁱʲ"
 def format_number(value: Any, digits: int = DIGITS) -> str:
     """Return a number rounded to significant digits; integers and text unchanged, an en dash for None and NaN.
 
-    Magnitudes from 1e-4 to 1e6 are written without an exponent; zero has no sign.
+    Magnitudes from 1e-4 to 1e6 are written without an exponent; zero has no sign. A truth value is yes or no, a pair a
+    range, `1 to 2`.
     """
     if value is None:
         return MISSING
-    if isinstance(value, bool | str) or not isinstance(value, Real):
+    if isinstance(value, bool | np.bool_):
+        return "yes" if value else "no"
+    if isinstance(value, tuple):
+        return " to ".join(dict.fromkeys(format_number(each, digits) for each in value))
+    if isinstance(value, str) or not isinstance(value, Real):
         return str(value)
     if isinstance(value, Integral):
         return str(int(value))
@@ -76,19 +76,19 @@ def format_number(value: Any, digits: int = DIGITS) -> str:
     return f"{rounded:.{digits}g}"
 
 
-def format_cell(value: Any) -> str:
-    """Return a table cell: numbers as `format_number` does, also those stored as text, in typographic form."""
+def format_cell(value: Any, digits: int = DIGITS) -> str:
+    """Return a table cell: as `format_number` does, also numbers stored as text, in typographic form."""
     if isinstance(value, str) and not _NUMBERS.fullmatch(value):
         return value
-    return typographic(_NEGATIVE_ZERO.sub("", _rounded(value)))
+    return typographic(_NEGATIVE_ZERO.sub("", _rounded(value, digits)))
 
 
-def _rounded(value: Any) -> str:
+def _rounded(value: Any, digits: int) -> str:
     if is_number_text(value) and not value.lstrip("-+").isdigit():
         mantissa = value.partition("e")[0].lstrip("-+0.")
         if "e" in value or sum(map(str.isdigit, mantissa)) > DIGITS:
             return format_number(float(value))
-    return format_number(value)
+    return format_number(value, digits)
 
 
 def is_number_text(value: Any) -> bool:
@@ -160,39 +160,3 @@ def count_readings(statement: Statement) -> str:
     counts = {verdict: verdicts.count(verdict) for verdict in MARKS if verdict in verdicts}
     texts = [format_verdicts(n, verdict) for verdict, n in counts.items()]
     return f"{len(verdicts)} readings: {', '.join(texts)}"
-
-
-def displayed_columns(table: Table) -> dict[str, list[Any]]:
-    """The columns of a table for the page, in the units chosen for display; its file keeps the declared units.
-
-    A meaning that is that of the row above, such as the one of all coefficients of a polynomial, is shown once.
-    """
-    columns: dict[str, list[Any]] = {}
-    for header, values in table.columns.items():
-        factor, shown = heading_scale(header)
-        columns[shown] = [_times(value, factor) for value in np.atleast_1d(np.asarray(values, dtype=object))]
-    meanings = columns.get("meaning", [])
-    for i in range(len(meanings) - 1, 0, -1):
-        if meanings[i] == meanings[i - 1]:
-            meanings[i] = ""
-    numbers = [name for name in columns if name in _VALUES]
-    scales = [in_display_unit(1.0, unit) for unit in columns.get("unit", [])]
-    if not numbers or all(factor == 1.0 for factor, _ in scales):
-        return columns
-    for name in numbers:
-        columns[name] = [_times(value, factor) for value, (factor, _) in zip(columns[name], scales, strict=True)]
-    columns["unit"] = [unit for _, unit in scales]
-    return {name.removesuffix(" (SI)"): values for name, values in columns.items()}
-
-
-def _times(value: Any, factor: float) -> Any:
-    """A cell of a table, or the numbers of its text, times a factor."""
-    if factor == 1.0 or value is None:
-        return value
-    return scaled_numbers(value, factor) if isinstance(value, str) else value * factor
-
-
-def table_rows(table: Table) -> list[tuple[Any, ...]]:
-    """Return the rows of a table, which stores columns."""
-    columns = [np.atleast_1d(np.asarray(values, dtype=object)) for values in table.columns.values()]
-    return list(zip(*columns, strict=True))

@@ -10,32 +10,28 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from .chapter import Chapter, Kind, statements
+from .chapter import Chapter
+from .claims import Kind, statements
 from .formatting import (
     MARKS,
     MEANINGS,
-    P_VALUE,
     count_readings,
     count_verdicts,
-    displayed_columns,
     format_cell,
-    format_p_value,
     format_published,
     format_reproduced,
     format_unit,
     format_verdicts,
-    is_number_text,
     typographic,
 )
 from .formula import symbol_formula, to_display_mathml, to_mathml, to_plain
+from .shown import SYMBOL, ShownColumn, rows_of, shown_columns, value_table
 from .versions import versions
 
 MAX_SVG_BYTES = 600_000
 """Figures with a larger SVG are embedded as PNG: a dense chart would make the page slow."""
 MAX_LINE = 26
 """Characters of a text in a table cell that is not wrapped."""
-SYMBOL, UNIT = "symbol", "unit"
-"""Headers of columns with a special format."""
 _BRACKETS = re.compile(r"\s*\[([^\]]*)\]$")
 
 
@@ -48,7 +44,7 @@ def render_page(chapters: Sequence[Chapter], figures: Path, *, title: str, date:
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     environment.filters.update(
-        cell=lambda value, header="": Markup(render_cell(header, value)),
+        cell=lambda value, column=None: Markup(render_cell(value, column)),
         header=lambda text: Markup(render_header(text)),
         formulas=lambda text: Markup(to_mathml(text)),
         equation=lambda latex: Markup(to_display_mathml(latex)),
@@ -57,20 +53,20 @@ def render_page(chapters: Sequence[Chapter], figures: Path, *, title: str, date:
         reproduced=lambda statement: typographic(format_reproduced(statement)),
         unit=format_unit,
         anchor=anchor,
-        paragraphs=paragraphs,
         readings=count_readings,
         verdicts=format_verdicts,
-        displayed=displayed_columns,
-        is_numeric=is_numeric,
+        shown=shown_columns,
+        rows=rows_of,
+        sentence=as_sentence,
+        results=lambda chapter: value_table(f"{chapter.name}-results", "Results", chapter.values),
         is_short=is_short,
     )
     template = resources.files(__package__).joinpath("template.html").read_text(encoding="utf-8")
-    claims = tuple(claim for chapter in chapters for claim in chapter.claims)
     return environment.from_string(template).render(
         title=title,
         date=date.isoformat(),
         chapters=chapters,
-        claims=claims,
+        claims=[claim for chapter in chapters for claim in chapter.claims],
         kinds=list(Kind),
         statements=statements,
         count_verdicts=count_verdicts,
@@ -82,15 +78,13 @@ def render_page(chapters: Sequence[Chapter], figures: Path, *, title: str, date:
     )
 
 
-def render_cell(header: str, value: Any) -> str:
-    """Return the HTML of a table cell; the column's header decides on the format of symbols, units and p-values."""
-    if header == P_VALUE:
-        return to_mathml(format_p_value(value))
-    if header == SYMBOL and isinstance(value, str):
+def render_cell(value: Any, column: ShownColumn | None = None) -> str:
+    """Return the HTML of a cell; the heading of its column decides on the format of symbols, units and p-values."""
+    if column is None:
+        return to_mathml(format_cell(value))
+    if column.heading == SYMBOL and isinstance(value, str):
         return to_mathml(symbol_formula(value))
-    if header == UNIT and isinstance(value, str):
-        return to_mathml(format_unit(value))
-    return to_mathml(format_cell(value))
+    return to_mathml(column.cell_text(value))
 
 
 def render_header(header: str) -> str:
@@ -119,16 +113,11 @@ def anchor(text: str) -> str:
     return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")
 
 
-def paragraphs(text: str) -> list[str]:
-    """Return the paragraphs of a text, which are separated by blank lines."""
-    return [" ".join(part.split()) for part in re.split(r"\n\s*\n", text) if part.strip()]
+def as_sentence(text: str) -> str:
+    """Return a note as a sentence: with a capital letter and a full stop."""
+    return f"{text[:1].upper()}{text[1:]}{'' if text.endswith(('.', '!', '?', ':')) else '.'}"
 
 
 def is_short(value: Any) -> bool:
     """Whether a cell is shown on one line."""
     return isinstance(value, str) and len(to_plain(value)) <= MAX_LINE
-
-
-def is_numeric(values: Sequence[Any]) -> bool:
-    """Whether a column contains numbers only, which are aligned to the right."""
-    return all(not isinstance(value, str) or is_number_text(value) for value in values)

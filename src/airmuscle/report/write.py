@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-import csv
 import dataclasses
 import datetime
-import json
-import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from ..core import plotting
 from ..core.atomic_output import atomic_folder
 from ..core.errors import FileError
-from .chapter import Chapter, Table
-from .formatting import table_rows
-from .formula import to_plain
+from .chapter import Chapter, Plot, Table
+from .data import as_json
 from .html import render_page
+from .sheet import csv_text
 
 REPORT_FILE = "report.html"
 
@@ -45,7 +39,7 @@ def write_into(
     try:
         for chapter in chapters:
             for plot in chapter.plots:
-                save_figure(plot.figure, staging / "figures" / plot.name)
+                save_figure(plot, staging / "figures" / plot.name)
             for table in chapter.tables:
                 save_table(table, staging / "data" / f"{table.name}.csv")
         claims = [claim.as_dict() for chapter in chapters for claim in chapter.claims]
@@ -57,46 +51,29 @@ def write_into(
         raise FileError(f"{staging.parent}: the report cannot be written: {error.strerror or error}.") from error
 
 
-def save_figure(figure: Any, stem: Path) -> None:
-    """Write a figure, or the files of a rendered one, as `stem`.svg and `stem`.png."""
+def save_figure(plot: Plot, stem: Path) -> None:
+    """Write the figure of a plot as `stem`.svg and `stem`.png."""
     stem.parent.mkdir(parents=True, exist_ok=True)
-    files = figure if isinstance(figure, dict) else plotting.rendered(figure)
-    for suffix, content in files.items():
+    for suffix, content in rendered_figure(plot).items():
         stem.with_name(f"{stem.name}.{suffix}").write_bytes(content)
+
+
+def rendered_figure(plot: Plot) -> dict[str, bytes]:
+    """The files of the figure of a plot by their format."""
+    drawn = plot.draw()
+    return drawn if isinstance(drawn, dict) else plotting.rendered(drawn)
 
 
 def with_rendered_figures(chapter: Chapter) -> Chapter:
     """The chapter with the files of its figures, by format, in place of the figures, to be sent to another process."""
-    plots = tuple(dataclasses.replace(plot, figure=plotting.rendered(plot.figure)) for plot in chapter.plots)
+    plots = tuple(dataclasses.replace(plot, figure=rendered_figure(plot)) for plot in chapter.plots)
     return dataclasses.replace(chapter, plots=plots)
 
 
 def save_table(table: Table, path: Path) -> None:
     """Write a table as CSV: headers with units, numbers with all digits, an empty cell for NaN and infinity."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([to_plain(header) for header in table.columns])
-        writer.writerows([_csv_value(value) for value in row] for row in table_rows(table))
-
-
-def as_json(content: Any) -> str:
-    """Return standard JSON: NumPy values become plain ones, values that are not finite become null."""
-    return json.dumps(_json_value(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-
-
-def _csv_value(value: Any) -> Any:
-    return to_plain(value) if isinstance(value, str) else _json_value(value)
-
-
-def _json_value(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {str(key): _json_value(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        return _json_value(value.tolist())
-    if isinstance(value, list | tuple):
-        return [_json_value(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    path.write_text(csv_text(table), encoding="utf-8", newline="")
 
 
 def _check_unique(chapters: Iterable[Chapter]) -> None:

@@ -3,25 +3,31 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from typing import Any
 
 import numpy as np
 
 from ...core.arrays import Array
+from ...core.display import contraction_text, quantity_text
 from ...core.errors import IdentificationError, SolveError
-from ...core.short_repr import ShortRepr
 from ...physics.muscle.characteristic.base import Characteristic
 from ...physics.muscle.characteristic.validity_range import ValidityRange
 from ...recording import Recording
+from ...report.chapter import Chapter, NamedValue, Table, TableColumn
+from ...report.parameters import parameter_table
+from ..reported import Reported
 from .static_fit import fit
 from .weighting import UNCENSORED
 
+BANDS = 6
+"""Pressure intervals of the validity range for which errors are stated (chosen)."""
 GRID_POINTS = 24
 """Grid points in pressure and in contraction for the fit; the error is evaluated on a grid with one more of each."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class ModelApproximation(ShortRepr):
+class ModelApproximation(Reported):
     """The fitted target model, and its error in force over the validity range."""
 
     model: Characteristic
@@ -36,11 +42,54 @@ class ModelApproximation(ShortRepr):
     check_points: Recording
     """The points where the error was evaluated: force of the source law [N], and `error` of the target [N]."""
 
-    def __str__(self) -> str:
+    validity_range: ValidityRange
+    """The range of the approximation."""
+
+    @property
+    def summary(self) -> str:
+        """The errors in one phrase."""
         return (
             f"{type(self.model).__name__}: rms error {self.rmse:.4g} N, maximum error {self.max_error:.4g} N at "
             f"{self.max_error_pressure / 1e3:.4g} kPa and {100 * self.max_error_contraction:.2f} %"
         )
+
+    def chapter(self) -> Chapter:
+        """The description of the approximation: its errors, also in intervals of pressure, and its parameters."""
+        limits, model = self.validity_range, type(self.model).__name__
+        return Chapter(
+            name="approximation",
+            title=f"{model} over {quantity_text(limits.min_pressure, 'Pa', 'kPa')} to "
+            f"{quantity_text(limits.max_pressure, 'Pa', 'kPa')} and {contraction_text(limits.min_contraction)} to "
+            f"{contraction_text(limits.max_contraction)}",
+            summary=f"{self.summary}.",
+            values=(
+                NamedValue("model", model, brief=False),
+                NamedValue("pressure range", limits.pressure, "Pa", "kPa", brief=False),
+                NamedValue("contraction range", limits.contraction, "1", "%", brief=False),
+                NamedValue("rms error", self.rmse, "N", brief=False),
+                NamedValue("maximum error", self.max_error, "N", brief=False),
+                NamedValue("pressure of the maximum error", self.max_error_pressure, "Pa", "kPa", brief=False),
+                NamedValue("contraction of the maximum error", self.max_error_contraction, "1", "%", brief=False),
+            ),
+            tables=(self._band_table(), parameter_table(self.model, "parameters", f"Parameters of {model}")),
+        )
+
+    def _band_table(self) -> Table:
+        """The errors in intervals of pressure; the maximum force is that of the original."""
+        points, rows = self.check_points, []
+        for low, high in itertools.pairwise(np.linspace(*self.validity_range.pressure, BANDS + 1).tolist()):
+            inside = (points["pressure"] >= low) & (points["pressure"] <= high)
+            if inside.any():
+                error, force = points["error"][inside], points["force"][inside]
+                rms, most = float(np.sqrt(np.mean(error**2))), float(np.abs(error).max())
+                rows.append(((low, high), rms, most, float(force.max())))
+        columns: dict[str, Any] = {
+            "pressure": TableColumn([row[0] for row in rows], "Pa", "kPa"),
+            "rms error": TableColumn([row[1] for row in rows], "N"),
+            "maximum error": TableColumn([row[2] for row in rows], "N"),
+            "maximum force": TableColumn([row[3] for row in rows], "N"),
+        }
+        return Table("bands", "Errors by pressure", columns, brief=len(rows))
 
 
 def approximate(law: Characteristic, other: Characteristic, validity_range: ValidityRange) -> ModelApproximation:
@@ -69,7 +118,7 @@ def approximate(law: Characteristic, other: Characteristic, validity_range: Vali
     return ModelApproximation(
         model, float(np.sqrt(np.mean(difference**2))), float(difference[worst]),
         float(check_points["pressure"][worst]), float(check_points["contraction"][worst]),
-        check_points.with_columns(error=difference),
+        check_points.with_columns(error=difference), validity_range,
     )  # fmt: skip
 
 

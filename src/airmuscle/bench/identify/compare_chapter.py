@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ...core.plotting import BLUE, LINES, MARKERS, legend_outside, new_figure
-from ...report.chapter import Chapter, Plot, Table
+from ...report.chapter import Chapter, Plot, Table, TableColumn
 from ...report.formula import symbol_formula, to_mathtext
 from . import Comparison, Fit
 from .candidate_scores import RankedModel
@@ -33,66 +34,26 @@ def compare_chapter(
 
     `recommended` is the law that was selected for several purposes, for the given reason.
     """
-    fit = (recommended or comparison.recommended).fit
-    joint = "" if reason in ("", comparison.reason) else f"{reason}\n\n"
-    tables = (_ranking(comparison), _excluded(comparison), _fold_table(comparison))
-    chapter = Chapter(
-        paper="comparison",
-        title="Model selection",
-        summary=f"{joint}{comparison.reason}\n\n"
-        f"Cross-validation: each {comparison.leave_out.group_name} is left out in turn. "
-        "All errors are errors of the force, over the rows with a positive force; the squared force of the law at "
-        "slack rows is added.",
-        tables=tuple(table for table in tables if table is not None),
-        plots=(
-            Plot("left-out", "Cross-validation error of the laws on each fold.", _fold_figure(comparison)),
-            *(_plots_of_fit(fit) if figures_of_fit else ()),
-        ),
+    fit, chapter = (recommended or comparison.recommended).fit, comparison.chapter()
+    joint = () if reason in ("", comparison.reason) else (reason,)
+    folds = Plot("left-out", "Cross-validation error of the laws on each fold.", partial(_fold_figure, comparison))
+    chapter = replace(
+        chapter,
+        summary=(*joint, *chapter.paragraphs),
+        tables=(*chapter.tables, _fold_table(comparison)),
+        plots=(folds, *(_plots_of_fit(fit) if figures_of_fit else ())),
     )
-    return _of_one_purpose(chapter, comparison) if joint else chapter
+    group = comparison.leave_out.group_name
+    return replace(chapter.among(f"{group}-"), name=f"comparison-{group}") if joint else chapter
 
 
 def _plots_of_fit(fit: Fit) -> tuple[Plot, ...]:
     return (
-        Plot("residuals", "Residuals of the recommended law over each variable.", residual_figure(fit)),
-        Plot("correlations", "Correlations of the parameters of the recommended law.", correlation_figure(fit)),
+        Plot("residuals", "Residuals of the recommended law over each variable.", partial(residual_figure, fit)),
+        Plot(
+            "correlations", "Correlations of the parameters of the recommended law.", partial(correlation_figure, fit)
+        ),
     )
-
-
-def _of_one_purpose(chapter: Chapter, comparison: Comparison) -> Chapter:
-    """Return the chapter with names that differ from those of the comparison for the other purpose."""
-    group = comparison.leave_out.group_name
-    return replace(
-        chapter,
-        paper=f"comparison-{group}",
-        title=f"Model selection for {comparison.purpose}",
-        tables=tuple(replace(table, name=f"{group}-{table.name}") for table in chapter.tables),
-        plots=tuple(replace(plot, name=f"{group}-{plot.name}") for plot in chapter.plots),
-    )
-
-
-def _ranking(comparison: Comparison) -> Table:
-    contenders = comparison.ranking
-    return Table(
-        "ranking",
-        "Ranking by cross-validation error",
-        {
-            "law": [c.candidate.name for c in contenders],
-            "parameters": [c.parameter_count for c in contenders],
-            "in-sample rms error [N]": [c.in_sample_rmse for c in contenders],
-            "cross-validation rms error [N]": [c.cross_validated_rmse for c in contenders],
-            "AICc above the lowest": [c.aicc - min(other.aicc for other in contenders) for c in contenders],
-        },
-    )
-
-
-def _excluded(comparison: Comparison) -> Table | None:
-    left_out = (*comparison.excluded, *comparison.unavailable)
-    if not left_out:
-        return None
-    columns = {"law": [e.name for e in left_out], "cause": [e.cause for e in left_out]}
-    columns["reason"] = [e.reason for e in left_out]
-    return Table("excluded", "Laws that are not ranked", columns)
 
 
 def _fold_table(comparison: Comparison) -> Table:
@@ -100,7 +61,7 @@ def _fold_table(comparison: Comparison) -> Table:
     columns: dict[str, Any] = {"fold": list(parts)}
     for contender in comparison.ranking:
         errors = {part.fold: part.rmse for part in contender.fold_scores}
-        columns[f"{contender.candidate.name} [N]"] = [errors.get(part, float("nan")) for part in parts]
+        columns[contender.candidate.name] = TableColumn([errors.get(part) for part in parts], "N")
     return Table("left-out-parts", "Errors by fold", columns, shown=False)
 
 

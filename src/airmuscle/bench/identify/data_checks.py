@@ -6,12 +6,13 @@ They need no law. `DataChecks` joins them with the checks of `bench.checks`, for
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from ...core.errors import Hint, HintedText
 from ...recording import Recording
+from ...report.chapter import NamedValue
 from ..checks import find_suspicious, without_missing_codes
 from ..segment import Outlier, estimate_sensors, find_outliers
 from ..segment.remembered import remembered
@@ -43,14 +44,14 @@ class Scatter:
         noise = [estimate_noise(force[np.isfinite(force)]) for force in timed]
         return cls(float(np.median(noise)) if noise and np.median(noise) > 0 else None, repeatability)
 
-    def __str__(self) -> str:
-        """Both as text; empty if neither is known."""
-        parts = [] if self.noise is None else [f"noise {self.noise:.3g} N"]
+    def values(self) -> Iterator[NamedValue]:
+        """What is known of the scatter, for a report."""
+        if self.noise is not None:
+            yield NamedValue("noise of the data", self.noise, "N", digits=3)
         if self.repeatability is not None:
-            parts.append(f"repeated runs differ by {np.sqrt(2.0) * self.repeatability:.3g} N")
+            yield NamedValue("difference of repeated runs", float(np.sqrt(2.0)) * self.repeatability, "N", digits=3)
         if self.branches:
-            parts.append(f"branches {self.branches:.3g} N apart")
-        return ", ".join(parts)
+            yield NamedValue("distance of the branches", self.branches, "N", digits=3)
 
     def misfit_notes(self, rmse: float, greatest: float, lengths: int = 1) -> list[str]:
         """The remark that a residual [N] is greater than the scatter explains.

@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Collection, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +21,8 @@ from ...core.errors import IdentificationError, ParameterError
 from ...physics.muscle.characteristic.base import Characteristic
 from ...physics.muscle.characteristic.validity_range import ValidityRange
 from ...recording import Recording
+from ...report.chapter import Chapter, NamedValue, Table, TableColumn
+from ..reported import Reported
 from .identifiability import EXACT_RANK_TOLERANCE, UndeterminedCombination, analyse_identifiability
 from .problem import make_problem
 from .weighting import UNCENSORED
@@ -75,8 +78,8 @@ class PlannedRun:
         return float(values[0]), float(values[-1])
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class ExperimentPlan:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class ExperimentPlan(Reported):
     """The runs to measure, sorted by the constant quantity and its level, and the expected precision."""
 
     runs: tuple[PlannedRun, ...]
@@ -101,11 +104,44 @@ class ExperimentPlan:
             "gain of the sensors) are not contained, and several points of a run do not reduce them"
         )
 
+    def chapter(self) -> Chapter:
+        """The description of the plan: runs, expected precision, efficiency."""
+        columns: dict[str, Any] = {
+            "parameter": list(self.names),
+            "present value": TableColumn(self.values),
+            "expected standard error": TableColumn(self.standard_errors, digits=3),
+        }
+        return Chapter(
+            name="plan",
+            title="D-optimal static runs",
+            summary=f"Relative D-efficiency {self.relative_d_efficiency:.2f}, compared with the same number of evenly "
+            "spaced runs.",
+            values=(NamedValue("relative D-efficiency", self.relative_d_efficiency, "1", digits=3, brief=False),),
+            tables=(run_table(self.runs, "runs", "Runs"),
+                    Table("precision", "Expected precision", columns, "SI units.", brief=len(self.names))),
+            notes=(*map(str, self.undetermined), self.assumption),
+        )  # fmt: skip
+
     def recording(self) -> Recording:
         """The points in order, as a set-point list for the test rig: run, pressure, contraction, expected force."""
         numbers = np.concatenate([np.full(r.force.size, i + 1.0) for i, r in enumerate(self.runs)])
         columns = {n: np.concatenate([getattr(r, n) for r in self.runs]) for n in ("pressure", "contraction", "force")}
         return Recording({"run": numbers, **columns}, "plan of static runs; force is that of the initial parameters")
+
+
+def run_table(runs: Sequence[PlannedRun], name: str, title: str) -> Table:
+    """The table of planned runs: the quantity that is constant has one value, the swept one its ends."""
+    ends = {each: [(run.level if run.constant == each else run.sweep_limits) for run in runs]
+            for each in ("pressure", "contraction")}  # fmt: skip
+    columns: dict[str, Any] = {
+        "run": list(range(1, len(runs) + 1)),
+        "constant": [run.constant for run in runs],
+        "pressure": TableColumn(ends["pressure"], "Pa", "kPa"),
+        "contraction": TableColumn(ends["contraction"], "1", "%"),
+        "points": [run.force.size for run in runs],
+        "expected force": TableColumn([(float(run.force.max()), float(run.force.min())) for run in runs], "N"),
+    }
+    return Table(name, title, columns, brief=12)
 
 
 def optimal_design(

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
 from ...core.errors import HintedText, IdentificationError
-from ...core.short_repr import ShortRepr
 from ...engine.processes import Workers
 from ...recording import Recording
+from ...report.chapter import Chapter, NamedValue, Table, TableColumn
+from ..reported import Reported
 from .candidate_scores import (
     MAX_RECOMMENDED_EXCESS,
     ExcludedModel,
@@ -126,13 +128,18 @@ def excess_error(model: RankedModel, best: RankedModel) -> float:
 
 MAX_LIMITED = 0.01
 """Fraction of the rows above which limited residuals are no outliers (chosen)."""
-
 MAX_LISTED = 10
-"""Maximum number of laws in the text of a comparison, besides the recommended one (chosen)."""
+"""Maximum number of laws in the brief view of a comparison, besides the recommended one (chosen)."""
+SHORT_LISTED = 4
+"""Maximum number of excluded laws in the brief view (chosen)."""
+_SLACK_NOTE = (
+    "Slack rows: where the muscle was measured slack. A law that pulls there more than three rms errors of the law and "
+    "2 % of the maximum force is not recommended if another law pulls less."
+)
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class Comparison(ShortRepr):
+class Comparison(Reported):
     """The ranked models, lowest cross-validated error first, and the excluded candidates; `print` it."""
 
     ranking: tuple[RankedModel, ...]
@@ -142,7 +149,6 @@ class Comparison(ShortRepr):
     reason: str
     unavailable: tuple[ExcludedModel, ...] = ()
     """Standard candidates whose initial values do not follow from the data; empty if candidates were given."""
-
     notes: tuple[str, ...] = ()
     """Remarks on the data and on the fit of the recommended law, such as contradicting rows or two branches."""
 
@@ -158,54 +164,58 @@ class Comparison(ShortRepr):
             raise IdentificationError(f"the comparison has no model '{name}'; it has {', '.join(models)}.")
         return models[name]
 
-    def _listed(self) -> tuple[RankedModel, ...]:
-        """The first models of the ranking, and the recommended one."""
-        first = self.ranking[:MAX_LISTED]
-        return first if self.recommended in first else (*first, self.recommended)
+    def chapter(self) -> Chapter:
+        """The description of the comparison: recommendation, ranking, excluded laws, remarks on the data."""
+        names: dict[str, list[str]] = {}
+        for each in self.unavailable:
+            names.setdefault(each.cause, []).append(each.name)
+        excluded = _unranked("excluded", "Laws that are not ranked", self.excluded, SHORT_LISTED)
+        unavailable = _unranked("not-compared", "Laws that are not compared", self.unavailable, 0)
+        return Chapter(
+            name="comparison",
+            title=f"Leave-one-{self.leave_out.group_name}-out cross-validation; the ranking is for {self.purpose}",
+            summary=(
+                self.reason,
+                f"Cross-validation: each {self.leave_out.group_name} is left out in turn. All errors are errors of the "
+                "force, over the rows with a positive force; the squared force of the law at slack rows is added.",
+            ),
+            values=(NamedValue("recommended", self.recommended.candidate.name, brief=False),
+                    NamedValue("left out", self.leave_out.group_name, brief=False),
+                    NamedValue("purpose", self.purpose, brief=False)),
+            tables=(self._ranking_table(), *(table for table in (excluded, unavailable) if len(table))),
+            notes=(*self.notes, *(f"{m.candidate.name}: {note}" for m in self.ranking for note in m.notes),
+                   *(f"not compared: {', '.join(laws)}: {cause}." for cause, laws in names.items())),
+        )  # fmt: skip
 
-    def __str__(self) -> str:
-        title = (
-            f"Leave-one-{self.leave_out.group_name}-out cross-validation, rms errors in force; the ranking is for "
-            f"{self.purpose}."
-        )
-        width = max(40, *(len(m.candidate.name) + 1 for m in self._listed()))
-        slack = any(m.slack.rows for m in self.ranking)
-        head = f"{'law':<{width}}{'parameters':>11}{'in sample':>12}{'left out':>12}"
-        head += f"{'at slack':>13}" * slack + f"{'AICc excess':>13}"
-        lowest = min(m.aicc for m in self.ranking)
-        rows = [
-            f"{m.candidate.name:<{width}}{m.parameter_count:>11}{m.in_sample_rmse:>10.4g} N"
-            f"{m.cross_validated_rmse:>10.4g} N" + _at_slack(m) * slack + f"{m.aicc - lowest:>13.1f}"
-            for m in self._listed()
-        ]
-        more = len(self.ranking) - len(rows)
-        rows += [f"and {more} more, with larger errors; the report and `ranking` contain all."] if more else []
-        notes = [f"note: {note}" for note in self.notes]
-        notes += [f"note: {m.candidate.name}: {note}" for m in self._listed() for note in m.notes]
-        excluded = [f"excluded: {e}" for e in self.excluded if e.error is None]
-        causes = dict.fromkeys(e.cause for e in self.unavailable)
-        excluded += [
-            f"not compared: {', '.join(e.name for e in self.unavailable if e.cause == c)}: {c}." for c in causes
-        ]
-        errors = [f"{e.name} ({e.error:.4g} N)" for e in self.excluded if e.error is not None]
-        excluded += (
-            [f"excluded, as the error is too large (cross-validation ended early): {', '.join(errors)}."]
-            if errors
-            else []
-        )
-        remark = [_SLACK_REMARK] if slack else []
-        return "\n".join([title, "", head, *rows, *remark, "", self.reason, *notes, *excluded])
-
-
-_SLACK_REMARK = (
-    "at slack: greatest force of the law where the muscle was measured slack.\n"
-    "*: more than three rms errors of the law and 2 % of the greatest force; not recommended if another law pulls less."
-)
+    def _ranking_table(self) -> Table:
+        models, lowest = self.ranking, min(m.aicc for m in self.ranking)
+        columns: dict[str, Any] = {
+            "law": [m.candidate.name for m in models],
+            "parameters": [m.parameter_count for m in models],
+            "in-sample rms error": TableColumn([m.in_sample_rmse for m in models], "N", short="in sample"),
+            "cross-validation rms error": TableColumn([m.cross_validated_rmse for m in models], "N", short="left out"),
+            "AICc above the lowest": TableColumn([m.aicc - lowest for m in models], short="AICc excess"),
+        }
+        if any(m.slack.rows for m in models):
+            columns["maximum force at slack rows"] = TableColumn([m.slack.greatest for m in models], "N", digits=3,
+                                                            short="at slack")  # fmt: skip
+        if any(m.slack.pulling for m in models):
+            pulls = [bool(m.slack.pulling) for m in models]
+            columns["pulls at slack rows"] = TableColumn(pulls, short="pulls at slack")
+        recommended = next(i for i, m in enumerate(models) if m is self.recommended)
+        rows = sorted({*range(min(MAX_LISTED, len(models))), recommended})
+        return Table("ranking", "Ranking by cross-validation error", columns, _SLACK_NOTE, brief=rows)
 
 
-def _at_slack(model: RankedModel) -> str:
-    """The column of the greatest force at slack rows."""
-    return f"{model.slack.greatest:>10.3g} N{'*' if model.slack.pulling else ' '}"
+def _unranked(name: str, title: str, models: Sequence[ExcludedModel], brief: int) -> Table:
+    too_large = "its error, {:.4g} N, is too large; its cross-validation was not completed"
+    columns: dict[str, Any] = {
+        "law": [each.name for each in models],
+        "cause": [each.cause if each.error is None else too_large.format(each.error) for each in models],
+        "error": TableColumn([each.error for each in models], "N", brief=False),
+        "reason": TableColumn([each.reason for each in models], brief=False),
+    }
+    return Table(name, title, columns, brief=brief)
 
 
 def compare(
@@ -226,8 +236,7 @@ def compare(
                 ones. By default the first of specimens, runs and levels with three groups or more
     loss        LeastSquares(), or a robust loss such as Huber(scale) with its scale in force [N]; all errors are then
                 rms errors of residuals that are limited to `loss.limit`, and a note states the limit
-    workers     number of processes, or an executor, such as that of `shared_folder`; a script that asks
-                for several needs `if __name__ == "__main__":`
+    workers     number of processes, for several of which a script needs `if __name__ == "__main__":`, or an executor
     progress    called with the name of each candidate and the completed fraction, at the end with an empty name
 
     The recommended law is the one with the fewest parameters among those whose error is not larger than the lowest one
@@ -272,8 +281,8 @@ def _comparison(
         raise IdentificationError(HintedText(f"the data determine none of the {len(excluded)} candidates.", *reasons))
     ranking.sort(key=lambda m: (m.cross_validated_rmse, m.parameter_count))
     recommended, reason = recommend(ranking, split)
-    length_remarks = length_notes(find_length_errors(recommended.fit.model, runs))
-    remarks = (*recommended.fit.notes, *length_remarks, *_limit_notes(recommended))
+    of_lengths = length_notes(find_length_errors(recommended.fit.model, runs))
+    remarks = (*recommended.fit.notes, *of_lengths, *_limit_notes(recommended))
     return Comparison(tuple(ranking), excluded, split, recommended, reason, unavailable, remarks)
 
 

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ...core.arrays import Array
-from ...core.display import contraction_text, in_display_unit, quantity_text
+from ...core.display import contraction_text, quantity_text
 from ...core.errors import ParameterError, suggestion
-from ...core.tree import continues_list
 from ...physics.muscle.characteristic.base import Characteristic
 from ...physics.muscle.characteristic.validity_range import ValidityRange
 from ...recording import Recording
-from ...recording.notebook import Card, NotebookDisplay
+from ...report.chapter import Chapter, NamedValue, Plot, Table
+from ...report.parameters import estimate_table
+from ..reported import Reported
 from .data_checks import Remarks, Scatter
 from .parameter_covariance import ParameterCovariance
 from .plot import plot_fit
@@ -25,6 +26,9 @@ from .problem import CONTRACTION, FORCE, FitProblem, FittedQuantity, evaluate
 from .specimen_effects import SpecimenEffects
 from .statistics import CorrelationIndex, WorstPoint
 from .weighting import Loss
+
+MAX_ROWS = 12
+"""Maximum number of parameters in the brief view (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,7 +56,7 @@ class Estimate:
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class Fit(NotebookDisplay):
+class Fit(Reported):
     """A fitted characteristic with its data and statistics; `print` it, or `.plot()` it.
 
     Residuals are in the fitted quantity. `rmse` and `correlation_index` are over the uncensored rows, `max_error` over
@@ -212,33 +216,55 @@ class Fit(NotebookDisplay):
     def _title(self) -> str:
         return f"{type(self.model).__name__} fitted to {self.recording.origin}"
 
-    def __str__(self) -> str:
-        notes = [f"note: {note}" for note in self.notes]
-        statistics = (f"{name:<18}{text}" for name, text in self.summary())
-        return "\n".join([self._title, "", *estimate_table(self.estimates), "", *statistics, *notes])
+    def chapter(self) -> Chapter:
+        """The description of the fit: goodness of fit, estimates, residuals, remarks on the data."""
+        return Chapter(
+            name="fit",
+            title=self._title,
+            summary=f"Standard errors {self.error_basis}.",
+            values=self.goodness(),
+            tables=(
+                estimate_table(self.estimates, "parameters", "Parameters", brief=MAX_ROWS),
+                self._correlation_table,
+            ),
+            plots=(Plot("errors", "Modelled against measured values, and residuals.", self.plot),),
+            notes=self.notes,
+        )
 
-    def summary(self) -> list[tuple[str, str]]:
-        """The goodness of fit as pairs of a name and a text with units."""
-        worst = self.max_error
+    @property
+    def _correlation_table(self) -> Table:
+        columns = {name: self.correlations[:, i] for i, name in enumerate(self.names)}
+        return Table("correlations", "Correlations", {"parameter": list(self.names), **columns}, shown=False)
+
+    def goodness(self) -> tuple[NamedValue, ...]:
+        """The goodness of fit."""
+        worst, index = self.max_error, self.correlation_index
         point = f"at {_point_text(worst.pressure, worst.contraction, worst.force)}"
         undefined = "undefined, because the measured values do not vary"
-        index = undefined if self.correlation_index is None else str(self.correlation_index)
-        r2 = undefined if self.r2 is None else f"{self.r2:.6f}"
         ranges = self.data_ranges
-        (p0, p1), (f0, f1) = ranges["pressure"], ranges["force"]
-        contractions = " to ".join(contraction_text(c) for c in ranges["contraction"])
-        return [
-            ("rows", f"{self.rows_used} used, {self.rows_censored} of them censored; {self.rows_dropped} dropped"),
-            ("rms error", self.format_residual(self.rmse) + self._limited_text()),
-            *([("scatter of data", str(self.scatter))] if self.scatter and str(self.scatter) else []),
-            ("maximum error", f"{self.format_residual(worst.error)} {point}"),
-            ("residual std", self.format_residual(self.sigma)),
-            ("standard errors", self.error_basis),
-            ("R2", r2),
-            ("correlation index", index),
-            ("rank, condition", f"{self.rank} of {len(self.estimates)}, {self.condition:.3g}"),
-            ("data range", f"{_range_text(p0, p1, 'Pa', 'kPa')}, {contractions}, {_range_text(f0, f1, 'N', 'N')}"),
-        ]
+        return (
+            NamedValue("rows used", self.rows_used,
+                     remark=f"{self.rows_censored} of them censored; {self.rows_dropped} dropped"),
+            NamedValue("rows censored", self.rows_censored, brief=False),
+            NamedValue("rows dropped", self.rows_dropped, brief=False),
+            self._residual("rms error", self.rmse, self._limited_text()),
+            *(self.scatter.values() if self.scatter else ()),
+            self._residual("maximum error", worst.error, point),
+            self._residual("residual standard deviation", self.sigma, brief=False),
+            NamedValue("R2", self.r2, "1", digits=6, remark=undefined if self.r2 is None else ""),
+            NamedValue("correlation index IK", self.ik, "1",
+                     remark="" if self.ik is not None else undefined if index is None else str(index)),
+            NamedValue("rank", self.rank, remark=f"of {len(self.estimates)}"),
+            NamedValue("condition", self.condition, "1", digits=3, brief=False),
+            *(NamedValue(f"{name} of the data", ranges[name], unit, shown, brief=False)
+              for name, unit, shown in (("pressure", "Pa", "kPa"), ("contraction", "1", "%"), ("force", "N", "N"))),
+        )  # fmt: skip
+
+    def _residual(self, name: str, value: float, remark: str = "", brief: bool = True) -> NamedValue:
+        """A residual in the fitted quantity."""
+        quantity = self.fitted_quantity
+        shown = {"Pa": "kPa", "1": "%"}.get(quantity.unit, "")
+        return NamedValue(name, value, quantity.unit, shown, remark=remark, brief=brief)
 
     def _limited_text(self) -> str:
         """The rms error of a robust fit with its residuals limited, as in a comparison; empty if none is limited."""
@@ -249,7 +275,7 @@ class Fit(NotebookDisplay):
             return ""
         rmse = float(np.sqrt(np.mean(np.clip(residuals, -limit, limit) ** 2)))
         rows = "1 row" if count == 1 else f"{count} rows"
-        return f"; {self.format_residual(rmse)} with {rows} limited to {self.format_residual(limit)}"
+        return f"({self.format_residual(rmse)} with {rows} limited to {self.format_residual(limit)})"
 
     def format_residual(self, residual: float) -> str:
         """A residual [SI] as text in the usual unit of the fitted quantity."""
@@ -259,39 +285,7 @@ class Fit(NotebookDisplay):
             return contraction_text(residual, 4)
         return quantity_text(residual, "Pa", "kPa")
 
-    def _card(self) -> Card:
-        lines = [f"{name}: {text}" for name, text in self.summary()]
-        return Card(
-            self._title, estimate_rows(self.estimates), self.plot, ["; ".join(lines[:4]), *lines[4:], *self.notes]
-        )
-
 
 def _point_text(pressure: float, contraction: float, force: float) -> str:
     texts = (quantity_text(pressure, "Pa", "kPa"), contraction_text(contraction), quantity_text(force, "N", "N"))
     return ", ".join(texts)
-
-
-def _range_text(low: float, high: float, si_unit: str, default: str) -> str:
-    """A range as text with its unit behind the upper limit."""
-    return f"{quantity_text(low, si_unit, default).partition(' ')[0]} to {quantity_text(high, si_unit, default)}"
-
-
-def estimate_rows(estimates: Sequence[Estimate]) -> list[tuple[str, ...]]:
-    """The rows of a table of estimates in display units, with its header; SE is the standard error.
-
-    The values of a list, coefficients[0], coefficients[1], ..., state their meaning once.
-    """
-    rows: list[tuple[str, ...]] = [("parameter", "", "value", "2 SE", "unit", "meaning")]
-    for e, continued in zip(estimates, continues_list([e.name for e in estimates]), strict=True):
-        value, unit = in_display_unit(e.value, e.unit)
-        shown = dataclasses.replace(e, value=value, stderr=in_display_unit(e.stderr, e.unit)[0], unit=unit)
-        meaning = "" if continued else e.meaning
-        rows.append((e.name, e.label, f"{value:.4g}", shown.format_interval(), shown.display_unit, meaning))
-    return rows
-
-
-def estimate_table(estimates: Sequence[Estimate]) -> list[str]:
-    """The lines of a text table of estimates; SE is the standard error."""
-    rows = estimate_rows(estimates)
-    widths = [max(len(row[i]) for row in rows) for i in range(5)]
-    return ["  ".join([*(c.ljust(w) for c, w in zip(row, widths, strict=False)), row[5]]).rstrip() for row in rows]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ...core.plotting import DASHES, LINES, legend_outside, new_figure
-from ...report.chapter import Chapter, Plot, Table
+from ...report.chapter import Chapter, NamedValue, Plot, Table, TableColumn
 from . import Fit, ShapeConstrainedFit
 from .levels import levels_of
 from .surface.monotonicity import MonotonicityViolation
@@ -25,41 +26,40 @@ def shape_chapter(shaped: ShapeConstrainedFit, unconstrained: Fit, free: int) ->
         if not shaped.unconstrained_violations
         else "violates them in the regions of the table"
     )
+    violations = shaped.unconstrained_violations
+    title = "Monotonicity violations of the unconstrained surface"
     return Chapter(
-        paper="shape",
+        name="shape",
         title="Shape-constrained surface",
-        summary="The muscle file contains the constrained surface: within its validity range the force does not "
-        f"decrease with pressure and does not increase with contraction{zero}. Its rms error is {shaped.rmse:.4g} N, "
-        f"compared with {shaped.unconstrained_rmse:.4g} N of the unconstrained surface, which {verdict}. The "
-        "uncertainties and bands below are those of the unconstrained surface.",
-        tables=(
-            violation_table(
-                shaped.unconstrained_violations, "shape-loose", "Monotonicity violations of the unconstrained surface"
-            ),
-        )
-        if shaped.unconstrained_violations
-        else (),
-        plots=(Plot("shaped", "Solid: constrained. Dashed: unconstrained.", _surface_figure(shaped, unconstrained)),),
-    )
+        summary=(
+            f"Rms error {shaped.rmse:.4g} N with constraints, {shaped.unconstrained_rmse:.4g} N without.",
+            "The muscle file contains the constrained surface: within its validity range the force does not decrease "
+            f"with pressure and does not increase with contraction{zero}. The unconstrained surface {verdict}. The "
+            "uncertainties and bands are those of the unconstrained surface.",
+        ),
+        values=(NamedValue("rms error", shaped.rmse, "N", brief=False),
+                NamedValue("rms error without constraints", shaped.unconstrained_rmse, "N", brief=False)),
+        tables=(violation_table(violations, "shape-loose", title),) if violations else (),
+        plots=(Plot("shaped", "Solid: constrained. Dashed: unconstrained.",
+                    partial(_surface_figure, shaped, unconstrained)),),
+        notes=tuple(f"unconstrained: {each}" for each in violations),
+    )  # fmt: skip
 
 
 def violation_table(violations: Sequence[MonotonicityViolation], name: str, title: str) -> Table:
     """Return a table of the regions in which a law is not monotonic, largest first."""
-    return Table(
-        name,
-        title,
-        {
-            "constraint": [each.rule.description for each in violations],
-            "from [kPa]": [each.pressure[0] / 1e3 for each in violations],
-            "to [kPa]": [each.pressure[1] / 1e3 for each in violations],
-            "from [%]": [100 * each.second_argument[0] for each in violations],
-            "to [%]": [100 * each.second_argument[1] for each in violations],
-            "fraction of the validity range [%]": [100 * each.area_fraction for each in violations],
-            "worst at [kPa]": [each.worst_point[0] / 1e3 for each in violations],
-            "worst at [%]": [100 * each.worst_point[1] for each in violations],
-        },
-        "Gauge pressure and contraction. `airmuscle fit --shape` fits a surface without such regions.",
-    )
+    of_force = all(each.rule.quantity == "force" for each in violations)
+    second, units = ("contraction", ("1", "%")) if of_force else ("force", ("N", ""))
+    columns: dict[str, Any] = {
+        "constraint": [each.rule.description for each in violations],
+        "pressure": TableColumn([tuple(each.pressure) for each in violations], "Pa", "kPa"),
+        second: TableColumn([tuple(each.second_argument) for each in violations], *units),
+        "fraction of the validity range": TableColumn([each.area_fraction for each in violations], "1", "%"),
+        "worst at pressure": TableColumn([each.worst_point[0] for each in violations], "Pa", "kPa"),
+        f"worst at {second}": TableColumn([each.worst_point[1] for each in violations], *units),
+    }
+    note = "`airmuscle fit --shape` fits a surface without such regions."
+    return Table(name, title, columns, note)
 
 
 def _surface_figure(shaped: ShapeConstrainedFit, unconstrained: Fit) -> Any:

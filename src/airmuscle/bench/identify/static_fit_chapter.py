@@ -14,15 +14,16 @@ from ...physics.muscle.characteristic.validity_range import ValidityRange
 from ...physics.muscle.geometry import Geometry
 from ...physics.muscle.isobar_plot import isobar_plot
 from ...physics.muscle.isobars import compute_isobars
-from ...report.chapter import Chapter, DisplayedEquation, Plot, Table
+from ...report.chapter import BY_ROW, Chapter, DisplayedEquation, NamedValue, Plot, Table, TableColumn
 from ...report.equation import LawEquation, law_equation
 from ...report.equation.source_code import REMARKS, displayed_lines, source_codes
-from ...report.formatting import format_number, format_unit
+from ...report.formatting import format_number
 from . import Fit
 from .curve_plots import band_plot, ramp_plot
 from .levels import is_pressure_ramp, levels_of
 from .shape_chapter import violation_table
 from .surface.shape import shape_violations_of_fit
+from .volume_chapter import defect_values
 
 MAX_CURVES = 8
 
@@ -40,85 +41,52 @@ class MuscleDescription(Protocol):
     def validity_range(self) -> ValidityRange | None: ...
 
 
-def fit_chapter(fit: Fit, entry: MuscleDescription, notes: Sequence[str] = ()) -> Chapter:
-    """Return the chapter of a fit: equation, goodness of fit, parameters, isobars with measured points, residuals."""
-    remarks = "\n\n".join((*fit.notes, *notes))
-    equations, symbols = equation_section(fit)
-    errors = Plot("errors", "Modelled against measured values, and residuals.", fit.plot())
-    return Chapter(
-        paper="fit",
+def fit_chapter(
+    fit: Fit, entry: MuscleDescription, notes: Sequence[str] = (), of_recordings: Sequence[str] = ()
+) -> Chapter:
+    """Return the chapter of a fit with its muscle: equation, goodness of fit, parameters, isobars, residuals.
+
+    notes          on the fit and the muscle
+    of_recordings  notes on the reading of the data, for the page
+    """
+    chapter, (equations, symbols) = fit.chapter(), equation_section(fit)
+    plots = (ramp_plot(fit), _isobars(fit, entry), *chapter.plots, band_plot(fit))
+    parameters, correlations = chapter.tables
+    return dataclasses.replace(
+        chapter,
         title=entry.title,
-        summary=f"{entry.note}\n\n{remarks}",
+        summary=(*chapter.paragraphs, entry.note, *of_recordings),
+        values=(*chapter.values, *(dataclasses.replace(each, brief=False) for each in _energy_consistency(fit, entry))),
         equations=equations,
-        tables=(
-            _goodness_of_fit(fit),
-            *_energy_consistency(fit, entry),
-            *symbols,
-            _parameters(fit),
-            *_violations(fit),
-            _correlations(fit),
-            _rows(fit),
-        ),
-        plots=tuple(
-            plot for plot in (ramp_plot(fit), _isobars(fit, entry), errors, band_plot(fit)) if plot is not None
-        ),
+        tables=(*symbols, parameters, *_violations(fit), correlations, _rows(fit)),
+        plots=tuple(plot for plot in plots if plot is not None),
+        notes=(*chapter.notes, *notes),
         references=tuple(cite(entry)),
     )
 
 
-def _goodness_of_fit(fit: Fit) -> Table:
-    names, texts = zip(*fit.summary(), strict=True)
-    return Table("figures", "Goodness of fit", {"quantity": list(names), "value": list(texts)})
-
-
-def _energy_consistency(fit: Fit, entry: MuscleDescription) -> list[Table]:
-    """Return a table of the Maxwell defect of the law with the volume of the muscle, if it has one."""
+def _energy_consistency(fit: Fit, entry: MuscleDescription) -> list[NamedValue]:
+    """The Maxwell defect of the law with the volume of the muscle, if it has one."""
     if entry.geometry is None or entry.validity_range is None:
         return []
     try:
         defect = maxwell_defect(fit.model, entry.geometry, entry.validity_range)
     except AirmuscleError:  # slack everywhere, or contractions outside the geometry
         return []
-    title = "Energy consistency of force and volume"
-    note = "The law and the volume derive from one potential where dF/dp + dV/dL is zero."
-    return [Table("energy", title, {"quantity": ["Maxwell defect |dF/dp + dV/dL|"], "value": [str(defect)]}, note)]
-
-
-def _parameters(fit: Fit) -> Table:
-    return Table(
-        "parameters",
-        "Parameters",
-        {
-            "parameter": [e.name for e in fit.estimates],
-            "symbol": [e.label for e in fit.estimates],
-            "value (SI)": [e.value for e in fit.estimates],
-            "standard error (SI)": [e.stderr for e in fit.estimates],
-            "unit": ["" if e.unit == "1" else e.unit for e in fit.estimates],
-            "meaning": [e.meaning for e in fit.estimates],
-        },
-    )
-
-
-def _correlations(fit: Fit) -> Table:
-    columns = {name: fit.correlations[:, i] for i, name in enumerate(fit.names)}
-    return Table("correlations", "Correlations", {"parameter": list(fit.names), **columns}, shown=False)
+    return defect_values(defect)
 
 
 def _rows(fit: Fit) -> Table:
-    unit = fit.fitted_quantity.unit
-    return Table(
-        "rows",
-        "Measured and modelled values",
-        {
-            "pressure [Pa]": fit.recording["pressure"],
-            "contraction [1]": fit.recording["contraction"],
-            "force [N]": fit.recording["force"],
-            f"modelled {fit.fitted_quantity.name} [{unit}]": fit.modelled,
-            f"residual [{unit}]": fit.residuals,
-            "censored": (fit.censoring != 0).astype(int),
-        },
-        shown=False,
-    )
+    recording, unit = fit.recording, fit.fitted_quantity.unit
+    columns = {
+        "pressure": TableColumn(recording["pressure"], "Pa"),
+        "contraction": TableColumn(recording["contraction"], "1"),
+        "force": TableColumn(recording["force"], "N"),
+        f"modelled {fit.fitted_quantity.name}": TableColumn(fit.modelled, unit),
+        "residual": TableColumn(fit.residuals, unit),
+        "censored": fit.censoring != 0,
+    }
+    return Table("rows", "Measured and modelled values", columns, series=True)
 
 
 def _isobars(fit: Fit, entry: MuscleDescription) -> Plot:
@@ -167,9 +135,9 @@ def _specimen_effects(fit: Fit, validity: str) -> tuple[list[DisplayedEquation],
         )
         shown.append(_displayed(titled, f"effect-{i}", validity))
     surface: Any = law.effects[0]
-    columns: dict[str, list[Any]] = {"term": list(surface.term_labels)}
+    columns: dict[str, Any] = {"term": list(surface.term_labels)}
     for name, values, errors in zip(law.specimens, effects.coefficients, effects.standard_errors, strict=True):
-        columns |= {f"{name} [N]": list(values), f"{name}, standard error [N]": list(errors)}
+        columns |= {name: TableColumn(values, "N"), f"{name}, standard error": TableColumn(errors, "N")}
     title = f"Specimen effects (standard deviation of the prior {format_number(effects.deviation)} N)"
     return shown, [Table("specimen-effects", title, columns)]
 
@@ -200,10 +168,10 @@ def _validity(ranges: Mapping[str, tuple[float, float]], arguments: tuple[str, .
 
 
 def _symbol_table(equation: LawEquation) -> Table:
-    columns: dict[str, list[Any]] = {
+    columns: dict[str, Any] = {
         "symbol": [each.name for each in equation.parameters],
-        "value (SI)": [each.value for each in equation.parameters],
-        "unit": [format_unit(each.unit) for each in equation.parameters],
+        "value": TableColumn([each.value for each in equation.parameters], BY_ROW),
+        "unit": [each.unit for each in equation.parameters],
         "meaning": [each.meaning for each in equation.parameters],
     }
     return Table("equation-symbols", "Symbols of the equation", columns)

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ...core.plotting import BLACK, BLUE, RED, legend_below, new_figure
-from ...report.chapter import Chapter, Plot, Table
-from ...report.formatting import MISSING, format_number, format_unit
+from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
 from ...report.formula import symbol_formula, to_mathtext
-from . import Bootstrap, Fit, ProfileLikelihood
+from . import Bootstrap, Fit, LengthError, ProfileLikelihood
+from .length_errors import PRIOR_STD
 
-MAX_ROWS = 40
-"""Maximum number of parameters in the figure."""
+MAX_ROWS, MAX_BRIEF = 40, 8
+"""Maximum numbers of parameters in the figure and in the brief view (chosen)."""
 NORMAL_QUANTILE = 1.96
 """Half width of a 95 % interval in standard deviations."""
-UNBOUNDED = "unbounded"
-"""End of an interval that the data do not limit."""
 MAX_FAILED_SHARE = 0.1
 """Fraction of failed refits above which the remaining ones are a biased selection (chosen)."""
 AXIS_LIMIT = 12.0
@@ -32,38 +32,13 @@ class Uncertainty:
     fit: Fit
     bootstrap: Bootstrap | None = None
     profiles: tuple[ProfileLikelihood, ...] = ()
+    none_weak: bool = False
+    """Whether profiles of the weakly determined parameters were requested and there are none."""
 
     @property
     def requested(self) -> bool:
-        """Whether there is a bootstrap or a profile."""
-        return self.bootstrap is not None or bool(self.profiles)
-
-    def lines(self) -> list[str]:
-        """Return the intervals as lines of text for a terminal."""
-        lines = [f"profile: {profile}" for profile in self.profiles]
-        if self.bootstrap is not None:
-            lines.append(_describe_bootstrap(self.bootstrap))
-            lines += [
-                f"  {e.name}: 95 % {format_number(low)} to {format_number(high)} {format_unit(e.unit)}".rstrip()
-                for e, (low, high) in zip(self.fit.estimates, self.bootstrap.intervals(), strict=True)
-            ]
-        return lines
-
-    def as_data(self) -> dict[str, Any]:
-        """Return the intervals as plain data, all SI."""
-        data: dict[str, Any] = {}
-        if self.profiles:
-            data["profiles"] = {p.name: {"low": p.low, "high": p.high, "level": p.level} for p in self.profiles}
-        if self.bootstrap is not None:
-            data["bootstrap"] = {
-                "refits": len(self.bootstrap.values),
-                "parts": self.bootstrap.group_count,
-                "lost": self.bootstrap.failed_refits,
-                "seed": self.bootstrap.seed,
-                "deviations": dict(zip(self.fit.names, self.bootstrap.standard_errors.tolist(), strict=True)),
-                "intervals": dict(zip(self.fit.names, self.bootstrap.intervals().tolist(), strict=True)),
-            }
-        return data
+        """Whether a bootstrap or a profile was requested."""
+        return self.bootstrap is not None or bool(self.profiles) or self.none_weak
 
 
 def _describe_bootstrap(bootstrap: Bootstrap) -> str:
@@ -81,19 +56,28 @@ def uncertainty_chapter(uncertainty: Uncertainty) -> Chapter:
         f"95 % intervals. Standard errors are estimated {uncertainty.fit.error_basis}. They hold for a law that is "
         "nearly linear in its parameters."
     ]
-    if uncertainty.bootstrap is not None:
-        sentences.append(f"{_describe_bootstrap(uncertainty.bootstrap).capitalize()}.")
+    values: tuple[NamedValue, ...] = ()
+    if (bootstrap := uncertainty.bootstrap) is not None:
+        sentences.insert(0, f"{_describe_bootstrap(bootstrap).capitalize()}.")
+        values = (
+            NamedValue("refits", len(bootstrap.values), brief=False),
+            NamedValue("resampled groups", bootstrap.group_count, brief=False),
+            NamedValue("failed refits", bootstrap.failed_refits, brief=False),
+            NamedValue("seed", bootstrap.seed, brief=False),
+        )
     if uncertainty.profiles:
         sentences.append(
             "A profile fixes one parameter and estimates all others again; an interval is unbounded where the data do "
             "not limit the parameter."
         )
     return Chapter(
-        paper="uncertainty",
+        name="uncertainty",
         title="Uncertainty of the parameters",
-        summary="\n\n".join(sentences),
+        summary=tuple(sentences),
+        values=values,
         tables=(_table(uncertainty),),
-        plots=(Plot("intervals", _CAPTION, _figure(uncertainty)),),
+        plots=(Plot("intervals", _CAPTION, partial(_figure, uncertainty)),),
+        notes=("no parameter is weakly determined; the standard errors are valid",) if uncertainty.none_weak else (),
     )
 
 
@@ -103,28 +87,40 @@ _CAPTION = "95 % intervals in units of the standard error; an arrow marks an int
 def _table(uncertainty: Uncertainty) -> Table:
     fit, estimates = uncertainty.fit, uncertainty.fit.estimates
     half = NORMAL_QUANTILE * fit.standard_errors
+    ends = list(zip((fit.values - half).tolist(), (fit.values + half).tolist(), strict=True))
     columns: dict[str, Any] = {
         "parameter": [e.name for e in estimates],
-        "value (SI)": [e.value for e in estimates],
-        "2.5 %, standard error": fit.values - half,
-        "97.5 %, standard error": fit.values + half,
+        "value": TableColumn([e.value for e in estimates], BY_ROW, brief=False),
+        "by standard error": TableColumn(ends, BY_ROW, brief=False),
     }
     if uncertainty.bootstrap is not None:
-        ends = uncertainty.bootstrap.intervals()
-        columns |= {"2.5 %, bootstrap": ends[:, 0], "97.5 %, bootstrap": ends[:, 1]}
+        columns["by bootstrap"] = TableColumn(list(map(tuple, uncertainty.bootstrap.intervals().tolist())), BY_ROW)
+        deviations = uncertainty.bootstrap.standard_errors
+        columns["standard error of bootstrap"] = TableColumn(deviations, BY_ROW, digits=3, brief=False)
     if uncertainty.profiles:
-        by_name = {profile.name: profile for profile in uncertainty.profiles}
-        columns["2.5 %, profile"] = [_interval_end(by_name.get(e.name), "low") for e in estimates]
-        columns["97.5 %, profile"] = [_interval_end(by_name.get(e.name), "high") for e in estimates]
-    columns["unit"] = ["" if e.unit == "1" else e.unit for e in estimates]
-    return Table("intervals", "95 % intervals", columns)
+        profiled = {profile.name: (float(profile.low), float(profile.high)) for profile in uncertainty.profiles}
+        columns["by profile"] = TableColumn([profiled.get(e.name) for e in estimates], BY_ROW)
+    columns["unit"] = [e.unit for e in estimates]
+    return Table("intervals", "95 % intervals", columns, brief=MAX_BRIEF)
 
 
-def _interval_end(profile: ProfileLikelihood | None, side: str) -> float | str:
-    if profile is None:
-        return MISSING
-    end = float(getattr(profile, side))
-    return end if np.isfinite(end) else UNBOUNDED
+def length_error_chapter(errors: Sequence[LengthError]) -> Chapter:
+    """Return the chapter of the estimated errors of recorded resting lengths."""
+    columns: dict[str, Any] = {
+        "specimen": [each.specimen for each in errors],
+        "resting length": TableColumn([each.resting_length for each in errors], "m", "mm"),
+        "offset": TableColumn([each.offset for each in errors], "m", "mm", digits=2),
+        "standard error": TableColumn([each.standard_error for each in errors], "m", "mm", digits=1),
+        "rms residual before": [each.rmse_before for each in errors],
+        "rms residual after": [each.rmse_after for each in errors],
+    }
+    return Chapter(
+        name="length-errors",
+        title="Errors of recorded resting lengths",
+        summary=f"As if {', or '.join(map(str, errors))}. Normal prior with a standard deviation of "
+        f"{PRIOR_STD * 1e3:g} mm (chosen).",
+        tables=(Table("resting-lengths", "Resting lengths", columns, "Residuals in SI units.", brief=len(errors)),),
+    )
 
 
 def _figure(uncertainty: Uncertainty) -> Any:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
+from ...core import plotting
 from ...core.arrays import Array
-from ...core.short_repr import ShortRepr
 from ...physics import Plant, PressureDriven, ProportionalRegulator, SecondOrderLag, Supply, Valve
+from ...report import Chapter, NamedValue, Plot, Table, TableColumn
+from ..reported import Reported
 from .episode_inspection import EpisodeInspection
 from .free_run import coverage, rms
 from .separation import ArmParameter
@@ -19,7 +22,7 @@ SUPPLY = 6e5
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class ArmFit(ShortRepr):
+class ArmFit(Reported):
     """An arm identified from the first episodes and judged on the last ones; `print` it.
 
     arm          the arm along measured pressures, with the identified parameters
@@ -82,19 +85,71 @@ class ArmFit(ShortRepr):
         )
         return Plant(self.arm.muscle, regulators, self.arm.mechanism)
 
-    def table(self) -> list[tuple[str, list[float]]]:
-        """Errors of the free run [deg] by joint, of the baselines and of the model, the skill, and the band's end."""
-        rows = [(name, np.degrees(rms(errors)).tolist()) for name, errors in self.by_baseline.items()]
-        rows += [("model", np.degrees(self.rms).tolist()), ("skill", self.skill.tolist())]
-        rows += [("band at the horizon, +- deg", np.degrees(self.band[-1]).tolist())]
-        return [*rows, ("share inside the band, %", (100 * self.coverage).tolist())]
+    def chapter(self) -> Chapter:
+        """The description of the fit: errors beside those of the baselines, skill, band, muscles and parameters."""
+        end, count = self.horizon[-1], len(np.unique(self.episode))
+        skill = ", ".join(f"joint {j}: {value:.2f}" for j, value in enumerate(self.skill, start=1))
+        caption = (
+            "Root mean square error against the horizon: the model, its baselines, and the 95 % band of the model "
+            "(shaded), which is the 95th percentile of the errors at each row."
+        )
+        return Chapter(
+            name="joint",
+            title="Identified arm",
+            summary=f"Angles are predicted from the state at the start of a window and from the pressures alone: free "
+            f"run over {end:.3g} s on {count} episodes left out, {len(self.errors)} windows. Skill, 1 - error/error of "
+            f"the best baseline: {skill}.",
+            values=(
+                NamedValue("horizon", float(end), "s", digits=3, brief=False),
+                NamedValue("windows", len(self.errors), brief=False),
+                NamedValue("delay in rows", self.inspection.delay, brief=False),
+            ),
+            tables=(self._error_table(), self._joint_table(), self._band_table(), self._parameter_table()),
+            plots=(Plot("horizon", caption, self._horizon_figure),),
+            notes=self.remarks,
+        )
 
-    def __str__(self) -> str:
-        joints = range(1, self.errors.shape[2] + 1)
-        count, end = len(np.unique(self.episode)), self.horizon[-1]
-        head = f"free run over {end:.3g} s on {count} episodes left out, {len(self.errors)} windows; rms [deg]"
-        width = max(len(name) for name, _ in self.table()) + 2
-        lines = [head, " " * width + "".join(f"{f'joint {j}':>10}" for j in joints)]
-        lines += [f"{name:<{width}}" + "".join(f"{v:>10.3g}" for v in values) for name, values in self.table()]
-        muscles = [f"joint {j}: {a} raises, {b} lowers" for j, (a, b) in enumerate(self.pairs, start=1)]
-        return "\n".join([*lines, "muscles: " + "; ".join(muscles), *(f"remark: {each}" for each in self.remarks)])
+    def _error_table(self) -> Table:
+        rows = {name: rms(errors) for name, errors in self.by_baseline.items()} | {"model": self.rms}
+        columns: dict[str, Any] = {"prediction by": list(rows)}
+        for j in range(self.errors.shape[2]):
+            columns[f"joint {j + 1}"] = TableColumn([values[j] for values in rows.values()], "rad", "deg", 3)
+        return Table("joint-errors", "Root mean square error of the free run", columns, brief=len(rows))
+
+    def _joint_table(self) -> Table:
+        count = len(self.pairs)
+        columns: dict[str, Any] = {
+            "joint": list(range(1, count + 1)),
+            "raised by muscle": [raising for raising, _ in self.pairs],
+            "lowered by muscle": [lowering for _, lowering in self.pairs],
+            "skill": TableColumn(self.skill, digits=3),
+            "best baseline": TableColumn(list(self.best_baseline), brief=False),
+            "95 % band at the horizon ±": TableColumn(self.band[-1], "rad", "deg", 3),
+            "share inside the band": TableColumn(self.coverage, "1", "%", 3, short="inside"),
+        }
+        return Table("joints", "Joints", columns, brief=count)
+
+    def _band_table(self) -> Table:
+        columns: dict[str, Any] = {"horizon": TableColumn(self.horizon, "s")}
+        columns |= {f"joint {j}": TableColumn(band, "rad", "deg") for j, band in enumerate(self.band.T, start=1)}
+        return Table("joint-band", "Half width of the 95 % band", columns, shown=False)
+
+    def _parameter_table(self) -> Table:
+        columns: dict[str, Any] = {
+            "parameter": [each.path for each in self.estimates],
+            "value [SI]": [each.value for each in self.estimates],
+            "standard error [SI]": [each.standard_error for each in self.estimates],
+        }
+        return Table("joint-parameters", "Identified parameters", columns, key="parameters")
+
+    def _horizon_figure(self) -> Any:
+        """Error of every joint against the horizon, one panel each."""
+        figure, panels = plotting.new_figure(1, self.errors.shape[2], squeeze=False)
+        for j, axes in enumerate(panels[0]):
+            for i, (name, errors) in enumerate([("model", self.errors), *self.by_baseline.items()]):
+                axes.plot(self.horizon, np.degrees(rms(errors, axis=(0,))[:, j]), color=plotting.LINES[i], label=name)
+            band = np.degrees(self.band[:, j])
+            axes.fill_between(self.horizon, 0.0, band, color=plotting.LINES[0], alpha=0.15, linewidth=0)
+            axes.set(title=f"joint {j + 1}", xlabel="horizon [s]", ylabel="error [deg]" if j == 0 else "")
+        panels[0][0].legend()
+        return figure

@@ -4,31 +4,30 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from ...core.reference import Reference, cite
-from ...report.chapter import Chapter, Table
+from ...core.units import conversion
+from ...report.chapter import Chapter, NamedValue, Table, TableColumn
 from ...report.write import write_report
 from .benchmark import REST_LIFE, REST_TASK, BenchmarkResult, Group
 from .learning import LearningCurve
 from .plots import benchmark_plots
-from .signals import BONE2019, RATED_STROKES, SETTLING_BAND, STEADY_TIME, TrackingMetrics
+from .signals import BONE2019, METRICS, RATED_STROKES, SETTLING_BAND, STEADY_TIME
 
-HEADERS = {
-    "rmse": "rms error [deg]",
-    "max_error": "maximum error [deg]",
-    "itae": "ITAE [deg s^2]",
-    "settling": "settling time [s]",
-    "overshoot": "overshoot [%]",
-    "steady": "steady-state error [deg]",
-    "air": "air [l/s (ANR)]",
-    "strokes": "valve strokes [1/s]",
-    "valve_life": "valve life [h]",
-    "stiffness_error": "stiffness error [%]",
-}
-"""Headers of the metrics, by the fields of TrackingMetrics."""
-Columns = dict[str, list[str] | list[float]]
+ANR = " (ANR)"
+"""End of the unit of a volume of air at the reference atmosphere of ISO 8778."""
+MAX_BRIEF, SHORT_CONTROLLERS = 16, 4
+"""Tasks and controllers of the table of errors in the brief view (chosen)."""
+
+
+def _column(metric: str, values: Sequence[float], **declared: Any) -> TableColumn:
+    """The column of a metric."""
+    _, unit, shown = METRICS[metric]
+    factor = 1.0 if unit == shown else conversion(shown.removesuffix(ANR), unit.removesuffix(ANR)).factor
+    return TableColumn([factor * value for value in values], unit, shown, **declared)
 
 
 def write_benchmark(result: BenchmarkResult, folder: Path | str, curves: Sequence[LearningCurve] = ()) -> Path:
@@ -44,12 +43,16 @@ def benchmark_chapter(result: BenchmarkResult, curves: Sequence[LearningCurve] =
     tables += [truth_table(result), metrics_table(result)]
     tables += [learning_table(curves)] if curves else []
     tables += [failures] if (failures := failure_table(result)) else []
+    learned = [f"learning: {each.errors[0]:.3g} degrees in trial 1, {each.errors[-1]:.3g} in trial {each.errors.size}"
+               for each in curves]  # fmt: skip
     return Chapter(
-        paper="benchmark",
+        name="benchmark",
         title=f"Control of an antagonistic joint with {result.joint.name}",
-        summary="\n\n".join(_summary(result)),
+        summary=tuple(_summary(result)),
+        values=(NamedValue("seeds", ", ".join(map(str, result.seeds)), brief=False),),
         tables=tuple(tables),
         plots=benchmark_plots(result, curves),
+        notes=tuple(learned),
         references=_references(result),
         chosen=_settings(result),
     )
@@ -75,14 +78,15 @@ def ranking_table(result: BenchmarkResult, group: Group) -> Table:
             "score": [each.median for each in scores.values()],
             "lowest": [each.low for each in scores.values()],
             "highest": [each.high for each in scores.values()],
-            "air, mean [l/s (ANR)]": [_mean(result, name, "air", group) for name in scores],
-            "strokes at rest [1/s]": [strokes for strokes, _ in rest.values()],
-            "valve life at rest [h]": [life for _, life in rest.values()],
-            "runs completed [%]": [_completed(result, name, group) for name in scores],
+            "air, mean": _column("air", [_mean(result, name, "air", group) for name in scores]),
+            "strokes at rest": _column("strokes", [strokes for strokes, _ in rest.values()]),
+            "valve life at rest": _column("valve_life", [life for _, life in rest.values()], short="life at rest"),
+            "runs completed": TableColumn([_completed(result, name, group) for name in scores], "1", "%", brief=False),
         },
         "Score: geometric mean over the tasks of the rms error, divided by the smallest of the group on the same "
         f"truth, times {REST_LIFE:g} h over the life of the busiest valve in the task '{REST_TASK}' where it is "
         f"shorter; 1 is the best in every task. {_spread_note(result)}",
+        brief=len(scores),
     )  # fmt: skip
 
 
@@ -91,8 +95,8 @@ def order_table(result: BenchmarkResult, group: Group) -> Table:
     ratios = result.ratios(group)
     names = list(result.scores(group))
     rows = {a: [int((ratios[a].max(axis=0) < ratios[b].min(axis=0)).sum()) for b in names] for a in names}
-    columns: Columns = {"better": list(names)}
-    columns |= {f"than {b}": [float(rows[a][j]) if a != b else math.nan for a in names] for j, b in enumerate(names)}
+    columns: dict[str, Any] = {"better": names}
+    columns |= {f"than {b}": [rows[a][j] if a != b else None for a in names] for j, b in enumerate(names)}
     return Table(
         f"order_{_key(group)}", f"Order, {group}", columns,
         f"Number of truths, of {len(result.truths)}, on which every search of a controller has a smaller score than "
@@ -102,14 +106,16 @@ def order_table(result: BenchmarkResult, group: Group) -> Table:
 
 def error_table(result: BenchmarkResult, metric: str, group: Group) -> Table:
     """The median of one metric of all contenders of a group, one row for each task."""
-    columns: Columns = {"task": [task.name for task in result.tasks]}
-    for name in result.contenders(group):
-        columns[name] = [result.metric(name, task.name, metric, group).median for task in result.tasks]
-    title = HEADERS[metric]
-    title = f"{title[0].upper()}{title[1:]}" if not title.startswith("rms") else f"RMS{title[3:]}"
+    columns: dict[str, Any] = {"task": [task.name for task in result.tasks]}
+    for i, name in enumerate(result.contenders(group)):
+        values = [result.metric(name, task.name, metric, group).median for task in result.tasks]
+        columns[name] = _column(metric, values, brief=i < SHORT_CONTROLLERS)
+    name = METRICS[metric][0]
+    title = f"RMS{name[3:]}" if name.startswith("rms") else name.capitalize()
     return Table(
         f"{metric}_{_key(group)}", f"{title}, {group}", columns,
         f"Median over searches and truths, from the beginning of the judged time of each task. {_spread_note(result)}",
+        brief=MAX_BRIEF,
     )  # fmt: skip
 
 
@@ -121,19 +127,19 @@ def search_table(result: BenchmarkResult) -> Table | None:
         return None
     searches = {name: [each.tuning for each in tuned if each.name == name and each.tuning] for name in names}
     best = {name: [tuning.objective for tuning in found] for name, found in searches.items()}
-    columns: Columns = {
+    columns: dict[str, Any] = {
         "controller": names,
-        "gains": [float(len(found[0].ranges)) for found in searches.values()],
-        "sets of gains": [max(float(len(each.history)) for each in found) for found in searches.values()],
+        "gains": [len(found[0].ranges) for found in searches.values()],
+        "sets of gains": [max(len(each.history) for each in found) for found in searches.values()],
         "converged": [f"{sum(each.converged for each in found)} of {len(found)}" for found in searches.values()],
-        "objective [deg]": [sorted(values)[len(values) // 2] for values in best.values()],
-        "spread [%]": [100.0 * (max(values) / min(values) - 1.0) for values in best.values()],
+        "objective": _column("rmse", [sorted(values)[len(values) // 2] for values in best.values()]),
+        "spread": TableColumn([max(values) / min(values) - 1.0 for values in best.values()], "1", "%"),
     }
     return Table(
         "searches", "Searches", columns,
-        f"For {len(result.joint.family)} models, none of which is a truth; seeds {_listed(result.seeds)}. Objective: "
-        f"{result.joint.objective}, median over the seeds; spread: largest over smallest. A search has converged where "
-        "its two best descents agree.",
+        f"For {len(result.joint.family)} models, none of which is a truth; seeds {', '.join(map(str, result.seeds))}. "
+        f"Objective: {result.joint.objective}, median over the seeds; spread: largest over smallest. A search has "
+        "converged where its two best descents agree.",
     )  # fmt: skip
 
 
@@ -159,7 +165,7 @@ def gains_table(result: BenchmarkResult) -> Table | None:
 def truth_table(result: BenchmarkResult) -> Table:
     """The truths."""
     truths = result.joint.truths
-    columns: Columns = {"truth": [truth.name for truth in truths]}
+    columns: dict[str, Any] = {"truth": [truth.name for truth in truths]}
     described = [result.joint.describe(truth) for truth in truths]
     columns |= {key: [each[key] for each in described] for key in described[0]}
     return Table("truths", "Truths", columns, "Flow, inertia, weight and offset relative to the model.")
@@ -168,16 +174,16 @@ def truth_table(result: BenchmarkResult) -> Table:
 def metrics_table(result: BenchmarkResult) -> Table:
     """All metrics, one row for each run."""
     keys = [(each, key) for each in result.results for key in each.runs]
-    columns: Columns = {
+    columns: dict[str, Any] = {
         "controller": [each.name for each, _ in keys],
-        "seed": [float(each.seed) for each, _ in keys],
+        "seed": [each.seed for each, _ in keys],
         "group": [str(key.group) for _, key in keys],
         "truth": [key.truth for _, key in keys],
         "task": [key.task for _, key in keys],
     }
-    for field in dataclasses.fields(TrackingMetrics):
-        found = (each.runs[key].metrics for each, key in keys)
-        columns[HEADERS[field.name]] = [math.nan if m is None else float(getattr(m, field.name)) for m in found]
+    found = [each.runs[key].metrics for each, key in keys]
+    for field, (title, _, _) in METRICS.items():
+        columns[title] = _column(field, [math.nan if m is None else float(getattr(m, field)) for m in found])
     return Table(
         "metrics", "All metrics", columns,
         f"Settling: until the error remains within {SETTLING_BAND:g} degrees. Steady-state error: mean of the last "
@@ -189,8 +195,8 @@ def metrics_table(result: BenchmarkResult) -> Table:
 
 def learning_table(curves: Sequence[LearningCurve]) -> Table:
     """The rms errors of repeated trials."""
-    columns: Columns = {"trial": [float(i + 1) for i in range(max(c.errors.size for c in curves))]}
-    columns |= {f"{curve.contender}, {curve.task.name} [deg]": curve.errors.tolist() for curve in curves}
+    columns: dict[str, Any] = {"trial": list(range(1, max(c.errors.size for c in curves) + 1))}
+    columns |= {f"{each.contender}, {each.task.name}": _column("rmse", each.errors.tolist()) for each in curves}
     return Table("learning", "Iterative learning", columns, "rms error of each trial; the first is without learning.")
 
 
@@ -238,7 +244,7 @@ def _completed(result: BenchmarkResult, name: str, group: Group) -> float:
         for key, run in each.runs.items()
         if key.group is group
     ]
-    return 100.0 * sum(runs) / len(runs)
+    return sum(runs) / len(runs)
 
 
 def _spread_note(result: BenchmarkResult) -> str:
@@ -246,16 +252,12 @@ def _spread_note(result: BenchmarkResult) -> str:
     return f"Over {searches} search{'es' if searches != 1 else ''} on {truths} truth{'s' if truths != 1 else ''}."
 
 
-def _listed(items: Iterable[object]) -> str:
-    return ", ".join(map(str, items))
-
-
 def _summary(result: BenchmarkResult) -> list[str]:
     joint = result.joint
-    names = dict.fromkeys(each.name for each in result.results)
+    number = len({each.name for each in result.results})
     best = (f"Smallest score, {group}: {next(iter(result.scores(group)))}." for group in result.groups)
     return [
-        f"{_counted(len(names), 'controller')}, {_counted(len(result.tasks), 'task')}, "
+        f"{_counted(number, 'controller')}, {_counted(len(result.tasks), 'task')}, "
         f"{_counted(len(joint.truths), 'truth')}. {' '.join(best)} Valves: {joint.valve}. Sampled every "
         f"{joint.sample_time * 1e3:g} ms.",
         "Every controller is tuned by the same optimiser, with at most the same number of sets of gains for each "

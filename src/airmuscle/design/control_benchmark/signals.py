@@ -174,6 +174,20 @@ STEADY_TIME = 0.3
 RATED_STROKES = 5e8
 """Strokes of a valve in its life (chosen; state that of the valve used)."""
 
+METRICS = {
+    "rmse": ("rms error", "rad", "deg"),
+    "max_error": ("maximum error", "rad", "deg"),
+    "itae": ("ITAE", "rad s^2", "deg s^2"),
+    "settling": ("settling time", "s", "s"),
+    "overshoot": ("overshoot", "1", "%"),
+    "steady": ("steady-state error", "rad", "deg"),
+    "air": ("air", "m3/s (ANR)", "l/s (ANR)"),
+    "strokes": ("valve strokes", "1/s", "1/s"),
+    "valve_life": ("valve life", "s", "h"),
+    "stiffness_error": ("stiffness error", "1", "%"),
+}
+"""Names, SI units and shown units of the metrics, by the fields of TrackingMetrics, which are in the shown units."""
+
 
 @dataclasses.dataclass(frozen=True)
 class TrackingMetrics:

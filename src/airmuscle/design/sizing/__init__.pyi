@@ -1,3 +1,4 @@
+from .chapter import sizing_chapter as sizing_chapter
 from .choice import SORT_KEYS as SORT_KEYS
 from .choice import MuscleChoice as MuscleChoice
 from .choice import MuscleDesign as MuscleDesign
@@ -19,9 +20,10 @@ from .search import SizingResult as SizingResult
 from .search import catalogue as catalogue
 from .search import choose as choose
 from .search import size_muscles as size_muscles
-from .sizing_chapter import choice_row as choice_row
 from .static_muscle import EndPoint as EndPoint
 from .static_muscle import StaticMuscle as StaticMuscle
 from .valve_sizing import air_path as air_path
+from .valve_sizing import discharge_time as discharge_time
 from .valve_sizing import discharge_valve as discharge_valve
+from .valve_sizing import fill_time as fill_time
 from .valve_sizing import fill_valve as fill_valve

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from typing import Any
 
-from ...core.errors import SolveError
+from ...core.errors import AirmuscleError, SolveError
 from ...core.units import STANDARD_GRAVITY
 from ...files.library.write import scenario_toml
 from ...physics.mechanism import AntagonisticJoint, HangingMass, Isotonic, Mechanism, SpringLoad
@@ -42,6 +43,30 @@ def scenario_text(choice: MuscleChoice) -> str:
     Raises SolveError for a choice without a geometry, or a joint with several muscles on each side.
     """
     return _lift_text(choice) if isinstance(choice.requirement, LiftRequirement) else _joint_text(choice)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class SizingScenario:
+    """The scenario of the first choice that can be simulated: choice, text, and a sentence on it; none without."""
+
+    choice: MuscleChoice | None
+    text: str
+    note: str
+
+
+def sizing_scenario(choices: Sequence[MuscleChoice], file: str) -> SizingScenario:
+    """The scenario of the first choice that has one; the sentence names `file`, or the reason why there is none."""
+    reasons = []
+    for rank, choice in enumerate(choices):
+        try:
+            text = scenario_text(choice)
+        except AirmuscleError as error:
+            reasons.append(str(error))
+            continue
+        size = f"{choice.total_count} x {choice.entry.name}, {1e3 * choice.length:.4g} mm"
+        note = f"The scenario of choice {rank + 1}, {size}, is {file}; run airmuscle simulate with it."
+        return SizingScenario(choice, text, note)
+    return SizingScenario(None, "", f"No scenario is written: {reasons[0]}" if reasons else "")
 
 
 def scenario_valves(choice: MuscleChoice | None) -> tuple[Valve, ...]:

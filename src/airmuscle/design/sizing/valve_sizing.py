@@ -8,12 +8,13 @@ Along the quasi-static path between the end points the pressure p balances the l
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 
 from ...core.arrays import Array
 from ...core.errors import SolveError
-from ...physics.pneumatics import Valve
+from ...physics.pneumatics import Orifice, Valve
 from ...physics.pneumatics.gas import Isothermal, absolute_pressure
 from .choice import MuscleChoice
 from .requirement import LiftRequirement
@@ -63,23 +64,34 @@ def air_path(choice: MuscleChoice) -> AirPath:
 
 def fill_valve(choice: MuscleChoice, duration: float) -> Valve:
     """Valve between the supply and one muscle that fills it in a time [s]. Raises SolveError."""
-    path, ambient = air_path(choice), choice.conditions.ambient
-    supply = absolute_pressure(choice.conditions.supply, ambient)
-    flow = Valve(TRIAL, CRITICAL_RATIO).mass_flow(supply, path.pressure, 1.0, ambient.temperature)
-    return _valve(choice, np.asarray(flow), path, duration)
+    return _valve(choice, fill_time(choice, Valve(TRIAL, CRITICAL_RATIO)), duration)
 
 
 def discharge_valve(choice: MuscleChoice, duration: float) -> Valve:
     """Valve between one muscle and the surroundings that discharges it in a time [s]. Raises SolveError."""
-    path, ambient = air_path(choice), choice.conditions.ambient
-    flow = Valve(TRIAL, CRITICAL_RATIO).mass_flow(path.pressure, ambient.pressure, 1.0, ambient.temperature)
-    return _valve(choice, np.asarray(flow), path, duration)
+    return _valve(choice, discharge_time(choice, Valve(TRIAL, CRITICAL_RATIO)), duration)
 
 
-def _valve(choice: MuscleChoice, flow: Array, path: AirPath, duration: float) -> Valve:
-    """The valve whose flow moves the air of the path in a time; `flow` is that of the trial conductance."""
+def fill_time(choice: MuscleChoice, orifice: Orifice, path: AirPath | None = None) -> float:
+    """Time [s] in which an open valve at the supply fills one muscle. Raises SolveError."""
+    path, ambient = path or air_path(choice), choice.conditions.ambient
+    supply = absolute_pressure(choice.conditions.supply, ambient)
+    return _time(orifice.mass_flow(supply, path.pressure, 1.0, ambient.temperature), path)
+
+
+def discharge_time(choice: MuscleChoice, orifice: Orifice, path: AirPath | None = None) -> float:
+    """Time [s] in which an open valve discharges one muscle into the surroundings. Raises SolveError."""
+    path, ambient = path or air_path(choice), choice.conditions.ambient
+    return _time(orifice.mass_flow(path.pressure, ambient.pressure, 1.0, ambient.temperature), path)
+
+
+def _time(flow: Any, path: AirPath) -> float:
     slowness = 1.0 / np.maximum(flow, 1e-300)
-    time = float(np.sum(0.5 * (slowness[1:] + slowness[:-1]) * np.diff(path.mass)))
+    return float(np.sum(0.5 * (slowness[1:] + slowness[:-1]) * np.diff(path.mass)))
+
+
+def _valve(choice: MuscleChoice, time: float, duration: float) -> Valve:
+    """The valve that moves the air in a duration; `time` is that of the trial conductance."""
     limit = 1e-5
     conductance = TRIAL * time / duration
     if not 0.0 < conductance <= limit:

@@ -16,17 +16,17 @@ from typing import Any
 
 import numpy as np
 
-from ...core.absolute_pressure import AbsolutePressure
+from ...core.absolute_pressure import AbsolutePressure, ambient_pressure
 from ...core.arrays import Array
 from ...core.declaration import parameters
 from ...core.errors import ParameterError, suggestion
 from ...core.tree import absolute_pressures, flatten, leaves, with_parameters
-from ...core.units import ABSOLUTE
+from ...core.units import ABSOLUTE, quantity
 from ...engine.loop.control_loop import ControlLoop
 from ...files.library.location import Location
 from ...files.library.models import model_class
 from ...files.scenario.controller import controller_number_paths
-from ...files.scenario.scenario import Scenario, build_scenario, initial_pressure, run_column_units
+from ...files.scenario.scenario import Scenario, build_scenario, initial_pressure, run_column_units, scenario_tables
 from ...physics.equilibrium import find_equilibrium_of_each
 
 Keys = tuple[str | int, ...]
@@ -118,6 +118,20 @@ class ScenarioTemplate:
         # the failure reason must be the same on every machine and therefore names the file without its folder
         location = dataclasses.replace(self.location, file=Path(self.location.file).name)
         return build_scenario(tables, location, with_parameters(scenario.plant, leaf_values), initial_state)
+
+
+def changed_scenario(path: str | Path, changes: Mapping[str, str]) -> Scenario:
+    """The scenario of a file or of a plant of the library with other numbers, by their paths: texts with a unit.
+
+    Raises ParameterError for a path that the scenario does not have, and others as `load_scenario`.
+    """
+    tables, location = scenario_tables(path)
+    template = ScenarioTemplate(tables, location, build_scenario(tables, location))
+    varied = [template.parameter(name, str(location)) for name in changes]
+    with ambient_pressure(template.scenario.plant.ambient.pressure):
+        values = [quantity(changes[each.path], each.unit, where=each.path) for each in varied]
+    made = template.with_values(varied, values)
+    return dataclasses.replace(made, title=f"{made.title}; {', '.join(f'{k} = {v}' for k, v in changes.items())}")
 
 
 def _input_parameters(table: Mapping[str, Any], scenario: Scenario) -> Iterator[tuple[Keys, str]]:

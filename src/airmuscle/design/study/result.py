@@ -12,10 +12,13 @@ import numpy.typing as npt
 from ...core.arrays import Array
 from ...core.errors import ColumnError, suggestion
 from ...core.short_repr import ShortRepr
-from ...report.chapter import Table
+from ...report.chapter import BY_ROW, Table, TableColumn
 from .design import Saltelli
 from .sensitivity import SobolIndices, sobol_indices
 from .study import Study
+
+BRIEF, MAX_BRIEF = ("mean", "standard deviation", "5 %", "95 %"), 8
+"""Statistics and number of metrics in the brief view (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -60,23 +63,24 @@ class StudyResult(ShortRepr):
         runs: list[Any] = list(range(len(study)))
         reasons = list(self.failure_reasons)
         columns: dict[str, Any] = {"run": runs, **inputs, **metrics, "status": status, "reason": reasons}
-        return Table("results", "All runs", columns, shown=False)
+        return Table("results", "All runs", columns, series=True)
 
     def statistics(self) -> Table:
         """The nominal value and the statistics over all runs of each scalar metric."""
-        rows = [_statistics(self[name]) for name in self.study.scalars]
+        names = list(self.study.scalars)
+        rows = [_statistics(self[name]) for name in names]
+        columns: dict[str, Any] = {
+            "metric": names,
+            "nominal": TableColumn([self.nominal[name] for name in names], BY_ROW),
+            "runs": TableColumn([row.pop("runs") for row in rows], brief=False),
+            **{
+                key: TableColumn([row[key] for row in rows], BY_ROW, brief=key in BRIEF)
+                for key in (rows[0] if rows else ())
+            },
+            "unit": [self.study.units[name] for name in names],
+        }
         return Table(
-            "statistics",
-            "Metrics",
-            {
-                "metric": list(self.study.scalars),
-                "unit": [self.study.units[name] for name in self.study.scalars],
-                "nominal": [self.nominal[name] for name in self.study.scalars],
-                **{key: [row[key] for row in rows] for key in rows[0]},
-            }
-            if rows
-            else {},
-            "Statistics over all runs that have the metric.",
+            "statistics", "Metrics", columns, "Statistics over all runs that have the metric.", brief=MAX_BRIEF
         )
 
     def indices(self) -> dict[str, SobolIndices]:
@@ -87,7 +91,7 @@ class StudyResult(ShortRepr):
         return {name: sobol_indices(self[name], len(self.study.parameters), design.seed) for name in self.study.scalars}
 
 
-def _statistics(values: Array) -> dict[str, float]:
+def _statistics(values: Array) -> dict[str, Any]:
     finite = values[np.isfinite(values)]
     names = ("min", "5 %", "median", "95 %", "max")
     quantiles = np.quantile(finite, [0.0, 0.05, 0.5, 0.95, 1.0]) if finite.size else np.full(5, np.nan)

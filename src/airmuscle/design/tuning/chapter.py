@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from ...engine.loop.control_loop import SETPOINT, ControlLoop
 from ...engine.run import simulate
 from ...engine.run.integrators import Integrator
 from ...recording import Recording
-from ...report.chapter import Chapter, Plot, Table
+from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
 from .case import loop_with_gains
 from .result import Tuning
 from .rules import RuleSettings
@@ -24,6 +25,8 @@ DISPLAY = {"Pa": (1e-5, "bar"), "m": (1e3, "mm"), "rad": (180 / np.pi, "deg")}
 """Factor and unit in which the controlled column is displayed."""
 COSTS = {"air": (1e3, "mean air drawn [g/s]"), "travel": (1.0, "mean travel [strokes/s]")}
 """Factor and axis label of the metrics that are compared with the error."""
+MAX_BRIEF = 10
+"""Rows of the brief view (chosen)."""
 
 
 def convergence_figure(tuning: Tuning) -> Any:
@@ -105,25 +108,32 @@ def tuning_chapter(
     """
     column, unit = next(iter(tuning.scales)), _error_unit(tuning, units)
     runs = _runs(tuning, integrator)
-    plots = [
-        Plot(
-            "convergence", "Objective over the budget; a failed set of gains is not drawn.", convergence_figure(tuning)
-        )
-    ]
+    caption = "Objective over the budget; a failed set of gains is not drawn."
+    plots = [Plot("convergence", caption, partial(convergence_figure, tuning))]
     caption = (
         "Mean tracking index over the cases against mean air drawn and travel of the commands, with the Pareto fronts."
     )
-    plots.append(Plot("pareto", caption, pareto_figure(tuning, tuning.index.unit(unit))))
+    plots.append(Plot("pareto", caption, partial(pareto_figure, tuning, tuning.index.unit(unit))))
     if runs:
-        plots.append(
-            Plot("response", "Nominal case with present and tuned gains.", response_figure(runs, column, unit))
-        )
+        caption = "Nominal case with present and tuned gains."
+        plots.append(Plot("response", caption, partial(response_figure, runs, column, unit)))
+    bound = [f"'{path}' is on a bound of its range; a wider range may give a smaller objective"
+             for path in tuning.on_bound]  # fmt: skip
     return Chapter(
-        paper="tuning",
+        name="tuning",
         title=title,
-        summary="\n\n".join([_summary(tuning), *(f"{note[:1].upper()}{note[1:]}." for note in notes)]),
+        summary=_summary(tuning),
+        values=(
+            NamedValue("objective", tuning.objective, brief=False),
+            NamedValue("objective with the present gains", tuning.present_objective, brief=False),
+            NamedValue("simulated loops", tuning.simulated_loops, brief=False),
+            NamedValue("sets of gains", len(tuning.history), brief=False),
+            NamedValue("seed", tuning.seed, brief=False),
+            NamedValue("interrupted", tuning.interrupted, brief=False),
+        ),
         tables=(gain_table(tuning, units), case_table(tuning, units), *([rule_table(rules)] if rules else [])),
         plots=tuple(plots),
+        notes=(*notes, *bound),
         references=(*tuning.references, *cite(tuple(rules))),
         chosen=_settings(tuning),
     )
@@ -145,14 +155,12 @@ def _runs(tuning: Tuning, integrator: Integrator | None) -> dict[str, Recording]
 
 
 def _summary(tuning: Tuning) -> str:
-    present, bound = tuning.present_objective, tuning.on_bound
+    present = tuning.present_objective
     before = "" if present is None else f"; with the present gains it is {present:.4g}"
     parts = [
         f"{tuning.simulated_loops} loops were simulated: {len(tuning.history)} sets of gains in "
         f"{len(tuning.cases)} cases. The objective is {tuning.objective:.4g}{before}."
     ]
-    if bound:
-        parts.append(f"On a bound of its range: {', '.join(bound)}; a wider range may give a smaller objective.")
     failed = int(np.count_nonzero(~np.isfinite(tuning.history.objective)))
     if failed:
         parts.append(f"{failed} sets of gains failed in at least one case.")
@@ -162,17 +170,17 @@ def _summary(tuning: Tuning) -> str:
 
 
 def gain_table(tuning: Tuning, units: Mapping[str, str]) -> Table:
-    """The gains before and after, with their ranges [SI]."""
+    """The gains before and after, with their ranges."""
     present = {leaf.path: leaf.value for leaf in leaves(tuning.cases[0].controller)}
     columns: dict[str, Any] = {
         "gain": [each.path for each in tuning.ranges],
+        "minimum": TableColumn([each.low for each in tuning.ranges], BY_ROW),
+        "maximum": TableColumn([each.high for each in tuning.ranges], BY_ROW),
+        "present": TableColumn([present[each.path] for each in tuning.ranges], BY_ROW),
+        "tuned": TableColumn([tuning.gains[each.path] for each in tuning.ranges], BY_ROW),
         "unit": [units.get(each.path, "") for each in tuning.ranges],
-        "minimum": [each.low for each in tuning.ranges],
-        "maximum": [each.high for each in tuning.ranges],
-        "present": [present[each.path] for each in tuning.ranges],
-        "tuned": [tuning.gains[each.path] for each in tuning.ranges],
     }
-    return Table("gains", "Gains", columns, "Values in SI units.")
+    return Table("gains", "Gains", columns, brief=MAX_BRIEF)
 
 
 def _error_unit(tuning: Tuning, units: Mapping[str, str]) -> str:
@@ -186,15 +194,14 @@ def case_table(tuning: Tuning, units: Mapping[str, str]) -> Table:
     units  of the columns of the plant by name
     """
     unit = tuning.index.unit(_error_unit(tuning, units))
-    shown = "" if unit == "1" else f" [{unit}]"
     metrics, best = tuning.history.metrics, tuning.best
     columns: dict[str, Any] = {"case": [case.name for case in tuning.cases]}
     if tuning.start:
-        columns[f"index, present gains{shown}"] = metrics.index[0].tolist()
-    columns[f"index, tuned gains{shown}"] = metrics.index[best].tolist()
-    columns["air drawn [g/s]"] = (1e3 * metrics.air[best]).tolist()
-    columns["travel [strokes/s]"] = metrics.travel[best].tolist()
-    return Table("cases", "Cases", columns, f"Index: {type(tuning.index).__name__}.")
+        columns["index, present gains"] = TableColumn(metrics.index[0], unit)
+    columns["index, tuned gains"] = TableColumn(metrics.index[best], unit)
+    columns["air drawn"] = TableColumn(metrics.air[best], "kg/s", "g/s")
+    columns["travel"] = TableColumn(metrics.travel[best], "strokes/s")
+    return Table("cases", "Cases", columns, f"Index: {type(tuning.index).__name__}.", brief=MAX_BRIEF)
 
 
 def history_table(tuning: Tuning) -> Table:
@@ -204,7 +211,7 @@ def history_table(tuning: Tuning) -> Table:
     columns |= {path: history.gains[:, i] for i, path in enumerate(history.paths)}
     columns["objective"] = history.objective
     columns |= {f"mean {name}": history.means(name) for name in ("index", "air", "travel")}
-    return Table("history", "Sets of gains", columns, shown=False)
+    return Table("history", "Sets of gains", columns, series=True)
 
 
 def rule_table(rules: Sequence[RuleSettings]) -> Table:
@@ -212,11 +219,12 @@ def rule_table(rules: Sequence[RuleSettings]) -> Table:
     columns: dict[str, Any] = {
         "rule": [each.rule for each in rules],
         "gain": [each.gain for each in rules],
-        "integral time [s]": [each.integral_time for each in rules],
-        "derivative time [s]": [each.derivative_time for each in rules],
+        "integral time": TableColumn([each.integral_time for each in rules], "s"),
+        "derivative time": TableColumn([each.derivative_time for each in rules], "s"),
         "set-point weight": [each.setpoint_weight for each in rules],
     }
-    return Table("rules", "Settings of tuning rules, among the starts", columns, "The gain is in SI units.")
+    title = "Settings of tuning rules, among the starts"
+    return Table("rules", title, columns, "The gain is in SI units.", brief=len(rules))
 
 
 def _settings(tuning: Tuning) -> tuple[tuple[str, str, str], ...]:

@@ -16,7 +16,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar
 
 from ...core.annotation import check_field_types, one_line
@@ -32,8 +32,10 @@ from ...physics.muscle.geometry.base import Geometry
 from ...physics.plant.plant import Plant
 from ...physics.pneumatics.gas import REFERENCE_DENSITY, REFERENCE_TEMPERATURE
 from ...physics.pneumatics.valve import Orifice
+from ...report.chapter import Table
 from .entry_display import EntryDisplay
 from .fields import under
+from .files import entries_of_product
 from .stated_band import StatedBand
 from .uncertainty import ParameterUncertainty
 
@@ -213,8 +215,17 @@ class ProductEntry(EntryDisplay):
     warning: str = ""
     references: tuple[Reference, ...] = dataclasses.field(default=(), metadata=under("reference"))
 
-    def _table(self) -> list[tuple[str, ...]]:
-        return [("permitted", "range"), *((row.quantity, str(row)) for row in self.ratings.ranges())]
+    def _tables(self) -> Iterator[Table]:
+        """The permitted ranges, and the muscles and laws that were measured on the product."""
+        rows = list(self.ratings.ranges())
+        columns = {"permitted": [row.quantity for row in rows], "range": list(map(str, rows))}
+        yield Table("permitted", "Permitted ranges", columns)
+        laws = entries_of_product(self.name)
+        yield Table("laws", "Muscles and laws of this product", {"law": list(laws)}, brief=len(laws))
+
+    def _remarks(self) -> Iterator[str]:
+        if not entries_of_product(self.name):
+            yield "No law of it is published; fit one to measurements."
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -233,9 +244,6 @@ class PlantEntry(EntryDisplay):
     warning: str = ""
     sources: tuple[tuple[str, str], ...] = ()
     references: tuple[Reference, ...] = dataclasses.field(default=(), metadata=under("reference"))
-
-    def _table(self) -> list[tuple[str, ...]]:
-        return [tuple(row) for row in self.plant._card().table]
 
     def _chart(self) -> Any:
         return self.plant._card().draw

@@ -1,32 +1,46 @@
-"""Display of library entries in a notebook: title, provenance, chart, parameters and references."""
+"""Description of library entries: provenance, components, parameters, checks, chart and references."""
 
 from __future__ import annotations
 
 import abc
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
+from ...bench.reported import Reported
 from ...core.annotation import check_field_types, one_line
 from ...core.errors import ParameterError, suggestion
 from ...core.plotting import LINES, new_figure, relabel_in_display_units
 from ...core.reference import cite
-from ...physics.muscle.display import PARAMETERS, parameter_rows, plot_isobars
-from ...recording.notebook import Card, NotebookDisplay
+from ...core.tree import leaves
+from ...physics.muscle import Ratings
+from ...physics.muscle.display import plot_isobars
+from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
+from ...report.parameters import leaf_table
 
-PARTS = ("characteristic", "geometry", "spring", "damper", "friction", "wall", "series", "stop", "creep", "valve",
-         "exhaust", "switching_times")  # fmt: skip
-"""Components of an entry whose parameters are shown."""
 PROVENANCES = (
     "printed", "corrected", "converted", "measured", "data sheet", "secondary source", "fitted", "chosen", "example",
 )  # fmt: skip
 """Words for the origin of the numbers of an entry."""
+PARTS = (
+    "characteristic", "geometry", "spring", "damper", "friction", "wall", "series", "stop", "creep", "ratings",
+    "validity_range", "valve", "exhaust", "switching_times", "plant",
+)  # fmt: skip
+"""Components of an entry, in the order in which they are described."""
+CHECK_UNITS = {
+    "pressure": ("Pa", "kPa"), "contraction": ("1", "%"), "force": ("N", "N"), "upstream": ("Pa", "kPa"),
+    "downstream": ("Pa", "kPa"),
+}  # fmt: skip
+"""Conditions of a check: their unit, and the one in which they are shown; the last two are absolute."""
+SHOWN_UNITS = {"Pa": "kPa", "1": "%", "m3": "cm3", "m3/s": "l/min"}
+"""Units in which published values are shown."""
 FLOW_SUPPLY = 7e5
 """Absolute pressure [Pa] upstream of a valve in its chart (chosen)."""
 
 
-class EntryDisplay(NotebookDisplay, abc.ABC):
-    """Base of the library entries: the check of their fields, and their display."""
+class EntryDisplay(Reported, abc.ABC):
+    """Base of the library entries: the check of their fields, and their description."""
 
     def __post_init__(self) -> None:
         check_field_types(self)
@@ -37,21 +51,61 @@ class EntryDisplay(NotebookDisplay, abc.ABC):
                     f"{suggestion(word, PROVENANCES)}"
                 )
 
-    def _card(self) -> Card:
+    def chapter(self) -> Chapter:
+        """The description of the entry."""
         entry: Any = self
-        parts = {name: getattr(entry, name) for name in PARTS if getattr(entry, name, None) is not None}
-        if parts.get("geometry") is not None and parts["geometry"] == getattr(
-            parts.get("characteristic"), "geometry", None
-        ):
-            del parts["geometry"]  # its parameters are those of the law
-        notes = [f"provenance: {entry.provenance}", *(text for text in (entry.note, entry.warning) if text)]
-        notes += [str(reference) for reference in cite(entry)]
-        table = [PARAMETERS, *parameter_rows(parts)] if parts else self._table()
-        return Card(f"{entry.name}: {entry.title}", table, self._chart(), notes)
+        parts = {name: part for name in PARTS if (part := getattr(entry, name, None)) is not None}
+        law_geometry = getattr(parts.get("characteristic"), "geometry", None)
+        rows = [
+            (f"{name}.{leaf.path}", leaf)
+            for name, model in parts.items()
+            if name != "geometry" or model != law_geometry  # its parameters are those of the law
+            for leaf in leaves(model)
+            if not isinstance(model, Ratings) or leaf.declared.name in model.stated
+        ]
+        models = {name: type(model).__name__ for name, model in parts.items()}
+        tables = [
+            Table("components", "Components", {"component": list(models), "model": list(models.values())}, shown=False),
+            leaf_table(rows, "parameters", "Parameters", bounds=True, brief=True),
+            *self._tables(),
+        ]
+        chart = self._chart()
+        return Chapter(
+            name="entry",
+            title=f"{entry.name}: {entry.title}",
+            summary=f"Provenance: {entry.provenance}. Components: {', '.join(map(' '.join, models.items()))}.",
+            values=(
+                NamedValue("name", entry.name, brief=False),
+                NamedValue("provenance", entry.provenance, brief=False),
+            ),
+            tables=tuple(table for table in tables if len(table)),
+            plots=() if chart is None else (Plot("entry", entry.title, chart),),
+            problems=(entry.warning,) if entry.warning else (),
+            notes=tuple(filter(None, (entry.note, *self._remarks()))),
+            references=tuple(cite(entry)),
+        )
 
-    def _table(self) -> list[tuple[str, ...]]:
-        """The table of an entry without parameters of components."""
-        return []
+    def _tables(self) -> Iterator[Table]:
+        """Checks, and the sources of single numbers."""
+        checks, sources = getattr(self, "checks", ()), dict(getattr(self, "sources", ()))
+        at = {name: [dict(check.conditions).get(name) for check in checks] for name in CHECK_UNITS}
+        units = [check.units_of_table({"quantity": check.quantity})["equals"] for check in checks]
+        columns: dict[str, Any] = {
+            "checked quantity": TableColumn([check.quantity for check in checks], short="check"),
+            **{f"at {name}": TableColumn(values, CHECK_UNITS[name][0], CHECK_UNITS[name][1])
+               for name, values in at.items() if any(value is not None for value in values)},
+            "published value": TableColumn([check.equals for check in checks], BY_ROW, short="published"),
+            "tolerance": TableColumn([check.tolerance for check in checks], BY_ROW),
+            "unit": TableColumn(units, shown=[SHOWN_UNITS.get(unit, unit) for unit in units]),
+            "source": [check.source for check in checks],
+        }  # fmt: skip
+        yield Table("checks", "Checks", columns, brief=len(checks))
+        columns = {"numbers": list(sources), "source": list(sources.values())}
+        yield Table("sources", "Sources", columns, brief=len(sources))
+
+    def _remarks(self) -> Iterator[str]:
+        """Remarks besides the note of the entry."""
+        return iter(())
 
     def _chart(self) -> Any:
         """Function that draws the chart, or None: the isobars of a law, the flow of a valve."""

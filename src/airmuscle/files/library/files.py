@@ -54,7 +54,12 @@ def list_products() -> tuple[str, ...]:
 
 def entries_of_product(name: str) -> tuple[str, ...]:
     """Names of the muscles and laws of the library that were measured on a product, sorted."""
-    return tuple(law for law in list_laws() if read_toml(LAWS / f"{law}.toml").get("product") == name)
+    return tuple(law for law, product in products_of_laws().items() if product == name)
+
+
+def products_of_laws() -> dict[str, str]:
+    """The product on which each muscle or law of the library was measured, by its name; empty where none is stated."""
+    return {law: str(read_toml(LAWS / f"{law}.toml").get("product", "")) for law in list_laws()}
 
 
 def list_data() -> tuple[str, ...]:

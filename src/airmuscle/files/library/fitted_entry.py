@@ -17,6 +17,7 @@ from ...core.errors import printable
 from ...core.reference import cite
 from ...physics.muscle.geometry import Geometry
 from ...recording import Recording
+from ...report.shown import value_text
 from .entry import MISSING_GEOMETRY, Entry
 from .stated_band import StatedBand
 
@@ -34,9 +35,9 @@ def fitted_entry(
     recordings   of the fit, whose specimens, resting lengths and rates the band holds for
     errors       of specimens left out of the fit, for the band of a specimen that was not measured
     """
-    summary = dict(result.summary())
+    texts = {quantity.name: value_text(quantity) for quantity in result.goodness()}
     names = list_files([f.name for f in files])
-    note = f"Fitted to {names}: rms error {summary['rms error']}, maximum error {summary['maximum error']}."
+    note = f"Fitted to {names}: rms error {texts['rms error']}, maximum error {texts['maximum error']}."
     geometry = fitted_geometry(initial, result.model)
     title = f"{type(result.model).__name__} fitted to {list_files([f.stem for f in files])}"
     entry = dataclasses.replace(

@@ -13,7 +13,7 @@ from ...engine.loop.controller import relative_unit
 from ...engine.loop.piecewise_linear import PiecewiseLinear
 from ...recording import Recording
 from ...recording.display_units import display_scale
-from ...report.chapter import Plot, Table
+from ...report.chapter import Plot, Table, TableColumn
 from ...report.parameters import parameter_table
 from .scenario import Scenario, run_column_units
 
@@ -57,5 +57,4 @@ def controller_table(scenario: Scenario, loop: ControlLoop) -> Table:
         loop.controller, "controller", f"Parameters of the controller, {type(loop.controller).__name__}"
     )
     resolved = [relative_unit(str(unit), y, u) for unit in table.columns["unit"]]
-    display_units: list[Any] = ["" if unit == "1" else unit for unit in resolved]
-    return dataclasses.replace(table, columns={**table.columns, "unit": display_units})
+    return dataclasses.replace(table, columns={**table.columns, "unit": TableColumn(resolved)})

@@ -143,13 +143,18 @@ def load_scenario(path: str | Path) -> Scenario:
     A file of this name takes precedence. Raises FileError, ParameterError, UnitError or UnknownNameError with the
     location.
     """
+    return build_scenario(*scenario_tables(path))
+
+
+def scenario_tables(path: str | Path) -> tuple[Mapping[str, Any], Location]:
+    """The tables of a scenario with their location. Raises as `load_scenario`."""
     file = Path(path)
     if str(path) in list_plants() and not is_path(str(path)) and not file.exists():
         tables, location = plant_tables(str(path))
-        return build_scenario({key: tables[key] for key in TABLES if key in tables}, location)
+        return {key: tables[key] for key in TABLES if key in tables}, location
     if not is_path(str(path)) and not file.exists():
         raise FileError(f"{path}: there is no such file, and no such plant; plants are {', '.join(list_plants())}.")
-    return build_scenario(read_toml(file), Location.of_file(file))
+    return read_toml(file), Location.of_file(file)
 
 
 def build_scenario(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
+from typing import Any
 
 from ...core.plotting import BLACK, BLUE, legend_below, new_figure
 from ...core.reference import cite
@@ -10,14 +12,17 @@ from ...engine.loop import InputSignal, Periodic, SampledSignal, Schedule
 from ...engine.loop.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop
 from ...engine.loop.driver import WithDrivers
 from ...recording import Recording
-from ...report.chapter import Chapter, Plot
+from ...recording.columns import quantity_of
+from ...report.chapter import BY_ROW, Chapter, Plot, Table, TableColumn
 from ...report.formatting import format_number, typographic
 from ...report.parameters import parameter_table
 from .control_loop_plot import controller_table, loop_plot, segment_vertices
-from .scenario import Scenario
+from .scenario import Scenario, run_column_units
 
 PLOTTED = ("pressure", "contraction", "force", "friction", "position", "angle", "speed", "angular_speed")
 """Quantities plotted, in this order; the recording contains all."""
+MAX_BRIEF = 16
+"""Columns of the brief view (chosen)."""
 MAX_DRIVER_SEGMENTS = 300
 """Segments of an input with drivers that a figure resolves; of a longer input only the beginning is plotted."""
 MAX_SEGMENTS = 50_000
@@ -28,28 +33,40 @@ MAX_LISTED_CHANGES = 6
 
 def run_chapter(scenario: Scenario, recording: Recording) -> Chapter:
     """Return the chapter of a run, complete or up to its early end."""
-    notes = "\n\n".join(_sentence(note) for note in recording.notes)
     loop = scenario.problem.input if isinstance(scenario.problem.input, ControlLoop) else None
-    plots = [loop_plot(scenario, loop, recording)] if loop else []
-    plots.append(Plot("run", f"{scenario.title}: simulated time series.", recording.plot(*_plotted_columns(recording))))
+    caption, columns = f"{scenario.title}: simulated time series.", _plotted_columns(recording)
+    plots = [Plot("run", caption, partial(recording.plot, *columns))]
+    if loop is not None:
+        plots.insert(0, loop_plot(scenario, loop, recording))
     if scenario.plant.inputs:
         plots.append(_input_plot(scenario, recording))
     return Chapter(
-        paper="simulation",
+        name="simulation",
         title=scenario.title,
-        summary=f"{_describe_duration(scenario, recording)} All columns are in recording.csv.\n\n{notes}",
+        summary=f"{_describe_duration(scenario, recording)} {len(recording)} rows; all columns are in recording.csv.",
         plots=tuple(plots),
         tables=(
+            _range_table(scenario, recording),
             parameter_table(scenario.plant, "parameters", "Parameters of the plant"),
             *((controller_table(scenario, loop),) if loop else ()),
         ),
+        notes=recording.notes,
         references=tuple(cite((scenario.plant, loop))),
         chosen=_settings(scenario),
     )
 
 
-def _sentence(note: str) -> str:
-    return f"{note[:1].upper()}{note[1:].rstrip('.')}."
+def _range_table(scenario: Scenario, recording: Recording) -> Table:
+    """Return the minimum, maximum and last value of each column."""
+    names, units = list(recording), run_column_units(scenario.problem)
+    columns: dict[str, Any] = {
+        "column": names,
+        "min": TableColumn([float(recording[name].min()) for name in names], BY_ROW),
+        "max": TableColumn([float(recording[name].max()) for name in names], BY_ROW),
+        "last": TableColumn([float(recording[name][-1]) for name in names], BY_ROW),
+        "unit": [units.get(name) or getattr(quantity_of(name), "unit", "") for name in names],
+    }
+    return Table("ranges", "Columns", columns, brief=MAX_BRIEF)
 
 
 def _describe_duration(scenario: Scenario, recording: Recording) -> str:

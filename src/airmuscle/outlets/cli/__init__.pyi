@@ -7,7 +7,6 @@ from .completion import complete_data as complete_data
 from .completion import complete_entry as complete_entry
 from .completion import complete_plant as complete_plant
 from .entry_point import main as main
-from .fit_options import parse_split as parse_split
 from .interruption import check_interrupted as check_interrupted
 from .interruption import deferred_sigint as deferred_sigint
 from .option_hints import INSTRUCTIONS as INSTRUCTIONS

@@ -15,9 +15,9 @@ from ...core.errors import ParameterError
 from ...files.library.catalogue import load_data
 from ...recording import Recording
 from ...recording.row_notes import row_notes
+from ..requests.reading import ReadingRequest
 from .completion import complete_data
 from .progress import reading_progress
-from .reading_options import ReadingOptions
 from .terminal import echo
 
 Files = Annotated[
@@ -38,7 +38,7 @@ def print_row_notes(recordings: Iterable[Recording]) -> None:
         echo(f"note: {note}", err=True)
 
 
-def read_recordings(files: list[Path], reading: ReadingOptions) -> list[Recording]:
+def read_recordings(files: list[Path], reading: ReadingRequest) -> list[Recording]:
     """The recordings of the files, read together so that their units can be compared, then library data sets.
 
     A name without suffix and folder that is not in the working directory is a data set of the library. Raises

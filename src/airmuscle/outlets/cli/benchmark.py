@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import enum
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -25,15 +24,13 @@ from ...design.control_benchmark import (
     standard_contenders,
 )
 from ...design.control_benchmark.benchmark import COMMISSIONING_RUNS
-from ...design.control_benchmark.chapter import error_table, ranking_table, write_benchmark
+from ...design.control_benchmark.chapter import benchmark_chapter
 from ...design.control_benchmark.tasks import find_tasks
 from ...design.control_benchmark.truths import TRUTH_SEEDS
 from ...files.library.files import is_path
-from ...report.chapter import Table
-from ...report.formatting import format_number, table_rows
+from .delivery import deliver
 from .interruption import check_interrupted
 from .options import Folder, Json
-from .terminal import echo, print_json, print_table
 
 DEFAULT_BUDGET = 60
 """Sets of gains for each gain (chosen)."""
@@ -108,20 +105,10 @@ def benchmark(
             commissioning_runs=runs, progress=show,
         )  # fmt: skip
     curves = _learned(result, trials, seed) if trials else []
-    page = write_benchmark(result, out, curves)
-    if json:
-        print_json(_to_dict(result, curves))
-    else:
-        for group in result.groups:
-            _print(ranking_table(result, group), titled=True)
-            _print(error_table(result, "rmse", group), titled=True)
+    deliver("benchmark", [benchmark_chapter(result, curves)], json=json, out=out, title="Control benchmark")
     found = [run for each in result.results for run in each.runs.values()]
     if not any(run.metrics for run in found):
         raise SimulationError(f"all runs failed; reason of the first: {found[0].reason}")
-    if not json:
-        for curve in curves:
-            echo(f"learning: {curve.errors[0]:.3g} degrees in trial 1, {curve.errors[-1]:.3g} in trial {trials}")
-        echo(f"report: {page}")
 
 
 def _contenders(joint: BenchmarkJoint, names: list[str]) -> tuple[Contender, ...]:
@@ -156,36 +143,3 @@ def _progress() -> Iterator[Callable[[str, int, int], None]]:
             display.update(bar, description=step, completed=done, total=total)
 
         yield show
-
-
-def _print(table: Table, titled: bool = False) -> None:
-    if titled:
-        echo(f"\n{table.title}")
-    rows = [tuple(v if isinstance(v, str) else format_number(v) for v in row) for row in table_rows(table)]
-    numeric = [header.strip() for header, values in table.columns.items() if not isinstance(next(iter(values)), str)]
-    print_table([header.strip() for header in table.columns], rows, right=numeric)
-
-
-def _to_dict(result: BenchmarkResult, curves: list[LearningCurve]) -> dict[str, Any]:
-    """A benchmark as plain data; units as in the report."""
-    return {
-        "joint": result.joint.name,
-        "valves": result.joint.valve,
-        "seeds": result.seeds,
-        "truths": {truth.name: result.joint.describe(truth) for truth in result.joint.truths},
-        "scores": {group: {n: s._asdict() for n, s in result.scores(group).items()} for group in result.groups},
-        "controllers": [
-            {
-                "controller": each.name, "seed": each.seed, "gains": each.tuning.gains if each.tuning else {},
-                "commissioned": {truth: found.gains for truth, found in each.commissionings.items()},
-            }
-            for each in result.results
-        ],
-        "runs": [
-            {"controller": each.name, "seed": each.seed, **key._asdict(), "reason": run.reason}
-            | (dataclasses.asdict(run.metrics) if run.metrics else {})
-            for each in result.results
-            for key, run in each.runs.items()
-        ],
-        "learning": {curve.task.name: curve.errors for curve in curves},
-    }  # fmt: skip

@@ -11,7 +11,7 @@ import numpy as np
 import typer
 
 from ...bench.identify.campaign import STAGES, Campaign, LeftOutStage, StaticStage, identify_campaign
-from ...bench.identify.campaign.campaign_chapters import UnreadFile, ValidationRow, campaign_chapters
+from ...bench.identify.campaign.campaign_chapters import UnreadFile, ValidationRow, campaign_chapters, stage_data
 from ...bench.readers import ColumnMapping
 from ...bench.readers.reader import complete_bench, find_files, read_file
 from ...bench.readers.reading_chapter import reading_chapters
@@ -20,21 +20,22 @@ from ...core.errors import AirmuscleError, ColumnError, FileError, Identificatio
 from ...files.library.campaign_entry import campaign_entry
 from ...files.library.entry import Entry
 from ...files.library.initial_law import resting_lengths
-from ...files.library.write import save
+from ...files.library.write import to_toml
 from ...files.scenario.campaign import RecordScenario, campaign_scenarios
 from ...physics.muscle.geometry import Geometry
 from ...recording import Recording
-from ...report.chapter import Chapter
-from ...report.write import as_json, write_into
+from ...report.data import as_json
+from ..requests.braid import BraidSize, braid_of_length, check_one_length, read_braid
+from ..requests.declaration import option, request
+from ..requests.reading import ReadingRequest
 from .bench_files import print_row_notes
-from .campaign_output import campaign_to_dict, print_campaign, stage_to_dict
 from .campaign_stages import KeptStages
-from .fit_geometry import braid_of_length, check_one_length, parse_braid
+from .delivery import deliver
 from .option_hints import in_options
 from .options import Folder, Json
 from .progress import computation_progress, reading_progress
-from .reading_options import NO_OPTIONS, ReadingOptions, with_reading_options
-from .terminal import echo, print_json
+from .request_options import with_requests
+from .terminal import echo
 
 STAGES_FILE = "stages.json"
 """File of the finished stages, which is replaced at the end of each stage."""
@@ -45,28 +46,30 @@ CampaignFolder = Annotated[
     list[Path],
     typer.Argument(metavar="FOLDER", help="Folder with the files of one rig; or its files, or a glob pattern."),
 ]
-Braid = Annotated[
-    str | None,
-    typer.Option(
-        "--braid",
+
+
+@request
+class CampaignRequest:
+    """What a campaign is asked for."""
+
+    validate: tuple[Path, ...] = option(
+        "Record that is kept aside and predicted; repeatable.", default=(), metavar="FILE"
+    )
+    braid: BraidSize | None = option(
+        "Braid at rest, such as 'radius=10 mm, angle=24.4 deg'; default: the volume follows from the static law and "
+        "fills at several lengths.",
+        default=None,
         metavar="SIZE",
-        help="Braid at rest, such as 'radius=10 mm, angle=24.4 deg'; default: the volume follows from the static law "
-        "and fills at several lengths.",
-    ),
-]
-KeptAside = Annotated[
-    list[Path] | None,
-    typer.Option("--validate", metavar="FILE", help="Record that is kept aside and predicted; repeatable."),
-]
+        read=read_braid,
+    )
 
 
-@with_reading_options
+@with_requests
 def campaign(
     folder: CampaignFolder,
-    validate: KeptAside = None,
-    braid: Braid = None,
+    request: CampaignRequest,
+    reading: ReadingRequest,
     out: Folder = Path("campaign"),
-    reading: ReadingOptions = NO_OPTIONS,
     json: Json = False,
 ) -> None:
     """Identify a muscle from all files of a test rig.
@@ -85,12 +88,11 @@ def campaign(
       airmuscle campaign bench --validate later/isobar_250kPa.csv --mapping rig.toml
       airmuscle simulate campaign/scenarios/fill_1.toml
     """
-    size = parse_braid(braid)
-    columns = reading.column_mapping()
-    kept_aside = {path.resolve() for path in validate or ()}
+    columns, size = reading.column_mapping(), request.braid
+    kept_aside = {path.resolve() for path in request.validate}
     files = [path for path in find_files(folder) if path.resolve() not in kept_aside]
     recordings, unread = _read_each(files, columns)
-    aside = [recording for path in find_files(validate or ()) for recording in read_file(path, columns)]
+    aside = [recording for path in find_files(request.validate) for recording in read_file(path, columns)]
     complete = complete_bench([*recordings, *aside], columns)
     print_row_notes(complete)
     recordings, aside = complete[: len(recordings)], complete[len(recordings) :]
@@ -99,11 +101,25 @@ def campaign(
     result = _identify(recordings, geometry, out)
     validation = [row for recording in aside for row in _validation(result, recording)]
     scenarios = campaign_scenarios(result)
-    _write(result, unread, scenarios, validation, out, reading_chapters(complete))
-    if json:
-        print_json(campaign_to_dict(result, unread, scenarios, validation))
-        return
-    print_campaign(result, unread, scenarios, validation, out)
+    entry = _entry(result)
+    named = [(s.record, f"{SCENARIOS}/{s.name}" if s.text else s.reason) for s in scenarios]
+    chapters = campaign_chapters(result, entry, unread=unread, scenarios=named, validation=validation)
+    chapters[0] = dataclasses.replace(chapters[0], notes=(*chapters[0].notes, *_not_written(result, entry, scenarios)))
+    contents = {**_muscles(result, entry), **{f"{SCENARIOS}/{s.name}": s.text for s in scenarios if s.text}}
+    chapters += reading_chapters(complete)
+    deliver("campaign", chapters, json=json, out=out, title="Bench campaign", files=contents)
+
+
+def _not_written(result: Campaign, entry: Entry | None, scenarios: Sequence[RecordScenario]) -> list[str]:
+    """Sentences on files that are not written, and the reasons."""
+    notes = []
+    if entry is None and isinstance(result.static, LeftOutStage):
+        reason = f"{result.static.reason}; {result.static.remedy}"
+        notes.append(f"muscle: not written, because it needs a static law: {reason}")
+    if scenarios and not any(scenario.text for scenario in scenarios):
+        reasons = dict.fromkeys(scenario.reason for scenario in scenarios)
+        notes.append(f"scenarios: not written: {'; '.join(reasons)}")
+    return notes
 
 
 def _read_each(files: Sequence[Path], mapping: ColumnMapping) -> tuple[list[Recording], list[UnreadFile]]:
@@ -136,7 +152,7 @@ def _identify(recordings: Sequence[Recording], geometry: Geometry | None, out: P
         echo(f"  continued after: {', '.join(known)} (finished before the interruption)", err=True)
 
     def keep(stage: str, result: object) -> None:
-        stages.append(stage_to_dict(stage, result))
+        stages.append(stage_data(stage, result))
         if stage in names and stage not in known:
             kept.save(stage, result)
         with atomic_folder(out) as folder:
@@ -147,26 +163,7 @@ def _identify(recordings: Sequence[Recording], geometry: Geometry | None, out: P
             recordings, geometry=geometry, progress=lambda _, fraction: show(fraction), finished=keep, known=known
         )
     kept.remove(names)
-    return _with_option_names(result)
-
-
-def _with_option_names(result: Campaign) -> Campaign:
-    """The campaign whose reasons name options instead of Python arguments."""
-    changes: dict[str, Any] = {}
-    for field in dataclasses.fields(result):
-        stage = getattr(result, field.name)
-        if isinstance(stage, LeftOutStage):
-            changes[field.name] = dataclasses.replace(stage, reason=in_options(stage.reason, "campaign"))
-        if isinstance(stage, StaticStage):
-            excluded = tuple(
-                dataclasses.replace(each, reason=in_options(each.reason, "campaign"))
-                for each in stage.comparison.excluded
-            )
-            notes = tuple(in_options(note, "campaign") for note in stage.data_notes)
-            changes[field.name] = dataclasses.replace(
-                stage, comparison=dataclasses.replace(stage.comparison, excluded=excluded), data_notes=notes
-            )
-    return dataclasses.replace(result, **changes)
+    return result
 
 
 def _validation(result: Campaign, recording: Recording) -> list[ValidationRow]:
@@ -195,24 +192,14 @@ def _entry(result: Campaign, length: float | None = None) -> Entry | None:
         return None  # the overview of the report states why
 
 
-def _write(
-    result: Campaign, unread: Sequence[UnreadFile], scenarios: Sequence[RecordScenario],
-    validation: Sequence[ValidationRow], out: Path, more: Sequence[Chapter],
-) -> None:  # fmt: skip
-    """Write muscle files, scenarios and report into the folder."""
-    entry = _entry(result)
+def _muscles(result: Campaign, entry: Entry | None) -> dict[str, str]:
+    """The file of the muscle, and those of the other resting lengths."""
+    if entry is None:
+        return {}
     lengths = {r.resting_length for r in result.records if r.kind.is_static and r.resting_length is not None}
-    with atomic_folder(out) as folder:
-        if entry is not None:
-            save(entry, folder / "muscle.toml")
-            for length in sorted(lengths - {result.resting_length}):
-                other = _entry(result, length)
-                if other is not None:
-                    save(other, folder / f"muscle-{1e3 * length:.0f}mm.toml")
-        (folder / SCENARIOS).mkdir()
-        for scenario in scenarios:
-            if scenario.text:
-                (folder / SCENARIOS / scenario.name).write_text(scenario.text, encoding="utf-8")
-        named = [(s.record, f"{SCENARIOS}/{s.name}" if s.text else s.reason) for s in scenarios]
-        chapters = campaign_chapters(result, entry, unread=unread, scenarios=named, validation=validation)
-        write_into(folder, [*chapters, *more], title="Bench campaign")
+    files = {"muscle.toml": to_toml(entry)}
+    for length in sorted(lengths - {result.resting_length}):
+        other = _entry(result, length)
+        if other is not None:
+            files[f"muscle-{1e3 * length:.0f}mm.toml"] = to_toml(other)
+    return files

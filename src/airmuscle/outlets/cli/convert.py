@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -11,9 +12,11 @@ from ...bench.readers import Decimation, read, write
 from ...bench.readers.reader import find_files
 from ...bench.readers.writer import EXTENSIONS
 from ...core.errors import FileError
+from ..requests.declaration import option, request
+from ..requests.reading import ReadingRequest
 from .bench_files import print_row_notes
 from .options import Json
-from .reading_options import NO_OPTIONS, ReadingOptions, with_reading_options
+from .request_options import with_requests
 from .terminal import echo, print_json
 
 EVERY_ROW = 2**62
@@ -21,18 +24,22 @@ EVERY_ROW = 2**62
 
 Source = Annotated[str, typer.Argument(metavar="FILE", help="A file, folder or glob pattern, as for inspect.")]
 Target = Annotated[Path, typer.Argument(metavar="TARGET", help=f"The file to write: {', '.join(EXTENSIONS)}.")]
-MaxRows = Annotated[
-    int | None,
-    typer.Option("--max-rows", min=1, metavar="N", help="Keep every n-th row, N at most; default: all rows."),
-]
-Plain = Annotated[bool, typer.Option("--plain", help="CSV without comments, as pandas and spreadsheets expect it.")]
 
 
-@with_reading_options
+@request
+class ConvertRequest:
+    """Form of the files that are written."""
+
+    plain: bool = option("CSV without comments, as pandas and spreadsheets expect it.", default=False)
+    max_rows: int | None = option(
+        "Keep every n-th row, N at most; default: all rows.", default=None, bounds=(1, math.inf)
+    )
+
+
+@with_requests
 def convert(
-    source: Source, target: Target, plain: Plain = False, max_rows: MaxRows = None,
-    reading: ReadingOptions = NO_OPTIONS, json: Json = False,
-) -> None:  # fmt: skip
+    source: Source, target: Target, request: ConvertRequest, reading: ReadingRequest, json: Json = False
+) -> None:
     """Write measurement files as CSV, Parquet or HDF5.
 
     \b
@@ -46,17 +53,17 @@ def convert(
       airmuscle convert logger.csv run.parquet --time uniform --resting-length "300 mm"
       airmuscle convert run/recording.csv plain.csv --plain
     """
-    if plain and target.suffix.lower() != ".csv":
+    if request.plain and target.suffix.lower() != ".csv":
         raise typer.BadParameter("--plain belongs to a target that ends in .csv.")
     if target.suffix.lower() not in EXTENSIONS:
         raise FileError(f"{target}: the extension must be one of {', '.join(EXTENSIONS)}.")
-    rows = Decimation(max_rows or EVERY_ROW)
+    rows = Decimation(request.max_rows or EVERY_ROW)
     recordings = read(source, reading.column_mapping(), downsampling=rows)
     print_row_notes(recordings)
     paths = [_path(target, i, len(recordings)) for i in range(len(recordings))]
     _check_no_source(paths, source)
     for recording, path in zip(recordings, paths, strict=True):
-        write(recording, path, comments=not plain)
+        write(recording, path, comments=not request.plain)
     if json:
         print_json({"files": [{"file": str(p), "rows": len(r)} for r, p in zip(recordings, paths, strict=True)]})
         return

@@ -5,51 +5,45 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from ...bench.identify.dynamic import CrossPrediction, DynamicFit, describe_cross_predictions
+from ...bench.identify.dynamic import DynamicFit
 from ...bench.identify.dynamic.dynamic_chapter import dynamic_chapters
-from ...bench.identify.dynamic.problem import DynamicProfile
 from ...bench.segment import inspect
-from ...core.atomic_output import atomic_folder, check_writable
+from ...core.atomic_output import check_writable
 from ...files.scenario.identification import DynamicFitSetup, load_dynamic_fit
 from ...recording.row_notes import row_notes
-from ...report.write import write_into
+from ..requests.declaration import option, request
+from ..requests.fit import WEAK
+from .delivery import deliver
 from .options import Folder, Json
-from .terminal import echo, print_json
-
-WEAK = "weak"
-"""Value of --profile that stands for all parameters of the undetermined combinations."""
+from .request_options import with_requests
+from .terminal import echo
 
 Study = Annotated[
     Path, typer.Argument(metavar="STUDY.toml", help="A file with [plant], [observed], [fit] and [[record]].")
 ]
-Profiled = Annotated[
-    list[str] | None,
-    typer.Option(
+
+
+@request
+class DynamicFitRequest:
+    """What a dynamic fit is asked for beyond its file."""
+
+    profile: tuple[str, ...] = option(
+        "Profile likelihood of this parameter; 'weak': of all undetermined ones. Repeatable.",
+        default=(),
         metavar="PARAMETER",
-        help="Profile likelihood of this parameter; 'weak': of all undetermined ones. Repeatable.",
-    ),
-]
-Points = Annotated[
-    int, typer.Option(min=2, max=50, metavar="N", help="Values of a profile on either side of the estimate.")
-]
-Starts = Annotated[
-    int | None,
-    typer.Option(min=1, max=10_000, metavar="N", help="Number of initial guesses; default: that of the file."),
-]
+    )
+    points: int = option("Values of a profile on either side of the estimate.", default=5, bounds=(2, 50))
+    starts: int | None = option(
+        "Number of initial guesses; default: that of the file.", default=None, bounds=(1, 10_000)
+    )
 
 
-def fit_dynamic(
-    study: Study,
-    profile: Profiled = None,
-    points: Points = 5,
-    starts: Starts = None,
-    out: Folder = Path("dynamic"),
-    json: Json = False,
-) -> None:
+@with_requests
+def fit_dynamic(study: Study, request: DynamicFitRequest, out: Folder = Path("dynamic"), json: Json = False) -> None:
     """Identify plant parameters from transient records.
 
     \b
@@ -66,8 +60,8 @@ def fit_dynamic(
       airmuscle simulate dynamic/scenario.toml
     """
     loaded = load_dynamic_fit(study)
-    if starts is not None:
-        loaded = dataclasses.replace(loaded, starts=starts)
+    if request.starts is not None:
+        loaded = dataclasses.replace(loaded, starts=request.starts)
     check_writable(out)
     findings = _findings(loaded)
     if not json:
@@ -75,24 +69,12 @@ def fit_dynamic(
         echo("  " + ", ".join(f"{count} {noun}{'s' * (count != 1)}" for count, noun in counts), err=True)
     fit = loaded.fit()
     cross = loaded.cross_predictions(fit)
-    profiles = [fit.profile(name, points) for name in _profiled_names(fit, profile or [])]
-    scenarios = _write(loaded, fit, profiles, findings, cross, out)
-    if json:
-        print_json(_to_dict(fit, profiles, findings, cross))
-        return
-    for prediction in cross:
-        echo(str(prediction))
-    if cross:
-        echo(describe_cross_predictions(cross))
-        echo()
-    echo(str(fit))
-    for finding in findings:
-        echo(f"note: {finding}")
-    for each in profiles:
-        echo(str(each))
-    for path in scenarios:
-        echo(f"{path.stem}: {path}")
-    echo(f"report: {out / 'report.html'}")
+    profiles = [fit.profile(name, request.points) for name in _profiled_names(fit, request.profile)]
+    count = len(loaded.experiments)
+    names = ["scenario.toml"] if count == 1 else [f"scenario-{i + 1}.toml" for i in range(count)]
+    files = {name: loaded.scenario(fit, i, cross) for i, name in enumerate(names)}
+    chapters = dynamic_chapters(fit, loaded.title, profiles, findings, cross)
+    deliver("fit-dynamic", chapters, json=json, out=out, title="Dynamic fit", files=files)
 
 
 def _findings(study: DynamicFitSetup) -> list[str]:
@@ -107,48 +89,3 @@ def _profiled_names(fit: DynamicFit, names: Sequence[str]) -> list[str]:
     weak = [name for each in fit.identifiability.undetermined for name, _ in each.shares]
     requested = [*(weak if WEAK in names else []), *(name for name in names if name != WEAK)]
     return [fit[name].name for name in dict.fromkeys(requested)]
-
-
-def _write(
-    study: DynamicFitSetup,
-    fit: DynamicFit,
-    profiles: Sequence[DynamicProfile],
-    findings: Sequence[str],
-    cross: Sequence[CrossPrediction],
-    out: Path,
-) -> list[Path]:
-    """Write the report and one scenario per record; returns the paths of the scenarios."""
-    names = []
-    with atomic_folder(out) as folder:
-        for i in range(len(study.experiments)):
-            suffix = f"-{i + 1}" if len(study.experiments) > 1 else ""
-            names.append(f"scenario{suffix}.toml")
-            (folder / names[-1]).write_text(study.scenario(fit, i, cross), encoding="utf-8")
-        write_into(folder, dynamic_chapters(fit, study.title, profiles, findings, cross), title="Dynamic fit")
-    return [out / name for name in names]
-
-
-def _to_dict(
-    fit: DynamicFit, profiles: Sequence[DynamicProfile], findings: Sequence[str], cross: Sequence[CrossPrediction]
-) -> dict[str, Any]:
-    """A dynamic fit as plain data, all numbers SI."""
-    return {
-        "parameters": [dataclasses.asdict(estimate) for estimate in fit.estimates],
-        "records": [
-            {"origin": record.experiment.recording.origin, "rms": {n: fit.rms(n, i) for n in record.names}}
-            for i, record in enumerate(fit.problem.record_models)
-        ],
-        "cross_predictions": [dataclasses.asdict(each) for each in cross],
-        "residual_std": fit.residual_std,
-        "rank": fit.identifiability.rank,
-        "starts_at_optimum": fit.starts_at_optimum,
-        "optima": [{"searches": o.searches, "cost": o.cost, "values": o.values} for o in fit.optima],
-        "undetermined": [
-            {"shares": dict(each.shares), "deviation": each.relative_stderr, "experiment": each.remedy}
-            for each in fit.identifiability.undetermined
-        ],
-        "profiles": {
-            p.name: {"values": p.values, "growth": p.cost_increase, "interval": list(p.interval)} for p in profiles
-        },
-        "notes": [*fit.notes, *findings],
-    }

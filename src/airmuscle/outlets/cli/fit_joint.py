@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import typer
 
 from ...bench.joint import ArmFit, fit_joint, inspect_episodes, read_episode_mapping, read_episodes
-from ...bench.joint.chapter import joint_chapter
-from ...core.atomic_output import atomic_folder, check_writable
+from ...core.atomic_output import check_writable
 from ...files.library.write import scenario_toml
-from ...report.write import write_into
+from .delivery import deliver
 from .options import Folder, Json
-from .terminal import echo, print_json
+from .terminal import echo
 
 DURATION = 2.0
 """Duration [s] of the scenario that is written (chosen)."""
@@ -54,38 +54,17 @@ def fit_joint_command(
         episodes, pairs=rules.pairs, axes=rules.axes, left_out=left_out, rows=horizon, seed=seed,
         progress=lambda text: None if json else echo(text),
     )  # fmt: skip
-    _write(fit, f"Arm identified from {source.name}", out)
-    if json:
-        print_json(_to_dict(fit))
-        return
-    echo(str(fit))
-    echo(f"plant: {out / 'scenario.toml'}")
-    echo(f"report: {out / 'report.html'}")
+    title = f"Arm identified from {source.name}"
+    chapter = dataclasses.replace(fit.chapter(), title=title)
+    files = {"scenario.toml": _scenario(fit, title)}
+    deliver("fit-joint", [chapter], json=json, out=out, title="Identified arm", files=files)
 
 
-def _write(fit: ArmFit, title: str, out: Path) -> None:
+def _scenario(fit: ArmFit, title: str) -> str:
+    """The scenario of the arm with a pressure regulator for each muscle."""
     names = [muscle.name for muscle in fit.arm.muscle]
     middle = np.median(fit.inspection.episodes.rows("pressure"), axis=0)
     levels = [max(float(middle[muscle - 1]), 0.0) for pair in fit.pairs for muscle in pair]
     held = {f"{name}.setpoint": [[0.0, level]] for name, level in zip(names, levels, strict=True)}
     run = {"duration": DURATION, "initial_state": {"pressure": float(np.mean(levels))}}
-    with atomic_folder(out) as folder:
-        text = scenario_toml(title, fit.plant(), held, run, "supply, orifices and volumes are chosen")
-        (folder / "scenario.toml").write_text(text, encoding="utf-8")
-        write_into(folder, [joint_chapter(fit, title)], title="Identified arm")
-
-
-def _to_dict(fit: ArmFit) -> dict[str, Any]:
-    """A fit of an arm as plain data, all numbers SI."""
-    return {
-        "pairs": [list(pair) for pair in fit.pairs],
-        "delay_rows": fit.inspection.delay,
-        "rms": fit.rms.tolist(),
-        "skill": fit.skill.tolist(),
-        "best_baseline": list(fit.best_baseline),
-        "coverage": fit.coverage.tolist(),
-        "horizon": fit.horizon.tolist(),
-        "band": fit.band.tolist(),
-        "parameters": [{"path": e.path, "value": e.value, "standard_error": e.standard_error} for e in fit.estimates],
-        "remarks": list(fit.remarks),
-    }
+    return scenario_toml(title, fit.plant(), held, run, "supply, orifices and volumes are chosen")

@@ -2,56 +2,72 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
 import sys
 from json import dumps
 from pathlib import Path
-from typing import Annotated
-
-import typer
+from typing import Any
 
 from ...bench.identify.experiment_design import BenchLimits
 from ...bench.identify.recursive_fit import RecursiveFit
 from ...bench.readers.follow import RowReader, follow_lines
 from ...core.atomic_output import atomic_folder, check_writable
-from ...core.display import quantity_text
+from ...core.display import contraction_text, quantity_text
 from ...core.errors import ColumnError, IdentificationError
-from ...core.units import quantity
 from ...files.library.entry import Entry
 from ...files.library.write import save
 from ...physics.muscle.characteristic import ValidityRange
+from ..requests.declaration import option, request
+from ..requests.reading import Pairs, ReadingRequest
 from .options import Json, OptionalFolder
-from .reading_options import Columns, Constants, DisplacementZero, Length, ReadingOptions, SkipRows, Units
-from .terminal import echo, percent
+from .request_options import with_requests
+from .terminal import echo
 
 QUANTITIES = ("pressure", "contraction", "force")
+READING = ("resting_length", "unit", "column", "constant", "displacement_zero", "skip_rows")
+"""Fields of the request that are those of reading."""
 
 
-def fit_live(
-    follow: Annotated[
-        str, typer.Option("--follow", metavar="FILE", help="Growing file, pipe or serial port; '-' for standard input.")
-    ],
-    max_pressure: Annotated[str, typer.Option(metavar="QUANTITY", help="Maximum pressure, such as '6 bar'.")],
-    max_force: Annotated[str, typer.Option(metavar="QUANTITY", help="Maximum force of the test rig, such as '1 kN'.")],
-    min_pressure: Annotated[str, typer.Option(metavar="QUANTITY", help="Minimum pressure.")] = "0 kPa",
-    max_contraction: Annotated[str, typer.Option(metavar="QUANTITY", help="Maximum contraction.")] = "25 %",
-    min_contraction: Annotated[str, typer.Option(metavar="QUANTITY", help="Minimum contraction.")] = "0 %",
-    resting_length: Length = None,
-    unit: Units = None,
-    column: Columns = None,
-    constant: Constants = None,
-    displacement_zero: DisplacementZero = None,
-    skip_rows: SkipRows = None,
-    degree: Annotated[int, typer.Option(min=1, max=9, metavar="N", help="Degree of the polynomial surface.")] = 5,
-    forgetting: Annotated[
-        float, typer.Option(metavar="FACTOR", help="Weight of the former samples at each sample; 1: none is forgotten.")
-    ] = 1.0,
-    every: Annotated[int, typer.Option(min=1, metavar="N", help="Samples between two lines of the output.")] = 1000,
-    idle: Annotated[
-        float, typer.Option(min=0.0, metavar="SECONDS", help="End when no row has come for so long.")
-    ] = 10.0,
-    out: OptionalFolder = None,
-    json: Json = False,
-) -> None:
+def same(name: str) -> Any:
+    """A field as the request of reading declares it."""
+    field = ReadingRequest.__dataclass_fields__[name]
+    return dataclasses.field(default=field.default, metadata=field.metadata)
+
+
+@request
+class LiveRequest:
+    """Limits of the test rig, how the rows are read, and the surface."""
+
+    follow: str = option("Growing file, pipe or serial port; '-' for standard input.", metavar="FILE")
+    max_pressure: float = option("Maximum pressure, such as '6 bar'.", unit="Pa")
+    max_force: float = option("Maximum force of the test rig, such as '1 kN'.", unit="N")
+    min_pressure: float = option("Minimum pressure.", unit="Pa", default="0 kPa")
+    max_contraction: float = option("Maximum contraction.", unit="1", default="25 %")
+    min_contraction: float = option("Minimum contraction.", unit="1", default="0 %")
+    resting_length: str | None = same("resting_length")
+    unit: Pairs = same("unit")
+    column: Pairs = same("column")
+    constant: Pairs = same("constant")
+    displacement_zero: str | None = same("displacement_zero")
+    skip_rows: int | None = same("skip_rows")
+    degree: int = option("Degree of the polynomial surface.", default=5, bounds=(1, 9))
+    forgetting: float = option(
+        "Weight of the former samples at each sample; 1: none is forgotten.", default=1.0, metavar="FACTOR"
+    )
+    every: int = option("Samples between two lines of the output.", default=1000, bounds=(1, math.inf))
+    idle: float = option(
+        "End when no row has come for so long.", default=10.0, bounds=(0.0, math.inf), metavar="SECONDS"
+    )
+
+    def reader(self) -> RowReader:
+        """The reader of the rows."""
+        reading = ReadingRequest(**{name: getattr(self, name) for name in READING})
+        return RowReader("standard input" if self.follow == "-" else Path(self.follow).name, reading.column_mapping())
+
+
+@with_requests
+def fit_live(request: LiveRequest, out: OptionalFolder = None, json: Json = False) -> None:
     """Fit a surface while rows arrive; name the next point.
 
     \b
@@ -65,32 +81,29 @@ def fit_live(
       cat /dev/ttyUSB0 | airmuscle fit-live --follow - --column "1=pressure [kPa]" --column "2=contraction [%]"
       --column "3=force [N]" --max-pressure "6 bar" --max-force "1 kN"
     """
-    pressures = [quantity(text, "Pa", where="pressure limits") for text in (min_pressure, max_pressure)]
-    contractions = [quantity(text, "1", where="contraction limits") for text in (min_contraction, max_contraction)]
-    limits = BenchLimits(ValidityRange(*pressures, *contractions), quantity(max_force, "N", where="--max-force"))
+    pressures, contractions = (
+        (request.min_pressure, request.max_pressure),
+        (request.min_contraction, request.max_contraction),
+    )
+    limits = BenchLimits(ValidityRange(*pressures, *contractions), request.max_force)
     if out is not None:
         check_writable(out)
-    options = ReadingOptions(
-        column=column, unit=unit, constant=constant, resting_length=resting_length, skip_rows=skip_rows,
-        displacement_zero=displacement_zero,
-    )  # fmt: skip
-    reader = RowReader("standard input" if follow == "-" else Path(follow).name, options.column_mapping())
-    fit = _follow(RecursiveFit(limits, degree, forgetting=forgetting), reader, follow, idle, every, json)
-    _finish(fit, reader, out, json)
+    reader, fit = request.reader(), RecursiveFit(limits, request.degree, forgetting=request.forgetting)
+    _finish(_follow(fit, reader, request, json), reader, out, json)
 
 
-def _follow(fit: RecursiveFit, reader: RowReader, source: str, idle: float, every: int, json: bool) -> RecursiveFit:
+def _follow(fit: RecursiveFit, reader: RowReader, request: LiveRequest, json: bool) -> RecursiveFit:
     """The fit to all rows until the stream ends or the user interrupts it."""
     printed = 0
     try:
-        for line in follow_lines(sys.stdin if source == "-" else source, idle=idle):
+        for line in follow_lines(sys.stdin if request.follow == "-" else request.follow, idle=request.idle):
             row = reader.read(line)
             if row is None:
                 continue
             if fit.samples + fit.outside == 0:
                 _check_columns(reader, row)
             fit = fit.updated(*(row[name] for name in QUANTITIES))
-            if fit.samples >= printed + every:
+            if fit.samples >= printed + request.every:
                 printed = fit.samples
                 _report(fit, json)
     except KeyboardInterrupt:
@@ -119,8 +132,8 @@ def _report(fit: RecursiveFit, json: bool) -> None:
         return
     echo(
         f"{fit.samples} samples, rms residual {fit.rmse:.4g} N, force determined on {100 * fit.determined:.0f} % of "
-        f"the range; next: {quantity_text(point.pressure, 'Pa', 'kPa')}, {percent(point.contraction)} (expected "
-        f"{point.force:.4g} ± {2 * point.standard_error:.2g} N)"
+        f"the range; next: {quantity_text(point.pressure, 'Pa', 'kPa')}, {contraction_text(point.contraction)} "
+        f"(expected {point.force:.4g} ± {2 * point.standard_error:.2g} N)"
     )
 
 

@@ -5,45 +5,43 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
 
-import typer
-
-from ...bench.identify.volume_chapter import volume_chapter
+from ...bench.identify.volume_chapter import volume_chapter, volume_summary
 from ...bench.identify.volume_fit import VolumeFit, fit_volume, volume_points
 from ...bench.readers.reading_chapter import reading_chapters
-from ...core.atomic_output import atomic_folder, check_writable
-from ...core.declaration import parameters
+from ...core.atomic_output import check_writable
 from ...core.errors import ParameterError, PhysicsError
-from ...core.units import quantity
 from ...files.library.entry import Entry
 from ...files.library.entry_file import load_law
 from ...files.library.fitted_entry import list_files
 from ...files.library.initial_law import resting_lengths
-from ...files.library.write import part_toml, save
+from ...files.library.write import part_toml, to_toml
 from ...physics.muscle.characteristic import ValidityRange
 from ...physics.muscle.characteristic.energy_defect import EnergyDefect, maxwell_defect
 from ...physics.muscle.characteristic.validity_range import validity_range_of
 from ...recording import Recording
-from ...report.chapter import Chapter
-from ...report.write import write_into
+from ..requests.braid import check_one_length
+from ..requests.declaration import option, request
+from ..requests.reading import ReadingRequest
 from .bench_files import Files, read_recordings
-from .fit_geometry import check_one_length
+from .delivery import deliver
 from .options import Folder, Json
-from .reading_options import NO_OPTIONS, ReadingOptions, with_reading_options
-from .terminal import echo, percent, print_json, print_table
+from .request_options import with_requests
 
 
-@with_reading_options
+@request
+class VolumeRequest:
+    """What the fit of a volume is asked for."""
+
+    muscle: str | None = option("Muscle whose geometry is replaced, for the Maxwell defect.", default=None)
+    temperature: float = option("Temperature of the air at both ends of a fill.", unit="K", default="293.15 K")
+
+
+@with_requests
 def fit_volume_command(
     files: Files,
-    muscle: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Muscle whose geometry is replaced, for the Maxwell defect.")
-    ] = None,
-    temperature: Annotated[
-        str, typer.Option(metavar="QUANTITY", help="Temperature of the air at both ends of a fill.")
-    ] = "293.15 K",
-    reading: ReadingOptions = NO_OPTIONS,
+    request: VolumeRequest,
+    reading: ReadingRequest,
     out: Folder = Path("volume"),
     json: Json = False,
 ) -> None:
@@ -59,21 +57,20 @@ def fit_volume_command(
       airmuscle fit-volume column.csv --resting-length "200 mm" --out volume
       airmuscle fit-volume fills/*.csv --muscle fit/muscle.toml --out volume
     """
-    entry = None if muscle is None else load_law(muscle)
+    entry = None if request.muscle is None else load_law(request.muscle)
     check_writable(out)
     recordings = read_recordings(files, reading)
-    fit = fit_volume(volume_points(recordings, quantity(temperature, "K", where="--temperature")),
-                     _length(recordings, entry))  # fmt: skip
+    fit = fit_volume(volume_points(recordings, request.temperature), _length(recordings, entry))
     limits = None if entry is None else _limits(entry, fit)
     defect = None if entry is None or limits is None else _defect(entry, fit, limits)
-    fitted = _entry(entry, fit, files) if entry is not None else None
-    _write(fit, entry, fitted, limits, defect, files, out, reading_chapters(recordings))
-    if json:
-        print_json(_to_dict(fit, defect))
-        return
-    _print(fit, defect)
-    echo(f"{'muscle' if fitted else 'geometry'}: {out / ('muscle.toml' if fitted else 'geometry.toml')}")
-    echo(f"report: {out / 'report.html'}")
+    title, law = f"Volume fitted to {list_files([f.stem for f in files])}", None
+    contents = {"geometry.toml": part_toml("geometry", fit.geometry)}
+    if entry is not None:
+        fitted = _entry(entry, fit, files)
+        title, law = fitted.title, None if limits is None else entry.characteristic
+        contents = {"muscle.toml": to_toml(fitted)}
+    chapters = [volume_chapter(fit, title, law, limits, defect), *reading_chapters(recordings)]
+    deliver("fit-volume", chapters, json=json, out=out, title="Volume", files=contents)
 
 
 def _length(recordings: Sequence[Recording], entry: Entry | None) -> float:
@@ -110,56 +107,6 @@ def _defect(entry: Entry, fit: VolumeFit, limits: ValidityRange) -> EnergyDefect
 
 
 def _entry(entry: Entry, fit: VolumeFit, files: list[Path]) -> Entry:
-    note = f"Volume fitted to {list_files([f.name for f in files])}: {_summary(fit)}."
+    note = f"Volume fitted to {list_files([f.name for f in files])}: {volume_summary(fit)}."
     return dataclasses.replace(entry, name="muscle", geometry=fit.geometry, provenance="fitted",
                                note=" ".join(filter(None, (entry.note, note))), checks=())  # fmt: skip
-
-
-def _summary(fit: VolumeFit) -> str:
-    deviation = float(fit.standard_deviation(fit.points.contraction).max())
-    return (
-        f"{type(fit.geometry).__name__}, rms residual {1e6 * fit.rmse:.4g} cm3, standard deviation of the volume at "
-        f"most {1e6 * deviation:.4g} cm3"
-    )
-
-
-def _write(
-    fit: VolumeFit, entry: Entry | None, fitted: Entry | None, limits: ValidityRange | None,
-    defect: EnergyDefect | None, files: list[Path], out: Path, more: Sequence[Chapter],
-) -> None:  # fmt: skip
-    title = fitted.title if fitted else f"Volume fitted to {list_files([f.stem for f in files])}"
-    law = entry.characteristic if entry is not None and limits is not None else None
-    chapter = volume_chapter(fit, title, f"{_summary(fit)}.", law, limits, defect)
-    with atomic_folder(out) as folder:
-        if fitted is not None:
-            save(fitted, folder / "muscle.toml")
-        else:
-            (folder / "geometry.toml").write_text(part_toml("geometry", fit.geometry), encoding="utf-8")
-        write_into(folder, [chapter, *more], title="Volume")
-
-
-def _print(fit: VolumeFit, defect: EnergyDefect | None) -> None:
-    echo(_summary(fit))
-    low, high = float(fit.points.contraction.min()), float(fit.points.contraction.max())
-    rows = []
-    for contraction in (low, (low + high) / 2, high):
-        volume, error = float(fit.geometry.volume(contraction)), float(fit.standard_deviation([contraction])[0])  # type: ignore[arg-type]
-        rows.append((percent(contraction), f"{1e6 * volume:.4g} cm3", f"{2e6 * error:.2g} cm3"))
-    print_table(("contraction", "volume", "2 standard deviations"), rows, right=("volume",))
-    if defect is not None:
-        echo(f"Maxwell defect |dF/dp + dV/dL|: {defect}")
-
-
-def _to_dict(fit: VolumeFit, defect: EnergyDefect | None) -> dict[str, Any]:
-    """A volume fit as plain data, all numbers SI."""
-    contraction = fit.points.contraction
-    return {
-        "model": type(fit.geometry).__name__,
-        "parameters": {p.name: getattr(fit.geometry, p.name) for p in parameters(fit.geometry)},
-        "points": len(contraction),
-        "fills": fit.points.fills,
-        "rmse": fit.rmse,
-        "standard_deviation": float(fit.standard_deviation(contraction).max()),
-        "aicc": fit.aicc,
-        "maxwell_defect": None if defect is None else dataclasses.asdict(defect),
-    }

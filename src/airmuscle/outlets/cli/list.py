@@ -51,7 +51,7 @@ def list_entries(json: Json = False) -> None:
     if json:
         print_json([dataclasses.asdict(row) for row in rows])
         return
-    print_table(("name", "title", "kind", "provenance"), (dataclasses.astuple(row) for row in rows))
+    print_table({field.name: [getattr(row, field.name) for row in rows] for field in dataclasses.fields(ListRow)})
 
 
 def library_rows() -> list[ListRow]:

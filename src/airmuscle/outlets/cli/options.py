@@ -18,14 +18,6 @@ Name = Annotated[
     ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON in SI units instead of a table.")]
-RestingLength = Annotated[
-    str | None,
-    typer.Option("--resting-length", metavar="QUANTITY", help="Scale the muscle to this resting length: '200 mm'."),
-]
-Diameter = Annotated[
-    str | None,
-    typer.Option("--diameter", metavar="QUANTITY", help="Scale a McKibben muscle to this braid diameter at rest."),
-]
 Folder = Annotated[Path, typer.Option("--out", metavar="DIR", help="Output folder; created if it does not exist.")]
 """An output folder that the command always writes."""
 OptionalFolder = Annotated[

@@ -2,73 +2,56 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
-from typing import Annotated, Any
 
-import typer
-
-from ...bench.identify.experiment_design import BenchLimits, ExperimentPlan, PlannedRun, optimal_design
+from ...bench.identify.dynamic import rank_records
+from ...bench.identify.experiment_design import BenchLimits, optimal_design
 from ...bench.readers import write
-from ...core.atomic_output import atomic_folder, check_writable
-from ...core.display import quantity_text
-from ...core.units import quantity
+from ...core.atomic_output import check_writable
 from ...files.library.entry_file import load_law
 from ...files.library.files import is_path, read_toml
+from ...files.scenario.identification import load_dynamic_fit
 from ...physics.muscle.characteristic import ValidityRange
+from ...report.write import save_table
+from ..requests.declaration import RequestError, option, request
+from .delivery import deliver
 from .options import Json, Name, OptionalFolder
-from .plan_records import describes_study, plan_records
-from .terminal import echo, percent, print_json, print_table
+from .request_options import with_requests
 
-Separated = Annotated[
-    list[str] | None,
-    typer.Option(metavar="PARAMETER", help="Study of fit-dynamic: one of the two parameters to separate; give two."),
-]
+PLAN_FILE = "plan.csv"
 
 
-MaxPressure = Annotated[
-    str | None, typer.Option(metavar="QUANTITY", help="Maximum pressure, such as '6 bar'; needed for static runs.")
-]
-MaxForce = Annotated[
-    str | None,
-    typer.Option(
-        metavar="QUANTITY", help="Maximum force of the load cell or frame, such as '1 kN'; needed for static runs."
-    ),
-]
-MinPressure = Annotated[str, typer.Option(metavar="QUANTITY", help="Minimum pressure.")]
-MaxContraction = Annotated[str, typer.Option(metavar="QUANTITY", help="Maximum contraction.")]
-MinContraction = Annotated[
-    str, typer.Option(metavar="QUANTITY", help="Minimum contraction; negative if the bench stretches the muscle.")
-]
-Runs = Annotated[int, typer.Option(min=1, max=100, metavar="N", help="Number of runs.")]
-Points = Annotated[int, typer.Option(min=3, max=1000, metavar="N", help="Number of points per run.")]
-Sigma = Annotated[
-    float,
-    typer.Option(
-        metavar="NUMBER",
-        help="Standard deviation of a measured value, in the SI unit of the fitted quantity (mostly N).",
-    ),
-]
-Fixed = Annotated[
-    list[str] | None,
-    typer.Option("--fix", metavar="PARAMETER", help="Parameter that the fit will keep fixed; repeatable."),
-]
+@request
+class PlanRequest:
+    """Limits of a test bench and of its plan, or the parameters that a further record is to separate."""
+
+    max_pressure: float | None = option(
+        "Maximum pressure, such as '6 bar'; needed for static runs.", unit="Pa", default=None
+    )
+    max_force: float | None = option(
+        "Maximum force of the load cell or frame, such as '1 kN'; needed for static runs.", unit="N", default=None
+    )
+    min_pressure: float = option("Minimum pressure.", unit="Pa", default="50 kPa")
+    max_contraction: float = option("Maximum contraction.", unit="1", default="25 %")
+    min_contraction: float = option(
+        "Minimum contraction; negative if the bench stretches the muscle.", unit="1", default="0 %"
+    )
+    runs: int = option("Number of runs.", default=6, bounds=(1, 100))
+    points: int = option("Number of points per run.", default=15, bounds=(3, 1000))
+    sigma: float = option(
+        "Standard deviation of a measured value, in the SI unit of the fitted quantity (mostly N).", default=1.0
+    )
+    fix: tuple[str, ...] = option(
+        "Parameter that the fit will keep fixed; repeatable.", default=(), metavar="PARAMETER"
+    )
+    separate: tuple[str, ...] = option(
+        "Study of fit-dynamic: one of the two parameters to separate; give two.", default=(), metavar="PARAMETER"
+    )
 
 
-def plan(
-    name: Name,
-    max_pressure: MaxPressure = None,
-    max_force: MaxForce = None,
-    min_pressure: MinPressure = "50 kPa",
-    max_contraction: MaxContraction = "25 %",
-    min_contraction: MinContraction = "0 %",
-    runs: Runs = 6,
-    points: Points = 15,
-    sigma: Sigma = 1.0,
-    fix: Fixed = None,
-    separate: Separated = None,
-    out: OptionalFolder = None,
-    json: Json = False,
-) -> None:
+@with_requests
+def plan(name: Name, request: PlanRequest, out: OptionalFolder = None, json: Json = False) -> None:
     """Design the most informative experiments.
 
     \b
@@ -85,71 +68,32 @@ def plan(
       airmuscle plan study.toml
       airmuscle plan study.toml --separate circuit.fill.critical_ratio --separate gas.heat_transfer
     """
-    if is_path(name) and describes_study(read_toml(Path(name))):
-        plan_records(Path(name), separate or (), out, json)
+    if is_path(name) and {"fit", "record"} <= set(read_toml(Path(name))):
+        _plan_record(Path(name), request.separate, out, json)
         return
-    if separate:
-        raise typer.BadParameter("--separate is for a study of fit-dynamic; NAME is a muscle or a law")
-    if max_pressure is None or max_force is None:
-        raise typer.BadParameter("give the limits of the test bench with --max-pressure and --max-force")
-    limits = _bench_limits((min_pressure, max_pressure), (min_contraction, max_contraction), max_force)
-    law = load_law(name).characteristic
-    design = optimal_design(law, limits, runs=runs, points=points, sigma=sigma, fixed=fix or ())
+    if request.separate:
+        raise RequestError("--separate is for a study of fit-dynamic; NAME is a muscle or a law")
+    if request.max_pressure is None or request.max_force is None:
+        raise RequestError("give the limits of the test bench with --max-pressure and --max-force")
+    limits = ValidityRange(request.min_pressure, request.max_pressure, request.min_contraction, request.max_contraction)
+    design = optimal_design(
+        load_law(name).characteristic, BenchLimits(limits, request.max_force), runs=request.runs,
+        points=request.points, sigma=request.sigma, fixed=request.fix,
+    )  # fmt: skip
     if out is not None:
-        _write(design, out)
-    if json:
-        print_json(_to_dict(design))
-        return
-    _print(design)
+        check_writable(out)
+    files = {PLAN_FILE: lambda path: write(design.recording(), path)}
+    deliver("plan", [design.chapter()], json=json, out=out, files=files)
+
+
+def _plan_record(study: Path, separate: tuple[str, ...], out: Path | None, json: bool) -> None:
+    """Fit a study and rank the candidate records. Raises RequestError unless none or two parameters are separated."""
+    if len(separate) not in (0, 2):
+        raise RequestError(f"--separate names {len(separate)} parameters; give two, or none")
     if out is not None:
-        echo(f"plan: {out / 'plan.csv'}")
-
-
-def _bench_limits(pressures: tuple[str, str], contractions: tuple[str, str], force: str) -> BenchLimits:
-    low, high = (quantity(text, "Pa", where="pressure limits") for text in pressures)
-    least, greatest = (quantity(text, "1", where="contraction limits") for text in contractions)
-    return BenchLimits(ValidityRange(low, high, least, greatest), quantity(force, "N", where="--max-force"))
-
-
-def _write(design: ExperimentPlan, out: Path) -> None:
-    check_writable(out)
-    with atomic_folder(out) as folder:
-        write(design.recording(), folder / "plan.csv")
-
-
-def _format(name: str, value: float) -> str:
-    return quantity_text(value, "Pa", "kPa") if name == "pressure" else percent(value)
-
-
-def _row(number: int, run: PlannedRun) -> tuple[str, ...]:
-    constant = f"{run.constant} {_format(run.constant, run.level)}"
-    ends = " to ".join(_format(run.swept, end) for end in run.sweep_limits)
-    forces = f"{run.force.max():.4g} to {run.force.min():.4g} N"
-    return str(number), constant, f"{run.swept} {ends}", str(run.force.size), forces
-
-
-def _print(design: ExperimentPlan) -> None:
-    rows = [_row(i + 1, run) for i, run in enumerate(design.runs)]
-    print_table(("run", "constant", "sweep", "points", "expected force"), rows, right=("run", "points"))
-    parameters = zip(design.names, design.values, design.standard_errors, strict=True)
-    headers = ("parameter", "present value", "expected 2 stderr")
-    print_table(headers, [(n, f"{v:.4g}", f"{2 * d:.2g}") for n, v, d in parameters], right=headers[1:])
-    echo(
-        f"relative D-efficiency {design.relative_d_efficiency:.2f}, compared with the same number of evenly spaced runs"
-    )
-    for remark in (*design.undetermined, design.assumption):
-        echo(f"note: {remark}")
-
-
-def _to_dict(design: ExperimentPlan) -> dict[str, Any]:
-    """A plan as plain data, all numbers SI."""
-    parameters = zip(design.names, design.values, design.standard_errors, strict=True)
-    return {
-        "runs": [
-            {"constant": r.constant, "level": r.level, "swept": r.swept, "ends": r.sweep_limits, "points": r.force.size}
-            for r in design.runs
-        ],
-        "parameters": {name: {"value": value, "stderr": stderr} for name, value, stderr in parameters},
-        "relative_efficiency": design.relative_d_efficiency,
-        "notes": [*(str(remark) for remark in design.undetermined), design.assumption],
-    }
+        check_writable(out)
+    loaded = load_dynamic_fit(study)
+    chapter = rank_records(loaded.fit(), (separate[0], separate[1]) if separate else None).chapter()
+    chapter = dataclasses.replace(chapter, title=f"{chapter.title}: {loaded.title}")
+    files = {PLAN_FILE: lambda path: save_table(chapter.tables[0], path)}
+    deliver("plan", [chapter], json=json, out=out, title="Next record", files=files)

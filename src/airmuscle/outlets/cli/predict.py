@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,22 +9,22 @@ import typer
 
 from ...bench.identify.dynamic import StartTime
 from ...bench.identify.prediction import RecordPrediction
-from ...bench.identify.prediction.prediction_chapter import band_sources, describe_band, prediction_chapters, with_unit
+from ...bench.identify.prediction.prediction_chapter import prediction_chapters
 from ...bench.readers.reading_chapter import reading_chapters
-from ...core.atomic_output import atomic_folder, check_writable
+from ...core.atomic_output import check_writable
 from ...core.errors import FileError
-from ...core.units import quantity
 from ...files.library.entry import PlantEntry
 from ...files.library.entry_file import kind_of, load_law
 from ...files.library.entry_prediction import predict_with_entry
 from ...files.library.files import is_path, list_plants, read_toml
 from ...files.scenario.prediction import load_plant_model
-from ...report.write import write_into
+from ..requests.declaration import RequestError, Where, option, request
+from ..requests.reading import ReadingRequest
 from .bench_files import read_recordings
 from .completion import complete_model
+from .delivery import deliver
 from .options import Folder, Json
-from .reading_options import NO_OPTIONS, ReadingOptions, with_reading_options
-from .terminal import echo, print_json, print_table
+from .request_options import with_requests
 
 Model = Annotated[
     str,
@@ -42,35 +41,45 @@ Records = Annotated[
         help="Measurement files; for a scenario also a TOML file with [[record]], as of fit-dynamic.",
     ),
 ]
-Start = Annotated[
-    str | None,
-    typer.Option(
-        "--start-time", metavar="QUANTITY", help="Scenario: time of the record at which its input begins; default 0 s."
-    ),
-]
-Margin = Annotated[
-    str | None,
-    typer.Option(
-        "--start-margin", metavar="QUANTITY", help="Scenario: estimate the start time within this margin, '50 ms'."
-    ),
-]
-Own = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--own", metavar="PARAMETER", help="Scenario: parameter that is estimated from each record; repeatable."
-    ),
-]
 
 
-@with_reading_options
+@request
+class PredictRequest:
+    """What the prediction of transient records is asked for."""
+
+    start_time: float | None = option(
+        "Scenario: time of the record at which its input begins; default 0 s.", unit="s", default=None
+    )
+    start_margin: float | None = option(
+        "Scenario: estimate the start time within this margin, '50 ms'.", unit="s", default=None
+    )
+    own: tuple[str, ...] = option(
+        "Scenario: parameter that is estimated from each record; repeatable.", default=(), metavar="PARAMETER"
+    )
+
+    def check(self, where: Where) -> None:
+        """Raise RequestError for a margin that is not positive."""
+        if self.start_margin is not None and not self.start_margin > 0.0:
+            raise RequestError(f"{where('start_margin')} is {self.start_margin:g} s; it must be greater than zero")
+
+    @property
+    def given(self) -> list[str]:
+        """The options that are given."""
+        return [f"--{name.replace('_', '-')}" for name in ("start_time", "start_margin", "own") if getattr(self, name)]
+
+    @property
+    def unknowns(self) -> list[Any]:
+        """What is estimated from each record."""
+        return [*self.own, *([] if self.start_margin is None else [StartTime(self.start_margin)])]
+
+
+@with_requests
 def predict(
     model: Model,
     files: Records,
-    start_time: Start = None,
-    start_margin: Margin = None,
-    own: Own = None,
+    request: PredictRequest,
+    reading: ReadingRequest,
     out: Folder = Path("prediction"),
-    reading: ReadingOptions = NO_OPTIONS,
     json: Json = False,
 ) -> None:
     """Predict further records by an identified muscle or plant.
@@ -89,29 +98,15 @@ def predict(
       airmuscle predict dmsp-20-300 bench.csv --json
     """
     check_writable(out)
-    options = {"--start-time": start_time, "--start-margin": start_margin, "--own": own}
     if _is_plant(model):
-        thing, predictions = _transient(model, files, reading, start_time, start_margin, own or ())
+        thing, predictions = _transient(model, files, reading, request)
+    elif request.given:
+        raise RequestError(f"{', '.join(request.given)} is for a scenario; MODEL is a muscle or a law")
     else:
-        unused = [name for name, value in options.items() if value]
-        if unused:
-            raise typer.BadParameter(f"{', '.join(unused)} is for a scenario; MODEL is a muscle or a law")
         thing, predictions = _static(model, files, reading)
-    with atomic_folder(out) as folder:
-        chapters = prediction_chapters(Path(model).name, thing, predictions)
-        chapters += reading_chapters(each.recording for each in predictions)
-        write_into(folder, chapters, title="Prediction")
-    if json:
-        print_json(
-            {
-                "model": model,
-                "band": "; ".join(band_sources(predictions)),
-                "records": [_to_dict(each) for each in predictions],
-            }
-        )
-        return
-    _print(predictions)
-    echo(f"report: {out / 'report.html'}")
+    chapters = prediction_chapters(Path(model).name, thing, predictions)
+    chapters += reading_chapters(each.recording for each in predictions)
+    deliver("predict", chapters, json=json, out=out, title="Prediction")
 
 
 def _is_plant(model: str) -> bool:
@@ -121,7 +116,7 @@ def _is_plant(model: str) -> bool:
     return model in list_plants()
 
 
-def _static(model: str, files: list[Path], reading: ReadingOptions) -> tuple[Any, list[RecordPrediction]]:
+def _static(model: str, files: list[Path], reading: ReadingRequest) -> tuple[Any, list[RecordPrediction]]:
     entry = load_law(model)
     tables = [path for path in files if path.suffix == ".toml"]
     if tables:
@@ -131,58 +126,14 @@ def _static(model: str, files: list[Path], reading: ReadingOptions) -> tuple[Any
 
 
 def _transient(
-    model: str, files: list[Path], reading: ReadingOptions, start: str | None, margin: str | None, own: Sequence[str]
+    model: str, files: list[Path], reading: ReadingRequest, request: PredictRequest
 ) -> tuple[Any, list[RecordPrediction]]:
     loaded = load_plant_model(model)
-    begun = 0.0 if start is None else quantity(start, "s", where="--start-time")
-    unknowns: list[Any] = list(own)
-    if margin is not None:
-        within = quantity(margin, "s", where="--start-margin")
-        if not within > 0.0:
-            raise typer.BadParameter(f"--start-margin is '{margin}'; it must be greater than zero")
-        unknowns.append(StartTime(within))
     measured = [path for path in files if path.suffix != ".toml"]
     recordings = read_recordings(measured, reading) if measured else []
+    begun, unknowns = request.start_time or 0.0, request.unknowns
     predictions = [loaded.predict_recording(recording, begun, unknowns) for recording in recordings]
     for path in files:
         if path not in measured:
             predictions += loaded.predict_file(path)
     return loaded.scenario.plant, predictions
-
-
-def _print(predictions: Sequence[RecordPrediction]) -> None:
-    rows = []
-    for each in predictions:
-        for item in each.quantities:
-            share = "–" if item.share is None else f"{100.0 * item.share:.3g} %"
-            greatest = f"{with_unit(item.max_error, item.name)} (row {item.worst_row + 1})"
-            compared = str(int(item.compared.sum()))
-            rms, half = with_unit(item.rms, item.name), describe_band(item)
-            rows.append((each.origin, item.name, compared, rms, greatest, half, share))
-    headers = ("record", "quantity", "rows", "rms error", "maximum error", "95 % band", "within")
-    print_table(headers, rows, right=("rows", "rms error", "maximum error", "95 % band", "within"))
-    for source in band_sources(predictions):
-        echo(f"band: {source}")
-    for each in predictions:
-        for note in each.notes:
-            echo(f"note: {each.origin}: {note}")
-
-
-def _to_dict(prediction: RecordPrediction) -> dict[str, Any]:
-    """A prediction as plain data, all numbers SI, rows counted from 1."""
-    return {
-        "record": prediction.origin,
-        "quantities": {
-            each.name: {
-                "rows": int(each.compared.sum()),
-                "rms": each.rms,
-                "max_error": each.max_error,
-                "max_error_row": each.worst_row + 1,
-                "band": each.band,
-                "half_width": None if each.half_width is None else each.half_width.tolist(),
-                "share": each.share,
-            }
-            for each in prediction.quantities
-        },
-        "notes": list(prediction.notes),
-    }

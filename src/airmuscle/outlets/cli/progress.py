@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Iterator
 
-from .terminal import without_markup
+from ...core.errors import printable
 
 
 @contextlib.contextmanager
@@ -21,7 +21,7 @@ def reading_progress(label: str = "reading") -> Iterator[Callable[[str, float], 
         def show(name: str, fraction: float) -> None:
             task = tasks.get(name)
             if task is None:
-                task = tasks[name] = display.add_task(without_markup(f"{label} {name}"), total=1.0)
+                task = tasks[name] = display.add_task(_without_markup(f"{label} {name}"), total=1.0)
             display.update(task, completed=fraction)
 
         yield show
@@ -32,3 +32,10 @@ def computation_progress(label: str) -> Iterator[Callable[[float], None]]:
     """Yield a callback (fraction done) that draws one bar."""
     with reading_progress(label) as show:
         yield lambda fraction: show("", fraction)
+
+
+def _without_markup(text: str) -> str:
+    """Printable text for rich, in which brackets are not markup."""
+    from rich.markup import escape
+
+    return escape(printable(text))

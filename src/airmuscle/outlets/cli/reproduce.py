@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -12,31 +12,18 @@ from ...core.errors import AirmuscleError
 from ...engine.processes import available_cores
 from ...papers.run import reproduce as reproduce_papers
 from ...papers.run import select_papers
-from ...report.chapter import (
-    DEPENDS,
-    DIFFERS,
-    HOLDS,
-    NOT_PRINTED,
-    NOT_TESTABLE,
-    Chapter,
-    Claim,
-    Kind,
-    Statement,
-    statements,
-)
+from ...report.chapter import Chapter
+from ...report.claims import Claim, Kind, Statement, statements
 from ...report.formatting import MARKS, count_verdicts, format_published, format_reproduced
 from ...report.formula import to_plain
+from ...report.text import GAP
 from .options import Folder
-from .terminal import WIDE_GAP, echo, print_table, table_width
-
-if TYPE_CHECKING:
-    from rich.text import Text
+from .terminal import echo, print_table, terminal_width
 
 HEADERS = ("claim", "expected", "reproduced", "verdict")
 MIN_CLAIM = 28
 """Smallest number of characters of a statement in the terminal, where the others are cut (chosen)."""
 PREFIXES = {Kind.CLAIM: "", Kind.FINDING: "comparison: ", Kind.CHECK: "check: "}
-COLOURS = {HOLDS: "green", DIFFERS: "bold red", DEPENDS: "yellow", NOT_TESTABLE: "dim", NOT_PRINTED: "dim"}
 
 
 def reproduce(
@@ -83,14 +70,14 @@ def _print_chapter(chapter: Chapter) -> None:
     echo(f"\n{chapter.title}")
     for question, answer in chapter.answers:
         text = f"{question} {to_plain(answer)}"
-        echo(textwrap.fill(text, table_width(), subsequent_indent="  ", break_on_hyphens=False))
+        echo(textwrap.fill(text, terminal_width(), subsequent_indent="  ", break_on_hyphens=False))
     found = [(kind, each) for kind in Kind for each in statements(chapter.claims, kind)]
     values = [(_expected(each), _reproduced(each), _verdict(each.verdict)) for _, each in found]
     columns = zip(HEADERS[1:], *values, strict=True)
-    room = max(MIN_CLAIM, table_width() - sum(max(len(str(cell)) for cell in column) + WIDE_GAP for column in columns))
+    room = max(MIN_CLAIM, terminal_width() - sum(max(len(str(cell)) for cell in column) + GAP for column in columns))
     texts = (f"{PREFIXES[kind]}{to_plain(each.claim)}" for kind, each in found)
     rows = [(textwrap.shorten(text, room, placeholder=" …"), *row) for text, row in zip(texts, values, strict=True)]
-    print_table(HEADERS, rows, right=HEADERS[1:3])
+    print_table(dict(zip(HEADERS, zip(*rows, strict=True), strict=True)))
 
 
 def _print_counts(claims: list[Claim]) -> None:
@@ -113,7 +100,5 @@ def _reproduced(statement: Statement) -> str:
     return f"{format_reproduced(statement, 3)} {unit}".rstrip()
 
 
-def _verdict(verdict: str) -> Text:
-    from rich.text import Text
-
-    return Text(f"{MARKS[verdict]} {verdict}", style=COLOURS[verdict], no_wrap=True)
+def _verdict(verdict: str) -> str:
+    return f"{MARKS[verdict]} {verdict}"

@@ -9,7 +9,7 @@ import typer
 
 from ...core.atomic_output import atomic_folder
 from ...files.scenario.schema import muscle_schema, scenario_schema
-from ...report.write import as_json
+from ...report.data import as_json
 from .terminal import echo, print_json
 
 

@@ -3,24 +3,41 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from ...bench.readers import write
-from ...core.atomic_output import atomic_folder, check_writable
+from ...core.atomic_output import check_writable
 from ...core.errors import SimulationError
+from ...design.study.paths import changed_scenario
 from ...files.scenario.scenario import Scenario, load_scenario
 from ...files.scenario.simulation_chapter import run_chapter
 from ...recording import Recording
-from ...recording.recording import column_heading
-from ...report.formatting import format_number
-from ...report.write import write_into
+from ...report.chapter import Chapter
+from ..requests.declaration import option, request
+from ..requests.reading import read_pair
 from .completion import complete_plant
+from .delivery import Files, deliver, write_result
 from .options import Folder, Json
-from .terminal import echo, print_json, print_table
+from .request_options import with_requests
+from .terminal import echo
 
 
+@request
+class SimulateRequest:
+    """How a simulation differs from its scenario file."""
+
+    set: tuple[Any, ...] = option(
+        "Another value of a number of the scenario, by its path as in a study: 'mechanism.mass=12 kg', "
+        "run.duration=10. Repeatable.",
+        default=(),
+        metavar="PATH=VALUE",
+        read=read_pair,
+    )
+
+
+@with_requests
 def simulate(
     scenario: Annotated[
         Path,
@@ -30,6 +47,7 @@ def simulate(
             autocompletion=complete_plant,
         ),
     ],
+    request: SimulateRequest,
     out: Folder = Path("run"),
     json: Json = False,
 ) -> None:
@@ -44,51 +62,24 @@ def simulate(
     Examples:
       airmuscle simulate examples/fill_discharge.toml --out run
       airmuscle simulate joint-dmsp-20-matrix --out run
+      airmuscle simulate examples/fill_discharge.toml --set "mechanism.mass=12 kg" --set run.duration=10 --out run
     """
-    loaded = load_scenario(scenario)
+    loaded = changed_scenario(scenario, dict(request.set)) if request.set else load_scenario(scenario)
     check_writable(out)
     try:
         recording = loaded.simulate()
     except SimulationError as error:
         if error.recording is not None and len(error.recording):
-            _write(loaded, error.recording, out)
+            write_result(out, *_results(loaded, error.recording))
             echo(f"partial results were written to {out}", err=True)
         if error.interrupted:
             raise KeyboardInterrupt from None
         raise
-    _write(loaded, recording, out)
-    if json:
-        print_json(
-            {"title": loaded.title, "rows": len(recording), "notes": recording.notes, "range": _ranges(recording)}
-        )
-        return
-    _print(loaded, recording)
-    echo(f"report: {out / 'report.html'}")
+    chapters, title, files = _results(loaded, recording)
+    deliver("simulate", chapters, json=json, out=out, title=title, files=files)
 
 
-def _ranges(recording: Recording) -> dict[str, dict[str, float | str]]:
-    """Header, minimum, maximum and last value of each column [SI]."""
-    return {
-        name: {
-            "column": column_heading(name),
-            "min": float(recording[name].min()),
-            "max": float(recording[name].max()),
-            "last": float(recording[name][-1]),
-        }
-        for name in recording
-    }
-
-
-def _print(scenario: Scenario, recording: Recording) -> None:
-    echo(f"{scenario.title}: {len(recording)} rows over {scenario.problem.duration:g} s")
-    rows = [tuple(map(format_number, column.values())) for column in _ranges(recording).values()]
-    rows = [(heading.removesuffix(" [1]"), *values) for heading, *values in rows]
-    print_table(("column", "min", "max", "last"), rows, right=("min", "max", "last"))
-    for note in recording.notes:
-        echo(f"note: {note}")
-
-
-def _write(scenario: Scenario, recording: Recording, out: Path) -> None:
-    with atomic_folder(out) as folder:
-        write(scenario.select_columns(recording), folder / "recording.csv")
-        write_into(folder, [run_chapter(scenario, recording)], title="Simulation")
+def _results(scenario: Scenario, recording: Recording) -> tuple[list[Chapter], str, Files]:
+    """The chapters, the title of the report, and the file of the recording."""
+    files = {"recording.csv": lambda path: write(scenario.select_columns(recording), path)}
+    return [run_chapter(scenario, recording)], "Simulation", files

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any
 
-from ...core.atomic_output import atomic_folder, check_writable
+import typer
+
+from ...core.atomic_output import check_writable
 from ...core.tree import leaves
 from ...design.tuning import (
+    IntegralAbsoluteError,
+    IntegralTimeAbsoluteError,
     Perturbations,
     RobustObjective,
+    RootMeanSquareError,
     RuleSettings,
     TrackingIndex,
     Tuning,
@@ -19,79 +24,90 @@ from ...design.tuning import (
     step_experiment,
 )
 from ...design.tuning import tune as find_gains
-from ...design.tuning.chapter import case_table, gain_table, history_table, rule_table, tuning_chapter
+from ...design.tuning.chapter import history_table, tuning_chapter
 from ...design.tuning.scenario_loop import ScenarioLoop, load_scenario_loop
 from ...files.scenario.controller import signal_units
-from ...report.chapter import Table
-from ...report.formatting import format_number, table_rows
-from ...report.write import save_table, write_into
+from ...report.write import save_table
+from ..requests.declaration import RequestError, option, request
+from .delivery import deliver
 from .interruption import check_interrupted
 from .options import Folder, Json
 from .progress import computation_progress
-from .terminal import echo, print_json, print_table
-from .tune_options import (
-    AirWeight,
-    Bounds,
-    Budget,
-    Delay,
-    Draws,
-    Index,
-    Leak,
-    Loads,
-    Quantile,
-    QuantileWeight,
-    Rules,
-    Save,
-    ScenarioFile,
-    Seed,
-    Supplies,
-    TravelWeight,
-    read_factors,
-    read_index,
-)
+from .request_options import with_requests
+from .terminal import echo
 
 HISTORY_FILE = "history.csv"
+INDICES: dict[str, type[TrackingIndex]] = {
+    "rmse": RootMeanSquareError,
+    "iae": IntegralAbsoluteError,
+    "itae": IntegralTimeAbsoluteError,
+}
+"""Tracking indices by their names."""
+ScenarioFile = Annotated[Path, typer.Argument(metavar="SCENARIO.toml", help="A scenario file with [input.controller].")]
+Save = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE.toml", help="Scenario with the tuned gains; default: SCENARIO-tuned.toml next to the scenario."
+    ),
+]
 
 
-class TuneRequest(NamedTuple):
-    """Settings of a search."""
-
-    tracking: TrackingIndex
-    objective: RobustObjective
-    perturbations: Perturbations
-    budget: int
-    seed: int
-    rules: bool
-
-
-class TuneResult(NamedTuple):
-    """A scenario, the result for it, notes and settings of rules."""
-
-    loaded: ScenarioLoop
-    tuning: Tuning
-    notes: tuple[str, ...]
-    rules: tuple[RuleSettings, ...]
+def read_factors(text: str, where: str) -> tuple[float, ...]:
+    """Factors with commas between them. Raises RequestError."""
+    try:
+        return tuple(float(part) for part in text.split(",") if part.strip())
+    except ValueError:
+        raise RequestError(
+            f"{where} is '{text}'; it must be factors with commas between them, such as 0.5,2."
+        ) from None
 
 
+@request
+class TuneRequest:
+    """What a tuning is asked for."""
+
+    bounds: tuple[str, ...] = option(
+        "Range of a gain, such as 'gain=5 1/m:500 1/m'; repeatable. Default: every gain and time that is not 0, from a "
+        "tenth of its present value to ten times it.",
+        default=(),
+        metavar="GAIN=MIN:MAX",
+    )
+    index: type[TrackingIndex] = option(
+        f"Tracking index of a run: {', '.join(INDICES)}.", choices=INDICES, default="rmse"
+    )
+    quantile: float = option("Quantile of the index over the cases; 1: the worst case.", default=0.9)
+    quantile_weight: float = option("Weight of the quantile; that of the mean is 1.", default=1.0)
+    air_weight: float = option("Weight of the mean air drawn [kg/s].", default=0.0)
+    travel_weight: float = option("Weight of the mean travel of the commands [strokes/s].", default=0.0)
+    loads: Any = option(
+        "Factors of the load; '' for none.", default="0.5,2", metavar="FACTORS", read=read_factors, empty=True
+    )
+    supplies: Any = option(
+        "Factors of the supply pressure; '' for none.", default="0.8", metavar="FACTORS", read=read_factors, empty=True
+    )
+    leak: float = option(
+        "Leak at each muscle, relative to the largest conductance; 0 for none.", default=0.01, metavar="RATIO"
+    )
+    delay: int = option("Dead time of the measurements in samples; 0 for none.", default=1, bounds=(0, 1000))
+    draws: int = option("Draws of fitted parameters, from their covariance.", default=4, bounds=(0, 10_000))
+    rules: bool = option("Start from SIMC and AMIGO settings by a simulated step (PID only).", default=False)
+    budget: int = option("Maximum number of simulated loops.", default=4000, bounds=(8, 10_000_000))
+    seed: int = option("Seed of the optimiser and of the draws.", default=0, bounds=(0, float("inf")))
+
+    @property
+    def objective(self) -> RobustObjective:
+        """The objective of the search."""
+        return RobustObjective(self.quantile, self.quantile_weight, self.air_weight, self.travel_weight)
+
+    @property
+    def perturbations(self) -> Perturbations:
+        """The perturbations of the plant."""
+        return Perturbations(self.loads, self.supplies, self.leak, self.delay, self.draws)
+
+
+@with_requests
 def tune(
-    scenario: ScenarioFile,
-    bounds: Bounds = None,
-    index: Index = "rmse",
-    quantile: Quantile = 0.9,
-    quantile_weight: QuantileWeight = 1.0,
-    air_weight: AirWeight = 0.0,
-    travel_weight: TravelWeight = 0.0,
-    loads: Loads = "0.5,2",
-    supplies: Supplies = "0.8",
-    leak: Leak = 0.01,
-    delay: Delay = 1,
-    draws: Draws = 4,
-    rules: Rules = False,
-    budget: Budget = 4000,
-    seed: Seed = 0,
-    save: Save = None,
-    out: Folder = Path("tuning"),
-    json: Json = False,
+    scenario: ScenarioFile, request: TuneRequest, save: Save = None, out: Folder = Path("tuning"), json: Json = False
 ) -> None:
     """Tune the controller of a scenario for a family of plants.
 
@@ -111,100 +127,43 @@ def tune(
     for folder in (out, target.parent):
         check_writable(folder)
     loaded.check_target(target)
-    factors = read_factors(loads, "--loads"), read_factors(supplies, "--supplies")
-    objective = RobustObjective(quantile, quantile_weight, air_weight, travel_weight)
-    request = TuneRequest(
-        read_index(index), objective, Perturbations(*factors, leak, delay, draws), budget, seed, rules
-    )  # fmt: skip
-    result = _search(loaded, loaded.bounds(bounds or ()), request)
-    loaded.save(result.tuning.gains, target)
-    page = _write(result, out)
-    if json:
-        print_json(_to_dict(result.tuning, target))
-    else:
-        _print(result, f"scenario: {target}", f"report: {page}")
-    if result.tuning.interrupted:
+    objective, perturbations = request.objective, request.perturbations
+    ranges = loaded.bounds(request.bounds)
+    tuning, notes, rules = _search(loaded, ranges, request, objective, perturbations)
+    loaded.save(tuning.gains, target)
+    problem = loaded.scenario.problem
+    chapter = tuning_chapter(tuning, loaded.scenario.title, _units(loaded), notes, rules, problem.integrator)
+    files = {HISTORY_FILE: lambda path: save_table(history_table(tuning), path)}
+    if tuning.interrupted:
+        echo("interrupted: the best gains so far are written", err=True)
+    deliver("tune", [chapter], json=json, out=out, title="Tuning", files=files, others={"scenario": target})
+    if tuning.interrupted:
         check_interrupted()
         raise KeyboardInterrupt
 
 
-def _search(loaded: ScenarioLoop, ranges: Mapping[str, tuple[float, float]], request: TuneRequest) -> TuneResult:
+def _search(
+    loaded: ScenarioLoop, ranges: Mapping[str, tuple[float, float]], request: TuneRequest, objective: RobustObjective,
+    perturbations: Perturbations,
+) -> tuple[Tuning, tuple[str, ...], tuple[RuleSettings, ...]]:  # fmt: skip
+    """The tuning, notes on the family of plants, and the settings of the rules."""
     problem = loaded.scenario.problem
-    family = loaded.family(request.perturbations, request.seed)
+    family = loaded.family(perturbations, request.seed)
     rules: tuple[RuleSettings, ...] = ()
     if request.rules:
         experiment = step_experiment(family.cases[0], problem.duration, integrator=problem.integrator)
         rules = rule_settings(experiment.model)
     with computation_progress("tuning") as show:
         tuning = find_gains(
-            family.cases, ranges, duration=problem.duration, index=request.tracking, objective=request.objective,
+            family.cases, ranges, duration=problem.duration, index=request.index(), objective=objective,
             budget=request.budget, seed=request.seed, start=rule_starts(rules, ranges), start_time=problem.start_time,
             integrator=problem.integrator, progress=lambda done, total: show(done / total),
         )  # fmt: skip
-    return TuneResult(loaded, tuning, family.notes, rules)
+    return tuning, family.notes, rules
 
 
-def _units(loaded: ScenarioLoop) -> dict[str, str]:
+def _units(loaded: ScenarioLoop) -> dict[str, Any]:
     """Units of the columns of the plant by name, and of the parameters of the controller by path."""
     scenario, loop = loaded.scenario, loaded.loop
     of_gains = {leaf.path: loaded.unit(leaf) for leaf in leaves(loop.controller)}
     return {**signal_units(scenario.plant, scenario.initial_state), **of_gains}
-
-
-def _write(result: TuneResult, out: Path) -> Path:
-    loaded = result.loaded
-    chapter = tuning_chapter(
-        result.tuning, loaded.scenario.title, _units(loaded), result.notes, result.rules,
-        loaded.scenario.problem.integrator,
-    )  # fmt: skip
-    with atomic_folder(out) as folder:
-        save_table(history_table(result.tuning), folder / HISTORY_FILE)
-        write_into(folder, [chapter], title="Tuning")
-    return out / "report.html"
-
-
-def _print(result: TuneResult, *files: str) -> None:
-    tuning = result.tuning
-    present = tuning.present_objective
-    before = "" if present is None else f", with the present gains {present:.4g}"
-    echo(f"{result.loaded.scenario.title}: objective {tuning.objective:.4g}{before}")
-    echo(f"{tuning.simulated_loops} loops: {len(tuning.history)} sets of gains in {len(tuning.cases)} cases")
-    _print_table(gain_table(tuning, _units(result.loaded)))
-    _print_table(case_table(tuning, _units(result.loaded)))
-    if result.rules:
-        _print_table(rule_table(result.rules))
-    for note in result.notes:
-        echo(f"note: {note}")
-    for path in tuning.on_bound:
-        echo(f"note: '{path}' is on a bound of its range; a wider range may give a smaller objective")
-    if tuning.interrupted:
-        echo("interrupted: the best gains so far are written", err=True)
-    for line in files:
-        echo(line)
-
-
-def _print_table(table: Table) -> None:
-    rows = [
-        tuple(value if isinstance(value, str) else format_number(value) for value in row) for row in table_rows(table)
-    ]
-    numeric = [name for name, values in table.columns.items() if not isinstance(next(iter(values)), str)]
-    print_table(list(table.columns), rows, right=numeric)
-
-
-def _to_dict(tuning: Tuning, target: Path) -> dict[str, Any]:
-    """A tuning as plain data, all numbers SI."""
-    metrics, best = tuning.history.metrics, tuning.best
-    return {
-        "gains": tuning.gains,
-        "objective": tuning.objective,
-        "present_objective": tuning.present_objective,
-        "loops": tuning.simulated_loops,
-        "seed": tuning.seed,
-        "interrupted": tuning.interrupted,
-        "on_bound": list(tuning.on_bound),
-        "cases": {
-            case.name: {"index": metrics.index[best, i], "air": metrics.air[best, i]}
-            for i, case in enumerate(tuning.cases)
-        },
-        "scenario": str(target),
-    }

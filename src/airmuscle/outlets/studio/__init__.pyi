@@ -1,3 +1,4 @@
+from ..requests.declaration import RequestError as RequestError
 from .app import MAX_PAGE as MAX_PAGE
 from .app import create_app as create_app
 from .app import library_list as library_list
@@ -6,7 +7,6 @@ from .fit_queue import MAX_WAITING as MAX_WAITING
 from .fit_queue import FitQueue as FitQueue
 from .fit_routes import MAX_SETTINGS as MAX_SETTINGS
 from .fit_routes import FitService as FitService
-from .fit_settings import FieldError as FieldError
 from .fit_task import run_fit as run_fit
 from .fit_uploads import UploadStore as UploadStore
 from .fit_uploads import check_file_name as check_file_name

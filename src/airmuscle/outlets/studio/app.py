@@ -15,13 +15,16 @@ from typing import Any
 
 from ...core.errors import AirmuscleError
 from ...files.library.files import LAWS, PLANTS, list_laws, list_plants, read_toml
+from ..requests.braid import BraidRequest
+from ..requests.declaration import RequestError, form_fields
+from ..requests.fit import FitRequest
+from ..requests.reading import ReadingRequest
 from .fit_routes import FitService
-from .fit_settings import FieldError
 from .joint_sheet import joint_names, sheet_of_joint
 from .page import self_contained_page, server_page, web_files
 from .requests import BadRequest, decoded, json_answer, limited_body
 from .security import Access, Application, cookie_name, given_token, secured
-from .size_sheet import size_sheet
+from .size_sheet import size_form, size_sheet
 from .tasks import (
     sheet_of_law,
     sheet_of_law_text,
@@ -91,7 +94,9 @@ def library_list() -> dict[str, Any]:
     """Names and titles of the laws and plants that the page offers."""
     kinds = {"laws": (LAWS, list_laws()), "plants": (PLANTS, list_plants()), "joints": (PLANTS, joint_names())}
     rows = {kind: [_row(folder, name) for name in names] for kind, (folder, names) in kinds.items()}
-    return {"version": metadata.version("airmuscle"), **rows}
+    requests = (ReadingRequest, BraidRequest, FitRequest)
+    forms = {"size": size_form(), "fit": [field for each in requests for field in form_fields(each)]}
+    return {"version": metadata.version("airmuscle"), **rows, "forms": forms}
 
 
 def _row(folder: Path, name: str) -> dict[str, str]:
@@ -252,7 +257,7 @@ def _without_script(sheet: Mapping[str, Any]) -> dict[str, Any]:
 async def _refused(request: Any, error: Exception) -> Any:
     assert isinstance(error, AirmuscleError)
     status = error.status if isinstance(error, BadRequest) else 503 if isinstance(error, LimitError) else 422
-    field = {"field": error.field} if isinstance(error, FieldError) else {}
+    field = {"field": error.field} if isinstance(error, RequestError) else {}
     return json_answer({"error": str(error.message), **field}, status)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 import airmuscle as am
 
 from ...core.errors import AirmuscleError, Hint, HintedText
-from .fit_settings import FieldError
+from ..requests.declaration import RequestError
 
 
 def _missing(hint: Hint) -> str:
@@ -53,10 +53,10 @@ def in_page_words(text: str) -> str:
     return text.written(sentence)
 
 
-def as_field_error(error: AirmuscleError, field: str = "") -> FieldError:
+def as_field_error(error: AirmuscleError, field: str = "") -> RequestError:
     """The error with its field: its own, that of its hint, or else `field`."""
     own = getattr(error, "field", "")
     hinted = next(
         (instruction[0] for hint in error.message.hints if (instruction := _INSTRUCTIONS.get(hint.argument))), ""
     )
-    return FieldError(in_page_words(error.message), own or hinted or field)
+    return RequestError(in_page_words(error.message), own or hinted or field)

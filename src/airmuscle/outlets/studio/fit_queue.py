@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ...core.errors import AirmuscleError
-from .fit_settings import FieldError
+from ..requests.declaration import RequestError
 from .requests import BadRequest
 from .worker import LimitedWorker, LimitError
 
@@ -160,7 +160,7 @@ class FitQueue:
             state, error = FAILED, str(reason)
         except AirmuscleError as reason:
             state, error = FAILED, str(reason)
-            field = reason.field if isinstance(reason, FieldError) else ""
+            field = reason.field if isinstance(reason, RequestError) else ""
         except Exception as reason:
             state, error = FAILED, f"the fit ended without a result ({type(reason).__name__})."
         if state != DONE:  # what a process that was ended has left

@@ -21,8 +21,9 @@ from ...bench.segment.outliers import Outlier, find_bench_outliers
 from ...core.errors import AirmuscleError, AirmuscleWarning, ColumnError
 from ...core.units import AMBIENT_PRESSURE, quantity
 from ...recording.heading import Heading, parse_heading
+from ..requests.declaration import RequestError
 from .fit_hints import as_field_error, in_page_words
-from .fit_settings import FieldError, FitSettings
+from .fit_settings import FitSettings
 from .fit_uploads import FILES
 
 MAX_ROWS = 200_000
@@ -60,7 +61,7 @@ class ReadSet:
     recordings: list[am.Recording] = dataclasses.field(default_factory=list)
     files: list[str] = dataclasses.field(default_factory=list)
     """The name of the file of each recording."""
-    problems: list[FieldError] = dataclasses.field(default_factory=list)
+    problems: list[RequestError] = dataclasses.field(default_factory=list)
     remarks: list[str] = dataclasses.field(default_factory=list)
     outliers: Sequence[Sequence[Outlier]] = ()
     """The suspected outliers of each recording that are left out."""
@@ -105,7 +106,7 @@ def _read_file(path: Path, settings: FitSettings, read: ReadSet) -> None:
         constants = _constants(path, settings)
     except AirmuscleError as error:
         problem = as_field_error(error, field)
-        read.complain(FieldError(without_folder(problem.message, path.parent), problem.field))
+        read.complain(RequestError(without_folder(problem.message, path.parent), problem.field))
         return
     for table in tables:
         columns = list(_columns(table, settings))[:MAX_COLUMNS]
@@ -193,7 +194,7 @@ def _name_and_unit(text: str) -> tuple[str, str, bool]:
 
 def _unit_problems(
     table: RawTable, columns: Sequence[FileColumn], constants: dict[str, float | str]
-) -> Iterator[FieldError]:
+) -> Iterator[RequestError]:
     """A problem for each column whose unit is missing or unknown, and for two columns of one quantity."""
     ambient = constants.get("ambient")
     pressure = quantity(ambient, "Pa", ambient=0.0) if ambient else AMBIENT_PRESSURE
@@ -202,7 +203,7 @@ def _unit_problems(
     double = next((column for column in used if column.known and names.count(column.name) > 1), None)
     if double is not None:
         keys = " and ".join(f"'{column.key}'" for column in used if column.name == double.name)
-        yield FieldError(
+        yield RequestError(
             f"{table.origin}: columns {keys} are both read as {double.name}. Select 'not used' for all but one.",
             f"column:{double.key}",
         )
@@ -218,7 +219,7 @@ def _unit_problems(
         try:
             unit_conversion(table, heading, pressure)
         except AirmuscleError as error:
-            yield FieldError(_unit_text(column, heading, error), f"column:{column.key}")
+            yield RequestError(_unit_text(column, heading, error), f"column:{column.key}")
 
 
 def _unit_text(column: FileColumn, heading: Heading, error: AirmuscleError) -> str:
@@ -236,7 +237,7 @@ def _check_needed(recording: am.Recording, file: str, read: ReadSet) -> None:
         if name == "contraction" and moved:
             text = f"{recording.origin}: the resting length is not known, which converts the {moved} to a contraction."
             read.complain(
-                FieldError(f"{text} Write it into the field 'Resting length', such as 300 mm.", "resting_length")
+                RequestError(f"{text} Write it into the field 'Resting length', such as 300 mm.", "resting_length")
             )
         elif name == "contraction":
             text = (
@@ -244,6 +245,6 @@ def _check_needed(recording: am.Recording, file: str, read: ReadSet) -> None:
                 "be a shortening or an elongation, or write the length at which the muscle was held into the row of "
                 "the file."
             )
-            read.complain(FieldError(text, f"file:{file}"))
+            read.complain(RequestError(text, f"file:{file}"))
         else:
-            read.complain(FieldError(f"{recording.origin}: no column is a {name}. Select its column.", "columns"))
+            read.complain(RequestError(f"{recording.origin}: no column is a {name}. Select its column.", "columns"))

@@ -10,7 +10,10 @@ import airmuscle as am
 from ...bench.identify.curve_plots import band_curves
 from ...bench.identify.law_selection import LawSelection
 from ...bench.identify.static_fit_chapter import equation_section
+from ...report.chapter import Chapter
+from ...report.data import in_words
 from ...report.formula import to_display_mathml
+from ...report.sheet import as_sheet
 from .fit_hints import in_page_words
 
 MAX_POINTS = 4000
@@ -25,47 +28,19 @@ def result_sheet(selection: LawSelection, fit: am.Fit) -> dict[str, Any]:
         "parameters": best.parameter_count,
         "error": best.cross_validated_rmse,
         "reason": selection.reason,
-        "comparisons": [_comparison(each) for each in selection.comparisons],
-        "fit": _fit(fit),
+        "comparisons": [
+            {"purpose": each.purpose, "group": each.leave_out.group_name, **_sheet(each.chapter())}
+            for each in selection.comparisons
+        ],
+        "fit": _sheet(fit.chapter()),
         "equations": _equations(fit),
         "parity": _parity(fit),
         "bands": _bands(fit),
     }
 
 
-def _comparison(comparison: am.bench.Comparison) -> dict[str, Any]:
-    left_out = (*comparison.excluded, *comparison.unavailable)
-    return {
-        "purpose": comparison.purpose,
-        "group": comparison.leave_out.group_name,
-        "reason": comparison.reason,
-        "notes": [in_page_words(note) for note in comparison.notes],
-        "ranking": [
-            {
-                "law": each.candidate.name, "parameters": each.parameter_count, "in_sample": each.in_sample_rmse,
-                "left_out": each.cross_validated_rmse, "aicc": each.aicc, "notes": list(each.notes),
-            }
-            for each in comparison.ranking
-        ],
-        "excluded": [{"law": e.name, "cause": e.cause, "reason": in_page_words(e.reason)} for e in left_out],
-    }  # fmt: skip
-
-
-def _fit(fit: am.Fit) -> dict[str, Any]:
-    return {
-        "law": type(fit.model).__name__,
-        "summary": [list(row) for row in fit.summary()],
-        "rmse": fit.rmse,
-        "r2": fit.r2,
-        "estimates": [
-            {
-                "name": e.name, "symbol": e.label, "value": e.value, "standard_error": e.stderr,
-                "unit": e.display_unit, "meaning": e.meaning, "on_bound": bool(e.on_bound),
-            }
-            for e in fit.estimates
-        ],
-        "notes": [in_page_words(note) for note in fit.notes],
-    }  # fmt: skip
+def _sheet(chapter: Chapter) -> dict[str, Any]:
+    return as_sheet(in_words(chapter, in_page_words))
 
 
 def _equations(fit: am.Fit) -> list[dict[str, Any]]:

@@ -11,7 +11,8 @@ import numpy.typing as npt
 import airmuscle as am
 
 from ...bench.segment.outliers import Outlier, kept_rows, leave_out
-from .fit_settings import FieldError, Rule
+from ..requests.declaration import RequestError
+from .fit_settings import Rule
 
 Mask = npt.NDArray[np.bool_]
 
@@ -25,13 +26,15 @@ def inside(rule: Rule, recording: am.Recording) -> Mask:
         return mask
     for name, (low, high) in rule.ranges.items():
         if name not in recording:
-            raise FieldError(f"{recording.origin}: no column '{name[:40]}', which a selection of rows names.", "rules")
+            raise RequestError(
+                f"{recording.origin}: no column '{name[:40]}', which a selection of rows names.", "rules"
+            )
         mask &= (recording[name] >= low) & (recording[name] <= high)
     return mask
 
 
 def used_rows(recording: am.Recording, rules: Sequence[Rule], outliers: Sequence[Outlier] = ()) -> Mask:
-    """The rows of a recording that the rules leave, without outliers, shape (N,). Raises FieldError for an unknown
+    """The rows of a recording that the rules leave, without outliers, shape (N,). Raises RequestError for an unknown
     column."""
     used = kept_rows(recording, outliers)
     for rule in rules:
@@ -47,7 +50,7 @@ def selected(
 ) -> list[am.Recording]:
     """The recordings reduced to the selected rows, with a note on what was left out; without those that are empty.
 
-    The rows of the rules and of the outliers of each recording are those of the file. Raises FieldError if no row is
+    The rows of the rules and of the outliers of each recording are those of the file. Raises RequestError if no row is
     left.
     """
     kept = []
@@ -61,5 +64,5 @@ def selected(
         elif used.any():
             kept.append(dataclasses.replace(recording.rows(used), notes=(*recording.notes, note)))
     if recordings and not kept:
-        raise FieldError("no row is left; remove a selection.", "rules")
+        raise RequestError("no row is left; remove a selection.", "rules")
     return kept

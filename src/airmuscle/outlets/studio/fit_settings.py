@@ -7,24 +7,24 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import airmuscle as am
 
-from ...bench.readers import mapping_of_tables
-from ...core.errors import AirmuscleError, InputError
+from ...core.errors import AirmuscleError
 from ...core.units import quantity
 from ...files.library.files import list_laws
+from ..requests import fit
+from ..requests.braid import BraidRequest, BraidSize
+from ..requests.declaration import RequestError, build, form_fields
+from ..requests.reading import ReadingRequest
 
 MAX_RULES = 200
 """Maximum number of selections of rows (chosen)."""
 MAX_CHOICES = 500
 """Maximum number of corrected columns, or of files with facts of their own (chosen)."""
-TEXTS = (
-    "resting_length", "ambient", "displacement_zero", "file_name", "decimal", "delimiter", "sheet", "group", "time",
-    "skip_rows", "missing", "missing_codes", "outliers",
-)  # fmt: skip
+TEXTS = tuple(each["name"] for each in form_fields(ReadingRequest))
 """Fields with a text that applies to all files."""
 CONSTANTS = {"resting_length": "300 mm", "ambient": "98 kPa", "displacement_zero": "12 mm"}
 """Those that are constants of the runs, with an example."""
@@ -34,14 +34,7 @@ FILE_FACTS = ("resting_length", "length", "specimen")
 """Facts that may be stated for one file."""
 COLUMN_CHOICES = (*am.recording.QUANTITIES, "resting_length", "ambient")
 """Quantities of a column."""
-SPLITS: Mapping[str, am.bench.GroupSplit | None] = {
-    "": None,
-    "run": am.bench.RunSplit(),
-    "specimen": am.bench.SpecimenSplit(),
-    "contraction": am.bench.LevelSplit("contraction"),
-    "pressure": am.bench.LevelSplit("pressure"),
-    "block": am.bench.BlockSplit(),
-}
+SPLITS: Mapping[str, am.bench.GroupSplit | None] = {"": None, **fit.SPLITS}
 """Groups that are left out in turn; by default those that the data allow."""
 _UNITS = {
     "braid_radius": "m",
@@ -51,14 +44,6 @@ _UNITS = {
     "displacement_zero": "m",
     "length": "m",
 }
-
-
-class FieldError(InputError):
-    """An input of the page that is not possible, with the field that it concerns."""
-
-    def __init__(self, message: str, field: str = "") -> None:
-        super().__init__(message)
-        self.field = field
 
 
 @dataclasses.dataclass(frozen=True)
@@ -94,43 +79,31 @@ class FitSettings:
     hysteresis: bool
 
     def mapping(self, columns: Mapping[str, str] | None = None) -> am.bench.ColumnMapping:
-        """The interpretation of all files, with these columns in place of all. Raises FieldError."""
-        texts: dict[str, Any] = {name: text for name, text in self.texts.items() if text and name not in BRAID}
-        constants = {name: texts.pop(name) for name in CONSTANTS if name in texts}
-        codes = texts.pop("missing_codes", "").replace(";", ",").split(",")
-        if "skip_rows" in texts:
-            texts["skip_rows"] = _line_count(texts["skip_rows"])
+        """The interpretation of all files, with these columns in place of all. Raises RequestError."""
+        codes = self.texts["missing_code"].replace(";", ",").split(",")
+        texts: dict[str, Any] = {**self.texts, "missing_code": [each for each in codes if each.strip()]}
         try:
             chosen = self.columns if columns is None else columns
-            stated = {
-                "columns": chosen,
-                "missing_codes": [each for each in codes if each.strip()],
-                **constants,
-                **texts,
-            }
-            return mapping_of_tables(stated, "mapping")
+            return build(ReadingRequest, texts, _words).column_mapping(columns=chosen)
         except AirmuscleError as error:
-            field = next((name for name in TEXTS if name.split("_")[0] in error.message[:40]), "columns")
-            raise FieldError(error.message, field) from None
+            named = next((name for name in TEXTS if name.split("_")[0] in error.message[:40]), "columns")
+            raise RequestError(error.message, getattr(error, "field", "") or named) from None
 
-    def braid(self, resting_lengths: Sequence[float]) -> am.geometry.Braid | None:
-        """The braid for the resting lengths [m] of the records; None if none is stated. Raises FieldError."""
-        sizes = [quantity(self.texts[name], _UNITS[name]) for name in BRAID if self.texts[name]]
-        if not sizes:
-            return None
-        if len(resting_lengths) != 1:
-            stated = ", ".join(f"{1e3 * length:.4g} mm" for length in resting_lengths) or "none"
-            raise FieldError(f"a braid has exactly one resting length; the files state {stated}.", "resting_length")
-        try:
-            return am.geometry.Braid(sizes[0], sizes[1], resting_lengths[0])
-        except AirmuscleError as error:
-            raise FieldError(error.message, "braid_angle" if "angle" in error.message else "braid_radius") from None
+    @property
+    def braid(self) -> BraidSize | None:
+        """The size of the braid; None if none is stated. Raises RequestError."""
+        texts = {name: self.texts[name] for name in BRAID}
+        return build(BraidRequest, texts, _words).size
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
 
 
 def read_settings(data: Any) -> FitSettings:
-    """The settings in a request of the page. Raises FieldError."""
+    """The settings in a request of the page. Raises RequestError."""
     if not isinstance(data, dict):
-        raise FieldError("the request must be a table of settings.")
+        raise RequestError("the request must be a table of settings.")
     texts = {name: _text(data.get(name, ""), name) for name in (*TEXTS, *BRAID)}
     facts = _table(data.get("files", {}), "files")
     settings = FitSettings(
@@ -150,17 +123,15 @@ def _check(settings: FitSettings) -> None:
     for name in (*CONSTANTS, *BRAID):
         if settings.texts[name]:
             _check_quantity(settings.texts[name], name, name)
-    missing = [name for name in BRAID if not settings.texts[name]]
-    if len(missing) == 1:
-        raise FieldError("a braid needs its radius and its angle.", missing[0])
+    _ = settings.braid  # checks it
     for file, facts in settings.facts.items():
         for name in ("resting_length", "length"):
             if facts.get(name):
                 _check_quantity(facts[name], name, f"file:{file}")
     if settings.entry and settings.entry not in list_laws():
-        raise FieldError(f"the library has no muscle or law '{settings.entry}'.", "entry")
+        raise RequestError(f"the library has no muscle or law '{settings.entry}'.", "entry")
     if settings.leave_out not in SPLITS:
-        raise FieldError(
+        raise RequestError(
             f"'{settings.leave_out}' is no group; allowed: {', '.join(filter(None, SPLITS))}.", "leave_out"
         )
     settings.mapping()
@@ -172,30 +143,24 @@ def _check_quantity(text: str, name: str, field: str) -> None:
     try:
         value = quantity(text, _UNITS[name], ambient=0.0, where=words)
     except AirmuscleError as error:
-        raise FieldError(f"{error.message} Write a number with its unit, such as {example}.", field) from None
+        raise RequestError(f"{error.message} Write a number with its unit, such as {example}.", field) from None
     signed = name == "displacement_zero"
     if not (math.isfinite(value) and (signed or value > 0)):
         allowed = "finite" if signed else "positive"
-        raise FieldError(f"{words} is {text}; it must be {allowed}, such as {example}.", field)
-
-
-def _line_count(text: str) -> int:
-    if not (text.isdecimal() and len(text) < 8):
-        raise FieldError(
-            f"lines above the headings is {text}; it must be a whole number from 0, such as 7.", "skip_rows"
-        )
-    return int(text)
+        raise RequestError(f"{words} is {text}; it must be {allowed}, such as {example}.", field)
 
 
 def _text(value: Any, field: str, longest: int = 200) -> str:
     if not isinstance(value, str) or len(value) > longest or not value.isprintable():
-        raise FieldError(f"{field.replace('_', ' ')} must be a text of at most {longest} printable characters.", field)
+        raise RequestError(
+            f"{field.replace('_', ' ')} must be a text of at most {longest} printable characters.", field
+        )
     return value.strip()
 
 
 def _table(value: Any, field: str) -> dict[str, Any]:
     if not isinstance(value, dict) or len(value) > MAX_CHOICES:
-        raise FieldError(f"{field} must be a table with at most {MAX_CHOICES} rows.", field)
+        raise RequestError(f"{field} must be a table with at most {MAX_CHOICES} rows.", field)
     return value
 
 
@@ -203,12 +168,12 @@ def _heading(key: str, value: Any) -> str:
     """The heading that a correction gives a column; empty for one that is not used."""
     field = f"column:{key}"
     if not isinstance(value, dict):
-        raise FieldError("a column needs a quantity and a unit.", field)
+        raise RequestError("a column needs a quantity and a unit.", field)
     name, unit = _text(value.get("quantity", ""), field), _text(value.get("unit", ""), field, 40)
     if not name:
         return ""
     if name not in COLUMN_CHOICES:
-        raise FieldError(f"'{name[:40]}' is no known quantity; allowed: {', '.join(COLUMN_CHOICES)}.", field)
+        raise RequestError(f"'{name[:40]}' is no known quantity; allowed: {', '.join(COLUMN_CHOICES)}.", field)
     return f"{name} [{unit}]" if unit else name
 
 
@@ -216,7 +181,7 @@ def _facts(file: str, value: Any) -> dict[str, str]:
     facts = _table(value, f"file:{file}")
     unknown = [name for name in facts if name not in FILE_FACTS]
     if unknown:
-        raise FieldError(
+        raise RequestError(
             f"'{str(unknown[0])[:40]}' is no fact of a file; allowed: {', '.join(FILE_FACTS)}.", f"file:{file}"
         )
     return {name: text for name in FILE_FACTS if (text := _text(facts.get(name, ""), f"file:{file}"))}
@@ -224,7 +189,7 @@ def _facts(file: str, value: Any) -> dict[str, str]:
 
 def _rules(value: Any) -> tuple[Rule, ...]:
     if not isinstance(value, list) or len(value) > MAX_RULES:
-        raise FieldError(f"at most {MAX_RULES} selections of rows are possible; remove some.", "rules")
+        raise RequestError(f"at most {MAX_RULES} selections of rows are possible; remove some.", "rules")
     return tuple(map(_rule, value))
 
 
@@ -240,7 +205,7 @@ def _rule(value: Any) -> Rule:
             raise ValueError
         return Rule(recordings, ranges, rows, value.get("keep") is True)
     except (AttributeError, TypeError, ValueError):
-        raise FieldError(
+        raise RequestError(
             "a selection of rows needs ranges of columns, or the first and the last row.", "rules"
         ) from None
 

@@ -16,10 +16,11 @@ from ...bench.segment import Inspection, Run, inspect_all
 from ...bench.segment.outliers import Outlier, kept_rows
 from ...core.errors import AirmuscleError
 from ...recording.display_units import display_scale
+from ..requests.declaration import RequestError
 from .fit_hints import in_page_words
 from .fit_reading import ReadSet, read_set
 from .fit_selection import used_rows
-from .fit_settings import FieldError, FitSettings, Rule
+from .fit_settings import FitSettings, Rule
 from .fit_uploads import FILES
 
 MAX_POINTS = 9000
@@ -59,11 +60,11 @@ def _selected_rows(read: ReadSet, rules: Sequence[Rule]) -> list[Any]:
     for recording, outliers in zip(read.recordings, read.outliers, strict=True):
         try:
             used.append(used_rows(recording, rules, outliers))
-        except FieldError as error:
+        except RequestError as error:
             read.complain(error)
             used.append(np.ones(len(recording), dtype=bool))
     if used and not any(rows.any() for rows in used):
-        read.complain(FieldError("no row is left; remove a selection.", "rules"))
+        read.complain(RequestError("no row is left; remove a selection.", "rules"))
     return used
 
 

@@ -6,7 +6,6 @@ their folder together at the end.
 
 from __future__ import annotations
 
-import dataclasses
 import itertools
 import warnings
 import zipfile
@@ -18,25 +17,28 @@ import numpy as np
 
 import airmuscle as am
 
-from ...bench.identify.compare_chapter import compare_chapters
-from ...bench.identify.hysteresis import LoopFit, find_loops, fit_jointly, fit_loop, loops_not_joined, preferred_fit
-from ...bench.identify.hysteresis.hysteresis_chapter import hysteresis_chapters
+from ...bench.identify.hysteresis import LoopFit, find_loops, fit_jointly, fit_loop, loops_not_joined
+from ...bench.identify.hysteresis.hysteresis_chapter import hysteresis_chapters, joint_friction_chapter, loop_chapter
 from ...bench.identify.hysteresis.joint import select_friction
-from ...bench.identify.law_selection import LawSelection, select_law
-from ...bench.identify.specimen_errors import odd_specimen_notes, ranked_specimen_errors
 from ...bench.segment import check_contents, motion_direction
 from ...core.atomic_output import atomic_folder
 from ...core.errors import AirmuscleError, AirmuscleWarning
-from ...files.library.entry import Entry
-from ...files.library.fitted_entry import fitted_entry, left_out_ratio, missing_geometry
-from ...files.library.initial_law import find_initial_law, resting_lengths
-from ...files.library.write import part_toml, write_fit
-from ...report.write import as_json, write_into
+from ...files.library.fitted_entry import missing_geometry
+from ...files.library.initial_law import resting_lengths
+from ...files.library.write import part_toml, save
+from ...report.chapter import Chapter
+from ...report.data import as_json, in_words
+from ...report.sheet import as_sheet
+from ...report.write import write_into
+from ..requests.braid import problem_of_lengths
+from ..requests.declaration import RequestError
+from ..requests.fit import FitRequest
+from ..requests.fitting import fit_requested
 from .fit_hints import as_field_error, in_page_words
 from .fit_reading import read_set
 from .fit_result import result_sheet
 from .fit_selection import selected
-from .fit_settings import SPLITS, FieldError, FitSettings
+from .fit_settings import SPLITS, FitSettings
 
 Report = Callable[[float, str], None]
 DOWNLOADS = ("report.html", "muscle.toml", "report.zip", "friction.html", "friction.toml")
@@ -58,81 +60,52 @@ MAX_POINTS = 2000
 def run_fit(folder: str, out: str, settings: FitSettings, report: Report) -> None:
     """Fit the selected rows of a set of files, and write result.json, report and muscle into `out`.
 
-    Raises FieldError for input of the page that is not possible.
+    Raises RequestError for input of the page that is not possible.
     """
     report(0.0, "reading the files")
     recordings, names = _recordings(Path(folder), settings)
     report(SHARES[0], "comparison of the laws")
-    braid = settings.braid(resting_lengths(recordings))
+    braid = settings.braid
+    if braid is not None and (problem := problem_of_lengths(resting_lengths(recordings))):
+        raise RequestError(problem, "resting_length")
+
+    def progress(name: str, fraction: float) -> None:
+        report(SHARES[0] + (SHARES[1] - SHARES[0]) * fraction, f"comparison: {name}" if name else "comparison")
+
+    request = FitRequest(
+        compare=True, characteristic=settings.entry or None, leave_out=SPLITS[settings.leave_out], braid=braid
+    )
     try:
-        selection, geometry = _select(recordings, settings, report)
+        found = fit_requested(request, names, recordings, progress)
     except AirmuscleError as error:
         raise as_field_error(error, "fit") from None
-    best = selection.recommended
-    own = isinstance(getattr(best.candidate.law, "geometry", None), am.geometry.Geometry)
-    initial = Entry(
-        best.candidate.name, best.candidate.name, "chosen", best.candidate.law, geometry if own else braid or geometry
-    )
-    errors = ranked_specimen_errors(best, selection.comparisons, recordings)
-    entry = fitted_entry(best.fit, initial, names, left_out_ratio(best), recordings, errors)
-    chapters = compare_chapters(selection.comparisons, best, selection.reason)
+    assert found.selection is not None
+    chapters = [in_words(chapter, in_page_words) for chapter in found.chapters]
     with atomic_folder(out) as staging, warnings.catch_warnings():
         warnings.simplefilter("ignore", AirmuscleWarning)
-        sheet = {**result_sheet(selection, best.fit), "rows": sum(map(len, recordings))}
+        sheet = {**result_sheet(found.selection, found.fit), "rows": sum(map(len, recordings))}
         sheet["hysteresis"] = _friction(recordings, staging, report) if settings.hysteresis else None
         report(SHARES[2], "report")
-        write_fit(staging, best.fit, entry, recordings, chapters)
-        odd = [in_page_words(note) for note in odd_specimen_notes(errors)]
-        unused = [f"The braid is not used: {best.candidate.name} contains its geometry, which was fitted."]
-        sheet["notes"] = [*odd, *(unused if own and braid else []), *([GEOMETRY] if missing_geometry(entry) else [])]
+        save(found.entry, staging / "muscle.toml")
+        write_into(staging, chapters, title="Fit")
+        sheet["notes"] = [*map(in_page_words, found.notes), *([GEOMETRY] if missing_geometry(found.entry) else [])]
         sheet["files"] = _pack(staging)
         (staging / RESULT).write_text(as_json(sheet), encoding="utf-8")
 
 
 def _recordings(folder: Path, settings: FitSettings) -> tuple[list[am.Recording], list[Path]]:
-    """The selected rows of all recordings, and the names of the files. Raises the first problem as FieldError."""
+    """The selected rows of all recordings, and the names of the files. Raises the first problem as RequestError."""
     read = read_set(folder, settings)
     if read.problems:
         raise read.problems[0]
     if not read.recordings:
-        raise FieldError("there is no file; drop a measurement file first.", "files")
+        raise RequestError("there is no file; drop a measurement file first.", "files")
     recordings = selected(read.recordings, settings.rules, read.outliers)
     try:
         check_contents(recordings)
     except AirmuscleError as error:
         raise as_field_error(error, "rules" if settings.rules else "files") from None
     return recordings, [Path(name) for name in dict.fromkeys(read.files)]
-
-
-def _select(
-    recordings: Sequence[am.Recording], settings: FitSettings, report: Report
-) -> tuple[LawSelection, am.geometry.Geometry | None]:
-    """The selected law, in the words of the page, and the geometry of the library entry if its law is selected."""
-
-    def progress(name: str, fraction: float) -> None:
-        report(SHARES[0] + (SHARES[1] - SHARES[0]) * fraction, f"comparison: {name}" if name else "comparison")
-
-    named = find_initial_law(settings.entry, recordings, 5, "library entry") if settings.entry else None
-    candidates: list[am.bench.Candidate] | None = None
-    if named is not None:
-        own = am.bench.Candidate(f"{settings.entry} (named)", named.entry.characteristic, named.fixed)
-        candidates = [*am.bench.standard_candidates(recordings), own]
-    selection = select_law(recordings, candidates, leave_out=SPLITS[settings.leave_out], progress=progress)
-    is_named = candidates is not None and selection.recommended.candidate is candidates[-1]
-    return _in_page_words(selection), named.entry.geometry if named is not None and is_named else None
-
-
-def _in_page_words(selection: LawSelection) -> LawSelection:
-    """The selection whose reasons and notes name fields of the page."""
-    best = selection.recommended
-    fit = best.fit.with_notes(map(in_page_words, best.fit.notes))
-    comparisons = tuple(
-        dataclasses.replace(
-            each, excluded=tuple(dataclasses.replace(e, reason=in_page_words(e.reason)) for e in each.excluded)
-        )
-        for each in selection.comparisons
-    )
-    return dataclasses.replace(selection, comparisons=comparisons, recommended=dataclasses.replace(best, fit=fit))
 
 
 def _friction(recordings: Sequence[am.Recording], folder: Path, report: Report) -> dict[str, Any]:
@@ -157,13 +130,18 @@ def _friction(recordings: Sequence[am.Recording], folder: Path, report: Report) 
     return {
         "reason": "",
         "loops": [_loop(fit) for fit in fits],
-        "joint": "" if not joint else str(preferred_fit(joint) or joint[0]),
-        "remarks": [*remarks, *(loops_not_joined(fits) if joint else ())],
+        "joint": _sheet(joint_friction_chapter(joint, loops_not_joined(fits))) if joint else None,
+        "remarks": remarks,
     }
 
 
+def _sheet(chapter: Chapter) -> dict[str, Any]:
+    return as_sheet(in_words(chapter, in_page_words))
+
+
 def _write_friction(folder: Path, fits: Sequence[LoopFit], joint: Any) -> None:
-    write_into(_made(folder / "friction"), hysteresis_chapters(fits, (), joint), title="Friction")
+    chapters = [in_words(chapter, in_page_words) for chapter in hysteresis_chapters(fits, joint)]
+    write_into(_made(folder / "friction"), chapters, title="Friction")
     chosen = select_friction(fits, joint)
     if chosen is not None:
         text = f"# {chosen.verdict}\n{part_toml('friction', chosen.friction)}"
@@ -177,27 +155,18 @@ def _made(folder: Path) -> Path:
 
 
 def _loop(fit: LoopFit) -> dict[str, Any]:
-    recording, best = fit.loop.recording, fit.recommended
+    recording = fit.loop.recording
     varied = "contraction" if {"contraction", "length"} & set(fit.loop.run.swept_columns) else "pressure"
     direction = motion_direction(fit.loop.friction_path.displacement(recording), recording.columns.get("time"))
     rows = slice(None, None, max(1, -(-len(recording) // MAX_POINTS)))
     return {
-        "title": f"{recording.origin}: {fit.loop.description}",
+        **_sheet(loop_chapter(fit)),
+        "justified": fit.recommended is not None,
         "varied": varied,
         "x": recording[varied][rows],
         "force": recording["force"][rows],
         "direction": np.asarray(direction)[rows],
-        "models": [
-            {
-                "model": type(each.friction).__name__, "without": each.rmse_without_friction, "error": each.rmse,
-                "gap_without": each.gap, "gap": each.residual_gap, "p_value": each.p_value, "justified": each.justified,
-            }
-            for each in fit.fits
-        ],
-        "verdict": str(best) if best is not None else "The data justify no friction model for this loop.",
-        "usable": fit.usable_in_plant,
-        "failed": [f"{name} was not fitted: {in_page_words(reason)}" for name, reason in fit.failed.items()],
-    }  # fmt: skip
+    }
 
 
 def _pack(folder: Path) -> list[str]:

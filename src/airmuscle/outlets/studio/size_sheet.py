@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,17 +11,19 @@ import numpy as np
 import airmuscle as am
 
 from ...core.arrays import Array
-from ...core.errors import AirmuscleError, ParameterError, UnitError
-from ...core.units import quantity
-from ...design.sizing.sizing_chapter import choice_row
+from ...core.errors import AirmuscleError, ParameterError
+from ...design.sizing.chapter import product_of, sizing_chapter
+from ...design.sizing.scenario import sizing_scenario
 from ...physics.muscle.characteristic.validity_range import validity_range_of
 from ...physics.muscle.isobars import compute_isobars
+from ...report.sheet import as_sheet, csv_text
+from ..requests.declaration import build, form_fields, options_of
+from ..requests.size import JOINT, LIFT, SizeRequest
 
-FIELDS = (
-    "kind", "load", "stroke", "stiffness", "torque", "angle", "inertia", "supply", "safety", "cycle_time",
-    "max_length", "max_diameter", "max_count", "sort",
-)  # fmt: skip
-"""Fields of a request; each is a text as a user types it, and may be empty where it is optional."""
+OMITTED = ("count", "muscle")
+"""Fields of the command that the page does not have."""
+FIELDS = tuple(each.name for each in options_of(SizeRequest) if each.name not in OMITTED)
+"""Fields of the page; each is a text as a user types it, and may be empty where it is optional."""
 MAX_CHOICES = 30
 """Maximum number of choices that the page receives (chosen)."""
 MAX_FIELD = 60
@@ -31,22 +32,31 @@ POINTS = 81
 """Points of a curve (chosen)."""
 
 
+def size_form() -> dict[str, Any]:
+    """The fields of the form of the page: those of a lift, of a joint, and of both."""
+    fields = {each["name"]: each for each in form_fields(SizeRequest) if each["name"] not in OMITTED}
+    common = [each for name, each in fields.items() if name not in (*LIFT, *JOINT)]
+    return {"lift": [fields[name] for name in LIFT], "joint": [fields[name] for name in JOINT], "all": common}
+
+
 def size_sheet(text: str) -> dict[str, Any]:
-    """The sheet of a request in JSON. Raises ParameterError, UnitError, or SolveError with what is reachable."""
+    """The sheet of a request in JSON. Raises InputError, or SolveError with what is reachable."""
     given = read_request(text)
-    requirement, conditions = _requirement(given), _conditions(given)
-    result = am.design.size_muscles(requirement, conditions, sort=am.design.SORT_KEYS[given["sort"]])
-    result.check_reachable()
+    request = build(SizeRequest, given, lambda name: name.replace("_", " "))
+    result = request.evaluate()
+    chapter = sizing_chapter(result, sizing_scenario(result.choices, "in the page"))
     sheet: dict[str, Any] = {
         "tab": "size",
         "name": "sizing",
-        "title": requirement.describe(),
         "provenance": "the library",
         "request": given,
+        "form": size_form(),
         "own_text": text,
+        **as_sheet(chapter),
+        "title": result.requirement.describe(),
+        "csv": "\n".join(csv_text(table) for table in chapter.tables[1:3]),
         "choices": [_choice(choice) for choice in result.choices[:MAX_CHOICES]],
         "left_out": max(0, len(result.choices) - MAX_CHOICES),
-        "unsuitable": [{"name": item.name, "count": item.count, "reason": item.reason} for item in result.unsuitable],
     }
     sheet["id"] = hashlib.sha256(json.dumps(sheet).encode()).hexdigest()[:32]
     return {**sheet, "script": '"use strict";\n'}
@@ -62,62 +72,20 @@ def read_request(text: str) -> dict[str, str]:
         raise ParameterError(f"the request must have the fields {', '.join(FIELDS)} and no others.")
     if not all(isinstance(value, str) and len(value) <= MAX_FIELD for value in given.values()):
         raise ParameterError(f"the fields of the request must be texts of at most {MAX_FIELD} characters.")
-    fields = {name: given.get(name, "").strip() for name in FIELDS}
-    if fields["kind"] not in ("lift", "joint"):
-        raise ParameterError("kind must be lift or joint.")
-    if fields["sort"] not in am.design.SORT_KEYS:
-        raise ParameterError(f"sort must be one of {', '.join(am.design.SORT_KEYS)}.")
-    return fields
-
-
-def _read(given: Mapping[str, str], name: str, unit: str, default: float | None = None) -> float:
-    """A quantity; the default where the field is empty."""
-    label = name.replace("_", " ")
-    if not given[name]:
-        if default is None:
-            raise ParameterError(f"{label} is missing; give a number with its unit.")
-        return default
-    return quantity(given[name], unit, where=label)
-
-
-def _requirement(given: Mapping[str, str]) -> am.design.Requirement:
-    if given["kind"] == "joint":
-        inertia = _read(given, "inertia", "kg m^2", 0.0)
-        return am.design.JointRequirement(_read(given, "angle", "rad"), _read(given, "torque", "N m"), inertia)
-    try:
-        load = {"mass": _read(given, "load", "kg")}
-    except UnitError:
-        load = {"force": _read(given, "load", "N")}
-    return am.design.LiftRequirement(
-        _read(given, "stroke", "m"), stiffness=_read(given, "stiffness", "N/m", 0.0), **load
-    )
-
-
-def _conditions(given: Mapping[str, str]) -> am.design.SizingConditions:
-    default = am.design.SizingConditions
-    count = given["max_count"] or str(default.max_count)
-    if not count.isascii() or not count.isdecimal():
-        raise ParameterError(f"the maximum number of muscles is '{count}'; give a whole number.")
-    return am.design.SizingConditions(
-        _read(given, "supply", "Pa"),
-        _read(given, "safety", "1", default.safety_factor),
-        _read(given, "cycle_time", "s", default.cycle_time),
-        _read(given, "max_length", "m", default.max_length),
-        _read(given, "max_diameter", "m", default.max_diameter),
-        max_count=int(count),
-    )
+    return {name: given.get(name, "").strip() for name in FIELDS}
 
 
 def _choice(choice: am.design.MuscleChoice) -> dict[str, Any]:
-    """A choice with its row of the table, its chart and its scenario, or the reason why it has none."""
+    """A choice with its chart and its scenario, or the reason why it has none."""
     try:
         scenario, reason = am.design.scenario_text(choice), ""
     except AirmuscleError as error:
         scenario, reason = "", str(error.message)
+    radius = choice.design.radius
+    of_radius = "" if radius is None else f", pulley radius {1e3 * radius:.4g} mm"
     return {
         "name": choice.entry.name,
-        "title": choice.entry.title,
-        "row": {header: _number(value) for header, value in choice_row(choice).items()},
+        "label": f"{choice.total_count} × {product_of(choice)}, {1e3 * choice.length:.4g} mm{of_radius}",
         "chart": _chart(choice),
         "scenario": scenario,
         "reason": reason,
@@ -144,10 +112,6 @@ def _chart(choice: am.design.MuscleChoice) -> dict[str, Any]:
         chart["load"] = {"contractions": _rounded(contractions), "forces": _rounded(load / choice.count),
                          "factor": choice.conditions.safety_factor}  # fmt: skip
     return chart
-
-
-def _number(value: Any) -> Any:
-    return float(value) if isinstance(value, float | np.floating) else value
 
 
 def _rounded(values: Array) -> list[float | None]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Callable
 from typing import Any
 
 from ...core import plotting
 from ...core.display import contraction_text, quantity_text
 from ...recording import Recording
-from ...report.chapter import Plot, Table
+from ...report.chapter import Plot, Table, TableColumn
 from .characteristic.base import Characteristic
 from .characteristic.validity_range import ValidityRange
 from .isobars import Isobars, WorkingPoint, axis_scales, draw_isobars, forces_along, mask_slack
@@ -20,20 +21,41 @@ MAX_TITLE_LINES = 3
 def isobar_table(curves: Isobars, name: str = "isobars") -> Table:
     """Return the isobars as a table with one column of tensions per pressure."""
     columns = {
-        f"force at {pressure / 1e3:.6g} kPa [N]": forces
+        f"force at {pressure / 1e3:.6g} kPa": TableColumn(forces, "N")
         for pressure, forces in zip(curves.pressures, curves.forces, strict=True)
     }
-    return Table(name, "Isobars", {"contraction [1]": curves.contractions, **columns}, "Gauge pressures.", shown=False)
+    first = {"contraction": TableColumn(curves.contractions, "1")}
+    return Table(name, "Isobars", {**first, **columns}, "Gauge pressures.", series=True)
 
 
 def isobar_plot(
+    characteristic: Characteristic,
+    title: str,
+    curves: Isobars | Callable[[], Isobars],
+    validity_range: ValidityRange | None = None,
+    point: WorkingPoint | None = None,
+    measured: Recording | None = None,
+) -> Plot:
+    """Return the plot of the isobars, or of those that a function computes when it is drawn."""
+
+    def draw() -> Any:
+        drawn = curves() if callable(curves) else curves
+        return isobar_figure(characteristic, title, drawn, validity_range, point, measured)
+
+    caption = f"{title}: force over contraction at constant gauge pressure."
+    if point is not None:
+        caption += f" Working point: {describe_point(point)}."
+    return Plot("isobars", caption, draw)
+
+
+def isobar_figure(
     characteristic: Characteristic,
     title: str,
     curves: Isobars,
     validity_range: ValidityRange | None = None,
     point: WorkingPoint | None = None,
     measured: Recording | None = None,
-) -> Plot:
+) -> Any:
     """Return the figure of the isobars: shaded outside the validity range, with the working point if one is given.
 
     `measured` points are drawn with the curve of the same pressure.
@@ -45,10 +67,7 @@ def isobar_plot(
     if point is not None:
         _draw_working_point(axes, characteristic, curves, point)
     plotting.legend_outside(axes, title="gauge pressure")
-    caption = f"{title}: force over contraction at constant gauge pressure."
-    if point is not None:
-        caption += f" Working point: {describe_point(point)}."
-    return Plot("isobars", caption, figure)
+    return figure
 
 
 def describe_point(point: WorkingPoint) -> str:

@@ -6,16 +6,22 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
-from ....report.chapter import Chapter, Plot, Table
+from ....core.arrays import Array
+from ....physics.muscle import CreepElements
+from ....report.chapter import Chapter, Plot, Table, TableColumn
+from ....report.data import as_data
 from ..compare_chapter import compare_chapter
 from ..dynamic.dynamic_chapter import dynamic_chapters
+from ..experiment_design import run_table
 from ..hysteresis import loops_not_joined
-from ..hysteresis.hysteresis_chapter import hysteresis_chapters
-from ..hysteresis.joint_friction_chapter import joint_friction_chapter
+from ..hysteresis.hysteresis_chapter import hysteresis_chapters, joint_friction_chapter
 from ..static_fit_chapter import MuscleDescription, fit_chapter
 from . import Campaign, CreepStage, FillStage, FrictionStage, LeftOutStage, RecordKind, ReleaseStage, StaticStage
 from .campaign_plots import characteristic_plot, creep_plot, fill_plot, prediction_plot, residual_plot
 from .campaign_stages import USES, count_records, stage_result
+
+MAX_NEXT = 4
+"""Rows of unused records and of further experiments in the brief view (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -46,71 +52,109 @@ def campaign_chapters(
     validation: Sequence[ValidationRow] = (),
 ) -> list[Chapter]:
     """Return the chapters of a campaign; `scenarios` are pairs of a record and its scenario file or the reason."""
-    chapters = [_overview(campaign, unread, dict(scenarios)), _predictions(campaign, validation), _next(campaign)]
-    if isinstance(campaign.static, StaticStage) and entry is not None:
-        chapters.append(compare_chapter(campaign.static.comparison))
-        chapters.append(fit_chapter(campaign.static.fit, entry))
-    if isinstance(campaign.hysteresis, FrictionStage):
-        loops, joint = campaign.hysteresis.loops, campaign.hysteresis.joint
-        chapters += [joint_friction_chapter(joint, loops_not_joined(loops))] if joint else hysteresis_chapters(loops)
-    if isinstance(campaign.creep, CreepStage):
-        chapters.append(_creep(campaign.creep))
-    if isinstance(campaign.fills, FillStage):
-        chapters += _prefixed(dynamic_chapters(campaign.fills.fit, "Fills and volume"), "fill")
-    if isinstance(campaign.release, ReleaseStage):
-        chapters += _prefixed(dynamic_chapters(campaign.release.fit, "Release"), "release")
-    return chapters
+    stages = [stage for _, stage in campaign.stages]
+    chapters = [_predictions(campaign)]
+    for stage in sorted(stages, key=lambda each: not isinstance(each, StaticStage)):
+        chapters += stage_chapters(stage, entry)
+    parts = [dataclasses.replace(chapter, brief=False) for chapter in chapters]
+    return [_overview(campaign, unread, dict(scenarios), validation), _next(campaign), *parts]
 
 
-def _overview(campaign: Campaign, unread: Sequence[UnreadFile], scenarios: dict[str, str]) -> Chapter:
-    """Return the chapter of the stages and the records."""
+def stage_chapters(stage: object, entry: MuscleDescription | None = None) -> list[Chapter]:
+    """Return the chapters of one stage; that of the static law has the chapter of the muscle if its entry is given."""
+    if isinstance(stage, StaticStage):
+        fitted = stage.fit.chapter() if entry is None else fit_chapter(stage.fit, entry)
+        return [compare_chapter(stage.comparison), fitted]
+    if isinstance(stage, FrictionStage):
+        loops, joint = stage.loops, stage.joint
+        return [joint_friction_chapter(joint, loops_not_joined(loops))] if joint else hysteresis_chapters(loops)
+    if isinstance(stage, CreepStage):
+        holds = [f"{origin}: {fit.verdict}" for origin, fit in stage.holds]
+        chapter = creep_chapter(stage.verdict, holds, stage.elements, stage.standard_errors)
+        return [dataclasses.replace(chapter, plots=(creep_plot(stage),))]
+    if isinstance(stage, FillStage):
+        return [each.among("fill-") for each in dynamic_chapters(stage.fit, "Fills and volume")]
+    if isinstance(stage, ReleaseStage):
+        return [each.among("release-") for each in dynamic_chapters(stage.fit, "Release")]
+    return []
+
+
+def stage_data(name: str, stage: object) -> dict[str, Any]:
+    """Return a stage as plain data: name, verdict, whether it is identified, its chapters or the reason."""
+    data: dict[str, Any] = {"stage": name, "verdict": getattr(stage, "verdict", "")}
+    if isinstance(stage, LeftOutStage):
+        return data | {"identified": False, "reason": stage.reason, "remedy": stage.remedy}
+    if isinstance(stage, tuple):
+        return data | {"count": len(stage)}
+    return data | {"identified": True, **as_data(stage_chapters(stage))}
+
+
+def _overview(
+    campaign: Campaign, unread: Sequence[UnreadFile], scenarios: dict[str, str], validation: Sequence[ValidationRow]
+) -> Chapter:
+    """Return the chapter of the stages, the bands and the records."""
     used = sum(record.kind is not RecordKind.UNUSED for record in campaign.records)
     sentences = [f"{used} of {len(campaign.records)} records are used."]
     if unread:
         sentences.append(f"{len(unread)} {'file' if len(unread) == 1 else 'files'} could not be read.")
-    left_out = [name for name, stage in campaign.stages if isinstance(stage, LeftOutStage)]
-    sentences.append(f"Not identified: {', '.join(left_out)}." if left_out else "All stages are identified.")
-    if isinstance(campaign.static, StaticStage):
-        sentences += [*(f"{band}" for band in campaign.static.all_bands), *campaign.static.data_notes]
+    left_out = [(name, stage) for name, stage in campaign.stages if isinstance(stage, LeftOutStage)]
+    names = ", ".join(name for name, _ in left_out)
+    sentences.append(f"Not identified: {names}." if left_out else "All stages are identified.")
+    notes = list(campaign.static.data_notes) if isinstance(campaign.static, StaticStage) else []
+    notes += [f"{name}: {stage.reason}; {stage.remedy}" for name, stage in left_out]
     columns: dict[str, Any] = {
         "stage": [name for name, _ in campaign.stages],
         "records": [count_records(campaign, name) for name, _ in campaign.stages],
+        "identified": TableColumn([not isinstance(stage, LeftOutStage) for _, stage in campaign.stages], brief=False),
         "result": [stage_result(stage) for _, stage in campaign.stages],
     }
     tables = [
-        Table("campaign-stages", "Stages", columns), _record_table(campaign, scenarios), _unread_table(unread)
+        Table("campaign-stages", "Stages", columns, brief=len(campaign.stages), key="stages"), _band_table(campaign),
+        _validation_table(validation), _record_table(campaign, scenarios), _unread_table(unread),
     ]  # fmt: skip
     return Chapter(
-        paper="campaign",
+        name="campaign",
         title="Overview",
         summary=" ".join(sentences),
         tables=tuple(table for table in tables if table is not None),
+        notes=tuple(notes),
     )
 
 
-def _predictions(campaign: Campaign, validation: Sequence[ValidationRow]) -> Chapter:
+def _predictions(campaign: Campaign) -> Chapter:
     """Return the chapter of the muscle: characteristic, predicted loops and fills, residuals and bands."""
     plots: list[Plot | None] = [characteristic_plot(campaign), prediction_plot(campaign), residual_plot(campaign)]
     if isinstance(campaign.fills, FillStage):
         plots.append(fill_plot(campaign.fills))
-    tables = [_band_table(campaign), _validation_table(validation)]
     return Chapter(
-        paper="campaign-muscle",
+        name="campaign-muscle",
         title="Muscle and prediction error",
         summary="The predicted force is that of the static law minus friction and creep along the recorded motion.",
-        tables=tuple(table for table in tables if table is not None),
         plots=tuple(plot for plot in plots if plot is not None),
     )
 
 
 def _next(campaign: Campaign) -> Chapter:
     """Return the chapter of the next experiments."""
-    tables = [_next_table(campaign), _plan_table(campaign)]
+    plan = next((each.plan for each in campaign.next_experiments if each.plan is not None), None)
+    columns = {
+        "measure": [each.measure for each in campaign.next_experiments],
+        "because of": TableColumn([each.purpose for each in campaign.next_experiments], brief=False),
+    }
+    tables = (
+        [Table("campaign-next", "Experiments", columns, brief=MAX_NEXT, key="experiments")]
+        if campaign.next_experiments
+        else []
+    )
+    if plan is not None:
+        tables.append(dataclasses.replace(
+            run_table(plan.runs, "campaign-plan", "D-optimal static runs to measure next"), brief=0
+        ))  # fmt: skip
     return Chapter(
-        paper="campaign-next",
+        name="campaign-next",
         title="What to measure next",
         summary="Missing stages first, then parameters that the records do not determine, then further static runs.",
-        tables=tuple(table for table in tables if table is not None),
+        tables=tuple(tables),
     )
 
 
@@ -120,12 +164,14 @@ def _band_table(campaign: Campaign) -> Table | None:
     bands = campaign.static.all_bands
     columns: dict[str, Any] = {
         "prediction of": [band.purpose for band in bands],
-        "half width of the 95 % band [N]": [band.half_width for band in bands],
-        "rms error [N]": [band.rmse for band in bands],
-        "groups left out": [band.groups for band in bands],
-        "rows": [band.rows for band in bands],
+        "half width of the 95 % band": TableColumn(
+            [band.half_width for band in bands], "N", digits=3, short="95 % band ±"
+        ),
+        "rms error": TableColumn([band.rmse for band in bands], "N", digits=3),
+        "groups left out": TableColumn([band.groups for band in bands], brief=False),
+        "rows": TableColumn([band.rows for band in bands], brief=False),
     }
-    return Table("campaign-bands", "Error of the predicted force", columns)
+    return Table("campaign-bands", "Error of the predicted force", columns, brief=len(bands), key="bands")
 
 
 def _validation_table(rows: Sequence[ValidationRow]) -> Table | None:
@@ -133,12 +179,14 @@ def _validation_table(rows: Sequence[ValidationRow]) -> Table | None:
         return None
     columns: dict[str, Any] = {
         "record": [row.record for row in rows],
-        "rms error [N]": [row.rmse for row in rows],
-        "half width of the 95 % band [N]": [row.half_width for row in rows],
-        "rows within the band [%]": [100.0 * row.share for row in rows],
+        "rms error": TableColumn([row.rmse for row in rows], "N"),
+        "half width of the 95 % band": TableColumn(
+            [row.half_width for row in rows], "N", digits=3, short="95 % band ±"
+        ),
+        "rows within the band": TableColumn([row.share for row in rows], "1", "%", digits=3, short="within"),
         "rows": [row.rows for row in rows],
     }
-    return Table("campaign-validation", "Records that were kept aside", columns)
+    return Table("campaign-validation", "Records that were kept aside", columns, brief=len(rows), key="validation")
 
 
 def _record_table(campaign: Campaign, scenarios: dict[str, str]) -> Table:
@@ -146,78 +194,38 @@ def _record_table(campaign: Campaign, scenarios: dict[str, str]) -> Table:
     columns: dict[str, Any] = {
         "record": [record.origin for record in records],
         "kind": [record.kind.value for record in records],
-        "resting length [mm]": [None if r.resting_length is None else 1e3 * r.resting_length for r in records],
-        "rows": [len(record.recording) for record in records],
+        "resting length": TableColumn([record.resting_length for record in records], "m", "mm", brief=False),
+        "rows": TableColumn([len(record.recording) for record in records], brief=False),
         "reason": [record.reason for record in records],
-        "used for": [USES[record.kind] for record in records],
-        "scenario": [scenarios.get(record.origin, "") for record in records],
+        "used for": TableColumn([USES[record.kind] for record in records], brief=False),
+        "scenario": TableColumn([scenarios.get(record.origin, "") for record in records], brief=False),
     }
-    return Table("campaign-records", "Records and their use", columns)
+    unused = [i for i, record in enumerate(records) if record.kind is RecordKind.UNUSED]
+    return Table("campaign-records", "Records and their use", columns, brief=unused[:MAX_NEXT], key="records")
 
 
 def _unread_table(unread: Sequence[UnreadFile]) -> Table | None:
     if not unread:
         return None
     columns = {"file": [file.name for file in unread], "reason": [file.reason for file in unread]}
-    return Table("campaign-unread", "Files that could not be read", columns)
+    return Table("campaign-unread", "Files that could not be read", columns, brief=MAX_NEXT, key="unread")
 
 
-def _next_table(campaign: Campaign) -> Table | None:
-    if not campaign.next_experiments:
-        return None
-    columns = {
-        "measure": [each.measure for each in campaign.next_experiments],
-        "because of": [each.purpose for each in campaign.next_experiments],
-    }
-    return Table("campaign-next", "Experiments", columns)
+def creep_chapter(verdict: str, sentences: Sequence[str], elements: CreepElements, standard_errors: Array) -> Chapter:
+    """Return the chapter of creep: the verdict, a sentence on each hold, and the Maxwell elements.
 
-
-def _plan_table(campaign: Campaign) -> Table | None:
-    """Return the static runs to measure next."""
-    plan = next((each.plan for each in campaign.next_experiments if each.plan is not None), None)
-    if plan is None:
-        return None
-    units = {"pressure": (1e-3, "kPa"), "contraction": (100.0, "%")}
-
-    def text(name: str, value: float) -> str:
-        factor, unit = units[name]
-        return f"{0.0 if abs(factor * value) < 5e-3 else factor * value:.4g} {unit}"
-
+    standard_errors  of the stiffnesses [N/m], then of the relaxation times [s]
+    """
+    count = len(elements.stiffnesses)
     columns: dict[str, Any] = {
-        "constant": [f"{run.constant} {text(run.constant, run.level)}" for run in plan.runs],
-        "swept": [f"{run.swept} {' to '.join(text(run.swept, end) for end in run.sweep_limits)}" for run in plan.runs],
-        "points": [run.force.size for run in plan.runs],
-        "expected force [N]": [f"{run.force.min():.4g} to {run.force.max():.4g}" for run in plan.runs],
-    }
-    return Table("campaign-plan", "D-optimal static runs to measure next", columns)
-
-
-def _creep(stage: CreepStage) -> Chapter:
-    holds = "\n\n".join(f"{origin}: {fit.verdict}" for origin, fit in stage.holds)
-    count = len(stage.elements.stiffnesses)
-    columns: dict[str, Any] = {
-        "stiffness [N/m]": list(stage.elements.stiffnesses),
-        "standard error [N/m]": stage.standard_errors[:count].tolist(),
-        "relaxation time [s]": list(stage.elements.relaxation_times),
-        "standard error [s]": stage.standard_errors[count:].tolist(),
+        "stiffness": TableColumn(elements.stiffnesses, "N/m"),
+        "standard error of the stiffness": TableColumn(standard_errors[:count], "N/m"),
+        "relaxation time": TableColumn(elements.relaxation_times, "s"),
+        "standard error of the time": TableColumn(standard_errors[count:], "s"),
     }
     return Chapter(
-        paper="campaign-creep",
+        name="creep",
         title="Creep",
-        summary=f"{stage.verdict}\n\n{holds}",
-        tables=(Table("campaign-creep", "Maxwell elements", columns),),
-        plots=(creep_plot(stage),),
+        summary=(verdict, *sentences),
+        tables=(Table("creep-elements", "Maxwell elements", columns, brief=count),) if count else (),
     )
-
-
-def _prefixed(chapters: Sequence[Chapter], prefix: str) -> list[Chapter]:
-    """Return the chapters with a prefix of the names of their tables and figures, which must be unique in a report."""
-    return [
-        dataclasses.replace(
-            chapter,
-            paper=f"{prefix}-{chapter.paper}",
-            tables=tuple(dataclasses.replace(table, name=f"{prefix}-{table.name}") for table in chapter.tables),
-            plots=tuple(dataclasses.replace(plot, name=f"{prefix}-{plot.name}") for plot in chapter.plots),
-        )
-        for chapter in chapters
-    ]

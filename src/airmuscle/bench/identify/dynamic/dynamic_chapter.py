@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,11 +12,12 @@ import numpy as np
 from ....core.plotting import BLACK, BLUE, RED, legend_below, new_figure
 from ....core.reference import cite
 from ....recording.display_units import display_scale, displayed
-from ....recording.recording import column_heading
-from ....report.chapter import Chapter, Plot, Table
-from ..uncertainty_chapter import NORMAL_QUANTILE, UNBOUNDED
-from . import CrossPrediction, DynamicFit, describe_cross_predictions
-from .problem import DynamicProfile
+from ....report.chapter import BY_ROW, Chapter, Plot, Table, TableColumn
+from ...reported import unit_column
+from ..result import MAX_ROWS
+from ..uncertainty_chapter import NORMAL_QUANTILE
+from . import CrossPrediction, DynamicFit, RegulatorFit, describe_cross_predictions
+from .problem import MIN_IMPROVEMENT, DynamicProfile
 
 MAX_OPTIMA = 8
 """Maximum number of optima in a table; the lowest are shown."""
@@ -37,34 +40,26 @@ def dynamic_chapters(
     return [*chapters, *(_record(fit, i) for i in range(len(fit.problem.record_models)))]
 
 
+def regulator_chapters(result: RegulatorFit, title: str) -> list[Chapter]:
+    """Return the chapters of the fit of a pressure regulator, as those of a dynamic fit."""
+    first, own = _estimates(result.fit, title, (), ()), result.chapter()
+    records = [_record(result.fit, i) for i in range(len(result.zeros))]
+    return [dataclasses.replace(first, tables=(*first.tables, own.tables[-1]), notes=own.notes), *records]
+
+
 def _estimates(fit: DynamicFit, title: str, remarks: Sequence[str], cross: Sequence[CrossPrediction]) -> Chapter:
-    identifiability = fit.identifiability
-    sentences = [
-        *([describe_cross_predictions(cross)] if cross else []),
-        f"Standard deviation of the residuals: {fit.residual_std:.3g} sensor standard deviations. Identifiable: "
-        f"{identifiability.rank} of {identifiability.singular_values.size} unknowns that are not on a bound. "
-        f"{fit.starts_at_optimum} of {fit.costs.size} initial points converged to this optimum.",
-        *(f"{note[:1].upper()}{note[1:].rstrip('.')}." for note in fit.notes),
-        *remarks,
-    ]
-    rms = {
-        "record": [c.experiment.recording.origin for c in fit.problem.record_models for _ in c.names],
-        "quantity": [name for c in fit.problem.record_models for name in c.names],
-        "rms residual": [displayed(n, fit.rms(n, i)) for i, c in enumerate(fit.problem.record_models) for n in c.names],
-    }
-    tables = [
-        *_cross_table(cross),
-        _estimate_table(fit),
-        *_undetermined_table(fit),
-        *_optima_table(fit),
-        Table("rms", "Residuals by record", rms),
-        _correlations(fit),
-    ]
-    return Chapter(
-        paper="dynamic",
+    chapter = fit.chapter()
+    estimates, residuals = chapter.tables
+    if cross:  # the table of the cross-predictions contains the residuals, too
+        residuals = dataclasses.replace(residuals, brief=0)
+    tables = [*_cross_table(cross), estimates, *_undetermined_table(fit), *_optima_table(fit), residuals]
+    return dataclasses.replace(
+        chapter,
         title=title,
-        summary="\n\n".join(sentences),
-        tables=tuple(tables),
+        summary=(*([describe_cross_predictions(cross)] if cross else []), *chapter.paragraphs),
+        tables=(*tables, _correlations(fit)),
+        plots=(),
+        notes=(*chapter.notes, *remarks),
         references=tuple(cite(fit.plant())),
     )
 
@@ -76,25 +71,21 @@ def _cross_table(cross: Sequence[CrossPrediction]) -> list[Table]:
     columns: dict[str, Any] = {
         "record": [each.record for each, _ in pairs],
         "quantity": [name for _, name in pairs],
-        "rms error, predicted by the others": [displayed(name, each.rms[name]) for each, name in pairs],
-        "rms residual of the joint fit": [displayed(name, each.fitted[name]) for each, name in pairs],
-    }
-    return [Table("cross", "Each record predicted by the parameters of the others", columns)]
-
-
-def _estimate_table(fit: DynamicFit) -> Table:
-    return Table(
-        "estimates",
-        "Estimates",
-        {
-            "parameter": [e.name for e in fit.estimates],
-            "symbol": [e.label for e in fit.estimates],
-            "value (SI)": [e.value for e in fit.estimates],
-            "2 standard errors (SI)": ["on bound" if e.on_bound else 2 * e.stderr for e in fit.estimates],
-            "unit": ["" if e.unit == "1" else e.unit for e in fit.estimates],
-            "meaning": [e.meaning for e in fit.estimates],
-        },
-    )
+        "rms error, predicted by the others": TableColumn([each.rms[name] for each, name in pairs], BY_ROW,
+                                                     short="rms error"),
+        "rms residual of the joint fit": TableColumn([each.fitted[name] for each, name in pairs], BY_ROW,
+                                                short="joint fit"),
+        "unit": unit_column([name for _, name in pairs]),
+    }  # fmt: skip
+    return [
+        Table(
+            "cross",
+            "Each record predicted by the parameters of the others",
+            columns,
+            brief=MAX_ROWS,
+            key="cross-predictions",
+        )
+    ]
 
 
 def _undetermined_table(fit: DynamicFit) -> list[Table]:
@@ -117,15 +108,13 @@ def _optima_table(fit: DynamicFit) -> list[Table]:
     if len(fit.optima) < 2:
         return []
     shown = fit.optima[:MAX_OPTIMA]
+    lowest = max(fit.optima[0].cost, 1e-300)
     columns: dict[str, Any] = {
         "searches": [each.searches for each in shown],
-        "rms residual relative to the lowest": [
-            float(np.sqrt(each.cost / max(fit.optima[0].cost, 1e-300))) for each in shown
-        ],
+        "rms residual relative to the lowest": [float(np.sqrt(each.cost / lowest)) for each in shown],
     }
     for i, estimate in enumerate(fit.estimates):
-        unit = f" [{estimate.display_unit}]" if estimate.display_unit else ""
-        columns[f"{estimate.name}{unit}"] = [float(each.values[i]) for each in shown]
+        columns[estimate.name] = TableColumn([float(each.values[i]) for each in shown], estimate.unit)
     return [Table("optima", "Optima of the searches", columns)]
 
 
@@ -139,21 +128,31 @@ _PROFILE_CAPTION = "Increase of the sum of squares; dashed: limit of the 95 % in
 
 
 def _profiles(profiles: Sequence[DynamicProfile]) -> Chapter:
-    ends = [profile.interval for profile in profiles]
     columns: dict[str, Any] = {
         "parameter": [p.name for p in profiles],
-        "2.5 % (SI)": [low if np.isfinite(low) else UNBOUNDED for low, _ in ends],
-        "97.5 % (SI)": [high if np.isfinite(high) else UNBOUNDED for _, high in ends],
-        "unit": ["" if p.unit == "1" else p.unit for p in profiles],
+        "95 % interval": TableColumn([p.interval for p in profiles], BY_ROW),
+        "unit": [p.unit for p in profiles],
+    }
+    rows = [(p, k) for p in profiles for k in range(len(p.values))]
+    courses: dict[str, Any] = {
+        "parameter": [p.name for p, _ in rows],
+        "value": TableColumn([float(p.values[k]) for p, k in rows], BY_ROW),
+        "increase of the sum of squares": [float(p.cost_increase[k]) for p, k in rows],
+        "unit": [p.unit for p, _ in rows],
     }
     return Chapter(
-        paper="profiles",
+        name="profiles",
         title="Profile likelihood",
-        summary="One parameter is fixed at a series of values and all others are estimated again. An end is unbounded "
+        summary="One parameter is fixed at a series of values and all others are estimated again. An end is missing "
         "if the sum of squares does not rise enough within these values: the records do not limit the parameter there.",
-        tables=(Table("profiles", "95 % intervals", columns),),
-        plots=(Plot("profiles", _PROFILE_CAPTION, _profile_figure(profiles)),),
-    )
+        tables=(
+            Table("profiles", "95 % intervals", columns, brief=MAX_ROWS),
+            Table("profile-courses", "Increase of the sum of squares [residual variances]", courses, shown=False),
+        ),
+        plots=(Plot("profiles", _PROFILE_CAPTION, partial(_profile_figure, profiles)),),
+        notes=tuple(f"{p.name}: a better fit was found on the profile: fit again from there" for p in profiles
+                    if p.cost_increase.min() < -MIN_IMPROVEMENT),
+    )  # fmt: skip
 
 
 def _profile_figure(profiles: Sequence[DynamicProfile]) -> Any:
@@ -180,19 +179,20 @@ def _record(fit: DynamicFit, number: int) -> Chapter:
     course = fit.problem.record_models[number]
     origin = course.experiment.recording.origin
     measured, modelled, errors = course.experiment.recording, fit.modelled(number), fit.residuals(number)
-    columns: dict[str, Any] = {"time [s]": course.times}
-    for name in course.names:
-        columns[f"measured {column_heading(name)}"] = measured[name]
-        columns[f"modelled {column_heading(name)}"] = modelled[name]
-        columns[f"residual of {column_heading(name)}"] = errors[name]
+    columns: dict[str, Any] = {"time": TableColumn(course.times, "s")}
+    for name, unit in zip(course.names, unit_column(course.names), strict=True):
+        columns[f"measured {name}"] = TableColumn(measured[name], unit)
+        columns[f"modelled {name}"] = TableColumn(modelled[name], unit)
+        columns[f"residual of {name}"] = TableColumn(errors[name], unit)
     rms = ", ".join(f"{name} {displayed(name, fit.rms(name, number))}" for name in course.names)
-    stem = f"record-{number + 1}"
+    stem, caption = f"record-{number + 1}", f"{origin}: measured and modelled values, and residuals."
     return Chapter(
-        paper=stem,
+        name=stem,
         title=f"Record {number + 1}: {origin}",
         summary=f"Rms residual: {rms}. The run begins at {course.start_time(fit.values):.4g} s of the record's time.",
-        tables=(Table(stem, "Measured and modelled values", columns, shown=False),),
-        plots=(Plot(stem, f"{origin}: measured and modelled values, and residuals.", _record_figure(fit, number)),),
+        tables=(Table(stem, "Measured and modelled values", columns, series=True),),
+        plots=(Plot(stem, caption, partial(_record_figure, fit, number)),),
+        brief=False,
     )
 
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from ....core import tree
 from ....core.arrays import Array
 from ....core.errors import AirmuscleError, IdentificationError, ParameterError, suggestion
-from ....core.short_repr import ShortRepr
+from ....report.chapter import Chapter, Table, TableColumn
+from ...reported import Reported
 from .candidate_records import CandidateRecord, candidate_records
 from .experiment import StartTime, Unknown, make_unknowns
 from .record_model import RecordModel
@@ -54,7 +56,7 @@ class RankedRecord:
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class RecordRanking(ShortRepr):
+class RecordRanking(Reported):
     """Candidate records in the order of their gain for a pair of parameters; the first separates it best."""
 
     pair: tuple[str, str]
@@ -79,6 +81,26 @@ class RecordRanking(ShortRepr):
             f"{now} To separate them, measure {best.description}: with it, the correlation is expected to be "
             f"{after.correlation:.2f} and the relative standard errors {_percent(after.standard_errors[0])} and "
             f"{_percent(after.standard_errors[1])}."
+        )
+
+    def chapter(self) -> Chapter:
+        """The description of the ranking: verdict, and gain, correlation and standard errors with each record."""
+        precisions = [self.now, *(each.precision for each in self.ranking)]
+        columns: dict[str, Any] = {
+            "record in addition": ["none", *(each.description for each in self.ranking)],
+            "gain": TableColumn([1.0, *(each.gain for each in self.ranking)], digits=3),
+            "correlation": TableColumn([each.correlation for each in precisions], digits=3),
+        }
+        for i, name in enumerate(self.pair):
+            errors = [each.standard_errors[i] for each in precisions]
+            columns[f"standard error of {name}"] = TableColumn(errors, "1", "%", digits=3, short=f"error of {i + 1}")
+        title = f"Expected precision of 1, {self.pair[0]}, and 2, {self.pair[1]}, with one further record"
+        return Chapter(
+            name="ranking",
+            title="Next record",
+            summary=self.verdict,
+            tables=(Table("ranking", title, columns, brief=len(precisions)),),
+            notes=tuple(f"left out: {reason}" for reason in self.failed),
         )
 
 

@@ -11,7 +11,6 @@ import numpy as np
 from ....core import tree
 from ....core.arrays import Array
 from ....core.errors import ColumnError, IdentificationError, ParameterError
-from ....core.short_repr import ShortRepr
 from ....engine.loop.inputs import Schedule
 from ....physics.mechanism import Isometric
 from ....physics.muscle import Muscle
@@ -19,6 +18,8 @@ from ....physics.muscle.geometry import Vessel
 from ....physics.plant import Plant
 from ....physics.pneumatics import Isothermal, PressureRegulator, Supply, Valve
 from ....recording import Recording
+from ....report.chapter import Chapter, Table, TableColumn
+from ...reported import Reported
 from .experiment import Experiment
 from .fit import fit_dynamic
 from .initial_conditions import InitialConditions
@@ -53,7 +54,7 @@ LIMITS = {"sensitivity": (200.0, 2e4), "overlap": (0.02, 1.0), "pilot_time": (0.
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class RegulatorFit(ShortRepr):
+class RegulatorFit(Reported):
     """A regulator identified from its records; `print` it.
 
     `fit` is the dynamic fit of a vessel behind the regulator, `zeros` [Pa] the difference of settled pressure and
@@ -85,10 +86,15 @@ class RegulatorFit(ShortRepr):
         assert isinstance(circuit, PressureRegulator)
         return circuit
 
-    def __str__(self) -> str:
-        zeros = ", ".join(f"{zero / 1e3:+.2f}" for zero in self.zeros)
-        subtracted = f"settled pressure minus command, taken as the zero of the sensor: {zeros} kPa"
-        return "\n".join([str(self.fit), subtracted, *(f"too little excited: {remark}" for remark in self.remarks)])
+    def chapter(self) -> Chapter:
+        """The description of the fit: that of the dynamic fit, zeros, and what is too little excited."""
+        chapter = self.fit.chapter()
+        zeros = TableColumn(self.zeros, "Pa", "kPa", digits=3)
+        title = "Settled pressure minus command, taken as the zero of the sensor"
+        names = [each.experiment.recording.origin for each in self.fit.problem.record_models]
+        table = Table("zeros", title, {"record": names, "zero": zeros}, brief=len(names))
+        notes = (*(f"too little excited: {remark}" for remark in self.remarks), *chapter.notes)
+        return dataclasses.replace(chapter, title="Pressure regulator", tables=(*chapter.tables, table), notes=notes)
 
 
 def fit_regulator(

@@ -15,10 +15,12 @@ from ....core.errors import IdentificationError, ParameterError, suggestion
 from ....core.plotting import BLACK, RED, given_axes, legend_outside, new_figure
 from ....engine.compile import System
 from ....recording import Recording
-from ....recording.display_units import display_scale, displayed
-from ....recording.notebook import Card, NotebookDisplay
+from ....recording.display_units import display_scale
+from ....report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
+from ....report.parameters import estimate_table
+from ...reported import Reported, unit_column
 from ..identifiability import Identifiability
-from ..result import Estimate, estimate_rows, estimate_table
+from ..result import MAX_ROWS, Estimate
 from .experiment import Unknown
 from .problem import DynamicFitProblem, DynamicProfile, compute_profile
 from .reliability import Optimum, searches_at_lowest
@@ -49,7 +51,7 @@ def plot_record(measured: Recording, modelled: Recording, names: Sequence[str], 
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class DynamicFit(NotebookDisplay):
+class DynamicFit(Reported):
     """Plant parameters estimated from transient records; `print` it."""
 
     problem: DynamicFitProblem
@@ -128,27 +130,42 @@ class DynamicFit(NotebookDisplay):
         model = self.problem.record_models[record]
         return plot_record(model.experiment.recording, self.modelled(record), model.names, ax)
 
-    def _card(self) -> Card:
-        return Card("Dynamic fit", estimate_rows(self.estimates), self.plot, [*self._summary_lines(), *self.notes])
-
-    def __str__(self) -> str:
-        notes = (f"note: {note}" for note in self.notes)
-        return "\n".join([*estimate_table(self.estimates), "", *self._summary_lines(), *notes])
-
-    def _summary_lines(self) -> list[str]:
-        lines = []
-        for i, model in enumerate(self.problem.record_models):
-            rms = ", ".join(f"{name} {displayed(name, self.rms(name, i))}" for name in model.names)
-            lines.append(f"record {i + 1}, {model.experiment.recording.origin}: rms residual {rms}")
+    def chapter(self) -> Chapter:
+        """The description of the fit: estimates, residuals of each record, identifiability, the records' courses."""
         analysis = self.identifiability
-        lines.append(
-            f"residual std {self.residual_std:.3g} times that of the sensors; rank {analysis.rank} of "
-            f"{analysis.singular_values.size} unknowns that are not on a bound"
-        )
         single = "one search, so other optima were not sought; increase the number of starts"
         several = f"{self.starts_at_optimum} of {self.costs.size} searches reached this optimum"
-        lines.append(single if self.costs.size == 1 else several)
-        return lines
+        return Chapter(
+            name="dynamic",
+            title="Dynamic fit",
+            summary=f"Residual standard deviation {self.residual_std:.3g} times that of the sensors; rank "
+            f"{analysis.rank} of {analysis.singular_values.size} unknowns that are not on a bound; "
+            f"{single if self.costs.size == 1 else several}.",
+            values=(
+                NamedValue("residual standard deviation", self.residual_std, "1", digits=3, brief=False,
+                         remark="relative to the sensors"),
+                NamedValue("rank", analysis.rank, brief=False),
+                NamedValue("unknowns not on a bound", analysis.singular_values.size, brief=False),
+                NamedValue("searches", self.costs.size, brief=False),
+                NamedValue("searches at the optimum", self.starts_at_optimum, brief=False),
+            ),
+            tables=(estimate_table(self.estimates, "estimates", "Estimates", brief=MAX_ROWS), self._rms_table),
+            plots=(Plot("record", "First record, measured and modelled.", self.plot),),
+            notes=self.notes,
+        )  # fmt: skip
+
+    @property
+    def _rms_table(self) -> Table:
+        """The rms residual of each observed quantity in each record."""
+        rows = [(i, each.experiment.recording.origin, name)
+                for i, each in enumerate(self.problem.record_models) for name in each.names]  # fmt: skip
+        columns: dict[str, Any] = {
+            "record": [origin for _, origin, _ in rows],
+            "quantity": [name for _, _, name in rows],
+            "rms residual": TableColumn([self.rms(name, i) for i, _, name in rows], BY_ROW),
+            "unit": unit_column([name for _, _, name in rows]),
+        }
+        return Table("rms", "Residuals by record", columns, brief=MAX_ROWS)
 
 
 MIN_RELATIVE_RESIDUAL = 0.02

@@ -14,7 +14,6 @@ from .fit import PressurePath as PressurePath
 from .fit import fit_hysteresis as fit_hysteresis
 from .fit import initial_friction_laws as initial_friction_laws
 from .fit import make_loop_series as make_loop_series
-from .hysteresis_chapter import describe_row_counts as describe_row_counts
 from .hysteresis_chapter import hysteresis_chapters as hysteresis_chapters
 from .joint import fit_jointly as fit_jointly
 from .joint import identified_friction as identified_friction

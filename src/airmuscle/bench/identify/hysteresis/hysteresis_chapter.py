@@ -1,119 +1,221 @@
-"""Report chapters: hysteresis loops with all fitted friction laws, and creep."""
+"""Report chapters: friction laws of each loop and of all runs together, and creep."""
 
 from __future__ import annotations
 
+import dataclasses
+import functools
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from ....core import leaves
 from ....core.plotting import BLACK, BLUE, RED, legend_below, new_figure
 from ....recording.display_units import display_scale
-from ....report.chapter import Chapter, Plot, Table
+from ....report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
 from ....report.formatting import P_VALUE
 from ...segment import motion_direction
-from . import HysteresisFit, HysteresisLoop, JointFit, LoopFit, loops_not_joined
-from .joint_friction_chapter import joint_friction_chapter
+from . import HysteresisFit, HysteresisLoop, JointFit, LoopFit, loops_not_joined, preferred_fit
 from .plot import plot_loops
 
+SEPARATE_LOOPS = 2
+"""Maximum number of loops of which the brief view has the laws of each; of more it has one row each (chosen)."""
 
-def hysteresis_chapters(
-    loop_fits: Sequence[LoopFit],
-    creep: Sequence[str] = (),
-    joint: Sequence[JointFit] = (),
-    remarks: Sequence[str] = (),
-) -> list[Chapter]:
-    """Return the chapter of the joint fits, if any, and one per loop; the sentences on creep form the last chapter.
 
-    Remarks on the data, such as the delay of a sensor, form the first one.
-    """
-    chapters = [Chapter("data", "Remarks on the data", "\n\n".join(remarks))] if remarks else []
+def hysteresis_chapters(loop_fits: Sequence[LoopFit], joint: Sequence[JointFit] = ()) -> list[Chapter]:
+    """Return the overview of several loops, the chapter of the joint fits, if any, and one chapter for each loop."""
+    chapters = [_overview(loop_fits)] if len(loop_fits) > 1 else []
     chapters += [joint_friction_chapter(joint, loops_not_joined(loop_fits))] if joint else []
-    chapters += [_chapter(each, "" if len(loop_fits) == 1 else f"-{i}") for i, each in enumerate(loop_fits, 1)]
-    if creep:
-        chapters.append(Chapter("creep", "Creep", "\n\n".join(creep)))
+    for i, each in enumerate(loop_fits, 1):
+        chapter = loop_chapter(each).among(suffix="" if len(loop_fits) == 1 else f"-{i}")
+        chapters.append(dataclasses.replace(chapter, brief=len(loop_fits) <= SEPARATE_LOOPS))
     return chapters
 
 
-def _chapter(loop_fit: LoopFit, suffix: str) -> Chapter:
+def _overview(loop_fits: Sequence[LoopFit]) -> Chapter:
+    """Return the chapter with one row for each loop: its preferred law, or that of the lowest AICc."""
+    best = [each.recommended or (each.fits[0] if each.fits else None) for each in loop_fits]
+    columns: dict[str, Any] = {
+        "run": [each.loop.recording.origin for each in loop_fits],
+        "kind": [each.loop.description for each in loop_fits],
+        "rows": [int(each.loop.fitted_rows.sum()) for each in loop_fits],
+        "law": [None if each is None else type(each.friction).__name__ for each in best],
+        "rms error without friction": TableColumn([each and each.rmse_without_friction for each in best], "N", digits=3,
+                                             short="without friction"),
+        "rms error": TableColumn([each and each.rmse for each in best], "N", digits=3),
+        "justified": [each.recommended is not None for each in loop_fits],
+        "usable in a plant": TableColumn([each.usable_in_plant for each in loop_fits], brief=False),
+    }  # fmt: skip
+    failed: dict[str, list[str]] = {}
+    for each in loop_fits if len(loop_fits) > SEPARATE_LOOPS else ():
+        for name, reason in each.failed.items():
+            failed.setdefault(f"{name} was not fitted to {{}}: {reason}", []).append(each.loop.recording.origin)
+    justified = sum(each.recommended is not None for each in loop_fits)
+    return Chapter(
+        name="loops",
+        title="Hysteresis loops",
+        summary=f"{len(loop_fits)} loops; the data justify a friction law for {justified} of them.",
+        tables=(Table("loops", "Best law of each loop", columns, brief=12),),
+        notes=tuple(text.format(origins[0] if len(origins) == 1 else f"{len(origins)} runs")
+                    for text, origins in failed.items()),
+    )  # fmt: skip
+
+
+def loop_chapter(loop_fit: LoopFit) -> Chapter:
+    """Return the chapter of the friction laws of one loop."""
     loop = loop_fit.loop
     shown = loop_fit.recommended or (loop_fit.fits[0] if loop_fit.fits else None)
-    plots = [Plot(f"loop{suffix}", "Measured loop; light: rows that are not used.", _loop_figure(loop))]
-    tables = [_law_table(loop_fit, suffix)]
-    references: tuple[Any, ...] = ()
-    if shown is not None:
+    of_shown = None if shown is None else shown.chapter()
+    plots = [Plot("loop", "Measured loop; light: rows that are not used.", functools.partial(_figure, loop))]
+    tables = [_law_table(loop_fit)]
+    if shown is not None and of_shown is not None:
         law = type(shown.friction).__name__
-        plots.append(Plot(f"friction{suffix}", f"Loop and hysteresis described by {law}.", shown.plot()))
         caption = f"{law} with the fitted parameters: initial loading, outer loop and two minor loops."
-        plots.append(Plot(f"minor-loops{suffix}", caption, plot_loops(shown.friction, loop.friction_path.axis)))
-        tables.append(_parameter_table(shown, f"parameters{suffix}", f"Parameters of {law}"))
-        references = shown.friction.references
+        minor = functools.partial(plot_loops, shown.friction, loop.friction_path.axis)
+        plots += [*of_shown.plots, Plot("minor-loops", caption, minor)]
+        tables += [dataclasses.replace(table, brief=0) for table in of_shown.tables]
+    tables.append(_all_parameters(loop_fit))
     return Chapter(
-        paper=f"friction{suffix}",
+        name="friction",
         title=f"{loop.recording.origin}: {loop.description}",
-        summary="\n\n".join(_summary(loop_fit, shown)),
+        summary=tuple(_summary(loop_fit, shown)),
+        values=(
+            NamedValue("recommended", _name(loop_fit.recommended), brief=False),
+            NamedValue("usable in a plant", loop_fit.usable_in_plant, brief=False),
+        ),
         tables=tuple(tables),
         plots=tuple(plots),
-        references=references,
+        notes=tuple(_notes(loop_fit)),
+        references=() if of_shown is None else of_shown.references,
     )
 
 
-def _parameter_table(fit: HysteresisFit, name: str, title: str) -> Table:
-    """Return the parameters of a friction, in units of the quantity that drives it."""
-    headers = ("parameter", "symbol", "value (SI)", "unit", "meaning")
-    columns = zip(*fit.displayed_parameters, strict=True)
-    return Table(name, title, {header: list(column) for header, column in zip(headers, columns, strict=True)})
+def _name(fit: HysteresisFit | None) -> str | None:
+    return None if fit is None else type(fit.friction).__name__
 
 
 def _summary(loop_fit: LoopFit, shown: HysteresisFit | None) -> list[str]:
     loop = loop_fit.loop
-    sentences = [describe_row_counts(loop)]
-    if shown is not None and loop_fit.recommended is None:
-        sentences.append(
-            f"The data justify none of the laws; {type(shown.friction).__name__} is shown as the best one."
-        )
-    if shown is not None:
-        sentences.append(shown.verdict)
+    direction = motion_direction(loop.friction_path.displacement(loop.recording), loop.recording.columns.get("time"))
+    up, down = (int(np.count_nonzero((direction == sign) & loop.fitted_rows)) for sign in (1, -1))
+    rows = f"{up} rows of the rising branch and {down} of the falling branch are used, of {len(loop.recording)}."
+    if shown is None:
+        return [rows]
+    if loop_fit.recommended is None:
+        name = type(shown.friction).__name__
+        return [f"The data justify none of the laws; {name} is shown as the best one. {shown.verdict}", rows]
+    return [shown.verdict, rows]
+
+
+def _notes(loop_fit: LoopFit) -> list[str]:
+    notes = []
     if not loop_fit.usable_in_plant:
-        sentences.append(
+        notes.append(
             "The loop is isometric: the pressure moved the fibres at constant length, and only a friction force over "
             "pressure is determined. Such a friction describes isometric loops and cannot be used in a plant. For a "
             "friction that can, measure a loop of contraction at constant pressure."
         )
-    if loop.repeat is not None:
-        sentences.append(f"Validated on {loop.repeat[0].origin}, a second run at the same level.")
-    return [*sentences, *(f"{name} was not fitted: {reason}" for name, reason in loop_fit.failed.items())]
+    if loop_fit.loop.repeat is not None:
+        notes.append(f"Validated on {loop_fit.loop.repeat[0].origin}, a second run at the same level.")
+    return [*notes, *(f"{name} was not fitted: {reason}" for name, reason in loop_fit.failed.items())]
 
 
-def describe_row_counts(loop: HysteresisLoop) -> str:
-    """Return a sentence with the number of rows used from each branch."""
-    direction = motion_direction(loop.friction_path.displacement(loop.recording), loop.recording.columns.get("time"))
-    up, down = (int(np.count_nonzero((direction == sign) & loop.fitted_rows)) for sign in (1, -1))
-    return f"{up} rows of the rising branch and {down} of the falling branch are used, of {len(loop.recording)}."
-
-
-def _law_table(loop_fit: LoopFit, suffix: str) -> Table:
+def _law_table(loop_fit: LoopFit) -> Table:
     fits = loop_fit.fits
-    repeated = loop_fit.loop.repeat is not None
-    return Table(
-        f"laws{suffix}",
-        "Friction laws, best first",
-        {
-            "law": [type(f.friction).__name__ for f in fits],
-            "rms error without friction [N]": [f.rmse_without_friction for f in fits],
-            "rms error [N]": [f.rmse for f in fits],
-            **({"rms error on second run [N]": [f.repeat_rmse for f in fits]} if repeated else {}),
-            "branch gap without friction [N]": [f.gap for f in fits],
-            "remaining branch gap [N]": [f.residual_gap for f in fits],
-            "reduction of AICc": [f.aicc_reduction for f in fits],
-            P_VALUE: [f.p_value for f in fits],
-            "justified": ["yes" if f.justified else "no" for f in fits],
-            "not determined": [", ".join(f.undetermined) for f in fits],
-        },
+    columns: dict[str, Any] = {
+        "law": [type(f.friction).__name__ for f in fits],
+        "rms error without friction": TableColumn([f.rmse_without_friction for f in fits], "N", digits=3, brief=False),
+        "rms error": TableColumn([f.rmse for f in fits], "N", digits=3),
+    }
+    if loop_fit.loop.repeat is not None:
+        columns |= {
+            "rms error on second run": TableColumn([f.repeat_rmse for f in fits], "N", digits=3, short="on second run"),
+            "rms error on second run without friction": TableColumn(
+                [f.repeat_rmse_without_friction for f in fits], "N", digits=3, brief=False
+            ),
+            "repeatability": TableColumn([f.repeatability for f in fits], "N", digits=3, brief=False),
+        }
+    columns |= {
+        "branch gap without friction": TableColumn([f.gap for f in fits], "N", brief=False),
+        "remaining branch gap": TableColumn([f.residual_gap for f in fits], "N", digits=3),
+        "reduction of AICc": [f.aicc_reduction for f in fits],
+        P_VALUE: TableColumn([f.p_value for f in fits], brief=False),
+        "justified": [f.justified for f in fits],
+        "not determined": TableColumn([", ".join(f.undetermined) for f in fits], brief=False),
+    }
+    return Table("laws", "Friction laws, best first", columns, brief=len(fits))
+
+
+def _all_parameters(loop_fit: LoopFit) -> Table:
+    """Return the parameters of all laws of a loop."""
+    rows = [(type(f.friction).__name__, leaf) for f in loop_fit.fits for leaf in leaves(f.friction)]
+    columns: dict[str, Any] = {
+        "law": [law for law, _ in rows],
+        "parameter": [leaf.path for _, leaf in rows],
+        "value": TableColumn([leaf.value for _, leaf in rows], BY_ROW),
+        "unit": [leaf.declared.unit for _, leaf in rows],
+    }
+    return Table("law-parameters", "Parameters of all laws", columns, shown=False)
+
+
+def joint_friction_chapter(fits: Sequence[JointFit], not_joined: Sequence[str] = ()) -> Chapter:
+    """Return the chapter of the joint fits of all laws, lowest AICc first; the best justified one is shown.
+
+    `not_joined` are sentences on the loops that the joint fit does not use.
+    """
+    shown = preferred_fit(fits) or fits[0]
+    of_shown = shown.chapter()
+    first = shown.verdict
+    if not shown.justified:
+        first = (
+            "The runs justify no friction law that holds for all of them, so none is written. "
+            f"{shown.name} is shown as the best one. {first}"
+        )
+    tables = [dataclasses.replace(table, brief=0) for table in of_shown.tables]
+    return dataclasses.replace(
+        of_shown,
+        title="Friction of all runs",
+        summary=(first,),
+        tables=(_joint_laws(fits), _run_table(shown), *tables),
+        notes=tuple(not_joined),
     )
 
 
-def _loop_figure(loop: HysteresisLoop) -> Any:
+def _joint_laws(fits: Sequence[JointFit]) -> Table:
+    columns: dict[str, Any] = {
+        "law": [fit.name for fit in fits],
+        "depends on pressure": [fit.law is not fit.friction for fit in fits],
+        "rms error without friction": TableColumn(
+            [fit.rmse_without_friction for fit in fits], "N", digits=3, brief=False
+        ),
+        "rms error": TableColumn([fit.rmse for fit in fits], "N", digits=3),
+        "reduction of AICc": [fit.aicc_reduction for fit in fits],
+        P_VALUE: TableColumn([fit.p_value for fit in fits], brief=False),
+        "runs that disagree": [sum(run.disagrees for run in fit.agreement) for fit in fits],
+        "justified": [fit.justified for fit in fits],
+    }
+    return Table("joint-laws", "Friction laws fitted to all runs together, best first", columns, brief=len(fits))
+
+
+def _run_table(fit: JointFit) -> Table:
+    """Return the friction of each run, from the run alone and from all runs; in the brief view those that disagree."""
+    runs = fit.agreement
+    columns: dict[str, Any] = {
+        "run": [run.origin for run in runs],
+        "level": [run.description for run in runs],
+        "from this run": TableColumn([run.amplitude for run in runs], "N", digits=3),
+        "standard error": TableColumn([run.amplitude_stderr for run in runs], "N", digits=2),
+        "from all runs": TableColumn([run.joint_amplitude for run in runs], "N", digits=3),
+        "rms deviation": TableColumn([run.deviation for run in runs], "1", "%"),
+        P_VALUE: TableColumn([run.p_value for run in runs], brief=False),
+        "agrees": TableColumn([not run.disagrees for run in runs], brief=False),
+    }
+    title = f"Friction of each run, {fit.name}: half the range of the force"
+    disagreeing = [i for i, run in enumerate(runs) if run.disagrees]
+    return Table("joint-runs", title, columns, brief=disagreeing)
+
+
+def _figure(loop: HysteresisLoop) -> Any:
     """Return a figure of the force over the varied quantity, by branch; rows that are not used are light."""
     recording = loop.recording
     name = (

@@ -9,9 +9,11 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ....core.tree import Leaf, leaves
+from ....core.tree import leaves
 from ....physics.muscle.friction import Friction, PressureScaledFriction
-from ....recording.notebook import Card, NotebookDisplay
+from ....report.chapter import Chapter, Plot
+from ....report.parameters import parameter_table
+from ...reported import Reported
 from ..identifiability import UndeterminedCombination
 from ..model_evidence import format_p_value
 from .agreement import RunAgreement, plot_amplitudes
@@ -22,7 +24,7 @@ from .series import LoopSeries
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class JointFit(NotebookDisplay):
+class JointFit(Reported):
     """A friction law fitted to several runs together, each with its own static curve; forces in N.
 
     `friction` is a `PressureScaledFriction` if the runs justify a dependence on pressure; `scale_p_value` is that of
@@ -127,25 +129,22 @@ class JointFit(NotebookDisplay):
         """
         return plot_amplitudes(self.agreement, self.friction, self.name, ax=ax)
 
-    def _card(self) -> Card:
-        rows = [
-            (leaf.path, leaf.declared.symbol, f"{leaf.value:.4g}", _unit_text(leaf), leaf.declared.meaning)
-            for leaf in leaves(self.friction)
-        ]
-        table = [("parameter", "symbol", "value", "unit", "meaning"), *rows]
-        return Card(f"{self.name} fitted to {len(self.series)} runs", table, self.plot, [self.verdict])
-
-    def __str__(self) -> str:
-        lines = [
-            f"{leaf.path:<24}{leaf.declared.symbol:<9}{leaf.value:<12.4g}{_unit_text(leaf)}".rstrip()
-            for leaf in leaves(self.friction)
-        ]
-        return "\n".join([f"{self.name} fitted to {len(self.series)} runs", *lines, self.verdict])
-
-
-def _unit_text(leaf: Leaf) -> str:
-    """The unit of a parameter, empty for a dimensionless one."""
-    return "" if leaf.declared.unit == "1" else leaf.declared.unit
+    def chapter(self) -> Chapter:
+        """The description of the fit: verdict, parameters, and friction over pressure."""
+        caption = (
+            f"Friction over pressure, {self.name}: half the range of the friction force of each run, and joint fit."
+        )
+        table = parameter_table(
+            self.friction, "joint-parameters", f"Parameters of {self.name} from all runs", brief=True
+        )
+        return Chapter(
+            name="joint-friction",
+            title=f"{self.name} fitted to {len(self.series)} runs",
+            summary=self.verdict,
+            tables=(table,),
+            plots=(Plot("joint-friction", caption, self.plot),),
+            references=(*self.friction.references, *(() if self.law is self.friction else self.law.references)),
+        )
 
 
 SIMILAR_RMSE = 1.02

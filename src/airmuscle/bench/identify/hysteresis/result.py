@@ -10,7 +10,8 @@ import numpy as np
 from ....core.arrays import Array
 from ....core.tree import leaves
 from ....physics.muscle.friction import Friction
-from ....recording.notebook import Card, NotebookDisplay
+from ....report.chapter import BY_ROW, Chapter, Plot, Table, TableColumn
+from ...reported import Reported
 from ..identifiability import UndeterminedCombination
 from ..model_evidence import aicc, effective_sample_size, f_test_p_value, format_p_value
 from .limits import limit_reservations, parameters_on_bounds, undetermined_parameters
@@ -28,7 +29,7 @@ MIN_BRANCH_RATIO = 0.1
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class HysteresisFit(NotebookDisplay):
+class HysteresisFit(Reported):
     """A friction law fitted to a loop, compared with the same static curve without friction; forces in N.
 
     `gap` is the rms difference of the falling and the rising branch, `residual_gap` the part that the friction does not
@@ -128,16 +129,17 @@ class HysteresisFit(NotebookDisplay):
         return f" and the gap between the branches from {self.gap:.3g} to {self.residual_gap:.3g} N"
 
     @property
-    def displayed_parameters(self) -> tuple[tuple[str, str, float, str, str], ...]:
-        """Path, symbol, value, unit and meaning of the parameters, in units of the driving quantity.
-
-        A friction driven by the pressure has Pa instead of m: N/Pa of a stiffness, Pa/s of a speed.
-        """
-        return tuple(
-            (leaf.path, leaf.declared.symbol, *self.series.axis.display(leaf.value, leaf.declared.unit),
-             leaf.declared.meaning)
-            for leaf in leaves(self.friction)
-        )  # fmt: skip
+    def parameter_table(self) -> Table:
+        """The parameters in units of the driving quantity: N/Pa of a stiffness, Pa/s of a speed with the pressure."""
+        rows = [(leaf, *self.series.axis.display(leaf.value, leaf.declared.unit)) for leaf in leaves(self.friction)]
+        columns: dict[str, Any] = {
+            "parameter": [leaf.path for leaf, _, _ in rows],
+            "symbol": [leaf.declared.symbol for leaf, _, _ in rows],
+            "value": TableColumn([value for _, value, _ in rows], BY_ROW),
+            "unit": [unit for _, _, unit in rows],
+            "meaning": TableColumn([leaf.declared.meaning for leaf, _, _ in rows], brief=False),
+        }
+        return Table("parameters", f"Parameters of {type(self.friction).__name__}", columns, brief=len(rows))
 
     def plot(self, *, ax: Any = None) -> Any:
         """Plot the loop with the friction force, and the residuals.
@@ -149,18 +151,17 @@ class HysteresisFit(NotebookDisplay):
         title = f"{self.series.origin}: rms error {rms}"
         return plot_hysteresis(self.series, self.friction, self.coefficients, title, ax=ax)
 
-    def _card(self) -> Card:
-        rows = [(path, symbol, f"{value:.4g}", unit, meaning) for path, symbol, value, unit, meaning in
-                self.displayed_parameters]  # fmt: skip
-        title = f"{type(self.friction).__name__} fitted to {self.series.origin}"
-        return Card(title, [("parameter", "symbol", "value", "unit", "meaning"), *rows], self.plot, [self.verdict])
-
-    def __str__(self) -> str:
-        lines = [
-            f"{path:<16}{symbol:<9}{value:<12.4g}{unit}".rstrip()
-            for path, symbol, value, unit, _ in self.displayed_parameters
-        ]
-        return "\n".join([f"{type(self.friction).__name__} fitted to {self.series.origin}", *lines, self.verdict])
+    def chapter(self) -> Chapter:
+        """The description of the fit: verdict, parameters, and the loop with the friction force."""
+        law = type(self.friction).__name__
+        return Chapter(
+            name="friction",
+            title=f"{law} fitted to {self.series.origin}",
+            summary=self.verdict,
+            tables=(self.parameter_table,),
+            plots=(Plot("friction", f"Loop and hysteresis described by {law}.", self.plot),),
+            references=self.friction.references,
+        )
 
 
 def assess_fit(

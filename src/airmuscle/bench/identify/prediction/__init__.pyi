@@ -1,6 +1,5 @@
 from .dynamic import PlantUncertainty as PlantUncertainty
 from .dynamic import predict_dynamic as predict_dynamic
-from .prediction_chapter import with_unit as with_unit
 from .result import QuantityPrediction as QuantityPrediction
 from .result import RecordPrediction as RecordPrediction
 from .static import predict_static as predict_static

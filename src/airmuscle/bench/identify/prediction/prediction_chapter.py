@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,14 @@ from ....core.arrays import Array
 from ....core.plotting import BLACK, BLUE, RED, legend_below, new_figure
 from ....core.reference import cite
 from ....recording.display_units import display_scale, displayed
-from ....recording.recording import column_heading
-from ....report.chapter import Chapter, Plot, Table
+from ....report.chapter import BY_ROW, Chapter, Plot, Table, TableColumn
+from ...reported import unit_column
 from ...segment.runs import CONTRACTION_BAND
 from . import QuantityPrediction, RecordPrediction
 
 NO_BAND = "the model states no band"
+MAX_BRIEF = 15
+"""Maximum number of predicted quantities in the brief view (chosen)."""
 STEADY_PRESSURE = 0.03
 """Variation of a constant pressure relative to its maximum, without the extreme 4 % of the rows (chosen)."""
 
@@ -35,73 +38,78 @@ def band_sources(predictions: Sequence[RecordPrediction]) -> list[str]:
     return [source for source in dict.fromkeys(quantity.band for quantity in stated) if source]
 
 
-def describe_band(quantity: QuantityPrediction) -> str:
-    """The median half width of the band with its unit, or that there is none."""
-    if quantity.half_width is None:
-        return quantity.band or NO_BAND
-    return f"±{with_unit(float(np.median(quantity.half_width[quantity.compared])), quantity.name)}"
-
-
-def with_unit(value: float, name: str) -> str:
-    """A value of a quantity in its display unit; a ratio has none."""
-    return displayed(name, value)
-
-
 def _overview(model: str, thing: Any, predictions: Sequence[RecordPrediction]) -> Chapter:
     pairs = [(each, quantity) for each in predictions for quantity in each.quantities]
-    shares = [quantity.share for _, quantity in pairs]
+    names = [quantity.name for _, quantity in pairs]
     columns: dict[str, Any] = {
         "record": [each.origin for each, _ in pairs],
-        "quantity": [quantity.name for _, quantity in pairs],
+        "quantity": names,
         "rows": [int(quantity.compared.sum()) for _, quantity in pairs],
-        "rms error": [with_unit(quantity.rms, quantity.name) for _, quantity in pairs],
-        "maximum error": [with_unit(quantity.max_error, quantity.name) for _, quantity in pairs],
-        "95 % band": [describe_band(quantity) for _, quantity in pairs],
-        "rows within the band [%]": [None if share is None else 100.0 * share for share in shares],
-        "notes": ["; ".join(each.notes) for each, _ in pairs],
+        "rms error": TableColumn([quantity.rms for _, quantity in pairs], BY_ROW),
+        "maximum error": TableColumn([quantity.max_error for _, quantity in pairs], BY_ROW),
+        "in row": TableColumn([quantity.worst_row + 1 for _, quantity in pairs], brief=False),
+        "half width of the 95 % band": TableColumn(
+            [_half_width(quantity) for _, quantity in pairs], BY_ROW, short="95 % band ±"
+        ),
+        "unit": unit_column(names),
+        "rows within the band": TableColumn(
+            [quantity.share for _, quantity in pairs], "1", "%", digits=3, short="within"
+        ),
+        "band": TableColumn([quantity.band or NO_BAND for _, quantity in pairs], brief=False),
+        "notes": TableColumn(["; ".join(each.notes) for each, _ in pairs], brief=False),
     }
     number = f"{len(predictions)} {'record' if len(predictions) == 1 else 'records'}"
     sentences = [f"{number} that {model} was not fitted to, predicted and compared with the measured values."]
     sources = band_sources(predictions)
     sentences += [f"Band: {source.rstrip('.')}." for source in sources]
-    if not sources and all(share is None for share in shares):
-        sentences.append(f"No share of rows within a band is given, because {NO_BAND}.")
+    if not sources and all(quantity.share is None for _, quantity in pairs):
+        reasons = dict.fromkeys(quantity.band or NO_BAND for _, quantity in pairs)
+        sentences.append(f"No share of rows within a band is given: {'; '.join(reasons)}.")
+    table = Table("predictions", "Errors of the predicted values", columns, "Errors: predicted minus measured.",
+                  brief=MAX_BRIEF)  # fmt: skip
     return Chapter(
-        paper="prediction",
+        name="prediction",
         title=f"Prediction by {model}",
         summary=" ".join(sentences),
-        tables=(Table("predictions", "Errors of the predicted values", columns, "Errors: predicted minus measured."),),
+        tables=(table,),
+        notes=tuple(f"{each.origin}: {note}" for each in predictions for note in each.notes),
         references=tuple(cite(thing)),
     )
+
+
+def _half_width(quantity: QuantityPrediction) -> float | None:
+    """The median half width of the band over the compared rows; None without a band."""
+    return None if quantity.half_width is None else float(np.median(quantity.half_width[quantity.compared]))
 
 
 def _record(number: int, prediction: RecordPrediction) -> Chapter:
     stem = f"prediction-{number}"
     columns: dict[str, Any] = {}
     if "time" in prediction.recording:
-        columns["time [s]"] = prediction.recording["time"]
+        columns["time"] = TableColumn(prediction.recording["time"], "s")
     for quantity in prediction.quantities:
-        heading = column_heading(quantity.name)
-        columns[f"measured {heading}"] = quantity.measured
-        columns[f"predicted {heading}"] = quantity.predicted
+        name, unit = quantity.name, unit_column([quantity.name]).values[0]
+        columns[f"measured {name}"] = TableColumn(quantity.measured, unit)
+        columns[f"predicted {name}"] = TableColumn(quantity.predicted, unit)
         if quantity.half_width is not None:
-            columns[f"half width of the band of {heading}"] = quantity.half_width
-        columns[f"compared {quantity.name}"] = quantity.compared.astype(int)
+            columns[f"half width of the band of {name}"] = TableColumn(quantity.half_width, unit)
+        columns[f"compared {name}"] = quantity.compared
     if prediction.outside is not None:
-        columns["outside the range of the fit"] = prediction.outside.astype(int)
+        columns["outside the range of the fit"] = prediction.outside
     errors = "; ".join(
-        f"{quantity.name}: rms error {with_unit(quantity.rms, quantity.name)}, maximum error "
-        f"{with_unit(quantity.max_error, quantity.name)} in row {quantity.worst_row + 1}"
+        f"{quantity.name}: rms error {displayed(quantity.name, quantity.rms)}, maximum error "
+        f"{displayed(quantity.name, quantity.max_error)} in row {quantity.worst_row + 1}"
         for quantity in prediction.quantities
     )
-    notes = [f"{note[:1].upper()}{note[1:].rstrip('.')}." for note in prediction.notes]
     caption = f"{prediction.origin}: measured and predicted values with the 95 % band, and errors."
     return Chapter(
-        paper=stem,
+        name=stem,
         title=f"Record {number}: {prediction.origin}",
-        summary="\n\n".join([f"{errors[:1].upper()}{errors[1:]}.", *notes]),
-        tables=(Table(stem, "Measured and predicted values", columns, shown=False),),
-        plots=(Plot(stem, caption, _figure(prediction)),),
+        summary=f"{errors[:1].upper()}{errors[1:]}.",
+        tables=(Table(stem, "Measured and predicted values", columns, series=True),),
+        plots=(Plot(stem, caption, partial(_figure, prediction)),),
+        notes=prediction.notes,
+        brief=False,
     )
 
 

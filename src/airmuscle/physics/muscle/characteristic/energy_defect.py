@@ -36,9 +36,14 @@ class EnergyDefect:
 
     def __str__(self) -> str:
         relative = "–" if math.isnan(self.relative) else f"{100 * self.relative:.2f}"
+        return f"{self.worst:.4g} {self.unit} ({relative} %) {self.place}"
+
+    @property
+    def place(self) -> str:
+        """Where the difference is a maximum, and the excluded share, in words."""
         return (
-            f"{self.worst:.4g} {self.unit} ({relative} %) at {self.pressure / 1e3:.4g} kPa and "
-            f"{100 * self.contraction:.2f} % of contraction; slack on {100 * self.slack:.0f} % of the validity range"
+            f"at {self.pressure / 1e3:.4g} kPa and {100 * self.contraction:.2f} % of contraction; slack on "
+            f"{100 * self.slack:.0f} % of the validity range"
         )
 
 

@@ -108,5 +108,13 @@
     await send(area.value);
   }
 
-  Object.assign(airmuscle, { element, symbolNode, svg, complain, noNumber, say, download, colour, oncePerFrame, textField });
+  /* A table of a chapter. `columns` are the texts of the headings that are shown, by default all; with `choose(i)` the first cell of each row is a button; `chosen` is the text of the first cell of a row that is marked. */
+  function chapterTable(table, { columns = null, choose = null, chosen = null, label = "" } = {}) {
+    const shown = table.headings.map((heading, i) => ({ ...heading, i })).filter(({ text }) => !columns || columns.includes(text));
+    const cell = (row, { text, number, i }, k, n) => element(number ? "td.number" : "td", {}, k === 0 && choose ? element("button.name", { type: "button", onclick: () => choose(n) }, row[i]) : text === "symbol" ? symbolNode(row[i]) : row[i]);
+    const rows = table.rows.map((row, n) => element(row[shown[0].i] === chosen ? "tr.chosen-row" : "tr", {}, ...shown.map((heading, k) => cell(row, heading, k, n))));
+    return element("div.scroll", { tabindex: "0", role: "group", "aria-label": label || table.title }, element("table", {}, element("thead", {}, element("tr", {}, ...shown.map(({ text, number }) => element(number ? "th.number" : "th", { scope: "col" }, text)))), element("tbody", {}, ...rows)));
+  }
+
+  Object.assign(airmuscle, { element, symbolNode, chapterTable, svg, complain, noNumber, say, download, colour, oncePerFrame, textField });
 })();

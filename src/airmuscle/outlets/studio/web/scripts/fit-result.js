@@ -2,7 +2,7 @@
 "use strict";
 
 (() => {
-  const { element, fitSource, Scatter, scaleOf, labelOf, shortText, GROUP_COLOURS, GROUP_DASHES } = airmuscle;
+  const { element, chapterTable, fitSource, Scatter, scaleOf, labelOf, shortText, GROUP_COLOURS, GROUP_DASHES } = airmuscle;
   const MATHML = "http://www.w3.org/1998/Math/MathML";
   const NAMES = { "report.html": "Report (HTML)", "muscle.toml": "Muscle (TOML)", "report.zip": "All files (ZIP)", "friction.html": "Report on friction (HTML)", "friction.toml": "Friction (TOML)" };
 
@@ -20,25 +20,14 @@
     return copy(parsed);
   }
 
-  function table(headings, rows, numbers = []) {
-    const cell = (tag, value, i) => element(`${tag}${numbers.includes(i) ? ".number" : ""}`, tag === "th" ? { scope: "col" } : {}, value);
-    return element("div.scroll", { tabindex: "0", role: "group", "aria-label": `Table: ${headings.join(", ")}` }, element("table", {}, element("thead", {}, element("tr", {}, ...headings.map((text, i) => cell("th", text, i)))),
-      element("tbody", {}, ...rows.map((row) => element(`tr${row.chosen ? ".chosen-row" : ""}`, {}, ...row.cells.map((value, i) => cell("td", value, i)))))));
-  }
-
   const card = (title, ...children) => element("section.card", {}, element("h2", {}, title), ...children);
   const notes = (texts) => texts.map((text) => element("p.message", {}, text));
 
   function rankingCard(result) {
     const parts = result.comparisons.flatMap((comparison) => [
       result.comparisons.length > 1 ? element("h3", {}, `For ${comparison.purpose}`) : element("p.small.soft", {}, `Each ${comparison.group} is left out in turn; the ranking is for ${comparison.purpose}. Errors are root mean squares of the force.`),
-      table(["Law", "Parameters", "Rows of the fit [N]", `Left-out ${comparison.group} [N]`, "AICc"], comparison.ranking.map((row) => ({
-        chosen: row.law === result.recommended, cells: [row.law === result.recommended ? `${row.law} (recommended)` : row.law, String(row.parameters), shortText(row.in_sample), shortText(row.left_out), shortText(row.aicc)],
-      })), [1, 2, 3, 4]),
-      ...comparison.ranking.flatMap((row) => row.notes.map((text) => element("p.small", {}, `${row.law}: ${text}`))),
-      ...notes(comparison.notes),
-      comparison.excluded.length ? element("details", {}, element("summary", {}, `Why ${comparison.excluded.length} laws are not ranked`),
-        table(["Law", "Reason"], comparison.excluded.map((row) => ({ cells: [row.law, `${row.cause[0].toUpperCase()}${row.cause.slice(1)}.${row.reason.replace(/\.$/, "") === row.cause ? "" : ` ${row.reason}`}`] })))) : null]);
+      chapterTable(comparison.tables.ranking, { chosen: result.recommended }), ...notes(comparison.notes),
+      comparison.tables.excluded ? element("details", {}, element("summary", {}, `Why ${comparison.tables.excluded.rows.length} laws are not ranked`), chapterTable(comparison.tables.excluded)) : null]);
     return card("Ranking", ...parts.filter(Boolean));
   }
 
@@ -47,10 +36,9 @@
       each.title ? element("h3", {}, each.title) : null,
       ...each.lines.map((line) => element("div.formula.scroll", { tabindex: "0", role: "group", "aria-label": "Equation" }, formula(line))), element("p.small.soft", {}, each.note),
       Object.keys(each.sources).length ? element("details", {}, element("summary.small", {}, "As text for other programs"), ...Object.entries(each.sources).flatMap(([name, text]) => [element("p.small", {}, name), element("pre", { tabindex: "0" }, text)])) : null]);
-    const estimates = table(["Parameter", "Meaning", "Value (SI)", "2 standard errors", "Unit"], result.fit.estimates.map((e) => ({
-      cells: [airmuscle.symbolNode(e.symbol), e.meaning, shortText(e.value, 6), e.on_bound ? "on bound" : e.standard_error === null ? "unknown" : shortText(2 * e.standard_error, 3), e.unit] })), [2, 3]);
-    return card(`Equation of ${result.recommended}`, ...parts.filter(Boolean), element("details", {}, element("summary", {}, `Parameters (${result.fit.estimates.length})`), estimates),
-      element("details", {}, element("summary", {}, "Goodness of fit"), table(["Quantity", "Value"], result.fit.summary.map((cells) => ({ cells })))), ...notes(result.fit.notes));
+    const { parameters } = result.fit.tables, goodness = { title: "Goodness of fit", headings: ["quantity", "value"].map((text) => ({ text })), rows: result.fit.values };
+    return card(`Equation of ${result.recommended}`, ...parts.filter(Boolean), element("details", {}, element("summary", {}, `Parameters (${parameters.rows.length})`), chapterTable(parameters)),
+      element("details", {}, element("summary", {}, "Goodness of fit"), ...result.fit.paragraphs.map((text) => element("p.small", {}, text)), chapterTable(goodness)), ...notes(result.fit.notes));
   }
 
   function chartsCard(result) {
@@ -86,17 +74,18 @@
     return [card("Residuals and bands", ...parts.filter(Boolean)), later];
   }
 
+  /* The paragraphs, tables and notes of a chapter. */
+  const chapter = (part) => [...part.paragraphs.map((text) => element("p.small", {}, text)), ...Object.values(part.tables).flatMap((table) => [element("h4", {}, table.title), chapterTable(table)]), ...part.notes.map((text) => element("p.small", {}, text))];
+
   function frictionCard(friction) {
     if (!friction.loops.length) return [card("Friction from both branches", element("p", {}, friction.reason)), []];
     const later = [], parts = friction.loops.flatMap((loop) => {
       const host = element("div"), [fx] = scaleOf(loop.varied);
       later.push(() => new Scatter(host, loop.title, 240).show({ x: labelOf(loop.varied), y: "force [N]", points: { x: loop.x.map((v) => v * fx), y: loop.force, group: loop.direction.map((d) => (d < 0 ? 1 : 0)) } }));
-      return [element("details", { open: friction.loops.length === 1 }, element("summary", {}, `${loop.title}: ${loop.models.some((m) => m.justified) ? "friction is justified" : "no friction is justified"}`), host,
-        element("div.row.small", {}, element("span.row", {}, element("span.dot.c1"), "rising"), element("span.row", {}, element("span.dot.c2"), "falling")),
-        table(["Law", "Error without [N]", "Error with [N]", "Gap without [N]", "Gap with [N]", "p-value", "Justified"], loop.models.map((m) => ({ cells: [m.model, shortText(m.without), shortText(m.error), shortText(m.gap_without), shortText(m.gap), m.p_value < 0.001 ? "< 0.001" : shortText(m.p_value, 2), m.justified ? "yes" : "no"] })), [1, 2, 3, 4, 5]),
-        element("pre.small", { tabindex: "0" }, loop.verdict), loop.usable ? null : element("p.small", {}, "The loop is isometric; a friction along the pressure describes isometric loops only and cannot be used in a plant."), ...loop.failed.map((text) => element("p.small", {}, text)))];
+      return [element("details", { open: friction.loops.length === 1 }, element("summary", {}, `${loop.title}: ${loop.justified ? "friction is justified" : "no friction is justified"}`), host,
+        element("div.row.small", {}, element("span.row", {}, element("span.dot.c1"), "rising"), element("span.row", {}, element("span.dot.c2"), "falling")), ...chapter(loop))];
     });
-    const joint = friction.joint ? [element("h3", {}, "All runs together"), element("pre.small", { tabindex: "0" }, friction.joint)] : [];
+    const joint = friction.joint ? [element("h3", {}, "All runs together"), ...chapter(friction.joint)] : [];
     return [card("Friction from both branches", ...parts, ...joint, ...(friction.remarks ?? []).map((text) => element("p.small", {}, text))), later];
   }
 

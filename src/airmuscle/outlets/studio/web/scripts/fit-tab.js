@@ -4,14 +4,12 @@
 (() => {
   const { element, source, fitSource, say, problemOf } = airmuscle;
   const PAUSE = 800;
-  const TEXTS = ["resting_length", "file_name", "ambient", "displacement_zero", "decimal", "delimiter", "time", "sheet", "group", "skip_rows", "missing", "missing_codes", "outliers", "braid_radius", "braid_angle"];
   const SHOWN = ["resting_length", "outliers", "braid_radius", "braid_angle"];
-  const SPLITS = [["", "automatic"], ["run", "one run at a time"], ["specimen", "one specimen at a time"], ["contraction", "one level of contraction"], ["pressure", "one level of pressure"], ["block", "blocks within each run"]];
-  const empty = () => ({ columns: {}, files: {}, rules: [], entry: "", leave_out: "", hysteresis: false, ...Object.fromEntries(TEXTS.map((name) => [name, ""])) });
+  const empty = (names) => ({ columns: {}, files: {}, rules: [], entry: "", leave_out: "", hysteresis: false, ...Object.fromEntries(names.map((name) => [name, ""])) });
 
   class FitTab {
     constructor(host, stateChanged) {
-      Object.assign(this, { host, stateChanged, set: "", names: [], sheet: null, task: "", settings: empty(), problems: new Map() });
+      Object.assign(this, { host, stateChanged, set: "", names: [], sheet: null, task: "", settings: empty([]), texts: [], problems: new Map() });
       this.fields = {};
       this.places = {};
     }
@@ -28,6 +26,12 @@
       return this.labelled(name, label, made);
     }
 
+    /* A field as the program declares it. */
+    declared(name) {
+      const { label, example, offered } = this.form[name];
+      return offered.length ? this.choice(name, label, offered) : this.text(name, label, example ? { placeholder: example } : {});
+    }
+
     labelled(name, label, made) {
       this.fields[name] = made;
       this.places[name] = element("div", { role: "alert" });
@@ -35,6 +39,9 @@
     }
 
     build(library) {
+      this.form = Object.fromEntries(library.forms.fit.map((field) => [field.name, field]));
+      this.texts = Object.keys(this.form).filter((name) => name !== "leave_out");
+      this.settings = empty(this.texts);
       const card = (title, ...children) => element("section.card", {}, element("h2", {}, title), ...children);
       const hosts = { files: element("ul.files"), columns: element("div"), data: element("div") };
       this.message = element("div", { role: "alert" });
@@ -47,23 +54,16 @@
       this.bar = element("progress", { max: 1, value: 0, hidden: true, "aria-label": "Progress of the fit" });
       this.progressText = element("p.small", { role: "status" });
       const laws = [["", "none"], ...library.laws.map((law) => [law.name, `${law.name} – ${law.title}`])];
-      this.dataCard = card("Measured rows", this.choice("outliers", "Suspected outliers", [["", "keep"], ["drop", "leave out"]]), hosts.data);
+      this.dataCard = card("Measured rows", this.declared("outliers"), hosts.data);
       this.columnsCard = card("Columns", element("p.small.soft", {}, "What each column was read as. Correct the quantity or the unit where it is wrong."), hosts.columns);
       this.resultHost = element("div.stack");
       this.further = element("details", {}, element("summary", {}, "More on the files"),
-        this.text("file_name", "Values in file names", { placeholder: "cut{specimen}_held{length [mm]}mm" }), this.text("ambient", "Ambient pressure (for absolute pressures)", { placeholder: "98 kPa" }),
-        this.text("displacement_zero", "Displacement at the resting length", { placeholder: "0 mm" }),
-        this.choice("missing", "Missing values", [["", "are an error"], ["drop", "leave out the rows"], ["interpolate", "interpolate short gaps"]]),
-        this.text("missing_codes", "Codes of missing values", { placeholder: "-999, OL" }),
-        this.text("skip_rows", "Lines above the headings", { placeholder: "detected", inputmode: "numeric" }),
-        this.choice("time", "Time base", [["", "as recorded"], ["uniform", "uniform, for rounded stamps"], ["unordered", "unordered"], ["none", "none"]]),
-        this.choice("decimal", "Decimal mark of text files", [["", "detected"], [",", "comma"], [".", "point"]]), this.choice("delimiter", "Column delimiter of text files", [["", "detected"], [";", "semicolon"], [",", "comma"], ["\t", "tab"], [" ", "blank"]]),
-        this.text("sheet", "Worksheet of Excel files"), this.text("group", "Group or struct of TDMS, MDF, HDF5 and MAT files"));
+        ...this.texts.filter((name) => !SHOWN.includes(name)).map((name) => this.declared(name)));
       this.host.append(element("div.columns", {},
         element("div.stack", {},
           card("Files", airmuscle.dropArea((files) => this.upload(files)), this.message, this.places.files, hosts.files),
-          card("Muscle", this.text("resting_length", "Resting length, without pressure and load", { placeholder: "300 mm" }), this.text("braid_radius", "Radius of the braid, for the geometry of the muscle file", { placeholder: "optional: 10 mm" }), this.text("braid_angle", "Angle of the braid to the axis at rest", { placeholder: "optional: 24.4 deg" }), this.choice("entry", "Also compare an entry of the library", laws), this.further),
-          card("Fit", this.choice("leave_out", "Cross-validation leaves out", SPLITS), element("label.row", { for: "fit-hysteresis" }, this.fields.hysteresis, "Friction from both branches (takes longer)"),
+          card("Muscle", this.declared("resting_length"), this.declared("braid_radius"), this.declared("braid_angle"), this.choice("entry", "Also compare an entry of the library", laws), this.further),
+          card("Fit", this.declared("leave_out"), element("label.row", { for: "fit-hysteresis" }, this.fields.hysteresis, "Friction from both branches (takes longer)"),
             this.places.fit, element("div.row", {}, this.startButton, this.cancelButton), this.bar, this.progressText)),
         element("div.stack", {}, this.columnsCard, this.dataCard, this.resultHost)));
       this.list = new airmuscle.FileList(hosts.files, { remove: (name) => this.remove(name), stated: (name, key, value) => { this.settings.files[name] = { ...this.settings.files[name], [key]: value }; this.read(); } });
@@ -86,12 +86,12 @@
     restore(state) {
       const given = state.settings ?? {}, table = (value) => (value && typeof value === "object" && !Array.isArray(value) ? value : {});
       const rules = (Array.isArray(given.rules) ? given.rules : []).filter((rule) => Array.isArray(rule?.recordings) && (Array.isArray(rule.rows) || (rule.ranges && typeof rule.ranges === "object")));
-      this.settings = { ...empty(), columns: table(given.columns), files: table(given.files), rules, hysteresis: given.hysteresis === true };
-      for (const name of [...TEXTS, "entry", "leave_out"]) if (typeof given[name] === "string") this.settings[name] = given[name];
+      this.settings = { ...empty(this.texts), columns: table(given.columns), files: table(given.files), rules, hysteresis: given.hysteresis === true };
+      for (const name of [...this.texts, "entry", "leave_out"]) if (typeof given[name] === "string") this.settings[name] = given[name];
       Object.assign(this, { set: state.set, task: typeof state.task === "string" ? state.task : "", names: [] });
-      for (const name of [...TEXTS, "entry", "leave_out"]) this.fields[name].value = this.settings[name];
+      for (const name of [...this.texts, "entry", "leave_out"]) this.fields[name].value = this.settings[name];
       this.fields.hysteresis.checked = this.settings.hysteresis;
-      this.further.open = TEXTS.some((name) => !SHOWN.includes(name) && this.settings[name]);
+      this.further.open = this.texts.some((name) => !SHOWN.includes(name) && this.settings[name]);
       this.data.rules = this.settings.rules;
     }
 

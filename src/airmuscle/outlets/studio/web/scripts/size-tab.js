@@ -2,37 +2,33 @@
 "use strict";
 
 (() => {
-  const { element, complain, source, say, download, shortText, Chart } = airmuscle;
-  const FIELDS = {
-    lift: [["load", "Load", "20 kg", "mass or force"], ["stroke", "Stroke", "40 mm", ""], ["stiffness", "Stiffness of a spring", "", "optional: 2 N/mm"]],
-    joint: [["torque", "Torque in either direction", "5 N m", ""], ["angle", "Range of the angle", "60 deg", ""], ["inertia", "Moment of inertia", "", "optional: 0.05 kg m^2"]],
-    all: [["supply", "Supply pressure", "6 bar", "gauge"], ["safety", "Safety factor", "1.5", "on the load"], ["cycle_time", "Cycle time", "2 s", "there and back"], ["max_length", "Maximum length", "400 mm", "optional"], ["max_diameter", "Maximum diameter", "", "optional: 60 mm"], ["max_count", "Maximum number in parallel", "3", ""]],
-  };
-  const SORTS = [["air", "air of a cycle"], ["length", "length"], ["count", "number of muscles"], ["reserve", "force reserve"], ["diameter", "diameter"]];
-  const COLUMNS = [["muscle", "muscle"], ["number", "number"], ["length [mm]", "length [mm]"], ["radius [mm]", "pulley radius [mm]"], ["pressure, short [bar]", "pressure [bar]"], ["contraction, short [%]", "contraction [%]"], ["reserve [%]", "reserve [%]"], ["air a cycle [l (ANR)]", "air a cycle [l\u00a0(ANR)]"], ["efficiency [%]", "efficiency [%]"], ["diameter [mm]", "diameter [mm]"]];
+  const { element, chapterTable, complain, source, say, download, shortText, Chart } = airmuscle;
+  const COLUMNS = ["muscle", "number", "nominal length [mm]", "pressure, short [bar]", "contraction, short [%]", "reserve [%]"];
 
   class SizeTab {
     constructor(host, stateChanged) {
       Object.assign(this, { host, stateChanged, kind: "lift", chosen: 0, fields: {} });
-      this.build();
     }
 
-    build() {
+    build(form) {
       const card = (title, order, ...children) => element(`section.card${order}`, {}, element("h2", {}, title), ...children);
-      const field = ([name, label, value, hint]) => {
-        const input = this.fields[name] = element("input", { type: "text", id: `size-${name}`, value, autocomplete: "off", "aria-describedby": hint ? `size-${name}-hint` : null });
+      const field = ({ name, label, filled, hint }) => {
+        const input = this.fields[name] = element("input", { type: "text", id: `size-${name}`, value: filled, autocomplete: "off", "aria-describedby": hint ? `size-${name}-hint` : null });
         input.addEventListener("input", () => this.stateChanged());
         return element("div.quantity", {}, element("label", { for: `size-${name}` }, label), input, hint ? element("span.small.soft", { id: `size-${name}-hint` }, hint) : null);
       };
       this.kinds = ["lift", "joint"].map((kind) => element("button", { type: "button", onclick: () => this.setKind(kind) }, kind === "lift" ? "Lift" : "Joint"));
-      this.groups = { lift: element("div.stack.tight", {}, ...FIELDS.lift.map(field)), joint: element("div.stack.tight", {}, ...FIELDS.joint.map(field)) };
-      this.sort = element("select", { id: "size-sort" }, ...SORTS.map(([key, text]) => element("option", { value: key }, text)));
+      this.groups = { lift: element("div.stack.tight", {}, ...form.lift.map(field)), joint: element("div.stack.tight", {}, ...form.joint.map(field)) };
+      const { label, offered } = form.all.find(({ name }) => name === "sort");
+      this.sort = element("select", { id: "size-sort" }, ...offered.map(([value, text]) => element("option", { value }, text)));
       this.sort.addEventListener("change", () => this.stateChanged());
       this.message = element("p", { role: "alert" });
       this.go = element("button.primary", { type: "submit" }, "Find muscles");
-      this.form = element("form", { novalidate: true }, element("div.row", { role: "group", "aria-label": "Task" }, ...this.kinds), this.groups.lift, this.groups.joint, element("div.stack.tight", {}, ...FIELDS.all.map(field), element("div.quantity", {}, element("label", { for: "size-sort" }, "Rank by"), this.sort)), element("div.row", {}, this.go), this.message);
+      this.form = element("form", { novalidate: true }, element("div.row", { role: "group", "aria-label": "Task" }, ...this.kinds), this.groups.lift, this.groups.joint, element("div.stack.tight", {}, ...form.all.filter(({ name }) => name !== "sort").map(field), element("div.quantity", {}, element("label", { for: "size-sort" }, label), this.sort)), element("div.row", {}, this.go), this.message);
       this.form.addEventListener("submit", (event) => { event.preventDefault(); this.find(); });
-      this.table = element("div.scroll", { tabindex: 0, role: "region", "aria-label": "Choices, best first" });
+      this.summary = element("p");
+      this.table = element("div");
+      this.further = element("div");
       this.unsuitable = element("div");
       this.caption = element("p.small");
       const chart = element("div"), button = (text, action) => element("button", { type: "button", onclick: () => this.sheet && action() }, text);
@@ -40,7 +36,7 @@
       this.host.append(element("div.columns", {},
         element("div.stack", {}, card("Requirement", ".first", this.form)),
         this.results = element("div.stack.second", { hidden: true },
-          card("Muscles, best first", ".early", this.table, element("p.small.soft", {}, "Each at its shortest length. Pressure and contraction at the contracted end. Air: of all muscles, at the reference atmosphere of ISO 8778, without tubes."), element("div.row", {}, element("span.small.soft", {}, "Download"), button("CSV", () => download("sizing.csv", this.csv(), "text/csv")))),
+          card("Muscles, best first", ".early", this.summary, this.table, this.further, element("div.row", {}, element("span.small.soft", {}, "Download"), button("CSV", () => download("sizing.csv", this.sheet.csv, "text/csv")))),
           card("Working points", ".early", this.caption, chart, element("div.row", {}, element("span.small.soft", {}, "Download"), this.scenario)),
           card("Unsuitable muscles", ".late", this.unsuitable))));
       this.chart = new Chart(chart, { label: "Force over contraction of one muscle, with its capacity, the load and both working points", x: "contraction [%]", y: "force [N]", height: (width) => Math.round(Math.min(460, Math.max(280, 0.56 * width))), overlay: (...drawing) => this.overlay(...drawing) });
@@ -49,19 +45,21 @@
 
     async start(library, state) {
       this.wanted = state ?? {};
+      this.declared = library.forms.size;
+      if (!this.declared) { this.host.replaceChildren(element("p.message", {}, "This page contains no sizing.")); return; }
+      this.build(this.declared);
       for (const [name, value] of Object.entries(this.wanted.fields ?? {})) if (this.fields[name] && typeof value === "string") this.fields[name].value = value.slice(0, 60);
-      if (SORTS.some(([key]) => key === this.wanted.sort)) this.sort.value = this.wanted.sort;
+      if ([...this.sort.options].some(({ value }) => value === this.wanted.sort)) this.sort.value = this.wanted.sort;
       this.setKind(this.wanted.kind === "joint" ? "joint" : "lift");
       this.chosen = Number.isInteger(this.wanted.chosen) ? this.wanted.chosen : 0;
       this.pending = true;
       if (!source.embedded) return;
       this.go.disabled = true;
       this.message.textContent = "A saved page shows the sizing that was on the screen; airmuscle studio finds others.";
-      if (!source.embedded.sheets.some((sheet) => sheet.tab === "size")) this.host.replaceChildren(element("p.message", {}, "This page contains no sizing."));
     }
 
     visible(seen) {
-      if (!seen || !this.pending || !this.host.contains(this.form)) return;
+      if (!seen || !this.pending) return;
       this.pending = false;
       this.find(this.chosen);
     }
@@ -74,8 +72,8 @@
     }
 
     request() {
-      const names = [...FIELDS[this.kind], ...FIELDS.all].map(([name]) => name);
-      return JSON.stringify({ kind: this.kind, ...Object.fromEntries(names.map((name) => [name, this.fields[name].value])), sort: this.sort.value });
+      const names = [...this.declared[this.kind], ...this.declared.all].map(({ name }) => name).filter((name) => this.fields[name]);
+      return JSON.stringify({ ...Object.fromEntries(names.map((name) => [name, this.fields[name].value])), sort: this.sort.value });
     }
 
     async find(chosen = 0) {
@@ -95,21 +93,22 @@
     show(sheet, chosen) {
       this.sheet = sheet;
       this.results.hidden = false;
-      this.columns = COLUMNS.filter(([key]) => sheet.choices.some((choice) => choice.row[key] !== undefined && choice.row[key] !== null));
-      const cell = (choice, key, i) => (key === "muscle" ? element("td", {}, element("button.name", { type: "button", onclick: () => this.choose(i) }, choice.name)) : element("td.number", {}, typeof choice.row[key] === "number" ? shortText(choice.row[key], 3 + (key === "length [mm]")) : "–"));
-      this.rows = sheet.choices.map((choice, i) => element("tr", {}, ...this.columns.map(([key]) => cell(choice, key, i))));
-      this.table.replaceChildren(element("table.choices", {}, element("thead", {}, element("tr", {}, ...this.columns.map(([key, title]) => element(key === "muscle" ? "th" : "th.number", { scope: "col" }, title)))), element("tbody", {}, ...this.rows)));
-      this.unsuitable.replaceChildren(sheet.unsuitable.length ? element("table", {}, element("thead", {}, element("tr", {}, element("th", { scope: "col" }, "muscle"), element("th", { scope: "col" }, "reason"))), element("tbody", {}, ...sheet.unsuitable.map((item) => element("tr", {}, element("td", {}, item.name), element("td", {}, item.reason))))) : element("p.small", {}, "None."));
+      const { choices, unsuitable, ...others } = sheet.tables, table = chapterTable({ ...choices, rows: choices.rows.slice(0, sheet.choices.length) }, { columns: COLUMNS, choose: (i) => this.choose(i) });
+      this.rows = [...table.querySelectorAll("tbody tr")];
+      this.summary.textContent = sheet.paragraphs.join(" ");
+      this.table.replaceChildren(table);
+      this.further.replaceChildren(...Object.values(others).map((each) => element("details", {}, element("summary", {}, each.title), chapterTable(each), each.note ? element("p.small.soft", {}, each.note) : null)));
+      this.unsuitable.replaceChildren(unsuitable ? chapterTable(unsuitable) : element("p.small", {}, "None."));
       this.choose(Math.min(Math.max(0, chosen), sheet.choices.length - 1));
       this.host.dataset.shown = `${sheet.title}, ${sheet.request.sort}`;
     }
 
     choose(index) {
       this.chosen = index;
-      const choice = this.sheet.choices[index], { chart, row } = choice;
+      const choice = this.sheet.choices[index], { chart } = choice;
       this.rows.forEach((line, i) => { line.classList.toggle("active", i === index); line.querySelector("button").setAttribute("aria-pressed", String(i === index)); });
       const [first, last] = chart.points, range = (a, b, factor, unit) => { const [from, to] = [a, b].map((v) => shortText(Math.abs(v) < 1e-6 ? 0 : v * factor, 3)); return from === to ? `${to} ${unit}` : `${from} to ${to} ${unit}`; };
-      this.caption.replaceChildren(element("strong", {}, `${row.number} × ${choice.name}, ${shortText(row["length [mm]"])} mm${row["radius [mm]"] ? `, pulley radius ${shortText(row["radius [mm]"])} mm` : ""}: `), `${this.sheet.title}. One muscle works at ${range(first.pressure, last.pressure, 1e-5, "bar")}, ${range(first.contraction, last.contraction, 100, "%")}, ${range(first.force, last.force, 1, "N")}.`);
+      this.caption.replaceChildren(element("strong", {}, `${choice.label}: `), `${this.sheet.title}. One muscle works at ${range(first.pressure, last.pressure, 1e-5, "bar")}, ${range(first.contraction, last.contraction, 100, "%")}, ${range(first.force, last.force, 1, "N")}.`);
       this.scenario.disabled = !choice.scenario;
       this.scenario.title = choice.reason;
       this.draw(chart);
@@ -159,14 +158,8 @@
       if (choice.scenario) download(`${choice.name}.toml`, choice.scenario, "application/toml"); else say(choice.reason);
     }
 
-    csv() {
-      const keys = Object.keys(this.sheet.choices[0].row), quote = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll("\"", "\"\"")}"` : text);
-      const lines = this.sheet.choices.map(({ row }) => keys.map((key) => (typeof row[key] === "number" ? airmuscle.pythonFloat(row[key]) : quote(String(row[key] ?? "")))).join(","));
-      return `${keys.map(quote).join(",")}\n${lines.join("\n")}\n`;
-    }
-
     state() {
-      return { kind: this.kind, fields: Object.fromEntries(Object.entries(this.fields).map(([name, input]) => [name, input.value])), sort: this.sort.value, chosen: this.chosen };
+      return { kind: this.kind, fields: Object.fromEntries(Object.entries(this.fields).map(([name, input]) => [name, input.value])), sort: this.sort?.value, chosen: this.chosen };
     }
 
     sheets() { return this.sheet ? [this.sheet.id] : []; }

@@ -37,7 +37,7 @@
     async library() {
       if (!embedded) return (await request("api/library")).json();
       const rows = (kind) => embedded.sheets.filter((s) => kindOf(s) === kind).map((s) => ({ name: s.name, title: s.title, provenance: s.provenance }));
-      return { laws: rows("law"), plants: rows("plant"), joints: rows("joint"), opened: [] };
+      return { laws: rows("law"), plants: rows("plant"), joints: rows("joint"), opened: [], forms: { size: embedded.sheets.find((s) => s.tab === "size")?.form } };
     },
 
     async named(kind, name) {

@@ -1,0 +1,285 @@
+"""Report chapter: choices of muscles for a lift or a joint, the valves for the best one, and its chart."""
+
+from __future__ import annotations
+
+import functools
+import warnings
+from typing import Any
+
+import numpy as np
+
+from ...core import plotting
+from ...core.errors import AirmuscleWarning
+from ...core.reference import cite
+from ...files.library import load
+from ...files.library.files import list_valves, products_of_laws
+from ...physics.muscle.characteristic.validity_range import validity_range_of
+from ...physics.muscle.isobar_plot import isobar_figure
+from ...physics.muscle.isobars import compute_isobars
+from ...report.chapter import Chapter, Plot, Table, TableColumn
+from . import JointRequirement, LiftRequirement, MuscleChoice, SizingConditions, SizingResult
+from .scenario import MOVING, SizingScenario, scenario_valves
+from .valve_sizing import air_path, discharge_time, fill_time
+
+SHORT_UNSUITABLE, SHORT_VALVES = 3, 4
+"""Rows of the brief view (chosen)."""
+POINTS = 121
+"""Points of the curve of the capacity."""
+
+
+def sizing_chapter(result: SizingResult, scenario: SizingScenario | None = None) -> Chapter:
+    """The chapter of a sizing with at least one choice; `scenario` is that which is written with it."""
+    best, simulated = result.best, None if scenario is None else scenario.choice
+    laws = (best.entry.characteristic, best.conditions.ambient, *scenario_valves(simulated))
+    tables = [_products(result), _end_points(result), _air(result), _valves(simulated), _unsuitable(result)]
+    return Chapter(
+        name="sizing",
+        title=f"Muscles for {result.requirement.describe()}, supply {result.conditions.supply / 1e5:.4g} bar",
+        summary=_summary(result),
+        tables=tuple(table for table in tables if table is not None),
+        plots=(sizing_plot(best),),
+        notes=() if scenario is None or not scenario.note else (scenario.note,),
+        references=tuple(best.entry.references) + tuple(cite(laws)),
+        chosen=(*_settings(result), *_valve_settings(simulated)),
+    )
+
+
+def product_of(choice: MuscleChoice) -> str:
+    """The product on which the law of a choice was measured, or the name of its entry."""
+    return products_of_laws().get(choice.entry.name) or choice.entry.name
+
+
+def _summary(result: SizingResult) -> tuple[str, ...]:
+    best, product = result.best, product_of(result.best)
+    side = " (half of them on each side)" if isinstance(best.requirement, JointRequirement) else ""
+    others = [each for each in result.choices[1:] if product_of(each) == product and each.count == best.count]
+    spread = ""
+    if others:
+        lengths = [1e3 * each.length for each in others]
+        ends = " to ".join(dict.fromkeys(f"{end:.4g}" for end in (min(lengths), max(lengths))))
+        spread = (
+            f" The other published laws of this product give {ends} mm: the spread is the uncertainty of the models, "
+            "not a choice between muscles."
+        )
+    by_law = "" if product == best.entry.name else f" by the law {best.entry.name}"
+    return (
+        f"The best choice is {best.total_count} x {product}{side}, nominal length {1e3 * best.length:.4g} mm{by_law}: "
+        f"the shortest that reaches both end points.{spread}",
+    )
+
+
+def _products(result: SizingResult) -> Table:
+    """One row for each product and number of muscles: its best law, and the lengths by all its laws."""
+
+    def key(choice: MuscleChoice) -> tuple[str, int]:
+        return product_of(choice), choice.total_count
+
+    groups: dict[tuple[str, int], list[MuscleChoice]] = {}
+    for choice in result.choices:
+        groups.setdefault(key(choice), []).append(choice)
+    first = [group[0] for group in groups.values()]
+    lengths = [sorted(choice.length for choice in group) for group in groups.values()]
+    columns: dict[str, Any] = {
+        "product": [product for product, _ in groups],
+        "number": [number for _, number in groups],
+        "nominal length": TableColumn([choice.length for choice in first], "m", "mm"),
+        "length by all laws": TableColumn(
+            [(each[0], each[-1]) for each in lengths], "m", "mm", brief=any(len(each) > 1 for each in lengths)
+        ),
+        **_radius(first, short="radius"),
+        "pressure": TableColumn(
+            [(c.design.extended.pressure, c.design.contracted.pressure) for c in first], "Pa", "bar", 3
+        ),
+        "reserve": TableColumn([choice.design.reserve for choice in first], "1", "%", 3),
+        "air a minute": TableColumn(list(map(_air_a_minute, first)), "m3 (ANR)", "l (ANR)", 3),
+        "law": TableColumn([choice.entry.name for choice in first], brief=False),
+    }
+    note = "Each product by the law of its best choice; length by all laws: the range by its published laws."
+    return Table("products", "Products, best first", columns, note, brief=len(first))
+
+
+def _radius(choices: list[MuscleChoice], short: str = "") -> dict[str, TableColumn]:
+    if choices[0].design.radius is None:
+        return {}
+    return {"pulley radius": TableColumn([choice.design.radius for choice in choices], "m", "mm", short=short)}
+
+
+def _end_points(result: SizingResult) -> Table:
+    """All choices, best first, with the end points of each muscle."""
+    first, last = ([getattr(c.design, end) for c in result.choices] for end in ("extended", "contracted"))
+    columns: dict[str, Any] = {**_common(result)}
+    for name, unit, shown in (("pressure", "Pa", "bar"), ("contraction", "1", "%"), ("force", "N", "")):
+        for end, points in (("long", first), ("short", last)):
+            values = [round(getattr(each, name), 9) + 0.0 for each in points]  # slack to rounding
+            columns[f"{name}, {end}"] = TableColumn(values, unit, shown)
+    columns["reserve"] = TableColumn([choice.design.reserve for choice in result.choices], "1", "%")
+    note = (
+        "Long and short: the end points of each muscle. Reserve: force beyond the load at the largest working "
+        "pressure. Rows of one product are different published laws of it."
+    )
+    return Table("choices", "Choices, best first", columns, note)
+
+
+def _common(result: SizingResult) -> dict[str, Any]:
+    return {
+        "muscle": [choice.entry.name for choice in result.choices],
+        "product": [product_of(choice) for choice in result.choices],
+        "number": [choice.total_count for choice in result.choices],
+        "nominal length": TableColumn([choice.length for choice in result.choices], "m", "mm"),
+    }
+
+
+def _air(result: SizingResult) -> Table:
+    """Air and dimensions of all choices."""
+    choices = result.choices
+    columns: dict[str, Any] = {
+        **_common(result),
+        "air a cycle": TableColumn([choice.reference_volume for choice in choices], "m3 (ANR)", "l (ANR)"),
+        "air a minute": TableColumn(list(map(_air_a_minute, choices)), "m3 (ANR)", "l (ANR)"),
+        "energy of the air": TableColumn([choice.air_energy for choice in choices], "J"),
+        "efficiency": TableColumn([choice.efficiency for choice in choices], "1", "%"),
+        "diameter": TableColumn([choice.diameter for choice in choices], "m", "mm"),
+        **_radius(list(choices)),
+    }
+    if choices[0].design.radii is not None:
+        ends = [choice.design.radii or (None, None) for choice in choices]
+        columns["minimum radius at 1.1 L"] = TableColumn([low for low, _ in ends], "m", "mm")
+        columns["maximum radius at 1.1 L"] = TableColumn([high for _, high in ends], "m", "mm")
+    note = (
+        "Air: that of all muscles, at the reference atmosphere of ISO 8778, without tubes; – where the law has no "
+        "geometry. Energy: available energy of this air at the supply pressure. Efficiency: work against the load "
+        "divided by it. A minute: without pauses. Diameter: at the contracted end, without the wall."
+    )
+    return Table("air", "Air and dimensions", columns, note)
+
+
+def _air_a_minute(choice: MuscleChoice) -> float | None:
+    volume = choice.reference_volume
+    return None if volume is None else 60.0 * volume / choice.conditions.cycle_time
+
+
+def _valves(choice: MuscleChoice | None) -> Table | None:
+    """The valves of the library with the times in which one of them fills and discharges one muscle of a choice."""
+    if choice is None:
+        return None
+    path, limit = air_path(choice), MOVING * choice.conditions.cycle_time
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AirmuscleWarning)  # the table states them
+        known: list[Any] = list(map(load, list_valves()))
+    times = {each.name: (fill_time(choice, each.valve, path), discharge_time(choice, each.exhaust or each.valve, path))
+             for each in known}  # fmt: skip
+    reaching = {each.name for each in known if max(times[each.name]) <= limit}
+    suitable = {each.name for each in known if each.name in reaching and not each.warning}
+    entries = sorted(known, key=lambda each: (each.name not in suitable, -times[each.name][0]))
+    columns: dict[str, Any] = {
+        "valve": [each.name for each in entries],
+        "conductance": TableColumn([getattr(each.valve, "conductance", None) for each in entries], "m3/(s Pa)",
+                              "dm3/(s bar)", 3),
+        "fills in": TableColumn([times[each.name][0] for each in entries], "s", digits=3),
+        "discharges in": TableColumn([times[each.name][1] for each in entries], "s", digits=3),
+        "reaches the cycle time": TableColumn([each.name in reaching for each in entries], brief=False),
+        "warning": TableColumn([each.warning for each in entries], brief=False),
+    }  # fmt: skip
+    note = (
+        f"One valve for each muscle, fully open, after its flow law; within {limit:.3g} s it reaches the cycle time. "
+        "Switching times and tubes are not contained. The smallest valve that does so is first; valves that do not, or "
+        "that have the stated warning, are last."
+    )
+    title = f"Valves of the library that reach the cycle time with {choice.entry.name}, {1e3 * choice.length:.4g} mm"
+    return Table("valves", title, columns, note, brief=min(SHORT_VALVES, len(suitable)))
+
+
+def _unsuitable(result: SizingResult) -> Table | None:
+    """The muscles that do not meet the requirement, with the reason."""
+    if not result.unsuitable:
+        return None
+    columns: dict[str, Any] = {
+        "muscle": [item.name for item in result.unsuitable],
+        "maximum number tried": TableColumn([item.count or None for item in result.unsuitable], short="number"),
+        "reason": [item.reason for item in result.unsuitable],
+    }
+    title = "Muscles that do not meet the requirement"
+    return Table("unsuitable", title, columns, brief=SHORT_UNSUITABLE)
+
+
+def _settings(result: SizingResult) -> tuple[tuple[str, str, str], ...]:
+    conditions = result.conditions
+    rows = {
+        "safety_factor": ("safety factor on the load", f"{conditions.safety_factor:.4g}"),
+        "cycle_time": ("cycle time", f"{conditions.cycle_time:.4g} s"),
+        "min_pressure": ("minimum working pressure", f"{conditions.min_pressure / 1e5:.4g} bar"),
+        "max_count": ("maximum number in parallel", str(conditions.max_count)),
+    }
+    sources = {name: "chosen" if getattr(conditions, name) == getattr(SizingConditions, name) else "given"
+               for name in rows}  # fmt: skip
+    stated = (("supply pressure", f"{conditions.supply / 1e5:.4g} bar", "given"),)
+    return (*stated, *((*row, sources[name]) for name, row in rows.items()))
+
+
+def _valve_settings(simulated: MuscleChoice | None) -> tuple[tuple[str, str, str], ...]:
+    names = ("fill", "discharge")
+    source = f"ISO 6358, for {100 * MOVING:.4g} % of the cycle; this part and the critical pressure ratio are chosen"
+    return tuple(
+        (f"sonic conductance, {name} valve of each muscle", f"{1e8 * valve.conductance:.4g} dm3/(s bar)", source)
+        for name, valve in zip(names, scenario_valves(simulated), strict=False)
+    )
+
+
+def sizing_plot(choice: MuscleChoice) -> Plot:
+    """The chart of one muscle of a choice, as a sizing tool draws it."""
+    caption = (
+        f"Force of one {choice.entry.name} over its contraction at constant gauge pressures, with both working points. "
+        "The capacity is the force at the maximum working pressure within the permitted force."
+    )
+    return Plot("working_points", caption, functools.partial(_figure, choice))
+
+
+def _figure(choice: MuscleChoice) -> Any:
+    entry = choice.entry
+    valid = validity_range_of(entry.characteristic, entry.validity_range)
+    title = f"{choice.total_count} x {entry.name}, {1e3 * choice.length:.4g} mm"
+    if choice.design.radius is not None:
+        title += f", radius {1e3 * choice.design.radius:.4g} mm"
+    figure = isobar_figure(entry.characteristic, title, compute_isobars(entry.characteristic, valid), valid)
+    axes = figure.axes[0]
+    _draw_limits(axes, choice)
+    _draw_load(axes, choice)
+    _draw_points(axes, choice)
+    plotting.legend_outside(axes)
+    return figure
+
+
+def _draw_limits(axes: Any, choice: MuscleChoice) -> None:
+    muscle = choice.muscle
+    contraction = np.linspace(*muscle.contraction_range, POINTS)
+    label = f"capacity, {muscle.pressure_range[1] / 1e3:.4g} kPa"
+    axes.plot(100 * contraction, muscle.capacity(contraction), color=plotting.BLACK, linewidth=1.8, label=label)
+    if muscle.max_force < axes.get_ylim()[1]:
+        axes.axhline(muscle.max_force, color=plotting.BLACK, linestyle=":", linewidth=1.0, label="permitted force")
+    permitted = muscle.contraction_range[1]
+    if 100 * permitted < axes.get_xlim()[1]:
+        axes.axvline(100 * permitted, color=plotting.BLACK, linestyle="-.", linewidth=1.0, label="maximum contraction")
+
+
+def _draw_load(axes: Any, choice: MuscleChoice) -> None:
+    """Draw the load of one muscle over the stroke, and with the safety factor; a joint has no single path."""
+    if not isinstance(choice.requirement, LiftRequirement):
+        return
+    displacement, load = choice.requirement.path
+    contraction = 100 * (choice.design.extended.contraction + displacement / choice.length)
+    factor = choice.conditions.safety_factor
+    axes.plot(contraction, load / choice.count, color=plotting.RED, linewidth=2.0, label="load", zorder=3)
+    axes.plot(contraction, factor * load / choice.count, color=plotting.RED, linestyle="--", linewidth=1.2,
+              label=f"load x {factor:.3g}", zorder=3)  # fmt: skip
+
+
+def _draw_points(axes: Any, choice: MuscleChoice) -> None:
+    lift = isinstance(choice.requirement, LiftRequirement)
+    names = ("start", "end") if lift else ("extended", "contracted")
+    points = zip((choice.design.extended, choice.design.contracted), names, ("o", "s"), strict=True)
+    for point, name, marker in points:
+        axes.plot(
+            [100 * point.contraction], [point.force], marker=marker, markersize=7, markerfacecolor="white",
+            markeredgecolor=plotting.RED, markeredgewidth=1.8, linestyle="none", zorder=4, clip_on=False,
+            label=f"{name}: {point.pressure / 1e3:.4g} kPa,\n{100 * point.contraction:.2f} %, {point.force:.4g} N",
+        )  # fmt: skip

@@ -1,0 +1,168 @@
+"""Evaluation of a muscle or a law: the third of pressure, contraction and force from the other two."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import warnings
+from collections.abc import Mapping
+from typing import Any
+
+from ...bench.reported import Reported
+from ...core import leaves
+from ...core.absolute_pressure import check_above_vacuum
+from ...core.display import contraction_text, quantity_text
+from ...core.errors import AirmuscleWarning, GeometryLimitError, ParameterError, PhysicsError, RatingError, SolveError
+from ...core.units import quantity
+from ...physics.muscle.characteristic import Characteristic, ForceLaw, ValidityRange
+from ...physics.muscle.characteristic.validity_range import validity_range_of
+from ...physics.muscle.isobar_plot import describe_point, isobar_plot
+from ...physics.muscle.isobars import Isobars, WorkingPoint, compute_isobars
+from ...report.chapter import Chapter, NamedValue
+from .entry import Entry
+
+UNITS = {"pressure": "Pa", "contraction": "1", "force": "N"}
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Evaluation(Reported):
+    """A working point of an entry.
+
+    solved     the quantity that follows from the other two
+    stiffness  -dF/deps at constant pressure [N]; None where the force is not unique or not defined
+    """
+
+    entry: Entry
+    point: WorkingPoint
+    solved: str
+
+    @property
+    def stiffness(self) -> float | None:
+        """-dF/deps at constant pressure [N]; None where the force is not unique or not defined."""
+        try:
+            return float(self.entry.characteristic.stiffness(self.point.pressure, self.point.contraction))
+        except PhysicsError:
+            return None
+
+    @property
+    def resting_length(self) -> float | None:
+        """The resting length of geometry or law [m]; None if neither has one."""
+        parts = (part for part in (self.entry.geometry, self.entry.characteristic) if part is not None)
+        lengths = (leaf.value for part in parts for leaf in leaves(part) if leaf.path.endswith("resting_length"))
+        return next(lengths, None)
+
+    @property
+    def validity_range(self) -> ValidityRange | None:
+        """The validity range of the law; None if none is stated."""
+        return validity_range_of(self.entry.characteristic, self.entry.validity_range)
+
+    def chapter(self) -> Chapter:
+        """The description of the point: quantities, stiffness, and the isobars around it."""
+        point, length, stiffness = self.point, self.resting_length, self.stiffness
+        limits, ratings = self.validity_range, self.entry.ratings
+        remarks = {"pressure": "gauge"}
+        if length:
+            moved, whole = quantity_text(length * point.contraction, "m", "mm"), quantity_text(length, "m", "mm", 6)
+            remarks["contraction"] = f"{moved} of {whole}"
+        shown = {"pressure": "kPa", "contraction": "%", "force": "N"}
+        digits = {name: 4 if name in (self.solved, "contraction") else 6 for name in UNITS}  # a given value as given
+        values = [
+            NamedValue(name, value, UNITS[name], shown[name], digits[name],
+                       "; ".join(filter(None, (remarks.get(name, ""), "solved" * (name == self.solved)))))
+            for name, value in point._asdict().items()
+        ]  # fmt: skip
+        if stiffness is not None and length:
+            values.append(NamedValue("stiffness", stiffness / length, "N/m", "N/mm", remark="at constant pressure"))
+        elif stiffness is not None:
+            values.append(NamedValue("stiffness per contraction", stiffness, "N", "N/%", remark="at constant pressure"))
+        if stiffness is not None and length:
+            values.append(NamedValue("stiffness per contraction", stiffness, "N", brief=False))
+        inside = None if limits is None else bool(limits.contains(point.pressure, point.contraction))
+        return Chapter(
+            name="evaluation",
+            title=f"{self.entry.name}: {self.entry.title}",
+            summary="",
+            values=(
+                *values,
+                NamedValue("solved", self.solved, brief=False),
+                NamedValue("resting length", length, "m", "mm", brief=False),
+                NamedValue("inside the validity range", inside, brief=False),
+                NamedValue(
+                    "permitted", None if ratings is None else not ratings.excesses(**point._asdict()), brief=False
+                ),
+            ),
+            plots=(isobar_plot(self.entry.characteristic, self.entry.title, self.isobars, limits, point),),
+        )
+
+    def isobars(self) -> Isobars:
+        """The isobars of the law, with that of the point."""
+        return compute_isobars(self.entry.characteristic, self.validity_range, self.point)
+
+
+def evaluate(entry: Entry, given: Mapping[str, Any]) -> Evaluation:
+    """The working point of two of pressure, contraction and force: numbers in SI units, or texts with a unit.
+
+    If several solutions exist, it is the one reached from the state of rest. Warns of a point that is measured but not
+    permitted, slack, or extrapolated. Raises SolveError, GeometryLimitError, UnitError, and RatingError for a point
+    that is neither permitted nor measured.
+    """
+    unknown = [name for name in UNITS if name not in given]
+    if len(unknown) != 1 or len(given) != 2:
+        raise ParameterError(f"give two of {', '.join(UNITS)}, not {', '.join(given) or 'none'}.")
+    values = {name: quantity(given[name], unit, where=name) for name, unit in UNITS.items() if name in given}
+    law, solved = entry.characteristic, unknown[0]
+    if "pressure" in values:
+        check_above_vacuum(values["pressure"])
+    if "contraction" in values and isinstance(law, ForceLaw):  # the other laws check it themselves
+        _check_contraction(law, values["contraction"])
+    point = WorkingPoint(**values, **{solved: float(getattr(law, solved)(*values.values()))})
+    if not math.isfinite(sum(point)) or (solved == "contraction" and not -0.5 <= point.contraction < 1.0):
+        raise SolveError(
+            f"{type(law).__name__}: the solution {describe_point(point)} is not physical. Give values nearer to the "
+            "validity range of the characteristic (airmuscle show)."
+        )
+    found = Evaluation(entry, point, solved)
+    _check_ratings(found)
+    _warn(found)
+    return found
+
+
+def _check_contraction(law: Characteristic, contraction: float) -> None:
+    low, high = law.contraction_range
+    if not low <= contraction <= high:
+        as_percentage = contraction >= 1.0 and contraction / 100 <= high
+        hint = f" For a percentage, write '{contraction:g} %'." if as_percentage else ""
+        raise GeometryLimitError(
+            f"contraction: {100 * contraction:.6g} % is outside the range of {type(law).__name__}, {100 * low:.4g} to "
+            f"{100 * high:.4g} %.{hint}"
+        )
+
+
+def _check_ratings(found: Evaluation) -> None:
+    """Warn of a measured point that the maker does not permit. Raises RatingError for one that was not measured."""
+    point, ratings, limits = found.point, found.entry.ratings, found.validity_range
+    excesses = ratings.excesses(**point._asdict()) if ratings is not None else ()
+    if not excesses:
+        return
+    text = "; ".join(excesses)
+    if limits is None or not limits.contains(point.pressure, point.contraction):
+        raise RatingError(
+            f"beyond the values that the maker permits, and not measured: {text}. Choose a permitted point, or a "
+            "larger muscle."
+        )
+    warnings.warn(f"beyond the values that the maker permits: {text}.", AirmuscleWarning, stacklevel=3)
+
+
+def _warn(found: Evaluation) -> None:
+    point, limits = found.point, found.validity_range
+    if point.force < 0:
+        warnings.warn("the force is negative; a muscle cannot push and is slack here.", AirmuscleWarning, stacklevel=3)
+    if limits is not None and not limits.contains(point.pressure, point.contraction):
+        (p_low, p_high), contractions = limits.pressure, map(contraction_text, limits.contraction)
+        warnings.warn(
+            "the operating point is outside the validity range of the characteristic, "
+            f"{p_low / 1e3:.4g} to {p_high / 1e3:.4g} kPa and {' to '.join(contractions)}: the result is an "
+            "extrapolation.",
+            AirmuscleWarning,
+            stacklevel=3,
+        )

@@ -1,0 +1,65 @@
+"""Delivery of a result: its files, all or none, and its brief view in the terminal, or JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from ...core.atomic_output import atomic_folder
+from ...report.chapter import Chapter
+from ...report.data import as_data, in_words
+from ...report.text import as_text
+from ...report.write import REPORT_FILE, write_into
+from .option_hints import in_options
+from .terminal import echo, print_json, terminal_width
+
+Files = Mapping[str, "str | Callable[[Path], object]"]
+"""Files of a result by name: a text, or a function that writes the file at a path."""
+WITHOUT_REPORT = "the report of --out"
+
+
+def deliver(
+    command: str, chapters: Sequence[Chapter], *, json: bool, out: Path | None = None, title: str = "",
+    files: Files | None = None, others: Mapping[str, Path] | None = None,
+) -> None:  # fmt: skip
+    """Write the files and the report of a result into a folder, if there is one, and print the result.
+
+    command  whose options the hints of the texts name
+    title    of the report; without one no report is written
+    others   files elsewhere that are named with those of the folder
+    """
+    worded = in_option_words(command, chapters)
+    written = {} if out is None else write_result(out, worded, title, files or {})
+    print_result(worded, {**(others or {}), **written}, json)
+
+
+def print_result(chapters: Sequence[Chapter], paths: Mapping[str, Path], json: bool) -> None:
+    """Print chapters and the paths of their files."""
+    if json:
+        print_json({**as_data(chapters), "files": {name: str(path) for name, path in paths.items()}})
+        return
+    echo(as_text(chapters, terminal_width(), "the report" if "report" in paths else WITHOUT_REPORT))
+    for name, path in paths.items():
+        echo(f"{name}: {path}")
+
+
+def in_option_words(command: str, chapters: Sequence[Chapter]) -> list[Chapter]:
+    """The chapters with hints that name the options of a command."""
+    return [in_words(chapter, lambda text: in_options(text, command)) for chapter in chapters]
+
+
+def write_result(out: Path, chapters: Sequence[Chapter], title: str, files: Files) -> dict[str, Path]:
+    """Write the files and the report, all or none; returns their paths, those of a folder as one."""
+    with atomic_folder(out) as folder:
+        for name, content in files.items():
+            path = folder / name
+            path.parent.mkdir(exist_ok=True)
+            if isinstance(content, str):
+                path.write_text(content, encoding="utf-8")
+            else:
+                content(path)
+        if title:
+            write_into(folder, chapters, title=title)
+    names = [*files, *([REPORT_FILE] if title else [])]
+    parts = [Path(name) if len(Path(name).parts) == 1 else Path(name).parent for name in names]
+    return {path.stem: out / path for path in parts}

@@ -1,0 +1,13 @@
+from .braid import BraidRequest as BraidRequest
+from .declaration import Option as Option
+from .declaration import RequestError as RequestError
+from .declaration import build as build
+from .declaration import form_fields as form_fields
+from .declaration import option as option
+from .declaration import options_of as options_of
+from .declaration import request as request
+from .entry import EntryRequest as EntryRequest
+from .fit import FitRequest as FitRequest
+from .fitting import fit_requested as fit_requested
+from .reading import ReadingRequest as ReadingRequest
+from .size import SizeRequest as SizeRequest

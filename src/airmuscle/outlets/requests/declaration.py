@@ -1,0 +1,182 @@
+"""Declaration of requests: frozen dataclasses whose fields state meaning, unit and bounds of what a user may give.
+
+The options of a command, the form of the page and the tables of a file are derived from the fields, and so are the
+conversion of texts to SI units and the messages. A request may define `check(where)` for conditions on several fields.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import types
+import typing
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeVar, dataclass_transform
+
+from ...core.errors import InputError, suggestion
+from ...core.units import quantity
+
+T = TypeVar("T")
+Where = Callable[[str], str]
+"""The name of a field in the words of an outlet, such as --max-length."""
+_KEY = "option"
+
+
+class RequestError(InputError):
+    """Texts that are no request: a missing or contradictory field. `field` is the field of a page that it concerns."""
+
+    def __init__(self, message: str, field: str = "") -> None:
+        super().__init__(message)
+        self.field = field
+
+
+@dataclasses.dataclass(frozen=True)
+class Option:
+    """Declaration of one field of a request.
+
+    name      of the field
+    kind      bool, int, float, str or Path
+    repeated  whether several values may be given
+    meaning   help text: what it is, with an example
+    unit      SI unit into which a text is converted; empty for other fields
+    bounds    closed range [SI]
+    choices   allowed texts with their values; empty if any is allowed
+    read      conversion of a text, given the name of the field for messages
+    metavar   placeholder of the value in a help text
+    flag      name on the command line, if it is not that of the field
+    label     name in a form, with a hint beside its field and an example in it
+    filled    text in the field of a form at first
+    offered   values that a form offers, with their names
+    default   as text, None without
+    empty     whether an empty text is a value
+    complete  completion of a text on the command line
+    """
+
+    name: str
+    kind: type[Any]
+    repeated: bool
+    meaning: str
+    unit: str = ""
+    bounds: tuple[float, float] = (-math.inf, math.inf)
+    choices: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    read: Callable[[str, str], Any] | None = None
+    metavar: str = ""
+    flag: str = ""
+    label: str = ""
+    hint: str = ""
+    example: str = ""
+    filled: str = ""
+    offered: Sequence[tuple[str, str]] = ()
+    default: Any = None
+    needed: bool = False
+    empty: bool = False
+    complete: Callable[[str], list[str]] | None = None
+
+    def convert(self, value: Any, where: str) -> Any:
+        """A value as given, a text or what a parser has made of it, as that of the field. Raises InputError."""
+        if self.choices:
+            return self._choice(value, where)
+        if self.read is not None:
+            return self.read(value, where) if isinstance(value, str) else value
+        if self.unit and isinstance(value, str):
+            value = quantity(value, self.unit, where=where)
+        elif self.kind is int and isinstance(value, str):
+            value = _whole_number(value, where)
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            self._check_bounds(value, where)
+        return value
+
+    def _choice(self, text: Any, where: str) -> Any:
+        if text not in self.choices:
+            allowed = ", ".join(filter(None, self.choices))
+            raise RequestError(
+                f"{where} is '{text}'; allowed range: {allowed}.{suggestion(str(text), self.choices)}", self.name
+            )
+        return self.choices[text]
+
+    def _check_bounds(self, value: float, where: str) -> None:
+        low, high = self.bounds
+        if not low <= value <= high:
+            raise RequestError(f"{where} is {value:g}; allowed range: {low:g} to {high:g}.", self.name)
+
+
+def _whole_number(text: str, where: str) -> int:
+    digits = text.strip()
+    if not (digits.isascii() and digits.removeprefix("-").isdecimal() and len(digits) < 10):
+        raise RequestError(f"{where} is '{text}'; give a whole number.")
+    return int(digits)
+
+
+def option(meaning: str, *, default: Any = dataclasses.MISSING, choices: Any = None, **declared: Any) -> Any:
+    """Declare a field; the keywords are those of `Option`. A default text is converted as a given one."""
+    names = choices if isinstance(choices, Mapping) else {name: name for name in choices or ()}
+    metadata = {"meaning": meaning, "default": default, "choices": names, **declared}
+    value = default
+    if isinstance(default, str):
+        value = Option("default", str, False, **{**metadata, "default": None}).convert(default, "default")
+    return dataclasses.field(metadata={_KEY: metadata}, default=value)
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(option,))
+def request(cls: type[T]) -> type[T]:
+    """Make a class a request: a frozen dataclass of declared fields."""
+    return dataclasses.dataclass(frozen=True, kw_only=True, eq=False)(cls)
+
+
+def options_of(cls: Any) -> tuple[Option, ...]:
+    """The declared fields of a request, in order."""
+    hints = typing.get_type_hints(cls)
+    return tuple(_option(field, hints[field.name]) for field in dataclasses.fields(cls) if _KEY in field.metadata)
+
+
+def _option(field: dataclasses.Field[Any], hint: Any) -> Option:
+    declared = dict(field.metadata[_KEY])
+    default = declared.pop("default")
+    kinds = [each for each in _parts(hint) if each is not type(None)]
+    repeated = typing.get_origin(kinds[0]) is tuple
+    kind = typing.get_args(kinds[0])[0] if repeated else kinds[0]
+    needed = default is dataclasses.MISSING
+    return Option(
+        field.name, kind if kind in (bool, int, float, str, Path) else str, repeated, needed=needed,
+        default=None if needed or default in ((), None) else default, **declared,
+    )  # fmt: skip
+
+
+def _parts(hint: Any) -> Sequence[Any]:
+    return typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
+
+
+def form_fields(cls: type[Any]) -> list[dict[str, Any]]:
+    """The fields of a form: name, label, hint, example, text at first, and offered values with their names."""
+    names = ("name", "label", "hint", "example", "filled")
+    return [{**{name: getattr(each, name) for name in names}, "offered": list(map(list, each.offered))}
+            for each in options_of(cls) if each.label]  # fmt: skip
+
+
+def build(cls: type[T], given: Mapping[str, Any], where: Where) -> T:
+    """The request of the values that a user has given; None and empty texts stand for the default.
+
+    Raises InputError, with the name of the field in the words of the outlet.
+    """
+    values: dict[str, Any] = {}
+    for each in options_of(cls):
+        value = given.get(each.name)
+        if value is None or value in ((), []) or (value == "" and not each.empty):
+            if each.needed:
+                raise RequestError(f"{where(each.name)} is missing; {_demand(each)}.", each.name)
+            continue
+        label = where(each.name)
+        if each.repeated:
+            values[each.name] = tuple(each.convert(item, label) for item in value)
+        else:
+            values[each.name] = each.convert(value, label)
+    made = cls(**values)
+    check = getattr(made, "check", None)
+    if check is not None:
+        check(where)
+    return made
+
+
+def _demand(declared: Option) -> str:
+    return "give a number with its unit" if declared.unit else "give it"

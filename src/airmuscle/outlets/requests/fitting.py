@@ -1,0 +1,195 @@
+"""Computation of a requested static fit: the fit or the comparison, the muscle, and the chapters of its report."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...bench.identify import (
+    UNCENSORED,
+    Candidate,
+    Fit,
+    bootstrap,
+    estimate_length_error,
+    fit,
+    profile,
+    standard_candidates,
+    weakly_determined,
+)
+from ...bench.identify.compare_chapter import compare_chapters
+from ...bench.identify.law_selection import LawSelection, select_law
+from ...bench.identify.problem import fitted_quantity_of
+from ...bench.identify.shape_chapter import shape_chapter
+from ...bench.identify.specimen_errors import odd_specimen_notes, ranked_specimen_errors, specimen_errors
+from ...bench.identify.static_fit_chapter import fit_chapter
+from ...bench.identify.surface.shape import fit_shape_constrained, shape_violations_of_fit
+from ...bench.identify.uncertainty_chapter import Uncertainty, length_error_chapter, uncertainty_chapter
+from ...core.errors import ParameterError
+from ...engine.processes import Workers
+from ...files.library.entry import Entry
+from ...files.library.fitted_entry import fitted_entry, left_out_ratio, missing_geometry
+from ...files.library.initial_law import InitialLaw, find_initial_law, resting_lengths
+from ...physics.muscle.characteristic import ContractileSurface
+from ...physics.muscle.geometry import Geometry
+from ...recording import Recording
+from ...report.chapter import Chapter
+from .braid import check_one_length, with_braid
+from .fit import WEAK, FitRequest
+
+Progress = Callable[[str, float], None]
+"""Called with a step and the fraction done."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class FittedMuscle:
+    """The fit, the muscle with its law, the chapters of the report, remarks on the specimens, and the selection of the
+    law, if laws were compared."""
+
+    fit: Fit
+    entry: Entry
+    chapters: list[Chapter]
+    notes: Sequence[str]
+    selection: LawSelection | None = None
+
+
+def fit_requested(
+    request: FitRequest,
+    names: Sequence[Path],
+    recordings: Sequence[Recording],
+    progress: Progress | None = None,
+    workers: Workers = 1,
+) -> FittedMuscle:
+    """The fit of the named law, or the recommended one of the comparison, with what else is requested.
+
+    names  of the files of the recordings
+
+    Raises IdentificationError, ParameterError and others of the fit.
+    """
+    recordings = list(recordings)
+    if request.compare:
+        return _compare(request, names, recordings, progress, workers)
+    assert request.characteristic is not None
+    initial = find_initial_law(request.characteristic, recordings, request.degree)
+    start = with_braid(initial.entry, request.braid, recordings)
+    law, fixed = start.characteristic, (*request.fix, *initial.fixed)
+    found = fit(
+        law,
+        recordings,
+        loss=request.loss(fitted_quantity_of(law).unit),
+        censoring=UNCENSORED if request.uncensored else None,
+        sigma=1.0 if request.equal_weights else None,
+        fixed=fixed,
+    )
+    errors = specimen_errors(found, recordings, fixed)
+    entry = fitted_entry(found, start, names, recordings=recordings, errors=errors)
+    entry, chapters, notes = _more(request, found, entry, recordings, progress)
+    odd = odd_specimen_notes(errors)
+    chapter = fit_chapter(found, entry, [*notes, *odd, *missing_geometry(entry)], _notes_of(recordings))
+    return FittedMuscle(found, entry, [chapter, *chapters], odd)
+
+
+def _compare(
+    request: FitRequest, names: Sequence[Path], recordings: list[Recording], progress: Progress | None, workers: Workers
+) -> FittedMuscle:
+    if request.braid is not None:
+        check_one_length(resting_lengths(recordings))
+    named = None
+    if request.characteristic is not None:
+        named = find_initial_law(request.characteristic, recordings, request.degree)
+    candidates = _candidates(request, recordings, named)
+    both = None if request.purpose is None else request.purpose == "both"
+    selection = select_law(
+        recordings, candidates, leave_out=request.split, both=both, loss=request.loss("N"), workers=workers,
+        progress=progress,
+    )  # fmt: skip
+    best = selection.recommended
+    is_named = named is not None and candidates is not None and best.candidate is candidates[-1]
+    geometry = named.entry.geometry if named is not None and is_named else None
+    initial = Entry(best.candidate.name, best.candidate.name, "chosen", best.candidate.law, geometry)
+    unused = []
+    if not isinstance(getattr(best.candidate.law, "geometry", None), Geometry):
+        initial = with_braid(initial, request.braid, recordings)
+    elif request.braid is not None:
+        unused = [f"The braid is not used: {best.candidate.name} contains its geometry, which was fitted."]
+    errors = ranked_specimen_errors(best, selection.comparisons, recordings)
+    entry = fitted_entry(best.fit, initial, names, left_out_ratio(best), recordings, errors)
+    entry, more, notes = _more(request, best.fit, entry, recordings, progress)
+    comparisons = _with_notes_once(compare_chapters(selection.comparisons, best, selection.reason))
+    odd = odd_specimen_notes(errors)
+    notes = [*notes, *unused, *odd, *missing_geometry(entry)]
+    comparisons[0] = dataclasses.replace(comparisons[0], notes=(*comparisons[0].notes, *notes))
+    fitted = dataclasses.replace(fit_chapter(best.fit, entry, (), _notes_of(recordings)), brief=False)
+    return FittedMuscle(best.fit, entry, [*comparisons, fitted, *more], [*odd, *unused], selection)
+
+
+def _candidates(request: FitRequest, recordings: list[Recording], named: InitialLaw | None) -> list[Candidate] | None:
+    """All candidates with the named law as the last; None without a named one: those that the data determine."""
+    if named is None:
+        return None
+    own = Candidate(f"{request.characteristic} (named)", named.entry.characteristic, (*request.fix, *named.fixed))
+    return [*standard_candidates(recordings), own]
+
+
+def _more(
+    request: FitRequest, found: Fit, entry: Entry, recordings: list[Recording], progress: Progress | None
+) -> tuple[Entry, list[Chapter], list[str]]:
+    """The entry with a constrained surface if one is requested, chapters of further results, and notes."""
+    chapters, notes = list[Chapter](), list[str]()
+    uncertainty = _uncertainty(request, found, recordings, progress)
+    if request.shape:
+        shaped = _shaped(request, found, recordings)
+        chapters.append(shape_chapter(shaped, found, len(request.free_contraction)))
+        note = f"{entry.note} With shape constraints: rms error {shaped.rmse:.4g} N."
+        entry = dataclasses.replace(entry, characteristic=shaped.model, note=note, error_band=None)
+    else:
+        notes = list(map(str, shape_violations_of_fit(found)))
+    if uncertainty.requested:
+        chapters.append(uncertainty_chapter(uncertainty))
+    if request.length_error:
+        errors = [estimate_length_error(found.model, recordings, name) for name in request.length_error]
+        chapters.append(length_error_chapter(errors))
+    return entry, chapters, notes
+
+
+def _uncertainty(
+    request: FitRequest, found: Fit, recordings: list[Recording], progress: Progress | None
+) -> Uncertainty:
+    weak = weakly_determined(found) if WEAK in request.profile else ()
+    names = dict.fromkeys((*weak, *(name for name in request.profile if name != WEAK)))
+    sample = None
+    if request.bootstrap is not None:
+        report = None if progress is None else lambda fraction: progress("refits", fraction)
+        sample = bootstrap(found, recordings, refits=request.bootstrap, by=request.split, progress=report)
+    profiles = tuple(profile(found, name) for name in names)
+    return Uncertainty(found, sample, profiles, WEAK in request.profile and not weak)
+
+
+def _shaped(request: FitRequest, found: Fit, recordings: list[Recording]) -> Any:
+    if not isinstance(found.model, ContractileSurface):
+        raise ParameterError(
+            f"--shape: the shape of {type(found.model).__name__} is given by its formula; only a "
+            "ContractileSurface can be constrained. Give --characteristic ContractileSurface, or omit --shape."
+        )
+    free = None
+    if request.free_contraction:
+        pressure, contraction = np.array(request.free_contraction).T
+        free = Recording({"pressure": pressure, "contraction": contraction}, "--free-contraction")
+    return fit_shape_constrained(found.model, recordings, free=free)
+
+
+def _with_notes_once(chapters: Sequence[Chapter]) -> list[Chapter]:
+    """The chapters without the notes that one before states."""
+    stated, once = set[str](), list[Chapter]()
+    for each in chapters:
+        once.append(dataclasses.replace(each, notes=tuple(note for note in each.notes if note not in stated)))
+        stated |= set(each.notes)
+    return once
+
+
+def _notes_of(recordings: Sequence[Recording]) -> tuple[str, ...]:
+    """The notes on the reading of the recordings, each once."""
+    return tuple(dict.fromkeys(note for recording in recordings for note in recording.notes))

@@ -1,0 +1,157 @@
+"""Request of a sizing: a lift or a joint, and the conditions of operation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from ...core.errors import UnitError
+from ...core.units import quantity
+from ...design.sizing import (
+    SORT_KEYS,
+    JointRequirement,
+    LiftRequirement,
+    Requirement,
+    SizingConditions,
+    SizingResult,
+    size_muscles,
+)
+from ...files.library import load_law
+from .declaration import RequestError, Where, option, request
+
+LIFT, JOINT = ("load", "stroke", "stiffness"), ("torque", "angle", "inertia")
+"""Fields of either requirement; the first two are needed."""
+
+
+SORTS = (
+    ("air", "air of a cycle"), ("length", "length"), ("count", "number of muscles"), ("reserve", "force reserve"),
+    ("diameter", "diameter"),
+)  # fmt: skip
+"""Criteria of ranking with their names in a form."""
+
+
+def read_load(text: str, where: str) -> dict[str, float]:
+    """Mass [kg] or force [N] of a load. Raises UnitError."""
+    for name, unit in (("mass", "kg"), ("force", "N")):
+        try:
+            return {name: quantity(text, unit, where=where)}
+        except UnitError as error:
+            if unit == "N":
+                raise UnitError(f"{error} A load is a mass or a force: '20 kg' or '200 N'.") from None
+    raise AssertionError
+
+
+@request
+class SizeRequest:
+    """What a sizing is asked for."""
+
+    supply: float = option(
+        "Supply pressure: '6 bar' (gauge).", unit="Pa", label="Supply pressure", hint="gauge", filled="6 bar"
+    )
+    load: Mapping[str, float] | None = option(
+        "Lift: mass or force of the load, '20 kg' or '200 N'.",
+        metavar="QUANTITY",
+        read=read_load,
+        default=None,
+        label="Load",
+        hint="mass or force",
+        filled="20 kg",
+    )
+    stroke: float | None = option(
+        "Lift: stroke, such as '40 mm'.", unit="m", default=None, label="Stroke", filled="40 mm"
+    )
+    stiffness: float | None = option(
+        "Lift: stiffness of a spring, relaxed at the start: '2 N/mm'.",
+        unit="N/m",
+        default=None,
+        label="Stiffness of a spring",
+        hint="optional: 2 N/mm",
+    )
+    torque: float | None = option(
+        "Joint: torque in either direction, such as '5 N m'.",
+        unit="N m",
+        default=None,
+        label="Torque in either direction",
+        filled="5 N m",
+    )
+    angle: float | None = option(
+        "Joint: range of the angle, such as '60 deg'.",
+        unit="rad",
+        default=None,
+        label="Range of the angle",
+        filled="60 deg",
+    )
+    inertia: float | None = option(
+        "Joint: inertia, such as '0.05 kg m^2'.",
+        unit="kg m^2",
+        default=None,
+        label="Moment of inertia",
+        hint="optional: 0.05 kg m^2",
+    )
+    safety: float = option(
+        "Factor on the load that is held.",
+        unit="1",
+        metavar="NUMBER",
+        default="1.5",
+        label="Safety factor",
+        hint="on the load",
+        filled="1.5",
+    )
+    cycle_time: float = option(
+        "Time of a cycle, there and back.",
+        unit="s",
+        default="2 s",
+        label="Cycle time",
+        hint="there and back",
+        filled="2 s",
+    )
+    max_length: float | None = option(
+        "Maximum nominal length.", unit="m", default=None, label="Maximum length", hint="optional", filled="400 mm"
+    )
+    max_diameter: float | None = option(
+        "Maximum outer diameter.", unit="m", default=None, label="Maximum diameter", hint="optional: 60 mm"
+    )
+    max_count: int = option(
+        "Maximum number of muscles in parallel.", default=3, label="Maximum number in parallel", filled="3"
+    )
+    count: int | None = option("Exact number of muscles in parallel.", default=None)
+    muscle: tuple[str, ...] = option("Muscle or file instead of the catalogue; repeatable.", metavar="NAME", default=())
+    sort: str = option(
+        f"Criterion of ranking: {', '.join(SORT_KEYS)}.",
+        choices=SORT_KEYS,
+        default="air",
+        metavar="KEY",
+        label="Rank by",
+        offered=SORTS,
+    )
+
+    def check(self, where: Where) -> None:
+        """Raise RequestError unless a lift or a joint is given."""
+        lift, joint = ([getattr(self, name) is not None for name in names] for names in (LIFT, JOINT))
+        if any(lift) == any(joint) or (any(lift) and not all(lift[:2])) or (any(joint) and not all(joint[:2])):
+            load, stroke, torque, angle = map(where, (*LIFT[:2], *JOINT[:2]))
+            raise RequestError(f"give {load} and {stroke} for a lift, or {torque} and {angle} for a joint")
+
+    @property
+    def requirement(self) -> Requirement:
+        """The lift or the joint. Raises ParameterError."""
+        if self.load is not None and self.stroke is not None:
+            return LiftRequirement(self.stroke, stiffness=self.stiffness or 0.0, **self.load)
+        return JointRequirement(self.angle or 0.0, self.torque or 0.0, self.inertia or 0.0)
+
+    @property
+    def conditions(self) -> SizingConditions:
+        """The conditions of operation. Raises ParameterError."""
+        limits: dict[str, Any] = {
+            name: value for name in ("max_length", "max_diameter") if (value := getattr(self, name)) is not None
+        }
+        low, high = (1, self.max_count) if self.count is None else (self.count, self.count)
+        return SizingConditions(self.supply, self.safety, self.cycle_time, min_count=low, max_count=high, **limits)
+
+    def evaluate(self, progress: Callable[[float], None] | None = None) -> SizingResult:
+        """The sizing, with at least one choice. Raises SolveError with what is reachable."""
+        entries = tuple(map(load_law, self.muscle)) or None
+        sort: Any = self.sort
+        result = size_muscles(self.requirement, self.conditions, entries, sort, progress)
+        result.check_reachable()
+        return result

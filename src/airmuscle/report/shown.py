@@ -1,0 +1,143 @@
+"""Tables and quantities as they are shown: headings with their unit, and numbers in that unit."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+from ..core.display import chosen_scale, heading_scale, scaled_numbers
+from ..core.units import conversion, known_factor
+from .chapter import BY_ROW, NamedValue, Table, TableColumn
+from .formatting import P_VALUE, format_cell, format_number, format_p_value, format_unit, is_number_text
+
+UNIT, MEANING, SYMBOL = "unit", "meaning", "symbol"
+"""Names of columns with a special form."""
+_ANR = " (ANR)"
+"""End of the unit of a volume of air at the reference atmosphere of ISO 8778."""
+
+
+@dataclasses.dataclass(frozen=True)
+class ShownColumn:
+    """A column as it is shown: heading with unit, and cells in this unit."""
+
+    heading: str
+    cells: list[Any]
+    column: TableColumn
+
+    @property
+    def is_numeric(self) -> bool:
+        """Whether all cells are numbers, which are aligned to the right."""
+        return all(not isinstance(cell, str | bool) or is_number_text(cell) for cell in self.cells)
+
+    def cell_text(self, cell: Any) -> str:
+        """A cell in typographic form; the heading decides on the format of units and p-values."""
+        if self.heading == P_VALUE:
+            return format_p_value(cell)
+        if self.heading == UNIT and isinstance(cell, str):
+            return format_unit(cell)
+        return format_cell(cell, self.column.digits)
+
+    @property
+    def texts(self) -> list[str]:
+        """The cells as text with their significant digits."""
+        return [format_number(cell, self.column.digits) for cell in self.cells]
+
+
+def shown_columns(table: Table, *, chosen: bool = True, brief: bool = False) -> list[ShownColumn]:
+    """The columns of a table as they are shown, in the units of the user's choice or, for a file, in the declared ones.
+
+    A meaning that is that of the row above, such as the one of all coefficients of a polynomial, is shown once. The
+    brief view has its rows and columns only.
+    """
+    rows = table.brief_rows if brief else list(range(len(table)))
+    columns = {name: each for name, each in table.columns.items() if each.brief or not brief}
+    scales = _scales_of_rows(table.columns[UNIT], rows, chosen) if UNIT in table.columns else []
+    shown = [_shown(name, each, rows, scales, chosen, brief) for name, each in columns.items()]
+    return [_with_meanings_once(each) if each.heading == MEANING and chosen else each for each in shown]
+
+
+def _shown(
+    name: str, column: TableColumn, rows: list[int], scales: list[tuple[float, str]], chosen: bool, brief: bool
+) -> ShownColumn:
+    values, title = [column.values[i] for i in rows], (brief and column.short) or name
+    if column.unit == BY_ROW:
+        return ShownColumn(title, [_times(v, scale) for v, (scale, _) in zip(values, scales, strict=True)], column)
+    if name == UNIT:
+        return ShownColumn(title, ["" if unit == "1" else unit for _, unit in scales], column)
+    if not column.unit:
+        factor, heading = heading_scale(title) if chosen else (1.0, title)
+        return ShownColumn(heading, [_times(value, factor) for value in values], column)
+    factor, unit = scale_of(name, column.unit, str(column.shown), chosen=chosen)
+    heading = title if unit == "" or (unit == "1" and chosen) else f"{title} [{unit}]"
+    return ShownColumn(heading, [_times(value, factor) for value in values], column)
+
+
+def _scales_of_rows(units: TableColumn, rows: list[int], chosen: bool) -> list[tuple[float, str]]:
+    """Factor from SI and unit of each row: that of the column, or its own where the rows have different ones."""
+    shown = units.shown or units.values
+    scales = []
+    for i in rows:
+        unit, label = units.values[i], shown[i]
+        factor = 1.0 if label == unit else _factor(label, unit)
+        known = chosen and unit != "1"  # not each ratio is a contraction
+        scales.append(chosen_scale(unit, factor, label) if known else (factor, label))
+    return scales
+
+
+def scale_of(name: str, unit: str, shown: str = "", *, chosen: bool = True) -> tuple[float, str]:
+    """Factor from SI, and the unit in which a quantity is shown. A ratio has a unit of choice only as contraction."""
+    label = shown or unit
+    factor = 1.0 if label == unit else _factor(label.removesuffix(_ANR), unit.removesuffix(_ANR))
+    if chosen and (unit != "1" or "contraction" in name.lower()):
+        return chosen_scale(unit, factor, label)
+    return factor, label
+
+
+def _factor(unit: str, si_unit: str) -> float:
+    """The factor from SI to a unit."""
+    known = known_factor(unit, 0.0) or conversion(unit, si_unit).factor
+    return 1.0 / known
+
+
+def value_cells(named: NamedValue) -> tuple[str, str]:
+    """A named value as text, and its unit in the choice of the user."""
+    if not named.unit or not isinstance(named.value, int | float | tuple) or isinstance(named.value, bool):
+        return format_number(named.value, named.digits), ""
+    factor, unit = scale_of(named.name, named.unit, named.shown)
+    return format_number(_times(named.value, factor), named.digits), "" if unit == "1" else unit
+
+
+def value_text(named: NamedValue) -> str:
+    """A named value as text with its unit and remark."""
+    return " ".join(filter(None, (*value_cells(named), named.remark)))
+
+
+def _times(value: Any, factor: float) -> Any:
+    """A cell, each end of a range, or the numbers of a text, times a factor."""
+    if factor == 1.0 or value is None or isinstance(value, bool):
+        return value
+    if isinstance(value, tuple):
+        return tuple(_times(each, factor) for each in value)
+    return scaled_numbers(value, factor) if isinstance(value, str) else value * factor
+
+
+def _with_meanings_once(shown: ShownColumn) -> ShownColumn:
+    cells = shown.cells
+    once = ["" if i and cell == cells[i - 1] else cell for i, cell in enumerate(cells)]
+    return dataclasses.replace(shown, cells=once)
+
+
+def rows_of(shown: list[ShownColumn]) -> list[tuple[Any, ...]]:
+    """The rows of shown columns."""
+    return list(zip(*(each.cells for each in shown), strict=True))
+
+
+def value_table(name: str, title: str, values: tuple[NamedValue, ...]) -> Table:
+    """The named values of a chapter as a table."""
+    columns: Mapping[str, Any] = {
+        "quantity": [each.name for each in values],
+        "value": [" ".join(filter(None, value_cells(each))) for each in values],
+    }
+    remarks = [each.remark for each in values]
+    return Table(name, title, {**columns, "remark": remarks} if any(remarks) else columns)
