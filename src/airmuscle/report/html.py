@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import base64
 import datetime
+import functools
+import platform
 import re
 from collections.abc import Sequence
-from importlib import resources
+from importlib import metadata, resources
 from pathlib import Path
 from typing import Any
 
@@ -26,12 +28,12 @@ from .formatting import (
 )
 from .formula import symbol_formula, to_display_mathml, to_mathml, to_plain
 from .shown import SYMBOL, ShownColumn, rows_of, shown_columns, value_table
-from .versions import versions
 
 MAX_SVG_BYTES = 600_000
 """Figures with a larger SVG are embedded as PNG: a dense chart would make the page slow."""
 MAX_LINE = 26
 """Characters of a text in a table cell that is not wrapped."""
+_PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "casadi", "matplotlib")
 _BRACKETS = re.compile(r"\s*\[([^\]]*)\]$")
 
 
@@ -121,3 +123,21 @@ def as_sentence(text: str) -> str:
 def is_short(value: Any) -> bool:
     """Whether a cell is shown on one line."""
     return isinstance(value, str) and len(to_plain(value)) <= MAX_LINE
+
+
+@functools.cache
+def versions() -> dict[str, str]:
+    """Return the versions of airmuscle, Python and the numerical packages; `not installed` for a missing one."""
+    return {
+        "airmuscle": _version("airmuscle"),
+        "Python": platform.python_version(),
+        **{package: _version(package) for package in _PACKAGES},
+        "machine": f"{platform.system()} {platform.machine()}",
+    }
+
+
+def _version(package: str) -> str:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "not installed"

@@ -15,6 +15,7 @@ from ...core.errors import ParameterError
 from ...files.library.catalogue import load_data
 from ...recording import Recording
 from ...recording.row_notes import row_notes
+from ...report.chapter import Chapter
 from ..requests.reading import ReadingRequest
 from .completion import complete_data
 from .progress import reading_progress
@@ -61,3 +62,9 @@ def read_recordings(files: list[Path], reading: ReadingRequest) -> list[Recordin
     check_contents(recordings)
     print_row_notes(recordings)
     return [*recordings, *(load_data(str(name)) for name in names)]
+
+
+def reading_chapters(recordings: Iterable[Recording]) -> list[Chapter]:
+    """One chapter with the notes on the rows that were left out or filled; none if all rows are as measured."""
+    notes = row_notes(recordings)
+    return [Chapter("reading", "Rows left out or filled", "\n\n".join(notes))] if notes else []

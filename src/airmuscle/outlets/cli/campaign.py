@@ -14,7 +14,6 @@ from ...bench.identify.campaign import STAGES, Campaign, LeftOutStage, StaticSta
 from ...bench.identify.campaign.campaign_chapters import UnreadFile, ValidationRow, campaign_chapters, stage_data
 from ...bench.readers import ColumnMapping
 from ...bench.readers.reader import complete_bench, find_files, read_file
-from ...bench.readers.reading_chapter import reading_chapters
 from ...core.atomic_output import atomic_folder, check_writable
 from ...core.errors import AirmuscleError, ColumnError, FileError, IdentificationError
 from ...files.library.campaign_entry import campaign_entry
@@ -28,7 +27,7 @@ from ...report.data import as_json
 from ..requests.braid import BraidSize, braid_of_length, check_one_length, read_braid
 from ..requests.declaration import option, request
 from ..requests.reading import ReadingRequest
-from .bench_files import print_row_notes
+from .bench_files import print_row_notes, reading_chapters
 from .campaign_stages import KeptStages
 from .delivery import deliver
 from .option_hints import in_options

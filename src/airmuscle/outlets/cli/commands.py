@@ -42,7 +42,7 @@ class CommandRow(NamedTuple):
 COMMANDS = (
     CommandRow("reproduce", "reproduce", "reproduce", "Reproduce three papers and test each of their claims."),
     CommandRow("list", "list", "list_entries", "List muscles, laws, valves, plants, products and data sets."),
-    CommandRow("show", "show", "show", "Show parameters, sources and checks of a library entry."),
+    CommandRow("show", "evaluate", "show", "Show parameters, sources and checks of a library entry."),
     CommandRow("cite", "cite", "cite", "Print the references of a library entry."),
     CommandRow("evaluate", "evaluate", "evaluate", "Evaluate a law for two of pressure, contraction and force."),
     CommandRow("inspect", "inspect", "inspect", "Inspect measurement files: columns, runs, sampling, outliers."),

@@ -1,7 +1,8 @@
-"""`airmuscle evaluate`: pressure, contraction or force of a muscle, given the other two."""
+"""`airmuscle evaluate` and `airmuscle show`: a library entry at an operating point, and what it contains."""
 
 from __future__ import annotations
 
+from ...files.library.catalogue import load
 from ...files.library.evaluation import UNITS
 from ...files.library.evaluation import evaluate as evaluate_entry
 from ...physics.muscle.isobar_plot import describe_point, isobar_table
@@ -65,3 +66,22 @@ def evaluate(
         }
         write_result(out, [], "", files)
         echo(f"chart: {out / 'isobars.png'}, data: {out / 'isobars.csv'} ({describe_point(found.point)})", err=json)
+
+
+@with_requests
+def show(name: Name, variant: EntryRequest, json: Json = False) -> None:
+    """Show parameters, sources and checks of a library entry.
+
+    The table of parameters contains symbol, value, unit, meaning and bounds.
+
+    \b
+    Examples:
+      airmuscle show dmsp-20-300
+      airmuscle show matrix-821
+      airmuscle show festo-dmsp-20
+      airmuscle show my/muscle.toml --json
+    """
+    chapter = variant.load(name, load).chapter()
+    print_result([chapter], {}, json)
+    for reference in () if json else chapter.references:
+        echo(f"- {reference}")

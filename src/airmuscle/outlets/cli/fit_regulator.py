@@ -6,13 +6,12 @@ from pathlib import Path
 
 from ...bench.identify.dynamic import fit_regulator
 from ...bench.identify.dynamic.dynamic_chapter import regulator_chapters
-from ...bench.readers.reading_chapter import reading_chapters
 from ...core.atomic_output import check_writable
 from ...files.library.fitted_entry import list_files
 from ...files.library.write import part_toml, scenario_toml
 from ..requests.declaration import option, request
 from ..requests.reading import ReadingRequest
-from .bench_files import Files, read_recordings
+from .bench_files import Files, read_recordings, reading_chapters
 from .delivery import deliver
 from .options import Folder, Json
 from .request_options import with_requests

@@ -8,7 +8,6 @@ from pathlib import Path
 
 from ...bench.identify.volume_chapter import volume_chapter, volume_summary
 from ...bench.identify.volume_fit import VolumeFit, fit_volume, volume_points
-from ...bench.readers.reading_chapter import reading_chapters
 from ...core.atomic_output import check_writable
 from ...core.errors import ParameterError, PhysicsError
 from ...files.library.entry import Entry
@@ -23,7 +22,7 @@ from ...recording import Recording
 from ..requests.braid import check_one_length
 from ..requests.declaration import option, request
 from ..requests.reading import ReadingRequest
-from .bench_files import Files, read_recordings
+from .bench_files import Files, read_recordings, reading_chapters
 from .delivery import deliver
 from .options import Folder, Json
 from .request_options import with_requests

@@ -12,7 +12,6 @@ from ...bench.identify.campaign.campaign_chapters import creep_chapter
 from ...bench.identify.hysteresis import find_loops, fit_jointly, fit_loop
 from ...bench.identify.hysteresis.hysteresis_chapter import hysteresis_chapters
 from ...bench.identify.hysteresis.joint import SelectedFriction, select_friction
-from ...bench.readers.reading_chapter import reading_chapters
 from ...core.atomic_output import check_writable
 from ...files.library.entry import Entry
 from ...files.library.entry_file import load_law
@@ -21,7 +20,7 @@ from ...files.library.write import part_toml, to_toml
 from ...physics.muscle.characteristic.base import ForceLaw
 from ..requests.declaration import RequestError, Where, option, request
 from ..requests.reading import ReadingRequest
-from .bench_files import Files, read_recordings
+from .bench_files import Files, read_recordings, reading_chapters
 from .delivery import deliver
 from .options import Folder, Json
 from .request_options import with_requests

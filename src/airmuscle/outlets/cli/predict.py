@@ -10,7 +10,6 @@ import typer
 from ...bench.identify.dynamic import StartTime
 from ...bench.identify.prediction import RecordPrediction
 from ...bench.identify.prediction.prediction_chapter import prediction_chapters
-from ...bench.readers.reading_chapter import reading_chapters
 from ...core.atomic_output import check_writable
 from ...core.errors import FileError
 from ...files.library.entry import PlantEntry
@@ -20,7 +19,7 @@ from ...files.library.files import is_path, list_plants, read_toml
 from ...files.scenario.prediction import load_plant_model
 from ..requests.declaration import RequestError, Where, option, request
 from ..requests.reading import ReadingRequest
-from .bench_files import read_recordings
+from .bench_files import read_recordings, reading_chapters
 from .completion import complete_model
 from .delivery import deliver
 from .options import Folder, Json
