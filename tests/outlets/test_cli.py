@@ -75,7 +75,7 @@ def assert_failed(result: Result, message: str) -> None:
 
 NAMES = (
     "reproduce", "list", "show", "cite", "evaluate", "inspect", "fit", "approximate", "convert", "hysteresis",
-    "fit-dynamic", "fit-regulator", "campaign", "predict", "fit-volume", "plan", "fit-live", "size", "simulate", "study", "tune", "benchmark", "export",
+    "fit-dynamic", "fit-regulator", "fit-joint", "campaign", "predict", "fit-volume", "plan", "fit-live", "size", "simulate", "study", "tune", "benchmark", "export",
     "studio", "schema",
 )  # fmt: skip
 
