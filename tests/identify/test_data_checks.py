@@ -37,7 +37,7 @@ from airmuscle.bench import Candidate, ColumnMapping, Fit, StaticStage, classify
 from airmuscle.bench.identify import blank_surface
 from airmuscle.bench.identify.campaign import fit_static_stage
 from airmuscle.bench.identify.data_checks import DataChecks
-from airmuscle.errors import AirmuscleWarning, ColumnError
+from airmuscle.errors import AirmuscleWarning, ColumnError, IdentificationError
 from airmuscle.physics import CreepElements, NoFriction
 from airmuscle.recording import Recording
 
@@ -114,6 +114,17 @@ def test_isobars_of_absolute_pressure_among_others_are_named(tmp_path):
     notes = notes_of(tmp_path, every_other(sweeps(), PRESSURE, ATMOSPHERE))
     assert "Rows contradict each other" in notes
     assert "the pressures of isobar_200.csv, isobar_400.csv are probably absolute" in notes
+
+
+def test_a_fit_that_contradictory_rows_prevent_names_them(tmp_path):
+    """Absolute pressures leave four of six levels, too few for degree 4; more levels would be no remedy."""
+    runs = read_all(tmp_path, every_other(sweeps(), PRESSURE, ATMOSPHERE))
+    with pytest.raises(IdentificationError, match=r"4 of pressure.* isobar_400\.csv are probably absolute") as refused:
+        fit(blank_surface(4, 1e5), runs)
+    assert refused.value.cause.startswith("the data cannot separate")
+    (isobar,) = read_all(tmp_path / "one", {"one": sweeps()["isobar_300"]})
+    with pytest.raises(IdentificationError, match=r"use degree=\d of [\w.]+$|law with fewer parameters\.[^.]*\.$"):
+        fit(blank_surface(4, 1e5), isobar)
 
 
 def test_ramps_of_absolute_pressure_among_others_are_named(tmp_path):

@@ -10,10 +10,11 @@ import numpy.typing as npt
 
 from ...core import tree
 from ...core.annotation import one_line
-from ...core.errors import IdentificationError, ParameterError
+from ...core.errors import HintedText, IdentificationError, ParameterError
 from ...physics.muscle.characteristic import PooledLengthLaw
 from ...physics.muscle.characteristic.base import Characteristic
 from ...recording import Recording
+from ..checks import find_suspicious
 from ..checks.contractions import MAX_CONTRACTION
 from .fit_notes import Examination, collect_notes, loss_scale_notes, weighting_notes
 from .fit_points import FitPoints
@@ -91,7 +92,17 @@ def fit(
     """
     check_arguments(law, recordings)
     points = FitPoints.from_recordings(recordings)
-    return fit_to_points(law, points, loss=loss, censoring=censoring, sigma=sigma, fixed=fixed)
+    try:
+        return fit_to_points(law, points, loss=loss, censoring=censoring, sigma=sigma, fixed=fixed)
+    except IdentificationError as error:
+        raise _with_remarks(error, points) from None
+
+
+def _with_remarks(error: IdentificationError, points: FitPoints) -> IdentificationError:
+    """The error, followed by what the recordings show without a law, which may be its cause; `read` says the rest."""
+    known = find_suspicious(points.recordings)
+    remarks = [part for note in points.checks.notes if note not in known for part in (" ", note)]
+    return IdentificationError(HintedText(error.message, *remarks), cause=error.cause)
 
 
 def fit_to_points(
