@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+import subprocess
+import sys
 import xml.etree.ElementTree as ET
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -170,3 +173,12 @@ def test_the_command_writes_both(tmp_path, unbuilt):
     assert len(set(plugins)) == 2
     assert {f"{each.removeprefix('airmuscle.')}_plugin.c" for each in plugins} <= {p.name for p in tmp_path.iterdir()}
     assert airmuscle("export", "joint-dmsp-20-matrix", "--to", "urdf", "--tunable", "x").exit_code == 2
+
+
+@pytest.mark.tool
+def test_the_wrist_of_the_examples_drums_with_its_beat():
+    """160 beats a minute are 10.7 in 4 s; the stick rebounds once at most."""
+    pytest.importorskip("mujoco")
+    example = Path(__file__).parents[2] / "examples" / "drumming_wrist.py"
+    said = subprocess.run([sys.executable, example], capture_output=True, text=True, check=True).stdout
+    assert 10 <= int(said.split()[0]) <= 12

@@ -17,6 +17,7 @@ from .library import load_law as load_law
 from .library import load_product as load_product
 from .library import load_valve as load_valve
 from .library import save as save
+from .library import scale_entry as scale_entry
 from .library import to_toml as to_toml
 from .library import verify as verify
 from .scenario import DynamicFitSetup as DynamicFitSetup
