@@ -88,3 +88,5 @@ def test_the_command_inspects_and_fits(tmp_path):
     assert (tmp_path / "out" / "report.html").exists()
     plant = am.files.load_scenario(tmp_path / "out" / "scenario.toml")
     assert len(plant.plant.muscles) == 2
+    simulated = airmuscle("simulate", tmp_path / "out" / "scenario.toml", "--out", tmp_path / "run")
+    assert simulated.exit_code == 0, simulated.output

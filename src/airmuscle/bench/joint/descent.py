@@ -24,13 +24,13 @@ CLIP, OUTLIER = 0.3, 3.0
 """Errors [rad] from which a residual counts less, and not at all: contact or a lost sensor (chosen)."""
 MEMORY, RATE, DAMPING, MAX_CHANGE = 0.9, 0.3, 1e-2, 0.4
 """Share of the past in the running averages, step, damping, greatest relative change of a parameter (chosen)."""
-PRIOR = 30.0
+PRIOR = 5.0
 """Weight of a prior value, in windows times rows with an error of one standard deviation (chosen)."""
 LOW = {"presliding_angle": 1.5e-3, "lags": 2e-3, "rotor_inertia": 1e-3, "stribeck_speed": 0.1, "slack_width": 0.3}
 """Lower limits of a search above those of the model, which the step of the integrator resolves (chosen)."""
 SIZES = {
-    "damping": 0.3, "coulomb_torque": 0.5, "load_arms": 4e-3, "presliding_angle": 2e-3, "lags": 0.01, "mass": 0.15,
-    "static_excess": 0.3, "stribeck_speed": 1.0, "zero_angle": 1.0, "rotor_inertia": 0.03, "centre": 0.05,
+    "damping": 0.3, "coulomb_torque": 0.5, "load_arms": 4e-3, "presliding_angle": 2e-3, "lags": 0.01, "mass": 1.0,
+    "static_excess": 0.3, "stribeck_speed": 1.0, "zero_angle": 1.0, "rotor_inertia": 0.03, "centre": 0.2,
     "slack_width": 5.0, "inertia": 0.03,
 }  # fmt: skip
 """Typical sizes [SI] of parameters that may start at 0 (chosen)."""

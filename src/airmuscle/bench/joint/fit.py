@@ -21,7 +21,7 @@ from .windows import HISTORY, ROWS, Windows, cut
 
 STRENGTHS = (1.0, 6.0)
 """Ratios of force and inertia from which the search of each joint starts (chosen)."""
-TRIALS = (SearchStage(12, 30, 120, 10), SearchStage(40, 40, 120, 20))
+TRIALS = (SearchStage(12, 30, 120, 10), SearchStage(40, 60, 120, 20))
 """Short and then long windows of every trial (chosen)."""
 SEARCH = SearchStage(40, 120, 160)
 """The search of all joints from their best trials (chosen)."""

@@ -51,7 +51,7 @@ def reduced_arm(middle: Array, axes: Sequence[tuple[int, int, int]] = (), link_l
 
 def _muscle(name: str, reference: float) -> Muscle:
     full = 3e5 * AREA
-    law = LinearInPressure((AREA, 0.0, 0.0), (-0.05 * full, 0.0, 0.0), 0.08 * full, reference)
+    law = LinearInPressure((AREA, 0.0, 0.0), (-0.05 * full, 0.0, 0.0), 0.3 * full, reference)
     return Muscle(law, GEOMETRY, name=name)
 
 
@@ -59,7 +59,7 @@ def _link(number: int, axis: tuple[int, int, int], distance: float) -> SpatialLi
     if not distance:
         return SpatialLink(axis, rotor_inertia=INERTIA, damping=0.5)
     position = (distance, 0.0, 0.0) if number > 1 else (0.0, 0.0, 0.0)
-    return SpatialLink(axis, position, 0.3, (0.0, 0.0, 0.0), 0.0, INERTIA, 0.5)
+    return SpatialLink(axis, position, 1.0, (0.0, 0.0, 0.0), 0.0, INERTIA, 0.5)
 
 
 def stronger(arm: PressureDriven, joint: int, factor: float) -> PressureDriven:
@@ -98,5 +98,5 @@ def shared_parameters(axes: Sequence[tuple[int, int, int]]) -> list[str]:
     paths = [f"{links[1]}zero_angle", *(f"{link}rotor_inertia" for link in links[1:])]
     for link, axis in zip(links[1:], axes[1:], strict=True):
         across = (k for k in range(3) if not axis[k])
-        paths += [f"{link}mass", *(f"{link}centre[{k}]" for k in across)]
+        paths += [f"{link}mass", f"{link}inertia", *(f"{link}centre[{k}]" for k in across)]
     return paths
