@@ -22,7 +22,8 @@ WORDS = {
     "area": "effective area", "passive_force": "force without pressure", "slack_width": "width of slackening",
     "lags": "lag of the pressure", "coulomb_torque": "dry friction", "presliding_angle": "presliding angle",
     "load_arms": "growth of friction with tension", "static_excess": "stiction", "stribeck_speed": "Stribeck speed",
-    "damping": "viscous friction", "rotor_inertia": "inertia", "inertia": "inertia of a link", "mass": "mass of a link", "centre": "centre of mass",
+    "damping": "viscous friction", "rotor_inertia": "inertia", "inertia": "inertia of a link",
+    "mass": "mass of a link", "centre": "centre of mass",
     "zero_angle": "direction of gravity",
 }  # fmt: skip
 
