@@ -24,6 +24,7 @@ from airmuscle.control import (
     HysteresisCompensation,
     HysteresisOperator,
     MotionFeedForward,
+    Multirate,
     OnOffController,
     ProportionalFeedback,
     SetpointCommand,
@@ -33,7 +34,10 @@ from airmuscle.control import (
     StaticFeedForward,
     StaticInverse,
     SuperTwisting,
+    WithCommandDelay,
     WithFeedForward,
+    WithManual,
+    WithRateLimit,
     WithSetpointDelay,
     WithStuckValve,
 )
@@ -91,6 +95,7 @@ def laws(regulated: Scenario) -> dict[str, ControlLaw]:
         Cascade(PID("angle", "difference", 2e5), CoContraction(SETPOINTS, 2e5), (-1.5e5,), (1.5e5,)),
         GainSchedule(pid, "gain", "angular_speed", (0.0, 1.0), (2e5, 3e5)),
         HysteresisCompensation(pid, first, HysteresisOperator((0.0, 1e4), (1.0, 0.5)).inverse),
+        Multirate(pid, 4), WithCommandDelay(pid, 2, 1, 0.1, 3.0), WithRateLimit(pid, (1e6,)), WithManual(pid, 0.3),
     )  # fmt: skip
     return {type(law).__name__: law for law in found}
 

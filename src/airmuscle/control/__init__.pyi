@@ -26,6 +26,7 @@ from .laws import InverseHysteresisOperator as InverseHysteresisOperator
 from .laws import IterativeLearning as IterativeLearning
 from .laws import LinearModelPredictive as LinearModelPredictive
 from .laws import MotionFeedForward as MotionFeedForward
+from .laws import Multirate as Multirate
 from .laws import OnOffController as OnOffController
 from .laws import OpenLoopLaw as OpenLoopLaw
 from .laws import ProportionalFeedback as ProportionalFeedback
@@ -36,7 +37,10 @@ from .laws import StateFeedback as StateFeedback
 from .laws import StaticFeedForward as StaticFeedForward
 from .laws import StaticInverse as StaticInverse
 from .laws import SuperTwisting as SuperTwisting
+from .laws import WithCommandDelay as WithCommandDelay
 from .laws import WithFeedForward as WithFeedForward
+from .laws import WithManual as WithManual
+from .laws import WithRateLimit as WithRateLimit
 from .laws import WithSetpointDelay as WithSetpointDelay
 from .laws import WithStuckValve as WithStuckValve
 from .linear_loop import LinearLaw as LinearLaw

@@ -93,4 +93,6 @@ from .tuning import rule_starts as rule_starts
 from .tuning import simc as simc
 from .tuning import step_experiment as step_experiment
 from .tuning import tune as tune
+from .tuning import tyreus_luyben as tyreus_luyben
 from .tuning import ultimate_point as ultimate_point
+from .tuning import ziegler_nichols as ziegler_nichols

@@ -4,6 +4,10 @@ from .composition import Cascade as Cascade
 from .composition import GainSchedule as GainSchedule
 from .composition import WithFeedForward as WithFeedForward
 from .computed_torque import ComputedTorque as ComputedTorque
+from .enclosing import Multirate as Multirate
+from .enclosing import WithCommandDelay as WithCommandDelay
+from .enclosing import WithManual as WithManual
+from .enclosing import WithRateLimit as WithRateLimit
 from .enclosing import WithSetpointDelay as WithSetpointDelay
 from .enclosing import WithStuckValve as WithStuckValve
 from .hysteresis import HysteresisCompensation as HysteresisCompensation

@@ -27,6 +27,8 @@ TONIETTI_BICCHI2002 = Reference(
 )
 
 
+UNREACHED = 0.01
+"""Part of the torque that the pressures must miss for the integral to stop (chosen): above the error of the inverse."""
 SLACK_STEPS = 6
 """Steps of the static inverse at the minimum tension."""
 
@@ -137,7 +139,8 @@ class AngleAndStiffness(ControlLaw):
     theta_r wanted angle, k_r wanted stiffness of the muscles (set point `stiffness`), e = theta_r - theta; tau_0 torque
     that holds the joint at rest, J a_r torque of the wanted acceleration where `acceleration_setpoint` names it; omega
     measured speed where D is not 0. The commands are two pressures, the set points of pressure regulators or, in a
-    `Cascade`, of inner pressure controllers. I is limited to `max_integral`. The stiffness is controlled in open loop.
+    `Cascade`, of inner pressure controllers. I is limited to `max_integral`, and does not grow where the pressures have
+    reached the end of their range and do not give the torque. The stiffness is controlled in open loop.
     References: Tondu and Lopez (2000), Tonietti and Bicchi (2002).
     """
 
@@ -195,7 +198,12 @@ class AngleAndStiffness(ControlLaw):
         first, second = self.inverse.pressures(wanted[angle], torque, wanted["stiffness"])
         integrates = self.integral_time > 0
         rate = self.gain / ops.where(integrates, self.integral_time, 1.0) * error
-        integral = ops.clip(memory["integral"] + dt * rate, -self.max_integral, self.max_integral)
+        missing = torque - self.inverse.torque(first, second, wanted[angle])
+        # with the same sign, the integral would ask for still more of what the pressures cannot give
+        held = ops.where(missing * rate > 0.0, ops.where(missing * missing > (UNREACHED * torque) ** 2, 1.0, 0.0), 0.0)
+        integral = ops.clip(
+            memory["integral"] + dt * ops.where(held > 0.5, 0.0, rate), -self.max_integral, self.max_integral
+        )
         later = {"integral": ops.where(integrates, integral, memory["integral"])}
         return dict(zip(self.commanded, (first, second), strict=True)), later
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from ...core import ops
 from ...core.declaration import Parameter, model, parameter
@@ -25,6 +25,8 @@ class Cascade(ControlLaw):
     `Cascade(PID("position", "pressure", ...), PID("pressure", SplitRange("fill", "discharge"), ...), (0.0,), (5e5,))`
     controls the position by the pressure. `minimum` and `maximum` are the ranges of the outer commands, in the order
     of `outer.inputs` and in SI units; the outer law sees them as the ranges of its inputs, so that it does not wind up.
+    With `tracking`, the saturation of the inner law reaches the outer one, too: while an inner command is at the end of
+    its range, the outer law sees the measured column as the end of the range of its command, and its anti-windup acts.
     Both laws are sampled at the same instants, the outer one first.
     Reference: Åström and Hägglund (1995), chapter 7.
     """
@@ -35,6 +37,7 @@ class Cascade(ControlLaw):
     inner: ControlLaw
     minimum: tuple[float, ...] = parameter("SI", "r_min", "minima of the outer commands", fitted=False)
     maximum: tuple[float, ...] = parameter("SI", "r_max", "maxima of the outer commands", fitted=False)
+    tracking: bool = False
 
     def check(self) -> None:
         commanded = self.outer.inputs
@@ -88,7 +91,30 @@ class Cascade(ControlLaw):
         commands, second = self.inner.step(
             select_prefix("inner.", memory), measurement._replace(setpoints=setpoints), dt
         )
+        if self.tracking:
+            first = self._tracked(memory, measurement, dt, (ranges, setpoints, commands, first))
         return dict(commands), {**with_prefix("outer.", first), **with_prefix("inner.", second)}
+
+    def _tracked(
+        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value, sample: tuple[Any, Any, Any, Any]
+    ) -> dict[str, Value]:
+        """The memory of the outer law where the inner one is saturated: that of the range that it reaches."""
+        ranges, wanted, commands, first = sample
+        at_end = 0.0 > 1.0
+        for name in self.inner.inputs:
+            low, high = measurement.ranges[name]
+            at_end = ops.either(at_end, commands[name] >= high)
+            if len(self.inner.inputs) == 1:  # of several, such as those in split range, zero is rest
+                at_end = ops.either(at_end, commands[name] <= low)
+        reached = {}
+        for name in self.outer.inputs:
+            low, high = ranges[name]
+            here = ops.clip(measurement.columns[name], low, high) if name in measurement.columns else wanted[name]
+            reached[name] = (
+                ops.where(wanted[name] < here, here, low), ops.where(wanted[name] > here, here, high)
+            )  # fmt: skip
+        _, tracked = self.outer.step(select_prefix("outer.", memory), measurement._replace(ranges=reached), dt)
+        return {name: ops.where(at_end, tracked[name], value) for name, value in first.items()}
 
 
 @model

@@ -22,6 +22,8 @@ from .rules import rule_settings as rule_settings
 from .rules import rule_starts as rule_starts
 from .rules import simc as simc
 from .rules import step_experiment as step_experiment
+from .rules import tyreus_luyben as tyreus_luyben
+from .rules import ziegler_nichols as ziegler_nichols
 from .scenario_loop import ScenarioLoop as ScenarioLoop
 from .scenario_loop import load_scenario_loop as load_scenario_loop
 from .tracking import IntegralAbsoluteError as IntegralAbsoluteError

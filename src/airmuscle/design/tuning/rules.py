@@ -24,6 +24,7 @@ from .process_models import (
     FirstOrderDeadTime,
     IntegratorDeadTime,
     ProcessModel,
+    UltimatePoint,
     first_order_of_step,
     integrator_of_step,
 )
@@ -46,6 +47,25 @@ ASTROM_HAGGLUND2004 = Reference(
 )
 
 
+ZIEGLER_NICHOLS1942 = Reference(
+    key="ziegler-nichols-1942",
+    authors="Ziegler, J. G., Nichols, N. B.",
+    title="Optimum settings for automatic controllers",
+    where="Transactions of the ASME 64, 759-768",
+    year=1942,
+    note="settings from ultimate gain and period; formulas as quoted in the later literature",
+)
+TYREUS_LUYBEN1992 = Reference(
+    key="tyreus-luyben-1992",
+    authors="Tyreus, B. D., Luyben, W. L.",
+    title="Tuning PI controllers for integrator/dead time processes",
+    where="Industrial & Engineering Chemistry Research 31(11), 2625-2628",
+    year=1992,
+    doi="10.1021/ie00011a029",
+    note="settings from ultimate gain and period; formulas as quoted in the later literature",
+)
+
+
 @dataclasses.dataclass(frozen=True)
 class RuleSettings:
     """Settings of a PID in standard form by a tuning rule: gain K [u/y], T_i [s], T_d [s] and set-point weight b."""
@@ -55,7 +75,9 @@ class RuleSettings:
     integral_time: float
     derivative_time: float = 0.0
     setpoint_weight: float = 1.0
-    references: ClassVar[tuple[Reference, ...]] = (SKOGESTAD2003, ASTROM_HAGGLUND2004)
+    references: ClassVar[tuple[Reference, ...]] = (
+        SKOGESTAD2003, ASTROM_HAGGLUND2004, ZIEGLER_NICHOLS1942, TYREUS_LUYBEN1992
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         check_field_types(self)
@@ -65,6 +87,30 @@ class RuleSettings:
         """Gain, integral and derivative time under the names of the parameters of PID; without a time that is 0."""
         named = {"gain": self.gain, "integral_time": self.integral_time, "derivative_time": self.derivative_time}
         return {name: value for name, value in named.items() if name == "gain" or value > 0}
+
+
+def ziegler_nichols(point: UltimatePoint, *, derivative: bool = True) -> RuleSettings:
+    """Settings of a PID or PI controller from the ultimate point (Ziegler and Nichols 1942):
+
+        K = 0.6 K_u,  T_i = T_u/2,  T_d = T_u/8      PID;        K = 0.45 K_u,  T_i = T_u/1.2      PI
+
+    They aim at a decay of 1/4 for each period, and are the fastest and least damped of the rules.
+    """
+    if derivative:
+        return RuleSettings("Ziegler-Nichols PID", 0.6 * point.gain, point.period / 2, point.period / 8)
+    return RuleSettings("Ziegler-Nichols PI", 0.45 * point.gain, point.period / 1.2)
+
+
+def tyreus_luyben(point: UltimatePoint, *, derivative: bool = True) -> RuleSettings:
+    """Settings of a PID or PI controller from the ultimate point (Tyreus and Luyben 1992):
+
+        K = K_u/2.2,  T_i = 2.2 T_u,  T_d = T_u/6.3      PID;        K = K_u/3.2,  T_i = 2.2 T_u      PI
+
+    They are slower and better damped than those of Ziegler and Nichols.
+    """
+    if derivative:
+        return RuleSettings("Tyreus-Luyben PID", point.gain / 2.2, 2.2 * point.period, point.period / 6.3)
+    return RuleSettings("Tyreus-Luyben PI", point.gain / 3.2, 2.2 * point.period)
 
 
 def simc(model: ProcessModel, closed_loop_time: float | None = None) -> RuleSettings:

@@ -1,0 +1,182 @@
+"""Laws with a sampling, delays and limits of their own, and what they do not wind up; rules from the ultimate point."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from control_plants import INVERSE, JOINT, LIFT, PRESSURES, SPLIT
+
+import airmuscle as am
+from airmuscle.control import (
+    PID,
+    AngleAndStiffness,
+    Cascade,
+    Multirate,
+    WithCommandDelay,
+    WithManual,
+    WithRateLimit,
+)
+from airmuscle.design import UltimatePoint, tyreus_luyben, ziegler_nichols
+from airmuscle.engine import ControlLoop, Measurement, Rodas4, Schedule, simulate
+from airmuscle.errors import ParameterError
+
+H = 0.01
+INNER = PID("pressure", "fill", 0.02, integral_time=0.3)
+
+
+def stepped(law, values, setpoint=1.0, further=None, ranges=None):
+    """The commands of a law for measured pressures, sample by sample, and its last memory."""
+    memory, told = law.init(), []
+    for k, value in enumerate(values):
+        setpoints = {"pressure": setpoint, **({} if further is None else further(k))}
+        measurement = Measurement({"pressure": value}, setpoints, ranges or {"fill": (-1.0, 1.0)})
+        commands, memory = law.step(memory, measurement, H)
+        told.append(commands["fill"])
+    return np.array(told), memory
+
+
+def test_a_slower_law_in_a_fast_loop_is_the_loop_with_its_sample_time():
+    state = am.find_equilibrium(LIFT, pressure=1e5)
+    law = PID("pressure", SPLIT, 5e-6, integral_time=0.4)
+    motion = Schedule({"pressure": ((0, 1e5), (0.2, 2e5))})
+    runs = [
+        simulate(LIFT, ControlLoop(each, h, motion), duration=1.0, initial_state=state, output_times=0.02,
+                 integrator=Rodas4(1e-10))
+        for each, h in ((law, 0.02), (Multirate(law, 5), 0.004))
+    ]  # fmt: skip
+    rows = [np.searchsorted(run["time"], np.arange(50) * 0.02 + 1e-9) - 1 for run in runs]
+    for name in ("pressure", "position"):
+        first, second = (run[name][at] for run, at in zip(runs, rows, strict=True))
+        assert second == pytest.approx(first, rel=1e-6)
+
+
+def test_two_rates_of_a_cascade_hold_the_outer_command():
+    outer = Multirate(PID("position", "pressure", 1e7), 4)
+    law = Cascade(outer, PID("pressure", "fill", 1e-6), (0.0,), (5e5,))
+    memory, held = law.init(), []
+    for k in range(12):
+        columns = {"position": 0.001 * k, "pressure": 0.0}
+        _, memory = law.step(memory, Measurement(columns, {"position": 0.02}, {"fill": (0.0, 1.0)}), H)
+        held.append(memory["outer.held.pressure"])
+    assert held == pytest.approx(np.repeat([2e5, 1.6e5, 1.2e5], 4))
+
+
+def test_commands_arrive_later_by_whole_samples_of_the_loop():
+    values = np.linspace(0.0, 0.8, 30)
+    plain, _ = stepped(INNER, values)
+    late, _ = stepped(WithCommandDelay(INNER, 3), values)
+    assert late.tolist() == [0.0, 0.0, 0.0, *plain[:-3].tolist()]
+    same, _ = stepped(WithCommandDelay(INNER, 0), values)
+    assert same.tolist() == plain.tolist()
+
+
+def test_the_age_of_a_command_is_uniform_and_the_stated_part_is_lost():
+    values = np.arange(4000) * 1e-4
+    law = PID("pressure", "fill", 1.0)
+    plain, _ = stepped(law, values, ranges={"fill": (-9.0, 9.0)})
+    late, _ = stepped(WithCommandDelay(law, 2, 3, seed=4), values, ranges={"fill": (-9.0, 9.0)})
+    ages = np.round((late - plain)[10:] / 1e-4).astype(int)
+    counts = np.bincount(ages, minlength=6) / ages.size
+    assert counts[:2].tolist() == [0.0, 0.0]
+    assert counts[2:6] == pytest.approx(0.25, abs=0.03)
+    lost, _ = stepped(WithCommandDelay(law, 0, lost=0.3, seed=5), values, ranges={"fill": (-9.0, 9.0)})
+    assert np.mean(np.diff(lost) == 0) == pytest.approx(0.3, abs=0.03)
+
+
+def test_a_rate_limit_is_kept_and_known_to_the_law():
+    """A PID behind a limiter that it does not know integrates on; one that knows it leaves the limit at once."""
+    law = PID("pressure", "fill", 1.0, integral_time=0.1)
+    values = np.where(np.arange(200) < 100, 0.0, 2.0)
+    limited, _ = stepped(WithRateLimit(law, (0.5,)), values)
+    assert np.abs(np.diff(limited)).max() <= 0.5 * H * (1 + 1e-12)
+    turned = np.argmax(np.diff(limited) < 0)
+    assert turned <= 100
+    unknown, _ = stepped(law, values, ranges={"fill": (-99.0, 99.0)})
+    assert np.argmax(unknown < 0) > 100 + 3
+
+
+def test_a_change_from_manual_to_automatic_has_no_bump_and_fades():
+    law, by_hand = PID("pressure", "fill", 0.4), {"manual.fill": 0.35}
+    told, _ = stepped(WithManual(law, 0.1), np.full(300, 0.7), further=lambda k: {**by_hand, "manual": float(k < 150)})
+    assert told[:151] == pytest.approx(0.35, abs=1e-15)
+    fading = 0.12 + (0.35 - 0.12) * np.exp(-H * np.arange(150) / 0.1)
+    assert told[150:] == pytest.approx(fading, rel=1e-12)
+    plain, _ = stepped(law, np.full(300, 0.7))
+    assert told[-1] == pytest.approx(plain[-1], abs=1e-6)
+
+
+def test_the_integral_does_not_grow_by_hand():
+    """By hand for 20 s with a constant error: the integral is that of the commands, not 20 s of the error."""
+    law, by_hand = PID("pressure", "fill", 0.4, integral_time=0.1), {"manual.fill": 0.35, "manual": 1.0}
+    _, memory = stepped(WithManual(law), np.full(2000, 0.7), further=lambda k: by_hand)
+    assert memory["law.integral"] == pytest.approx(0.35, abs=1e-6)
+
+
+def returned(law, plant, column, motion, wanted, band, begin, **options):
+    """The time after `begin` until a column stays within a band around the wanted value."""
+    run = simulate(plant, ControlLoop(law, 2e-3, motion), duration=begin + 4.0, output_times=5e-3, **options)
+    outside = run["time"][np.abs(run[column] - wanted) > band]
+    return outside[-1] - begin
+
+
+def test_the_saturation_of_an_inner_law_reaches_the_outer_one():
+    """The supply does not reach the pressure that the outer law asks for; back to what is within reach."""
+    state = am.find_equilibrium(LIFT, pressure=1e5)
+    far, near = state["position"] + 0.08, state["position"] + 0.01
+    times = []
+    for tracking in (False, True):
+        outer = PID("position", "pressure", 5e6, integral_time=0.2, initial_output=1e5)
+        law = Cascade(outer, PID("pressure", SPLIT, 5e-5), (0.0,), (12e5,), tracking)
+        motion = Schedule({"position": ((0, far), (2.0, near))})
+        times.append(returned(law, LIFT, "position", motion, near, 1e-3, 2.0, initial_state=state))
+    assert times[1] < 0.7 * times[0]
+
+
+def test_without_saturation_tracking_changes_nothing():
+    state = am.find_equilibrium(LIFT, pressure=1e5)
+    motion = Schedule({"position": ((0, state["position"]), (0.1, state["position"] + 2e-4))})
+    runs = []
+    for tracking in (False, True):
+        outer = PID("position", "pressure", 5e5, integral_time=0.5, initial_output=1e5)
+        law = Cascade(outer, PID("pressure", SPLIT, 2e-6), (0.0,), (5e5,), tracking)
+        runs.append(simulate(LIFT, ControlLoop(law, 5e-3, motion), duration=0.5, initial_state=state)["position"])
+    assert runs[0].tolist() == runs[1].tolist()
+
+
+def test_the_integral_of_angle_and_stiffness_stops_where_the_pressures_end():
+    """1.5 bar reach 0.91 rad; after 3 s of a set point of 1.3 rad the return takes as long as that from 0.6 rad."""
+    state, times = am.find_equilibrium(JOINT, pressure=8e4), []
+    inverse = replace(INVERSE, max_pressure=1.5e5)
+    law = AngleAndStiffness(inverse, ("left.pressure", "right.pressure"), 3.0, 0.2, 0.1, speed_column="angular_speed")
+    for far in (0.6, 1.3):
+        motion = Schedule({"angle": ((0, far), (3.0, 0.1)), "stiffness": ((0, 7.0),)})
+        limited = Cascade(law, PRESSURES, (0.0, 0.0), (1.5e5, 1.5e5))
+        times.append(returned(limited, JOINT, "angle", motion, 0.1, 0.02, 3.0, initial_state=state))
+    assert times[1] < 1.5 * times[0]
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda: Multirate(INNER, 0), "Multirate: every is 0; allowed range: 1 to 1000"),
+        (lambda: WithCommandDelay(INNER, -1), "samples and jitter are -1 and 0; allowed range: from 0"),
+        (lambda: WithRateLimit(INNER, (1.0, 2.0)), r"2 rates for 1 inputs \(fill\); give one for each"),
+    ],
+)
+def test_impossible_timings_and_limits_are_refused(make, text):
+    with pytest.raises(ParameterError, match=text):
+        make()
+
+
+def test_rules_from_the_ultimate_point_are_those_of_the_literature():
+    """Astrom and Hagglund (1995), Table 4.2 for 0.6 K_u, T_u/2, T_u/8; Luyben's settings for the rest."""
+    point = UltimatePoint(10.0, 2.0)
+    found = [
+        (each.gain, each.integral_time, each.derivative_time)
+        for rule in (ziegler_nichols, tyreus_luyben)
+        for each in (rule(point), rule(point, derivative=False))
+    ]
+    expected = [(6.0, 1.0, 0.25), (4.5, 2.0 / 1.2, 0.0), (10 / 2.2, 4.4, 2.0 / 6.3), (10 / 3.2, 4.4, 0.0)]
+    assert found == [pytest.approx(each, rel=1e-12) for each in expected]
