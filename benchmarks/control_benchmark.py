@@ -1,6 +1,7 @@
 """Control benchmark of the antagonistic joint: all standard controllers on all truths, and the page of their results.
 
-    python benchmarks/control_benchmark.py [--quick] [--searches 3] [--processes 2] [--results FOLDER] [--out PAGE]
+    python benchmarks/control_benchmark.py [--quick] [--searches 3] [--on-off-searches 3] [--processes 2]
+                                           [--results FOLDER] [--out PAGE]
 
 Each controller is tuned by three searches, commissioned on every truth and judged there; the sealed truth is one of
 them, so that it is run for the page alone. A search with its runs is a file in the folder of the results: an
@@ -80,8 +81,8 @@ def searches(joint: BenchmarkJoint, kind: str, settings: Settings) -> list[tuple
     return sorted(map(tuple, groups.values()), key=len, reverse=True)
 
 
-def measure(settings: Settings, folder: Path, processes: int) -> list[Part]:
-    """All parts, from their files where these exist."""
+def measure(settings: Settings, folder: Path, processes: int, switched: int) -> list[Part]:
+    """All parts, from their files where these exist; `switched` is the number of searches for on/off valves."""
     folder.mkdir(parents=True, exist_ok=True)
     key = fingerprint(settings)
     jobs = [
@@ -95,6 +96,7 @@ def measure(settings: Settings, folder: Path, processes: int) -> list[Part]:
         for seed in settings.seeds
         for kind, joint in JOINTS.items()
         for names in searches(joint(settings.truths[:1]), kind, settings)
+        if kind == "proportional" or seed in settings.seeds[:switched]
     ]
     waiting = [job for job in jobs if not job[-1].exists()]
     with concurrent.futures.ProcessPoolExecutor(processes) as pool:
@@ -159,13 +161,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--searches", type=int, default=len(FULL.seeds), help="of each controller (3); 1 for --quick")
+    parser.add_argument("--on-off-searches", type=int, help="of those with on/off valves; the same unless given")
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--results", type=Path, default=here.parent / "build" / "control_benchmark")
     parser.add_argument("--out", type=Path, help="default: CONTROL.md beside this file; of --quick in the results")
     given = parser.parse_args()
     settings = QUICK if given.quick else dataclasses.replace(FULL, seeds=tuple(range(1, given.searches + 1)))
     out = given.out or (given.results / "quick.md" if given.quick else here / "CONTROL.md")
-    parts = measure(settings, given.results, given.processes)
+    parts = measure(settings, given.results, given.processes, given.on_off_searches or len(settings.seeds))
     curve = next(part.curve for part in parts if part.curve)
     text = page(collect(parts, settings), curve, settings, sum(part.cpu for part in parts))
     staging = out.with_name(f".{out.name}.part")

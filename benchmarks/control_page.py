@@ -33,7 +33,7 @@ Row = tuple[str, str, str, str]
 def page(results: Mapping[str, BenchmarkResult], curve: LearningCurve, settings: Any, cpu: float) -> str:
     """The page in Markdown."""
     known = {kind: without_sealed(result) for kind, result in results.items()}
-    lines = ["# Results of the control benchmark", "", *introduction(known["proportional"], settings, cpu), ""]
+    lines = ["# Results of the control benchmark", "", *introduction(known, settings, cpu), ""]
     lines += ["## Targets", "", *rows(("target, commissioned", "bound", "reached", ""), targets(known, curve)), ""]
     lines += ["## What holds on every truth", "", *orders(known["proportional"]), ""]
     for kind, title in (("proportional", "Proportional valves"), ("on/off", "On/off valves")):
@@ -44,16 +44,20 @@ def page(results: Mapping[str, BenchmarkResult], curve: LearningCurve, settings:
     return "\n".join(lines) + "\n"
 
 
-def introduction(result: BenchmarkResult, settings: Any, cpu: float) -> list[str]:
+def introduction(results: Mapping[str, BenchmarkResult], settings: Any, cpu: float) -> list[str]:
     """What was computed, how long it took, and the truths."""
-    quick = " --quick" if not settings.slow else ""
+    result, switched = results["proportional"], results["on/off"]
+    options = (
+        f" --searches {len(result.seeds)} --on-off-searches {len(switched.seeds)}" if settings.slow else " --quick"
+    )
+    seeds = "; ".join(f"{kind} valves, seeds {', '.join(map(str, each.seeds))}" for kind, each in results.items())
     return [
-        f"Results of `benchmarks/control_benchmark.py{quick}` on {datetime.date.today()}, Python "
+        f"Results of `benchmarks/control_benchmark.py{options}` on {datetime.date.today()}, Python "
         f"{platform.python_version()}; {cpu / 60:.3g} minutes of CPU time. All figures are simulations. [Comparison of "
         "controllers](../docs/benchmark.md) describes joint, truths, groups, tasks and metrics; their numbers are "
         "chosen. All text of this page but the headings is computed from the results.",
         "",
-        f"Searches: seeds {', '.join(map(str, settings.seeds))}, at most {settings.sets_per_gain} sets of gains for "
+        f"Searches: {seeds}; at most {settings.sets_per_gain} sets of gains for "
         f"each gain. Commissioning: {settings.commissioning_runs} runs on each truth. The controllers of the package "
         "were developed on other truths of the same family (seeds 1 to 6).",
         "",
