@@ -17,7 +17,6 @@ from pathlib import Path
 import numpy as np
 
 import airmuscle as am
-from airmuscle.bench.joint.chapter import horizon_figure
 from airmuscle.core.plotting import save
 
 
@@ -50,7 +49,7 @@ def main() -> None:
     if given.keep:
         np.savez(given.keep, errors=fit.errors, band=fit.band, episode=fit.episode, **fit.by_baseline)
     if given.figure:
-        save(horizon_figure(fit), given.figure)
+        save(fit.chapter().plots[0].draw(), given.figure)
 
 
 if __name__ == "__main__":

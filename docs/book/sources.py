@@ -14,7 +14,13 @@ from .docstrings import joined_lines
 from .formulas_in_text import displayed, is_formula_block
 from .latex_symbols import GREEK
 
-COPIED = ("benchmarks/RESULTS.md", "benchmarks/CONTROL.md", "benchmarks/REAL_DATA.md", "CHANGELOG.md")
+COPIED = (
+    "benchmarks/RESULTS.md",
+    "benchmarks/CONTROL.md",
+    "benchmarks/REAL_DATA.md",
+    "CHANGELOG.md",
+    "CHANGELOG-history.md",
+)
 """Pages outside docs/ that belong to the site."""
 INDENTED = re.compile(r"(?<=\n\n)(?:    .*\n|\n(?=    ))+(?=\n|\Z)")
 KEPT = re.compile(r"(^ {4}.*?$|^```.*?^```|`[^`]*`|\]\([^)]*\)|^\[[^\]]*\]:.*?$|<[^>]+>)", re.MULTILINE | re.DOTALL)

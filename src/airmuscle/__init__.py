@@ -11,6 +11,6 @@ their packages are those of `__init__.pyi`, which type checkers read, too.
 
 from .core.stubs import attach_stub as _attach_stub
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __getattr__, __dir__, __all__ = _attach_stub(__name__, __file__)
