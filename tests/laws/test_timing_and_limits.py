@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import control
 import numpy as np
 import pytest
 from control_plants import INVERSE, JOINT, LIFT, PRESSURES, SPLIT
@@ -15,12 +16,13 @@ from airmuscle.control import (
     Cascade,
     Multirate,
     WithCommandDelay,
+    WithFilter,
     WithManual,
     WithRateLimit,
 )
 from airmuscle.design import UltimatePoint, tyreus_luyben, ziegler_nichols
 from airmuscle.engine import ControlLoop, Measurement, Rodas4, Schedule, simulate
-from airmuscle.errors import ParameterError
+from airmuscle.errors import ParameterError, UnitError
 
 H = 0.01
 INNER = PID("pressure", "fill", 0.02, integral_time=0.3)
@@ -157,9 +159,35 @@ def test_the_integral_of_angle_and_stiffness_stops_where_the_pressures_end():
     assert times[1] < 1.5 * times[0]
 
 
+@pytest.mark.parametrize("kind", ["notch", "lead-lag"])
+def test_a_filter_is_that_of_python_control(kind):
+    """Tustin's rule, prewarped at the notch; it starts in the steady state of the first value."""
+    law, w = PID("pressure", "fill", -1.0), 2 * np.pi * 7.0
+    if kind == "notch":
+        filtered = WithFilter.notch(law, "pressure", 7.0, depth=0.2, damping=0.4)
+        continuous, warp = control.tf([1 / w**2, 0.2 * 0.8 / w, 1], [1 / w**2, 0.8 / w, 1]), w
+    else:
+        filtered, warp = WithFilter.lead_lag(law, "pressure", 0.05, 0.01), None
+        continuous = control.tf([0.05, 1], [0.01, 1])
+    values = 0.3 + np.random.default_rng(2).normal(size=80) * (np.arange(80) > 0)
+    told, _ = stepped(filtered, values, setpoint=0.0, ranges={"fill": (-99.0, 99.0)})
+    discrete = control.c2d(continuous, H, "tustin", prewarp_frequency=warp)
+    _, expected = control.forced_response(discrete, np.arange(80) * H, values - 0.3)
+    assert told == pytest.approx(0.3 + expected, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("given", ["10 ms", np.float32(0.01), np.float64(0.01), 0.01])
+def test_the_sample_time_of_a_loop_is_a_number_of_any_kind_or_a_text(given):
+    loop = ControlLoop(INNER, given, Schedule({"pressure": ((0, 1e5),)}))
+    assert type(loop.sample_time) is float
+    assert loop.sample_time == pytest.approx(0.01, rel=1e-7)
+
+
 @pytest.mark.parametrize(
     ("make", "text"),
     [
+        (lambda: WithFilter.notch(INNER, "angle", 1.0), "WithFilter: the law does not measure 'angle'"),
+        (lambda: WithFilter(INNER, "pressure", (1.0,), (1.0, 0.0)), "give two coefficients each"),
         (lambda: Multirate(INNER, 0), "Multirate: every is 0; allowed range: 1 to 1000"),
         (lambda: WithCommandDelay(INNER, -1), "samples and jitter are -1 and 0; allowed range: from 0"),
         (lambda: WithRateLimit(INNER, (1.0, 2.0)), r"2 rates for 1 inputs \(fill\); give one for each"),
@@ -180,3 +208,8 @@ def test_rules_from_the_ultimate_point_are_those_of_the_literature():
     ]
     expected = [(6.0, 1.0, 0.25), (4.5, 2.0 / 1.2, 0.0), (10 / 2.2, 4.4, 2.0 / 6.3), (10 / 3.2, 4.4, 0.0)]
     assert found == [pytest.approx(each, rel=1e-12) for each in expected]
+
+
+def test_a_text_that_is_no_time_is_no_sample_time():
+    with pytest.raises(UnitError, match="ControlLoop.sample_time"):
+        ControlLoop(INNER, "1 m", Schedule({"pressure": ((0, 1e5),)}))

@@ -36,6 +36,7 @@ from airmuscle.control import (
     SuperTwisting,
     WithCommandDelay,
     WithFeedForward,
+    WithFilter,
     WithManual,
     WithRateLimit,
     WithSetpointDelay,
@@ -96,6 +97,7 @@ def laws(regulated: Scenario) -> dict[str, ControlLaw]:
         GainSchedule(pid, "gain", "angular_speed", (0.0, 1.0), (2e5, 3e5)),
         HysteresisCompensation(pid, first, HysteresisOperator((0.0, 1e4), (1.0, 0.5)).inverse),
         Multirate(pid, 4), WithCommandDelay(pid, 2, 1, 0.1, 3.0), WithRateLimit(pid, (1e6,)), WithManual(pid, 0.3),
+        WithFilter.notch(pid, "angle", 5.0),
     )  # fmt: skip
     return {type(law).__name__: law for law in found}
 

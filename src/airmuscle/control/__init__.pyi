@@ -39,6 +39,7 @@ from .laws import StaticInverse as StaticInverse
 from .laws import SuperTwisting as SuperTwisting
 from .laws import WithCommandDelay as WithCommandDelay
 from .laws import WithFeedForward as WithFeedForward
+from .laws import WithFilter as WithFilter
 from .laws import WithManual as WithManual
 from .laws import WithRateLimit as WithRateLimit
 from .laws import WithSetpointDelay as WithSetpointDelay

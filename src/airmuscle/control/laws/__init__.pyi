@@ -10,6 +10,7 @@ from .enclosing import WithManual as WithManual
 from .enclosing import WithRateLimit as WithRateLimit
 from .enclosing import WithSetpointDelay as WithSetpointDelay
 from .enclosing import WithStuckValve as WithStuckValve
+from .filtering import WithFilter as WithFilter
 from .hysteresis import HysteresisCompensation as HysteresisCompensation
 from .hysteresis import HysteresisOperator as HysteresisOperator
 from .hysteresis import InverseHysteresisOperator as InverseHysteresisOperator

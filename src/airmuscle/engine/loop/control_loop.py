@@ -21,6 +21,7 @@ from ...core.ops import Value
 from ...core.short_repr import ShortRepr
 from ...core.system import System
 from ...core.tree import Structure, structure, with_ambient
+from ...core.units import quantity
 from ...recording.recording import Recording
 from .control_law import ControlLaw, EnclosingLaw, rebuilt
 from .controller import Controller, Measurement, named_signal_units
@@ -57,6 +58,7 @@ class ControlLoopState(NamedTuple):
 class ControlLoop(ShortRepr):
     """A sampled control loop: every `sample_time` [s], from the start of a run, the controller measures and commands.
 
+    sample_time   a number [s], or a text with its unit, "5 ms"
     setpoint      an InputSignal whose names are the controller's set points,
                   `Schedule({"pressure": ((0, 1e5), (2, 3e5))})`
     other_inputs  an InputSignal for the inputs that the controller does not command; zero by default
@@ -76,7 +78,12 @@ class ControlLoop(ShortRepr):
             raise ParameterError(
                 f"ControlLoop.controller is {abridged(self.controller)}; give a PID or another Controller."
             )
-        sample_time = self.sample_time
+        sample_time: Any = self.sample_time
+        if isinstance(sample_time, str):
+            sample_time = quantity(sample_time, "s", where="ControlLoop.sample_time")
+        elif isinstance(sample_time, np.number):
+            sample_time = sample_time.item()
+        object.__setattr__(self, "sample_time", sample_time)
         if (
             isinstance(sample_time, bool)
             or not isinstance(sample_time, float | int)
