@@ -211,5 +211,5 @@ def test_rules_from_the_ultimate_point_are_those_of_the_literature():
 
 
 def test_a_text_that_is_no_time_is_no_sample_time():
-    with pytest.raises(UnitError, match="ControlLoop.sample_time"):
+    with pytest.raises(UnitError, match=r"ControlLoop\.sample_time"):
         ControlLoop(INNER, "1 m", Schedule({"pressure": ((0, 1e5),)}))
