@@ -29,6 +29,7 @@ from airmuscle.outlets import (
     ValueRange,
     register_environments,
 )
+from airmuscle.outlets.environments import PlantEnv
 
 NAMES = ("Joint", "Lift", "Arm")
 gymnasium = pytest.importorskip("gymnasium", reason="gymnasium is not installed")
@@ -121,6 +122,22 @@ def test_an_episode_of_a_vector_ends_where_the_task_ends_it():
     assert not truncated[0]
     assert abs(observations[0, 0]) <= 0.1
     assert observations[0, 1] == 0.0
+
+
+@pytest.mark.parametrize("name", ["Joint", "Lift"])
+def test_a_picture_shows_the_present_state(name):
+    env = gymnasium.make(f"airmuscle/{name}-v0", render_mode="rgb_array")
+    env.reset(seed=1)
+    first = env.render()
+    for _ in range(30):
+        env.step(np.ones(env.action_space.shape, np.float32) * np.array([1.0, -1.0])[: env.action_space.shape[0]])
+    second = env.render()
+    assert (first.dtype, first.ndim, first.shape[2]) == (np.uint8, 3, 3)
+    assert first.shape == second.shape
+    assert (first != second).any()
+    assert (env.render() == second).all()
+    with pytest.raises(ParameterError, match="render_mode is 'human'; allowed are 'rgb_array' and None"):
+        PlantEnv(TASK, render_mode="human")
 
 
 def test_a_mask_chooses_the_plants_that_begin_anew_as_in_the_vectors_of_gymnasium():

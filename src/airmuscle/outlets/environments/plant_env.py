@@ -12,6 +12,8 @@ import numpy.typing as npt
 
 from ...core.errors import ParameterError, SimulationError
 from ...engine.run import RungeKutta4, Stepper
+from ...physics.equilibrium import complete_inputs
+from ...recording import Recording
 from .randomisation import EpisodeDraw, Randomisation, whole_steps
 from .standard import arm_task, joint_task, lift_task
 from .task import EnvironmentTask
@@ -44,12 +46,14 @@ class PlantEnv(gymnasium.Env):  # type: ignore[misc, unused-ignore]
     an action that is not finite or of another shape.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 100}
 
     def __init__(
         self, task: EnvironmentTask, randomisation: tuple[Randomisation, ...] = (), *,
-        integrator: RungeKutta4 = STEP, render_mode: None = None,
+        integrator: RungeKutta4 = STEP, render_mode: str | None = None,
     ) -> None:  # fmt: skip
+        if render_mode not in (None, "rgb_array"):
+            raise ParameterError(f"render_mode is {render_mode!r}; allowed are 'rgb_array' and None.")
         self.task, self.render_mode = task, render_mode
         self._draw = EpisodeDraw(task, randomisation)
         whole_steps(task, integrator)
@@ -95,6 +99,23 @@ class PlantEnv(gymnasium.Env):  # type: ignore[misc, unused-ignore]
         effort = self.task.effort_weight * sum(u * u for u in inputs[:-1]) / self._actions
         terms = {"closeness": reward + effort, "effort": effort}
         return outputs[: self._count].astype(np.float32), reward, terminated, False, terms
+
+    def render(self) -> Any:
+        """The present state of the plant as the picture of `Recording.animate`, (height, width, 3) of uint8.
+
+        None without `render_mode="rgb_array"`; takes some tenths of a second. Raises ParameterError for an arm, which
+        is not drawn.
+        """
+        if self.render_mode is None:
+            return None
+        plant = self.task.plant
+        state = dict(zip((s.name for s in plant.states), self._stepper.state.tolist(), strict=True))
+        values = {**plant.outputs(state, complete_inputs(plant, None)), **state}
+        columns = {"time": np.array([0.0, 1.0]), **{name: np.full(2, float(v)) for name, v in values.items()}}
+        picture = plant.animate(Recording(columns, "environment"))
+        picture.draw(0)
+        picture.figure.canvas.draw()
+        return np.asarray(picture.figure.canvas.buffer_rgba())[..., :3].copy()
 
 
 class MeasuredObservations(gymnasium.ObservationWrapper):  # type: ignore[misc, unused-ignore]
