@@ -252,7 +252,7 @@ class Fit(Reported):
             self._residual("maximum error", worst.error, point),
             self._residual("residual standard deviation", self.sigma, brief=False),
             NamedValue("R2", self.r2, "1", digits=6, remark=undefined if self.r2 is None else ""),
-            NamedValue("correlation index IK", self.ik, "1",
+            NamedValue("correlation index IK", self.ik, "1", digits=6,
                      remark="" if self.ik is not None else undefined if index is None else str(index)),
             NamedValue("rank", self.rank, remark=f"of {len(self.estimates)}"),
             NamedValue("condition", self.condition, "1", digits=3, brief=False),
