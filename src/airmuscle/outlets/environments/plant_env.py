@@ -111,7 +111,8 @@ class PlantEnv(gymnasium.Env):  # type: ignore[misc, unused-ignore]
         plant = self.task.plant
         state = dict(zip((s.name for s in plant.states), self._stepper.state.tolist(), strict=True))
         values = {**plant.outputs(state, complete_inputs(plant, None)), **state}
-        columns = {"time": np.array([0.0, 1.0]), **{name: np.full(2, float(v)) for name, v in values.items()}}
+        time = self._elapsed * self.task.period + np.array([0.0, 1.0])
+        columns = {"time": time, **{name: np.full(2, float(v)) for name, v in values.items()}}
         picture = plant.animate(Recording(columns, "environment"))
         picture.draw(0)
         picture.figure.canvas.draw()
