@@ -21,6 +21,7 @@ from airmuscle.bench.identify import (
     is_linear_parameter,
     label_folds,
     make_problem,
+    shortened_step,
     solve_censored_least_squares,
 )
 from airmuscle.core import leaves
@@ -137,6 +138,17 @@ def test_slack_rows_take_part_in_the_projection():
     assert solve_censored_least_squares(problem, slopes, problem.predict(again)) == pytest.approx(
         start[linear], rel=1e-6
     )
+
+
+def test_a_step_is_halved_until_the_sum_of_squares_is_at_most_the_limit():
+    """From x = 1 a step of -4 ends at 9, half of it at 1, a quarter at 0."""
+
+    def square(x):
+        return float(x @ x)
+
+    x, step = np.array([1.0]), np.array([-4.0])
+    assert [shortened_step(square, x, step, limit).item() for limit in (9.0, 1.0, 0.9)] == [-4.0, -2.0, -1.0]
+    assert shortened_step(square, x, step, 0.9, halvings=2).item() == 0.0
 
 
 def test_what_is_linear_alone_is_solved_at_once():

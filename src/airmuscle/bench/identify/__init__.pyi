@@ -7,6 +7,7 @@ from .candidate_scores import FoldScore as FoldScore
 from .candidates import Candidate as Candidate
 from .candidates import blank_surface as blank_surface
 from .candidates import standard_candidates as standard_candidates
+from .censored_least_squares import shortened_step as shortened_step
 from .censored_least_squares import solve_censored_least_squares as solve_censored_least_squares
 from .compare_chapter import compare_chapters as compare_chapters
 from .cross_validation import ALWAYS_FITTED as ALWAYS_FITTED
