@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from airmuscle.design import SEALED_SEED, BenchmarkResult, Group, LearningCurve
+from airmuscle.design.control_benchmark.benchmark import SEARCH_SPREAD
 from airmuscle.design.control_benchmark.chapter import (
     error_table,
     order_table,
@@ -61,8 +62,24 @@ def introduction(results: Mapping[str, BenchmarkResult], settings: Any, cpu: flo
         f"each gain. Commissioning: {settings.commissioning_runs} runs on each truth. The controllers of the package "
         "were developed on other truths of the same family (seeds 1 to 6).",
         "",
+        *(f"* {kind} valves: {convergence(each)}" for kind, each in results.items()),
+        "",
         *table(truth_table(result)),
     ]
+
+
+def convergence(result: BenchmarkResult) -> str:
+    """How many searches have converged, and the controllers whose searches differ by more than the stated spread."""
+    found = search_table(result)
+    if found is None:
+        return "nothing was tuned."
+    ended = [list(map(int, str(each).split(" of "))) for each in found.columns["converged"]]
+    pairs = zip(found.columns["controller"], found.columns["spread [%]"], strict=True)
+    beyond = [str(name) for name, value in pairs if float(value) > 100 * SEARCH_SPREAD]
+    text = f"{sum(n for n, _ in ended)} of {sum(m for _, m in ended)} searches converged within their sets of gains; "
+    if len(result.seeds) == 1:
+        return text + "one search each, so that its spread is not known."
+    return text + f"objectives that differ by more than {100 * SEARCH_SPREAD:g} %: {', '.join(beyond) or 'none'}."
 
 
 def without_sealed(result: BenchmarkResult) -> BenchmarkResult:

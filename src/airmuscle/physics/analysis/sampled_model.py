@@ -146,7 +146,7 @@ def imported_control() -> Any:
         import control
     except ImportError:
         raise AirmuscleError(
-            "to_control needs the package 'control' (python-control); pip install airmuscle[control], or use to_scipy()."
+            "to_control needs python-control; pip install airmuscle[control], or use to_scipy()."
         ) from None
     return control
 
