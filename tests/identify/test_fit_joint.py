@@ -42,7 +42,7 @@ def test_the_band_grows_with_the_horizon_and_holds_what_it_says(fitted):
 def test_the_remarks_name_the_scale_of_the_torques(fitted):
     fit, _ = fitted
     assert any("do not contain the scale of the torques" in remark for remark in fit.remarks)
-    assert any("not separated; fix" in remark for remark in fit.remarks)
+    assert any("the record does not separate" in remark for remark in fit.remarks)
 
 
 def test_the_gain_of_a_muscle_is_that_of_the_plant_that_made_the_record(fitted):

@@ -24,6 +24,9 @@ CLIP, OUTLIER = 0.3, 3.0
 """Errors [rad] from which a residual counts less, and not at all: contact or a lost sensor (chosen)."""
 MEMORY, RATE, DAMPING, MAX_CHANGE = 0.9, 0.3, 1e-2, 0.4
 """Share of the past in the running averages, step, damping, greatest relative change of a parameter (chosen)."""
+CHECKED, LOST, SAMPLE = 10, 1.5, 400
+"""Iterations after which the cost of their mean is checked, its ratio to the best one from which the search has lost
+its way, and windows from which it is computed (chosen)."""
 PRIOR = 5.0
 """Weight of a prior value, in windows times rows with an error of one standard deviation (chosen)."""
 LOW = {"presliding_angle": 1.5e-3, "lags": 2e-3, "rotor_inertia": 1e-3, "stribeck_speed": 0.1, "slack_width": 0.3}
@@ -38,12 +41,11 @@ SIZES = {
 
 @dataclasses.dataclass(frozen=True)
 class SearchStage:
-    """Iterations with windows of `rows` rows, `batch` windows each; the estimate is the mean of the last ones."""
+    """Iterations with windows of `rows` rows, `batch` windows each."""
 
     rows: int
     iterations: int
-    batch: int = 240
-    averaged: int = 30
+    batch: int
 
 
 @dataclasses.dataclass(eq=False)
@@ -67,11 +69,15 @@ class Descent:
         self.rng = np.random.default_rng(self.seed)
         self.spread = np.full(len(self.paths), 0.1)
 
-    def run(self, schedule: SearchStage) -> list[Array]:
-        """Descend; returns the rms error [rad] of each joint at every iteration. Afterwards `arm` is the estimate."""
-        count = len(self.names)
-        normal, slope, tail, errors = np.zeros((count, count)), np.zeros(count), [], []
-        for step in range(schedule.iterations):
+    def run(self, schedule: SearchStage) -> float:
+        """Descend; afterwards `arm` is the mean of CHECKED iterates in turn with the smallest cost, which is returned.
+
+        A search that has lost its way goes on from that mean with half the step.
+        """
+        count, rate = len(self.names), RATE
+        normal, slope, tail = np.zeros((count, count)), np.zeros(count), []
+        best, cost = self.values.copy(), self._cost(self.values, schedule.rows)
+        for step in range(1, schedule.iterations + 1):
             which = self.rng.permutation(len(self.windows))[: schedule.batch]
             batch = self.windows.part(np.sort(which), schedule.rows)
             found = [self._of_joint(joint, batch) for joint in self.paths]
@@ -80,14 +86,28 @@ class Descent:
             )
             new_normal, new_slope = self._sum(found)
             normal, slope = MEMORY * normal + (1 - MEMORY) * new_normal, MEMORY * slope + (1 - MEMORY) * new_slope
-            last = step >= schedule.iterations - schedule.averaged
-            self._step(normal, slope, 0.4 * RATE if last else RATE)
-            errors.append(np.array([e for *_, e in found]))
-            if last:
-                tail.append(self.values.copy())
-        self.values = np.mean(tail, axis=0)
+            self._step(normal, slope, 0.4 * rate if step > 0.7 * schedule.iterations else rate)
+            tail.append(self.values.copy())
+            if step % CHECKED == 0:
+                mean = np.mean(tail[-CHECKED:], axis=0)
+                reached = self._cost(mean, schedule.rows)
+                if reached < cost:
+                    best, cost = mean, reached
+                elif not reached < LOST * cost:
+                    self.values, rate = best.copy(), 0.5 * rate
+        self.values = best
         self.arm = with_values(self.arm, self.names, self.values)
-        return errors
+        return cost
+
+    def _cost(self, values: Array, rows: int) -> float:
+        """Robust mean square error [rad^2] of the free run of these joints over a fixed sample of the windows."""
+        arm = with_values(self.arm, self.names, values)
+        some = self.windows.part(
+            np.linspace(0, len(self.windows) - 1, min(SAMPLE, len(self.windows))).astype(int), rows
+        )
+        errors = np.stack([joint_errors(arm, joint, some) for joint in self.paths])
+        errors = np.where(np.isfinite(errors), np.clip(np.abs(errors), 0.0, OUTLIER), OUTLIER)
+        return float(np.mean(2 * CLIP**2 * (np.sqrt(1 + (errors / CLIP) ** 2) - 1)))
 
     def _of_joint(self, joint: int, batch: Windows) -> tuple[Array, Array, float]:
         """Normal matrix and slope of one joint in its own parameters, and its rms error [rad]."""
@@ -118,6 +138,19 @@ class Descent:
         limit = MAX_CHANGE * np.maximum(np.abs(self.values), self.sizes)
         self.values = np.clip(self.values + np.clip(rate * change, -limit, limit), self.low, self.high)
         self.arm = with_values(self.arm, self.names, self.values)
+
+
+def joint_errors(arm: PressureDriven, joint: int, windows: Windows) -> Array:
+    """Errors (N, rows) [rad] of the free run of one joint; the other joints move as measured."""
+    system, known = OneJoint(arm, joint), start_of(arm, windows)
+    angle = system.states[0].name
+    run = simulate_batch(
+        system, {}, signals(system, windows), duration=windows.rows * windows.sample_time,
+        initial_states={s.name: known[s.name] for s in system.states},
+        output_times=windows.sample_time * np.arange(windows.rows + 1),
+        integrator=RungeKutta4(windows.sample_time / SUBSTEPS), keep=[angle],
+    )  # fmt: skip
+    return np.asarray(run[angle][:, 1:] - windows.angle[:, HISTORY + 1 :, joint])
 
 
 def gradients(arm: PressureDriven, joint: int, paths: Sequence[str], windows: Windows) -> tuple[Array, Array]:

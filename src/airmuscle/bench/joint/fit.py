@@ -14,17 +14,17 @@ from .descent import Descent, SearchStage
 from .episode_inspection import check_episodes, inspect_episodes
 from .episodes import Episodes
 from .free_run import band, baseline_errors, free_run, rms
-from .reduced_arm import crossing_loads, own_parameters, reduced_arm, shared_parameters, stronger
+from .reduced_arm import own_parameters, reduced_arm, shared_parameters, stronger
 from .result import ArmFit
 from .separation import separate
 from .windows import HISTORY, ROWS, Windows, cut
 
-STRENGTHS = (1.0, 6.0)
+STRENGTHS = (1.0, 6.0, 25.0)
 """Ratios of force and inertia from which the search of each joint starts (chosen)."""
-TRIALS = (SearchStage(12, 30, 120, 10), SearchStage(40, 60, 120, 20))
+TRIALS = (SearchStage(12, 30, 120), SearchStage(40, 50, 120))
 """Short and then long windows of every trial (chosen)."""
 SEARCH = SearchStage(40, 120, 160)
-"""The search of all joints from their best trials (chosen)."""
+"""The search of each joint from its best trial (chosen)."""
 CONTACT = 5.0
 """Ratio of the greatest error in an episode to the rms error from which a contact is suspected (chosen)."""
 
@@ -107,30 +107,35 @@ def _ordered(episodes: Episodes, pairs: Sequence[tuple[int, int]]) -> Episodes:
 def _search(
     episodes: Episodes, windows: Windows, axes: tuple[tuple[int, int, int], ...], seed: int, progress: Progress
 ) -> tuple[PressureDriven, dict[int, list[str]]]:
+    """The arm, and the parameters fitted for each joint; the most coupled joint determines what they share."""
     low, high = np.quantile(episodes.rows("angle"), (0.01, 0.99), axis=0)
     arm = reduced_arm(0.5 * (low + high), axes)
-    paths = {joint: own_parameters(joint) for joint in range(episodes.joints)}
     shared = shared_parameters(axes) if axes else []
     prior = {leaf.path: float(leaf.value) for leaf in tree.leaves(arm) if leaf.path in shared}
-    for joint, own in paths.items():
+    paths: dict[int, list[str]] = {}
+    for joint in _by_coupling(axes, episodes.joints):
+        paths[joint] = [*own_parameters(joint), *(shared if not paths else [])]
         trials = [
-            _trial(Descent(stronger(arm, joint, factor), windows, {joint: [*own, *shared]}, seed, prior))
+            _trial(Descent(stronger(arm, joint, factor), windows, {joint: paths[joint]}, seed, prior))
             for factor in STRENGTHS
         ]
-        error, best = min(trials, key=lambda trial: trial[0])
+        best = min(trials, key=lambda trial: trial[0])[1]
+        cost = best.run(_shortened(SEARCH, best))
         arm = best.arm
-        progress(f"joint {joint + 1}: rms error {np.degrees(np.sqrt(error)):.3g} deg after the trials")
-    paths = {j: [*own, *crossing_loads(episodes.joints, j), *shared] for j, own in paths.items()}
-    descent = Descent(arm, windows, paths, seed, prior)
-    errors = descent.run(_shortened(SEARCH, descent))
-    progress(f"all joints: rms errors {np.degrees(np.sqrt(np.mean(np.square(errors[-20:]), axis=0))).round(2)} deg")
-    return descent.arm, paths
+        progress(f"joint {joint + 1}: {np.degrees(np.sqrt(cost)):.3g} deg, robust mean over the windows")
+    return arm, dict(sorted(paths.items()))
+
+
+def _by_coupling(axes: tuple[tuple[int, int, int], ...], joints: int) -> list[int]:
+    """The joints, first the one with the most joints beyond it about a parallel axis, whose inertia acts on it."""
+    parallel = [[abs(np.dot(a, b)) for b in axes[j + 1 :]] for j, a in enumerate(axes)] or [[]] * joints
+    return sorted(range(joints), key=lambda joint: -sum(parallel[joint]))
 
 
 def _trial(descent: Descent) -> tuple[float, Descent]:
     for schedule in TRIALS:
-        errors = descent.run(_shortened(schedule, descent))
-    return float(np.mean(np.square(errors[-20:]))), descent
+        cost = descent.run(_shortened(schedule, descent))
+    return cost, descent
 
 
 def _shortened(schedule: SearchStage, descent: Descent) -> SearchStage:

@@ -83,12 +83,6 @@ def own_parameters(joint: int) -> list[str]:
     return [*paths, f"{element}static_excess", f"{element}stribeck_speed", f"{link}damping"]
 
 
-def crossing_loads(joints: int, joint: int) -> list[str]:
-    """Paths of the friction that the tendons of the other joints cause in this one."""
-    others = (m for m in range(2 * joints) if m // 2 != joint)
-    return [f"mechanism.elements[{joint}].load_arms[{m}]" for m in others]
-
-
 def shared_parameters(axes: Sequence[tuple[int, int, int]]) -> list[str]:
     """Paths of what couples the joints of an arm whose axes are known.
 

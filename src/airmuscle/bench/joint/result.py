@@ -151,5 +151,6 @@ class ArmFit(Reported):
             band = np.degrees(self.band[:, j])
             axes.fill_between(self.horizon, 0.0, band, color=plotting.LINES[0], alpha=0.15, linewidth=0)
             axes.set(title=f"joint {j + 1}", xlabel="horizon [s]", ylabel="error [deg]" if j == 0 else "")
-        panels[0][0].legend()
+        lines, names = panels[0][0].get_legend_handles_labels()
+        figure.legend(lines, names, loc="outside upper center", ncols=len(names))
         return figure

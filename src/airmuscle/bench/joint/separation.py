@@ -13,9 +13,9 @@ from ...physics import PressureDriven
 from .descent import CLIP, OUTLIER, gradients, typical_size
 from .windows import Windows
 
-UNSEPARATED, SHARE, NAMED = 1.0, 0.1, 4
-"""Standard error of a direction, relative to its parameters, from which it is not separated; share of a parameter in a
-direction that is named, and number of those (chosen)."""
+UNSEPARATED, SHARE, NAMED = 1.0, 0.1, 6
+"""Standard error of a direction, relative to its parameters, from which it is not separated; share of a parameter in
+such directions that is named, and number of names (chosen)."""
 WINDOWS = 300
 """Windows from which the information is computed (chosen)."""
 WORDS = {
@@ -30,7 +30,7 @@ WORDS = {
 
 @dataclasses.dataclass(frozen=True)
 class ArmParameter:
-    """A parameter by its path in the arm, its value and its standard error [SI], which is robust between episodes."""
+    """A parameter by its path in the arm, its value and its standard error [SI], a window as one observation."""
 
     path: str
     value: float
@@ -49,28 +49,31 @@ def separate(
     lost = ~np.isfinite(error) | (np.abs(error) > OUTLIER) | ~np.isfinite(gradient).all(axis=-1)
     error, scaled = np.where(lost, 0.0, error), np.where(lost[..., None], 0.0, gradient) * sizes
     weight = 1.0 / np.sqrt(1.0 + (error / CLIP) ** 2)
-    information = np.einsum("nrp,nr,nrq->pq", scaled, weight, scaled)
-    scores = np.einsum("nrp,nr->np", scaled, weight * error)
-    scores = np.array([scores[some.episode == e].sum(axis=0) for e in np.unique(some.episode)])
-    larger = len(windows) / len(some)  # the information of all windows
-    levels, directions = np.linalg.eigh(information * larger)
-    meat = directions.T @ (scores.T @ scores * larger) @ directions
-    deviation = np.sqrt(np.maximum(np.diag(meat), 0.0)) / np.maximum(levels, 1e-300)
-    weak = (deviation > UNSEPARATED) | (levels < 1e-12 * levels[-1])
-    inverse = directions / np.maximum(levels, 1e-12 * levels[-1])
-    covariance = inverse @ meat @ inverse.T
+    scale = np.sqrt(np.mean(error**2) * windows.rows)  # the errors of one window count as one
+    information = (
+        np.einsum("nrp,nr,nrq->pq", scaled, weight, scaled) * (len(windows) / len(some)) / max(scale, 1e-9) ** 2
+    )
+    levels, directions = np.linalg.eigh(information)
+    weak = levels < 1.0 / UNSEPARATED**2
+    inverse = directions / np.sqrt(np.maximum(levels, 1e-12 * levels[-1]))
+    deviations = np.sqrt(np.sum(inverse**2, axis=1)) * sizes
     estimates = [
-        ArmParameter(path, float(value), float(size * np.sqrt(max(variance, 0.0))))
-        for path, value, size, variance in zip(paths, values, sizes, np.diag(covariance), strict=True)
+        ArmParameter(path, float(value), float(deviation))
+        for path, value, deviation in zip(paths, values, deviations, strict=True)
     ]
-    return estimates, [_words(joint, paths, directions[:, i] ** 2) for i in np.flatnonzero(weak)]
+    return estimates, _words(joint, paths, np.sum(directions[:, weak] ** 2, axis=1))
 
 
-def _words(joint: int, paths: Sequence[str], shares: Array) -> str:
-    order = [i for i in np.argsort(-shares) if shares[i] > SHARE][:NAMED] or [int(np.argmax(shares))]
-    names = list(dict.fromkeys(_name(paths[i]) for i in order))
-    remedy = "fix one of them, or measure it" if len(names) > 1 else "fix it, or measure it"
-    return f"joint {joint + 1}: {', '.join(names)} {'are' if len(names) > 1 else 'is'} not separated; {remedy}"
+def _words(joint: int, paths: Sequence[str], shares: Array) -> list[str]:
+    """The parameters of the directions that are not separated, first those that have the least information."""
+    names = list(dict.fromkeys(_name(paths[i]) for i in np.argsort(-shares) if shares[i] > SHARE))
+    if not names:
+        return []
+    further = f" and {len(names) - NAMED} others" if len(names) > NAMED else ""
+    return [
+        f"joint {joint + 1}: the record does not separate {', '.join(names[:NAMED])}{further}: combinations of them "
+        "may have any value; fix or measure them before they are read as properties of the arm"
+    ]
 
 
 def _name(path: str) -> str:
