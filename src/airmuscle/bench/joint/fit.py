@@ -19,7 +19,7 @@ from .result import ArmFit
 from .separation import separate
 from .windows import HISTORY, ROWS, Windows, cut
 
-STRENGTHS = (1.0, 6.0, 25.0)
+STRENGTHS = (1.0, 6.0)
 """Ratios of force and inertia from which the search of each joint starts (chosen)."""
 TRIALS = (SearchStage(12, 30, 120), SearchStage(40, 50, 120))
 """Short and then long windows of every trial (chosen)."""
