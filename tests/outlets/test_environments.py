@@ -141,7 +141,8 @@ def test_a_picture_shows_the_present_state(name):
 
 
 def test_a_mask_chooses_the_plants_that_begin_anew_as_in_the_vectors_of_gymnasium():
-    together, apart = pair_of_vectors("Lift", AutoresetMode.NEXT_STEP, num_envs=5)
+    """After one step all episodes are over: those of the mask go on, the others begin anew in the next step."""
+    together, apart = pair_of_vectors("Lift", AutoresetMode.NEXT_STEP, num_envs=5, max_episode_steps=1)
     mask, action = np.array([True, False, True, False, False]), np.full((5, 1), 0.4, np.float32)
     for env in (together, apart):
         env.reset(seed=3)
