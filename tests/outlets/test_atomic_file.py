@@ -10,6 +10,7 @@ import threading
 from pathlib import Path
 
 import pytest
+from command_line import airmuscle
 
 from airmuscle.core import atomic_file, atomic_folder, check_writable, exclusive_folders, temporary_folder
 from airmuscle.files.library import write_text
@@ -66,6 +67,15 @@ try:
 except FileError as error:
     print(error)
 """
+
+
+@pytest.mark.parametrize("name", ["", ".", "/"])
+def test_a_path_that_names_no_file_is_an_error_of_the_operating_system(name):
+    with pytest.raises(IsADirectoryError), atomic_file(Path(name)):
+        pass
+    done = airmuscle("approximate", "dmsp-20-300", "Sarosi2012", "--out", name)
+    assert done.exit_code == 1
+    assert done.stderr.startswith("error: "), done.stderr
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no locks of folders")

@@ -34,6 +34,8 @@ def atomic_file(path: Path) -> Iterator[Path]:
     If the block raises, `path` is unchanged and the temporary file is removed. Its name is that of the process and the
     thread, so that several writers do not meet. Errors of the operating system are those of `open` and `os.replace`.
     """
+    if not path.name:
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     temporary = path.with_name(f".{path.name[:_MAX_NAME]}.{os.getpid()}-{threading.get_ident()}.part")
     try:
         yield temporary

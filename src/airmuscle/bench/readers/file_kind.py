@@ -84,10 +84,15 @@ def check_text_file(path: Path) -> None:
             beginning = file.read(4096)
     except OSError as reason:
         raise FileError(f"{path}: cannot be read ({reason.strerror}). Check the name and the folder.") from None
+    check_beginning(path.name, beginning)
+
+
+def check_beginning(origin: str, beginning: bytes) -> None:
+    """Raise FileError if the first bytes are not those of a text."""
     kind = _binary_kind(beginning)
     if kind:
         raise FileError(
-            f"{path.name}: the file is {kind}, not a table of text. Export the data as text (.csv), or give the file "
+            f"{origin}: the file is {kind}, not a table of text. Export the data as text (.csv), or give the file "
             "the extension of its format (.xlsx, .ods, .mat, .tdms, .mf4, .parquet, .h5)."
         )
 

@@ -1,15 +1,19 @@
-"""Large text tables, read in chunks and downsampled while reading, so that memory use is bounded."""
+"""Large text tables and streams, read in chunks and downsampled while reading, so that memory use is bounded."""
 
 from __future__ import annotations
 
+import codecs
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
-from .downsampling import Decimation, Downsampling
-from .raw_csv import parse_columns
+from ...core.errors import FileError
+from .downsampling import Decimation, Downsampling, downsample
+from .file_kind import check_beginning
+from .raw_csv import parse_columns, parse_text
 from .table import Cells, RawTable
 from .text_format import NumberedLines, TextFormat, TextHeader, detect_encoding, has_content, is_comment, parse_header
 
@@ -53,10 +57,62 @@ def read_large_csv(
         if progress:
             progress(path.name, min(1.0, (rows[-1] - first + 1) / total))
     notes = (downsampling.note(total, step),) if step > 1 else ()
-    joined = tuple(_concatenate(list(parts)) for parts in zip(*columns, strict=True))
     return RawTable(
-        path.name, header.headings, header.units, joined, np.array(rows), constants=header.constants, notes=notes
+        path.name,
+        header.headings,
+        header.units,
+        _joined(columns),
+        np.array(rows),
+        constants=header.constants,
+        notes=notes,
     )
+
+
+def read_text_stream(
+    stream: BinaryIO,
+    origin: str,
+    text_format: TextFormat = TextFormat(),
+    downsampling: Downsampling = Decimation(),
+) -> RawTable:
+    """The table in a stream, such as a pipe, which is read once to its end and has an unknown length.
+
+    With Decimation, one row in 2, 4, 8, ... is kept as soon as more than `max_rows` rows have been read. Raises
+    FileError or ColumnError.
+    """
+    beginning = stream.read(_HEADER_BYTES)
+    if not beginning.strip():
+        raise FileError(f"{origin}: it contains nothing. Check the program that writes to it.")
+    check_beginning(origin, beginning)
+    encoding = detect_encoding(beginning)
+    if len(beginning) < _HEADER_BYTES:
+        return downsample(parse_text(origin, beginning.decode(encoding, errors="replace"), text_format), downsampling)
+    first, header = _read_header(origin, beginning, encoding, text_format)
+    blocks = itertools.chain([beginning], iter(lambda: stream.read(1 << 20), b""))
+    lines = enumerate(_split_lines(codecs.iterdecode(blocks, encoding, errors="replace")), 1)
+    body = ((i, line) for i, line in lines if i >= first and has_content(line) and not is_comment(line))
+    parts, rows, stride, total = list[tuple[Cells, ...]](), list[int](), 1, 0
+    while chunk := list(itertools.islice(body, _CHUNK_ROWS)):
+        kept = chunk[-total % stride :: stride]
+        total += len(chunk)
+        if not kept:
+            continue
+        parts.append(parse_columns(origin, header, kept, text_format))
+        rows += [line for line, _ in kept]
+        while isinstance(downsampling, Decimation) and len(rows) > downsampling.max_rows:
+            parts, rows, stride = [tuple(each[::2] for each in _joined(parts))], rows[::2], 2 * stride
+    notes = (downsampling.note(total, stride),) if stride > 1 else ()
+    table = RawTable(
+        origin, header.headings, header.units, _joined(parts), np.array(rows), constants=header.constants, notes=notes
+    )
+    return downsample(table, downsampling)
+
+
+def _split_lines(blocks: Iterable[str]) -> Iterator[str]:
+    rest = ""
+    for block in blocks:
+        *lines, rest = f"{rest}{block}".split("\n")
+        yield from (line.removesuffix("\r") for line in lines)
+    yield rest
 
 
 def _read_header(origin: str, beginning: bytes, encoding: str, text_format: TextFormat) -> tuple[int, TextHeader]:
@@ -87,6 +143,10 @@ def _read_chunks(path: Path, encoding: str, first: int, stride: int, step: int) 
             chunk = [(i, line) for i, line in lines if has_content(line) and not is_comment(line)]
             if chunk:
                 yield chunk
+
+
+def _joined(chunks: list[tuple[Cells, ...]]) -> tuple[Cells, ...]:
+    return tuple(_concatenate(list(parts)) for parts in zip(*chunks, strict=True))
 
 
 def _concatenate(parts: list[Cells]) -> Cells:

@@ -35,12 +35,17 @@ def read_csv_table(path: str | Path, text_format: TextFormat = TextFormat()) -> 
         raise FileError(f"read_csv: {abridged(path)} is not a path. Pass the name of a file.")
     path = Path(path)
     check_text_file(path)
-    lines = [(i, line) for i, line in enumerate(re.split(r"\r\n|\n|\r", _read_text(path)), 1) if has_content(line)]
-    header = parse_header(path.name, lines, text_format)
+    return parse_text(path.name, _read_text(path), text_format)
+
+
+def parse_text(origin: str, text: str, text_format: TextFormat) -> RawTable:
+    """The table in a text. Raises FileError or ColumnError."""
+    lines = [(i, line) for i, line in enumerate(re.split(r"\r\n|\n|\r", text), 1) if has_content(line)]
+    header = parse_header(origin, lines, text_format)
     body = [(i, line) for i, line in lines if not is_comment(line)][header.header_lines :]
-    columns = parse_columns(path.name, header, body, text_format)
+    columns = parse_columns(origin, header, body, text_format)
     rows = np.array([i for i, _ in body], dtype=np.int64)
-    return RawTable(path.name, header.headings, header.units, columns, rows, constants=header.constants)
+    return RawTable(origin, header.headings, header.units, columns, rows, constants=header.constants)
 
 
 def _read_text(path: Path) -> str:

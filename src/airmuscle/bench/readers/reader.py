@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import glob
+import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
@@ -15,7 +16,7 @@ from ..segment.outliers import without_outliers
 from .downsampling import Decimation, Downsampling, downsample
 from .file_kind import check_text_file
 from .interpret import interpret
-from .large_csv import Progress, is_large_file, read_large_csv
+from .large_csv import Progress, is_large_file, read_large_csv, read_text_stream
 from .mapping import ColumnMapping, apply_mapping, read_mapping
 from .raw_columnar import read_hdf5_tables, read_parquet_tables
 from .raw_csv import read_csv_table
@@ -32,6 +33,7 @@ Source = str | Path | Iterable[str | Path]
 Tables = tuple[RawTable, ...]
 
 WORKBOOKS = (".xlsx", ".xlsm", ".xls", ".ods")
+STANDARD_INPUT = Path("-")
 TEXT_EXTENSIONS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".prn")
 _BINARY_READERS: Mapping[str, Callable[[Path, ColumnMapping, Downsampling], Tables]] = {
     **dict.fromkeys(WORKBOOKS, lambda path, m, d: read_workbook_tables(path, m.sheet, m.text_format)),
@@ -57,7 +59,8 @@ def read(
     downsampling: Downsampling = Decimation(),
     progress: Progress | None = None,
 ) -> tuple[Recording, ...]:
-    """Read the recordings in a file, several files, a glob pattern (`runs/*.csv`) or a folder, in SI units.
+    """Read the recordings in a file, several files, a glob pattern (`runs/*.csv`) or a folder, in SI units; `-` is a
+    table of text on the standard input, which may be a pipe.
 
     mapping       what the files do not state: a ColumnMapping, `ColumnMapping(resting_length="300 mm")`, or a TOML file
     downsampling  reduction of very long files, which a note reports
@@ -154,6 +157,8 @@ def read_tables(
     path: Path, mapping: ColumnMapping, downsampling: Downsampling, progress: Progress | None = None
 ) -> Tables:
     """The uninterpreted tables of one file. Raises FileError or ColumnError."""
+    if path == STANDARD_INPUT:
+        return (read_text_stream(sys.stdin.buffer, "standard input", mapping.text_format, downsampling),)
     suffix = path.suffix.lower()
     if suffix in _BINARY_READERS:
         return tuple(downsample(table, downsampling) for table in _BINARY_READERS[suffix](path, mapping, downsampling))

@@ -19,7 +19,10 @@ UNORDERED = ColumnMapping(time=RecordedTime(ordered=False))
 """Stamps that repeat or decrease are shown, not refused."""
 Files = Annotated[
     list[str],
-    typer.Argument(metavar="FILES", help="Files, folders or glob patterns: CSV, Excel, MAT, TDMS, MDF."),
+    typer.Argument(
+        metavar="FILES",
+        help="Files, folders or glob patterns: CSV, Excel, MAT, TDMS, MDF; '-' is text on standard input.",
+    ),
 ]
 
 
@@ -35,6 +38,7 @@ def inspect(files: Files, reading: ReadingRequest, json: Json = False, out: Opti
     \b
     Examples:
       airmuscle inspect bench.csv
+      ssh rig cat log.csv | airmuscle inspect -
       airmuscle inspect runs/ --resting-length "300 mm" --out inspection
       airmuscle inspect log.mat --column "data(:,1)=time [s]" --column "data(:,2)=pressure [bara]"
       airmuscle inspect runs/*.tdms --mapping rig.toml --json
