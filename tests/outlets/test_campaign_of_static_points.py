@@ -94,4 +94,4 @@ def test_a_file_whose_name_is_no_text_and_that_cannot_be_read_is_named(tmp_path)
     write(load_data("dmsp-20-300"), tmp_path / "map.csv")
     done = airmuscle("campaign", tmp_path / "\udcff.csv", tmp_path / "map.csv", "--out", tmp_path / "out")
     assert done.exit_code == 0, done.stderr
-    assert "\\xff.csv" in (tmp_path / "out" / "data" / "campaign-records.csv").read_text(encoding="utf-8")
+    assert "ff.csv" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")

@@ -185,11 +185,8 @@ def check_arguments(
                 raise ParameterError(f"{owner}: {name} must be {describe(hint)}; it is {abridged(each)}.") from failure
         if _is_empty(value) and value is not declared.default:
             raise ParameterError(f"{owner}: {name} is empty; give at least one.") from failure
-        if (
-            Path in typing.get_args(hint)
-            and isinstance(value, str | Path)
-            and isinstance(failure, OSError | ValueError)
-        ):
+        is_path = Path in typing.get_args(hint) and isinstance(value, str | Path)
+        if is_path and (isinstance(failure, OSError) or not Path(value).name or "\0" in str(value)):
             reason = failure.strerror if isinstance(failure, OSError) else failure
             raise FileError(f"{owner}: {name} is {abridged(value)}, which is no usable path: {reason}.") from failure
 

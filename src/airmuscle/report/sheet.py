@@ -7,6 +7,7 @@ import io
 import math
 from typing import Any
 
+from ..core.errors import printable
 from .chapter import Chapter, Table
 from .formula import to_plain
 from .shown import rows_of, shown_columns, value_text
@@ -53,5 +54,5 @@ def _csv_value(value: Any) -> Any:
     if isinstance(value, bool):
         return int(value)
     if isinstance(value, str):
-        return to_plain(value)
+        return printable(to_plain(value))
     return None if isinstance(value, float) and not math.isfinite(value) else value

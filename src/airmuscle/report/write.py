@@ -46,7 +46,7 @@ def write_into(
         if claims:
             (staging / "claims.json").write_text(as_json(claims), encoding="utf-8")
         text = render_page(chapters, staging / "figures", title=title, date=date or datetime.date.today())
-        (staging / REPORT_FILE).write_text(text, encoding="utf-8")
+        (staging / REPORT_FILE).write_text(text, encoding="utf-8", errors="backslashreplace")  # names of files
     except OSError as error:
         raise FileError(f"{staging.parent}: the report cannot be written: {error.strerror or error}.") from error
 

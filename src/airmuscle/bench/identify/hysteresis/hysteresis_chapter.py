@@ -73,7 +73,7 @@ def loop_chapter(loop_fit: LoopFit) -> Chapter:
         caption = f"{law} with the fitted parameters: initial loading, outer loop and two minor loops."
         minor = functools.partial(plot_loops, shown.friction, loop.friction_path.axis)
         plots += [*of_shown.plots, Plot("minor-loops", caption, minor)]
-        tables += [dataclasses.replace(table, brief=0) for table in of_shown.tables]
+        tables += [dataclasses.replace(table, name=f"friction-{table.name}", brief=0) for table in of_shown.tables]
     tables.append(_all_parameters(loop_fit))
     return Chapter(
         name="friction",
@@ -171,7 +171,7 @@ def joint_friction_chapter(fits: Sequence[JointFit], not_joined: Sequence[str] =
             "The runs justify no friction law that holds for all of them, so none is written. "
             f"{shown.name} is shown as the best one. {first}"
         )
-    tables = [dataclasses.replace(table, brief=0) for table in of_shown.tables]
+    tables = [dataclasses.replace(table, name=f"friction-{table.name}", brief=0) for table in of_shown.tables]
     return dataclasses.replace(
         of_shown,
         title="Friction of all runs",
