@@ -38,12 +38,12 @@ def result(tmp_path_factory):
     out = folder / "out"
     done = run(rig, "--validate", rig / "later.csv", "--out", out, "--json")
     assert done.exit_code == 0, done.stderr
-    return rig, out, json.loads(done.stdout)
+    return rig, out, json.loads(done.stdout)["campaign"]
 
 
 def test_a_file_that_cannot_be_read_is_named_and_left_out(result):
     _, out, data = result
-    assert [file["name"] for file in data["unread"]] == ["notes.csv"]
+    assert [file["file"] for file in data["unread"]] == ["notes.csv"]
     assert "notes.csv" in (out / "report.html").read_text(encoding="utf-8")
 
 
@@ -79,8 +79,8 @@ def test_a_record_that_is_kept_aside_is_predicted_and_not_fitted(result):
     _, _, data = result
     (row,) = data["validation"]
     assert row["record"] == "later.csv"
-    assert "later.csv" not in [record["origin"] for record in data["records"]]
-    assert 0.9 <= row["share"] <= 1.0
+    assert "later.csv" not in [record["record"] for record in data["records"]]
+    assert 0.9 <= row["rows_within_the_band"] <= 1.0
 
 
 def test_finished_stages_are_kept_in_the_folder(result):
@@ -101,7 +101,7 @@ def test_an_interruption_keeps_the_finished_stages(tmp_path, monkeypatch):
     assert done.exit_code == 130
     stages = json.loads((tmp_path / "out" / "stages.json").read_text(encoding="utf-8"))
     assert [stage["stage"] for stage in stages] == ["records", "creep", "hysteresis"]
-    assert stages[1]["elements"]["stiffnesses"]
+    assert stages[1]["creep"]["creep_elements"][0]["stiffness"] > 0.0
 
 
 def test_an_empty_folder_is_refused(tmp_path):

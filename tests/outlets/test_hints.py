@@ -338,7 +338,7 @@ def test_laws_that_are_left_out_of_a_ranking_name_options(tmp_path: Path):
     reasons = [each.reason for each in compare(read(runs), leave_out=RunSplit()).excluded]
     assert any("use degree=" in reason for reason in reasons)
     command = ("--compare", "--leave-out", "run", "--json", "--out", tmp_path / "out")
-    excluded = json.loads(airmuscle("fit", *runs, *command).stdout)["excluded"]
+    excluded = json.loads(airmuscle("fit", *runs, *command).stdout)["comparison"]["excluded"]
     assert [reason for reason in excluded.values() if "degree=" in reason] == []
     assert any("--degree" in reason for reason in excluded.values())
 
