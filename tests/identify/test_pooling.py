@@ -327,7 +327,7 @@ def test_the_command_recommends_one_law_for_both_purposes_and_states_the_excess(
     assert purposes[0]["recommended"].startswith("pooled")
     assert [each["left_out"] for each in purposes] == ["run", "specimen"]
     assert "For other muscles of the same type: rms error" in purposes[0]["summary"][0]
-    assert answer["length_errors"]["length_errors"][0]["specimen"] == "100 mm"
+    assert answer["length_errors"]["resting_lengths"][0]["specimen"] == "100 mm"
     law = load(tmp_path / "out" / "muscle.toml").characteristic
     assert law.specimens == ("100 mm", "150 mm", "200 mm", "300 mm")
 
