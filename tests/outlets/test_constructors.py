@@ -19,6 +19,7 @@ from airmuscle import (
     bench,
     characteristic,
     control,
+    core,
     design,
     engine,
     friction,
@@ -128,6 +129,16 @@ def test_a_parameter_may_be_a_text_with_a_unit():
         HangingMass("10 mm")  # type: ignore[arg-type]
     with pytest.raises(UnitError, match=r"Supply.pressure \(.*\): '6' has no unit; write it like '6 bar'"):
         Supply("6")  # type: ignore[arg-type]
+
+
+def test_references_and_limits_of_a_bench_are_checked():
+    with pytest.raises(ParameterError, match="Reference: year must be an integer or None; it is '1999'"):
+        core.Reference("a1999", "A", "A title", "A journal", "1999")  # type: ignore[arg-type]
+    area = characteristic.ValidityRange(0.0, 6e5, 0.0, 0.25)
+    with pytest.raises(ParameterError, match="BenchLimits: validity_range must be an instance of ValidityRange"):
+        bench.BenchLimits(None, 1e3)  # type: ignore[arg-type]
+    with pytest.raises(ParameterError, match=r"max_force=inf, .* needs finite forces, and min_force below"):
+        bench.BenchLimits(area, math.inf)
 
 
 def test_a_supply_of_some_pascals_is_implausible():

@@ -6,6 +6,7 @@ import dataclasses
 from collections.abc import Iterator
 from typing import Any
 
+from .annotation import check_field_types
 from .errors import ParameterError
 
 
@@ -23,6 +24,9 @@ class Reference:
     year: int | None = None
     doi: str | None = None
     note: str = ""
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
 
     def __str__(self) -> str:
         year = f" ({self.year})" if self.year else " (undated)"

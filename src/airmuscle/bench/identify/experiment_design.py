@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ...core.annotation import check_field_types
 from ...core.arrays import Array
 from ...core.errors import IdentificationError, ParameterError
 from ...physics.muscle.characteristic.base import Characteristic
@@ -47,6 +48,11 @@ class BenchLimits:
     max_force: float
     min_force: float = 0.0
     """Minimum force of a point [N]."""
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
+        if not -math.inf < self.min_force < self.max_force < math.inf:
+            raise ParameterError(f"BenchLimits: {self} needs finite forces, and min_force below max_force.")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
