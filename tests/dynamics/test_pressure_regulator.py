@@ -166,7 +166,7 @@ def test_the_command_writes_a_regulator_that_a_scenario_takes(tmp_path):
     given = [tmp_path / "bench.csv", "--supply", "5.78 bar", "--starts", "1", "--out", out]
     done = airmuscle("fit-regulator", *map(str, given))
     assert done.exit_code == 0, done.output
-    assert "settled pressure minus command, taken as the zero of the sensor" in done.output
+    assert "Settled pressure minus command, taken as the zero of the sensor" in done.output
     assert "PressureRegulator" in (out / "regulator.toml").read_text(encoding="utf-8")
     plant = load_scenario(out / "scenario.toml").plant
     assert plant.circuits[0].supply.pressure == pytest.approx(5.78e5)

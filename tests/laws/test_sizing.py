@@ -23,6 +23,7 @@ from airmuscle.design import (
     LiftRequirement,
     MuscleChoice,
     SizingConditions,
+    SizingResult,
     by_length,
     by_reserve,
     catalogue,
@@ -32,7 +33,7 @@ from airmuscle.design import (
     scenario_text,
     size_muscles,
 )
-from airmuscle.design.sizing import air_path, choice_row
+from airmuscle.design.sizing import air_path, sizing_chapter
 from airmuscle.design.sizing.static_muscle import static_muscle
 from airmuscle.errors import AirmuscleError, ParameterError, SolveError
 from airmuscle.files import Entry
@@ -591,8 +592,10 @@ def test_the_diameter_is_twice_the_largest_radius_or_that_of_a_braid_at_25_per_c
 
 def test_the_row_of_a_choice_states_air_a_minute_and_efficiency_of_the_choice():
     choice = choose(am.load("dmsp-20-300"), LIFT, dataclasses.replace(SIX_BAR, cycle_time=3.0))
-    row = choice_row(choice)
-    assert row["air a minute [l (ANR)]"] == pytest.approx(20 * row["air a cycle [l (ANR)]"], rel=1e-12)
-    assert row["air a cycle [l (ANR)]"] == pytest.approx(1e3 * choice.reference_volume, rel=1e-12)
-    assert row["efficiency [%]"] == pytest.approx(100 * choice.efficiency, rel=1e-12)
-    assert row["diameter [mm]"] == pytest.approx(1e3 * choice.diameter, rel=1e-12)
+    result = SizingResult(LIFT, choice.conditions, (choice,), (), (choice.entry,))
+    (table,) = [each for each in sizing_chapter(result).tables if each.name == "air"]
+    row = {name: column.values[0] for name, column in table.columns.items() if hasattr(column, "values")}
+    assert row["air a minute"] == pytest.approx(20 * row["air a cycle"], rel=1e-12)
+    assert row["air a cycle"] == pytest.approx(choice.reference_volume, rel=1e-12)
+    assert row["efficiency"] == pytest.approx(choice.efficiency, rel=1e-12)
+    assert row["diameter"] == pytest.approx(choice.diameter, rel=1e-12)

@@ -49,7 +49,7 @@ def test_another_shell_is_refused_with_those_that_are_supported():
 
 
 def test_commands_options_and_names_of_the_library_are_completed(monkeypatch: pytest.MonkeyPatch):
-    assert {"fit", "fit-dynamic", "fit-live", "fit-regulator", "fit-volume"} == set(
+    assert {"fit", "fit-dynamic", "fit-joint", "fit-live", "fit-regulator", "fit-volume"} == set(
         completed("airmuscle fit", monkeypatch)
     )
     assert "--pressure" in completed("airmuscle evaluate --pre", monkeypatch)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import sys
 
 import numpy as np
@@ -166,10 +167,16 @@ def test_the_command_converts_one_file_and_several(tmp_path):
 # Rows
 
 
+def reduce_from(rows: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let `read` reduce files of more than `rows` rows by default."""
+    function = inspect.unwrap(read)  # `read` checks the names of its arguments first
+    monkeypatch.setitem(function.__kwdefaults__, "downsampling", Decimation(rows))
+
+
 def test_convert_keeps_all_rows_unless_fewer_are_asked_for(tmp_path, monkeypatch):
     """A long file, which `read` reduces: with limits that are a thousandth of the usual ones."""
     monkeypatch.setattr(large_csv, "LARGE_FILE_BYTES", 20_000)
-    monkeypatch.setitem(read.__kwdefaults__, "downsampling", Decimation(2000))
+    reduce_from(2000, monkeypatch)
     path = tmp_path / "long.csv"
     rows = "\n".join(f"{k / 1000},{k % 700}" for k in range(6500))
     path.write_text(f"time [s],pressure [kPa]\n{rows}\n")
@@ -183,7 +190,7 @@ def test_convert_keeps_all_rows_unless_fewer_are_asked_for(tmp_path, monkeypatch
 
 
 def test_the_other_commands_say_that_rows_are_left_out(tmp_path, monkeypatch):
-    monkeypatch.setitem(read.__kwdefaults__, "downsampling", Decimation(20))
+    reduce_from(20, monkeypatch)
     path = tmp_path / "long.csv"
     path.write_text("time [s],pressure [kPa]\n" + "\n".join(f"{k / 1000},{k % 70}" for k in range(100)))
     assert "The file has 100 rows; one in 5 is kept" in " ".join(airmuscle("inspect", path).output.split())

@@ -260,7 +260,7 @@ def test_the_lines_of_a_model_are_over_the_points_of_many_rows(recording: am.Rec
     for rows in (32, 2720):
         given = recording.rows(np.tile(np.arange(32), rows // 32))
         plot = isobar_plot(law, "isobars", compute_isobars(law, pressures=np.unique(given["pressure"])), measured=given)
-        lines = [line for line in plot.figure.axes[0].get_lines() if len(line.get_xdata())]
+        lines = [line for line in plot.draw().axes[0].get_lines() if len(line.get_xdata())]
         points = max(line.get_zorder() for line in lines if line.get_linestyle() == "None")
         curves = min(line.get_zorder() for line in lines if line.get_linestyle() != "None")
         assert (curves > points) == (rows > 500)

@@ -210,7 +210,7 @@ def test_the_library_holds_the_monotone_fit_of_the_chapter(laws):
 
 def test_the_chapter_is_complete():
     chapter = borzikova.chapter()
-    assert chapter.paper == "borzikova"
+    assert chapter.name == "borzikova"
     assert {c.verdict for c in chapter.claims} == {HOLDS, DIFFERS, NOT_TESTABLE}
     assert [c.reproduced for c in chapter.claims if c.kind is Kind.CHECK] == [15.0]
     assert {p.name for p in chapter.plots} >= {

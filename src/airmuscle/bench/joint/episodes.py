@@ -9,10 +9,11 @@ import numpy as np
 
 from ...core.arrays import Array
 from ...core.errors import ParameterError
+from ...core.short_repr import ShortRepr
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Episode:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Episode(ShortRepr):
     """One run of an arm, n rows at one sample time.
 
     angle (n, J) [rad] and speed (n, J) [rad/s] of the joints, pressure (n, M) of the muscles [Pa, or counts times a

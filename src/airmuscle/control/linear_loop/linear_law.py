@@ -10,6 +10,7 @@ import numpy as np
 
 from ...core.arrays import Array
 from ...core.errors import ParameterError
+from ...core.short_repr import ShortRepr
 from ...core.tree import flatten
 from ...engine.loop import ColumnSensor, ControlLaw
 from ...engine.loop.control_law import rebuilt
@@ -23,8 +24,8 @@ STEPS = 25
 """Newton steps for the memory that gives wanted commands (chosen)."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class LinearLaw:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class LinearLaw(ShortRepr):
     """dm_(k+1) = A dm_k + B dy_k + E dr_k,  du_k = C dm_k + D dy_k + F dr_k: deviations of a law from a working point.
 
     m memory, as far as commands depend on it, y measured columns, r set points, u commands
