@@ -79,6 +79,13 @@ def test_a_path_that_names_no_file_is_an_error_of_the_operating_system(name):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no locks of folders")
+@pytest.mark.skipif(not Path("/dev/null").is_char_device(), reason="has no device files")
+def test_a_device_is_not_replaced_by_a_file():
+    with pytest.raises(OSError, match="it is a device, not a file"), atomic_file(Path("/dev/null")):
+        pass
+    assert Path("/dev/null").is_char_device()
+
+
 def test_the_second_of_two_commands_that_write_to_one_folder_is_refused(tmp_path):
     """The lock ends with the block, and what was created for it is removed where nothing was written."""
     folder = tmp_path / "deep" / "out"

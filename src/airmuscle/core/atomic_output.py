@@ -36,6 +36,8 @@ def atomic_file(path: Path) -> Iterator[Path]:
     """
     if not path.name:
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    if path.is_char_device() or path.is_block_device():  # which would be replaced by a file
+        raise OSError(errno.EINVAL, "it is a device, not a file", str(path))
     temporary = path.with_name(f".{path.name[:_MAX_NAME]}.{os.getpid()}-{threading.get_ident()}.part")
     try:
         yield temporary
