@@ -39,7 +39,7 @@ TEXT = (
     "noise of the sensors (2 N, 300 Pa, 0.02 % contraction). 24 files: three resting lengths, four held contractions, "
     "two repeats, 500 rows each. Six sweeps: one muscle, 800 rows each. Comparison: all standard candidates, reading "
     "of the files not included. Hysteresis: three isobaric loops of 2000 rows with Dahl friction, all friction laws. "
-    "Bootstrap: 4000 rows in eight runs, 1000 refits of a surface of degree 5, 100 of a braided muscle, which is "
+    "Bootstrap: 4000 rows in eight runs, 1000 refits of a surface of degree 3, 100 of a braided muscle, which is "
     "nonlinear in its parameters. `airmuscle fit --compare` uses one process for each core: a task of two processes is "
     "judged by its time, including their start, any other by its CPU time. Median of the rounds, the first of which "
     "includes the tracing of the laws; the CPU time is of all threads and processes. The last row is one run of the "
@@ -149,7 +149,7 @@ def section(rounds: int = 3) -> Section:
     """The complete benchmark."""
     family, sweeps, loops = make_family(), make_sweeps(), find_loops(make_loops())
     runs = [make_sweep(length, held, 500, 300 + i) for i, (length, held) in enumerate(POINTS)]
-    surface, braid = am.fit(blank_surface(5), runs), am.fit(muscle(0.3), runs)
+    surface, braid = am.fit(blank_surface(3), runs), am.fit(muscle(0.3), runs)
     tasks: dict[str, tuple[Callable[[], Any], float]] = {
         "comparison of 24 files, by specimen": (lambda: am.bench.compare(family), 10.0),
         "comparison of 24 files, by run": (lambda: am.bench.compare(family, leave_out=am.bench.RunSplit()), 10.0),
