@@ -46,3 +46,20 @@ def writer_of(whole: str) -> Callable[..., Path]:
         return path
 
     return written
+
+
+HELD_FILL = f"""
+[plant]
+muscle = "muscle.toml"
+{CIRCUIT}
+[plant.mechanism]
+model = "Isometric"
+contraction = 0.05
+[input]
+fill = [["0.1 s", 1], ["0.3 s", 0]]
+[run]
+duration = "0.5 s"
+output_times = "5 ms"
+initial_state = {{ pressure = "0.5 bar" }}
+"""
+"""Scenario file of a fill at a held length; the muscle is `muscle.toml` beside it."""

@@ -17,27 +17,14 @@ from pathlib import Path
 
 import pytest
 from command_line import airmuscle
-from scenario_files import CIRCUIT, MUSCLE_FILE
+from scenario_files import HELD_FILL as SCENARIO
+from scenario_files import MUSCLE_FILE
 
 from airmuscle import load_data
 from airmuscle.bench import write
 from airmuscle.design import shared_folder
 from airmuscle.errors import AirmuscleError, FileError, InputError
 
-SCENARIO = f"""
-[plant]
-muscle = "muscle.toml"
-{CIRCUIT}
-[plant.mechanism]
-model = "Isometric"
-contraction = 0.05
-[input]
-fill = [["0.1 s", 1], ["0.3 s", 0]]
-[run]
-duration = "0.5 s"
-output_times = "5 ms"
-initial_state = {{ pressure = "0.5 bar" }}
-"""
 STUDY = """
 scenario = "scenario.toml"
 chunk_size = 4

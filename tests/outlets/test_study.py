@@ -25,7 +25,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import airmuscle
-from scenario_files import CIRCUIT, MUSCLE_FILE
+from scenario_files import HELD_FILL as SCENARIO
+from scenario_files import MUSCLE_FILE
 
 from airmuscle.core import fingerprint
 from airmuscle.design import dask_cluster, load_study, process_pool, run_study
@@ -37,20 +38,6 @@ from airmuscle.outlets.cli import check_interrupted, deferred_sigint
 from airmuscle.report import save_table
 
 ROOT = Path(__file__).parents[2]
-SCENARIO = f"""
-[plant]
-muscle = "muscle.toml"
-{CIRCUIT}
-[plant.mechanism]
-model = "Isometric"
-contraction = 0.05
-[input]
-fill = [["0.1 s", 1], ["0.3 s", 0]]
-[run]
-duration = "0.5 s"
-output_times = "5 ms"
-initial_state = {{ pressure = "0.5 bar" }}
-"""
 STUDY = """
 title = "Two valves"
 scenario = "scenario.toml"
