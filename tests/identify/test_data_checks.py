@@ -211,9 +211,22 @@ def test_friction_is_not_called_a_delay(tmp_path):
 
 def test_outliers_are_carried_into_the_notes_with_the_remedy(tmp_path):
     notes = notes_of(tmp_path, with_glitches(sweeps(), 0.01, (100.0, 400.0)))
-    assert "suspected outliers of the force" in notes
+    assert "Suspected outliers of the force pull the law" in notes
     assert "To leave them out, use drop_outliers=True of ColumnMapping." in notes
     assert "To reduce their weight, use loss=Huber(" in notes
+
+
+def test_one_gross_outlier_is_reported_by_its_share_in_the_rms_error(tmp_path):
+    """One row of 1100 is below the least share of rows, yet 600 N of it are 18 N of the rms error."""
+    (name, *others) = sorted(tables := sweeps())
+    glitch = with_glitches({name: tables[name]}, 0.0, (600.0, 601.0))
+    notes = notes_of(tmp_path, {**tables, **glitch})
+    rows = sum(table[FORCE].size for table in tables.values())
+    assert f"Suspected outliers of the force pull the law: 1 of {rows} rows, in 1 of {1 + len(others)} files" in notes
+    assert f"an rms error of {600 / rows**0.5:.2g} N" in notes
+    assert "Suspected outliers" not in notes_of(
+        tmp_path, {**tables, **with_glitches({name: tables[name]}, 0.0, (40.0, 41.0))}
+    )
 
 
 def test_the_branches_of_isobaric_loops_contract_and_extend(tmp_path):

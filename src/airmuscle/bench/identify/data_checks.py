@@ -6,6 +6,7 @@ They need no law. `DataChecks` joins them with the checks of `bench.checks`, for
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -83,6 +84,8 @@ MIN_DISTANCE = 0.02
 """Minimum distance of an outlier of the force from its neighbours, as a fraction of the maximum force (chosen)."""
 MIN_SHARE = 0.002
 """Minimum share of rows with such outliers that a fit reports (chosen)."""
+MIN_RMS = 0.005
+"""Minimum share of such outliers in the rms error that a fit reports, as a fraction of the maximum force (chosen)."""
 HUBER = 3.0
 """Threshold of the proposed Huber loss, in standard deviations of the sensor."""
 
@@ -100,14 +103,16 @@ def outlier_notes(recordings: Sequence[Recording]) -> list[str]:
         for outlier in find_outliers(run, {"force": sensors["force"]})
         if abs(outlier.value - outlier.expected) > MIN_DISTANCE * greatest
     ]
-    if len(found) < MIN_SHARE * sum(map(len, timed)):
+    rows = sum(map(len, timed))
+    rms = math.sqrt(sum((outlier.value - outlier.expected) ** 2 for _, outlier in found) / rows)
+    if len(found) < MIN_SHARE * rows and rms < MIN_RMS * greatest:
         return []
     files = len({run.origin for run, _ in found})
     examples = "; ".join(_describe_outlier(run, outlier) for run, outlier in found[:3])
     return [
         HintedText(
-            f"{len(found)} rows of {files} {'file' if files == 1 else 'files'} are suspected outliers of the force, "
-            f"which pull the law: {examples}.",
+            f"Suspected outliers of the force pull the law: {len(found)} of {rows} rows, in {files} of "
+            f"{len({run.origin for run in timed})} files, which alone give an rms error of {rms:.2g} N ({examples}).",
             Hint("To leave them out", "drop_outliers", True, "ColumnMapping"),
             Hint("To reduce their weight", "loss", Huber(_rounded(HUBER * sensors["force"].std))),
         )

@@ -130,11 +130,11 @@ def _remedies(found: Sequence[tuple[int, ExaminedColumn]]) -> Iterator[Hint]:
         text = next(text for text in texts if isinstance(text, str) and _GROUPED.fullmatch(text))
         sign = "," if text.rfind(",") > text.rfind(".") else "."
         yield Hint("To specify the decimal sign", "decimal", sign, "ColumnMapping")
-    elif not texts:
-        yield Hint("To leave out the rows with missing values", "missing", DropMissing(), "ColumnMapping")
-        yield Hint("To interpolate short gaps", "missing", InterpolateMissing(), "ColumnMapping")
     elif len(set(texts)) == 1 and isinstance(texts[0], str) and _is_code(texts[0]):
         yield Hint("If it stands for a missing value", "missing", DropMissing((texts[0],)), "ColumnMapping")
+    if any(each.missing[row] for row, each in found):
+        yield Hint("To leave out the rows with missing values", "missing", DropMissing(), "ColumnMapping")
+        yield Hint("To interpolate short gaps", "missing", InterpolateMissing(), "ColumnMapping")
 
 
 def _is_code(text: str) -> bool:
