@@ -79,7 +79,7 @@ def main() -> None:
     train, test = repeats(folder)
     surfaces, pooled = held_points((train, test))
     print()
-    fills = [fit_record(MODELS[-1], read_record(path), 10).rms(MODELS[-1].sensor) / 1e3
+    fills = [fit_record(MODELS[-1], read_record(path), 16).rms(MODELS[-1].sensor) / 1e3
              for path in sorted(folder.glob("*fill*.csv"))]  # fmt: skip
     bars = [
         *law_bars(train, test),

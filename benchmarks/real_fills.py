@@ -33,8 +33,11 @@ OPEN = am.Schedule({"fill": ((0.0, 1.0),)})
 BOUNDS = {
     "supply.pressure": (590e3, 660e3), "fill.critical_ratio": (0.1, 0.6), "growth_volume": (0.0, 2 * REST_VOLUME),
     "midpoint_pressure": (0.0, 600e3), "pressure_width": (1e4, 3e5), "time_constant": (0.01, 5.0),
+    "feed.conductance": (1e-10, 1e-7), "supply.volume": (1e-6, 5e-2),
 }  # fmt: skip
 """Physical bounds (chosen): supply about 620 kPa, critical ratio 0.1 to 0.6, volume at most three times rest volume."""
+DROOPING = am.physics.Tank(am.Supply(630e3), am.Valve(3e-9, 0.3), 5 * REST_VOLUME)
+"""The air line before the valve: a volume that is fed from the building, so that its pressure sinks; initial guess."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,7 +52,12 @@ class Model:
     @property
     def supply(self) -> str:
         """Path of the supply's pressure."""
-        return f"{self.valves}supply.pressure"
+        return f"{self.valves}{'supply.' * self.droops}supply.pressure"
+
+    @property
+    def droops(self) -> bool:
+        """Whether the supply has a volume."""
+        return any(path.endswith("supply.volume") for path in self.free)
 
     @property
     def valves(self) -> str:
@@ -67,19 +75,24 @@ class Model:
         return {path: pair for end, pair in BOUNDS.items() for path in named if path.endswith(end)}
 
 
-def make_plant(gas: am.physics.Gas, growth: float, lag: float, line: bool) -> am.Plant:
-    """An unloaded muscle of unknown length behind a valve, with a supply tube if `line`."""
+def make_plant(gas: am.physics.Gas, growth: float, lag: float, line: bool, supply: am.physics.AirSource) -> am.Plant:
+    """An unloaded muscle of unknown length behind a valve, with a supply tube if `line`, in which air does not heat if
+    the gas model is that of a chamber."""
     muscle = dataclasses.replace(
         am.Muscle.ideal(am.geometry.Vessel(REST_VOLUME)), wall=am.physics.SwellingWall(growth, 150e3, 5e4, lag)
     )
-    valves = am.FillDischarge(am.Supply(625e3), am.Valve(5e-10, 0.4), am.Valve(0.0, 0.3))
-    circuit = am.physics.WithTubes(valves, am.physics.Tube(am.Valve(1.3e-9, 0.3), 2e-5, gas=gas)) if line else valves
+    tube_gas = am.Isothermal() if isinstance(gas, am.physics.WallHeatTransfer) and lag > 0.1 else gas
+    valves = am.FillDischarge(supply, am.Valve(5e-10, 0.4), am.Valve(0.0, 0.3))
+    circuit = (
+        am.physics.WithTubes(valves, am.physics.Tube(am.Valve(1.3e-9, 0.3), 2e-5, gas=tube_gas)) if line else valves
+    )
     return am.Plant(muscle, circuit, am.Isometric(0.0), gas)
 
 
 def make_model(
-    name: str, gas: am.physics.Gas, *, growing: bool = False, lagging: bool = False, line: bool = False
-) -> Model:
+    name: str, gas: am.physics.Gas, *, growing: bool = False, lagging: bool = False, line: bool = False,
+    drooping: bool = False,
+) -> Model:  # fmt: skip
     """A model variant with the given features."""
     valves = "circuit.circuit." if line else "circuit."
     free = [f"{valves}fill.conductance", f"{valves}fill.critical_ratio"]
@@ -88,7 +101,9 @@ def make_model(
         [f"muscle.wall.{part}" for part in ("growth_volume", "midpoint_pressure", "pressure_width")] if growing else []
     )
     free += ["muscle.wall.time_constant"] if lagging else []
-    start = make_plant(gas, REST_VOLUME if growing else 0.0, 0.2 if lagging else 0.005, line)
+    free += [f"{valves}supply.feed.conductance", f"{valves}supply.volume"] if drooping else []
+    supply = DROOPING if drooping else am.Supply(625e3)
+    start = make_plant(gas, REST_VOLUME if growing else 0.0, 0.2 if lagging else 0.005, line, supply)
     return Model(name, start, tuple(free), "tube.pressure" if line else "pressure")
 
 
@@ -100,7 +115,11 @@ MODELS = (
     make_model(
         "tube, growing volume with lag, sensor in the tube", am.Polytropic(1.2), growing=True, lagging=True, line=True
     ),
-)
+    make_model(
+        "tube, growing volume with lag, air that cools, supply with a volume", am.physics.WallHeatTransfer(25.0),
+        growing=True, lagging=True, line=True, drooping=True,
+    ),
+)  # fmt: skip
 
 GASES = (
     am.Isothermal(), am.Polytropic(1.2), *(am.physics.WallHeatTransfer(h) for h in (12.5, 25.0, 50.0)),
@@ -113,6 +132,20 @@ def read_record(path: pathlib.Path) -> am.Recording:
     recording = am.read_csv(path)
     recording = recording.rows(recording["time"] < END)
     return recording.with_columns(**{"tube.pressure": recording["pressure"]})
+
+
+def noise_floor(recording: am.Recording, width: int = 11) -> tuple[float, float]:
+    """Rms deviation [Pa] from a cubic through each `width` successive rows after 0.1 s, and the rms error [Pa] that the
+    resolution of the recorded times, 1 ms, gives with the slope of the pressure, as an even distribution."""
+    time, pressure = recording["time"], recording["pressure"]
+    squares = []
+    for first in range(int(np.searchsorted(time, 0.1)), len(time) - width):
+        rows = slice(first, first + width)
+        powers = np.vander(time[rows] - time[first], 4)
+        residual = pressure[rows] - powers @ np.linalg.lstsq(powers, pressure[rows], rcond=None)[0]
+        squares.append(float(residual @ residual) / (width - 4))
+    slope = np.gradient(pressure, time)
+    return float(np.sqrt(np.mean(squares))), float(np.sqrt(np.mean(slope**2) / 12)) * 1e-3
 
 
 def make_experiment(start_plant: am.Plant, recording: am.Recording, wall: bool = False) -> Experiment:
@@ -157,7 +190,8 @@ def show_record(name: str, fits: list[DynamicFit]) -> None:
         print(f"{fit.rms(variant.sensor) / 1e3:7.2f} kPa rms  {variant.name}; {len(fit.estimates)} unknowns{note}")
     print(f"\n{fits[-1]}\n")
     for path in ("circuit.circuit.fill.critical_ratio", "circuit.circuit.fill.conductance",
-                 "muscle.wall.growth_volume", "circuit.tube.volume", "muscle.wall.time_constant"):  # fmt: skip
+                 "muscle.wall.growth_volume", "circuit.tube.volume", "muscle.wall.time_constant",
+                 "circuit.circuit.supply.feed.conductance", "circuit.circuit.supply.volume"):  # fmt: skip
         if not fits[-1][path].on_bound:
             print(fits[-1].profile(path, 4))
 
@@ -183,6 +217,10 @@ def main() -> None:
         fits = [fit_record(variant, recording, options.starts) for variant in MODELS]
         last.append(fits[-1])
         show_record(path.name, fits)
+        noise, timing = noise_floor(recording)
+        later = fits[-1].residuals()[MODELS[-1].sensor][recording["time"] >= 0.1]
+        print(f"noise {noise / 1e3:.2f} kPa, by resolution of the times {timing / 1e3:.2f} kPa; residual of the last "
+              f"plant after 0.1 s {np.sqrt(np.mean(later**2)) / 1e3:.2f} kPa")  # fmt: skip
     for wall in (False, True):
         refitted = "supply pressure, initial pressure and start time" + (" and initial wall volume" if wall else "")
         print(f"\n## Prediction of other records, rms error [kPa]; only {refitted} are fitted")

@@ -38,6 +38,7 @@ from airmuscle.physics import (
     Plant,
     Polytropic,
     Supply,
+    Tank,
     Valve,
     VirtualWork,
     WithLatch,
@@ -52,13 +53,18 @@ BOTH = {"fill": ((0.5, 1.0), (3.2, 0.0)), "discharge": ((3.2, 1.0),)}
 FILL, DISCHARGE = {"fill": ((0.5, 1.0),)}, {"discharge": ((0.5, 1.0),)}
 
 
-def true_plant(contraction, ratio, ambient):
-    valves = FillDischarge(Supply(6e5), Valve(3e-9, 0.35), Valve(3.6e-9, ratio))
+SINKING = Tank(Supply(6e5), Valve(5e-9, 0.3), 4e-4)
+
+
+def true_plant(contraction, ratio, ambient, supply=Supply(6e5)):
+    valves = FillDischarge(supply, Valve(3e-9, 0.35), Valve(3.6e-9, ratio))
     return Plant(Muscle.ideal(BRAID), valves, Isometric(contraction), EnergyBalance(0.4), ambient)
 
 
-def record(contraction, command, seed, *, ratio=0.35, ambient=STANDARD, begin=0.0, stated=True, duration=6.0):
-    plant, times = true_plant(contraction, ratio, ambient), np.arange(0.0, duration, 0.008)
+def record(contraction, command, seed, *, ratio=0.35, ambient=STANDARD, begin=0.0, stated=True, duration=6.0,
+    supply=Supply(6e5),
+):  # fmt: skip
+    plant, times = true_plant(contraction, ratio, ambient, supply), np.arange(0.0, duration, 0.008)
     run = simulate(
         plant, Schedule(command), duration=duration, initial_state=plant.state_at(pressure=begin), output_times=times,
         integrator=Rodas4(1e-8),
@@ -205,6 +211,42 @@ def test_a_partial_discharge_is_left_out_by_name_and_the_fill_before_it_is_used(
     assert (fill.kind, len(fill.steps)) == (RecordKind.FILL, 1)
     assert left_out.kind is RecordKind.UNUSED
     assert "1 of 2 pressure steps at a held length end between" in left_out.reason
+
+
+def test_a_supply_whose_pressure_sinks_is_found_where_the_records_need_it():
+    recordings = [record(c, BOTH, i, supply=SINKING) for i, c in enumerate(CONTRACTIONS[:2])]
+    stage = stage_of(recordings)
+    true = true_values() | {"circuit.supply.volume": 4e-4, "circuit.supply.feed.conductance": 5e-9}
+    true["circuit.supply.supply.pressure"] = true.pop("circuit.supply.pressure")
+    for name, value in true.items():
+        assert abs(stage.fit[name].value - value) < 3.0 * stage.fit[name].stderr, stage.fit[name]
+    assert stage.circuit.supply.volume == stage.fit["circuit.supply.volume"].value
+    assert "The supply pressure sinks during a fill: a volume of" in stage.verdict
+    assert max(stage.cross_rms) < 1.3 * NOISE
+
+
+@pytest.mark.slow
+def test_the_volume_of_the_muscle_follows_also_where_the_supply_sinks():
+    change = volume_change(VirtualWork(BRAID), 0.3, (1e5, 6e5), (0.0, 0.25))
+    stage = stage_of([record(c, BOTH, i, supply=SINKING) for i, c in enumerate(CONTRACTIONS)], None, change)
+    assert abs(stage.estimate.volume_at_rest - float(BRAID.volume(0.0))) < 3.0 * stage.estimate.volume_stderr
+    assert stage.fit["circuit.supply.volume"].value == pytest.approx(4e-4, rel=0.05)
+
+
+def test_the_air_of_a_tank_at_rest_follows_its_supply_in_every_iterate():
+    """A fit that starts from a wrong volume and a wrong supply pressure finds both, and predicts its own record."""
+    plant = true_plant(0.0, 0.35, STANDARD, Tank(Supply(5.9e5), Valve(5e-9, 0.3), 8e-4))
+    experiment = Experiment(record(0.0, FILL, 3, supply=SINKING), Schedule({"fill": ((0.0, 1.0),)}),
+                            InitialConditions.at_rest(plant, 0.0), 0.5)  # fmt: skip
+    assert experiment.initial_conditions.settled == ("supply.air_mass",)
+    fit = fit_dynamic(
+        plant, [experiment], free=("circuit.supply.volume", "circuit.supply.supply.pressure"),
+        observed={"pressure": NOISE},
+    )  # fmt: skip
+    assert abs(fit["circuit.supply.volume"].value - 4e-4) < 3.0 * fit["circuit.supply.volume"].stderr < 2e-5
+    again = Experiment(experiment.recording, experiment.command, InitialConditions.at_rest(fit.plant(), 0.0), 0.5)
+    predicted = fit_dynamic(fit.plant(), [again], free=("circuit.fill.critical_ratio",), observed={"pressure": NOISE})
+    assert predicted.rms("pressure") == pytest.approx(NOISE, rel=0.1)
 
 
 def test_records_that_the_model_does_not_follow_are_reported_as_a_misfit():

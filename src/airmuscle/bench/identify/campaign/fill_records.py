@@ -13,15 +13,23 @@ from ....physics.mechanism import Isometric
 from ....physics.muscle import Muscle
 from ....physics.muscle.geometry import Vessel
 from ....physics.plant.plant import Plant
-from ....physics.pneumatics import FillDischarge, Supply, Valve
+from ....physics.pneumatics import FillDischarge, Supply, Tank, Valve
 from ....physics.pneumatics.gas import EnergyBalance
-from ..dynamic import DynamicFit, Experiment, InitialConditions, stated_ambient
+from ..dynamic import (
+    CommandInstants,
+    DynamicFit,
+    Experiment,
+    InitialConditions,
+    StartTime,
+    fit_dynamic,
+    stated_ambient,
+)
 from ..result import Estimate
 from .record import CampaignRecord
 from .rows import thin
 
 FILL, DISCHARGE = "circuit.fill", "circuit.discharge"
-SUPPLY = "circuit.supply.pressure"
+SUPPLY = "circuit.supply"
 CONDUCTANCE, RATIO = "conductance", "critical_ratio"
 MAX_RATIO_ERROR = 0.1
 """Standard error of a critical ratio from which it counts as not determined (chosen)."""
@@ -29,17 +37,21 @@ MAX_RATIO_ERROR = 0.1
 
 @dataclasses.dataclass(frozen=True)
 class ValveUnknowns:
-    """The valves that the steps of the records show, and the reason for a common critical ratio, empty without one."""
+    """The valves that the steps of the records show, and the reason for a common critical ratio, empty without one.
+
+    `sinks`: the supply has a volume (`Tank`), so that its pressure sinks.
+    """
 
     fill: bool
     discharge: bool
     common_ratio: str = ""
+    sinks: bool = False
 
     @classmethod
-    def of(cls, records: Sequence[CampaignRecord], common_ratio: str = "") -> ValveUnknowns:
+    def of(cls, records: Sequence[CampaignRecord], common_ratio: str = "", sinks: bool = False) -> ValveUnknowns:
         """The valves through which the air of these records flows."""
         changes = [step.change for record in records for step in record.steps]
-        return cls(any(change > 0 for change in changes), any(change < 0 for change in changes), common_ratio)
+        return cls(any(change > 0 for change in changes), any(change < 0 for change in changes), common_ratio, sinks)
 
     @property
     def both(self) -> bool:
@@ -55,8 +67,10 @@ class ValveUnknowns:
 
     @property
     def shared(self) -> list[str | tuple[str, ...]]:
-        """The paths of critical ratios and, with a fill, of the supply pressure."""
-        return [*self.paths(RATIO), *([SUPPLY] if self.fill else [])]
+        """The paths of critical ratios and, with a fill, of the supply."""
+        constant, sinking = ["pressure"], ["supply.pressure", "feed.conductance", "volume"]
+        names = [f"{SUPPLY}.{name}" for name in (sinking if self.sinks else constant)]
+        return [*self.paths(RATIO), *(names if self.fill else [])]
 
     @property
     def supposed(self) -> list[str]:
@@ -90,6 +104,7 @@ ASSUMED_CONDUCTANCE = 1e-8
 """Conductance [m3/(s Pa)] for which the relative volumes are fitted (chosen)."""
 MIN_DEVIATION = 100.0
 """Least standard deviation of the pressure sensor [Pa] (chosen)."""
+HEAT_TRANSFER = "gas.heat_transfer"
 HEAT_TRANSFER_BOUNDS = (1e-3, 1e3)
 """Bounds of the heat transfer [W/K] (chosen)."""
 
@@ -125,11 +140,15 @@ def vessel_plant(record: CampaignRecord) -> Plant:
 
 
 def rescaled(plant: object, scale: float) -> Plant:
-    """The plant with its conductances and heat transfer multiplied by the scale."""
+    """The plant with its conductances, heat transfer and volume of the supply multiplied by the scale."""
     assert isinstance(plant, Plant)
     circuit, gas = plant.circuit, plant.gas
     assert isinstance(circuit, FillDischarge)
     assert isinstance(gas, EnergyBalance)
+    supply = circuit.supply
+    if isinstance(supply, Tank) and isinstance(supply.feed, Valve):
+        feed = dataclasses.replace(supply.feed, conductance=supply.feed.conductance * scale)
+        supply = dataclasses.replace(supply, feed=feed, volume=supply.volume * scale)
     fill, discharge = (
         dataclasses.replace(valve, conductance=valve.conductance * scale)
         for valve in (circuit.fill, circuit.discharge)
@@ -137,7 +156,7 @@ def rescaled(plant: object, scale: float) -> Plant:
     )
     return dataclasses.replace(
         plant,
-        circuit=dataclasses.replace(circuit, fill=fill, discharge=discharge),
+        circuit=dataclasses.replace(circuit, supply=supply, fill=fill, discharge=discharge),
         gas=dataclasses.replace(gas, heat_transfer=float(np.clip(gas.heat_transfer * scale, *HEAT_TRANSFER_BOUNDS))),
     )
 
@@ -149,6 +168,35 @@ def at_record(plant: Plant, record: CampaignRecord, volume: float) -> Plant:
         plant, muscle=Muscle.ideal(vessel), mechanism=Isometric(held_contraction(record)),
         ambient=stated_ambient(record.recording),
     )  # fmt: skip
+
+
+def with_supply_volume(experiment: Experiment) -> Experiment:
+    """The experiment with a volume before its valve that is fed from the supply; initial guess (chosen)."""
+    plant = experiment.plant
+    assert isinstance(plant, Plant)
+    circuit = plant.circuit
+    assert isinstance(circuit, FillDischarge)
+    assert isinstance(circuit.fill, Valve)
+    feed = Valve(3.0 * circuit.fill.conductance, 0.3)
+    tank = Tank(circuit.supply, feed, 3.0 * float(plant.muscles[0].geometry.volume(0.0)))
+    plant = dataclasses.replace(plant, circuit=dataclasses.replace(circuit, supply=tank))
+    initial = experiment.initial_conditions.known["pressure"]
+    return dataclasses.replace(experiment, plant=plant, initial_conditions=InitialConditions.at_rest(plant, initial))
+
+
+def has_supply_volume(plant: object) -> bool:
+    """Whether the supply of a plant has a volume, so that its pressure sinks."""
+    return isinstance(plant, Plant) and any(isinstance(circuit.supply, Tank) for circuit in plant.circuits)
+
+
+def describe_supply(fit: DynamicFit) -> str:
+    """The volume before the valve, as a sentence."""
+    volume, feed = fit[f"{SUPPLY}.volume"], fit[f"{SUPPLY}.feed.conductance"]
+    return (
+        f"The supply pressure sinks during a fill: a volume of {1e6 * volume.value:.3g} cm3 (standard error "
+        f"{1e6 * volume.stderr:.2g} cm3) before the valve, fed through a conductance of {feed.value:.3g} m3/(s Pa), "
+        "explains the records, which a constant supply pressure does not."
+    )
 
 
 def valve_commands(record: CampaignRecord) -> dict[str, tuple[tuple[float, float], ...]]:
@@ -179,3 +227,16 @@ def with_instants(experiment: Experiment, fit: DynamicFit, number: int) -> Exper
     """The experiment with the instants that a fit has found for it as its record of this number."""
     model = fit.problem.record_models[number]
     return dataclasses.replace(experiment, command=model.command(fit.values), start_time=model.start_time(fit.values))
+
+
+def fit_pressure(
+    records: Sequence[CampaignRecord], experiments: Sequence[Experiment], free: Sequence[str | tuple[str, ...]],
+    own: tuple[str, ...] = (),
+) -> DynamicFit:  # fmt: skip
+    """A fit with the heat transfer, and own instants of the valve commands, because the detected ones are inexact."""
+    first, margin = experiments[0].plant, instant_margin(records)
+    assert first is not None
+    return fit_dynamic(
+        first, experiments, free=(HEAT_TRANSFER, *free), observed={"pressure": pressure_deviation(records)},
+        per_record=(*own, StartTime(margin), CommandInstants(margin)), bounds={HEAT_TRANSFER: HEAT_TRANSFER_BOUNDS},
+    )  # fmt: skip

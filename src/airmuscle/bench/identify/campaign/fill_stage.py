@@ -14,29 +14,32 @@ from ....engine.loop.inputs import Schedule
 from ....physics.muscle.geometry import Geometry
 from ....physics.plant.plant import Plant
 from ....physics.pneumatics import FillDischarge
-from ..dynamic import CommandInstants, DynamicFit, Experiment, StartTime, fit_dynamic
+from ..dynamic import DynamicFit, Experiment
 from ..dynamic.experiment import describe_ambient
 from .fill_records import (
     CONDUCTANCE,
     DISCHARGE,
-    HEAT_TRANSFER_BOUNDS,
+    SUPPLY,
     ValveUnknowns,
     at_record,
+    describe_supply,
     detected_experiment,
+    fit_pressure,
+    has_supply_volume,
     held_contraction,
-    instant_margin,
     poor_ratios,
     pressure_deviation,
     rescaled,
     vessel_plant,
     with_instants,
+    with_supply_volume,
 )
 from .record import CampaignRecord
 from .rows import LeftOutStage
 from .volume import VolumeChange, VolumeEstimate, relate_volumes
 
+Fitted = Callable[[Sequence[Experiment], ValveUnknowns], DynamicFit]
 NAME = "fills and volume"
-HEAT_TRANSFER = "gas.heat_transfer"
 VOLUME = "muscle.geometry.enclosed_volume"
 REMEDY = (
     "record a fill from ambient pressure and a discharge through the valve at a held length, at three lengths with the "
@@ -44,6 +47,10 @@ REMEDY = (
 )
 MAX_NOISE_RATIO = 4.0
 """Ratio of the residual to the noise of the pressure sensor above which the model does not follow a record (chosen)."""
+MAX_FOLLOWED = 2.0
+"""That ratio up to which it follows them; above it, a supply whose pressure sinks is tried (chosen)."""
+MAX_VOLUME_ERROR = 0.3
+"""Maximum relative standard error of a volume before the valve (chosen)."""
 MIN_MISFIT = 0.01
 """Minimum residual that is reported, as a fraction of the greatest change of the pressure (chosen)."""
 
@@ -173,10 +180,12 @@ class _RelativeFit:
 
     @classmethod
     def of(cls, records: Sequence[CampaignRecord]) -> _RelativeFit:
+        def fitted(experiments: Sequence[Experiment], valves: ValveUnknowns) -> DynamicFit:
+            free = [*valves.shared, *([f"{DISCHARGE}.{CONDUCTANCE}"] if valves.both else [])]
+            return fit_pressure(records, experiments, free, (VOLUME,))
+
         experiments = [detected_experiment(record, vessel_plant(record)) for record in records]
-        valves = ValveUnknowns.of(records)
-        free = [*valves.shared, *([f"{DISCHARGE}.{CONDUCTANCE}"] if valves.both else [])]
-        return cls(_fit(records, experiments, free, (VOLUME,)), tuple(records))
+        return cls(_with_supply(records, experiments, ValveUnknowns.of(records), fitted)[0], tuple(records))
 
     @property
     def contractions(self) -> Array:
@@ -208,19 +217,6 @@ class _RelativeFit:
         return experiments
 
 
-def _fit(
-    records: Sequence[CampaignRecord], experiments: Sequence[Experiment], free: Sequence[str | tuple[str, ...]],
-    own: tuple[str, ...] = (),
-) -> DynamicFit:  # fmt: skip
-    """A fit with the heat transfer, and own instants of the valve commands, because the detected ones are inexact."""
-    first, margin = experiments[0].plant, instant_margin(records)
-    assert first is not None
-    return fit_dynamic(
-        first, experiments, free=(HEAT_TRANSFER, *free), observed={"pressure": pressure_deviation(records)},
-        per_record=(*own, StartTime(margin), CommandInstants(margin)), bounds={HEAT_TRANSFER: HEAT_TRANSFER_BOUNDS},
-    )  # fmt: skip
-
-
 def _fit_jointly(
     records: Sequence[CampaignRecord],
     experiments: Sequence[Experiment],
@@ -230,26 +226,56 @@ def _fit_jointly(
 ) -> FillStage:
     """The fit with the volumes of one curve, and the prediction of each record from the others."""
     everything = range(len(records))
-    valves = ValveUnknowns.of(records)
-    fit = _fit_common(records, experiments, everything)
+    valves = ValveUnknowns.of(records, sinks=any(has_supply_volume(each.plant) for each in experiments))
+    fit, experiments, valves = _with_supply(
+        records, experiments, valves, lambda changed, free: _fit_common(records, changed, everything, free)
+    )
     if valves.both and (reason := poor_ratios(fit)):
         valves = dataclasses.replace(valves, common_ratio=reason)
-        fit = _fit_common(records, experiments, everything, reason)
+        fit = _fit_common(records, experiments, everything, valves)
     cross = []
     for i in everything if len(records) > 1 else ():
-        part = _fit_common(records, experiments, [k for k in everything if k != i], valves.common_ratio)
+        part = _fit_common(records, experiments, [k for k in everything if k != i], valves)
         cross.append(_prediction_rms(fit, part, i))
         progress(0.5 + 0.5 * (i + 1) / len(records))
     contractions = np.array([held_contraction(record) for record in records])
-    supposed = (*valves.supposed, *describe_ambient([record.recording for record in records]))
+    supposed = (
+        *([describe_supply(fit)] if valves.sinks else []),
+        *valves.supposed,
+        *describe_ambient([record.recording for record in records]),
+    )
     return FillStage(fit, tuple(records), tuple(experiments), geometry, estimate, contractions, tuple(cross), supposed)
 
 
 def _fit_common(
-    records: Sequence[CampaignRecord], experiments: Sequence[Experiment], chosen: Sequence[int], common_ratio: str = ""
+    records: Sequence[CampaignRecord], experiments: Sequence[Experiment], chosen: Sequence[int], every: ValveUnknowns
 ) -> DynamicFit:
-    valves = ValveUnknowns.of([records[i] for i in chosen], common_ratio)
-    return _fit(records, [experiments[i] for i in chosen], [*valves.shared, *valves.paths(CONDUCTANCE)])
+    """The fit of the chosen records, with what is supposed of the valves of every record."""
+    valves = ValveUnknowns.of([records[i] for i in chosen], every.common_ratio, every.sinks)
+    return fit_pressure(records, [experiments[i] for i in chosen], [*valves.shared, *valves.paths(CONDUCTANCE)])
+
+
+def _with_supply(
+    records: Sequence[CampaignRecord], experiments: Sequence[Experiment], valves: ValveUnknowns, fitted: Fitted
+) -> tuple[DynamicFit, Sequence[Experiment], ValveUnknowns]:
+    """The fit with a constant supply; where it does not follow the records, with a volume before the valve.
+
+    The volume is used where the records determine it and the fit then follows them.
+    """
+    constant = fitted(experiments, valves)
+    limit, everything = MAX_FOLLOWED * pressure_deviation(records), range(len(records))
+    if not valves.fill or valves.sinks or all(constant.rms("pressure", i) <= limit for i in everything):
+        return constant, experiments, valves
+    sinking = dataclasses.replace(valves, sinks=True)
+    changed = [with_instants(with_supply_volume(each), constant, i) for i, each in enumerate(experiments)]
+    try:
+        fit = fitted(changed, sinking)
+    except AirmuscleError:  # the simulation fails on the way
+        return constant, experiments, valves
+    volume = fit[f"{SUPPLY}.volume"]
+    determined = not volume.on_bound and volume.stderr <= MAX_VOLUME_ERROR * volume.value
+    follows = all(fit.rms("pressure", i) <= limit for i in everything)
+    return (fit, changed, sinking) if determined and follows else (constant, experiments, valves)
 
 
 def _prediction_rms(fit: DynamicFit, part: DynamicFit, record: int) -> float:

@@ -21,6 +21,8 @@ from ....physics.plant.validation import check_pressures
 
 PRESSURE_STEP = 100.0
 """Increase of gauge pressure [Pa] by which states that depend on the pressure are detected."""
+NOMINAL_VOLUME = 1e-4
+"""Volume of a muscle [m3] at which circuits are settled; the state of a supply does not depend on it."""
 MusclePressures = float | str | Sequence[float | str]
 """Gauge pressure [Pa] of all muscles, or one for each; also as texts with a unit."""
 _compiled_conditions: dict[Any, Function] = {}
@@ -34,16 +36,18 @@ class InitialConditions:
     guess       initial guess of every state for Newton's method [SI]
     stationary  states whose time derivative is zero
     equal       pairs of outputs that are equal
+    settled     states of supplies and regulators in the steady state that follows from their parameters
     """
 
     known: Mapping[str, float]
     guess: Mapping[str, float]
     stationary: tuple[str, ...] = ()
     equal: tuple[tuple[str, str], ...] = ()
+    settled: tuple[str, ...] = ()
 
     @classmethod
     def at_rest(cls, plant: Plant, pressure: MusclePressures) -> InitialConditions:
-        """Equilibrium at gauge pressures [Pa], one for all muscles or one for each; walls and tubes in steady state.
+        """Equilibrium at gauge pressures [Pa], one for all muscles or one for each; walls, tubes and tanks are settled.
 
         Raises ParameterError for another number of pressures than muscles, EquilibriumError where there is none.
         """
@@ -51,32 +55,34 @@ class InitialConditions:
         coordinates = [c.name for c in plant.mechanism.coordinates]
         pressures = check_pressures(pressure, len(plant.muscles), plant.ambient)
         state = find_equilibrium(plant, pressure=tuple(pressures))
-        known, stationary, equal = _steady_conditions(plant, state, pressures, (*speeds, *coordinates))
+        known, stationary, equal, settled = _steady_conditions(plant, state, pressures, (*speeds, *coordinates))
         known |= dict.fromkeys(speeds, 0.0)
-        return cls({**_by_output(plant, pressures), **known}, state, (*stationary, *speeds), equal)
+        return cls({**_by_output(plant, pressures), **known}, state, (*stationary, *speeds), equal, settled)
 
     @classmethod
     def at_coordinates(cls, plant: Plant, pressure: MusclePressures, **coordinates: float) -> InitialConditions:
         """A plant at gauge pressures [Pa], one for all muscles or one for each, and given coordinates [SI].
 
-        Speeds are zero unless given. Walls and tubes are in steady state at these pressures, also where they are
-        unknowns. Raises ParameterError for another number of pressures than muscles, or an unknown name.
+        Speeds are zero unless given. Walls and tubes are in steady state at these pressures, tanks and regulators at
+        their supply, also where their parameters are unknowns. Raises ParameterError for another number of pressures
+        than muscles, or an unknown name.
         """
         pressures = check_pressures(pressure, len(plant.muscles), plant.ambient)
         state = plant.state_at(pressure=pressures, **coordinates)
-        known, stationary, equal = _steady_conditions(plant, state, pressures)
-        return cls({**_by_output(plant, pressures), **known}, state, stationary, equal)
+        known, stationary, equal, settled = _steady_conditions(plant, state, pressures)
+        return cls({**_by_output(plant, pressures), **known}, state, stationary, equal, settled)
 
     def check_plant(self, system: System, values: Mapping[str, Any]) -> None:
         """Raise ParameterError for a name that the system lacks, or where the number of conditions is wrong."""
         names = [s.name for s in system.states]
-        for name in (*self.known, *self.stationary, *(n for pair in self.equal for n in pair)):
-            if name not in (names if name in self.stationary else values):
+        for name in (*self.known, *self.stationary, *(n for pair in self.equal for n in pair), *self.settled):
+            if name not in (names if name in (*self.stationary, *self.settled) else values):
                 raise ParameterError(
                     f"the initial conditions name '{name}'; the system has {', '.join(values)}."
                     f"{suggestion(name, values)}"
                 )
-        if len(self.known) + len(self.stationary) + len(self.equal) != len(names) or set(self.guess) != set(names):
+        count = len(self.known) + len(self.stationary) + len(self.equal) + len(self.settled)
+        if count != len(names) or set(self.guess) != set(names):
             raise ParameterError(
                 f"the initial conditions must give as many conditions as there are states ({', '.join(names)}), and a "
                 f"guess of each state; known are {', '.join(self.known) or 'none'}, stationary are "
@@ -91,36 +97,49 @@ def _by_output(plant: Plant, pressures: Sequence[float]) -> dict[str, float]:
 
 def _steady_conditions(
     plant: Plant, state: Mapping[str, float], pressures: Sequence[float], excluded: Sequence[str] = ()
-) -> tuple[dict[str, float], tuple[str, ...], tuple[tuple[str, str], ...]]:
-    """The conditions for the states other than the air masses: known values, stationary states and equal outputs.
+) -> tuple[dict[str, float], tuple[str, ...], tuple[tuple[str, str], ...], tuple[str, ...]]:
+    """The conditions for the states other than the air masses: known values, stationary states, equal outputs, and
+    settled states.
 
-    A state that depends on no pressure is known. Of the others, a tube has the pressure of its muscle, and the
-    remaining ones are stationary.
+    A state that depends on no pressure of a muscle is settled if it is that of a circuit, such as the air of a tank,
+    else known. Of the others, a tube has the pressure of its muscle, and the remaining ones are stationary.
     """
     motion = {c.name: state[c.name] for c in plant.mechanism.coordinates}
     motion |= {c.speed: state[c.speed] for c in plant.mechanism.coordinates}
     increased = [[p + PRESSURE_STEP * (i == k) for i, p in enumerate(pressures)] for k in range(len(pressures))]
     others = [plant.state_at(pressure=each, **motion) for each in increased]
     outputs = plant.outputs(state, dict.fromkeys(plant.inputs, 0.0))
-    known, stationary, equal = {}, [], []
+    of_circuits = _circuit_states(plant)
+    known, stationary, equal, settled = {}, [], [], []
     for name, value in state.items():
         if name in excluded or name in [f"{prefix}air_mass" for prefix in plant.prefixes]:
             continue
         if all(other[name] == value for other in others):
-            known[name] = value
+            if name in of_circuits:
+                settled.append(name)
+            else:
+                known[name] = value
         elif (tube_pressure := f"{name.removesuffix('air_mass')}pressure") in outputs:
             prefix = next(prefix for prefix in plant.prefixes if name.startswith(prefix))
             equal.append((tube_pressure, f"{prefix}pressure"))
         else:
             stationary.append(name)
-    return known, tuple(stationary), tuple(equal)
+    return known, tuple(stationary), tuple(equal), tuple(settled)
+
+
+def _circuit_states(plant: Plant) -> dict[str, Any]:
+    """Steady states of the circuits with ambient pressure in the muscles; those of supplies do not depend on it."""
+    count = len(plant.muscles)
+    air = {f"{prefix}{name}" for prefix in plant.prefixes for name in ("air_mass", "internal_energy")}
+    states = plant.fill_muscles([0.0] * count, [NOMINAL_VOLUME] * count, {})
+    return {name: value for name, value in states.items() if name not in air}
 
 
 def compile_conditions(system: System, initial: InitialConditions) -> Function:
     """The compiled function (state, leaves) -> (known values and rates, their derivatives by state and by leaf)."""
     import casadi
 
-    key = (tree.structure(system), tuple(initial.known), initial.stationary, initial.equal)
+    key = (tree.structure(system), tuple(initial.known), initial.stationary, initial.equal, initial.settled)
     if key not in _compiled_conditions:
         model, p = autodiff.symbolic(system)
         x = casadi.SX.sym("x", len(system.states))
@@ -129,10 +148,12 @@ def compile_conditions(system: System, initial: InitialConditions) -> Function:
         values = {**model.outputs(state, inputs), **state}
         initial.check_plant(system, values)
         rates = model.rates(state, inputs)
+        steady = _circuit_states(model) if initial.settled else {}
         g = casadi.vertcat(
             *(casadi.SX(values[n]) for n in initial.known),
             *(casadi.SX(rates[n]) for n in initial.stationary),
             *(casadi.SX(values[a] - values[b]) for a, b in initial.equal),
+            *(casadi.SX(state[n] - steady[n]) for n in initial.settled),
         )
         outputs = {"values": g, "by_state": casadi.jacobian(g, x), "by_leaf": casadi.jacobian(g, p)}
         _compiled_conditions[key] = Function({"x": x, "leaves": p}, outputs)
@@ -148,7 +169,7 @@ def solve_initial_state(
     follow from the implicit function theorem. Raises IdentificationError where no state satisfies the conditions.
     """
     n, x = guess.size, guess.copy()
-    target = np.concatenate([known, np.zeros(len(initial.stationary) + len(initial.equal))])
+    target = np.concatenate([known, np.zeros(n - known.size)])
     values, by_state, by_leaf = np.empty(n), np.empty((n, n)), np.empty((n, leaves.size))
     workspace = np.zeros((n, n)), np.zeros(n)
     status = Status(newton(function.address, leaves, target, nominal, x, values, by_state, by_leaf, *workspace))
@@ -156,6 +177,7 @@ def solve_initial_state(
         conditions = [f"{name} = {value:.4g}" for name, value in zip(initial.known, known.tolist(), strict=True)]
         conditions += [f"{name} stationary" for name in initial.stationary]
         conditions += [f"{a} = {b}" for a, b in initial.equal]
+        conditions += [f"{name} settled" for name in initial.settled]
         raise IdentificationError(
             f"no state satisfies the initial conditions ({', '.join(conditions)}; SI): {status.message}. Change "
             "the conditions or the guess."
