@@ -13,8 +13,8 @@ import pytest
 from airmuscle.engine.compile import Printer
 from airmuscle.engine.compile.ir.instructions import Operation
 from airmuscle.engine.compile.llvm import emit, vector_math
+from airmuscle.engine.compile.llvm.emit import LlvmType
 from airmuscle.engine.compile.llvm.jit import jit_compile
-from airmuscle.engine.compile.llvm.types import LlvmType
 from airmuscle.engine.run.batch.lanes import aligned_arrays
 from airmuscle.errors import TraceError
 

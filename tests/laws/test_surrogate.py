@@ -11,8 +11,7 @@ from widths import widened
 from airmuscle.errors import AirmuscleWarning, SolveError
 from airmuscle.files.library import catalogue
 from airmuscle.physics import Braid, ChouHannaford1996, Tabulated, ValidityRange, as_force_law
-from airmuscle.physics.muscle.characteristic.error_search import estimate_maximum
-from airmuscle.physics.muscle.characteristic.polynomial_surrogate import forces_or_nan
+from airmuscle.physics.muscle.characteristic.polynomial_surrogate import estimate_maximum, forces_or_nan
 
 SMALL = Tabulated((1e5, 1e5, 1e5, 2e5, 2e5), (0.0, 0.05, 0.1, 0.0, 0.2), (100.0, 40.0, 0.0, 200.0, 0.0))
 PARTLY_SOLVED = [(5e4, 4e5, 0.01, 0.12), (1e5, 3.5e5, 0.02, 0.3)]

@@ -37,7 +37,7 @@ from airmuscle.files import load_dynamic_fit
 from airmuscle.outlets.cli import COMMANDS
 from airmuscle.physics import ContractileSurface
 from airmuscle.recording import Recording
-from airmuscle.recording.row_notes import row_notes
+from airmuscle.recording.recording import row_notes
 
 PREAMBLE = ("Prüfstand 3 (Zwick Z010)", "Prüfer;Müller", "Datum;12.03.2026;14:05", "Kanal;1;2;3", "Verstärkung;1;10;1")
 HEADINGS = "Zeit;Druck (rel.);Kraft;Weg;Bemerkung"

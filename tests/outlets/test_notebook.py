@@ -24,7 +24,7 @@ from airmuscle.physics import ContractileSurface
 from airmuscle.physics.muscle import compute_isobars, parameter_rows
 from airmuscle.physics.muscle.isobar_plot import isobar_plot
 from airmuscle.recording.notebook import MAX_NOTES, MAX_ROWS, Card, NotebookDisplay, render_card
-from airmuscle.recording.panels import panels_of
+from airmuscle.recording.plot import panels_of
 
 MAX_BYTES = 200_000
 BULKY = re.compile(r"\b(\w*Array|NDArray|Recording|\w*Fit|Problem|Plant|System|Comparison|Study|Entry|RankedModel)\b")

@@ -19,9 +19,7 @@ from airmuscle.engine.compile import compile_system, derivatives, functions
 from airmuscle.engine.compile.ir.instructions import Operation
 from airmuscle.engine.compile.ir.interpreter import InterpretedBody
 from airmuscle.engine.compile.llvm.jit import jit_compile
-from airmuscle.engine.compile.text.c import CLanguage
-from airmuscle.engine.compile.text.javascript import JavaScriptLanguage
-from airmuscle.engine.compile.text.matlab import DEFINITION, MatlabLanguage
+from airmuscle.engine.compile.text.programs import DEFINITION, CLanguage, JavaScriptLanguage, MatlabLanguage
 from airmuscle.errors import TraceError
 
 SOME = ("dmsp-20-300", "overlap", "shaped joint with friction", "manifold on tank and regulator")

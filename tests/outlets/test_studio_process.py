@@ -20,7 +20,8 @@ import pytest
 pytest.importorskip("starlette", reason="needs starlette")
 pytest.importorskip("uvicorn", reason="needs uvicorn")
 
-from airmuscle.outlets.studio import connections, worker
+from airmuscle.outlets.studio import server as studio_server
+from airmuscle.outlets.studio import worker
 
 
 @contextmanager
@@ -60,7 +61,7 @@ def test_a_server_that_is_ended_removes_its_uploads(tmp_path, number):
 
 def test_silent_connections_block_nobody(tmp_path):
     with running(tmp_path) as (_, address, send), ExitStack() as silent:
-        for _ in range(connections.MAX_CONNECTIONS + 10):
+        for _ in range(studio_server.MAX_CONNECTIONS + 10):
             silent.enter_context(socket.create_connection((address.hostname, address.port)))
         assert send("GET", "/api/library") == 200
 
@@ -74,23 +75,23 @@ def made_connection(cycle, since):
 def test_each_phase_of_a_request_has_its_limit(monkeypatch):
     body, answer = (SimpleNamespace(response_complete=False, more_body=more) for more in (True, False))
     done = SimpleNamespace(response_complete=True, more_body=True)
-    assert [connections.limit_of(cycle) for cycle in (None, body, answer, done)] == [
-        connections.HEAD_LIMIT, connections.BODY_LIMIT, connections.ANSWER_LIMIT, connections.HEAD_LIMIT,
+    assert [studio_server.limit_of(cycle) for cycle in (None, body, answer, done)] == [
+        studio_server.HEAD_LIMIT, studio_server.BODY_LIMIT, studio_server.ANSWER_LIMIT, studio_server.HEAD_LIMIT,
     ]  # fmt: skip
-    monkeypatch.setattr(connections, "MAX_CONNECTIONS", 2)
+    monkeypatch.setattr(studio_server, "MAX_CONNECTIONS", 2)
     kept = [made_connection(cycle, since) for since, cycle in enumerate((body, None, None))]
-    connections.close_one_of(kept)
+    studio_server.close_one_of(kept)
     assert [each.transport.is_closing() for each in kept] == [False, True, False]
 
 
 def test_a_silent_connection_is_closed_at_its_limit(monkeypatch):
     import uvicorn
 
-    monkeypatch.setattr(connections, "HEAD_LIMIT", 0.2)
+    monkeypatch.setattr(studio_server, "HEAD_LIMIT", 0.2)
 
     async def closed_after():
         server = uvicorn.Server(
-            uvicorn.Config(lambda *_: None, port=0, http=connections.limited_protocol(), lifespan="off", ws="none")
+            uvicorn.Config(lambda *_: None, port=0, http=studio_server.limited_protocol(), lifespan="off", ws="none")
         )
         task = asyncio.create_task(server.serve())
         while not server.started:

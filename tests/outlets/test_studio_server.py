@@ -36,10 +36,10 @@ from airmuscle.outlets.studio import (
     read_text_tables,
     self_contained_page,
     sheet_of_tables,
-    single_file,
     warning_of,
 )
 from airmuscle.outlets.studio import app as studio_app
+from airmuscle.outlets.studio import page as studio_page
 
 MUSCLE = to_toml(load("tondu-lopez"))
 
@@ -303,9 +303,9 @@ def test_a_loopback_address_is_recognised_and_has_a_token_as_well():
 def test_a_muscle_that_the_command_names_is_opened_by_its_name(tmp_path):
     """Only a file has a text of its own."""
     (tmp_path / "own.toml").write_text(MUSCLE, encoding="utf-8")
-    by_name, by_path = single_file.open_sheets(["dmsp-20-300", str(tmp_path / "own.toml")])
+    by_name, by_path = studio_page.open_sheets(["dmsp-20-300", str(tmp_path / "own.toml")])
     assert by_name.get("own_text", "") == ""
-    muscles = single_file.first_state([by_name, by_path])["muscle"]["muscles"]
+    muscles = studio_page.first_state([by_name, by_path])["muscle"]["muscles"]
     assert muscles[0] == {"name": "dmsp-20-300", "values": {}}
     assert set(muscles[1]) == {"text", "values"}
     opened = json.loads(request(create_app(pool=InThisProcess(), opened=(by_name,)), "GET", "/api/library").text)[

@@ -10,7 +10,7 @@ from chapter_words import visible_words
 
 from airmuscle.bench import fit
 from airmuscle.engine import ZERO_INPUT, DormandPrince8, RungeKutta4, SampledSignal, simulate
-from airmuscle.papers import hosovsky, hosovsky_claims, hosovsky_effect_ranges
+from airmuscle.papers import hosovsky, hosovsky_claims
 from airmuscle.papers import hosovsky_effects as causing
 from airmuscle.papers import hosovsky_fill as filling
 from airmuscle.papers import hosovsky_joint as joining
@@ -325,12 +325,12 @@ def test_a_missing_value_does_not_hold():
 
 
 def test_filling_suffers_more_by_a_fifth_only_inside_the_range_of_heat_transfer():
-    ranges = {r.meaning: r for r in hosovsky_effect_ranges.ratio_ranges(NUMBERS, causing.SuspectedCauses())}
+    ranges = {r.meaning: r for r in hosovsky_claims.ratio_ranges(NUMBERS, causing.SuspectedCauses())}
     heat = ranges["heat transfer coefficient times area, wall to air"]
     assert heat.ratios == pytest.approx((1.08, 1.40, 1.16), abs=5e-3)
     assert not heat.stronger
     assert ranges["critical pressure ratio of the valve with fittings"].ratios[1] == pytest.approx(3.26, abs=5e-3)
-    text = hosovsky_effect_ranges.describe_ranges(tuple(ranges.values()))
+    text = hosovsky_claims.describe_ranges(tuple(ranges.values()))
     assert "wall to air (ratio 1.08, 1.4 and 1.16 at 0.1, 0.5 and 2 W/K)" in text
 
 

@@ -23,7 +23,7 @@ from airmuscle.papers import saga2007_claims as claims
 from airmuscle.papers import saga2007_joint as joining
 from airmuscle.papers import saga2007_pairs as pairs
 from airmuscle.papers import saga2007_values as values
-from airmuscle.papers.saga2007 import chapter
+from airmuscle.papers.saga2007 import chapter, virtual_work
 from airmuscle.papers.saga2007_muscle import (
     DEFAULT,
     circular_meridian,
@@ -33,7 +33,6 @@ from airmuscle.papers.saga2007_muscle import (
     with_rings,
 )
 from airmuscle.papers.saga2007_previous import PREVIOUS_MODEL, Ferraresi2001
-from airmuscle.papers.saga2007_tables import virtual_work
 from airmuscle.physics import (
     AxialIntegral,
     CircularArc,

@@ -6,8 +6,7 @@ import abc
 import shutil
 from collections.abc import Sequence
 
-from ..recording.columns import quantity_of
-from ..recording.display_units import display_scale
+from ..recording.columns import display_scale, quantity_of
 from ..recording.notebook import Card, NotebookDisplay
 from ..report.chapter import Chapter, TableColumn
 from ..report.shown import shown_columns, value_cells

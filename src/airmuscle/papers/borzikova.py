@@ -1,18 +1,47 @@
-"""Report chapter: Borzíková, Balara and Piteľ, contraction of the Shadow Air Muscle SAM 30 x 290.
+"""Report chapter: Borzíková, Balara and Piteľ, contraction of the Shadow Air Muscle, with its claims as a table.
 
 The measurements and figures of the paper are lost; its three printed plane curves serve as data.
 """
 
 from __future__ import annotations
 
-from ..physics.muscle.characteristic.borzikova import BORZIKOVA, SAM_30X290
+from collections.abc import Mapping
+
+import numpy as np
+
+import airmuscle as am
+
+from ..bench.identify.surface.basis import Chebyshev, LoadRange, conditioning
+from ..bench.identify.surface.exponential import SurfaceFit, SurfaceProblem, fit_linearised, fit_nonlinear
+from ..core.arrays import Array
+from ..core.units import STANDARD_GRAVITY
+from ..physics.muscle.characteristic.borzikova import BORZIKOVA, SAM_30X290, PlaneCurves
 from ..report.chapter import Chapter
-from .borzikova_claims import PAPER, claims
+from ..report.claims import AtLeast, Claim, ClaimRow, Equal, Kind
+from ..report.formatting import format_number, typographic
 from .borzikova_figures import plots
-from .borzikova_surfaces import surfaces
-from .borzikova_tables import tables
+from .borzikova_surfaces import (
+    AS_EXPONENT,
+    CORRECTED,
+    EXPONENTIAL,
+    MISPRINT_CORRECTED,
+    PRINTED,
+    index_on_curves,
+    round_contraction,
+    sample,
+    surfaces,
+)
+from .borzikova_tables import CATALOGUE_TABLE, CATALOGUE_TEXT, tables
 from .run import chapter_texts
 
+PAPER = "borzikova"
+MAX_LINEARISATIONS = 50
+"""Maximum number of steps of the repeated linearisation (chosen)."""
+MEASURED_DIAMETER = 30
+"""Nominal diameter of the measured muscle [mm]."""
+SATURATION = SAM_30X290.curves[0].saturation
+
+Laws = Mapping[str, am.characteristic.ContractionLaw]
 CHOSEN = (
     ("maximum pressure", "3.5 bar", "inferred: the catalogue pressure; the range is not printed"),
     ("loads", "45, 130, 260 N", "printed for 4.5, 13, 26 kg"),
@@ -45,3 +74,148 @@ def chapter() -> Chapter:
         chosen=CHOSEN,
         **chapter_texts(PAPER),
     )
+
+
+def surface_index(curves: PlaneCurves, laws: Laws, name: str) -> tuple[float, str]:
+    """Return the correlation index of a surface on the plane curves [1], or 1 - SSE/SST where it does not exist."""
+    index = index_on_curves(laws[name], curves)
+    if index.value is None:
+        value = typographic(format_number(index.r_squared))
+        note = rf"The index does not exist as SSE > SST; the value is \(1 - \text{{SSE}}/\text{{SST}}\) = {value}."
+        return index.r_squared, note
+    return index.value, f"Index at 15 evenly spaced pressures of each curve, 0 to {curves.max_pressure / 1e5:g} bar."
+
+
+def design_rank(recording: am.Recording) -> float:
+    """Return the rank of the design matrix of equation (1) [1]."""
+    return float(conditioning(recording, Chebyshev(LoadRange.from_recording(recording))).rank)
+
+
+def linearised_ratio(recording: am.Recording, repeated: bool) -> tuple[float, str]:
+    """Return the rms error of a linearised fit of equation (1) relative to that of least squares on k [1]."""
+    fitted = fit_gauss_newton(recording, SATURATION) if repeated else fit_linearised(recording, SATURATION)
+    least = fit_nonlinear(recording, SATURATION).rmse
+    weights = r"the logarithm gives points near \(k_\text{max}\) too much weight."
+    reason = r"every step is a linear fit of the change of \(k\)." if repeated else weights
+    errors = f"rms error {100 * fitted.rmse:.4g} % linearised, {100 * least:.4g} % by least squares on "
+    return fitted.rmse / least, f"{errors}\\(k\\); {reason} The tolerance is chosen."
+
+
+def fit_gauss_newton(recording: am.Recording, saturation: float) -> SurfaceFit:
+    """Fit k by repeated linearisation of f in its coefficients, from the linear fit of the logarithm.
+
+    Raises IdentificationError if the coefficients are not determined.
+    """
+    problem = SurfaceProblem.from_recording(recording, saturation, 4, 2)
+    targets, weights = problem.linear_targets()
+    coefficients: Array = np.asarray(
+        np.linalg.lstsq(weights[:, None] * problem.design_matrix, weights * targets, rcond=None)[0], dtype=float
+    )
+    for _ in range(MAX_LINEARISATIONS):
+        error = problem.contraction - problem.predict(coefficients)
+        step = np.asarray(np.linalg.lstsq(problem.jacobian(coefficients), error, rcond=None)[0], dtype=float)
+        coefficients = coefficients + step
+        if np.abs(step).max() <= 1e-12 * np.abs(coefficients).max():
+            break
+    return problem.build_fit(coefficients, "repeated linearisation")
+
+
+def largest_contraction(curves: PlaneCurves, load: str) -> tuple[float, str]:
+    """Return the maximum [%] of the curve at the smallest or largest load."""
+    curve = {"smallest": min, "largest": max}[load](curves.curves, key=lambda c: c.force)
+    pressures = np.linspace(0.0, curves.max_pressure, 351)
+    heading = f"Maximum of the plane curve at {curve.force:g} N, "
+    heading += "the smallest load" if load == "smallest" else "a smaller load"
+    rest = {
+        "smallest": "The tolerance is chosen. The saturation is approached beyond the range.",
+        "largest": "The text gives no pressure: at a higher one it may hold.",
+    }
+    note = f"{heading}, up to {curves.max_pressure / 1e5:g} bar. {rest[load]}"
+    return 100.0 * float(np.max(curve.contraction(pressures))), note
+
+
+def largest_of_size(curves: PlaneCurves, diameter: int) -> tuple[float | None, str]:
+    """Return the maximum contraction [%] of a muscle of the text at the largest load; only one size was measured."""
+    if diameter == MEASURED_DIAMETER:
+        return largest_contraction(curves, "largest")
+    return None, "No characteristic of this size is printed; the measured muscle is the 30 x 290."
+
+
+def initial_load(curves: PlaneCurves) -> tuple[None, str]:
+    """Return no value, and the contraction at which the curve of the smallest load begins."""
+    lightest = min(curves.curves, key=lambda c: c.force)
+    start = typographic(format_number(100.0 * float(lightest.contraction(0.0)), 3))
+    return None, (
+        f"No characteristic without load is printed. The curve at {lightest.force:g} N begins at {start} %: the "
+        "fit places the start below the initial length, which may be its error or an extension by the load."
+    )
+
+
+_TABLE = dict(zip(CATALOGUE_TABLE["diameter [mm]"], CATALOGUE_TABLE["load at 3.5 bar [kg]"], strict=True))
+_TEXT = dict(zip(CATALOGUE_TEXT["diameter [mm]"], CATALOGUE_TEXT["load [kg]"], strict=True))
+_DIAMETERS = {load: diameter for diameter, load in _TEXT.items()}
+
+CURVES: tuple[ClaimRow, ...] = tuple(
+    ClaimRow("correlation index of the plane curve", Equal(curve.printed_index, 0.0005), "1", None,
+        "The index compares the curve with the measured points, which are lost, so it cannot be computed.",
+        {f"{curve.force:g} N": ()}, untestable=True, place="Fig. 4, plane curves")
+    for curve in SAM_30X290.curves
+)  # fmt: skip
+SURFACE = ClaimRow(
+    "correlation index of the surface on the three plane curves, not below the minimum printed for these",
+    AtLeast(min(c.printed_index for c in SAM_30X290.curves), 0.0005, derived=True), "1", surface_index,
+    cases={name: (name,) for name in (AS_EXPONENT, PRINTED, MISPRINT_CORRECTED, CORRECTED, EXPONENTIAL)},
+    place="equation (1), printed matrix",
+)  # fmt: skip
+RANK = ClaimRow(
+    rf"{len(SAM_30X290.curves)} loads determine the coefficients of equation (1), of degree 4 in \(p\) and 2 in \(F\)",
+    Equal(15.0, derived=True), "1", design_rank,
+    r"Rank of the design matrix. Three loads determine a quadratic in \(F\) exactly, so no load can be left out for "
+    "validation.", kind=Kind.CHECK,
+)  # fmt: skip
+PROCEDURE = ClaimRow(
+    r"the linearised fit of equation (1) minimises \(S(A)\): ratio of its rms error to that of least squares on \(k\)",
+    Equal(1.0, 0.005, derived=True), "1", linearised_ratio, "Plane curves rounded to 0.5 %:",
+    {r"linear fit of \(\ln(1 - k/k_\text{max})\)": (False,),
+     r"repeated linearisation of \(f\) (Gauss-Newton)": (True,)}, place=r"method, sum \(S(A)\)",
+)  # fmt: skip
+LOAD = ClaimRow(
+    "a load of 26 kg is 260 N", Equal(260.0, 0.5), "N", lambda: 26.0 * STANDARD_GRAVITY,
+    r"The paper uses \(g\) = 10 m/s²; with standard gravity the loads are 44.1, 127.5 and 255.0 N. The printed values "
+    "are used.", place="plane curves",
+)  # fmt: skip
+CATALOGUE: tuple[ClaimRow, ...] = (
+    *(ClaimRow("catalogue table: load that the muscle lifts at 3.5 bar", Equal(float(_TABLE[size])), "kg",
+        lambda size: float(_TEXT[size]), "The reproduced value is the load in the text of the same paper at 25 % "
+        "contraction and an unknown pressure; the table gives the force at 3.5 bar. The two cannot be compared.",
+        {case: (size,)}, untestable=True, place="catalogue") for size, case in ((30, "30 x 290"), (20, "20 x 210"))),
+    ClaimRow("catalogue table: diameter of the smallest muscle", Equal(6.0), "mm", lambda: float(_DIAMETERS[3]),
+        "The text gives the same length of 150 mm and the same load of 3 kg with this diameter.",
+        place="catalogue"),
+)  # fmt: skip
+MUSCLE: tuple[ClaimRow, ...] = (
+    ClaimRow("text: 25 % contraction under a load", AtLeast(25.0), "%", largest_of_size, untestable=True,
+        cases={f"{load} kg, diameter {size} mm": (size,) for size, load in _TEXT.items()}, place="catalogue"),
+    ClaimRow(r"the contraction saturates at \(k_\text{max}\) = 40 %: maximum over the pressure range",
+        Equal(100.0 * SATURATION, 0.5), "%", lambda curves: largest_contraction(curves, "smallest"),
+        place="equation (1)"),
+    ClaimRow("a load is needed in the initial position", None, "N", initial_load, untestable=True,
+        place="text"),
+    ClaimRow("the characteristic is the mean of filling and emptying", None, "%", lambda curves: None,
+        "The two branches are not printed, so that neither the hysteresis nor the error of the mean can be computed.",
+        untestable=True, place="text"),
+)  # fmt: skip
+
+
+def claims(curves: PlaneCurves, laws: Laws) -> tuple[Claim, ...]:
+    """Return all claims of the paper for these curves and surfaces."""
+    data = sample(curves)
+    subjects: tuple[tuple[tuple[ClaimRow, ...], tuple[object, ...]], ...] = (
+        (CURVES, ()),
+        ((SURFACE,), (curves, laws)),
+        ((RANK,), (data,)),
+        ((PROCEDURE,), (round_contraction(data),)),
+        ((LOAD, *CATALOGUE), ()),
+        (MUSCLE, (curves,)),
+    )
+    return tuple(claim for rows, subject in subjects for row in rows for claim in row.claims(PAPER, *subject))

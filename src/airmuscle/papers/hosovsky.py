@@ -1,23 +1,32 @@
-"""Report chapter: Hošovský et al., muscle dynamics by Hill's model with valves by ISO 6358."""
+"""Report chapter: Hošovský et al., muscle dynamics by Hill's model with valves by ISO 6358; Figures 1 and 2."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 import airmuscle as am
 
+from ..core.plotting import BLACK, BLUE, LINES, RED, legend_outside, new_figure
 from ..core.reference import cite
-from ..files.library import load_law
+from ..files.library import catalogue, load_law
 from ..physics.muscle.characteristic.contractile_surface import exponents
 from ..physics.muscle.characteristic.energy_defect import maxwell_defect
 from ..report.chapter import Chapter, Plot, Table
-from . import hosovsky_effect_ranges as causing_over_ranges
 from . import hosovsky_effects as causing
 from . import hosovsky_fill as filling
 from . import hosovsky_joint as joining
 from . import hosovsky_release as releasing
-from .hosovsky_claims import fill_claims, gas_findings, measurement_claims, surface_claims
-from .hosovsky_figures import hill_model, isobars, surface_in_space
+from .hosovsky_claims import (
+    describe_ranges,
+    fill_claims,
+    gas_findings,
+    measurement_claims,
+    range_table,
+    ratio_ranges,
+    surface_claims,
+)
 from .hosovsky_plant import (
     FORCE_MAPS,
     MATRIX,
@@ -29,6 +38,9 @@ from .hosovsky_plant import (
     surface_fit,
 )
 from .run import chapter_texts
+
+MAX_CONTRACTION = 0.26
+"""Largest contraction of the figures of the surface [1] (chosen: the free contraction at the largest pressure)."""
 
 
 def coefficient_table() -> Table:
@@ -57,8 +69,8 @@ def chapter(
     effects = causing.compute_effects(parameters, suspected)
     low, high = releasing.release_pair(parameters)
     ranges, joint = releasing.range_table(parameters), joining.joint_variation(parameters)
-    ratios = causing_over_ranges.ratio_ranges(parameters, suspected)
-    explanation = f"{causing.describe_effects(effects)} {causing_over_ranges.describe_ranges(ratios)}"
+    ratios = ratio_ranges(parameters, suspected)
+    explanation = f"{causing.describe_effects(effects)} {describe_ranges(ratios)}"
     return Chapter(
         PAPER,
         claims=(
@@ -71,7 +83,7 @@ def chapter(
         ),
         tables=(
             causing.effect_table(effects),
-            causing_over_ranges.range_table(ratios),
+            range_table(ratios),
             ranges,
             joining.joint_table(joint),
             coefficient_table(),
@@ -154,3 +166,104 @@ def _time_series(fill: filling.FillRun, low: releasing.Release, high: releasing.
         Table(key, key.replace("_", " "), {f"{n} [{unit}]": run[n] for n, unit in names}, shown=False)
         for key, run in runs.items()
     )
+
+
+def hill_model() -> Plot:
+    """Return Fig. 1: contractile element, damper and parallel spring side by side, nonlinear spring in series."""
+    figure, axes = new_figure(height=2.6)
+    axes.set(xlim=(-0.3, 10.6), ylim=(-0.4, 4.6), aspect="equal")
+    axes.axis("off")
+    axes.grid(visible=False)
+    line = {"color": BLACK, "linewidth": 1.4}
+    axes.plot([0, 0], [0.1, 4.1], color=BLACK, linewidth=3)
+    for height in (0.7, 2.1, 3.5):
+        axes.plot([0, 1.4], [height] * 2, **line)
+        axes.plot([4.6, 6.0], [height] * 2, **line)
+    axes.plot([6.0, 6.0], [0.7, 3.5], **line)
+    axes.add_patch(_rectangle((1.4, 3.1), 3.2, 0.8, BLUE))
+    _spring(axes, 1.4, 4.6, 2.1, BLACK)
+    _damper(axes, 1.4, 4.6, 0.7)
+    axes.plot([6.0, 6.6], [2.1] * 2, **line)
+    _spring(axes, 6.6, 9.0, 2.1, RED)
+    axes.annotate("", (7.1, 2.85), (8.5, 1.35), arrowprops={"arrowstyle": "<-", "color": RED})
+    axes.annotate("", (10.4, 2.1), (9.0, 2.1), arrowprops={"arrowstyle": "->", "color": BLACK})
+    axes.text(3.0, 3.5, "contractile $F_\\mathrm{KE}(k, P)$", ha="center", va="center", fontsize=8)
+    axes.text(3.0, 2.5, "parallel spring $F_\\mathrm{PP}$", ha="center", fontsize=8)
+    axes.text(3.0, 1.2, "damper $F_\\mathrm{TL}$", ha="center", fontsize=8)
+    axes.text(7.8, 0.75, "series spring,\nnonlinear", ha="center", fontsize=8, color=RED)
+    axes.text(9.9, 2.35, "$F_\\mathrm{E}$", ha="center", fontsize=8)
+    return Plot(
+        "hosovsky_fig1",
+        "Hill's muscle model, as in Fig. 1. Equation (1) contains the contractile element, the damper and the parallel "
+        "spring. The nonlinear series spring (red) is left out in (1); it is an option here, and its effect is "
+        "among those of the suspected causes.",
+        figure,
+    )
+
+
+def _rectangle(corner: tuple[float, float], width: float, height: float, colour: str) -> Any:
+    from matplotlib.patches import Rectangle
+
+    return Rectangle(corner, width, height, facecolor=colour, edgecolor=BLACK, alpha=0.25)
+
+
+def _spring(axes: Any, begin: float, end: float, height: float, colour: str) -> None:
+    """Draw a spring as a zigzag line."""
+    margin = 0.15 * (end - begin)
+    x = np.concatenate([[begin], np.linspace(begin + margin, end - margin, 10), [end]])
+    y = height + 0.28 * np.array([0, 0, 1, -1, 1, -1, 1, -1, 1, -1, 0, 0])
+    axes.plot(x, y, color=colour, linewidth=1.4)
+
+
+def _damper(axes: Any, begin: float, end: float, height: float) -> None:
+    """Draw a damper: a cylinder that is open to the right, and a piston."""
+    middle, half = 0.5 * (begin + end), 0.35
+    line = {"color": BLACK, "linewidth": 1.4}
+    axes.plot([begin, middle - 0.5], [height] * 2, **line)
+    axes.plot(
+        [middle + 0.6, middle - 0.5, middle - 0.5, middle + 0.6], height + half * np.array([1, 1, -1, -1]), **line
+    )
+    axes.plot([middle + 0.1] * 2, [height - 0.8 * half, height + 0.8 * half], **line)
+    axes.plot([middle + 0.1, end], [height] * 2, **line)
+
+
+def surface_in_space() -> Plot:
+    """Return Fig. 2: force over contraction and pressure, with the measured points."""
+    law, data = surface(), catalogue.load_data(FORCE_MAPS[0])
+    figure, axes = new_figure(height=4.4, subplot_kw={"projection": "3d", "computed_zorder": False})
+    contraction, pressure = np.meshgrid(np.linspace(0.0, MAX_CONTRACTION, 40), np.linspace(0.0, 675e3, 40))
+    force = np.asarray(law.force(pressure, contraction))
+    axes.plot_surface(
+        100 * contraction, pressure / 1e3, force, cmap="cividis", alpha=0.85, rstride=1, cstride=1,
+        linewidth=0.15, edgecolor=BLACK, zorder=1,
+    )  # fmt: skip
+    shown = (data["force"] > 0) & (data["force"] <= 1200) & (data["contraction"] >= 0)
+    axes.plot(
+        100 * data["contraction"][shown], data["pressure"][shown] / 1e3, data["force"][shown], ".",
+        color=RED, markersize=3, zorder=2,
+    )  # fmt: skip
+    axes.set(xlabel="contraction [%]", ylabel="gauge pressure [kPa]", zlabel="force [N]")
+    axes.set_box_aspect((1.3, 1.2, 0.9), zoom=0.95)
+    axes.view_init(elev=24, azim=38)
+    return Plot(
+        "hosovsky_fig2",
+        "Contractile surface of 21 coefficients, as in Fig. 2, limited to 0 to 1200 N: force over contraction and "
+        "pressure, fitted to a measured DMSP-20-300 (points). The coefficients of the paper are not printed.",
+        figure,
+    )
+
+
+def isobars() -> Plot:
+    """Return the isobars of the surface and the measured points."""
+    law, data = surface(), catalogue.load_data(FORCE_MAPS[0])
+    figure, axes = new_figure()
+    contraction = np.linspace(0.0, MAX_CONTRACTION, 200)
+    for i, pressure in enumerate((675e3, 525e3, 375e3, 250e3, 135e3)):
+        rows = np.isclose(data["pressure"], pressure)
+        axes.plot(contraction * 100, law.force(pressure, contraction), color=LINES[i], label=f"{pressure / 1e3:g} kPa")
+        axes.plot(data["contraction"][rows] * 100, data["force"][rows], "o", color=LINES[i])
+    axes.axhline(1200.0, color="0.4", linewidth=0.8, linestyle=":")
+    axes.set(xlabel="contraction [%]", ylabel="force [N]", xlim=(0, 27), ylim=(-30, 1700))
+    legend_outside(axes, title="gauge pressure")
+    caption = "Contractile surface (lines) fitted to a measured DMSP-20-300 (points), limited to 0 to 1200 N (dotted)."
+    return Plot("hosovsky_surface", caption, figure)

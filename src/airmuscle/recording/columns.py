@@ -1,8 +1,17 @@
-"""Quantities of a recording and the SI unit in which each is stored."""
+"""Quantities of a recording, the SI unit in which each is stored, and the unit in which it is displayed."""
 
 from __future__ import annotations
 
 import dataclasses
+
+from ..core.display import chosen_scale
+
+_DISPLAY_UNITS = {
+    "pressure": (1e-3, "kPa"), "contraction": (100.0, "%"), "length": (1e3, "mm"), "position": (1e3, "mm"),
+    "shortening": (1e3, "mm"),
+    "volume": (1e6, "cm³"), "air_mass": (1e3, "g"), "mass_flow": (1e3, "g/s"),
+}  # fmt: skip
+"""Factor and unit of the quantities that are not displayed in SI units."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -51,3 +60,24 @@ QUANTITIES: dict[str, Quantity] = {
 def quantity_of(column: str) -> Quantity | None:
     """The quantity of a column: `left.pressure` is a pressure, `bristle2` a bristle; None if it is unknown."""
     return QUANTITIES.get(column.rpartition(".")[2].rstrip("0123456789"))
+
+
+def display_scale(name: str) -> tuple[float, str]:
+    """Factor and unit in which a column is displayed, chosen or usual; the unit is empty for an unknown quantity.
+
+    Raises FileError or UnitError for an invalid configuration file.
+    """
+    quantity = quantity_of(name)
+    if quantity is None:
+        return 1.0, ""
+    usual = _DISPLAY_UNITS.get(name.rpartition(".")[2], (1.0, "-" if quantity.unit == "1" else quantity.unit))
+    if quantity.unit == "1" and usual[1] != "%":  # an opening is not a contraction
+        return usual
+    factor, unit = chosen_scale(quantity.unit, *usual)
+    return factor, "-" if unit == "1" else unit
+
+
+def displayed(name: str, value: float, digits: int = 4) -> str:
+    """A value [SI] of a column as text in the unit in which the column is displayed, such as "5.309 kPa"."""
+    factor, unit = display_scale(name)
+    return f"{value * factor:.{digits}g} {unit}".removesuffix(" -").rstrip()

@@ -1,10 +1,10 @@
-"""Recording: SI columns with common rows, constants and origin."""
+"""Recording: SI columns with common rows, constants and origin, its notes on rows, and its display in a notebook."""
 
 from __future__ import annotations
 
 import dataclasses
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,12 +14,19 @@ from ..core.arrays import Array
 from ..core.errors import AirmuscleError, ColumnError, HintedText, ParameterError, listed, suggestion
 from ..core.reference import Reference
 from ..core.units import conversion
-from .columns import quantity_of
+from .columns import display_scale, quantity_of
 from .displacement import ZERO_NOT_STATED
 from .heading import split_unit
 from .notebook import Card, NotebookDisplay
 from .plot import plot_columns
-from .recording_card import recording_card
+
+MAX_PANELS = 4
+"""Maximum number of panels of the chart."""
+ROUNDING = 1e-12
+"""Values below this fraction of the largest one of a column are shown as 0 (chosen)."""
+MAX_POINTS = 20_000
+"""Maximum number of rows of the chart; of more, every n-th row is drawn."""
+
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -188,3 +195,48 @@ def column_heading(name: str) -> str:
     """The heading of a column with its SI unit, for files and data frames: `pressure [Pa]`."""
     quantity = quantity_of(name)
     return f"{name} [{quantity.unit}]" if quantity else name
+
+
+def recording_card(recording: Any, units: Mapping[str, str]) -> Card:
+    """The display of a Recording; `units` are SI units of columns that are no known quantity."""
+    rows: list[tuple[str, ...]] = [("column", "unit", "first", "minimum", "maximum", "last")]
+    rows += [_row(name, values, units) for name, values in recording.columns.items()]
+    title = f"{recording.origin}: {len(recording)} rows of {len(recording.columns)} columns"
+    return Card(title, rows, (lambda: _draw(recording, units)) if len(recording) else None, recording.notes)
+
+
+def _row(name: str, values: Array, units: Mapping[str, str]) -> tuple[str, ...]:
+    factor, unit = display_scale(name)
+    finite = values[np.isfinite(values)] * factor
+    finite[np.abs(finite) < ROUNDING * np.max(np.abs(finite), initial=0.0)] = 0.0
+    shown = (finite[0], finite.min(), finite.max(), finite[-1]) if finite.size else ()
+    return (name, unit or units.get(name, ""), *(f"{value:.4g}" for value in shown))
+
+
+def _draw(recording: Any, units: Mapping[str, str]) -> Any:
+    every = slice(None, None, max(1, -(-len(recording) // MAX_POINTS)))
+    columns = {name: values[every] for name, values in recording.columns.items() if name != "time"}
+    time = recording.columns["time"][every] if "time" in recording.columns else None
+    return plot_columns(columns, time, recording.origin, units=units, limit=MAX_PANELS)
+
+
+class RowNote(str):
+    """Note on rows that were left out or filled, which the commands print and the reports contain."""
+
+    __slots__ = ()
+
+
+def row_notes(recordings: Iterable[Recording]) -> list[str]:
+    """The notes of the recordings on rows that were left out or filled, each once."""
+    return list(dict.fromkeys(note for each in recordings for note in each.notes if isinstance(note, RowNote)))
+
+
+def list_rows(label: str, rows: Sequence[Any] | Any, most: int) -> str:
+    """The first of the row numbers, with the word for a row: `lines 12, 15 and 5 more`."""
+    numbers = [str(row) for row in rows[:most]]
+    more = len(rows) - len(numbers)
+    if len(rows) == 1:
+        return f"{label} {numbers[0]}"
+    if more:
+        return f"{label}s {', '.join(numbers)} and {more} more"
+    return f"{label}s {', '.join(numbers[:-1])} and {numbers[-1]}"

@@ -20,6 +20,7 @@ from .claims import Statement as Statement
 from .claims import statements as statements
 from .data import as_data as as_data
 from .data import as_json as as_json
+from .data import as_sheet as as_sheet
 from .equation.source_code import EXAMPLE as EXAMPLE
 from .equation.source_code import source_codes as source_codes
 from .formatting import MARKS as MARKS
@@ -31,12 +32,11 @@ from .formatting import format_reproduced as format_reproduced
 from .formula import to_display_mathml as to_display_mathml
 from .formula import to_mathtext as to_mathtext
 from .formula import to_plain as to_plain
-from .html import MAX_SVG_BYTES as MAX_SVG_BYTES
-from .html import render_cell as render_cell
-from .html import render_header as render_header
-from .html import render_page as render_page
-from .sheet import as_sheet as as_sheet
 from .shown import shown_columns as shown_columns
 from .text import as_text as as_text
+from .write import MAX_SVG_BYTES as MAX_SVG_BYTES
+from .write import render_cell as render_cell
+from .write import render_header as render_header
+from .write import render_page as render_page
 from .write import save_table as save_table
 from .write import write_report as write_report

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from ...core.arrays import Array
 from ...core.plotting import BLACK, BLUE, RED, given_axes, new_figure
-from ...recording.display_units import display_scale
+from ...recording.columns import display_scale
 
 MANY_POINTS = 1000
 """Number of points from which markers are small."""

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from ...core.annotation import check_field_types
 from ...core.errors import ParameterError
-from ...recording.row_notes import RowNote
+from ...recording.recording import RowNote
 from .table import Cells, RawTable
 
 

@@ -14,7 +14,7 @@ from ...core.annotation import check_field_types
 from ...core.arrays import Array
 from ...core.errors import ColumnError, Hint, HintedText
 from ...recording.heading import Heading
-from ...recording.row_notes import RowNote, list_rows
+from ...recording.recording import RowNote, list_rows
 from .clock import seconds_from_clock
 from .missing_cells import MAX_LISTED, ExaminedColumn, Mask, describe_faulty, examine, faulty_cells, number
 from .table import Cells, RawTable

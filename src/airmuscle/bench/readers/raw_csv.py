@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core.annotation import abridged
 from ...core.errors import ColumnError, FileError, Hint
-from ...recording.row_notes import list_rows
+from ...recording.recording import list_rows
 from .file_kind import check_text_file
 from .header import COMMA_NUMBER, POINT_NUMBER
 from .missing_cells import MAX_LISTED

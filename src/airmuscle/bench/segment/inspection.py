@@ -11,7 +11,7 @@ import numpy as np
 from ...core.arrays import Array
 from ...core.plotting import BLUE, GREEN, ORANGE, PURPLE, RED, legend_below, new_figure
 from ...core.short_repr import ShortRepr
-from ...recording.display_units import display_scale
+from ...recording.columns import display_scale
 from ...recording.recording import Recording
 from .branches import Branch, branch_column_agreement, find_branches
 from .findings import Finding, check_swept, collect_findings

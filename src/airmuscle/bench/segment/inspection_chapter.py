@@ -11,8 +11,7 @@ import numpy as np
 
 from ...core.display import quantity_text
 from ...core.errors import HintedText
-from ...recording.columns import quantity_of
-from ...recording.display_units import display_scale
+from ...recording.columns import display_scale, quantity_of
 from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
 from ..readers.constants import CONSTANT_QUANTITIES
 from ..reported import unit_column

@@ -14,9 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.arrays import Array
-from ...recording.display_units import display_scale
-from ...recording.recording import Recording
-from ...recording.row_notes import RowNote
+from ...recording.columns import display_scale
+from ...recording.recording import Recording, RowNote
 from .sensor import Sensor, estimate_sensors
 
 MIN_DEVIATIONS = 8.0

@@ -13,8 +13,7 @@ from .cache.kernel import evaluate
 from .cache.store import load_module
 from .functions import PARAMETERS, Printer
 from .llvm import vector_math
-from .llvm.emit import LlvmLanguage
-from .llvm.types import LlvmType
+from .llvm.emit import LlvmLanguage, LlvmType
 from .program import CompiledSystem, Program, prepare_function
 
 

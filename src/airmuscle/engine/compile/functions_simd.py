@@ -8,8 +8,7 @@ from .functions import PARAMETERS, Extension, Printer, TracedSystem
 from .ir import emission
 from .ir.instructions import Code, Operand, instructions
 from .llvm import emit, vector_math
-from .llvm.emit import FLAGS, FunctionBody, LlvmLanguage
-from .llvm.types import LlvmType
+from .llvm.emit import FLAGS, FunctionBody, LlvmLanguage, LlvmType
 
 POINT = ("x", "u", PARAMETERS)
 """The arguments that rates and outputs depend on."""

@@ -21,7 +21,7 @@ from .cache.kernel import address_of
 from .cache.store import load_module
 from .functions import ArraySizes, TracedSystem
 from .functions_simd import lanes_module, row_outputs, rows_at_once
-from .llvm.types import LlvmType
+from .llvm.emit import LlvmType
 from .run_cache import RunCache
 
 Tableau = tuple[tuple[tuple[float, ...], ...], tuple[float, ...]]

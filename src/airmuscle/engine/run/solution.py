@@ -12,7 +12,7 @@ from ...core.reference import Reference
 from ...recording import Recording
 from ...recording.notebook import Card, NotebookDisplay
 from ...recording.plot import plot_columns
-from ...recording.recording_card import recording_card
+from ...recording.recording import recording_card
 from ..loop.control_loop import ControlLoopState
 from ..state import column_units
 from .problem import Problem

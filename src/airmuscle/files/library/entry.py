@@ -1,4 +1,4 @@
-"""Entries of the library: muscles and laws, valves, products and plants, with sources, provenance and checks.
+"""Entries of the library: muscles and laws, valves, products and plants, with sources, provenance and verified checks.
 
 The fields of an entry are the keys of its file, see build.py. A valve file, for example:
 
@@ -36,8 +36,7 @@ from ...report.chapter import Table
 from .entry_display import EntryDisplay
 from .fields import under
 from .files import entries_of_product
-from .stated_band import StatedBand
-from .uncertainty import ParameterUncertainty
+from .uncertainty import ParameterUncertainty, StatedBand
 
 OPTIONAL_PARTS = ("spring", "damper", "friction", "wall", "series", "stop", "creep")
 """Optional elements of a muscle, as fields of an entry and tables of its file."""
@@ -257,3 +256,38 @@ def issue_warning(name: str, warning: str, stacklevel: int) -> None:
     the functions of a room are called by one frame more (core/stubs.py)."""
     if warning:
         warnings.warn(f"{name}: {warning}", AirmuscleWarning, stacklevel=stacklevel + 1)
+
+
+@dataclasses.dataclass(frozen=True)
+class CheckResult:
+    """A check of a library entry with the value computed by the model."""
+
+    check: Check
+    computed: float
+
+    @property
+    def passes(self) -> bool:
+        """Whether the computed value is within the tolerance; False for NaN."""
+        return abs(self.computed - self.check.equals) <= self.check.tolerance
+
+    def __str__(self) -> str:
+        conditions = ", ".join(f"{name} {value:.4g}" for name, value in self.check.conditions)
+        relation = "within" if self.passes else "NOT within"
+        return (
+            f"{self.check.quantity} at {conditions}: computed {self.computed:.4g}, {relation} "
+            f"{self.check.equals:.4g} ± {self.check.tolerance:.4g} ({self.check.source})"
+        )
+
+
+def verify(entry: Entry) -> tuple[CheckResult, ...]:
+    """Results of all checks of a library entry. Raises SolveError if the model has no solution."""
+    return tuple(CheckResult(check, _compute(entry, check)) for check in entry.checks)
+
+
+def _compute(entry: Entry, check: Check) -> float:
+    conditions = dict(check.conditions)
+    if check.quantity != "volume":
+        return float(getattr(entry.characteristic, check.quantity)(**conditions))
+    if entry.geometry is None:
+        raise ParameterError(f"{entry.name}: a check of the volume requires a [geometry] in the file.")
+    return float(entry.geometry.volume(**conditions))

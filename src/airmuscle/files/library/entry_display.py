@@ -15,7 +15,7 @@ from ...core.plotting import LINES, new_figure, relabel_in_display_units
 from ...core.reference import cite
 from ...core.tree import leaves
 from ...physics.muscle import Ratings
-from ...physics.muscle.display import plot_isobars
+from ...physics.muscle.isobar_plot import plot_isobars
 from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
 from ...report.parameters import leaf_table
 

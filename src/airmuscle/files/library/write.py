@@ -22,8 +22,7 @@ from ...report.chapter import Chapter
 from ...report.write import write_into
 from .entry import OPTIONAL_PARTS, Check, Entry
 from .fitted_entry import fitted_entry
-from .stated_band import StatedBand
-from .uncertainty import ParameterUncertainty
+from .uncertainty import ParameterUncertainty, StatedBand
 
 Savable = Entry | Fit | Muscle | Characteristic
 """What a muscle file may contain."""

@@ -13,7 +13,19 @@ sample_time = "5 ms"
 pressure = [["0 s", "1 bar"], ["2 s", "3 bar"]]
 [input.drivers]                           as in an open loop
 
-Laws inside a law, such as those of a Cascade, are read by law_table.py.
+Tables of laws that contain other laws, sensors and models of the plant, at any depth:
+
+[input.controller]
+model = "Cascade"
+minimum = ["0 bar"]                         in the unit of the outer command
+maximum = ["5 bar"]
+[input.controller.outer]                    a law is a table; a list of laws is an array of tables
+model = "PID"
+[input.controller.inner]
+model = "PID"
+
+Numbers are SI or texts with a unit that fits the signals of the law in whose table they are. Muscles and mechanism of a
+static inverse are those of the plant unless the table gives others, in the form of [plant].
 """
 
 from __future__ import annotations
@@ -21,23 +33,136 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
+import typing
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from ...core.annotation import abridged
+from ...core.declaration import Parameter, parameters
 from ...core.errors import ParameterError
 from ...core.system import Input
-from ...engine.loop.control_loop import ControlLoop
-from ...engine.loop.controller import Controller, named_signal_units, parameter_units
+from ...core.units import is_known_unit
+from ...engine.loop.control_loop import ControlLoop, check_present
+from ...engine.loop.controller import RELATIVE, Controller, SignalRelated, named_signal_units, parameter_units, unit_of
 from ...engine.loop.inputs import InputSignal, check_input_names
 from ...engine.state import column_units
+from ...physics.mechanism.base import Mechanism
+from ...physics.muscle import Muscle
 from ...physics.plant.plant import Plant
 from ..library.build import build
-from ..library.fields import custom_field
+from ..library.fields import custom_field, origin, read_parameter
 from ..library.location import Location, located_errors
+from ..library.plant_file import PLANT_READER
 from .inputs import build_input_signal, read_drivers
-from .law_table import build_law
 from .values import Number
+
+
+def build_law(table: Any, plant: Plant, units: Mapping[str, str], location: Location) -> Controller:
+    """The controller of a table, with the laws inside it; `units` are those of the signals of the plant by name.
+
+    The table is read twice: the first time without its numbers, to find the signals that determine their units.
+    Raises ParameterError, UnitError or UnknownNameError with the location.
+    """
+
+    def built(known: Mapping[str, str] | None) -> Controller:
+        reader = dataclasses.replace(PLANT_READER, signals=PlantSignals(plant, known))
+        controller: Controller = reader.build(table, location, kind=Controller)
+        return controller
+
+    outline = built(None)
+    with located_errors(location):
+        check_present(outline, [name for name in units if name not in plant.inputs], plant.inputs)
+        named = named_signal_units(outline)
+    return built({**named, **{name: unit or named.get(name, "") for name, unit in units.items()}})
+
+
+@dataclasses.dataclass(frozen=True)
+class PlantSignals:
+    """Signals of a plant with their units; without units, of the models that depend on them no numbers are read."""
+
+    plant: Plant
+    units: Mapping[str, str] | None
+
+    def concerns(self, cls: type[Any]) -> bool:
+        """Whether a class has numbers in units of signals, or muscles or a mechanism, which are those of the plant."""
+        hints = typing.get_type_hints(cls).values()
+        return issubclass(cls, SignalRelated) or any(_has(h, kind) for h in hints for kind in (Muscle, Mechanism))
+
+    def parts(self, cls: type[Any], hints: Mapping[str, Any]) -> dict[str, Any]:
+        """Muscles and mechanism of the plant, for the fields of a static inverse that need them."""
+        own = {tuple[Muscle, ...]: self.plant.muscles, Mechanism: self.plant.mechanism}
+        return {name: own[hints[name]] for name in plant_fields(cls)}
+
+    def make(self, cls: type[Any], parts: Mapping[str, Any], numbers: Mapping[str, Any], location: Location) -> Any:
+        """The model of a class; its numbers are read in the units of the signals that its parts name."""
+        outline = _outline(cls, parts)
+        if self.units is None:
+            return outline
+        hints = typing.get_type_hints(cls)
+        declared = {p.name: p for p in parameters(cls)}
+        read = {n: self._number(v, declared[n], hints[n], outline, location) for n, v in numbers.items()}
+        with located_errors(location):
+            return cls(**parts, **read)
+
+    def _number(self, value: Any, declared: Parameter, hint: Any, outline: Any, location: Location) -> Any:
+        """A declared parameter in SI units, read in the units of the signals of its law."""
+        units = self.units or {}
+        if isinstance(outline, Controller) and declared.unit in RELATIVE:
+            names = outline.inputs
+            if len({units.get(name) for name in names}) > 1:
+                raise ParameterError(
+                    f"{location}: {' and '.join(names)} have different units; choose inputs of the same unit."
+                )
+        if not isinstance(value, list) or origin(hint) is not tuple:
+            return _read(value, declared, self._unit(value, declared, 0, outline, location), hint, location)
+        return tuple(
+            _read(item, dataclasses.replace(declared, name=f"{declared.name}[{i}]"),
+                  self._unit(item, declared, i, outline, location), float, location)
+            for i, item in enumerate(value)
+        )  # fmt: skip
+
+    def _unit(self, value: Any, declared: Parameter, index: int, outline: Any, location: Location) -> str:
+        """The unit of a parameter; "1" for a number without a unit where that of a signal is not known."""
+        try:
+            return unit_of(outline, declared, index, self.units or {})
+        except KeyError as error:
+            if isinstance(value, str):
+                raise ParameterError(
+                    f"{location.at(declared.name)} is {abridged(value)}; the unit of the signal {error} is not known, "
+                    "because it is no column or input of the plant. Correct the name, or give a number in SI units."
+                ) from None
+            return "1"
+
+
+def _read(value: Any, declared: Parameter, unit: str, hint: Any, location: Location) -> Any:
+    """A number or a column of a file; a unit that depends on no signal is no unit of a text."""
+    if isinstance(value, str) and not is_known_unit(unit):
+        raise ParameterError(
+            f"{location.at(declared.name)} is {abridged(value)}; it must be a number in SI units, without a unit "
+            f"({declared.symbol}, {declared.meaning})."
+        )
+    return read_parameter(value, dataclasses.replace(declared, unit=unit), hint, location)
+
+
+def _outline(cls: type[Any], parts: Mapping[str, Any]) -> Any:
+    """A model with its structural fields, whose numbers are defaults or 0; it is not validated."""
+    outline = object.__new__(cls)
+    for field in dataclasses.fields(cls):
+        default = 0.0 if field.default is dataclasses.MISSING else field.default
+        object.__setattr__(outline, field.name, parts.get(field.name, default))
+    return outline
+
+
+def plant_fields(cls: type[Any]) -> tuple[str, ...]:
+    """The fields of a model that are those of the plant where a table does not give them."""
+    hints = typing.get_type_hints(cls)
+    if tuple[Muscle, ...] not in hints.values():
+        return ()
+    return tuple(f.name for f in dataclasses.fields(cls) if hints[f.name] in (tuple[Muscle, ...], Mechanism))
+
+
+def _has(hint: Any, kind: type[Any]) -> bool:
+    return hint is kind or any(_has(option, kind) for option in typing.get_args(hint))
 
 
 def _read_setpoint(value: Any, plant: Any, where: Location) -> Mapping[str, Any]:

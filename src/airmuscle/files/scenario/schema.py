@@ -26,9 +26,9 @@ from ..library.build import only_class
 from ..library.entry import CONDITIONS, PATHS, Check, Entry
 from ..library.fields import is_required, options, origin
 from ..library.models import model_class, model_names
-from ..library.stated_band import PREDICTED, StatedBand
+from ..library.uncertainty import PREDICTED, StatedBand
 from . import controller, initial_state, inputs, plant_uncertainty, scenario, values
-from .law_table import plant_fields
+from .controller import plant_fields
 
 Schema = dict[str, Any]
 DRAFT = "https://json-schema.org/draft/2020-12/schema"

@@ -19,9 +19,8 @@ from ...files.library.write import save
 from ...physics.muscle.characteristic import ValidityRange
 from ...physics.muscle.characteristic.validity_range import validity_range_of
 from ..requests.declaration import option, request
-from .completion import complete_law
 from .delivery import print_result
-from .options import Json, Name
+from .options import Json, Name, complete_law
 from .request_options import with_requests
 
 LIMIT = "Limit of the validity range; default: that of the muscle."

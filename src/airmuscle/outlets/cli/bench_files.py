@@ -14,12 +14,11 @@ from ...bench.segment import check_contents
 from ...core.errors import ParameterError
 from ...files.library.catalogue import load_data
 from ...recording import Recording
-from ...recording.row_notes import row_notes
+from ...recording.recording import row_notes
 from ...report.chapter import Chapter
 from ..requests.reading import ReadingRequest
-from .completion import complete_data
-from .progress import reading_progress
-from .terminal import echo
+from .options import complete_data
+from .terminal import echo, reading_progress
 
 Files = Annotated[
     list[Path],

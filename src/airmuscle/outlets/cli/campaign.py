@@ -1,8 +1,16 @@
-"""`airmuscle campaign`: identification of one muscle from all files of a test rig."""
+"""`airmuscle campaign`: identification of one muscle from all files of a test rig, resumed at its finished stages.
+
+A stage is found by a fingerprint of the recordings, the geometry and the program; other data or another version of the
+program are fitted anew. The files are removed at the end of the campaign.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import hashlib
+import pickle
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -14,10 +22,12 @@ from ...bench.identify.campaign import STAGES, Campaign, LeftOutStage, StaticSta
 from ...bench.identify.campaign.campaign_chapters import UnreadFile, ValidationRow, campaign_chapters, stage_data
 from ...bench.readers import ColumnMapping
 from ...bench.readers.reader import complete_bench, find_files, read_file
-from ...core.atomic_output import atomic_folder, check_writable
+from ...core.atomic_output import atomic_file, atomic_folder, check_writable
 from ...core.errors import AirmuscleError, ColumnError, FileError, IdentificationError
-from ...files.library.campaign_entry import campaign_entry
+from ...core.fingerprint import fingerprint, program_fingerprint
+from ...engine.compile.cache.store import cache_folder, read_private
 from ...files.library.entry import Entry
+from ...files.library.fitted_entry import campaign_entry
 from ...files.library.initial_law import resting_lengths
 from ...files.library.write import to_toml
 from ...files.scenario.campaign import RecordScenario, campaign_scenarios
@@ -28,14 +38,17 @@ from ..requests.braid import BraidSize, braid_of_length, check_one_length, read_
 from ..requests.declaration import option, request
 from ..requests.reading import ReadingRequest
 from .bench_files import print_row_notes, reading_chapters
-from .campaign_stages import KeptStages
 from .delivery import deliver
 from .option_hints import in_options
 from .options import Folder, Json
-from .progress import computation_progress, reading_progress
 from .request_options import with_requests
-from .terminal import echo
+from .terminal import computation_progress, echo, reading_progress
 
+OMITTED_ROOMS = ("outlets", "papers", "report", "design", "files", "control")
+"""Rooms of the program that do not affect the stages of a campaign."""
+MAX_AGE = 30 * 86400.0
+"""Age from which the stages of a campaign that was never continued are removed [s] (chosen)."""
+_HASH = hashlib.sha256().digest_size
 STAGES_FILE = "stages.json"
 """File of the finished stages, which is replaced at the end of each stage."""
 SCENARIOS = "scenarios"
@@ -45,6 +58,53 @@ CampaignFolder = Annotated[
     list[Path],
     typer.Argument(metavar="FOLDER", help="Folder with the files of one rig; or its files, or a glob pattern."),
 ]
+
+
+class KeptStages:
+    """The stages of one campaign in the cache folder; without a private folder none is kept."""
+
+    def __init__(self, recordings: Sequence[Recording], geometry: Geometry | None) -> None:
+        data = [[each.origin, dict(each.columns), dict(each.constants)] for each in recordings]
+        self._key = fingerprint(data, geometry, program_fingerprint(OMITTED_ROOMS))[:32]
+        self._folder = cache_folder()
+        _remove_old(self._folder)
+
+    def load(self, names: Sequence[str]) -> dict[str, Any]:
+        """The results of the stages that an interrupted run has finished, by name."""
+        known = {}
+        for name in names:
+            content = None if self._folder is None else read_private(self._path(name))
+            if content is None or hashlib.sha256(content[_HASH:]).digest() != content[:_HASH]:
+                continue
+            with contextlib.suppress(Exception):  # written with other versions of the packages
+                known[name] = pickle.loads(content[_HASH:])
+        return known
+
+    def save(self, name: str, result: object) -> None:
+        """Keep the result of a finished stage; a result that cannot be stored is fitted again."""
+        if self._folder is None:
+            return
+        with contextlib.suppress(Exception):  # CasADi raises none of the usual errors
+            content = pickle.dumps(result, protocol=pickle.HIGHEST_PROTOCOL)
+            with atomic_file(self._path(name)) as unfinished:
+                unfinished.write_bytes(hashlib.sha256(content).digest() + content)
+
+    def remove(self, names: Sequence[str]) -> None:
+        """Remove the stages of a campaign that is complete."""
+        for name in names if self._folder is not None else ():
+            with contextlib.suppress(OSError):
+                self._path(name).unlink(missing_ok=True)
+
+    def _path(self, name: str) -> Path:
+        assert self._folder is not None
+        return self._folder / f"campaign-{self._key}-{name.replace(' ', '-')}.stage"
+
+
+def _remove_old(folder: Path | None) -> None:
+    for path in folder.glob("campaign-*") if folder is not None else ():
+        with contextlib.suppress(OSError):
+            if time.time() - path.stat().st_mtime > MAX_AGE:
+                path.unlink()
 
 
 @request

@@ -17,9 +17,9 @@ from typer.core import TyperGroup
 
 from ...core.atomic_output import exclusive_folders
 from ...core.errors import AirmuscleError, AirmuscleWarning, quotable, suggestion
-from .completion import install_completion_classes, print_completion_script
 from .interruption import INTERRUPTED, check_interrupted, deferred_sigint
 from .option_hints import in_options
+from .options import install_completion_classes, print_completion_script
 from .terminal import echo
 
 SETTINGS: dict[str, Any] = {
@@ -65,12 +65,7 @@ COMMANDS = (
     CommandRow("study", "study", "study", "Run a parameter study of a scenario."),
     CommandRow("tune", "tune", "tune", "Tune the controller of a scenario for a family of plants."),
     CommandRow("benchmark", "benchmark", "benchmark", "Benchmark controllers of a joint on common tasks."),
-    CommandRow(
-        "export",
-        "export",
-        "export",
-        "Export to C, MATLAB, FMU, MuJoCo, PyTorch and other targets.",
-    ),
+    CommandRow("export", "export", "export", "Export to C, MATLAB, FMU, MuJoCo, PyTorch and other targets."),
     CommandRow("studio", "studio", "studio", "Show muscles and plants in the browser."),
     CommandRow("schema", "schema", "schema", "Print the JSON schema of scenario or muscle files."),
 )

@@ -29,9 +29,8 @@ from ..export.identifiers import make_identifier
 from ..export.microcontroller import PROCESSORS, run_in_emulator
 from ..export.platforms import PLATFORMS, find_platform
 from ..export.robot_description import WRITERS
-from .completion import complete_entry
 from .export_models import export_actuator, export_fmu, export_modelica, export_mujoco, export_robot
-from .options import Folder, Json
+from .options import Folder, Json, complete_entry
 from .terminal import echo, print_json
 
 TARGETS: dict[str, Target] = {"c": C99(), "js": JavaScript(), "octave": Octave()}

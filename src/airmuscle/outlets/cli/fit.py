@@ -14,8 +14,8 @@ from .bench_files import Files, read_recordings
 from .delivery import deliver
 from .execution import DaskAddress, Execution, JoinedFolder, WorkerCount
 from .options import Folder, Json
-from .progress import computation_progress
 from .request_options import with_requests
+from .terminal import computation_progress
 
 
 @with_requests

@@ -14,7 +14,7 @@ from ...bench.identify.dynamic.dynamic_chapter import dynamic_chapters
 from ...bench.segment import inspect
 from ...core.atomic_output import check_writable
 from ...files.scenario.identification import DynamicFitSetup, load_dynamic_fit
-from ...recording.row_notes import row_notes
+from ...recording.recording import row_notes
 from ..requests.declaration import option, request
 from ..requests.fit import WEAK
 from .delivery import deliver

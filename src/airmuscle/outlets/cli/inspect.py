@@ -12,8 +12,8 @@ from ...bench.segment.inspection_chapter import inspection_chapters
 from ..requests.reading import ReadingRequest
 from .delivery import deliver
 from .options import Json, OptionalFolder
-from .progress import reading_progress
 from .request_options import with_requests
+from .terminal import reading_progress
 
 UNORDERED = ColumnMapping(time=RecordedTime(ordered=False))
 """Stamps that repeat or decrease are shown, not refused."""

@@ -14,15 +14,13 @@ from ...core.atomic_output import check_writable
 from ...core.errors import FileError
 from ...files.library.entry import PlantEntry
 from ...files.library.entry_file import kind_of, load_law
-from ...files.library.entry_prediction import predict_with_entry
 from ...files.library.files import is_path, list_plants, read_toml
-from ...files.scenario.prediction import load_plant_model
+from ...files.scenario.prediction import load_plant_model, predict_with_entry
 from ..requests.declaration import RequestError, Where, option, request
 from ..requests.reading import ReadingRequest
 from .bench_files import read_recordings, reading_chapters
-from .completion import complete_model
 from .delivery import deliver
-from .options import Folder, Json
+from .options import Folder, Json, complete_model
 from .request_options import with_requests
 
 Model = Annotated[

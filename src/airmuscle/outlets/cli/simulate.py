@@ -17,9 +17,8 @@ from ...recording import Recording
 from ...report.chapter import Chapter
 from ..requests.declaration import option, request
 from ..requests.reading import read_pair
-from .completion import complete_plant
 from .delivery import Files, deliver, write_result
-from .options import Folder, Json
+from .options import Folder, Json, complete_plant
 from .request_options import with_requests
 from .terminal import echo
 

@@ -8,8 +8,8 @@ from ...design.sizing.scenario import sizing_scenario
 from ..requests.size import SizeRequest
 from .delivery import deliver
 from .options import Json, OptionalFolder
-from .progress import computation_progress
 from .request_options import with_requests
+from .terminal import computation_progress
 
 SCENARIO_FILE = "scenario.toml"
 

@@ -9,9 +9,9 @@ from typing import Annotated
 import typer
 
 from ..studio import export_page, serve
+from ..studio.page import open_sheets
 from ..studio.server import warning_of
-from ..studio.single_file import open_sheets
-from .completion import complete_law
+from .options import complete_law
 from .terminal import echo
 
 

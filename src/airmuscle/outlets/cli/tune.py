@@ -32,9 +32,8 @@ from ..requests.declaration import RequestError, option, request
 from .delivery import deliver
 from .interruption import check_interrupted
 from .options import Folder, Json
-from .progress import computation_progress
 from .request_options import with_requests
-from .terminal import echo
+from .terminal import computation_progress, echo
 
 HISTORY_FILE = "history.csv"
 INDICES: dict[str, type[TrackingIndex]] = {

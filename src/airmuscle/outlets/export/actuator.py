@@ -25,7 +25,7 @@ from ...engine.compile.functions import Printer, TracedSystem
 from ...engine.compile.ir.emission import TargetLanguage
 from ...engine.run.integrators import RungeKutta4
 from ...physics.mechanism import ExternalLoad
-from ...physics.mechanism.external_load import SHORTENING, SHORTENING_SPEED
+from ...physics.mechanism.loads import SHORTENING, SHORTENING_SPEED
 from ...physics.plant import Plant, open_plant
 from .printed_system import make_labels
 

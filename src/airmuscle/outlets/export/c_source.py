@@ -12,7 +12,7 @@ import numpy as np
 
 from ...engine.compile.functions import ArraySizes, Extension
 from ...engine.compile.kernel_text import CKernels
-from ...engine.compile.text.c import CLanguage
+from ...engine.compile.text.programs import CLanguage
 from ...engine.run.integrators import Integrator
 from ...recording.recording import column_heading
 from .c_text import c_array, c_number, c_string, c_strings

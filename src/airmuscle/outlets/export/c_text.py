@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...engine.compile.text.c import CBody
+from ...engine.compile.text.programs import CBody
 from .templates import filled
 
 WIDTH = 116

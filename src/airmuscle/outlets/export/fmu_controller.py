@@ -11,7 +11,7 @@ import numpy as np
 
 from ...core.atomic_output import atomic_folder
 from ...core.errors import ParameterError
-from ...engine.compile.text.c import CLanguage
+from ...engine.compile.text.programs import CLanguage
 from ...engine.loop.control_loop import MEASURED, SETPOINT, ControlLoop
 from ...engine.loop.controller import named_signal_units
 from ...engine.loop.inputs import Schedule

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...engine.compile.kernel_text import JavaScriptKernels
-from ...engine.compile.text.javascript import JavaScriptLanguage
+from ...engine.compile.text.programs import JavaScriptLanguage
 from .c_source import csv_header
 from .exported_loop import ExportedLoop
 from .printed_system import ExportedSystem

@@ -12,9 +12,7 @@ from ...core.errors import ParameterError
 from ...core.tree import Leaf, leaves
 from ...engine.compile.functions import PARAMETERS, Printer
 from ...engine.compile.ir.emission import TargetLanguage
-from ...engine.compile.text.c import CLanguage
-from ...engine.compile.text.javascript import JavaScriptLanguage
-from ...engine.compile.text.matlab import DEFINITION, MatlabLanguage
+from ...engine.compile.text.programs import DEFINITION, CLanguage, JavaScriptLanguage, MatlabLanguage
 from ...physics.muscle.characteristic import Characteristic, ContractionLaw, ForceLaw, PressureLaw
 from .c_text import c_array, c_strings
 from .javascript_module import to_json

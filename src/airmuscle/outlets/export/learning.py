@@ -14,8 +14,7 @@ import numpy as np
 from ...core.arrays import Array
 from ...core.errors import ParameterError
 from ...engine.compile.ir.emission import TargetLanguage
-from ...engine.compile.text.torch import TorchLanguage
-from ...engine.compile.text.warp import WarpLanguage
+from ...engine.compile.text.learning import TorchLanguage, WarpLanguage
 from ...engine.run.batch import Double, Precision, Single
 from ...files import load_scenario
 from ...files.library.uncertainty import ParameterUncertainty

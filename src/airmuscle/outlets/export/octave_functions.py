@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core.errors import printable
 from ...engine.compile.kernel_text import MatlabKernels
-from ...engine.compile.text.matlab import DEFINITION, MatlabBody, MatlabLanguage
+from ...engine.compile.text.programs import DEFINITION, MatlabBody, MatlabLanguage
 from .c_source import csv_header
 from .exported_loop import ExportedLoop
 from .printed_system import ExportedSystem

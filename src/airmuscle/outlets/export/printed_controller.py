@@ -17,7 +17,7 @@ from ...engine.compile.ir.emission import TargetLanguage
 from ...engine.compile.ir.instructions import Code, instructions
 from ...engine.compile.ir.interpreter import InterpretedBody
 from ...engine.compile.text.body import Labels
-from ...engine.compile.text.c import CLanguage
+from ...engine.compile.text.programs import CLanguage
 from ...engine.loop.control_law import ControlLaw
 from ...engine.loop.control_loop import ControlLoop
 from ...engine.run import Problem

@@ -1,11 +1,16 @@
-"""Request of a variant of a library entry: another size, other parameter values."""
+"""Request of a variant of a library entry: another size, and other values of its parameters."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import dataclasses
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from ...files.library.changes import with_values
+from ...core.errors import ParameterError, suggestion
+from ...core.tree import leaves, with_parameters
+from ...core.units import quantity
+from ...files.library.entry import Entry
+from ...files.library.entry_display import PARTS
 from ...files.library.entry_file import load_law
 from ...files.library.scaling import scale_entry
 from .declaration import option, request
@@ -36,3 +41,53 @@ class EntryRequest:
         if self.resting_length is not None or self.diameter is not None:
             entry = scale_entry(entry, resting_length=self.resting_length, diameter=self.diameter)
         return with_values(entry, dict(self.set))
+
+
+def with_values(entry: Any, changes: Mapping[str, float | str]) -> Any:
+    """The entry with other values of declared parameters, by their paths: numbers [SI] or texts with a unit.
+
+    A muscle or law loses what belongs to its own parameters: standard errors, error band and checks. Raises
+    ParameterError for a path or a value that the entry cannot have, UnitError.
+    """
+    if not changes:
+        return entry
+    parts = {name: part for name in PARTS if (part := getattr(entry, name, None)) is not None}
+    known = {f"{name}.{leaf.path}": leaf for name, part in parts.items() for leaf in leaves(part)}
+    for path in changes:
+        if path not in known:
+            raise ParameterError(
+                f"{entry.name} has no parameter '{path}'; allowed names: {', '.join(_shown(known))}."
+                f"{suggestion(path, known)}"
+            )
+    values = {path: quantity(value, known[path].declared.unit, where=path) for path, value in changes.items()}
+    changed = {name: _changed(part, name, values) for name, part in parts.items() if _concerned(name, values)}
+    law = changed.get("characteristic")
+    if (
+        law is not None
+        and entry.geometry is not None
+        and entry.geometry == getattr(parts["characteristic"], "geometry", None)
+    ):
+        changed["geometry"] = law.geometry
+    if not isinstance(entry, Entry):
+        return dataclasses.replace(entry, **changed)
+    stated = ", ".join(f"{path} = {value:.6g}" for path, value in values.items())
+    return dataclasses.replace(
+        entry, **changed, title=f"{entry.title}, parameters changed", provenance="chosen", uncertainty=None, checks=(),
+        error_band=None, note=f"Changed (SI): {stated}. {entry.note}".strip(),
+    )  # fmt: skip
+
+
+def _shown(paths: Iterable[str]) -> list[str]:
+    """The paths, of a long list such as `coefficients[0]` to `coefficients[20]` the first and the last one."""
+    stems: dict[str, list[str]] = {}
+    for path in paths:
+        stems.setdefault(path.partition("[")[0], []).append(path)
+    return [group[0] if len(group) == 1 else f"{group[0]} to {group[-1]}" for group in stems.values()]
+
+
+def _concerned(name: str, values: Mapping[str, float]) -> bool:
+    return any(path.startswith(f"{name}.") for path in values)
+
+
+def _changed(part: Any, name: str, values: Mapping[str, float]) -> Any:
+    return with_parameters(part, [values.get(f"{name}.{leaf.path}", leaf.value) for leaf in leaves(part)])

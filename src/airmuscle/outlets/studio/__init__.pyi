@@ -15,6 +15,7 @@ from .joint_laws import statics_within_valves as statics_within_valves
 from .joint_sheet import joint_names as joint_names
 from .joint_sheet import joint_tables as joint_tables
 from .joint_sheet import sheet_of_joint as sheet_of_joint
+from .page import export_page as export_page
 from .page import self_contained_page as self_contained_page
 from .plant_sheet import sheet_of_tables as sheet_of_tables
 from .requests import BadRequest as BadRequest
@@ -25,13 +26,12 @@ from .server import bound_socket as bound_socket
 from .server import reachable_host as reachable_host
 from .server import serve as serve
 from .server import warning_of as warning_of
-from .single_file import export_page as export_page
 from .size_sheet import read_request as read_request
+from .tasks import MAX_TEXT as MAX_TEXT
+from .tasks import read_text_tables as read_text_tables
 from .tasks import sheet_of_any as sheet_of_any
 from .tasks import sheet_of_scenario_text as sheet_of_scenario_text
 from .toml_template import fill_template as fill_template
-from .uploads import MAX_TEXT as MAX_TEXT
-from .uploads import read_text_tables as read_text_tables
 from .worker import LimitedWorker as LimitedWorker
 from .worker import LimitError as LimitError
 from .worker import WorkerPool as WorkerPool

@@ -21,17 +21,17 @@ from ..requests.fit import FitRequest
 from ..requests.reading import ReadingRequest
 from .fit_routes import FitService
 from .joint_sheet import joint_names, sheet_of_joint
-from .page import self_contained_page, server_page, web_files
+from .page import MAX_PAGE_SHEETS, self_contained_page, server_page, web_files
 from .requests import BadRequest, decoded, json_answer, limited_body
 from .security import Access, Application, cookie_name, given_token, secured
 from .size_sheet import size_form, size_sheet
 from .tasks import (
+    MAX_TEXT,
     sheet_of_law,
     sheet_of_law_text,
     sheet_of_library_plant,
     sheet_of_scenario_text,
 )
-from .uploads import MAX_TEXT
 from .worker import LimitError, WorkerPool
 
 WORKERS = 5
@@ -46,8 +46,6 @@ MAX_SHEETS = 100
 """Number of sheets that the server keeps (chosen)."""
 MAX_PAGE = 256 * 1024
 """Largest size of a request for a self-contained page [bytes] (chosen)."""
-MAX_PAGE_SHEETS = 12
-"""Maximum number of muscles and plants in a self-contained page (chosen)."""
 LONG_TASKS = (sheet_of_joint, size_sheet)
 """Tasks that leave the workers of the other sheets free."""
 

@@ -11,9 +11,8 @@ from ...bench.identify.curve_plots import band_curves
 from ...bench.identify.law_selection import LawSelection
 from ...bench.identify.static_fit_chapter import equation_section
 from ...report.chapter import Chapter
-from ...report.data import in_words
+from ...report.data import as_sheet, in_words
 from ...report.formula import to_display_mathml
-from ...report.sheet import as_sheet
 from .fit_hints import in_page_words
 
 MAX_POINTS = 4000

@@ -15,7 +15,7 @@ from ...bench.readers.constants import CONSTANT_QUANTITIES
 from ...bench.segment import Inspection, Run, inspect_all
 from ...bench.segment.outliers import Outlier, kept_rows
 from ...core.errors import AirmuscleError
-from ...recording.display_units import display_scale
+from ...recording.columns import display_scale
 from ..requests.declaration import RequestError
 from .fit_hints import in_page_words
 from .fit_reading import ReadSet, read_set

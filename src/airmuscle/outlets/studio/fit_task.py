@@ -27,8 +27,7 @@ from ...files.library.fitted_entry import missing_geometry
 from ...files.library.initial_law import resting_lengths
 from ...files.library.write import part_toml, save
 from ...report.chapter import Chapter
-from ...report.data import as_json, in_words
-from ...report.sheet import as_sheet
+from ...report.data import as_json, as_sheet, in_words
 from ...report.write import write_into
 from ..requests.braid import problem_of_lengths
 from ..requests.declaration import RequestError

@@ -24,7 +24,7 @@ import airmuscle as am
 from ...core import autodiff
 from ...core.errors import AirmuscleError, TraceError
 from ...engine.compile.functions import Printer
-from ...engine.compile.text.javascript import JavaScriptLanguage
+from ...engine.compile.text.programs import JavaScriptLanguage
 from ...physics.muscle.geometry.straight_fibre import FibreTube
 
 DIRECTIONS = ("force", "contraction", "pressure")

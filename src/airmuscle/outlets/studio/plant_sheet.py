@@ -18,7 +18,7 @@ from ...core.tree import Leaf, leaves
 from ...files.library.location import Location
 from ...files.library.write import part_toml, tables_toml
 from ...files.scenario.scenario import TABLES, Scenario, build_scenario, initial_pressure
-from ...recording.display_units import display_scale
+from ...recording.columns import display_scale
 from ..export.write import make_run
 from .law_sheet import parameter_row, script_text
 from .toml_template import toml_template

@@ -16,7 +16,7 @@ from ...design.sizing.chapter import product_of, sizing_chapter
 from ...design.sizing.scenario import sizing_scenario
 from ...physics.muscle.characteristic.validity_range import validity_range_of
 from ...physics.muscle.isobars import compute_isobars
-from ...report.sheet import as_sheet, csv_text
+from ...report.data import as_sheet, csv_text
 from ..requests.declaration import build, form_fields, options_of
 from ..requests.size import JOINT, LIFT, SizeRequest
 

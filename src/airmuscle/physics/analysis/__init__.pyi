@@ -1,4 +1,3 @@
-from .joint_plot import plot_reachable_region as plot_reachable_region
 from .linear_model import LinearModel as LinearModel
 from .linear_model import Pole as Pole
 from .linear_model import linearise as linearise
@@ -9,3 +8,4 @@ from .static_stiffness import stiffness as stiffness
 from .statics_of_joint import JointPoints as JointPoints
 from .statics_of_joint import JointStatics as JointStatics
 from .statics_of_joint import joint_statics as joint_statics
+from .statics_of_joint import plot_reachable_region as plot_reachable_region

@@ -16,10 +16,9 @@ from ...core.system import System
 from ...core.units import quantity
 from ...engine.compile.program import CompiledSystem, compile_system
 from ...engine.loop.inputs import check_input_names
-from .explanation import no_equilibrium
 from .multi_dof import equilibria_of_several_coordinates
 from .single_dof import GRID_POINTS, equilibria_of_one_coordinate, grid
-from .stability import are_stable
+from .stability import are_stable, no_equilibrium
 from .static_plant import StaticPlant
 from .statics import Rows, Statics
 

@@ -1,4 +1,4 @@
-"""Stability of equilibria, by the eigenvalues of the motion."""
+"""Stability of equilibria, by the eigenvalues of the motion; error messages for a plant without equilibrium."""
 
 from __future__ import annotations
 
@@ -9,8 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.arrays import Array
+from ...core.errors import EquilibriumError, GeometryLimitError, PhysicsError
 from ...engine.compile.program import CompiledSystem, Program
-from .static_plant import StaticPlant
+from .multi_dof import starts
+from .single_dof import grid
+from .static_plant import MAX_PRESSURE, StaticPlant
+from .statics import Statics
 
 MARGIN = 1e-9
 """Real part of an eigenvalue, relative to the largest eigenvalue, up to which it counts as zero (chosen)."""
@@ -80,3 +84,85 @@ def _function(compiled: CompiledSystem, free: list[int]) -> Any:
         wanted = [casadi.jacobian(t.f[free], t.x), volumes, casadi.jacobian(volumes, t.x)]
         _functions[program] = casadi.Function("motion", [t.x, t.u, t.p], casadi.cse(wanted))
     return _functions[program]
+
+
+def no_equilibrium(one: Statics) -> PhysicsError:
+    """The error for one plant without a stable equilibrium, with the forces at both ends of its range.
+
+    GeometryLimitError if no position is within the limits of all muscles, EquilibriumError otherwise.
+    """
+    kind, count = type(one.plants.mechanism).__name__, len(one.plants.mechanism.coordinates)
+    if count == 0:
+        return EquilibriumError(_without_coordinates(one))
+    x = grid(one)[0][:, None] if count == 1 else starts(one)
+    x = x[np.isfinite(x).all(axis=1)]
+    if count == 1 and not len(x):
+        muscles = ", ".join(m.name for m in one.separate[0].muscles)
+        return GeometryLimitError(
+            f"{kind} has no position within the contraction limits of {muscles}; change offsets, radius or arms."
+        )
+    f = one.accelerations(x[None])[0] if len(x) else x
+    x, f = x[np.isfinite(f).all(axis=1)], f[np.isfinite(f).all(axis=1)]
+    if not len(x):
+        return EquilibriumError(f"{kind} has no equilibrium: no position permits the given air masses.")
+    if not f.any():
+        return EquilibriumError(
+            f"{kind} is in equilibrium at every position: no force acts on it under these inputs. Choose an initial "
+            f"state by plant.state_at(pressure=..., {one.plants.mechanism.coordinates[0].name}=...)."
+        )
+    if count == 1:
+        places, load = [x[0], x[-1]], _required_tension(one, x[0])
+    else:
+        places, load = [x[int(np.argmin(np.abs(f).max(axis=1)))]], ""
+    lines = "; ".join(_line(one, place) for place in places)
+    return EquilibriumError(
+        f"{kind} has no stable equilibrium: {lines}.{load} Change the load, the pressure or the parallel spring."
+    )
+
+
+def _without_coordinates(one: Statics) -> str:
+    plant = one.separate[0]
+    contractions = plant.mechanism.contractions({}, plant.resting_lengths)
+    if one.shut:
+        texts = ", ".join(
+            f"{m.name} cannot hold {mass:g} kg of air at a contraction of {100 * float(eps):.1f} %"
+            for m, mass, eps in zip(plant.muscles, one.air, contractions, strict=True)
+        )
+        return f"{texts}: no pressure below {MAX_PRESSURE:g} Pa belongs to it."
+    plant.state_at(pressure=one.air)
+    return f"{type(plant.mechanism).__name__} has no stable equilibrium: a muscle in series or its wall is unstable."
+
+
+def _line(one: Statics, x: Array) -> str:
+    plant = one.separate[0]
+    states = plant.muscle_states(one.state(one.place(x)))
+    pulls = ", ".join(
+        f"{m.name} pulls {float(state.tension) + 0.0:.4g} N at {round(float(state.pressure) / 1e3, 6) + 0.0:.4g} kPa "
+        f"and a contraction of {100 * float(state.contraction):.1f} %"
+        for m, state in zip(plant.muscles, states, strict=True)
+    )
+    accelerations = one.accelerations(x[None, None])[0, 0]
+    if len(x) == 1:
+        unit = one.plants.mechanism.coordinates[0].unit
+        return f"{pulls}, and the load accelerates at {accelerations[0]:+.4g} {unit}/s2"
+    moving = ", ".join(
+        f"{c.name} {a:+.4g} {c.unit}/s2" for c, a in zip(one.plants.mechanism.coordinates, accelerations, strict=True)
+    )
+    return f"{pulls}, and the accelerations are {moving}"
+
+
+def _required_tension(one: Statics, x: Array) -> str:
+    """The tension of a single muscle that would hold the load; empty for several muscles."""
+    plant = one.separate[0]
+    if len(plant.muscles) > 1:
+        return ""
+    state, mechanism = one.state(one.place(x)), plant.mechanism
+    inputs = dict(zip(plant.inputs, one.inputs.tolist(), strict=True))
+    accelerations = []
+    for tension in (0.0, 1.0):
+        forces = mechanism.generalised_forces(state, [tension], plant.resting_lengths)
+        accelerations.append(
+            float(mechanism.acceleration(state, state, forces, inputs)[one.plants.mechanism.coordinates[0].name])
+        )
+    slope = accelerations[1] - accelerations[0]
+    return f" The load requires a tension of {-accelerations[0] / slope:.4g} N." if slope else ""

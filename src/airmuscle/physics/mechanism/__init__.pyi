@@ -5,10 +5,10 @@ from .base import Mechanism as Mechanism
 from .end_stops import HuntCrossley as HuntCrossley
 from .end_stops import JointWithEndStops as JointWithEndStops
 from .end_stops import WithEndStops as WithEndStops
-from .external_load import SHORTENING as SHORTENING
-from .external_load import SHORTENING_SPEED as SHORTENING_SPEED
-from .external_load import ExternalLoad as ExternalLoad
 from .lever import Lever as Lever
+from .loads import SHORTENING as SHORTENING
+from .loads import SHORTENING_SPEED as SHORTENING_SPEED
+from .loads import ExternalLoad as ExternalLoad
 from .loads import HangingMass as HangingMass
 from .loads import Isometric as Isometric
 from .loads import Isotonic as Isotonic

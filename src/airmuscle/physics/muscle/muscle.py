@@ -18,9 +18,9 @@ from .characteristic.base import Characteristic, Clamped, ForceLaw
 from .characteristic.contractile_surface import HOSOVSKY_HILL
 from .characteristic.validity_range import ValidityRange
 from .characteristic.virtual_work import VirtualWork
-from .display import component_rows, plot_isobars
 from .friction.base import Friction, NoFriction
 from .geometry.base import Geometry
+from .isobar_plot import component_rows, plot_isobars
 from .passive_elements import CreepElements, Damper, LinearDamper, LinearSpring, NoStop, Spring, Stop
 from .quantity_arguments import accept_quantities_in
 from .ratings import Ratings

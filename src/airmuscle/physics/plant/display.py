@@ -16,7 +16,7 @@ from ...core.errors import ColumnError, FileError, ParameterError
 from ...core.plotting import BLACK, LINES, new_figure
 from ...recording import Recording
 from ...recording.notebook import Card, NotebookDisplay
-from ..muscle.display import plot_isobars
+from ..muscle.isobar_plot import plot_isobars
 from .drawing import Row, Scene, scene_of
 
 FRAMES = 25.0

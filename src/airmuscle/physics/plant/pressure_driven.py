@@ -1,18 +1,20 @@
-"""PressureDriven: muscles on a mechanism whose pressures are inputs, such as measured ones; no air and no circuits."""
+"""Plants with ports: muscles whose pressures are inputs, and a load that another simulator carries."""
 
 from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import ClassVar
 
 from ...core.declaration import model, parameter
 from ...core.errors import ParameterError
 from ...core.ops import Value, Values
 from ...core.system import Input, StateVariable, System, select_prefix, with_prefix
-from ..mechanism import Mechanism
+from ..mechanism import ExternalLoad, Mechanism
 from ..muscle import Muscle
 from .muscle_state import states_of_muscle
+from .plant import Plant
 
 
 @model
@@ -115,3 +117,15 @@ class PressureDriven(System):
             state |= with_prefix(prefix, muscle.steady_state(p, eps))
             state[f"{prefix}pressure"] = p
         return {name: float(value) for name, value in {**state, **values}.items()}
+
+
+def open_plant(plant: Plant, shortenings: Sequence[float] = ()) -> Plant:
+    """The plant with shortenings [m] and their speeds [m/s] as inputs, and the tensions of its muscles as outputs.
+
+    shortenings  of the muscles [m], from their resting lengths, in states without inputs; 0 by default
+
+    With one muscle the inputs are `shortening` and `shortening_speed`, and the output is `force`; with several, the
+    name of the muscle precedes them. Raises ParameterError for another number of shortenings than muscles.
+    """
+    names = tuple(muscle.name for muscle in plant.muscles) if len(plant.muscles) > 1 else ()
+    return replace(plant, mechanism=ExternalLoad(names, tuple(shortenings)))

@@ -10,8 +10,7 @@ from ...core.declaration import check_structure, model
 from ...core.errors import ParameterError
 from ...core.ops import Value, Values
 from ...core.system import Input, StateVariable, add_prefix, select_prefix, with_prefix
-from .circuit import SUPPLY, Circuit, CircuitFlows, CircuitWrapper
-from .fill_discharge import ambient_air
+from .circuit import SUPPLY, Circuit, CircuitFlows, CircuitWrapper, ambient_air
 from .gas import Air, Ambient
 from .supply import AirSource, SharedSupply
 from .valve import Orifice, orifice_flow

@@ -9,8 +9,7 @@ from ...core.declaration import model, parameter
 from ...core.ops import Value, Values
 from ...core.reference import Reference
 from ...core.system import Input, StateVariable
-from .circuit import Circuit, CircuitFlows
-from .fill_discharge import ambient_air
+from .circuit import Circuit, CircuitFlows, ambient_air
 from .gas import Air, Ambient, gauge_pressure
 from .supply import AirSource
 from .valve import ISO6358, Orifice, orifice_flow

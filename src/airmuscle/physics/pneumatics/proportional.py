@@ -7,8 +7,7 @@ from ...core.declaration import model, parameter
 from ...core.errors import ParameterError
 from ...core.ops import Value, Values
 from ...core.system import Input, StateVariable
-from .circuit import Circuit, CircuitFlows
-from .fill_discharge import ambient_air
+from .circuit import Circuit, CircuitFlows, ambient_air
 from .gas import NO_FLOW, Air, Ambient, absolute_pressure, gauge_pressure
 from .supply import AirSource
 from .valve import Orifice, orifice_flow, proportional_opening

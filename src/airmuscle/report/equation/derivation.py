@@ -11,9 +11,8 @@ from typing import Any
 from ...core.short_repr import ShortRepr
 from ...core.tree import Leaf, leaves
 from .expression import ADD, COMPARISONS, NEGATIVE, PRODUCT, QUOTIENT, WHERE, Expressions, Node, in_order
-from .intervals import Bounds, within
+from .intervals import Bounds, traced_expression, within
 from .polynomial import assemble, coefficients_by_monomial, depends_on, expand, summands
-from .tracing import traced_expression
 
 MAX_OPERATIONS = 600
 """Maximum number of operations of an equation that is shown (chosen)."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from ....core.plotting import BLACK, BLUE, RED, legend_below, new_figure
 from ....core.reference import cite
-from ....recording.display_units import display_scale, displayed
+from ....recording.columns import display_scale, displayed
 from ....report.chapter import BY_ROW, Chapter, Plot, Table, TableColumn
 from ...reported import unit_column
 from ..result import MAX_ROWS

@@ -14,7 +14,7 @@ from ....core.arrays import Array
 from ....core.errors import AirmuscleError, IdentificationError, ParameterError
 from ....engine.compile import System
 from ....engine.run.integrators import Integrator, Rodas4
-from ....recording.display_units import displayed
+from ....recording.columns import displayed
 from ..identifiability import analyse_identifiability
 from ..model_evidence import lag_one_autocorrelation
 from ..result import Estimate

@@ -15,7 +15,7 @@ from ....core.errors import IdentificationError, ParameterError, suggestion
 from ....core.plotting import BLACK, RED, given_axes, legend_outside, new_figure
 from ....engine.compile import System
 from ....recording import Recording
-from ....recording.display_units import display_scale
+from ....recording.columns import display_scale
 from ....report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
 from ....report.parameters import estimate_table
 from ...reported import Reported, unit_column

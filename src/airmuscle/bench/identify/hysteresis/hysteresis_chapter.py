@@ -11,7 +11,7 @@ import numpy as np
 
 from ....core import leaves
 from ....core.plotting import BLACK, BLUE, RED, legend_below, new_figure
-from ....recording.display_units import display_scale
+from ....recording.columns import display_scale
 from ....report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
 from ....report.formatting import P_VALUE
 from ...segment import motion_direction

@@ -13,7 +13,7 @@ from ....core.arrays import Array
 from ....core.short_repr import ShortRepr
 from ....physics.muscle.characteristic.validity_range import ValidityRange
 from ....recording import Recording
-from ....recording.display_units import displayed
+from ....recording.columns import displayed
 from ...segment import rate_of_change
 
 LIMIT_MARGIN = 1e-3

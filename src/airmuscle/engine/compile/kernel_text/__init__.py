@@ -4,8 +4,7 @@ The functions of `compile/kernels/` are the text. They are read as syntax trees;
 writes them. `plain_kernels` are the same functions in Python, for few numbers.
 """
 
-from .c import CKernels
-from .javascript import JavaScriptKernels
+from .braces import CKernels, JavaScriptKernels
 from .matlab import MatlabKernels
 from .source import plain_kernels, read_kernels, read_text
 from .types import typed

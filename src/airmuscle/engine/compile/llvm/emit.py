@@ -1,14 +1,14 @@
-"""LLVM intermediate representation of instructions: straight-line code, and branches around conditional blocks."""
+"""LLVM text of instructions over numbers or vectors of lanes: straight-line code, and branches around blocks."""
 
 from __future__ import annotations
 
 import dataclasses
 import functools
+import struct
 from collections.abc import Callable, Mapping, Sequence
 
 from ..ir.emission import FunctionBlock, TargetLanguage, unknown_operation
 from ..ir.instructions import Operand, Operation
-from .types import DOUBLE, LlvmType
 
 FLAGS = "nsz arcp contract reassoc afn"
 """Fast-math flags without nnan and ninf: a failed step must remain detectable by NaN or infinity."""
@@ -27,6 +27,64 @@ _CALLS = {
 _COMPARISONS = {Operation.LESS_EQUAL: "ole", Operation.LESS: "olt", Operation.EQUAL: "oeq", Operation.NOT_EQUAL: "une"}
 _EXTREMES = {Operation.FMIN: "olt", Operation.FMAX: "ogt", Operation.MINIMUM: "olt", Operation.MAXIMUM: "ogt"}
 """Strict comparison, as in the processor's instruction: of two equal values either may be returned."""
+
+
+@dataclasses.dataclass(frozen=True)
+class LlvmType:
+    """`lanes` numbers of `bits` each, which LLVM computes together: double, <32 x double>, <32 x float>."""
+
+    bits: int = 64
+    lanes: int = 1
+
+    @property
+    def element(self) -> str:
+        """LLVM name of the element type."""
+        return "double" if self.bits == 64 else "float"
+
+    @functools.cached_property
+    def text(self) -> str:
+        """LLVM name of the type."""
+        return self._of(self.element)
+
+    @property
+    def mask(self) -> str:
+        """LLVM name of the type of a comparison."""
+        return self._of("i1")
+
+    @property
+    def whole(self) -> str:
+        """LLVM name of the integer type of the same size."""
+        return self._of(f"i{self.bits}")
+
+    @property
+    def size(self) -> int:
+        """Bytes of a value."""
+        return self.lanes * self.bits // 8
+
+    @property
+    def alignment(self) -> int:
+        """Alignment of a value in bytes: its size, at most a cache line."""
+        return min(self.size, 64)
+
+    def intrinsic(self, name: str) -> str:
+        """Name of an LLVM intrinsic for this type: llvm.sqrt.f64, llvm.sqrt.v32f64."""
+        return f"llvm.{name}.{f'v{self.lanes}' if self.lanes > 1 else ''}f{self.bits}"
+
+    def function(self, name: str) -> str:
+        """Name of the vectorised replacement of a C library function, which `vector_math` defines."""
+        return f"{name}.v{self.lanes}f{self.bits}"
+
+    def literal(self, value: float) -> str:
+        """A number as LLVM text; in single precision it is rounded first, because LLVM requires an exact value."""
+        if self.bits == 32:
+            value = struct.unpack("<f", struct.pack("<f", value))[0]
+        return f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016X}"
+
+    def _of(self, element: str) -> str:
+        return element if self.lanes == 1 else f"<{self.lanes} x {element}>"
+
+
+DOUBLE = LlvmType()
 _OF_ONE = (*sorted(_CALLS.values()), *(DOUBLE.intrinsic(name) for name in _INTRINSICS.values()))
 DECLARED = "".join(f"declare double @{name}(double)\n" for name in _OF_ONE) + "declare double @pow(double, double)\n"
 """Declarations of the functions that printed code may call."""

@@ -16,8 +16,7 @@ import dataclasses
 import math
 from collections.abc import Sequence
 
-from .emit import STEADY_POWER, FunctionBody, function_of_values
-from .types import LlvmType
+from .emit import STEADY_POWER, FunctionBody, LlvmType, function_of_values
 
 
 class ExactBody(FunctionBody):

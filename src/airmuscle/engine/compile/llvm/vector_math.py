@@ -15,9 +15,8 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 
-from .emit import STEADY_POWER, FunctionBody, function_of_values
+from .emit import STEADY_POWER, FunctionBody, LlvmType, function_of_values
 from .exact import ExactBody, steady_power
-from .types import LlvmType
 
 LN2_HIGH, LN2_LOW = 0.693147180559890330187, 5.497923018708371e-14
 """ln 2 in two parts; the first ends in zeros, so that its product with an exponent is exact."""

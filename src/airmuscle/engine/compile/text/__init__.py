@@ -1,1 +1,1 @@
-"""Source text of printed functions in languages of users: C99, JavaScript, MATLAB and Octave."""
+"""Source text of printed functions: C99, JavaScript, MATLAB and Octave, PyTorch, Warp."""

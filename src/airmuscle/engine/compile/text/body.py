@@ -64,13 +64,13 @@ class TextBody(FunctionBlock, abc.ABC):
         self.stored: dict[str, tuple[str, int]] = {}
         self.sizes: dict[str, int] = {}
 
-    @abc.abstractmethod
     def element(self, array: str, index: int) -> str:
         """An array element as an expression."""
+        return f"{array}[{index}]"
 
-    @abc.abstractmethod
     def choose(self, test: str, when_true: str, when_false: str) -> str:
         """The name of one of two values, by a test."""
+        return self.put(f"({test}) ? {when_true} : {when_false}")
 
     @abc.abstractmethod
     def call(self, function: str, x: Sequence[str]) -> str:
@@ -80,9 +80,9 @@ class TextBody(FunctionBlock, abc.ABC):
     def remark(self, text: str) -> str:
         """A comment at the end of a line."""
 
-    @abc.abstractmethod
     def begin_branch(self, test: str) -> str:
         """The line that opens a branch."""
+        return f"  if ({test}) {{"
 
     end_branch = "  }"
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from ....core.diagnostics import Status
 from ....core.errors import ParameterError
 from ...compile.cache.kernel import lanes
-from ...compile.llvm.types import LlvmType
+from ...compile.llvm.emit import LlvmType
 from ..integrators import ExplicitRungeKutta
 from .job import BatchJob
 from .thread_pool import Queue
