@@ -63,3 +63,26 @@ output_times = "5 ms"
 initial_state = {{ pressure = "0.5 bar" }}
 """
 """Scenario file of a fill at a held length; the muscle is `muscle.toml` beside it."""
+PRESSURE_LOOP = f"""# A comment at the top
+title = "Pressure of a lifted load"
+[plant]
+muscle = "muscle.toml"
+{CIRCUIT}
+[plant.mechanism]
+model = "HangingMass"
+mass = "5 kg"   # the load
+
+[input.controller]
+model = "PID"
+measured = "pressure"
+commanded = {{ model = "SplitRange", positive = "fill", negative = "discharge" }}
+gain = "1.5 1/bar"          # a careful gain
+integral_time = 0.6
+sample_time = "10 ms"
+
+[input.controller.setpoint]
+pressure = [["0 s", "1 bar"], ["0.1 s", "2 bar"]]
+[run]
+duration = "0.3 s"
+initial_state = {{ pressure = "1 bar" }}
+"""

@@ -114,7 +114,8 @@ def test_refits_at_once_are_refits_one_by_one():
     drawn = bootstrap(found, runs, refits=40, by=RunSplit(), seed=3)
     which, count = _assign_groups(found, runs, RunSplit())
     times = np.random.default_rng(3).multinomial(count, np.full(count, 1 / count), size=40).astype(float)
-    expected = _refit_iteratively(found, which, times)
+    none_known = np.empty((0, len(found.values)))
+    expected = _refit_iteratively((found, which, none_known, None), times)
     assert np.isfinite(expected).all()
     assert drawn.values == pytest.approx(expected, rel=1e-8, abs=1e-6)
 

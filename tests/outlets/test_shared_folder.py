@@ -18,10 +18,11 @@ from pathlib import Path
 import pytest
 from command_line import airmuscle
 from scenario_files import HELD_FILL as SCENARIO
-from scenario_files import MUSCLE_FILE
+from scenario_files import MUSCLE_FILE, PRESSURE_LOOP
 
 from airmuscle import load_data
 from airmuscle.bench import write
+from airmuscle.core import check_writable, exclusive_folders
 from airmuscle.design import shared_folder
 from airmuscle.errors import AirmuscleError, FileError, InputError
 
@@ -179,6 +180,38 @@ def test_options_that_exclude_each_other_are_refused(folder: Path):
     assert "--workers and --dask exclude each other" in airmuscle(*study, "--workers", "2").stderr
     single = airmuscle("fit", str(folder / "x.csv"), "--characteristic", "Sarosi2012", "--join", str(folder / "shared"))
     assert "distribute the candidates of --compare" in single.stderr
+
+
+def test_a_tuning_is_shared_by_its_generations(folder: Path):
+    """The second process reads all metrics and writes its own files; both have the gains of one process alone."""
+    (folder / "loop.toml").write_text(PRESSURE_LOOP, encoding="utf-8")
+    command = ("tune", str(folder / "loop.toml"), "--budget", "64", "--draws", "1", "--workers", "1")
+    assert airmuscle(*command, "--out", str(folder / "alone")).exit_code == 0
+    join = ("--join", str(folder / "shared"))
+    joined = [airmuscle(*command, "--out", str(folder / name), *join) for name in ("a", "b")]
+    assert [each.exit_code for each in joined] == [0, 0], joined[0].stderr
+    assert shares(joined[0].stderr) == shares(joined[1].stderr) == [len(results(folder))] == [2]
+    alone, *both = ((folder / name / "history.csv").read_bytes() for name in ("alone", "a", "b"))
+    assert both == [alone] * 2
+
+
+def test_the_process_that_does_not_write_names_the_files_of_the_other(folder: Path):
+    """Of two processes of a command one holds the folder of the output; the other draws no figure."""
+    data = write(load_data("dmsp-20-300"), folder / "bench.csv")
+    join = ("--join", str(folder / "shared"), "--workers", "1")
+    commands = [
+        ("fit", str(data), "--compare", "--characteristic", "Sarosi2012", *join, "--out", str(folder / "out")),
+        ("study", str(folder / "study.toml"), "--json", *join, "--out", str(folder / "out")),
+    ]
+    with exclusive_folders():
+        check_writable(folder / "out")
+        fit, study = (airmuscle(*command) for command in commands)
+    assert (fit.exit_code, study.exit_code) == (0, 0), fit.stderr
+    for said in (fit, study):
+        assert "out is written by another process; this one computes for" in said.stderr
+    assert f"muscle: {folder / 'out' / 'muscle.toml'}" in fit.stdout
+    assert json.loads(study.stdout)["files"]["report"] == str(folder / "out" / "report.html")
+    assert not (folder / "out").exists()
 
 
 def test_invalid_folders_and_numbers_of_workers_are_errors(tmp_path: Path):

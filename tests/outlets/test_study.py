@@ -272,11 +272,13 @@ def test_a_worker_of_dask_solves_a_problem_that_was_sent_to_it(folder: Path):
     np.testing.assert_array_equal(there.recording["pressure"], solve(problem).recording["pressure"])
 
 
-def test_each_worker_of_a_pool_has_one_thread_of_linear_algebra(monkeypatch):
+def test_each_worker_of_a_pool_has_one_thread_of_linear_algebra_and_its_share_of_the_cores(monkeypatch):
     monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
     environment = functools.partial(subprocess.check_output, shell=True, text=True)
     with process_pool(2, one_thread_each=True) as pool:
         said = set(pool.map(environment, ["sleep 0.3; echo $PPID has $OPENBLAS_NUM_THREADS"] * 8))
+        cores = "__import__('sys').modules['airmuscle.engine.processes'].available_cores()"
+        assert pool.submit(eval, cores).result() == 1  # of those of this process, which conftest limits to one
     assert [text.split()[1:] for text in said] == [["has", "1"]] * 2
     assert "OPENBLAS_NUM_THREADS" not in os.environ
 
@@ -443,7 +445,7 @@ def test_a_worker_ignores_sigint():
 def test_a_worker_rejects_a_different_study(folder: Path):
     study = load_study(folder / "study.toml")
     with pytest.raises(FileError, match="a worker process has read a different study"):
-        chunk.run_chunk(str(study.path), "0" * 64, 0)
+        chunk.run_chunk((str(study.path), "0" * 64), 0)
 
 
 def test_a_dead_worker_is_an_error_that_says_how_to_resume(folder: Path):
@@ -707,7 +709,7 @@ def test_invalid_executors_and_folders_are_rejected(folder: Path):
         run_study(load_study(folder / "study.toml"), folder / "file")
     study = str(folder / "study.toml")
     both = airmuscle("study", study, "--workers", "2", "--dask", "tcp://localhost:1")
-    assert both.exit_code == 1
+    assert both.exit_code == 2
     assert "--workers and --dask exclude each other" in both.stderr
 
 

@@ -13,7 +13,8 @@ from pathlib import Path
 
 import pytest
 from command_line import airmuscle
-from scenario_files import CIRCUIT, MUSCLE_FILE
+from scenario_files import MUSCLE_FILE
+from scenario_files import PRESSURE_LOOP as SCENARIO
 
 from airmuscle.design import Perturbations, load_scenario_loop, tune
 from airmuscle.errors import AirmuscleError, FileError, ParameterError
@@ -28,29 +29,6 @@ damping = "200 N s/m"
 parameters = ["damper.damping"]
 standard_errors = [10.0]
 correlations = [[1.0]]
-"""
-SCENARIO = f"""# A comment at the top
-title = "Pressure of a lifted load"
-[plant]
-muscle = "muscle.toml"
-{CIRCUIT}
-[plant.mechanism]
-model = "HangingMass"
-mass = "5 kg"   # the load
-
-[input.controller]
-model = "PID"
-measured = "pressure"
-commanded = {{ model = "SplitRange", positive = "fill", negative = "discharge" }}
-gain = "1.5 1/bar"          # a careful gain
-integral_time = 0.6
-sample_time = "10 ms"
-
-[input.controller.setpoint]
-pressure = [["0 s", "1 bar"], ["0.1 s", "2 bar"]]
-[run]
-duration = "0.3 s"
-initial_state = {{ pressure = "1 bar" }}
 """
 FEW = ["--budget", "64", "--draws", "1"]
 """Eight sets of gains in seven cases."""

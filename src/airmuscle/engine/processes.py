@@ -25,12 +25,16 @@ from ..core.errors import AirmuscleError, InputError
 Workers = int | Executor
 """Number of local processes, or an executor of `concurrent.futures`."""
 _stop_event: Any = None
+_share: int | None = None
+"""Cores of a worker: those of its parent, divided among its workers."""
 _BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """Environment variables that limit the threads of linear algebra, which a process reads when it loads the library."""
 
 
 def available_cores() -> int:
-    """The number of cores that this process may use."""
+    """The number of cores that this process may use; that of a worker is its share of those of its parent."""
+    if _share is not None:
+        return _share
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -58,7 +62,7 @@ def process_pool(
     context = multiprocessing.get_context("spawn")  # a forked copy of a process with threads may deadlock
     stop_event = context.Event()
     executor = _ProcessPool(workers, mp_context=context, initializer=_initialise_worker,
-                            initargs=(stop_event, current_units()))  # fmt: skip
+                            initargs=(stop_event, current_units(), max(1, available_cores() // workers)))  # fmt: skip
     try:
         with _one_thread_each() if one_thread_each else contextlib.nullcontext():
             for _ in range(workers):  # each starts a worker, as none is idle yet
@@ -115,12 +119,12 @@ def _sigint_blocked() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _initialise_worker(stop_event: Any, units: tuple[str, ...] | None) -> None:
-    """Make a worker ignore SIGINT, which its parent handles, exit with its parent, and have its display units."""
+def _initialise_worker(stop_event: Any, units: tuple[str, ...] | None, share: int) -> None:
+    """Make a worker ignore SIGINT, which its parent handles, exit with its parent, and have its units and cores."""
     if units is not None:
         display(*units)
-    global _stop_event  # noqa: PLW0603  set once, at the start of the worker
-    _stop_event = stop_event
+    global _stop_event, _share
+    _stop_event, _share = stop_event, share
     threading.Thread(target=_exit_with_parent, name="parent watchdog", daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(signal, "pthread_sigmask"):

@@ -7,8 +7,10 @@ from .environments import LoadLifting as LoadLifting
 from .environments import MeasuredObservations as MeasuredObservations
 from .environments import Observation as Observation
 from .environments import Randomisation as Randomisation
+from .environments import Rollouts as Rollouts
 from .environments import ValueRange as ValueRange
 from .environments import register_environments as register_environments
+from .environments import roll_out as roll_out
 from .export import C99 as C99
 from .export import PRECISIONS as PRECISIONS
 from .export import JavaScript as JavaScript

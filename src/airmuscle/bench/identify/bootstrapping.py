@@ -14,6 +14,8 @@ from ...core.annotation import check_whole
 from ...core.arrays import Array
 from ...core.errors import Hint, IdentificationError
 from ...core.short_repr import ShortRepr
+from ...engine.distribution import DistributedCalls
+from ...engine.processes import Workers, check_running, process_pool
 from ...physics.muscle.characteristic.base import Characteristic
 from ...recording import Recording
 from .cross_validation import GroupSplit, LevelSplit, default_split
@@ -30,6 +32,8 @@ interval needs 40. Reference: Hall (1992), The Bootstrap and Edgeworth Expansion
 RELIABLE_GROUPS = 12
 """Number of groups from which the intervals need no caution (chosen: in a study of errors that a run shares, 95 %
 intervals of a plane held 59 % with 3 runs, 84 % with 5, 89 % with 8, 91 % with 12 and 92 % with 24)."""
+REFITS_OF_A_TASK = 100
+"""Refits of a law that is not linear in its parameters, that are computed one after the other (chosen)."""
 _MIN_EIGENVALUE = 1e-10
 """Minimum eigenvalue of the normal matrix of a refit, in the basis in which that of all rows is 1 (chosen)."""
 
@@ -81,6 +85,7 @@ def bootstrap(
     by: GroupSplit | None = None,
     seed: int = 0,
     progress: Callable[[float], None] | None = None,
+    workers: Workers = 1,
 ) -> Bootstrap:
     """Refit a law to groups of its data drawn with replacement (Efron and Tibshirani (1993), An Introduction to the
     Bootstrap, chapter 9).
@@ -89,10 +94,12 @@ def bootstrap(
     by          the groups: RunSplit(), LevelSplit(...) or SpecimenSplit(); by default the first of these that has at
                 least `MIN_GROUPS` groups
     progress    called with the completed fraction
+    workers     number of processes, as in `compare`; the result does not depend on it
 
     Censored rows are active where the original fit violates their bound. A law that is linear in its parameters is
     refitted by one matrix product; any other law is refitted iteratively from the parameters of the original fit, or
-    from those of an earlier refit with a smaller sum of squares in this sample. Raises IdentificationError.
+    from those of an earlier refit with a smaller sum of squares in this sample, one of the first `REFITS_OF_A_TASK` or
+    of its own block of as many. Raises IdentificationError.
     """
     check_whole("bootstrap", "refits", refits, 1)
     check_whole("bootstrap", "seed", seed, 0)
@@ -101,9 +108,9 @@ def bootstrap(
     draws = np.random.default_rng(seed).multinomial(count, np.full(count, 1.0 / count), size=refits).astype(float)
     problem = fit.problem
     linear = is_linear(problem) and isinstance(fit.loss, LeastSquares)
-    values = (
-        _refit_linear(problem, fit.values, group, draws) if linear else _refit_iteratively(fit, group, draws, progress)
-    )
+    if linear:
+        return Bootstrap(fit, _refit_linear(problem, fit.values, group, draws), count, seed)
+    values = _refit_in_blocks(fit, group, draws, progress or (lambda fraction: None), workers)
     return Bootstrap(fit, values, count, seed)
 
 
@@ -159,19 +166,34 @@ def _has_full_rank(normal: Array) -> npt.NDArray[np.bool_]:
     return np.asarray(np.linalg.eigvalsh(normal)[:, 0] > _MIN_EIGENVALUE)
 
 
-def _refit_iteratively(
-    fit: Fit, group: RowIndices, draws: Array, progress: Callable[[float], None] | None = None
+def _refit_in_blocks(
+    fit: Fit, group: RowIndices, draws: Array, progress: Callable[[float], None], workers: Workers
 ) -> Array:
-    """Refits one by one, each started at the best of the parameters found before, the fit's own included."""
+    """The refits (R, P): a first block, then the others at once, which start at the parameters found in the first."""
+    blocks = [draws[i : i + REFITS_OF_A_TASK] for i in range(0, len(draws), REFITS_OF_A_TASK)]
+    first = _refit_iteratively((fit, group, np.empty((0, len(fit.estimates))), progress), blocks[0])
+    with process_pool(workers if len(blocks) > 2 else 1, one_thread_each=True, terminate=True) as executor:
+        distribution = DistributedCalls(executor, _refit_iteratively, (fit, group, first, None))
+        others = distribution.results(blocks[1:], lambda count: progress((1 + count) / len(blocks)))
+    return np.concatenate([first, *others])
+
+
+def _refit_iteratively(common: tuple[Fit, RowIndices, Array, Callable[[float], None] | None], draws: Array) -> Array:
+    """Refits one by one, each started at the best of the parameters found before: the fit's own, given ones, and those
+    of this block."""
+    fit, group, known_values, progress = common
     values = np.full((draws.shape[0], len(fit.estimates)), np.nan)
     problem, count = fit.problem, draws.shape[1]
     near, known = None, KnownMinima(problem, fit.values, group, count)
+    for found in known_values[np.isfinite(known_values).all(axis=1)]:
+        known.add(found)
     if isinstance(fit.loss, LeastSquares) and not is_linear(problem):
         solution = LeastSquaresSolution(fit.values, problem.predict(fit.values), problem.jacobian(fit.values))
         near = GroupRefits(problem, solution, group, count)
     for i, counts in enumerate(draws):
         if progress is not None:
-            progress(i / len(draws))
+            progress(0.1 * i / len(draws))
+        check_running()
         refitted = None if near is None else near.refit(counts, known.best(counts))
         values[i] = _search(fit, counts[group], near is not None) if refitted is None else refitted
         if np.isfinite(values[i]).all():

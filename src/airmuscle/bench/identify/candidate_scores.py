@@ -4,17 +4,15 @@ this process or in several."""
 from __future__ import annotations
 
 import dataclasses
-import functools
-import pickle
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Executor, as_completed
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
 from ...core import tree
 from ...core.arrays import Array
 from ...core.errors import AirmuscleError
-from ...engine.processes import Workers, check_running, process_pool
+from ...engine.distribution import DistributedCalls
+from ...engine.processes import Workers, process_pool
 from ...physics.muscle.characteristic import PooledLengthLaw
 from ...physics.muscle.characteristic.base import Characteristic
 from ...recording import Recording
@@ -223,10 +221,16 @@ def score_candidates(
     early = [i for i in range(len(candidates)) if i not in late]
     scores_of: dict[int, tuple[Score, ...]] = {}
     with process_pool(workers, one_thread_each=True) as pool:
+        if pool is not None:
+            for split in splits:
+                split.points.prepare()  # before they are sent
+        distribution = DistributedCalls(pool, _score_task, (tuple(splits), loss))
         for indices in (early, late):
             lowest = _lowest_errors(scores_of.values(), len(splits)) if indices is late else ()
+            if pool is not None:  # those that take longest first
+                indices.sort(key=lambda i: -sum(1 for _ in tree.leaves(candidates[i].law)))
             tasks = [_Task(candidates[i], tuple(max_excess(candidates[i]) * each for each in lowest)) for i in indices]
-            for position, scores in _results(pool, splits, loss, tasks):
+            for position, scores in distribution.completed(tasks):
                 scores_of[indices[position]] = scores
                 if progress is not None:
                     progress(candidates[indices[position]].name, (len(scores_of) - 1) / len(candidates))
@@ -260,34 +264,8 @@ class _Task:
     limits: Sequence[float]
 
 
-def _results(
-    pool: Executor | None, splits: Sequence[ComparedPoints], loss: Loss, tasks: Sequence[_Task]
-) -> Iterator[tuple[int, tuple[Score, ...]]]:
-    """The position of each task with its scores, as they are completed."""
-    if pool is None:
-        for position, task in enumerate(tasks):
-            yield position, score_candidate(task.candidate, splits, loss, task.limits)
-        return
-    for each in splits:
-        each.points.prepare()
-    shared = pickle.dumps((tuple(splits), loss))
-    largest_first = sorted(range(len(tasks)), key=lambda i: -sum(1 for _ in tree.leaves(tasks[i].candidate.law)))
-    futures = {pool.submit(_score_in_worker, shared, tasks[i]): i for i in largest_first}
-    for future in as_completed(futures):
-        yield futures[future], future.result()
-
-
-def _score_in_worker(shared: bytes, task: _Task) -> tuple[Score, ...]:
-    check_running()
-    splits, loss = _load(shared)
-    return score_candidate(task.candidate, splits, loss, task.limits)
-
-
-@functools.lru_cache(maxsize=1)
-def _load(shared: bytes) -> tuple[tuple[ComparedPoints, ...], Loss]:
-    """The points and the loss; a worker loads them once, with what is derived from them."""
-    loaded: tuple[tuple[ComparedPoints, ...], Loss] = pickle.loads(shared)
-    return loaded
+def _score_task(common: tuple[Sequence[ComparedPoints], Loss], task: _Task) -> tuple[Score, ...]:
+    return score_candidate(task.candidate, common[0], common[1], task.limits)
 
 
 def _lowest_errors(scores: Iterable[tuple[Score, ...]], count: int) -> tuple[float, ...]:

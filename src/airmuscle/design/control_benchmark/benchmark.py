@@ -6,14 +6,16 @@ import dataclasses
 import enum
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...core.arrays import Array
 from ...core.errors import ParameterError, PhysicsError, SimulationError
 from ...core.short_repr import ShortRepr
+from ...engine.distribution import DistributedCalls
 from ...engine.loop import Controller
+from ...engine.processes import Workers, process_pool
 from ...engine.run import RungeKutta4
 from ...recording import Recording
 from ..tuning import LoopCase, RootMeanSquareError, Tuning, tune
@@ -174,6 +176,7 @@ def benchmark_controllers(
     sets_per_gain: int = SETS_PER_GAIN,
     commissioning_runs: int = COMMISSIONING_RUNS,
     progress: Progress | None = None,
+    workers: Workers = 1,
 ) -> BenchmarkResult:
     """Tune every contender for the models of a joint, commission it on each truth, and run every task on the truths.
 
@@ -184,22 +187,36 @@ def benchmark_controllers(
                         converged. 0: none is tuned
     commissioning_runs  runs of each contender on a truth for the group `commissioned`; 0: there is none
     progress            called with the name of the present step, the number done and their number
+    workers             number of processes, for several of which a script needs `if __name__ == "__main__":`, or an
+                        executor: a contender with one search is a task. The result does not depend on it
 
     A run that fails has a reason and no metrics. Raises ParameterError for a contender that does not suit the joint.
     """
     _check_names("contender", [each.name for each in contenders])
     _check_names("task", [each.name for each in tasks])
     show = progress or (lambda text, done, total: None)
-    results: list[ContenderResult] = []
-    for i, (seed, contender) in enumerate((s, c) for s in seeds for c in contenders):
-        show(contender.name, i, len(seeds) * len(contenders))
-        same = [each for each in results if each.seed == seed and each.contender is contender.tuned_as]
-        found = benchmark_contender(
-            joint, contender, tasks, seed=seed, sets_per_gain=sets_per_gain, commissioning_runs=commissioning_runs,
-            progress=show, tuned_as=same[0] if same else None,
-        )  # fmt: skip
-        results.append(found)
-    return BenchmarkResult(joint, tuple(tasks), tuple(results))
+    pairs = [(seed, contender) for seed in seeds for contender in contenders]
+    found: dict[tuple[int, str], ContenderResult] = {}
+    with process_pool(workers) as executor:
+        options = {
+            "joint": joint, "tasks": tuple(tasks), "sets_per_gain": sets_per_gain,
+            "commissioning_runs": commissioning_runs, "progress": show if executor is None else None,
+        }  # fmt: skip
+        distribution = DistributedCalls(executor, _benchmark_task, options)
+        other = {each.name: known.name for each in contenders for known in contenders if each.tuned_as is known}
+        for later in (False, True):  # those that take the gains of the others
+            due = [(seed, each) for seed, each in pairs if (each.name in other) == later]
+            work = [(seed, each, found.get((seed, other.get(each.name, "")))) for seed, each in due]
+            for i, result in distribution.completed(work):
+                found[result.seed, result.name] = dataclasses.replace(result, contender=due[i][1])
+                show(result.name, len(found), len(pairs))
+    results = tuple(found[seed, contender.name] for seed, contender in pairs)
+    return BenchmarkResult(joint, tuple(tasks), results)
+
+
+def _benchmark_task(options: Mapping[str, Any], task: tuple[int, Contender, ContenderResult | None]) -> ContenderResult:
+    seed, contender, tuned_as = task
+    return benchmark_contender(contender=contender, seed=seed, tuned_as=tuned_as, **options)
 
 
 def benchmark_contender(

@@ -61,11 +61,12 @@ def register_study(study: Study) -> str:
     return identity
 
 
-def run_chunk(path: str, identity: str, index: int) -> Chunk:
-    """Run one chunk of the study in a file, in any process; the plants are built in that process.
+def run_chunk(study_file: tuple[str, str], index: int) -> Chunk:
+    """Run one chunk of the study in a file, its path and fingerprint, in any process; the plants are built there.
 
-    Raises FileError if the study in the file does not have the fingerprint `identity`.
+    Raises FileError if the study in the file does not have the fingerprint.
     """
+    path, identity = study_file
     if (path, identity) not in _loaded:
         study = load_study(path)
         if study_fingerprint(study) != identity:

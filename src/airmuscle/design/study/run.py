@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor, Executor, Future, as_completed
+from concurrent.futures import Executor
 from pathlib import Path
 
 import numpy as np
 
 from ...core.atomic_output import check_writable
-from ...core.errors import FileError, SimulationError
+from ...core.errors import FileError
+from ...engine.distribution import DistributedCalls
 from .chunk import Chunk, chunk_file_name, metric_times, read_chunk, register_study, run_chunk, write_chunk
 from .result import StudyResult
 from .scenario_runs import simulate_all
@@ -64,24 +65,9 @@ def count_finished_runs(study: Study, folder: Path | str) -> int:
 
 def _compute_missing(study: Study, missing: Sequence[int], executor: Executor | None) -> Iterator[tuple[int, Chunk]]:
     """The missing chunks with their indices, in the order of completion."""
-    path, identity = str(study.path.resolve()), register_study(study)
-    if executor is None:
-        yield from ((index, run_chunk(path, identity, index)) for index in missing)
-        return
-    tasks: dict[Future[Chunk], int] = {}
-    try:
-        for index in missing:
-            tasks[executor.submit(run_chunk, path, identity, index)] = index
-        for task in as_completed(tasks):
-            yield tasks.pop(task), task.result()  # removed at once, to bound the memory of a long study
-    except BrokenExecutor:
-        raise SimulationError(
-            "a worker process died, possibly for lack of memory. Completed runs are saved: run the same command again, "
-            "with fewer workers, to resume the study."
-        ) from None
-    finally:
-        for task in tasks:
-            task.cancel()
+    study_file = str(study.path.resolve()), register_study(study)
+    for place, chunk in DistributedCalls(executor, run_chunk, study_file).completed(missing):
+        yield missing[place], chunk
 
 
 def _read_finished(file: Path) -> Chunk:

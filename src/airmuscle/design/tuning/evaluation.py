@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy.typing as npt
 from ...core.arrays import Array
 from ...core.errors import AirmuscleError
 from ...core.tree import flatten, leaves, structure
+from ...engine.distribution import DistributedCalls
 from ...engine.loop.control_law import ControlLaw
 from ...engine.loop.control_loop import COMMAND, SETPOINT, ControlLoop, with_designed_laws
 from ...engine.run.batch import BatchSolution, simulate_batch
@@ -25,6 +27,8 @@ from .tracking import TrackingIndex
 
 MAX_VALUES = 20_000_000
 """Values of all columns of one batch, which is 160 MB; more sets of gains are simulated in several batches (chosen)."""
+SETS_OF_A_TASK = 4
+"""Sets of gains of one task of an executor (chosen: a generation has eight or more)."""
 AIR_MASS = "air_mass"
 """Last part of the name of the states that hold the air of a muscle."""
 
@@ -117,7 +121,7 @@ class Evaluator:
     reasons: dict[str, int] = dataclasses.field(default_factory=dict)
 
     def metrics(self, gains: Array) -> CaseMetrics:
-        """The metrics (E, M). Raises Interrupted if the user stops the simulation."""
+        """The metrics (E, M) of gains (E, D). Raises Interrupted if the user stops the simulation."""
         shape = len(gains), len(self.cases)
         metrics = CaseMetrics(
             np.full(shape, np.inf), np.full(shape, np.nan), np.full(shape, np.nan), np.zeros(shape, bool)
@@ -180,6 +184,38 @@ class Evaluator:
                 initial_states={name: np.tile(values, sets) for name, values in group.initial_states.items()},
                 integrator=self.integrator, keep=group.kept, start_time=self.start_time,
             )  # fmt: skip
+
+
+class DistributedEvaluator:
+    """Metrics by an executor, which divides sets of gains (E, D) into tasks of `SETS_OF_A_TASK`; by default in this
+    process. They do not depend on the executor."""
+
+    def __init__(self, evaluator: Evaluator, executor: Executor | None) -> None:
+        self._evaluator, self._alone = evaluator, executor is None
+        self._distribution = DistributedCalls(executor, _metrics_and_reasons, evaluator)
+
+    def metrics(self, gains: Array) -> CaseMetrics:
+        """The metrics (E, M) of gains (E, D). Raises Interrupted if the user stops the simulation."""
+        if self._alone:
+            return self._evaluator.metrics(gains)
+        parts = self._distribution.results(
+            [gains[i : i + SETS_OF_A_TASK] for i in range(0, len(gains), SETS_OF_A_TASK)]
+        )
+        for _, reasons in parts:
+            for reason, count in reasons.items():
+                self._evaluator.reasons[reason] = self._evaluator.reasons.get(reason, 0) + count
+        return joined_metrics([metrics for metrics, _ in parts])
+
+
+def _metrics_and_reasons(evaluator: Evaluator, gains: Array) -> tuple[CaseMetrics, dict[str, int]]:
+    fresh = dataclasses.replace(evaluator, reasons={})
+    return fresh.metrics(gains), fresh.reasons
+
+
+def joined_metrics(parts: Sequence[CaseMetrics]) -> CaseMetrics:
+    """The metrics of several groups of sets of gains as those of one."""
+    fields = ("index", "air", "travel", "completed")
+    return CaseMetrics(*(np.concatenate([getattr(each, name) for each in parts]) for name in fields))
 
 
 def _air_drawn(batch: BatchSolution, group: CaseGroup) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
 from typing import Any
 
 import numpy as np
@@ -11,9 +12,10 @@ import numpy as np
 from ...core.arrays import Array
 from ...core.errors import ParameterError, SimulationError
 from ...core.tree import leaves
+from ...engine.processes import Workers, process_pool
 from ...engine.run.integrators import Integrator
 from .case import GainRange, LoopCase, check_cases, gain_ranges, to_coordinates, to_gains
-from .evaluation import Evaluator, Interrupted, group_cases
+from .evaluation import DistributedEvaluator, Evaluator, Interrupted, group_cases, joined_metrics
 from .result import CaseMetrics, Objective, RobustObjective, Tuning, TuningHistory
 from .tracking import RootMeanSquareError, TrackingIndex
 
@@ -107,6 +109,7 @@ def tune(
     start_time: float = 0.0,
     integrator: Integrator | None = None,
     progress: Progress | None = None,
+    workers: Workers = 1,
 ) -> Tuning:
     """Find the gains of a controller that minimise an objective over a family of cases.
 
@@ -121,6 +124,8 @@ def tune(
                 controller are always among them if they are within the bounds, so that the result is never worse
     start_time, integrator  as in simulate_batch
     progress    called with the number of loops simulated so far, and the budget
+    workers     number of processes, for several of which a script needs `if __name__ == "__main__":`, or an executor;
+                by default this process, which uses all cores. The result does not depend on it
 
     The optimiser is the evolution strategy CMA-ES (Hansen 2016), with the same settings for every controller. The first
     generation are Sobol points, from whose best one a descent begins; further descents begin at other points of it. The
@@ -146,7 +151,8 @@ def tune(
     )
     search = _Search(evaluator, ranges, objective, budget, progress or (lambda done, total: None))
     given = search.given(start)
-    interrupted = search.run(given, seed)
+    with process_pool(workers) as executor:
+        interrupted = search.run(given, seed, executor)
     if not search.values:
         raise KeyboardInterrupt
     result = Tuning(
@@ -219,10 +225,11 @@ class _Search:
             raise ParameterError(f"tune: {len(start)} starts; at most {self.population - 1} fit the first generation.")
         return points
 
-    def run(self, given: list[Array], seed: int) -> bool:
+    def run(self, given: list[Array], seed: int, executor: Executor | None) -> bool:
         """Search until two descents agree or the budget is used; whether the user interrupted."""
         from scipy.stats import qmc
 
+        self._distributed = DistributedEvaluator(self.evaluator, executor)
         first = qmc.Sobol(d=len(self.ranges), scramble=True, seed=np.random.default_rng(seed)).random(self.population)
         first[: len(given)] = given if given else first[:0]
         random, ends = np.random.default_rng([seed, 1]), list[float]()
@@ -256,7 +263,7 @@ class _Search:
     def _energies(self, coordinates: Array) -> Array:
         """The energies (S,) of points (S, D): the objective, or a large number by the share of failed runs."""
         gains = to_gains(self.ranges, np.clip(coordinates, 0.0, 1.0))
-        metrics = self.evaluator.metrics(gains)
+        metrics = self._distributed.metrics(gains)
         values = np.asarray(self.objective(metrics), dtype=float)
         if values.shape != (len(gains),):
             raise ParameterError(f"tune: the objective returned {values.shape}; it must return ({len(gains)},) values.")
@@ -270,10 +277,8 @@ class _Search:
 
     def history(self) -> TuningHistory:
         """All that was simulated."""
-        fields = ("index", "air", "travel", "completed")
-        joined = (np.concatenate([getattr(each, name) for each in self.metrics]) for name in fields)
         return TuningHistory(
-            self.evaluator.paths, np.concatenate(self.gains), np.concatenate(self.values), CaseMetrics(*joined)
+            self.evaluator.paths, np.concatenate(self.gains), np.concatenate(self.values), joined_metrics(self.metrics)
         )
 
 

@@ -29,8 +29,10 @@ from ...design.control_benchmark.tasks import find_tasks
 from ...design.control_benchmark.truths import TRUTH_SEEDS
 from ...files.library.files import is_path
 from .delivery import deliver
+from .execution import Execution
 from .interruption import check_interrupted
 from .options import Folder, Json
+from .request_options import with_requests
 
 DEFAULT_BUDGET = 60
 """Sets of gains for each gain (chosen)."""
@@ -74,7 +76,9 @@ Trials = Annotated[
 ]  # fmt: skip
 
 
+@with_requests
 def benchmark(
+    execution: Execution,
     valves: Annotated[Valves, typer.Option(help="Valves of the joint.")] = Valves.PROPORTIONAL,
     controller: Names = None, task: Tasks = None, truths: Truths = len(TRUTH_SEEDS), searches: Searches = 1,
     budget: Budget = DEFAULT_BUDGET, runs: Runs = COMMISSIONING_RUNS, seed: Seed = 1, trials: Trials = 0,
@@ -94,18 +98,21 @@ def benchmark(
       airmuscle benchmark --controller PID --controller "feed-forward + PID" --task "sine 1 Hz" --trials 10
       airmuscle benchmark --valves on-off --truths 2 --budget 40
       airmuscle benchmark --controller PID --controller examples/joint_cascade.toml --runs 0
+      airmuscle benchmark --join /shared/benchmark    (on each machine)
     """
     joint = (proportional_joint if valves is Valves.PROPORTIONAL else on_off_joint)(TRUTH_SEEDS[:truths])
     contenders, tasks = _contenders(joint, controller or []), find_tasks(tuple(task or ()))
     if trials and (trials < 2 or LEARNED not in [each.name for each in contenders]):
         raise InputError(f"--trials needs at least 2 trials and the controller '{LEARNED}'.")
-    with _progress() as show:
+    writes = execution.writes(out)
+    with execution.executor(alone=True) as workers, _progress() as show:
         result = benchmark_controllers(
             joint, contenders, tasks, seeds=range(seed, seed + searches), sets_per_gain=budget,
-            commissioning_runs=runs, progress=show,
+            commissioning_runs=runs, progress=show, workers=workers,
         )  # fmt: skip
     curves = _learned(result, trials, seed) if trials else []
-    deliver("benchmark", [benchmark_chapter(result, curves)], json=json, out=out, title="Control benchmark")
+    chapter = benchmark_chapter(result, curves)
+    deliver("benchmark", [chapter], json=json, out=out, title="Control benchmark", writes=writes)
     found = [run for each in result.results for run in each.runs.values()]
     if not any(run.metrics for run in found):
         raise SimulationError(f"all runs failed; reason of the first: {found[0].reason}")

@@ -39,6 +39,7 @@ from ..requests.declaration import option, request
 from ..requests.reading import ReadingRequest
 from .bench_files import print_row_notes, reading_chapters
 from .delivery import deliver
+from .execution import Execution
 from .option_hints import in_options
 from .options import Folder, Json
 from .request_options import with_requests
@@ -128,6 +129,7 @@ def campaign(
     folder: CampaignFolder,
     request: CampaignRequest,
     reading: ReadingRequest,
+    execution: Execution,
     out: Folder = Path("campaign"),
     json: Json = False,
 ) -> None:
@@ -156,8 +158,10 @@ def campaign(
     print_row_notes(complete)
     recordings, aside = complete[: len(recordings)], complete[len(recordings) :]
     geometry = None if size is None else braid_of_length(size, _one_length(recordings))
-    check_writable(out)
-    result = _identify(recordings, geometry, out)
+    writes = execution.writes(out)
+    if writes:
+        check_writable(out)
+    result = _identify(recordings, geometry, out if writes else None, execution)
     validation = [row for recording in aside for row in _validation(result, recording)]
     scenarios = campaign_scenarios(result)
     entry = _entry(result)
@@ -166,7 +170,7 @@ def campaign(
     chapters[0] = dataclasses.replace(chapters[0], notes=(*chapters[0].notes, *_not_written(result, entry, scenarios)))
     contents = {**_muscles(result, entry), **{f"{SCENARIOS}/{s.name}": s.text for s in scenarios if s.text}}
     chapters += reading_chapters(complete)
-    deliver("campaign", chapters, json=json, out=out, title="Bench campaign", files=contents)
+    deliver("campaign", chapters, json=json, out=out, title="Bench campaign", files=contents, writes=writes)
 
 
 def _not_written(result: Campaign, entry: Entry | None, scenarios: Sequence[RecordScenario]) -> list[str]:
@@ -203,8 +207,10 @@ def _one_length(recordings: Sequence[Recording]) -> float:
     return lengths[0]
 
 
-def _identify(recordings: Sequence[Recording], geometry: Geometry | None, out: Path) -> Campaign:
-    """The campaign, continued from an interrupted one; each finished stage is kept and written to the folder."""
+def _identify(
+    recordings: Sequence[Recording], geometry: Geometry | None, out: Path | None, execution: Execution
+) -> Campaign:
+    """The campaign, continued from an interrupted one; each finished stage is kept, and written to a given folder."""
     kept, stages, names = KeptStages(recordings, geometry), list[dict[str, Any]](), STAGES[1:-1]
     known = kept.load(names)
     if known:
@@ -214,13 +220,15 @@ def _identify(recordings: Sequence[Recording], geometry: Geometry | None, out: P
         stages.append(stage_data(stage, result))
         if stage in names and stage not in known:
             kept.save(stage, result)
-        with atomic_folder(out) as folder:
-            (folder / STAGES_FILE).write_text(as_json(stages), encoding="utf-8")
+        if out is not None:
+            with atomic_folder(out) as folder:
+                (folder / STAGES_FILE).write_text(as_json(stages), encoding="utf-8")
 
-    with computation_progress("campaign") as show:
+    with execution.executor(alone=True) as workers, computation_progress("campaign") as show:
         result = identify_campaign(
-            recordings, geometry=geometry, progress=lambda _, fraction: show(fraction), finished=keep, known=known
-        )
+            recordings, geometry=geometry, progress=lambda _, fraction: show(fraction), finished=keep, known=known,
+            workers=workers,
+        )  # fmt: skip
     kept.remove(names)
     return result
 

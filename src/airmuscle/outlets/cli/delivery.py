@@ -20,17 +20,19 @@ WITHOUT_REPORT = "the report of --out"
 
 def deliver(
     command: str, chapters: Sequence[Chapter], *, json: bool, out: Path | None = None, title: str = "",
-    files: Files | None = None, others: Mapping[str, Path] | None = None,
+    files: Files | None = None, others: Mapping[str, Path] | None = None, writes: bool = True,
 ) -> None:  # fmt: skip
     """Write the files and the report of a result into a folder, if there is one, and print the result.
 
     command  whose options the hints of the texts name
     title    of the report; without one no report is written
     others   files elsewhere that are named with those of the folder
+    writes   whether this process writes the files; otherwise it names those that another one writes
     """
     worded = in_option_words(command, chapters)
-    written = {} if out is None else write_result(out, worded, title, files or {})
-    print_result(worded, {**(others or {}), **written}, json)
+    if out is not None and writes:
+        write_result(out, worded, title, files or {})
+    print_result(worded, {**(others or {}), **({} if out is None else result_paths(out, title, files or {}))}, json)
 
 
 def print_result(chapters: Sequence[Chapter], paths: Mapping[str, Path], json: bool) -> None:
@@ -49,7 +51,7 @@ def in_option_words(command: str, chapters: Sequence[Chapter]) -> list[Chapter]:
 
 
 def write_result(out: Path, chapters: Sequence[Chapter], title: str, files: Files) -> dict[str, Path]:
-    """Write the files and the report, all or none; returns their paths, those of a folder as one."""
+    """Write the files and the report, all or none; returns their paths."""
     with atomic_folder(out) as folder:
         for name, content in files.items():
             path = folder / name
@@ -60,6 +62,11 @@ def write_result(out: Path, chapters: Sequence[Chapter], title: str, files: File
                 content(path)
         if title:
             write_into(folder, chapters, title=title)
+    return result_paths(out, title, files)
+
+
+def result_paths(out: Path, title: str, files: Files) -> dict[str, Path]:
+    """The paths of the files and of the report of a result, those of a folder as one."""
     names = [*files, *([REPORT_FILE] if title else [])]
     parts = [Path(name) if len(Path(name).parts) == 1 else Path(name).parent for name in names]
     return {path.stem: out / path for path in parts}

@@ -3,58 +3,54 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
 
-import typer
-
-from ...core.atomic_output import check_writable, temporary_folder
-from ...core.errors import FolderInUseError, InputError
+from ...core.atomic_output import check_writable
+from ...core.errors import FolderInUseError
 from ...engine.executors import SharedFolder, dask_cluster, shared_folder
 from ...engine.processes import Workers, available_cores
+from ..requests.declaration import RequestError, Where, option, request
 from .terminal import echo
 
-WorkerCount = Annotated[
-    int | None,
-    typer.Option("--workers", min=1, max=1024, metavar="N", help="Number of local processes; default: one per core."),
-]
-DaskAddress = Annotated[
-    str | None, typer.Option("--dask", metavar="ADDRESS", help="Use a running Dask cluster, such as tcp://host:8786.")
-]
-JoinedFolder = Annotated[
-    Path | None,
-    typer.Option(
-        "--join",
-        metavar="FOLDER",
-        help="Share the computation with all processes that run the same command with this folder, on any machines.",
-    ),
-]
 
-
-@dataclasses.dataclass(frozen=True)
+@request
 class Execution:
-    """The processes that compute a command. Raises InputError for a cluster together with local processes."""
+    """The processes that compute a command."""
 
-    workers: int | None = None
-    dask: str | None = None
-    join: Path | None = None
+    workers: int | None = option(
+        "Number of local processes; by default as many as cores, or one that uses all cores.",
+        default=None,
+        bounds=(1, 1024),
+    )
+    dask: str | None = option("Use a running Dask cluster, such as tcp://host:8786.", default=None, metavar="ADDRESS")
+    join: Path | None = option(
+        "Share the computation with all processes that run the same command with this folder, on any machines.",
+        default=None,
+        metavar="FOLDER",
+    )
 
-    def __post_init__(self) -> None:
+    def check(self, where: Where) -> None:
+        """Refuse a cluster together with local processes."""
         if self.dask is not None and (self.workers is not None or self.join is not None):
-            raise InputError(
-                f"--{'join' if self.workers is None else 'workers'} and --dask exclude each other: a Dask cluster has "
-                "its own workers."
+            raise RequestError(
+                f"{where('join' if self.workers is None else 'workers')} and {where('dask')} exclude each other: a "
+                "Dask cluster has its own workers."
             )
 
+    @property
+    def requested(self) -> bool:
+        """Whether other processes than this one are asked for."""
+        return (self.workers, self.dask, self.join) != (None, None, None)
+
     @contextlib.contextmanager
-    def executor(self, tasks: int | None = None) -> Iterator[Workers]:
-        """Yield the executor, or the number of local processes; `tasks` limits the latter.
+    def executor(self, tasks: int | None = None, *, alone: bool = False) -> Iterator[Workers]:
+        """Yield the executor, or the number of local processes; `tasks` limits the latter, which is by default the
+        number of cores, or 1 for what uses all cores `alone`.
 
         At the end it is stated which processes have computed how many tasks of a shared folder.
         """
-        local = self.workers or available_cores()
+        local = self.workers or (1 if alone and self.join is None else available_cores())
         if self.dask is not None:
             with dask_cluster(self.dask) as cluster:
                 yield cluster
@@ -67,18 +63,15 @@ class Execution:
         else:
             yield min(local, tasks or local)
 
-    @contextlib.contextmanager
-    def output(self, out: Path) -> Iterator[Path]:
-        """Yield the folder of the output; if another joined process writes to it, a temporary one."""
+    def writes(self, out: Path) -> bool:
+        """Whether this process writes the output; false with a message if another one that has joined does."""
         if self.join is not None:
             try:
                 check_writable(out)
             except FolderInUseError:
                 echo(f"{out} is written by another process; this one computes for {self.join} only", err=True)
-                with temporary_folder() as scratch:
-                    yield scratch
-                return
-        yield out
+                return False
+        return True
 
 
 def contributions(folder: SharedFolder) -> str:

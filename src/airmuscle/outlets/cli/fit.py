@@ -12,7 +12,7 @@ from ..requests.fitting import fit_requested
 from ..requests.reading import ReadingRequest
 from .bench_files import Files, read_recordings
 from .delivery import deliver
-from .execution import DaskAddress, Execution, JoinedFolder, WorkerCount
+from .execution import Execution
 from .options import Folder, Json
 from .request_options import with_requests
 from .terminal import computation_progress
@@ -23,10 +23,8 @@ def fit(
     files: Files,
     request: FitRequest,
     reading: ReadingRequest,
+    execution: Execution,
     out: Folder = Path("fit"),
-    workers: WorkerCount = None,
-    dask: DaskAddress = None,
-    join: JoinedFolder = None,
     json: Json = False,
 ) -> None:
     """Fit a characteristic to measured points, or compare several.
@@ -49,15 +47,16 @@ def fit(
       airmuscle fit log_held*.csv --file-name "held{length [mm]}mm" --time uniform --resting-length "200 mm" --compare
       airmuscle evaluate fit/muscle.toml --pressure "3 bar" --force "100 N"
     """
-    execution = Execution(workers, dask, join)
-    if (workers, dask, join) != (None, None, None) and not request.compare:
-        raise RequestError("--workers, --dask and --join distribute the candidates of --compare")
-    with execution.output(out) as folder:
-        recordings = read_recordings(files, reading)
-        check_writable(folder)
-        progress = computation_progress("comparison" if request.compare else "fit")
-        with execution.executor() as executor, progress as show:
-            found = fit_requested(request, files, recordings, lambda _, fraction: show(fraction), executor)
-        muscle = {"muscle.toml": to_toml(found.entry)}
-        kept = out if folder == out else None
-        deliver("fit", found.chapters, json=json, out=kept, title="Fit", files=muscle)
+    if execution.requested and not (request.compare or request.bootstrap):
+        raise RequestError(
+            "--workers, --dask and --join distribute the candidates of --compare and the refits of --bootstrap"
+        )
+    recordings = read_recordings(files, reading)
+    writes = execution.writes(out)
+    if writes:
+        check_writable(out)
+    progress = computation_progress("comparison" if request.compare else "fit")
+    with execution.executor() as executor, progress as show:
+        found = fit_requested(request, files, recordings, lambda _, fraction: show(fraction), executor)
+    muscle = {"muscle.toml": to_toml(found.entry)}
+    deliver("fit", found.chapters, json=json, out=out, title="Fit", files=muscle, writes=writes)

@@ -9,28 +9,30 @@ from typing import Annotated
 
 import typer
 
+from ...core.atomic_output import temporary_folder
 from ...core.errors import AirmuscleError, SimulationError
 from ...design.study import Study, StudyResult, load_study, run_study
-from ...design.study.chapter import study_chapter, write_study
+from ...design.study.chapter import RESULTS_FILE, study_chapter, write_study
 from ...design.study.run import count_finished_runs
 from ...engine.executors import SharedFolder
 from ...engine.processes import process_pool
+from ...report.write import REPORT_FILE
 from .delivery import print_result
-from .execution import DaskAddress, Execution, JoinedFolder, WorkerCount, contributions
+from .execution import Execution, contributions
 from .interruption import check_interrupted
 from .options import Folder, Json
+from .request_options import with_requests
 from .terminal import echo
 
 
+@with_requests
 def study(
     file: Annotated[
         Path,
         typer.Argument(metavar="STUDY.toml", help="A file with scenario, [vary], [design] and [metrics]."),
     ],
+    execution: Execution,
     out: Folder = Path("study"),
-    workers: WorkerCount = None,
-    dask: DaskAddress = None,
-    join: JoinedFolder = None,
     json: Json = False,
 ) -> None:
     """Run a parameter study of a scenario.
@@ -47,12 +49,13 @@ def study(
       airmuscle study study.toml --dask tcp://head-node:8786
       airmuscle study study.toml --join /shared/study    (on each machine)
     """
-    execution = Execution(workers, dask, join)
-    with execution.output(out) as folder:
-        result, shares = _run(load_study(file), folder, execution)
-        chapter = study_chapter(result, execution=shares)
-        page = write_study(result, folder, chapter)
-    print_result([chapter], {"results": out / "results.csv", "report": page} if folder == out else {}, json)
+    loaded, writes = load_study(file), execution.writes(out)
+    with contextlib.nullcontext(out) if writes else temporary_folder() as folder:
+        result, shares = _run(loaded, folder, execution)
+    chapter = study_chapter(result, execution=shares)
+    page = write_study(result, out, chapter) if writes else out / REPORT_FILE
+    if writes or json:
+        print_result([chapter], {"results": out / RESULTS_FILE, "report": page}, json)
     if result.failed.size == len(result.study):
         raise SimulationError(f"all {len(result.study)} runs failed; reason of the first: {result.failure_reasons[0]}")
 

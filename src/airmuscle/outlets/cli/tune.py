@@ -26,10 +26,12 @@ from ...design.tuning import (
 from ...design.tuning import tune as find_gains
 from ...design.tuning.chapter import history_table, tuning_chapter
 from ...design.tuning.scenario_loop import ScenarioLoop, load_scenario_loop
+from ...engine.processes import Workers
 from ...files.scenario.controller import signal_units
 from ...report.write import save_table
 from ..requests.declaration import RequestError, option, request
 from .delivery import deliver
+from .execution import Execution
 from .interruption import check_interrupted
 from .options import Folder, Json
 from .request_options import with_requests
@@ -106,8 +108,9 @@ class TuneRequest:
 
 @with_requests
 def tune(
-    scenario: ScenarioFile, request: TuneRequest, save: Save = None, out: Folder = Path("tuning"), json: Json = False
-) -> None:
+    scenario: ScenarioFile, request: TuneRequest, execution: Execution, save: Save = None,
+    out: Folder = Path("tuning"), json: Json = False,
+) -> None:  # fmt: skip
     """Tune the controller of a scenario for a family of plants.
 
     \b
@@ -120,22 +123,27 @@ def tune(
     Examples:
       airmuscle tune examples/pressure_loop.toml --rules --out tuning
       airmuscle tune lift.toml --bounds "gain=5 1/m:500 1/m" --bounds "integral_time=50 ms:5 s" --budget 20000
+      airmuscle tune lift.toml --join /shared/tuning    (on each machine)
     """
     loaded = load_scenario_loop(scenario)
     target = save or scenario.with_name(f"{scenario.stem}-tuned.toml")
-    for folder in (out, target.parent):
+    writes = execution.writes(out)
+    for folder in (out, target.parent) if writes else ():
         check_writable(folder)
     loaded.check_target(target)
     objective, perturbations = request.objective, request.perturbations
     ranges = loaded.bounds(request.bounds)
-    tuning, notes, rules = _search(loaded, ranges, request, objective, perturbations)
-    loaded.save(tuning.gains, target)
+    with execution.executor(alone=True) as workers:
+        tuning, notes, rules = _search(loaded, ranges, request, objective, perturbations, workers)
+    if writes:
+        loaded.save(tuning.gains, target)
     problem = loaded.scenario.problem
     chapter = tuning_chapter(tuning, loaded.scenario.title, _units(loaded), notes, rules, problem.integrator)
     files = {HISTORY_FILE: lambda path: save_table(history_table(tuning), path)}
     if tuning.interrupted:
         echo("interrupted: the best gains so far are written", err=True)
-    deliver("tune", [chapter], json=json, out=out, title="Tuning", files=files, others={"scenario": target})
+    others = {"scenario": target}
+    deliver("tune", [chapter], json=json, out=out, title="Tuning", files=files, others=others, writes=writes)
     if tuning.interrupted:
         check_interrupted()
         raise KeyboardInterrupt
@@ -143,7 +151,7 @@ def tune(
 
 def _search(
     loaded: ScenarioLoop, ranges: Mapping[str, tuple[float, float]], request: TuneRequest, objective: RobustObjective,
-    perturbations: Perturbations,
+    perturbations: Perturbations, workers: Workers,
 ) -> tuple[Tuning, tuple[str, ...], tuple[RuleSettings, ...]]:  # fmt: skip
     """The tuning, notes on the family of plants, and the settings of the rules."""
     problem = loaded.scenario.problem
@@ -156,7 +164,7 @@ def _search(
         tuning = find_gains(
             family.cases, ranges, duration=problem.duration, index=request.index(), objective=objective,
             budget=request.budget, seed=request.seed, start=rule_starts(rules, ranges), start_time=problem.start_time,
-            integrator=problem.integrator, progress=lambda done, total: show(done / total),
+            integrator=problem.integrator, progress=lambda done, total: show(done / total), workers=workers,
         )  # fmt: skip
     return tuning, family.notes, rules
 

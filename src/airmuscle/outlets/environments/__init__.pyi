@@ -6,6 +6,8 @@ from .randomisation import FitUncertainty as FitUncertainty
 from .randomisation import Randomisation as Randomisation
 from .randomisation import ValueRange as ValueRange
 from .registration import register_environments as register_environments
+from .rollouts import Rollouts as Rollouts
+from .rollouts import roll_out as roll_out
 from .standard import ArmReaching as ArmReaching
 from .standard import JointTracking as JointTracking
 from .standard import LoadLifting as LoadLifting

@@ -86,7 +86,7 @@ def fit_requested(
     )
     errors = specimen_errors(found, recordings, fixed)
     entry = fitted_entry(found, start, names, recordings=recordings, errors=errors)
-    entry, chapters, notes = _more(request, found, entry, recordings, progress)
+    entry, chapters, notes = _more(request, found, entry, recordings, progress, workers)
     odd = odd_specimen_notes(errors)
     chapter = fit_chapter(found, entry, [*notes, *odd, *missing_geometry(entry)], _notes_of(recordings))
     return FittedMuscle(found, entry, [chapter, *chapters], odd)
@@ -117,7 +117,7 @@ def _compare(
         unused = [f"The braid is not used: {best.candidate.name} contains its geometry, which was fitted."]
     errors = ranked_specimen_errors(best, selection.comparisons, recordings)
     entry = fitted_entry(best.fit, initial, names, left_out_ratio(best), recordings, errors)
-    entry, more, notes = _more(request, best.fit, entry, recordings, progress)
+    entry, more, notes = _more(request, best.fit, entry, recordings, progress, workers)
     comparisons = _with_notes_once(compare_chapters(selection.comparisons, best, selection.reason))
     odd = odd_specimen_notes(errors)
     notes = [*notes, *unused, *odd, *missing_geometry(entry)]
@@ -135,11 +135,12 @@ def _candidates(request: FitRequest, recordings: list[Recording], named: Initial
 
 
 def _more(
-    request: FitRequest, found: Fit, entry: Entry, recordings: list[Recording], progress: Progress | None
-) -> tuple[Entry, list[Chapter], list[str]]:
+    request: FitRequest, found: Fit, entry: Entry, recordings: list[Recording], progress: Progress | None,
+    workers: Workers,
+) -> tuple[Entry, list[Chapter], list[str]]:  # fmt: skip
     """The entry with a constrained surface if one is requested, chapters of further results, and notes."""
     chapters, notes = list[Chapter](), list[str]()
-    uncertainty = _uncertainty(request, found, recordings, progress)
+    uncertainty = _uncertainty(request, found, recordings, progress, workers)
     if request.shape:
         shaped = _shaped(request, found, recordings)
         chapters.append(shape_chapter(shaped, found, len(request.free_contraction)))
@@ -156,14 +157,16 @@ def _more(
 
 
 def _uncertainty(
-    request: FitRequest, found: Fit, recordings: list[Recording], progress: Progress | None
+    request: FitRequest, found: Fit, recordings: list[Recording], progress: Progress | None, workers: Workers
 ) -> Uncertainty:
     weak = weakly_determined(found) if WEAK in request.profile else ()
     names = dict.fromkeys((*weak, *(name for name in request.profile if name != WEAK)))
     sample = None
     if request.bootstrap is not None:
         report = None if progress is None else lambda fraction: progress("refits", fraction)
-        sample = bootstrap(found, recordings, refits=request.bootstrap, by=request.split, progress=report)
+        sample = bootstrap(
+            found, recordings, refits=request.bootstrap, by=request.split, progress=report, workers=workers
+        )
     profiles = tuple(profile(found, name) for name in names)
     return Uncertainty(found, sample, profiles, WEAK in request.profile and not weak)
 

@@ -11,6 +11,7 @@ import numpy as np
 from ....core.arrays import Array
 from ....core.errors import IdentificationError
 from ....core.short_repr import ShortRepr
+from ....engine.processes import Workers, process_pool
 from ....physics.muscle import CreepElements, LinearDamper, Muscle
 from ....physics.muscle.characteristic.base import ForceLaw
 from ....physics.muscle.friction import Friction, NoFriction
@@ -153,6 +154,7 @@ def identify_campaign(
     progress: Callable[[str, float], None] | None = None,
     finished: Callable[[str, object], None] | None = None,
     known: Mapping[str, Any] | None = None,
+    workers: Workers = 1,
 ) -> Campaign:
     """Identify one muscle from all recordings of a rig.
 
@@ -164,6 +166,7 @@ def identify_campaign(
     progress  called with the name of the stage and the completed fraction of the campaign
     finished  called with the name and the result of each stage as it ends
     known     results of finished stages by name, from an interrupted call with the same recordings and geometry
+    workers   number of processes, as in `compare`: of the fits of loops and of the candidates of the static law
 
     Raises IdentificationError where no record can be used.
     """
@@ -174,9 +177,12 @@ def identify_campaign(
     steps.end("records", records)
     creep = steps.fit("creep", lambda _: fit_creep_stage(_of_kind(records, RecordKind.CREEP)))
     elements = creep.elements if isinstance(creep, CreepStage) else CreepElements()
-    hysteresis = steps.fit("hysteresis", lambda show: fit_friction_stage(records, elements, show))
-    friction = hysteresis.friction if isinstance(hysteresis, FrictionStage) else NoFriction()
-    static = steps.fit("static characteristic", lambda show: fit_static_stage(records, friction, elements, show))
+    with process_pool(workers, one_thread_each=True, terminate=True) as executor:
+        hysteresis = steps.fit("hysteresis", lambda show: fit_friction_stage(records, elements, show, executor))
+        friction = hysteresis.friction if isinstance(hysteresis, FrictionStage) else NoFriction()
+        static = steps.fit(
+            "static characteristic", lambda show: fit_static_stage(records, friction, elements, show, executor)
+        )
     fills = steps.fit("fills and volume", lambda show: _fit_fills(records, static, geometry, show))
     partial = Campaign(records, creep, hysteresis, static, fills, LeftOutStage("release", "", ""), (), geometry)
     releases = _of_kind(records, RecordKind.RELEASE)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from ....core.arrays import Array
 from ....core.errors import AirmuscleError
 from ....core.short_repr import ShortRepr
+from ....engine.distribution import DistributedCalls
 from ....physics.muscle import CreepElements
 from ....physics.muscle.friction import Friction, NoFriction
 from ....recording import Recording
@@ -67,8 +69,9 @@ class FrictionStage(ShortRepr):
 
 
 def fit_friction_stage(
-    records: Sequence[CampaignRecord], creep: CreepElements, progress: Callable[[float], None]
-) -> FrictionStage | LeftOutStage:
+    records: Sequence[CampaignRecord], creep: CreepElements, progress: Callable[[float], None],
+    executor: Executor | None = None,
+) -> FrictionStage | LeftOutStage:  # fmt: skip
     """Fit every friction law to the loops at constant pressure of all specimens together.
 
     The force of the creep elements is added before, so that it is not taken for friction. Each loop has its own static
@@ -81,19 +84,20 @@ def fit_friction_stage(
             NAME, reason, "shorten and lengthen the muscle slowly at constant pressure, at three pressures or more"
         )
     kept = _spread(loops)
-    fits = []
-    for i, loop in enumerate(kept):
-        fits.append(fit_loop(loop))
-        progress(0.5 * (i + 1) / len(kept))
+    fits = DistributedCalls(executor, _fit_loop, None).results(kept, lambda done: progress(0.5 * done / len(kept)))
     count = [0]
 
     def advance(_: str) -> None:
         count[0] += 1
         progress(0.5 + 0.5 * min(count[0] / 5.0, 1.0))
 
-    joint = fit_jointly(fits, progress=advance)
+    joint = fit_jointly(fits, progress=advance, workers=executor or 1)
     best = preferred_fit(joint)
     return FrictionStage(_friction(best, fits), tuple(fits), joint, len(loops) - len(kept))
+
+
+def _fit_loop(_: None, loop: HysteresisLoop) -> LoopFit:
+    return fit_loop(loop)
 
 
 def _friction(best: JointFit | None, fits: Sequence[LoopFit]) -> Friction:

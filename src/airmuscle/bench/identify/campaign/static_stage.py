@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 
 from ....core.errors import AirmuscleError
 from ....core.short_repr import ShortRepr
@@ -68,8 +69,9 @@ class StaticStage(ShortRepr):
 
 
 def fit_static_stage(
-    records: Sequence[CampaignRecord], friction: Friction, creep: CreepElements, progress: Callable[[float], None]
-) -> StaticStage | LeftOutStage:
+    records: Sequence[CampaignRecord], friction: Friction, creep: CreepElements, progress: Callable[[float], None],
+    executor: Executor | None = None,
+) -> StaticStage | LeftOutStage:  # fmt: skip
     """Select and fit the static characteristic to the quasi-static rows of all records.
 
     The friction and creep forces along the motion of each record are added to the measured force, so that the law is
@@ -87,7 +89,7 @@ def fit_static_stage(
     cleaned = [rows for rows in cleaned if len(rows)]
     try:
         points = tuple(thin(r, max(FIT_ROWS // len(cleaned), MIN_FIT_ROWS)) for r in cleaned)
-        comparison = compare(points, progress=lambda _, fraction: progress(0.9 * fraction))
+        comparison = compare(points, workers=executor or 1, progress=lambda _, fraction: progress(0.9 * fraction))
         fit, parts = comparison.recommended.fit, _parts_at_levels(used, points, friction, creep)
         bands = calibrate(fit, *parts)
         held = calibrate_held(fit, *parts, bands[0])

@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ....core.arrays import Array
+from ....engine.distribution import DistributedCalls
+from ....engine.processes import Workers, process_pool
 from ....physics.muscle.friction import Friction, IdentifiedFriction, PressureScaledFriction
 from ...segment.runs import RELATIVE_BAND
 from ..identifiability import UndeterminedCombination
@@ -50,24 +52,33 @@ def _reason_against(loop_fit: LoopFit) -> str:
     return " ".join(loop_fit.fits[0].reservations_of_rows)
 
 
-def fit_jointly(loop_fits: Sequence[LoopFit], *, progress: Callable[[str], None] | None = None) -> tuple[JointFit, ...]:
+def fit_jointly(
+    loop_fits: Sequence[LoopFit], *, progress: Callable[[str], None] | None = None, workers: Workers = 1
+) -> tuple[JointFit, ...]:
     """Fit every friction law to all loops together, lowest AICc first; empty for fewer than two usable loops.
 
     Each run has its own static curve, all runs have one friction. Its force scale depends on the pressure
     (`PressureScaledFriction`) if the F test and AICc favour this, and is constant otherwise.
+
+    progress  called with a text for each law
+    workers   number of processes, as in `compare`: a law is a task
     """
     usable = joinable_fits(loop_fits)
     if len(usable) < 2:
         return ()
-    fits = []
+    tasks = []
     for law in {type(fit.friction): None for each in usable for fit in each.fits}:
         own = [next((fit for fit in each.fits if type(fit.friction) is law), None) for each in usable]
         complete = [fit for fit in own if fit is not None]
         if len(complete) == len(usable):
+            tasks.append(complete)
+    fits: dict[int, JointFit] = {}
+    with process_pool(workers) as executor:
+        for i, fit in DistributedCalls(executor, _fit_law, usable).completed(tasks):
+            fits[i] = fit
             if progress is not None:
-                progress(f"{law.__name__}, all runs")
-            fits.append(_fit_law(complete, usable))
-    return tuple(sorted(fits, key=lambda fit: -fit.aicc_reduction))
+                progress(f"{fit.name}, all runs")
+    return tuple(sorted((fits[i] for i in sorted(fits)), key=lambda fit: -fit.aicc_reduction))
 
 
 def identified_friction(friction: Friction, runs: Sequence[LoopSeries]) -> Friction:
@@ -82,7 +93,7 @@ def identified_friction(friction: Friction, runs: Sequence[LoopSeries]) -> Frict
     return IdentifiedFriction(friction, float(low - margin), float(high + margin), **range_of_speed)
 
 
-def _fit_law(own: Sequence[HysteresisFit], usable: Sequence[LoopFit]) -> JointFit:
+def _fit_law(usable: Sequence[LoopFit], own: Sequence[HysteresisFit]) -> JointFit:
     """One law fitted to all runs, with a constant and with a pressure-dependent scale; the better of the two."""
     runs = [fit.series for fit in own]
     pressures = np.array([_mean_pressure(run) for run in runs])
