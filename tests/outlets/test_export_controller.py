@@ -40,7 +40,7 @@ from airmuscle.engine import (
 from airmuscle.engine.run import prepare_loop
 from airmuscle.errors import FileError, ParameterError
 from airmuscle.outlets import write_controller
-from airmuscle.outlets.export.microcontroller import COMPILER, EMULATOR, PROCESSORS, run_in_emulator
+from airmuscle.outlets.export.compiler import COMPILER, EMULATOR, PROCESSORS, run_in_emulator
 from airmuscle.outlets.export.printed_controller import print_controller
 
 SENSED = (ColumnSensor("position", resolution=5e-5, delay=2, lag=3e-3), ColumnSensor("pressure", noise=500.0, delay=1))

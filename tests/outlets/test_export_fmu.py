@@ -30,7 +30,7 @@ from airmuscle.engine import ControlLoop, Problem, Rodas4, RungeKutta4, Schedule
 from airmuscle.errors import FileError, ParameterError
 from airmuscle.outlets import write_fmu
 from airmuscle.outlets.export import compiler
-from airmuscle.outlets.export.fmi_units import BASE, base_powers
+from airmuscle.outlets.export.fmi_variables import BASE, base_powers
 from airmuscle.physics import ValidityRange
 
 pytestmark = pytest.mark.tool

@@ -496,7 +496,7 @@ def test_an_unexpected_exception_fails_only_its_own_run(folder: Path, monkeypatc
             raise ZeroDivisionError("by nothing")
         return solve(*given, **named)
 
-    monkeypatch.setattr("airmuscle.design.study.scenario_runs.solve", failing)
+    monkeypatch.setattr("airmuscle.design.study.chunk.solve", failing)
     result = run(folder)
     assert [r for r in result.failure_reasons if r] == ["ZeroDivisionError: by nothing"]
 

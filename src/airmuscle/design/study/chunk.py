@@ -1,4 +1,4 @@
-"""Chunks: groups of runs of a study, their results, and the files in which these are stored.
+"""Chunks: groups of runs of a study, their simulation, their results, and the files in which these are stored.
 
 The name of a chunk file is the fingerprint of everything that its content depends on. An existing chunk therefore need
 not be computed again, even if the study was interrupted; if an input has changed, no file matches, and the chunk is
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,13 +17,46 @@ import numpy.typing as npt
 
 from ...core.arrays import Array
 from ...core.atomic_output import atomic_file
-from ...core.errors import FileError
+from ...core.errors import AirmuscleError, FileError, SimulationError
 from ...core.fingerprint import fingerprint, program_fingerprint
 from ...engine.processes import check_running
+from ...engine.run import Problem, solve
+from ...engine.run.output_times import output_times
 from ...files.scenario.scenario import Scenario
 from ...recording import Recording
-from .scenario_runs import RUN_ERRORS, failure_reason, simulate_all
 from .study import Study, load_study
+
+RUN_ERRORS = (AirmuscleError, ArithmeticError, ValueError)
+"""Exceptions that fail a single run, without ending the study."""
+
+
+def simulate_all(scenarios: Sequence[Scenario], times: Array) -> Iterator[Recording | str]:
+    """Simulate scenarios in order, with additional rows at `times` [s]; yield the reason (text) of a failed run.
+
+    Raises KeyboardInterrupt if the user interrupts a run.
+    """
+    for scenario in scenarios:
+        try:
+            problem = dataclasses.replace(scenario.problem, output_times=_output_times(scenario.problem, times))
+            yield solve(problem).raise_if_incomplete().recording
+        except RUN_ERRORS as error:
+            if isinstance(error, SimulationError) and error.interrupted:
+                raise KeyboardInterrupt from None
+            yield failure_reason(error)
+
+
+def failure_reason(error: Exception) -> str:
+    """The reason of a failed run, on one line."""
+    kind = "" if isinstance(error, AirmuscleError) else f"{type(error).__name__}: "
+    return f"{kind}{' '.join(str(error).split())}"
+
+
+def _output_times(problem: Problem, times: Array) -> Array:
+    """The output times of the problem and those of `times` that lie within the run [s]."""
+    within = times[(times >= problem.start_time) & (times < problem.end_time)]
+    instants = np.append(within, problem.end_time)
+    return output_times(problem.output_times, problem.start_time, problem.duration, instants)
+
 
 _loaded: dict[tuple[str, str], Study] = {}
 

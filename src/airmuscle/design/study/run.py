@@ -11,9 +11,17 @@ import numpy as np
 from ...core.atomic_output import check_writable
 from ...core.errors import FileError
 from ...engine.distribution import DistributedCalls
-from .chunk import Chunk, chunk_file_name, metric_times, read_chunk, register_study, run_chunk, write_chunk
+from .chunk import (
+    Chunk,
+    chunk_file_name,
+    metric_times,
+    read_chunk,
+    register_study,
+    run_chunk,
+    simulate_all,
+    write_chunk,
+)
 from .result import StudyResult
-from .scenario_runs import simulate_all
 from .study import Study
 
 CHUNK_FOLDER = "chunks"

@@ -1,6 +1,4 @@
-from .building import build_and_run as build_and_run
-from .controller import PRECISIONS as PRECISIONS
-from .controller import write_controller as write_controller
+from .compiler import build_and_run as build_and_run
 from .fmi_package import WrittenFmu as WrittenFmu
 from .fmu import write_fmu as write_fmu
 from .fmu_controller import write_controller_fmu as write_controller_fmu
@@ -22,5 +20,7 @@ from .targets import C99 as C99
 from .targets import JavaScript as JavaScript
 from .targets import Octave as Octave
 from .targets import Target as Target
+from .write import PRECISIONS as PRECISIONS
+from .write import write_controller as write_controller
 from .write import write_law as write_law
 from .write import write_program as write_program

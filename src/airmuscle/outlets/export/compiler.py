@@ -1,7 +1,9 @@
-"""C compiler of the machine, for programs and shared libraries of exported sources."""
+"""C compilers: exported programs built and run on this machine, and on a microcontroller in the emulator QEMU."""
 
 from __future__ import annotations
 
+import dataclasses
+import re
 import shutil
 import subprocess
 from collections.abc import Mapping, Sequence
@@ -9,6 +11,7 @@ from pathlib import Path
 
 from ...core.atomic_output import temporary_folder
 from ...core.errors import FileError, ParameterError
+from .provenance import template
 
 COMPILERS = ("gcc", "clang", "cc")
 OPTIONS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden", "-s")
@@ -58,3 +61,112 @@ def run_command(command: Sequence[str], folder: Path | None = None) -> subproces
         reason = " ".join((done.stderr or done.stdout).split())[:300]
         raise FileError(f"{name} failed with exit code {done.returncode}: {reason}")
     return done
+
+
+@dataclasses.dataclass(frozen=True)
+class BuiltProgram:
+    """Output of an exported program, and the bytes of its code and stack with optimisation for size.
+
+    output      standard output
+    messages    standard error
+    code_size   [bytes] machine code and constants of the sources without `main.c`; None where the program `size` is
+                missing
+    stack_size  [bytes] of the functions of the sources without `main.c` together, without those of the C library; None
+                where it is not known
+    """
+
+    output: str
+    messages: str
+    code_size: int | None
+    stack_size: int | None = None
+
+
+def build_and_run(sources: Sequence[Path]) -> BuiltProgram:
+    """Compile exported C sources in a temporary folder and run the program; the folder of the sources is unchanged.
+
+    Raises ParameterError where there is no compiler, and FileError where the compiler or the program fails.
+    """
+    files = " ".join(p.name for p in sources if p.suffix == ".c")
+    compiler = find_compiler(
+        f". The sources are in {sources[0].parent}; install gcc or clang, or compile them elsewhere: cc -O2 {files} "
+        "-lm -o program. JavaScript and Octave need no compiler."
+    )
+    with temporary_folder() as folder:
+        program, units = folder / "program", [str(p) for p in sources if p.suffix == ".c"]
+        run_command([compiler, "-std=c99", "-O2", "-ffp-contract=off", *units, "-o", str(program), "-lm"])
+        done = run_command([str(program)])
+        code, _ = measure_sizes([compiler], shutil.which("size"), sources, folder)
+        return BuiltProgram(done.stdout, done.stderr, code)
+
+
+def measure_sizes(
+    command: Sequence[str], size: str | None, sources: Sequence[Path], folder: Path
+) -> tuple[int | None, int | None]:
+    """The bytes of machine code and constants, and of the stack, of sources without `main.c`, optimised for size.
+
+    command  compiler and its options
+    size     the program `size` of the compiler
+    """
+    units = [p for p in sources if p.suffix == ".c" and p.name != "main.c"]
+    if not units:
+        return None, None
+    code, stack = 0, 0
+    options = ["-std=c99", "-Os", "-ffp-contract=off", "-fstack-usage", "-c"]
+    for unit in units:
+        target = folder / f"{unit.stem}.o"
+        run_command([*command, *options, str(unit), "-o", str(target)])
+        numbers = re.search(r"^\s*(\d+)", run_command([size, str(target)]).stdout, re.MULTILINE) if size else None
+        code += int(numbers.group(1)) if numbers else 0
+        usage = target.with_suffix(".su")
+        text = usage.read_text() if usage.exists() else ""
+        stack += sum(int(n) for n in re.findall(r"\t(\d+)\t", text))
+    return code or None, stack or None
+
+
+COMPILER, SIZE, EMULATOR = "arm-none-eabi-gcc", "arm-none-eabi-size", "qemu-system-arm"
+PACKAGES = "gcc-arm-none-eabi, libnewlib-arm-none-eabi and qemu-system-arm"
+"""The packages of Debian that contain compiler, C library and emulator."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Processor:
+    """A processor: the options of the compiler, and the board of QEMU on which a program is run."""
+
+    options: tuple[str, ...]
+    board: str
+
+
+PROCESSORS = {
+    "cortex-m4": Processor(("-mcpu=cortex-m4", "-mfpu=fpv4-sp-d16"), "mps2-an386"),
+    "cortex-m7": Processor(("-mcpu=cortex-m7", "-mfpu=fpv5-d16"), "mps2-an500"),
+}
+"""Processors by name: Cortex-M4 with a unit for single precision, Cortex-M7 with one for double precision."""
+
+
+def run_in_emulator(sources: Sequence[Path], processor: Processor) -> BuiltProgram:
+    """Compile exported C for a processor in a temporary folder and run it in QEMU; the output is that of the program.
+
+    Raises ParameterError where compiler or emulator are missing, and FileError where one of them or the program fails.
+    """
+    for program in (COMPILER, EMULATOR):
+        if shutil.which(program) is None:
+            raise ParameterError(
+                f"{program} was not found. The sources are in {sources[0].parent}; to compile and run them for a "
+                f"microcontroller install the packages {PACKAGES} (names of Debian)."
+            )
+    command = [COMPILER, "-mthumb", "-mfloat-abi=hard", *processor.options]
+    with temporary_folder() as folder:
+        units = [str(p) for p in sources if p.suffix == ".c"]
+        for file in ("cortex_m_startup.c", "cortex_m.ld"):
+            (folder / file).write_text(template(file), encoding="utf-8")
+        run_command([
+            *command, "-std=c99", "-O2", "-ffp-contract=off", "-nostartfiles", "--specs=rdimon.specs", "-T",
+            str(folder / "cortex_m.ld"), str(folder / "cortex_m_startup.c"), *units, "-o", str(folder / "program.elf"),
+            "-lm",
+        ])  # fmt: skip
+        done = run_command([
+            EMULATOR, "-M", processor.board, "-display", "none", "-monitor", "none", "-serial", "none",
+            "-semihosting-config", "enable=on,target=native", "-kernel", str(folder / "program.elf"),
+        ])  # fmt: skip
+        code, stack = measure_sizes(command, shutil.which(SIZE), sources, folder)
+        return BuiltProgram(done.stdout, done.stderr, code, stack)

@@ -9,8 +9,7 @@ from collections.abc import Mapping, Sequence
 from importlib import metadata
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from .fmi_units import add_units, has_unit
-from .fmi_variables import Variable
+from .fmi_variables import Variable, add_units, has_unit
 from .provenance import LICENCE
 
 _WORD = r"[A-Za-z_][A-Za-z0-9_]*(\[\d+\])?"

@@ -15,8 +15,7 @@ from ...core.atomic_output import atomic_folder
 from ...core.errors import ParameterError
 from .fmi_description import FmuDescription
 from .platforms import Platform, this_platform
-from .provenance import block_comment
-from .templates import filled, template
+from .provenance import block_comment, filled, template
 
 VERSIONS = (2, 3)
 HEADERS = {

@@ -15,12 +15,11 @@ from .c_source import CSource
 from .c_text import c_array, c_number, c_string, c_strings
 from .fmi_description import FmuDescription, FmuExperiment
 from .fmi_package import FmuPackage, WrittenFmu, check_target, token_of
-from .fmi_units import has_unit
-from .fmi_variables import first_inputs, make_variables, references_of
+from .fmi_variables import first_inputs, has_unit, make_variables, references_of
 from .platforms import Platform
 from .printed_system import acting_parameters
+from .provenance import filled
 from .targets import ExportedRun
-from .templates import filled
 from .write import make_run
 
 SLACK = 1e-10

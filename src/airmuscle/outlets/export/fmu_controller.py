@@ -21,14 +21,12 @@ from ...engine.state import column_units
 from .c_text import c_array, c_number, c_strings
 from .fmi_description import FmuDescription, FmuExperiment
 from .fmi_package import FmuPackage, WrittenFmu, archive, check_target, token_of
-from .fmi_units import base_powers, has_unit
-from .fmi_variables import PARAMETERS, Variable, checked
+from .fmi_variables import PARAMETERS, Variable, base_powers, checked, has_unit
 from .fmu import fmu_package
 from .platforms import Platform
 from .printed_controller import PrintedController, check_control_law, print_controller
-from .provenance import block_comment
+from .provenance import block_comment, filled
 from .targets import program_name
-from .templates import filled
 from .write import checked_name
 
 STRUCTURE, COMMON = (f"http://ssp-standard.org/SSP1/SystemStructure{kind}" for kind in ("Description", "Common"))

@@ -15,10 +15,9 @@ from ...engine.compile.text.programs import JavaScriptLanguage
 from .c_source import csv_header
 from .exported_loop import ExportedLoop
 from .printed_system import ExportedSystem
-from .provenance import block_comment
+from .provenance import block_comment, filled
 from .run_data import RunData
 from .solver_text import BETWEEN, STEP, TABLEAU, SolverText
-from .templates import filled
 
 ULP = """/** The distance from a number to the next. */
 function ulp(value) {

@@ -17,8 +17,7 @@ from ...physics.muscle.characteristic import Characteristic, ContractionLaw, For
 from .c_text import c_array, c_strings
 from .javascript_module import to_json
 from .octave_functions import m_array, m_strings
-from .provenance import block_comment, line_comment, provenance
-from .templates import filled
+from .provenance import block_comment, filled, line_comment, provenance
 
 FORMS: tuple[tuple[type[Characteristic], str, tuple[str, str], tuple[str, str, str]], ...] = (
     (ForceLaw, "force", ("pressure", "contraction"), ("force", "force_by_pressure", "stiffness")),

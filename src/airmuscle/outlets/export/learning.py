@@ -23,9 +23,8 @@ from ...physics.muscle import Muscle
 from ...physics.plant import Plant
 from .actuator import ActuatorModel, actuator_model
 from .onnx_model import onnx_models
-from .provenance import line_comment, provenance
+from .provenance import filled, line_comment, provenance
 from .targets import program_name
-from .templates import filled
 from .write import checked_name, write_files
 
 OF_FILE = {"characteristic": "contractile"}

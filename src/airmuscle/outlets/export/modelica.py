@@ -12,9 +12,8 @@ from ...engine.run import Problem
 from .c_source import CSource
 from .fmi_variables import first_inputs
 from .identifiers import make_identifiers
-from .provenance import block_comment
+from .provenance import block_comment, filled
 from .targets import ExportedRun
-from .templates import filled
 from .write import make_run
 
 _WORDS = """

@@ -26,9 +26,8 @@ from .c_source import CSource
 from .c_text import c_integers, c_number, c_strings
 from .compiler import compile_library
 from .printed_system import export_system
-from .provenance import block_comment, provenance
+from .provenance import block_comment, filled, provenance
 from .targets import program_name
-from .templates import filled
 from .write import checked_name
 
 OLDEST, BROKEN = (3, 17), ("4.0.0",)

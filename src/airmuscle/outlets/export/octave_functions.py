@@ -14,10 +14,9 @@ from ...engine.compile.text.programs import DEFINITION, MatlabBody, MatlabLangua
 from .c_source import csv_header
 from .exported_loop import ExportedLoop
 from .printed_system import ExportedSystem
-from .provenance import line_comment
+from .provenance import filled, line_comment
 from .run_data import RunData
 from .solver_text import BETWEEN, SHAPES, STEP, SolverText
-from .templates import filled
 
 _BODY = MatlabBody()
 _IN_LINE = 6

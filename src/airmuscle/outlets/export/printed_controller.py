@@ -26,8 +26,7 @@ from ...engine.run.sampled_loop import SampledLoop
 from .c_text import c_array, c_number, c_strings, with_cmake
 from .identifiers import make_identifiers
 from .printed_system import find_leaf, make_labels
-from .provenance import block_comment, provenance
-from .templates import filled
+from .provenance import block_comment, filled, provenance
 
 SINGLE_TOLERANCE = 1e-4
 """Part of its range by which a command in single precision may differ from that in double precision (chosen)."""

@@ -1,10 +1,11 @@
-"""Provenance of an exported file: program, hash of the model, parameters, references and licence."""
+"""Frame of exported files: their templates, and comments that state where they come from."""
 
 from __future__ import annotations
 
+import re
 import textwrap
-from collections.abc import Iterable, Sequence
-from importlib import metadata
+from collections.abc import Iterable, Mapping, Sequence
+from importlib import metadata, resources
 from typing import Any
 
 from ...core.errors import printable
@@ -61,3 +62,20 @@ def block_comment(lines: Iterable[str]) -> str:
 def line_comment(lines: Iterable[str]) -> str:
     """The lines as a comment of MATLAB."""
     return "".join(f"% {line}".rstrip() + "\n" for line in lines)
+
+
+def filled(name: str, values: Mapping[str, str], prefix: str) -> str:
+    """A template with the values of its places `@name@`; `model_` and `MODEL_` become the prefix of the program.
+
+    Values are inserted as they are: what stands in them is not replaced. Of a place that is indented and alone in its
+    line every line of the value is indented so; an empty value leaves no line.
+    """
+    text = template(name).replace("model_", f"{prefix}_").replace("MODEL_", f"{prefix.upper()}_")
+    text = re.sub(r"^( +)@(\w+)@\n", lambda mark: textwrap.indent(f"{values[mark[2]]}\n".lstrip("\n"), mark[1]), text,
+                  flags=re.MULTILINE)  # fmt: skip
+    return re.sub(r"@(\w+)@", lambda mark: values[mark.group(1)], text)
+
+
+def template(name: str) -> str:
+    """The text of a template, or of a header that is shipped with the program."""
+    return resources.files(__package__).joinpath("templates", *name.split("/")).read_text(encoding="utf-8")

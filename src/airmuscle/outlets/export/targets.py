@@ -7,8 +7,7 @@ import dataclasses
 from collections.abc import Sequence
 from typing import ClassVar
 
-from .c_loop import loop_main
-from .c_source import CSource
+from .c_source import CSource, loop_main
 from .c_text import with_cmake
 from .exported_loop import ExportedLoop
 from .identifiers import make_identifier
