@@ -7,13 +7,8 @@ from typing import Any
 
 import numpy as np
 
-<<<<<<< HEAD
 from ...engine.compile.text.programs import CBody
-from .templates import filled
-=======
-from ...engine.compile.text.c import CBody
 from .provenance import filled
->>>>>>> 658900e9 (Export and study: files that one file alone used are joined to it)
 
 WIDTH = 116
 _PROGRAM = "add_executable({0}_run main.c)\ntarget_link_libraries({0}_run PRIVATE {0})"
