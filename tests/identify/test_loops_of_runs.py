@@ -7,9 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from airmuscle.bench import find_loops, fit_loop
+from airmuscle.bench import classify_records, find_loops, fit_jointly, fit_loop
+from airmuscle.bench.identify.campaign import fit_friction_stage
+from airmuscle.bench.identify.hysteresis import preferred_fit
 from airmuscle.errors import AirmuscleWarning, IdentificationError
-from airmuscle.physics import MaxwellSlip
+from airmuscle.physics import CreepElements, MaxwellSlip
 from airmuscle.recording import Recording
 
 SLIP = MaxwellSlip((2e4, 1e4), (3e-4, 2e-3))
@@ -75,3 +77,28 @@ def test_a_loop_at_another_held_length_is_no_repeat_without_a_resting_length_eit
         return Recording({**columns, "force": 200.0 + 1e-3 * pressure}, f"{length}")
 
     assert [loop.repeat is not None for loop in find_loops([held(0.3), held(0.296), held(0.2961)])] == [False, True]
+
+
+@pytest.mark.slow
+def test_a_campaign_and_the_command_for_hysteresis_choose_the_same_law():
+    """Loops whose transition takes 20 of 900 rows: every sixth row no longer shows its form."""
+    rng, rows = np.random.default_rng(4), np.arange(900.0)
+    swept = 0.0173 * (1.0 - np.cos(2.0 * np.pi * rows / 900))
+    friction = np.where(rows < 450, 1.0, -1.0) * np.tanh(np.minimum(rows, 900 - rows) / 20.0)
+    runs = [
+        Recording(
+            {
+                "time": 0.05 * rows,
+                "pressure": 1e5 * bar + 1.5e3 * rng.standard_normal(900),
+                "contraction": swept / 0.173 + 6e-5 * rng.standard_normal(900),
+                "force": bar * (100.0 - 3e3 * swept - 5.6 * friction) + rng.standard_normal(900),
+            },
+            f"{bar} bar",
+            {"resting_length": 0.173},
+        )
+        for bar in (2.0, 3.5, 5.0)
+    ]
+    stage = fit_friction_stage(classify_records(runs), CreepElements(), lambda _: None)
+    chosen = preferred_fit(fit_jointly([fit_loop(loop) for loop in find_loops(runs)]))
+    assert stage.selected.name == chosen.name
+    assert stage.selected.rmse == pytest.approx(chosen.rmse, rel=0.05)

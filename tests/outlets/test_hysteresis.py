@@ -167,7 +167,7 @@ def test_without_a_muscle_the_friction_stands_in_a_table_that_a_plant_takes(two,
     data = json.loads(result.stdout)
     assert data["files"]["friction"] == str(tmp_path / "friction.toml")
     found = data["friction"]
-    assert found["recommended"] == found["laws"][0]["law"]
+    assert found["recommended"] in {row["law"] for row in found["laws"]}
     assert "rms_error_on_second_run" not in found["laws"][0], "one run has no second"
     table = tomllib.loads((tmp_path / "friction.toml").read_text(encoding="utf-8"))
     muscle = build_muscle({"library": MUSCLE, **table}, Location("scenario.toml", "plant.muscle", tmp_path))

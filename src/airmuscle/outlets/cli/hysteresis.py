@@ -12,6 +12,7 @@ from ...bench.identify.campaign.campaign_chapters import creep_chapter
 from ...bench.identify.hysteresis import find_loops, fit_jointly, fit_loop
 from ...bench.identify.hysteresis.hysteresis_chapter import hysteresis_chapters
 from ...bench.identify.hysteresis.joint import SelectedFriction, select_friction
+from ...bench.identify.hysteresis.loops import CURVE_DEGREE
 from ...core.atomic_output import check_writable
 from ...files.library.entry import Entry
 from ...files.library.entry_file import load_law
@@ -38,7 +39,7 @@ class HysteresisRequest:
         "Take the muscle's characteristic plus an offset as the friction-free curve; default: a polynomial.",
         default=False,
     )
-    degree: int = option("Degree of the polynomial friction-free curve.", default=3, bounds=(0, 9))
+    degree: int = option("Degree of the polynomial friction-free curve.", default=CURVE_DEGREE, bounds=(0, 9))
     all_rows: bool = option("Include rows in which pressure or length change quickly.", default=False)
     elements: int = option("Number of elements of MaxwellSlip and PrandtlIshlinskii.", default=8, bounds=(1, 30))
     creep: bool = option("Fit creep to the longest hold of every file and write creep elements.", default=False)

@@ -33,8 +33,6 @@ from .record import CampaignRecord, RecordKind
 from .rows import PREDICTED_ROWS, LeftOutStage, displacement, held_steady, path_rows, with_force
 
 NAME = "hysteresis"
-CURVE_DEGREE = 5
-"""Degree of the polynomial static curve of each loop (chosen)."""
 MAX_LOOPS = 6
 """Maximum number of loops that are fitted; of more, those at evenly spaced pressures (chosen)."""
 
@@ -119,12 +117,12 @@ def _find_loops(records: Sequence[CampaignRecord], creep: CreepElements) -> tupl
         usable = []
         for recording in recordings:
             try:
-                find_loops([recording], degree=CURVE_DEGREE, all_rows=True)
+                find_loops([recording], all_rows=True)
             except AirmuscleError as error:
                 failed.append(error.message)
             else:
                 usable.append(recording)
-        loops += find_loops(usable, degree=CURVE_DEGREE, all_rows=True) if usable else ()
+        loops += find_loops(usable, all_rows=True) if usable else ()
     return loops, failed
 
 

@@ -28,7 +28,7 @@ class LeftOutStage:
         return f"Not identified: {self.reason.rstrip('.')}. To identify it, {self.remedy.rstrip('.')}."
 
 
-MAX_ROWS = 160
+MAX_ROWS = 1000
 """Maximum number of rows of a record for a fit of friction (chosen)."""
 PREDICTED_ROWS = 3000
 """Maximum number of rows of a record for which the friction is computed (chosen)."""

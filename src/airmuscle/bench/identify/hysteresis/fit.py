@@ -99,7 +99,7 @@ class PolynomialCurve(StaticCurve):
     """A fitted polynomial in one column: `pressure` in isometric runs, `contraction` in isobaric runs."""
 
     column: str
-    degree: int = 3
+    degree: int
 
     def known_force(self, recording: Recording) -> Array:
         return np.zeros(len(recording))

@@ -88,10 +88,10 @@ class JointFit(Reported):
         """The dependence of the friction on the pressure, as a sentence."""
         if isinstance(self.friction, PressureScaledFriction):
             ratio, reference = self.friction.ambient_ratio, self.friction.reference_pressure / 1e3
+            factor = f"{ratio:.3g} {'-' if ratio > 1 else '+'} {abs(1.0 - ratio):.3g} " if ratio >= 5e-4 else ""
             text = (
-                f"The friction at a gauge pressure p is its value at {reference:.4g} kPa times {ratio:.3g} "
-                f"{'-' if ratio > 1 else '+'} {abs(1.0 - ratio):.3g} p/({reference:.4g} kPa) (F test of this "
-                f"dependence {format_p_value(self.scale_p_value)})."
+                f"The friction at a gauge pressure p is its value at {reference:.4g} kPa times {factor}"
+                f"p/({reference:.4g} kPa) (F test of this dependence {format_p_value(self.scale_p_value)})."
             )
             levels = {round(run.pressure / self.friction.reference_pressure, 1) for run in self.agreement}
             return text if len(levels) > 2 else f"{text} Two pressures determine this dependence but cannot test it."

@@ -39,6 +39,9 @@ from .joint_result import preferred_fit
 from .limits import speed_reservation
 from .result import HysteresisFit
 
+CURVE_DEGREE = 5
+"""Degree of the polynomial static curve of a loop, in `hysteresis` as in `campaign` (chosen)."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class HysteresisLoop(ShortRepr):
@@ -87,7 +90,7 @@ def find_loops(
     recordings: Sequence[Recording],
     *,
     law: Characteristic | None = None,
-    degree: int = 3,
+    degree: int = CURVE_DEGREE,
     all_rows: bool = False,
 ) -> tuple[HysteresisLoop, ...]:
     """The loops in the runs of recordings, one for each kind and level; a second run at a level validates the first.
