@@ -22,8 +22,8 @@ from measure import Section, Target, format_time, print_section, time_variants
 import airmuscle as am
 from airmuscle.core.errors import ParameterError
 from airmuscle.engine.compile.program import compile_system
+from airmuscle.outlets.export.compiler import find_cross_compiler
 from airmuscle.outlets.export.mujoco_plugin import check_mujoco
-from airmuscle.outlets.export.platforms import find_cross_compiler
 
 STEPS = 1000
 TEXT = (

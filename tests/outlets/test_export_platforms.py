@@ -20,9 +20,7 @@ from airmuscle.engine import Problem, RungeKutta4, Schedule
 from airmuscle.errors import ParameterError
 from airmuscle.files import load_law
 from airmuscle.outlets import C99, write_fmu, write_law
-from airmuscle.outlets.export import platforms
-from airmuscle.outlets.export.compiler import run_command
-from airmuscle.outlets.export.platforms import PLATFORMS, find_cross_compiler, find_platform, this_platform
+from airmuscle.outlets.export.compiler import PLATFORMS, find_cross_compiler, find_platform, run_command, this_platform
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "fill_discharge.toml"
 FORMATS = {
@@ -76,7 +74,7 @@ def test_several_platforms_are_in_one_file_and_its_bytes_are_the_same(tmp_path):
 
 
 def test_without_the_cross_compiler_the_package_is_named_and_nothing_is_written(tmp_path, monkeypatch):
-    monkeypatch.setattr(platforms, "PACKAGE", "package_that_is_missing")
+    monkeypatch.setattr("airmuscle.outlets.export.compiler.PACKAGE", "package_that_is_missing")
     with pytest.raises(ParameterError, match=r"need the package package_that_is_missing.*pip install airmuscle\[fmu\]"):
         write_fmu(problem(), tmp_path / "plant.fmu", platforms=[PLATFORMS["win64"]])
     assert list(tmp_path.iterdir()) == []

@@ -14,6 +14,11 @@ from .requirement import LiftRequirement as LiftRequirement
 from .requirement import SizingConditions as SizingConditions
 from .scenario import MOVING as MOVING
 from .scenario import RESTING as RESTING
+from .scenario import air_path as air_path
+from .scenario import discharge_time as discharge_time
+from .scenario import discharge_valve as discharge_valve
+from .scenario import fill_time as fill_time
+from .scenario import fill_valve as fill_valve
 from .scenario import scenario_text as scenario_text
 from .scenario import scenario_valves as scenario_valves
 from .search import SizingResult as SizingResult
@@ -22,8 +27,3 @@ from .search import choose as choose
 from .search import size_muscles as size_muscles
 from .static_muscle import EndPoint as EndPoint
 from .static_muscle import StaticMuscle as StaticMuscle
-from .valve_sizing import air_path as air_path
-from .valve_sizing import discharge_time as discharge_time
-from .valve_sizing import discharge_valve as discharge_valve
-from .valve_sizing import fill_time as fill_time
-from .valve_sizing import fill_valve as fill_valve

@@ -18,8 +18,7 @@ from ...physics.muscle.isobar_plot import isobar_figure
 from ...physics.muscle.isobars import compute_isobars
 from ...report.chapter import Chapter, Plot, Table, TableColumn
 from . import JointRequirement, LiftRequirement, MuscleChoice, SizingConditions, SizingResult
-from .scenario import MOVING, SizingScenario, scenario_valves
-from .valve_sizing import air_path, discharge_time, fill_time
+from .scenario import MOVING, SizingScenario, air_path, discharge_time, fill_time, scenario_valves
 
 SHORT_UNSUITABLE, SHORT_VALVES = 3, 4
 """Rows of the brief view (chosen)."""

@@ -19,7 +19,6 @@ from .distributions import Truncated as Truncated
 from .distributions import Uniform as Uniform
 from .distributions import Variation as Variation
 from .distributions import read_variation as read_variation
-from .fields import read_difference as read_difference
 from .metrics import METRICS as METRICS
 from .metrics import Final as Final
 from .metrics import Maximum as Maximum
@@ -31,8 +30,9 @@ from .metrics import RootMeanSquare as RootMeanSquare
 from .metrics import SettlingTime as SettlingTime
 from .metrics import TimeSeries as TimeSeries
 from .metrics import TimeToReach as TimeToReach
+from .paths import read_difference as read_difference
 from .result import StudyResult as StudyResult
+from .result import sobol_indices as sobol_indices
 from .run import run_study as run_study
-from .sensitivity import sobol_indices as sobol_indices
 from .study import Study as Study
 from .study import load_study as load_study

@@ -15,8 +15,7 @@ from ...report.chapter import BY_ROW, Chapter, NamedValue, Table, TableColumn
 from ...report.write import save_table, write_into
 from .distributions import LevelSet, Variation
 from .plots import study_plots
-from .result import StudyResult
-from .sensitivity import SobolIndices
+from .result import SobolIndices, StudyResult
 from .study import Study
 
 RESULTS_FILE, TIME_SERIES_FILE = "results.csv", "time_series.npz"

@@ -17,7 +17,7 @@ from ...core.arrays import Array
 from ...core.errors import ParameterError
 from ...files.library.fields import custom_field
 from .distributions import LevelSet, Variation
-from .fields import read_count
+from .paths import read_count
 
 MAX_RUNS = 10_000_000
 """Maximum number of runs of a study, whose table fits into the memory of a usual computer."""

@@ -16,7 +16,7 @@ from ...core.errors import ParameterError
 from ...files.library.build import TableReader
 from ...files.library.fields import custom_field
 from ...files.library.location import Location, read_finite_number
-from .fields import read_count, read_difference, read_quantity, read_ratio
+from .paths import read_count, read_difference, read_quantity, read_ratio
 
 MIN_PROBABILITY = 1e-6
 """Minimum probability of the range of a truncated distribution, so that its bounds are exact to ten digits."""

@@ -17,7 +17,7 @@ import numpy as np
 from ...core.arrays import Array
 from ...core.errors import ParameterError
 from ...files.library.fields import custom_field
-from .fields import read_name, read_quantity, read_ratio, read_time
+from .paths import read_name, read_quantity, read_ratio, read_time
 
 
 class Window(NamedTuple):

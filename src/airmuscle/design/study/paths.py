@@ -3,6 +3,9 @@
 All declared parameters of the plant may vary, with the paths of `airmuscle.core.leaves`: `circuit.fill.conductance`. Of
 the other tables, all numbers may vary: `input.fill[0][1]` (value of the first point; `[0][0]` is its time),
 `run.duration`, `run.initial_state.pressure`, `run.integrator.rtol`.
+
+The unit of a field of designs, distributions and metrics is that of the varied parameter, or of the evaluated column:
+such a field is declared with `custom_field` and one of the readers, which receive that unit.
 """
 
 from __future__ import annotations
@@ -10,6 +13,7 @@ from __future__ import annotations
 import copy
 import dataclasses
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,13 +21,14 @@ from typing import Any
 import numpy as np
 
 from ...core.absolute_pressure import AbsolutePressure, ambient_pressure
+from ...core.annotation import abridged
 from ...core.arrays import Array
 from ...core.declaration import parameters
 from ...core.errors import ParameterError, suggestion
 from ...core.tree import absolute_pressures, flatten, leaves, with_parameters
 from ...core.units import ABSOLUTE, quantity
 from ...engine.loop.control_loop import ControlLoop
-from ...files.library.location import Location
+from ...files.library.location import Location, read_finite_number
 from ...files.library.models import model_class
 from ...files.scenario.controller import controller_number_paths
 from ...files.scenario.scenario import Scenario, build_scenario, initial_pressure, run_column_units, scenario_tables
@@ -190,3 +195,43 @@ def _replace_number(tables: Mapping[str, Any], keys: Keys, value: float) -> Mapp
         inner = inner.setdefault(key, {}) if isinstance(inner, dict) else inner[key]
     inner[keys[-1]] = value
     return dict(changed)
+
+
+_NUMBER = re.compile(r"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+
+
+def read_quantity(value: Any, unit: str, where: object) -> float:
+    """A finite number in the contextual unit. Raises ParameterError or UnitError."""
+    return read_finite_number(value, unit, where)
+
+
+def read_difference(value: Any, unit: str, where: object) -> float:
+    """A difference of two quantities, converted without the offset of its unit (degC, bara)."""
+    number = read_finite_number(value, unit, where)
+    return (
+        number - read_finite_number(_NUMBER.sub("0", value, count=1), unit, where) if isinstance(value, str) else number
+    )
+
+
+def read_ratio(value: Any, unit: str, where: object) -> float:
+    """A dimensionless number, or a percentage as text."""
+    return read_finite_number(value, "1", where)
+
+
+def read_time(value: Any, unit: str, where: object) -> float:
+    """A time [s]."""
+    return read_finite_number(value, "s", where)
+
+
+def read_count(value: Any, unit: str, where: object) -> int:
+    """A non-negative integer."""
+    if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+        raise ParameterError(f"{where} is {abridged(value)}; it must be a non-negative integer.")
+    return value
+
+
+def read_name(value: Any, unit: str, where: object) -> str:
+    """A non-empty text."""
+    if not isinstance(value, str) or not value:
+        raise ParameterError(f"{where} is {abridged(value)}; it must be a quoted name.")
+    return value

@@ -11,8 +11,7 @@ import numpy as np
 from ...core.arrays import Array
 from ...core.plotting import BLACK, BLUE, ORANGE, RED, SKY, legend_below, new_figure
 from ...report.chapter import Plot
-from .result import StudyResult
-from .sensitivity import SobolIndices
+from .result import SobolIndices, StudyResult
 
 PANELS_PER_ROW = 3
 MAX_POINTS = 2000

@@ -38,9 +38,8 @@ from ...files.library.location import Location, check_keys, located_errors, read
 from ...files.scenario.scenario import Scenario, build_scenario, load_scenario, run_column_units
 from .design import DESIGNS, Design
 from .distributions import Variation, read_variation
-from .fields import read_count
 from .metrics import METRICS, Metric, Scalar, TimeSeries
-from .paths import ScenarioParameter, ScenarioTemplate
+from .paths import ScenarioParameter, ScenarioTemplate, read_count
 
 TABLES = ("title", "scenario", "chunk_size", "vary", "follow", "design", "metrics")
 CHUNK_SIZE = 32

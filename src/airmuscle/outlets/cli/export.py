@@ -24,9 +24,8 @@ from ..export import (
     write_law,
     write_program,
 )
-from ..export.compiler import PROCESSORS, BuiltProgram, build_and_run, run_in_emulator
+from ..export.compiler import PLATFORMS, PROCESSORS, BuiltProgram, build_and_run, find_platform, run_in_emulator
 from ..export.identifiers import make_identifier
-from ..export.platforms import PLATFORMS, find_platform
 from ..export.robot_description import WRITERS
 from .export_models import export_actuator, export_fmu, export_modelica, export_mujoco, export_robot
 from .options import Folder, Json, complete_entry

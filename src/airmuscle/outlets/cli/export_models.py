@@ -20,7 +20,7 @@ from ..export import (
     write_mujoco_plugin,
     write_ssp,
 )
-from ..export.platforms import Platform
+from ..export.compiler import Platform
 from ..export.robot_description import WRITERS
 from .terminal import echo, print_json
 

@@ -15,13 +15,11 @@ from ...engine.compile.kernel_text import CKernels
 from ...engine.compile.text.programs import CLanguage
 from ...engine.run.integrators import Integrator
 from ...recording.recording import column_heading
-from .c_text import c_array, c_integers, c_number, c_string, c_strings
 from .exported_loop import ExportedLoop
-from .identifiers import make_identifiers
+from .identifiers import c_array, c_integers, c_number, c_string, c_strings, make_identifiers
 from .printed_system import ExportedSystem
 from .provenance import block_comment, filled
-from .run_data import RunData
-from .solver_text import BETWEEN, SHAPES, STEP, TABLEAU, SolverText
+from .solver_text import BETWEEN, SHAPES, STEP, TABLEAU, RunData, SolverText
 
 PUBLIC = frozenset({"prepare", "rhs", "outputs", "partials", "indicators"})
 """Printed functions that other files may call."""
@@ -215,6 +213,6 @@ def _constants(name: str, system: ExportedSystem, run: RunData, loop: ExportedLo
             "static int driver_kinds[DRIVERS][2]", [(int(i), int(kind)) for i, kind in loop.drivers.kinds]
         )
         text += c_array("static double driver_settings[DRIVERS][4]", loop.drivers.settings)
-        text += c_array("static double driver_states[DRIVERS][4]", loop.driver_states)
+        text += c_array("static double driver_states[DRIVERS][4]", loop.drivers.kept)
         text += "static double scratch[2][3][CAPACITY];\n"
     return text

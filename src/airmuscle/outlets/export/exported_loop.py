@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Any
 
-from ...core.arrays import Array
+import numpy as np
+
 from ...core.errors import ParameterError
 from ...engine.loop.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop
 from ...engine.loop.driver import WithDrivers
@@ -84,10 +86,22 @@ class ExportedLoop:
             *(["apply_drivers"] if len(self.drivers.kinds) else []),
         ]
 
-    @property
-    def driver_states(self) -> Array:
-        """The states of the drivers at rest (D, 4)."""
-        return self.drivers.kept
+    def data(self, system: ExportedSystem) -> dict[str, Any]:
+        """What a program states of its loop: names in tuples, numbers in arrays; states of the drivers at rest."""
+        law, signal, table, tunable = (
+            self.controller.law, self.prepared.setpoint_signal, self.drivers, self.controller.tunable
+        )  # fmt: skip
+        return {
+            "sample_time": self.sample_time, "samples": self.samples, "finish": float(self.prepared.instants[-1]),
+            "near": self.near, "columns": self.added_columns, "setpoints": tuple(law.setpoints),
+            "measured_at": np.array(self.measured_at(system), dtype=int).reshape(-1, 2),
+            "commanded": self.prepared.commanded,
+            "initial_memory": np.array([float(value) for value in law.initial_memory.values()]),
+            "parameters": tuple(leaf.path for leaf in tunable),
+            "parameter_defaults": np.array([float(leaf.value) for leaf in tunable]),
+            "setpoint": {"ends": signal.ends, "values": signal.values, "slopes": signal.slopes},
+            "drivers": {"kinds": table.kinds, "settings": table.settings, "states": table.kept},
+        }  # fmt: skip
 
 
 def export_loop(problem: Problem, name: str, title: str, tunable: Sequence[str] | None) -> ExportedLoop:

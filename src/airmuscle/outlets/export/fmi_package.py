@@ -13,8 +13,8 @@ from pathlib import Path
 
 from ...core.atomic_output import atomic_folder
 from ...core.errors import ParameterError
+from .compiler import Platform, this_platform
 from .fmi_description import FmuDescription
-from .platforms import Platform, this_platform
 from .provenance import block_comment, filled, template
 
 VERSIONS = (2, 3)

@@ -9,15 +9,16 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from xml.etree.ElementTree import Element, SubElement
 
 from ...core.errors import ParameterError, printable
+from ...core.tree import Leaf
 from ...engine.compile.jacobians import Place
 from ...engine.run.integrators import Rodas4
 from ...recording.columns import quantity_of
 from .printed_system import ExportedSystem, per_second
-from .run_data import RunData
+from .solver_text import RunData
 
 PARAMETERS, TOLERANCE = "parameters", "relative_tolerance"
 """Beginning of the names of parameters, and name of the tolerance."""
@@ -68,13 +69,7 @@ def make_variables(system: ExportedSystem, run: RunData, indicators: int = 0) ->
         known_quantity = quantity_of(name)
         about = known_quantity.meaning if known_quantity else ""
         add(name, "output", initial="calculated", unit=units[name], description=about)
-    for leaf in system.tunable:
-        low, high = leaf.declared.bounds
-        about = f"{leaf.declared.symbol}: {leaf.declared.meaning}"
-        add(
-            f"{PARAMETERS}.{leaf.path}", "parameter", variability="tunable", initial="exact", start=float(leaf.value),
-            minimum=low, maximum=high, unit=leaf.declared.unit, description=about,
-        )  # fmt: skip
+    variables += parameter_variables(system.tunable, len(variables))
     if isinstance(run.integrator, Rodas4):
         about = "relative tolerance of the integrator in Co-Simulation"
         start = run.integrator.rtol
@@ -83,6 +78,17 @@ def make_variables(system: ExportedSystem, run: RunData, indicators: int = 0) ->
         about = "changes its sign where the rates are not smooth"
         add(f"event_indicator[{i}]", "local", is_indicator=True, description=about)
     return checked(variables)
+
+
+def parameter_variables(tunable: Sequence[Leaf], first: int) -> list[Variable]:
+    """Parameters as tunable variables, whose value references follow each other from `first` on."""
+    return [
+        Variable(
+            f"{PARAMETERS}.{leaf.path}", first + i, "parameter", "tunable", "exact", float(leaf.value),
+            leaf.declared.unit, f"{leaf.declared.symbol}: {leaf.declared.meaning}", *leaf.declared.bounds,
+        )
+        for i, leaf in enumerate(tunable)
+    ]  # fmt: skip
 
 
 def _stated(v: Variable) -> Variable:

@@ -12,11 +12,11 @@ from ...engine.run.integrators import Rodas4
 from ...physics.plant.diagnostics import column_limits, describe_limit
 from ...physics.plant.plant import Plant
 from .c_source import CSource
-from .c_text import c_array, c_number, c_string, c_strings
+from .compiler import Platform
 from .fmi_description import FmuDescription, FmuExperiment
 from .fmi_package import FmuPackage, WrittenFmu, check_target, token_of
 from .fmi_variables import first_inputs, has_unit, make_variables, references_of
-from .platforms import Platform
+from .identifiers import c_array, c_number, c_string, c_strings
 from .printed_system import acting_parameters
 from .provenance import filled
 from .targets import ExportedRun

@@ -18,12 +18,12 @@ from ...engine.loop.inputs import Schedule
 from ...engine.run import Problem, solve
 from ...engine.run.sampled_loop import SampledLoop, prepare_loop
 from ...engine.state import column_units
-from .c_text import c_array, c_number, c_strings
+from .compiler import Platform
 from .fmi_description import FmuDescription, FmuExperiment
 from .fmi_package import FmuPackage, WrittenFmu, archive, check_target, token_of
-from .fmi_variables import PARAMETERS, Variable, base_powers, checked, has_unit
+from .fmi_variables import Variable, base_powers, checked, has_unit, parameter_variables
 from .fmu import fmu_package
-from .platforms import Platform
+from .identifiers import c_array, c_number, c_strings
 from .printed_controller import PrintedController, check_control_law, print_controller
 from .provenance import block_comment, filled
 from .targets import program_name
@@ -85,13 +85,8 @@ def _variables(
         variables.append(Variable(name, len(variables), causality, **attributes))  # type: ignore[arg-type]
 
     for column in law.measured_columns:
-        add(
-            column,
-            "input",
-            start=first[f"{MEASURED}{column}"],
-            unit=units.get(column, ""),
-            description=f"{column}, measured",
-        )
+        start, unit = first[f"{MEASURED}{column}"], units.get(column, "")
+        add(column, "input", start=start, unit=unit, description=f"{column}, measured")
     for signal, value in zip(law.setpoints, prepared.setpoint_values[0].tolist(), strict=True):
         add(f"{SETPOINT}{signal}", "input", start=value, unit=units.get(signal, ""), description=f"{signal} wanted")
     for command, (low, high) in zip(law.inputs, printed.ranges, strict=True):
@@ -100,13 +95,7 @@ def _variables(
             command, "output", variability="discrete", initial="calculated", minimum=low, maximum=high,
             unit=units.get(command, ""), description=about,
         )  # fmt: skip
-    for leaf in printed.tunable:
-        low, high = leaf.declared.bounds
-        about = f"{leaf.declared.symbol}: {leaf.declared.meaning}"
-        add(
-            f"{PARAMETERS}.{leaf.path}", "parameter", variability="tunable", initial="exact", start=float(leaf.value),
-            minimum=low, maximum=high, unit=leaf.declared.unit, description=about,
-        )  # fmt: skip
+    variables += parameter_variables(printed.tunable, len(variables))
     return checked(variables)
 
 
@@ -136,11 +125,7 @@ def _instance(
             f"static const char *const {name}_parameter_names{parameters}", [leaf.path for leaf in printed.tunable]
         ),
     )
-    counts = {
-        "memory": len(law.initial_memory), "measurements": len(law.measured_columns),
-        "setpoints": len(law.setpoints), "commands": len(law.inputs), "parameters": len(printed.tunable),
-    }  # fmt: skip
-    places = {key: str(count) for key, count in counts.items()} | {
+    places = printed.counts | {
         "provenance": block_comment(printed.provenance), "token": token, "period": c_number(sample_time),
         "start": c_number(start), "constants": "".join(constants),
         "functions": printed.sample_in(CLanguage("double", f"{name}_")),

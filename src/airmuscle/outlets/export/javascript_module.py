@@ -16,8 +16,7 @@ from .c_source import csv_header
 from .exported_loop import ExportedLoop
 from .printed_system import ExportedSystem
 from .provenance import block_comment, filled
-from .run_data import RunData
-from .solver_text import BETWEEN, STEP, TABLEAU, SolverText
+from .solver_text import BETWEEN, STEP, TABLEAU, RunData, SolverText, program_data
 
 ULP = """/** The distance from a number to the next. */
 function ulp(value) {
@@ -57,11 +56,14 @@ class JavaScriptModule:
             "SIZES": {"held": sizes.held, "jacobian": sizes.jacobian, "factors": sizes.factors},
             **solver.constants,
         }
-        text = "".join(f"export const {name} = {to_json(value)};\n" for name, value in self._names().items())
+        text = "".join(
+            f"export const {name} = {to_json(value)};\n"
+            for name, value in _camel(program_data(self.system, self.run)).items()
+        )
         text += "".join(f"const {name} = {to_json(value)};\n" for name, value in constants.items())
         comment = block_comment(self.provenance)
         if self.loop is not None:
-            text += f"export const loop = {to_json(self._loop_data(self.loop))};\n"
+            text += f"export const loop = {to_json(_camel(self.loop.data(self.system)))};\n"
             functions += f"\n{self.loop.controller.sample_in(JavaScriptLanguage('control_'))}"
         places = {
             "provenance": comment, "constants": text, "functions": functions,
@@ -87,20 +89,14 @@ class JavaScriptModule:
             "parameters": [leaf.path for leaf in system.tunable],
         }  # fmt: skip
         types = {kind: _union(of) for kind, of in names.items()}
-        if loop is None:
-            return {"provenance": comment, **types, "columns": "", "changes": "", "results": ""}
-        changes = f"  controllerParameters?: Values<{_union(leaf.path for leaf in loop.controller.tunable)}>;\n"
-        changes += (
-            f"  /** Set points {', '.join(loop.controller.law.setpoints) or 'none'}. */\n  setpoint?: Segments;\n"
-        )
-        columns = f" | {_union(loop.added_columns)}"
-        return {
-            "provenance": comment,
-            **types,
-            "columns": columns,
-            "changes": changes,
-            "results": "  samples: number;\n",
-        }
+        changes = columns = ""
+        if loop is not None:
+            columns = f" | {_union(loop.added_columns)}"
+            changes = f"  controllerParameters?: Values<{_union(leaf.path for leaf in loop.controller.tunable)}>;\n"
+            wanted = ", ".join(loop.controller.law.setpoints) or "none"
+            changes += f"  /** Set points {wanted}. */\n  setpoint?: Segments;\n"
+        results = "  samples: number;\n" if loop is not None else ""
+        return {"provenance": comment, **types, "columns": columns, "changes": changes, "results": results}
 
     def _package(self) -> str:
         """The package.json of a folder that npm installs."""
@@ -110,29 +106,6 @@ class JavaScriptModule:
             "type": "module", "types": module["types"], "exports": {".": module},
         }  # fmt: skip
         return json.dumps(content, indent=2) + "\n"
-
-    def _names(self) -> dict[str, Any]:
-        """The constants that importers can read."""
-        system, run, known = self.system, self.run, self.system.compiled.description
-        return {
-            "states": system.state_names,
-            "inputs": system.input_names,
-            "outputs": system.output_names,
-            "units": system.units,
-            "parameters": [leaf.path for leaf in system.tunable],
-            "defaults": system.defaults,
-            "nominal": system.nominal,
-            "inputMinimum": known.input_minimum,
-            "inputMaximum": known.input_maximum,
-            "run": {
-                "initial": run.initial,
-                "start": run.start,
-                "segments": {
-                    "ends": run.segments.ends, "values": run.segments.values, "slopes": run.segments.slopes,
-                },
-                "times": run.times,
-            },
-        }  # fmt: skip
 
     def _simulation(self) -> str:
         """The function `simulate`."""
@@ -145,32 +118,18 @@ class JavaScriptModule:
         }  # fmt: skip
         return filled("loop.mjs", places, self.name)
 
-    def _loop_data(self, loop: ExportedLoop) -> dict[str, Any]:
-        """The constants of a control loop."""
-        law, signal, table = loop.controller.law, loop.prepared.setpoint_signal, loop.drivers
-        return {
-            "sampleTime": loop.sample_time,
-            "samples": loop.samples,
-            "finish": float(loop.prepared.instants[-1]),
-            "near": loop.near,
-            "columns": loop.added_columns,
-            "setpoints": law.setpoints,
-            "measuredAt": loop.measured_at(self.system),
-            "commanded": loop.prepared.commanded,
-            "initialMemory": [float(value) for value in law.initial_memory.values()],
-            "parameters": [leaf.path for leaf in loop.controller.tunable],
-            "parameterDefaults": [float(leaf.value) for leaf in loop.controller.tunable],
-            "setpoint": {"ends": signal.ends, "values": signal.values, "slopes": signal.slopes},
-            "drivers": {"kinds": table.kinds, "settings": table.settings, "states": loop.driver_states},
-        }
-
     def _solver(self) -> SolverText:
         names = {*STEP.values(), *BETWEEN.values()}
-        fields = {name: f"this.{re.sub('_(.)', lambda mark: mark[1].upper(), name)}" for name in names}
+        fields = {name: f"this.{word}" for name, word in zip(names, _camel(dict.fromkeys(names)), strict=True)}
         fields |= {"nominal": "nominal"} | {key: key.upper() for key in TABLEAU}
         sizes = {"STATES": "states.length", "INPUTS": "inputs.length", "STAGES": "WEIGHTS.length",
                  "JACOBIAN": "SIZES.jacobian", "FACTORS": "SIZES.factors"}  # fmt: skip
         return SolverText(JavaScriptKernels(), self.run.integrator, fields, sizes, "work.")
+
+
+def _camel(data: dict[str, Any]) -> dict[str, Any]:
+    """The values by their names in the style of JavaScript."""
+    return {re.sub("_(.)", lambda mark: mark[1].upper(), name): value for name, value in data.items()}
 
 
 def _union(names: Iterable[str]) -> str:

@@ -23,8 +23,8 @@ from ...physics.mechanism import HangingMass
 from ...physics.plant import Plant, open_plant
 from .actuator import control_range, controls_of, single_muscle
 from .c_source import CSource
-from .c_text import c_integers, c_number, c_strings
 from .compiler import compile_library
+from .identifiers import c_integers, c_number, c_strings
 from .printed_system import export_system
 from .provenance import block_comment, filled, provenance
 from .targets import program_name

@@ -15,8 +15,7 @@ from .c_source import csv_header
 from .exported_loop import ExportedLoop
 from .printed_system import ExportedSystem
 from .provenance import filled, line_comment
-from .run_data import RunData
-from .solver_text import BETWEEN, SHAPES, STEP, SolverText
+from .solver_text import BETWEEN, SHAPES, STEP, RunData, SolverText, program_data
 
 _BODY = MatlabBody()
 _IN_LINE = 6
@@ -24,11 +23,11 @@ _IN_LINE = 6
 LOOP_HELP = """% In addition: controller_parameters, those of the control law; setpoint, with the fields ends, values
 % and slopes.
 """
-DRIVER_ARRAYS = """  states = loop.driver_states;
+DRIVER_ARRAYS = """  states = loop.drivers.states;
   scratch = {zeros(3, 0), zeros(3, 0)};
 """
 APPLY_DRIVERS = """    [states, signals, counts, scratch] = apply_drivers( ...
-      loop.driver_kinds, loop.driver_settings, states, states, signals, counts, scratch, start, eps(finish));
+      loop.drivers.kinds, loop.drivers.settings, states, states, signals, counts, scratch, start, eps(finish));
 """
 """The lines that pass commands through their drivers."""
 
@@ -53,7 +52,6 @@ class OctaveFunctions:
         constants = self._constants()
         if self.loop is not None:
             functions += f"\n{self.loop.controller.sample_in(MatlabLanguage('control_'))}"
-            constants += self._loop_constants(self.loop)
         places = {
             "provenance": line_comment(self.provenance), "file": self.name, "functions": f"{DEFINITION}\n{functions}",
             "constants": constants, "solver": filled("solver.m", {**solver.places, **steps}, self.name), **steps,
@@ -84,47 +82,20 @@ class OctaveFunctions:
         return SolverText(MatlabKernels(SHAPES), self.run.integrator, fields, sizes)
 
     def _constants(self) -> str:
-        system, run, known = self.system, self.run, self.system.compiled.description
-        values = {
-            "states": m_strings(system.state_names),
-            "inputs": m_strings(system.input_names),
-            "output_names": m_strings(system.output_names),
-            "units": m_strings(system.units[name] for name in system.columns),
-            "parameters": m_strings(leaf.path for leaf in system.tunable),
-            "defaults": m_array(system.defaults),
-            "nominal": m_array(system.nominal),
-            "input_minimum": m_array(known.input_minimum),
-            "input_maximum": m_array(known.input_maximum),
-            "run.initial": m_array(run.initial),
-            "run.start": m_number(run.start),
-            "run.ends": m_array(run.segments.ends),
-            "run.values": m_array(run.segments.values),
-            "run.slopes": m_array(run.segments.slopes),
-            "run.times": m_array(run.times),
-        }
-        return "".join(f"  model.{name} = {text};\n" for name, text in values.items())
+        """The fields of the model and of its loop."""
+        data = program_data(self.system, self.run)
+        data |= {"units": tuple(self.system.units[name] for name in self.system.columns)}
+        data["output_names"] = data.pop("outputs")
+        data["run"] |= data["run"].pop("segments")
+        return _fields("model", data if self.loop is None else {**data, "loop": self.loop.data(self.system)})
 
-    def _loop_constants(self, loop: ExportedLoop) -> str:
-        law, signal, table = loop.controller.law, loop.prepared.setpoint_signal, loop.drivers
-        values = {
-            "sample_time": m_number(loop.sample_time),
-            "samples": str(loop.samples),
-            "finish": m_number(float(loop.prepared.instants[-1])),
-            "near": m_number(loop.near),
-            "columns": m_strings(loop.added_columns),
-            "measured_at": m_array(loop.measured_at(self.system)),
-            "commanded": m_array(loop.prepared.commanded),
-            "initial_memory": m_array([float(value) for value in law.initial_memory.values()]),
-            "parameters": m_strings(leaf.path for leaf in loop.controller.tunable),
-            "parameter_defaults": m_array([float(leaf.value) for leaf in loop.controller.tunable]),
-            "setpoint.ends": m_array(signal.ends),
-            "setpoint.values": m_array(signal.values),
-            "setpoint.slopes": m_array(signal.slopes),
-            "driver_kinds": m_array(table.kinds),
-            "driver_settings": m_array(table.settings),
-            "driver_states": m_array(loop.driver_states),
-        }
-        return "".join(f"  model.loop.{name} = {text};\n" for name, text in values.items())
+
+def _fields(name: str, value: Any) -> str:
+    """Assignments of a value to a field, of those of a dictionary to its fields."""
+    if isinstance(value, dict):
+        return "".join(_fields(f"{name}.{key}", each) for key, each in value.items())
+    text = m_strings(value) if isinstance(value, tuple) else m_array(value) if np.ndim(value) else m_number(value)
+    return f"  {name} = {text};\n"
 
 
 def m_number(value: float) -> str:

@@ -23,8 +23,7 @@ from ...engine.loop.control_loop import ControlLoop
 from ...engine.run import Problem
 from ...engine.run.compiled_law import trace_sample
 from ...engine.run.sampled_loop import SampledLoop
-from .c_text import c_array, c_number, c_strings, with_cmake
-from .identifiers import make_identifiers
+from .identifiers import c_array, c_number, c_strings, make_identifiers, with_cmake
 from .printed_system import find_leaf, make_labels
 from .provenance import block_comment, filled, provenance
 
@@ -59,17 +58,21 @@ class PrintedController:
         """The instructions of a sample."""
         return instructions(list(self.inputs.values()), list(self.outputs.values()))
 
-    def source_files(self) -> dict[str, str]:
-        """Header and source, by file name."""
-        printer = Printer(CLanguage(self.number, f"{self.name}_", labels=self._labels))
-        printer.add_code("sample", list(self.inputs), self.code, list(self.outputs))
+    @property
+    def counts(self) -> dict[str, str]:
+        """The numbers of memories, measurements, set points, commands and parameters, for the templates."""
         law = self.law
         counts = {
             "memory": len(law.initial_memory), "measurements": len(law.measured_columns),
             "setpoints": len(law.setpoints), "commands": len(law.inputs), "parameters": len(self.tunable),
         }  # fmt: skip
-        places = {key: str(count) for key, count in counts.items()}
-        places |= {
+        return {key: str(count) for key, count in counts.items()}
+
+    def source_files(self) -> dict[str, str]:
+        """Header and source, by file name."""
+        printer = Printer(CLanguage(self.number, f"{self.name}_", labels=self._labels))
+        printer.add_code("sample", list(self.inputs), self.code, list(self.outputs))
+        places = self.counts | {
             "provenance": block_comment(self.provenance), "file": self.name, "enumerations": self._enumerations(),
             "functions": printer.text[-1], "constants": self._constants(), "number": self.number,
         }  # fmt: skip

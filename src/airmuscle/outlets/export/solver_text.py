@@ -1,8 +1,4 @@
-"""Solver of an exported program: the printed step of an integrator, called with the fields of the solver.
-
-The kernels of an integrator have functions `single_step` and `state_between`. Arguments are bound by their names; those
-that no field has are workspace.
-"""
+"""The run of an exported program as numbers, and its solver as text."""
 
 from __future__ import annotations
 
@@ -11,10 +7,84 @@ import functools
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
+from ...core.arrays import Array
+from ...core.errors import ParameterError
 from ...engine.compile.kernel_text.printer import KernelPrinter
 from ...engine.compile.kernel_text.types import TypedKernel
+from ...engine.loop.control_loop import ControlLoop
+from ...engine.loop.piecewise_linear import PiecewiseLinear
+from ...engine.run import Problem
 from ...engine.run.integrators import ExplicitRungeKutta, Integrator, Rodas4
-from .run_data import tableau_arrays
+from .printed_system import ExportedSystem
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class RunData:
+    """A run: `initial` (n,), the segments of the inputs, in a control loop of those that are not commanded, and `times`
+    (N,) of the rows, from `start` [s] on."""
+
+    initial: Array
+    segments: PiecewiseLinear
+    times: Array
+    start: float
+    integrator: Integrator
+
+
+def run_data(problem: Problem, segments: PiecewiseLinear | None = None, times: Array | None = None) -> RunData:
+    """The run of a problem with input signals, whose drivers are resolved into segments; with a control loop, the
+    segments of the inputs that are not commanded, and the output times, are given."""
+    assert problem.integrator is not None
+    return RunData(
+        problem.initial_vector, problem.segments if segments is None else segments,
+        problem.times if times is None else times, problem.start_time, check_integrator(problem.integrator),
+    )  # fmt: skip
+
+
+def program_data(system: ExportedSystem, run: RunData) -> dict[str, Any]:
+    """What a program states of its system and run: names in tuples, numbers in arrays."""
+    known, segments = system.compiled.description, run.segments
+    return {
+        "states": tuple(system.state_names), "inputs": tuple(system.input_names), "outputs": tuple(system.output_names),
+        "units": system.units, "parameters": tuple(leaf.path for leaf in system.tunable),
+        "defaults": system.defaults, "nominal": system.nominal,
+        "input_minimum": known.input_minimum, "input_maximum": known.input_maximum,
+        "run": {
+            "initial": run.initial, "start": run.start, "times": run.times,
+            "segments": {"ends": segments.ends, "values": segments.values, "slopes": segments.slopes},
+        },
+    }  # fmt: skip
+
+
+def check_integrator(integrator: Integrator) -> Integrator:
+    """The integrator. Raises ParameterError for one that has no printed form."""
+    if not integrator.printed_step:
+        raise ParameterError(
+            f"the integrator {type(integrator).__name__} has no printed form; choose Rodas4, RungeKutta4 or "
+            "DormandPrince8."
+        )
+    return integrator
+
+
+def check_open_loop(problem: Problem) -> None:
+    """Raise ParameterError for a problem with a controller."""
+    if isinstance(problem.input, ControlLoop):
+        raise ParameterError(
+            f"the controller {type(problem.input.controller).__name__} cannot be exported to this target; export the "
+            "plant with input signals, or the loop to C, JavaScript, Octave, or as FMUs of an SSP package."
+        )
+
+
+def tableau_arrays(integrator: ExplicitRungeKutta) -> tuple[Array, Array, Array]:
+    """Rows (s, s), weights (s,) and nodes (s,) of an explicit method."""
+    rows, weights = integrator.tableau()
+    count = len(weights)
+    table = np.zeros((count, count))
+    for i, row in enumerate(rows, 1):
+        table[i, : len(row)] = row
+    return table, np.array(weights), np.array([0.0, *(sum(row) for row in rows)])
+
 
 SHAPES: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(

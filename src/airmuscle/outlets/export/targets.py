@@ -1,21 +1,139 @@
-"""Targets of an export: the languages, and the files that each makes of a program."""
+"""Targets of an export: the languages, the files that each makes of a program, and printed laws."""
 
 from __future__ import annotations
 
 import abc
 import dataclasses
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
+from ...core import autodiff
+from ...core.annotation import one_line
+from ...core.errors import ParameterError
+from ...core.tree import Leaf, leaves
+from ...engine.compile.functions import PARAMETERS, Printer
+from ...engine.compile.ir.emission import TargetLanguage
+from ...engine.compile.text.programs import DEFINITION, CLanguage, JavaScriptLanguage, MatlabLanguage
+from ...physics.muscle.characteristic import Characteristic, ContractionLaw, ForceLaw, PressureLaw
 from .c_source import CSource, loop_main
-from .c_text import with_cmake
 from .exported_loop import ExportedLoop
-from .identifiers import make_identifier
-from .javascript_module import JavaScriptModule
-from .law import PrintedLaw
-from .octave_functions import OctaveFunctions
+from .identifiers import c_array, c_strings, make_identifier, with_cmake
+from .javascript_module import JavaScriptModule, to_json
+from .octave_functions import OctaveFunctions, m_array, m_strings
 from .printed_system import ExportedSystem
-from .run_data import RunData
+from .provenance import block_comment, filled, line_comment, provenance
+from .solver_text import RunData
+
+FORMS: tuple[tuple[type[Characteristic], str, tuple[str, str], tuple[str, str, str]], ...] = (
+    (ForceLaw, "force", ("pressure", "contraction"), ("force", "force_by_pressure", "stiffness")),
+    (ContractionLaw, "contraction", ("pressure", "force"),
+     ("contraction", "contraction_by_pressure", "contraction_by_force")),
+    (PressureLaw, "pressure", ("contraction", "force"), ("pressure", "pressure_by_contraction", "pressure_by_force")),
+)  # fmt: skip
+"""The closed form of each kind of law: method, arguments, and results; the stiffness is -dF/deps [N]."""
+UNITS = {"pressure": "Pa", "contraction": "1", "force": "N"}
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class PrintedLaw:
+    """A law as expressions, with what its files state."""
+
+    name: str
+    method: str
+    arguments: tuple[str, str]
+    results: tuple[str, str, str]
+    symbols: tuple[Any, Any]
+    parameters: Any
+    values: Any
+    known: tuple[Leaf, ...]
+    provenance: Sequence[str]
+
+    @property
+    def defaults(self) -> list[float]:
+        """The values of the parameters."""
+        return [float(leaf.value) for leaf in self.known]
+
+    def text(self, language: TargetLanguage) -> tuple[str, int]:
+        """`prepare` and the function `evaluate(argument, argument, c, result)`, and the length of c."""
+        printer = Printer(language)
+        inputs = dict(zip(self.arguments, self.symbols, strict=True))
+        printer.add("evaluate", {**inputs, PARAMETERS: self.parameters}, {"result": self.values}, self.arguments)
+        return printer.module(), printer.held
+
+    def _places(self, held: int) -> dict[str, str]:
+        first, second = self.arguments
+        return {
+            "provenance": block_comment(self.provenance), "file": self.name, "held": str(held),
+            "parameters": str(len(self.known)), "first": first, "second": second,
+            "first_unit": UNITS[first], "second_unit": UNITS[second], "results": ", ".join(self.results),
+        }  # fmt: skip
+
+    def c_files(self) -> dict[str, str]:
+        """Header and source."""
+        text, held = self.text(CLanguage("double", f"{self.name}_", None))
+        size = f"[{self.name.upper()}_PARAMETERS + 1]"
+        constants = c_array(f"const double {self.name}_defaults{size}", self.defaults, 1)
+        constants += c_strings(f"const char *const {self.name}_parameter_names{size}", (p.path for p in self.known))
+        places = {**self._places(held), "functions": text, "constants": constants}
+        return {
+            f"{self.name}.h": filled("law.h", places, self.name),
+            f"{self.name}.c": filled("law.c", places, self.name),
+        }
+
+    def javascript_files(self) -> dict[str, str]:
+        """A module."""
+        text, held = self.text(JavaScriptLanguage())
+        names = to_json(list(self.results))
+        constants = f"export const parameters = {to_json([p.path for p in self.known])};\n"
+        constants += f"export const defaults = {to_json(self.defaults)};\nexport const results = {names};\n"
+        places = {**self._places(held), "functions": text, "constants": constants}
+        return {f"{self.name}.mjs": filled("law.mjs", places, self.name)}
+
+    def octave_files(self) -> dict[str, str]:
+        """A function file."""
+        text, held = self.text(MatlabLanguage())
+        places = {
+            **self._places(held), "provenance": line_comment(self.provenance), "defaults": m_array(self.defaults),
+            "names": m_strings(p.path for p in self.known), "functions": f"{DEFINITION}\n{text}",
+        }  # fmt: skip
+        return {f"{self.name}.m": filled("law.m", places, self.name)}
+
+
+def print_law(law: Characteristic, name: str, title: str) -> PrintedLaw:
+    """A law ready for printing. Raises ParameterError for a law without closed form, which it names."""
+    import casadi
+
+    if not isinstance(law, Characteristic):
+        raise ParameterError(f"{one_line(law)} is not a characteristic; pass load('dmsp-20-300').characteristic, say.")
+    check_closed_form(law)
+    _, method, arguments, results = next(form for form in FORMS if isinstance(law, form[0]))
+    model, parameters = autodiff.symbolic(law)
+    x = casadi.SX.sym("x"), casadi.SX.sym("y")
+    value = casadi.SX(getattr(model, method)(*x))
+    autodiff.check_finite(value, f"{type(law).__name__}.{method}")
+    slopes = [casadi.jacobian(value, each) for each in x]
+    if method == "force":
+        slopes[1] = -slopes[1]
+    # NaN for a missing argument: a printed comparison takes one of its branches, such as the lower limit of the force.
+    known = casadi.logic_and(*(casadi.logic_or(each >= 0, each < 0) for each in x))
+    values = casadi.if_else(known, casadi.densify(casadi.vertcat(value, *slopes)), x[0] + x[1])
+    lines = provenance(title, law)
+    return PrintedLaw(name, method, arguments, results, x, parameters, casadi.cse(values), tuple(leaves(law)), lines)
+
+
+def check_closed_form(model: Any) -> None:
+    """Raise ParameterError, with its class, for a model of which a part has no closed form."""
+    if isinstance(model, tuple):
+        for item in model:
+            check_closed_form(item)
+    elif dataclasses.is_dataclass(model) and not isinstance(model, type):
+        if not autodiff.is_traceable(type(model)):
+            raise ParameterError(
+                f"{type(model).__name__} has no closed form and cannot be exported. Approximate it first, with its "
+                "error: as_force_law(law, validity_range) for a characteristic, as_polynomial for a geometry."
+            )
+        for field in dataclasses.fields(model):
+            check_closed_form(getattr(model, field.name))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -21,12 +21,11 @@ from ...engine.run.sampled_loop import prepare_loop
 from ...physics.muscle.characteristic import Characteristic
 from .exported_loop import CONTROLLER, export_loop
 from .identifiers import make_identifier
-from .law import print_law
 from .printed_controller import check_control_law, check_single_precision, print_controller
 from .printed_system import export_system
 from .provenance import provenance
-from .run_data import check_open_loop, loop_data, run_data
-from .targets import C99, ExportedRun, Target, program_name
+from .solver_text import check_open_loop, run_data
+from .targets import C99, ExportedRun, Target, print_law, program_name
 
 NOTE = (
     "The equations are those of the model. The program does not report where a run leaves the validity range of a "
@@ -75,7 +74,7 @@ def make_run(
     if with_loop and isinstance(problem.input, ControlLoop):
         plant_parameters, of_controller = _divided(tunable)
         loop = export_loop(problem, f"{name}_controller", title, of_controller)
-        run = loop_data(problem, loop.others, loop.prepared.times)
+        run = run_data(problem, loop.others, loop.prepared.times)
     else:
         check_open_loop(problem)
         run = run_data(problem)
