@@ -105,7 +105,7 @@ def outlier_notes(recordings: Sequence[Recording]) -> list[str]:
     ]
     rows = sum(map(len, timed))
     rms = math.sqrt(sum((outlier.value - outlier.expected) ** 2 for _, outlier in found) / rows)
-    if len(found) < MIN_SHARE * rows and rms < MIN_RMS * greatest:
+    if not found or (len(found) < MIN_SHARE * rows and rms < MIN_RMS * greatest):
         return []
     files = len({run.origin for run, _ in found})
     examples = "; ".join(_describe_outlier(run, outlier) for run, outlier in found[:3])

@@ -19,7 +19,6 @@ from ...core.arrays import Array, as_slice
 from .model_evidence import student_quantile
 from .parameter_covariance import (
     LEAST_DEGREES_OF_FREEDOM,
-    MIN_DEGREES_OF_FREEDOM,
     MIN_GROUP_ROWS,
     MIN_GROUPS,
     PARTS,
@@ -31,6 +30,8 @@ from .parameter_covariance import (
     successive_parts,
 )
 
+MIN_DEGREES_OF_FREEDOM = 1.6
+"""Minimum of the median of the estimates' degrees of freedom for groups of rows (chosen)."""
 _MIN_SHARE = 1e-6
 """Minimum share of the information on a combination of population parameters that remains without a run (chosen)."""
 
