@@ -179,7 +179,7 @@ def test_bristles_carry_the_name_of_their_muscle():
 
 
 def test_a_run_says_which_friction_was_on():
-    assert "friction: Dahl(stiffness=50000.0, coulomb_force=20.0)" in loops_of(Dahl(5e4, 20.0), 0.1).notes
+    assert "friction: Dahl(stiffness=50000, coulomb_force=20)" in loops_of(Dahl(5e4, 20.0), 0.1).notes
     assert "friction: off" in loops_of(NoFriction(), 0.1).notes
 
 

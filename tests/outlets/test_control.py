@@ -393,11 +393,21 @@ def test_the_program_runs_the_example(tmp_path: Path):
     assert done.exit_code == 0, done.output
     shown = json.loads(done.stdout)
     ranges = {row["column"]: row for row in shown["simulation"]["ranges"]}
-    assert ranges["setpoint.pressure"]["unit"] == "Pa"
-    assert ranges["pressure"]["last"] == pytest.approx(1.5e5, rel=0.05)
+    assert ranges["setpoint.pressure"]["unit"] == "kPa"
+    assert ranges["pressure"]["last"] == pytest.approx(150.0, rel=0.05)
     with (tmp_path / "run" / "recording.csv").open(encoding="utf-8") as file:
         heading = next(row for row in csv.reader(file) if row[0] == "time [s]")
     assert {"measured.pressure [Pa]", "command.discharge [1]"} <= set(heading)
+
+
+def test_a_controller_of_many_parts_is_named_by_them_and_a_single_one_with_its_gains():
+    cascade, single = (
+        load_scenario(ROOT / "examples" / name).problem.input for name in ("joint_cascade.toml", EXAMPLE)
+    )
+    parts = "WithSensors(Cascade(Cascade(PID, CoContraction), ProportionalFeedback), ColumnSensor, "
+    assert cascade.describe({}).startswith(parts)
+    assert single.describe({}).startswith("PID(measured='pressure', commanded=SplitRange(positive='fill', ")
+    assert f"gain={single.controller.gain:.12g}, " in single.describe({})
 
 
 @pytest.mark.slow  # `./run test` runs all examples

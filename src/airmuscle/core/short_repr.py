@@ -15,6 +15,8 @@ MAX_VALUE = 60
 """Maximum number of characters of a value."""
 WIDTH = 100
 """Characters of a line."""
+MAX_DESCRIPTION = 300
+"""Characters above which a description names the parts of a model without their numbers (chosen)."""
 
 
 class ShortRepr:
@@ -58,3 +60,38 @@ def _sequence(value: tuple[Any, ...] | list[Any]) -> str:
             return text
     classes = list(dict.fromkeys(type(item).__name__ for item in value))
     return f"({len(value)} of {' and '.join(classes[:2])}{' ...' if len(classes) > 2 else ''})"
+
+
+def describe_model(model: Any) -> str:
+    """A model in one line: its class and the fields that differ from their defaults, or only the classes of its parts
+    if that line were too long; reports have all numbers. Floats have twelve digits, without the rounding of units."""
+    text = _described(model)
+    return text if len(text) <= MAX_DESCRIPTION else _structure(model)
+
+
+def _described(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.12g}"
+    if isinstance(value, tuple):
+        return f"({', '.join(map(_described, value))}{',' * (len(value) == 1)})"
+    if not _is_model(value):
+        return repr(value)
+    fields = [(f, getattr(value, f.name)) for f in dataclasses.fields(value) if f.repr]
+    texts = [f"{f.name}={_described(each)}" for f, each in fields if not _is_default(f, each)]
+    return f"{type(value).__name__}({', '.join(texts)})"
+
+
+def _is_model(value: Any) -> bool:
+    return dataclasses.is_dataclass(value) and not isinstance(value, type)
+
+
+def _is_default(field: dataclasses.Field[Any], value: Any) -> bool:
+    default = field.default
+    return type(value) is type(default) and not isinstance(value, np.ndarray) and bool(value == default)
+
+
+def _structure(model: Any) -> str:
+    """The class of a model with those of its parts."""
+    values = [getattr(model, field.name) for field in dataclasses.fields(model)]
+    parts = [item for each in values for item in (each if isinstance(each, tuple) else (each,)) if _is_model(item)]
+    return type(model).__name__ + (f"({', '.join(map(_structure, parts))})" if parts else "")

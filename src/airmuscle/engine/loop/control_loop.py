@@ -18,7 +18,7 @@ import numpy as np
 from ...core.annotation import abridged
 from ...core.errors import ParameterError, suggestion
 from ...core.ops import Value
-from ...core.short_repr import ShortRepr
+from ...core.short_repr import ShortRepr, describe_model
 from ...core.system import System
 from ...core.tree import Structure, structure, with_ambient
 from ...core.units import quantity
@@ -160,7 +160,7 @@ class ControlLoop(ShortRepr):
     @functools.cached_property
     def _controller_text(self) -> str:
         """The controller and its fields."""
-        return _describe_controller(self.controller)
+        return describe_model(self.controller)
 
     def as_open_loop(self, recording: Recording) -> InputSignal:
         """The commands of a complete recorded run as an input signal without a controller.
@@ -213,15 +213,6 @@ class CombinedSignal(InputSignal):
 
 def _milliseconds(seconds: float) -> str:
     return f"{seconds * 1e3:.4g} ms" if seconds < 1 else f"{seconds:.4g} s"
-
-
-def _describe_controller(controller: Controller) -> str:
-    """A controller and its fields; floats with twelve digits, which hides the rounding of a unit conversion."""
-    known = dataclasses.fields(controller) if dataclasses.is_dataclass(controller) else tuple[Any, ...]()
-    names = [field.name for field in known if field.repr]
-    values = [(name, getattr(controller, name)) for name in names]
-    texts = [f"{name}={value:.12g}" if isinstance(value, float) else f"{name}={value!r}" for name, value in values]
-    return f"{type(controller).__name__}({', '.join(texts)})"
 
 
 _without_design: set[Structure] = set()

@@ -61,16 +61,27 @@ def run_chapter(scenario: Scenario, recording: Recording) -> Chapter:
 
 
 def _range_table(scenario: Scenario, recording: Recording) -> Table:
-    """Return the minimum, maximum and last value of each column."""
-    names, units = list(recording), run_column_units(scenario.problem)
+    """Return the minimum, maximum and last value of each column, in the unit in which it is displayed."""
+    names, declared = list(recording), run_column_units(scenario.problem)
+    scales = [_scale(name, declared.get(name)) for name in names]
+    values = [factor * recording[name] for name, (factor, _) in zip(names, scales, strict=True)]
     columns: dict[str, Any] = {
         "column": names,
-        "min": TableColumn([float(recording[name].min()) for name in names], BY_ROW),
-        "max": TableColumn([float(recording[name].max()) for name in names], BY_ROW),
-        "last": TableColumn([float(recording[name][-1]) for name in names], BY_ROW),
-        "unit": [units.get(name) or getattr(quantity_of(name), "unit", "") for name in names],
+        "min": TableColumn([float(each.min()) for each in values], BY_ROW),
+        "max": TableColumn([float(each.max()) for each in values], BY_ROW),
+        "last": TableColumn([float(each[-1]) for each in values], BY_ROW),
+        "unit": [unit for _, unit in scales],
     }
     return Table("ranges", "Columns", columns, brief=MAX_BRIEF)
+
+
+def _scale(name: str, declared: str | None) -> tuple[float, str]:
+    """Factor and unit in which a column is displayed; a unit that a model declares in place of the usual one stays."""
+    quantity = quantity_of(name)
+    if quantity is None or declared not in (None, quantity.unit):
+        return 1.0, declared or ""
+    factor, unit = display_scale(name)
+    return factor, unit.removesuffix("-")
 
 
 def _describe_duration(scenario: Scenario, recording: Recording) -> str:

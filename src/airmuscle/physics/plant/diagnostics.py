@@ -11,6 +11,7 @@ from ...core.arrays import Array
 from ...core.diagnostics import ColumnLimit, Columns, Diagnostic, DiagnosticCode
 from ...core.errors import ParameterError
 from ...core.ops import Value
+from ...core.short_repr import describe_model
 from ...core.system import select_prefix
 from ..muscle import INNER_CONTRACTION, ElasticSeriesElement, Muscle
 from ..muscle.friction import NoFriction
@@ -39,9 +40,11 @@ def friction(muscles: Sequence[Muscle]) -> Diagnostic:
     if all(isinstance(m.friction, NoFriction) for m in muscles):
         text = "off"
     elif len(muscles) == 1:
-        text = str(muscles[0].friction)
+        text = describe_model(muscles[0].friction)
     else:
-        parts = [f"{m.name} {'none' if isinstance(m.friction, NoFriction) else m.friction}" for m in muscles]
+        parts = [
+            f"{m.name} {'none' if isinstance(m.friction, NoFriction) else describe_model(m.friction)}" for m in muscles
+        ]
         text = ", ".join(parts)
     return Diagnostic(DiagnosticCode.MODEL, "friction", f"friction: {text}")
 
