@@ -125,7 +125,6 @@ def test_the_section_of_loops_has_a_row_for_each_plant_and_integrator():
 
 @pytest.mark.slow
 def test_the_section_of_controllers_has_a_row_for_each_call(monkeypatch):
-    pytest.importorskip("daqp", reason="the package daqp is not installed")
     monkeypatch.setattr(controllers, "SAMPLES", 20)
     section = controllers.section(rounds=1)
     assert len(section.rows) == 6

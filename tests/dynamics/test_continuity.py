@@ -32,7 +32,7 @@ NOT_IN_A_PLANT = {
         "AngleAndStiffness", "AntagonisticInverse", "Cascade", "ColumnSensor", "ComputedTorque", "FrictionFeedForward", "MotionFeedForward",
         "GainSchedule", "HysteresisCompensation", "HysteresisOperator", "InverseHysteresisOperator",
         "ProportionalFeedback", "StateFeedback", "SuperTwisting", "WithSensors", "WithSetpointDelay", "WithStuckValve",
-        "Multirate", "WithCommandDelay", "WithFilter", "WithManual", "WithRateLimit"),
+        "Multirate", "RepetitiveControl", "SmithPredictor", "WithCommandDelay", "WithFilter", "WithManual", "WithRateLimit"),
     "laws solved for pressure or contraction, where as_force_law stands in, and their readings": (
         "BorzikovaDirect", "BorzikovaExponential", "Hunt2017", "Saga2007", "ArcIntegral", "AxialIntegral",
         "UniformFibreSum", "UserDefinedFibreSum", "HalfShellFibreSum", "PrintedFibreSum",

@@ -36,7 +36,6 @@ from airmuscle.engine.run import LawSample
 from airmuscle.errors import ParameterError
 from airmuscle.physics import find_equilibrium
 
-pytest.importorskip("daqp", reason="the package daqp is not installed")
 JOINT = proportional_joint((11,))
 LQG, MPC, ADRC = "feed-forward + LQG", "feed-forward + MPC", "feed-forward + ADRC"
 CONTENDERS = {each.name: each for each in standard_contenders(JOINT) if each.name in (LQG, MPC, ADRC)}

@@ -16,7 +16,6 @@ from airmuscle.engine import ControlLoop, Measurement
 from airmuscle.errors import ParameterError
 from airmuscle.physics import find_equilibrium, linearise
 
-pytest.importorskip("daqp", reason="the package daqp is not installed")
 H = 0.01
 MUSCLE = replace(am.load("dmsp-20-300").muscle, damper=am.LinearDamper(300.0))
 VALVE = am.Valve(1e-9, 0.35)
@@ -57,7 +56,7 @@ def both_plans(size: float):
     scale = np.array([NOISE["air_mass"], PERMITTED["position"], NOISE["speed"]])
     estimate = np.array([*deviation / scale, disturbance])
     limits = [np.array([(end - OPEN["fill"]) / 0.2]) for end in (0.0, 1.0)]
-    theirs, _ = linear.plan(estimate, np.array([wanted]), *limits, linear.init().active)
+    theirs = linear.plan(estimate, np.array([wanted]), *limits)
     rest = np.array([REST[name] for name in STATES])
     state = np.array([*(rest + deviation), disturbance])
     ours, _ = LAW.plan(state, np.array([REST["position"] + wanted]), np.zeros(1), np.ones(1))

@@ -10,9 +10,9 @@ import pytest
 from control_plants import LIFT
 
 import airmuscle as am
-from airmuscle.control import ExtendedKalmanFilter, UnscentedKalmanFilter
+from airmuscle.control import ExtendedKalmanFilter, MovingHorizonEstimator, UnscentedKalmanFilter
 from airmuscle.core import StateVariable, System
-from airmuscle.errors import ParameterError
+from airmuscle.errors import ParameterError, SolveError
 
 H = 5e-3
 START = am.find_equilibrium(LIFT, pressure=2e5)
@@ -120,16 +120,20 @@ class Oscillator(System):
         return {"sum": state["position"] + 0.5 * state["speed"]}
 
 
-def test_the_smoother_of_a_linear_plant_has_the_least_squares_of_all_noise():
-    """All states of all samples as unknowns of one least-squares problem, an independent solution."""
-    h, rows, random = 0.1, 30, np.random.default_rng(7)
+def oscillation(rows=30):
+    """A filter of the oscillator, a record with missing values, and the first estimate."""
+    h, random = 0.1, np.random.default_rng(7)
     judged = ExtendedKalmanFilter(Oscillator(), ("sum",), h, {"position": 0.05, "speed": 0.3}, {"sum": 0.2})
-    force, values = np.sin(np.arange(rows)), random.normal(size=rows)
-    values[[4, 5, 20]] = np.nan
+    values = random.normal(size=rows)
+    values[[k for k in (4, 5, 20) if k < rows]] = np.nan
+    columns = {"time": h * np.arange(rows), "force": np.sin(np.arange(rows)), "sum": values}
     first = judged.start({"position": 0.2, "speed": -0.1}, {"position": 0.5, "speed": 0.7})
-    record = am.Recording({"time": h * np.arange(rows), "force": force, "sum": values}, "test")
-    found = judged.smooth(record, first)
-    equations, right = [], []
+    return judged, am.Recording(columns, "test"), first
+
+
+def noise_equations(judged, record, first):
+    """Matrix and right side of all noise in standard deviations, by the states of all samples."""
+    rows, equations, right = len(record["time"]), [], []
 
     def add(blocks, value, deviation):
         row = np.zeros(2 * rows)
@@ -141,12 +145,19 @@ def test_the_smoother_of_a_linear_plant_has_the_least_squares_of_all_noise():
     for i, deviation in enumerate((0.5, 0.7)):
         add([(0, np.eye(2)[i])], first.mean[i], deviation)
     for k in range(rows - 1):
-        moved, f = judged.transition(np.zeros(2), [force[k]])
-        for i, deviation in enumerate((0.05 * h**0.5, 0.3 * h**0.5)):
+        moved, f = judged.transition(np.zeros(2), [record["force"][k]])
+        for i, deviation in enumerate((0.05 * 0.1**0.5, 0.3 * 0.1**0.5)):
             add([(k + 1, np.eye(2)[i]), (k, -f[i])], moved[i], deviation)
-    for k in np.flatnonzero(np.isfinite(values)):
-        add([(k, np.array([1.0, 0.5]))], values[k], 0.2)
-    exact = np.linalg.lstsq(np.array(equations), np.array(right), rcond=None)[0].reshape(rows, 2)
+    for k in np.flatnonzero(np.isfinite(record["sum"])):
+        add([(k, np.array([1.0, 0.5]))], record["sum"][k], 0.2)
+    return np.array(equations), np.array(right)
+
+
+def test_the_smoother_of_a_linear_plant_has_the_least_squares_of_all_noise():
+    """All states of all samples as unknowns of one least-squares problem, an independent solution."""
+    judged, record, first = oscillation()
+    found = judged.smooth(record, first)
+    exact = np.linalg.lstsq(*noise_equations(judged, record, first), rcond=None)[0].reshape(-1, 2)
     assert np.column_stack([found["position"], found["speed"]]) == pytest.approx(exact, rel=1e-8, abs=1e-10)
 
 
@@ -173,3 +184,58 @@ def test_smoothed_estimates_of_a_lift_are_closer_than_filtered_ones():
         errors = [np.sqrt(np.mean((each[name] - truth[name]) ** 2)) for each in (filtered, smoothed)]
         assert errors[1] < 0.85 * errors[0], name
     assert smoothed["force"][-1] == filtered["force"][-1]
+
+
+# Moving horizon
+
+
+@pytest.mark.parametrize("horizon", [1, 6, 40])
+def test_without_bounds_the_moving_horizon_of_a_linear_plant_is_the_kalman_filter(horizon):
+    judged, record, first = oscillation()
+    kept = np.arange(30) != 12  # a lost sample
+    record = am.Recording({name: record[name][kept] for name in record}, "test")
+    exact, found = judged.estimate(record, first), MovingHorizonEstimator(judged, horizon).estimate(record, first)
+    for name in judged.states:
+        assert found[name] == pytest.approx(exact[name], abs=1e-9)
+
+
+def test_the_moving_horizon_has_the_least_squares_within_bounds():
+    """All states of all samples as unknowns of a bounded least-squares problem, an independent solution."""
+    from scipy.optimize import lsq_linear
+
+    judged, record, first = oscillation(12)
+    low, high = -0.05, 0.03
+    found = MovingHorizonEstimator(judged, 40, {"position": (low, high)}).estimate(record, first)
+    limits = np.tile([low, -np.inf], 12), np.tile([high, np.inf], 12)
+    best = lsq_linear(*noise_equations(judged, record, first), limits, method="bvls", tol=1e-14).x.reshape(-1, 2)
+    assert (np.isclose(best[:, 0], high) | np.isclose(best[:, 0], low)).sum() > 2
+    assert [found["position"][-1], found["speed"][-1]] == pytest.approx(best[-1], abs=1e-9)
+    assert found["position"].min() >= low - 1e-9
+    assert found["position"].max() <= high + 1e-9
+
+
+def test_a_bound_that_is_known_brings_the_estimate_of_a_lift_closer():
+    """The load is at rest; the filter starts with a wrong position, which its speed would explain."""
+    truth, record = noisy(rows=30)
+    judged = lift_filter(measured=("position",))
+    first = judged.start({**START, "position": START["position"] + 1e-3}, {"position": 1e-3, "speed": 0.2})
+    plain = judged.estimate(record, first)
+    found = MovingHorizonEstimator(judged, 5, {"speed": (-2e-3, 2e-3)}).estimate(record, first)
+    assert np.abs(truth["speed"]).max() < 1e-6
+    assert np.abs(plain["speed"]).max() > 4e-3
+    assert np.abs(found["speed"]).max() <= 2e-3 + 1e-9
+    assert np.abs(found["force"] - truth["force"])[-1] < np.abs(plain["force"] - truth["force"]).max()
+
+
+def test_an_impossible_window_is_refused():
+    judged = lift_filter()
+    with pytest.raises(ParameterError, match="horizon is 0; allowed range: 1 to 200"):
+        MovingHorizonEstimator(judged, 0)
+    with pytest.raises(ParameterError, match="bounds names 'presure'"):
+        MovingHorizonEstimator(judged, 3, {"presure": (0.0, 1.0)})
+    with pytest.raises(ParameterError, match="the bounds of 'speed' are 1 and 0"):
+        MovingHorizonEstimator(judged, 3, {"speed": (1.0, 0.0)})
+    with pytest.raises(SolveError, match="no trajectory of the window is within the bounds"):
+        MovingHorizonEstimator(judged, 3, {"position": (1.0, 2.0)}).start(
+            judged.start(START, {}), [2e5, START["position"]], [0.0, 0.0]
+        )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from airmuscle.control import PID, Cascade, FrictionFeedForward, GainSchedule
+from airmuscle.control import PID, Cascade, FrictionFeedForward, GainSchedule, SmithPredictor
 from airmuscle.engine import ColumnSensor, WithSensors
 from airmuscle.engine.loop.controller import parameter_units
 
@@ -27,6 +27,8 @@ OUTER = PID("position", "pressure", gain=1e6)
         (FrictionFeedForward("speed", "command", 2.0, 0.1), "boundary_speed", "rad/s"),
         (GainSchedule(INNER, "gain", "force", (0.0, 100.0), (1e-5, 2e-5)), "breakpoints[1]", "N"),
         (GainSchedule(INNER, "gain", "force", (0.0, 100.0), (1e-5, 2e-5)), "scheduled_values[0]", "1/Pa"),
+        (SmithPredictor(OUTER, "position", "pressure", 3, 1e-7, 0.1), "static_gain", "m/Pa"),
+        (SmithPredictor(OUTER, "position", "pressure", 3, 1e-7, 0.1), "time_constant", "s"),
         (WithSensors(OUTER, (ColumnSensor("position", 1e-5, 2e-5, 0.1),)), "sensors[0].noise", "m"),
         (WithSensors(OUTER, (ColumnSensor("position", 1e-5, 2e-5, 0.1),)), "sensors[0].lag", "s"),
     ],

@@ -14,7 +14,11 @@ from airmuscle.control import (
     PID,
     AngleAndStiffness,
     Cascade,
+    LinearLaw,
+    LinearLoop,
     Multirate,
+    RepetitiveControl,
+    SmithPredictor,
     WithCommandDelay,
     WithFilter,
     WithManual,
@@ -23,6 +27,7 @@ from airmuscle.control import (
 from airmuscle.design import UltimatePoint, tyreus_luyben, ziegler_nichols
 from airmuscle.engine import ControlLoop, Measurement, Rodas4, Schedule, simulate
 from airmuscle.errors import ParameterError, UnitError
+from airmuscle.physics import LinearModel
 
 H = 0.01
 INNER = PID("pressure", "fill", 0.02, integral_time=0.3)
@@ -214,3 +219,118 @@ def test_rules_from_the_ultimate_point_are_those_of_the_literature():
 def test_a_text_that_is_no_time_is_no_sample_time():
     with pytest.raises(UnitError, match=r"ControlLoop\.sample_time"):
         ControlLoop(INNER, "1 m", Schedule({"pressure": ((0, 1e5),)}))
+
+
+# Models of a dead time and of a period
+
+
+def first_order_run(law, setpoints, delay, gain=0.5, time_constant=0.2, loss=None):
+    """Columns of a sampled first-order plant with a dead time in samples, under a law of "pressure" by "fill"."""
+    kept = np.exp(-H / time_constant)
+    memory, x, waiting, told = law.init(), 0.0, [0.0] * delay, []
+    for k, setpoint in enumerate(setpoints):
+        waiting.append(x + (0.0 if loss is None else loss(k)))
+        y = waiting.pop(0)
+        told.append(y)
+        measurement = Measurement({"pressure": y}, {"pressure": setpoint}, {"fill": (-100.0, 100.0)})
+        commands, memory = law.step(memory, measurement, H)
+        x = kept * x + (1.0 - kept) * gain * commands["fill"]
+    return np.array(told)
+
+
+def test_a_smith_predictor_gives_the_response_without_dead_time_later():
+    """A gain at which the loop without it is unstable."""
+    law, wanted = PID("pressure", "fill", 15.0, integral_time=0.15), np.ones(300)
+    free = first_order_run(law, wanted, 0)
+    late = first_order_run(SmithPredictor(law, "pressure", "fill", 12, 0.5, 0.2), wanted, 12)
+    assert late[12:] == pytest.approx(free[:-12], abs=1e-12)
+    assert late[:12] == pytest.approx(0.0, abs=1e-15)
+    assert np.abs(first_order_run(law, wanted, 12)).max() > 10
+    assert first_order_run(SmithPredictor(law, "pressure", "fill", 12, 0.4, 0.25), np.ones(900), 12)[
+        -1
+    ] == pytest.approx(1)
+
+
+PERIOD = 50
+WAVE = np.sin(2 * np.pi * np.arange(40 * PERIOD) / PERIOD) + 0.3 * np.cos(6 * np.pi * np.arange(40 * PERIOD) / PERIOD)
+
+
+def repetitive(**changes):
+    given = {"period_samples": PERIOD, "lead_samples": 3, "gain": 0.5, "filter_weight": 0.02, **changes}
+    return RepetitiveControl(PID("pressure", "fill", 3.0, integral_time=0.2), "pressure", **given)
+
+
+def periodic_errors(law):
+    """The greatest error of each period."""
+    errors = WAVE - first_order_run(law, WAVE, 2)
+    return np.abs(errors).reshape(-1, PERIOD).max(axis=1)
+
+
+def first_order_loop(law):
+    """The loop of `first_order_run` with its dead time of two samples as a LinearLoop."""
+    plant = LinearModel(
+        np.array([[-1 / 0.2]]), np.array([[0.5 / 0.2]]), np.eye(1), np.zeros((1, 1)), ("pressure",), ("fill",),
+        ("pressure",), {}, {"pressure": 0.0}, {"fill": 0.0}, np.zeros(1), output_values={"pressure": 0.0},
+    )  # fmt: skip
+    h, k, t_i = H, law.gain, law.integral_time
+    linear = LinearLaw(
+        np.eye(1), np.array([[-k * h / t_i]]), np.array([[k * h / t_i]]), np.eye(1), np.array([[-k]]),
+        np.array([[k]]), ("integral",), ("pressure",), ("pressure",), ("fill",),
+    )  # fmt: skip
+    return LinearLoop(plant.with_delay(2 * H), linear, H)
+
+
+def test_repetitive_control_leaves_the_error_that_its_filter_leaves():
+    """(1 - Q)(1 - T)/(1 - Q (1 - k z^m T)) of the set point at both frequencies, T from the linear loop."""
+    law = repetitive(lead_samples=5, gain=1.0, filter_weight=0.2)
+    loop = first_order_loop(law.law)
+    assert 0.7 < law.convergence_rate(loop) < 0.9
+    wave = np.tile(WAVE, 3)
+    errors, plain = ((wave - first_order_run(each, wave, 2))[-PERIOD:] for each in (law, law.law))
+    assert np.abs(errors).max() < 0.2 * np.abs(plain).max()
+    for k in (1, 3):
+        z = np.exp(2j * np.pi * k / PERIOD)
+        t = loop.closed.frequency_response([k / (PERIOD * H)])[0, 0, 0]
+        q = 1 - 0.4 * (1 - z.real)
+        left = (1 - q) * (1 - t) / (1 - q * (1 - z**5 * t))
+        assert np.fft.fft(errors)[k] == pytest.approx(left * np.fft.fft(WAVE[:PERIOD])[k], rel=1e-6)
+
+
+def test_repetitive_control_diverges_where_the_condition_fails_without_the_filter():
+    law = repetitive(gain=1.5, lead_samples=0, filter_weight=0.0)
+    assert law.convergence_rate(first_order_loop(law.law)) > 1.2
+    errors = periodic_errors(law)
+    assert errors[-1] > 10 * errors[0]
+
+
+def test_repetitive_control_is_its_formula():
+    """Written down once more with arrays for the signal and the error."""
+    law = repetitive(lead_samples=2, gain=0.7, filter_weight=0.1)
+    memory, rng = law.init(), np.random.default_rng(3)
+    e, w, inner = np.zeros(160), np.zeros(160), law.law.init()
+    for k in range(160):
+        y, r = rng.normal(size=2)
+        e[k] = r - y
+        past = [w[k - n] + 0.7 * e[k - n + 2] if k - n >= 0 else (0.7 * e[k - n + 2] if k - n + 2 >= 0 else 0.0)
+                for n in (51, 50, 49)]  # fmt: skip
+        w[k] = 0.1 * past[0] + 0.8 * past[1] + 0.1 * past[2]
+        ranges = {"fill": (-1e3, 1e3)}
+        commands, memory = law.step(memory, Measurement({"pressure": y}, {"pressure": r}, ranges), H)
+        wanted, inner = law.law.step(inner, Measurement({"pressure": y}, {"pressure": r + w[k]}, ranges), H)
+        assert commands["fill"] == pytest.approx(wanted["fill"], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: SmithPredictor(INNER, "position", "fill", 3, 1.0, 0.1), "does not measure 'position'; it measures pressure"),
+        (lambda: SmithPredictor(INNER, "pressure", SPLIT, 3, 1.0, 0.1), "has the inputs fill, discharge; the law commands fill"),
+        (lambda: SmithPredictor(INNER, "pressure", "fill", -1, 1.0, 0.1), "samples is -1; allowed range: 0 to 1000"),
+        (lambda: RepetitiveControl(INNER, "pressure", 3), "period and lead are 3 and 0 samples"),
+        (lambda: RepetitiveControl(INNER, "position", 30), "does not measure 'position'"),
+        (lambda: repetitive().convergence_rate(first_order_loop(replace(repetitive().law, gain=300.0))), "is not stable"),
+    ],
+)  # fmt: skip
+def test_an_impossible_model_of_a_dead_time_or_period_is_refused(make, message):
+    with pytest.raises(ParameterError, match=message):
+        make()

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,7 @@ from airmuscle.control import (
     SlidingMode,
     SuperTwisting,
     WithStuckValve,
+    design_predictive,
 )
 from airmuscle.engine import (
     PWM,
@@ -42,6 +44,7 @@ from airmuscle.errors import FileError, ParameterError
 from airmuscle.outlets import write_controller
 from airmuscle.outlets.export.compiler import COMPILER, EMULATOR, PROCESSORS, run_in_emulator
 from airmuscle.outlets.export.printed_controller import print_controller
+from airmuscle.physics import linearise
 
 SENSED = (ColumnSensor("position", resolution=5e-5, delay=2, lag=3e-3), ColumnSensor("pressure", noise=500.0, delay=1))
 OUTER = PID("position", "pressure", gain=4e6, integral_time=0.4, derivative_time=0.01)
@@ -206,6 +209,50 @@ def test_the_source_allocates_nothing_and_does_not_call_itself(tmp_path):
     assert not re.search(r"\b(malloc|calloc|realloc|free|goto|while|static double)\b", source)
     assert source.count("law_step(") == 1
     assert source.count("law_sample(") == 2
+
+
+def predictive_problem(**further):
+    """A lift along a position that the predictive controller reaches at the limit of the pressure."""
+    model = linearise(LIFT, LIFT.state_at(pressure=2e5), {"fill": 0.05, "discharge": 0.05})
+    one = ("position",)
+    law = design_predictive(
+        model, 0.01, measured=one, controlled=one, disturbed=("air_mass",), blocks=(1, 2, 4, 8),
+        permitted={"position": 1e-3, "speed": 0.1, "fill": 0.1, "discharge": 0.1},
+        process_noise={"air_mass": 1e-6, "speed": 0.1, "air_mass.disturbance": 1e-5},
+        measurement_noise={"position": 1e-4}, limits={"pressure": (1e5, 2.2e5)}, max_rate={"fill": 20.0}, **further,
+    )  # fmt: skip
+    setpoint = Schedule({"position": ((0.0, 0.004), (0.2, 0.02))})
+    return Problem(LIFT, ControlLoop(law, 0.01, setpoint), 0.5, LIFT.state_at(pressure=2e5))
+
+
+def test_a_predictive_controller_in_c_gives_the_commands_of_python(tmp_path):
+    """To 1e-9 of their range, with active limits of the inputs, of a column and of a rate; no library is needed."""
+    problem = predictive_problem()
+    law, recording = problem.input.controller, solve(problem).recording
+    for name in law.inputs:
+        assert np.ptp(recording[f"command.{name}"]) > 0.3
+    write_controller(problem, tmp_path, name="law")
+    for options in (("-O0",), ("-O2",)):
+        done = replay(tmp_path, *options)
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert re.match(r"50 samples, 0 commands differ by more than 1e-09 of their range", done.stdout)
+    source = (tmp_path / "law.c").read_text()
+    assert not re.search(r"\b(malloc|calloc|realloc|free\(|goto|while)\b", source.split("*/", 1)[1])
+
+
+def test_a_predictive_controller_in_c_counts_samples_without_a_solution(tmp_path):
+    """A hard limit of the pressure that the start violates: both apply the last plan, or the target."""
+    problem = predictive_problem(slack_weight=float("inf"))
+    problem = replace(problem, initial_state=LIFT.state_at(pressure=3e5))
+    assert "no solution" in " ".join(solve(problem).recording.notes)
+    write_controller(problem, tmp_path, name="law")
+    assert replay(tmp_path).returncode == 0
+
+
+def test_options_that_a_predictive_controller_has_not_are_refused(tmp_path):
+    for options in ({"precision": Single()}, {"arduino": True}, {"tunable": ["gain"]}):
+        with pytest.raises(ParameterError, match="LinearModelPredictive is exported as C in double precision"):
+            write_controller(predictive_problem(), tmp_path, **options)
 
 
 def test_drivers_that_are_not_part_of_the_program_are_named(tmp_path):

@@ -48,6 +48,7 @@ class BoundFilter(NamedTuple):
     outputs: Any
     output_values: Array
     variances: Array
+    slopes: Array
 
 
 class MeasuredRows(NamedTuple):

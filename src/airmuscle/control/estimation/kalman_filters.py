@@ -62,6 +62,15 @@ class ExtendedKalmanFilter(StateEstimator):
         matrix = bound.transition.copy()
         return self._taken(bound).mean, matrix
 
+    def observation(self, state: Array, inputs: Sequence[float]) -> tuple[Array, Array]:
+        """The measured columns (p,) at a state (n,), and their derivative by it (p, n)."""
+        bound = self._filled(StateEstimate(state, np.zeros((len(state), len(state)))), inputs)
+        bound.values[:], bound.variances[:] = 0.0, self.variances
+        self._run(bound.correct, bound)
+        columns, slopes = -bound.difference, bound.slopes.copy()
+        self._taken(bound)
+        return columns, slopes
+
     def smooth(self, recording: Recording, first: StateEstimate) -> dict[str, Array]:
         """The columns of `estimate`, where each row also knows all later measurements: for records, not for control.
 
@@ -70,7 +79,7 @@ class ExtendedKalmanFilter(StateEstimator):
         For a linear plant it is the estimate with the least squares of all noise.
         Reference: Rauch, Tung and Striebel (1965).
         """
-        rows = self._rows(recording)
+        rows = self.rows(recording)
         passes = list(self._passes(rows, first))
         means = [passes[-1].corrected.mean]
         for now, after in zip(passes[-2::-1], passes[:0:-1], strict=True):
@@ -81,23 +90,23 @@ class ExtendedKalmanFilter(StateEstimator):
             moved = np.linalg.lstsq(known, (means[-1] - after.predicted.mean) / scale, rcond=1e-14)[0] / scale
             means.append(now.corrected.mean + now.corrected.covariance @ f.T @ moved)
         kept = [mean for mean, each in zip(reversed(means), passes, strict=True) if each.row is not None]
-        return {"time": rows.time, **self._table(np.array(kept), rows.held)}
+        return {"time": rows.time, **self.table(np.array(kept), rows.held)}
 
     def _bind(self) -> BoundFilter:
         functions, total, p = self._functions, len(self.states), len(self.measured)
         n, h, variances = self._compiled.sizes.states, float(self.sample_time), self.variances
         x, u, covariance = np.zeros(total), np.zeros(self._compiled.sizes.inputs), np.zeros((total, total))
         transition, values, difference, s = np.zeros((total, total)), np.zeros(p), np.zeros(p), np.zeros((p, p))
+        slopes = np.zeros((p, total))
         predict = _predict_extended.bind(
             functions.rates, functions.constants, self.magnitudes, h, self.noise, x, u, covariance, transition,
             np.zeros(n), np.zeros((n, total)), np.zeros((5, n, total + 1)), np.zeros((total, total)),
         )  # fmt: skip
         correct = _correct_extended.bind(
             functions.measured, functions.constants, variances, x, u, covariance, values, difference, s,
-            np.zeros((p, p)), np.zeros((p, total)), np.zeros((total, p)), np.zeros((total, total)),
-            np.zeros((total, total)),
+            np.zeros((p, p)), slopes, np.zeros((total, p)), np.zeros((total, total)), np.zeros((total, total)),
         )  # fmt: skip
-        return self._bound((x, covariance, u, values, difference, s), transition, variances, predict, correct)
+        return self._bound((x, covariance, u, values, difference, s), transition, variances, predict, correct, slopes)
 
 
 def normalised_error_squared(estimate: StateEstimate, state: Any) -> float:
@@ -193,4 +202,5 @@ class UnscentedKalmanFilter(StateEstimator):
             difference, s, np.zeros((p, p)), points, root, np.zeros((2 * total + 1, p)), np.zeros((p, total)),
             np.zeros((total, p)), np.zeros((total, p)),
         )  # fmt: skip
-        return self._bound((x, covariance, u, values, difference, s), np.zeros((0, 0)), variances, predict, correct)
+        arrays, none = (x, covariance, u, values, difference, s), np.zeros((0, 0))
+        return self._bound(arrays, none, variances, predict, correct, none)

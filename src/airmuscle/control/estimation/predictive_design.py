@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ...core.arrays import Array
 from ...core.errors import ParameterError
 from ...physics.analysis.linear_model import LinearModel
-from ..laws.linear_model_predictive import LinearModelPredictive, ObserverModel, TargetMap, condense
+from ..laws.linear_model_predictive import CondensedProblem, LinearModelPredictive, ObserverModel, TargetMap
 from .riccati import (
     DISTURBANCE,
     check_known,
@@ -30,6 +31,8 @@ def design_predictive(
     disturbed: Sequence[str], permitted: Mapping[str, float], process_noise: Mapping[str, float],
     measurement_noise: Mapping[str, float], horizon: int = 20,
     limits: Mapping[str, tuple[float, float]] | None = None, slack_weight: float = SLACK_WEIGHT,
+    blocks: Sequence[int] = (), max_rate: Mapping[str, float] | None = None,
+    bounded: Mapping[str, float] | None = None,
 ) -> LinearModelPredictive:  # fmt: skip
     """Model predictive control of a linearised plant, at a sample time [s] with a horizon of samples.
 
@@ -42,49 +45,55 @@ def design_predictive(
     limits                  minimum and maximum of columns without direct feedthrough, such as {"pressure": (0, 5e5)}
     slack_weight            weight of the squared violation of a limit relative to the size of its range; infinity makes
                             the limits hard
+    blocks                  numbers of samples over which the planned inputs are held, one after the other (move
+                            blocking); together the horizon, which is their sum where they are given
+    max_rate                maximum rate of inputs, in their units over 1 s
+    bounded                 greatest size of a disturbance of the rates of states, any value at each sample: all limits
+                            are narrowed by what it reaches under the regulator until then, so that a plan that keeps
+                            them is followed by another one. Errors of the observer and a terminal set are left out
 
     Plant and disturbances are discretised exactly for held inputs. Raises ParameterError for an unknown name, a number
-    that is not positive, set points that the inputs cannot keep, or columns that do not detect the disturbances.
-    Reference: Rawlings, Mayne and Diehl (2017), chapters 1, 2 and 8.
+    that is not positive, set points that the inputs cannot keep, columns that do not detect the disturbances, or
+    bounded disturbances that leave no room within a limit.
+    References: Rawlings, Mayne and Diehl (2017), chapters 1, 2 and 8; Chisci, Rossiter and Zappa (2001).
     """
-    states, limits = model.states, limits or {}
+    states, limits, blocks = model.states, limits or {}, tuple(blocks) or (1,) * horizon
     names = (*states, *(f"{name}{DISTURBANCE}" for name in disturbed))
-    where = "design_predictive"
-    _check(model, measured, controlled, disturbed, limits, horizon, slack_weight)
+    where, max_rate, bounded = "design_predictive", max_rate or {}, bounded or {}
+    _check(model, measured, controlled, disturbed, limits, blocks, slack_weight)
     check_numbers(where, "permitted", permitted, (*states, *model.inputs), model.inputs)
-    check_numbers(where, "process_noise", process_noise, names, [f"{name}{DISTURBANCE}" for name in disturbed])
+    check_numbers(where, "process_noise", process_noise, names, names[len(states) :])
     check_numbers(where, "measurement_noise", measurement_noise, measured, measured)
+    check_numbers(where, "max_rate", max_rate, model.inputs, ())
+    check_numbers(where, "bounded", bounded, states, ())
     scale = np.array([permitted.get(s, process_noise.get(s, max(abs(model.state[s]), 1.0))) for s in states])
     sizes = np.array([permitted[name] for name in model.inputs])
     a, b, by_disturbance = sampled_plant(model, sample_time, scale, sizes, disturbed)
     c, z, limited = (model.select(outputs=list(part)).C * scale for part in (measured, controlled, limits))
     weights = np.diag([(s / permitted[i]) ** 2 if i in permitted else 0.0 for i, s in zip(states, scale, strict=True)])
-    costs = np.eye(len(model.inputs))
-    _, terminal = regulator(where, a, b, weights, costs, "inputs do not stabilise")
-    noise = [
-        (process_noise.get(i, 0.0) / s) ** 2 for i, s in zip(names, (*scale, *np.ones(len(disturbed))), strict=True)
-    ]
+    costs = np.eye(sizes.size)
+    gain, terminal = regulator(where, a, b, weights, costs, "inputs do not stabilise")
+    noise = np.array([process_noise.get(i, 0.0) for i in names]) / np.append(scale, np.ones(len(disturbed)))
     deviations = np.array([measurement_noise[name] for name in measured])
+    at = [np.array([model.output_values[name] for name in part]) for part in (measured, controlled, limits)]
     observer = ObserverModel(
-        *disturbance_observer(where, (a, b, by_disturbance, c), np.diag(noise) * sample_time, deviations),
-        np.array([model.output_values[name] for name in measured]),
-        np.array([model.input_values[name] for name in model.inputs]), sizes,
+        *disturbance_observer(where, (a, b, by_disturbance, c), np.diag(noise**2) * sample_time, deviations),
+        at[0], np.array([model.input_values[name] for name in model.inputs]), sizes,
     )  # fmt: skip
-    target = steady_target(where, a, b, by_disturbance, z)
     ranges = np.array([high - low for low, high in limits.values()])
-    problem = condense(a, b, weights, costs, terminal, horizon, limited / ranges[:, None], slack_weight)
-    at = np.array([model.output_values[name] for name in limits])
-    low, high = (np.array([pair[i] for pair in limits.values()]) for i in (0, 1))
-    maps = TargetMap(
-        *target, np.array([model.output_values[name] for name in controlled]), limited / ranges[:, None],
-        (low - at) / ranges, (high - at) / ranges,
-    )  # fmt: skip
+    columns = limited / ranges[:, None]
+    entering = sampled_plant(model, sample_time, scale, sizes, tuple(bounded))[2] * list(bounded.values())
+    reach = _reach(limits, a - b @ gain, entering, gain, columns, sum(blocks))
+    change = sample_time * np.array([max_rate.get(name, np.inf) for name in model.inputs]) / sizes
+    problem = condense((a, b), weights, costs, terminal, columns, slack_weight, blocks, change, reach)
+    ends = [(np.array([pair[i] for pair in limits.values()]) - at[2]) / ranges for i in (0, 1)]
+    maps = TargetMap(*steady_target(where, a, b, by_disturbance, z), at[1], columns, *ends)
     return LinearModelPredictive(tuple(measured), tuple(controlled), model.inputs, observer, maps, problem)
 
 
 def _check(
     model: LinearModel, measured: Sequence[str], controlled: Sequence[str], disturbed: Sequence[str],
-    limits: Mapping[str, tuple[float, float]], horizon: int, slack_weight: float,
+    limits: Mapping[str, tuple[float, float]], blocks: Sequence[int], slack_weight: float,
 ) -> None:  # fmt: skip
     """Raise ParameterError for names, limits or numbers that make no problem."""
     for argument, names, known in (
@@ -108,7 +117,76 @@ def _check(
             f"design_predictive: {len(disturbed)} states are disturbed and {len(measured)} columns measured; there "
             "must be as many, so that no offset remains."
         )
-    if not 1 <= horizon <= MAX_HORIZON:
-        raise ParameterError(f"design_predictive: horizon is {horizon}; allowed range: 1 to {MAX_HORIZON} samples.")
+    if not (1 <= sum(blocks) <= MAX_HORIZON and min(blocks, default=0) >= 1):
+        raise ParameterError(
+            f"design_predictive: horizon is {sum(blocks)}; allowed range: 1 to {MAX_HORIZON} samples, and "
+            "blocks of one or more."
+        )
     if not slack_weight > 0.0:
         raise ParameterError(f"design_predictive: slack_weight is {slack_weight!r}; it must be positive.")
+
+
+def _reach(
+    limits: Mapping[str, tuple[float, float]], closed: Array, entering: Array, gain: Array, columns: Array, horizon: int
+) -> tuple[Array, Array]:
+    """How far disturbances move the inputs (N, m) and, one sample later, the columns (N, l) under the regulator.
+
+    Raises ParameterError where they reach half of the range of a column.
+    """
+    inputs, limited, moved = [np.zeros(len(gain))], list[Array](), entering
+    for _ in range(horizon):
+        limited.append((limited[-1] if limited else 0.0) + np.abs(columns @ moved).sum(axis=1))
+        inputs.append(inputs[-1] + np.abs(gain @ moved).sum(axis=1))
+        moved = closed @ moved
+    for (name, (low, high)), part in zip(limits.items(), limited[-1], strict=True):
+        if part >= 0.5:
+            raise ParameterError(
+                f"design_predictive: the bounded disturbances move '{name}' by {part * (high - low):.4g} within the "
+                f"horizon, which leaves no room within its limits {low:g} and {high:g}. Widen them, or shorten the "
+                "horizon."
+            )
+    return np.array(inputs[:-1]), np.array(limited).reshape(horizon, len(columns))
+
+
+def condense(
+    sampled: tuple[Array, Array], weights: Array, costs: Array, terminal: Array, columns: Array, slack_weight: float,
+    blocks: Sequence[int], max_change: Array, reach: tuple[Array, Array],
+) -> CondensedProblem:  # fmt: skip
+    """The problem of x_(k+1) = a x_k + b v_k with the cost sum x^T W x + v^T R v, and the terminal cost x_N^T P x_N.
+
+    columns (l, n) are limited at every sample from the next one on; their slack s costs slack_weight s^2, and there is
+    none where slack_weight is infinite. blocks: numbers of samples over which the inputs are held, one after the other.
+    reach: of disturbances in the inputs (N, m) and in the columns (N, l), by which their limits are narrower.
+    Reference: Rawlings, Mayne and Diehl (2017), chapter 8.
+    """
+    a, b = sampled
+    (n, m), horizon = b.shape, sum(blocks)
+    powers = [np.eye(n)]
+    for _ in range(horizon):
+        powers.append(a @ powers[-1])
+    forced = np.zeros((horizon, n, horizon, m))
+    for k in range(horizon):
+        for j in range(k + 1):
+            forced[k, :, j] = powers[k - j] @ b
+    moves = np.asarray(np.kron(np.repeat(np.eye(len(blocks)), blocks, axis=0), np.eye(m)), dtype=float)
+    by_input, by_state = forced.reshape(horizon * n, horizon * m) @ moves, np.concatenate(powers[1:])
+    each = np.kron(np.eye(horizon), weights)
+    each[-n:, -n:] = terminal
+    soft, count = len(columns) if np.isfinite(slack_weight) else 0, moves.shape[1]
+    hessian, gradient = np.zeros((count + soft, count + soft)), np.zeros((count + soft, n))
+    inner = by_input.T @ each @ by_input + moves.T @ np.kron(np.eye(horizon), costs) @ moves
+    hessian[:count, :count] = inner + inner.T
+    gradient[:count] = 2.0 * by_input.T @ each @ by_state
+    hessian[range(count, count + soft), range(count, count + soft)] = 2.0 * slack_weight if soft else 0.0
+    limited = np.kron(np.eye(horizon), columns)
+    rows = np.hstack([limited @ by_input, np.zeros((len(limited), soft))])
+    upper, lower, index = rows.copy(), rows.copy(), np.tile(np.arange(len(columns)), horizon)
+    if soft:
+        upper[np.arange(len(rows)), count + index] = -1.0
+        lower[np.arange(len(rows)), count + index] = 1.0
+    ahead, last = limited @ by_state, np.cumsum(blocks) - 1
+    return CondensedProblem(
+        horizon, m, soft, hessian, gradient, moves, np.vstack([upper, lower]), np.vstack([ahead, ahead]),
+        np.concatenate([index, index]), np.arange(2 * len(rows)) < len(rows),
+        (reach[0][last].ravel(), np.tile(reach[1].ravel(), 2)), max_change,
+    )  # fmt: skip

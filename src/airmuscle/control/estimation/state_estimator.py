@@ -99,15 +99,15 @@ class StateEstimator(ShortRepr, abc.ABC):
         """The compiled filter with new arrays."""
 
     def _bound(
-        self, arrays: FilterArrays, transition: Array, variances: Array, predict: Any, correct: Any
+        self, arrays: FilterArrays, transition: Array, variances: Array, predict: Any, correct: Any, slopes: Array
     ) -> BoundFilter:
-        """The compiled filter of arrays, with the function of the outputs."""
+        """The compiled filter of arrays, with the function of the outputs; slopes (p, n) of the measured columns."""
         mean, inputs = arrays[0], arrays[2]
         values = np.zeros((1, len(self._compiled.output_names)))
         outputs = evaluate.bind(
             self._functions.outputs, self._functions.constants, mean.reshape(1, -1), inputs.reshape(1, -1), values
         )
-        return BoundFilter(*arrays, transition, predict, correct, outputs, values, variances)
+        return BoundFilter(*arrays, transition, predict, correct, outputs, values, variances, slopes)
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -220,11 +220,11 @@ class StateEstimator(ShortRepr, abc.ABC):
         between them, nor does a value that is NaN. Inputs are the columns of their names, or the commands of a
         controller; an input without a column is 0. Raises ParameterError for other times.
         """
-        rows = self._rows(recording)
+        rows = self.rows(recording)
         estimates = [passed.corrected for passed in self._passes(rows, first) if passed.row is not None]
-        return {"time": rows.time, **self._table(np.array([each.mean for each in estimates]), rows.held)}
+        return {"time": rows.time, **self.table(np.array([each.mean for each in estimates]), rows.held)}
 
-    def _rows(self, recording: Recording) -> MeasuredRows:
+    def rows(self, recording: Recording) -> MeasuredRows:
         """The rows of a recording. Raises ParameterError for times that are no multiples of the sample time apart."""
         time = np.asarray(recording["time"], dtype=float)
         rounding = 1e-6 * self.sample_time + 2.0 * np.spacing(np.abs(time).max(initial=0.0))
@@ -251,7 +251,8 @@ class StateEstimator(ShortRepr, abc.ABC):
             yield Pass(k, predicted, corrected, held)
             predicted = corrected
 
-    def _table(self, means: Array, inputs: Array) -> dict[str, Array]:
+    def table(self, means: Array, inputs: Array) -> dict[str, Array]:
+        """All states and outputs of the plant at estimates (N, n) and inputs (N, m), by name."""
         known = self._compiled.description
         count = len(known.state_names)
         values = states_and_outputs(self._functions, count, means, inputs, len(known.output_names))

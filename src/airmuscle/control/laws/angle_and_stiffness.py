@@ -10,7 +10,7 @@ from ...core.declaration import model, parameter
 from ...core.errors import ParameterError
 from ...core.ops import Value
 from ...core.reference import Reference
-from ...engine.loop.control_law import ControlLaw
+from ...engine.loop.control_law import ControlLaw, Memory, Sampled
 from ...engine.loop.controller import Measurement
 from ...physics.mechanism.base import Mechanism
 from ...physics.muscle.characteristic.tondu_lopez2000 import TONDU_LOPEZ_2000
@@ -186,9 +186,7 @@ class AngleAndStiffness(ControlLaw):
     def inputs(self) -> tuple[str, ...]:
         return self.commanded
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         wanted, angle = measurement.setpoints, self.inverse.coordinate
         error = wanted[angle] - measurement.columns[angle]
         acceleration = wanted[self.acceleration_setpoint] if self.acceleration_setpoint else 0.0

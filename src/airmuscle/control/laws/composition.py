@@ -13,7 +13,7 @@ from ...core.ops import Value
 from ...core.reference import Reference
 from ...core.system import select_prefix, united, with_prefix
 from ...core.tree import leaves, unflatten
-from ...engine.loop.control_law import ControlLaw, EnclosingLaw
+from ...engine.loop.control_law import ControlLaw, EnclosingLaw, Memory, Sampled
 from ...engine.loop.controller import Measurement, parameter_units
 from .pid import ASTROM_HAGGLUND1995
 
@@ -81,9 +81,7 @@ class Cascade(ControlLaw):
         """The values of both laws, with the prefixes `outer.` and `inner.`."""
         return {**with_prefix("outer.", self.outer.initial_memory), **with_prefix("inner.", self.inner.initial_memory)}
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         limits = zip(self.outer.inputs, self.minimum, self.maximum, strict=True)
         ranges = {name: (low, high) for name, low, high in limits}
         wanted, first = self.outer.step(select_prefix("outer.", memory), measurement._replace(ranges=ranges), dt)
@@ -162,9 +160,7 @@ class WithFeedForward(ControlLaw):
             for name, value in with_prefix(f"{prefix}.", law.initial_memory).items()
         }
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         ahead, first = self.feed_forward.step(select_prefix("feed_forward.", memory), measurement, dt)
         ranges = {
             name: tuple(limit - ahead[name] for limit in measurement.ranges[name]) for name in self.feedback.inputs
@@ -234,9 +230,7 @@ class GainSchedule(EnclosingLaw):
     def measured_columns(self) -> tuple[str, ...]:
         return united(self.law.measured_columns, (self.scheduling_column,))
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[Mapping[str, Value], Mapping[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         value = interpolated(measurement.columns[self.scheduling_column], self.breakpoints, self.scheduled_values)
         numbers = [value if leaf.path == self.scheduled else leaf.value for leaf in leaves(self.law)]
         return unflatten(self.law, numbers).step(memory, measurement, dt)

@@ -9,7 +9,7 @@ from ...core.declaration import model, parameter
 from ...core.errors import ParameterError
 from ...core.ops import Value
 from ...core.reference import Reference
-from ...engine.loop.control_law import ControlLaw
+from ...engine.loop.control_law import ControlLaw, Memory, Sampled
 from ...engine.loop.controller import Measurement
 from .angle_and_stiffness import AntagonisticInverse
 
@@ -85,9 +85,7 @@ class ComputedTorque(ControlLaw):
     def _speed(self) -> str:
         return self.inverse.mechanism.coordinates[0].speed
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         wanted, columns, name = measurement.setpoints, measurement.columns, self.inverse.coordinate
         angle, speed = columns[name], columns[self._speed]
         acceleration = (

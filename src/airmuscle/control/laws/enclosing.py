@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 from ...core import ops
@@ -11,7 +10,7 @@ from ...core.errors import ParameterError, suggestion
 from ...core.ops import Value
 from ...core.reference import Reference
 from ...core.system import select_prefix, with_prefix
-from ...engine.loop.control_law import ControlLaw, EnclosingLaw
+from ...engine.loop.control_law import ControlLaw, EnclosingLaw, Memory, Sampled
 from ...engine.loop.controller import Measurement
 from ...engine.loop.sensors import LECUYER1999, STATE, drawn, seeded
 from .pid import ASTROM_HAGGLUND1995
@@ -46,9 +45,7 @@ class WithSetpointDelay(EnclosingLaw):
         waiting = {f"{name}.delayed{i}": 0.0 for name in self.setpoints for i in range(self.samples)}
         return {"started": 0.0, **waiting, **with_prefix("law.", dict(self.law.initial_memory))}
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[Mapping[str, Value], dict[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         delayed: dict[str, Value] = {}
         later: dict[str, Value] = {"started": 1.0}
         for name in self.setpoints:
@@ -86,9 +83,7 @@ class Multirate(EnclosingLaw):
         held = dict.fromkeys(self.inputs, 0.0)
         return {"phase": 0.0, **with_prefix("held.", held), **with_prefix("law.", dict(self.law.initial_memory))}
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         before, due = select_prefix("law.", memory), memory["phase"] < 0.5
         wanted, after = self.law.step(before, measurement, dt * self.every)
         commands = {name: ops.where(due, wanted[name], memory[f"held.{name}"]) for name in self.inputs}
@@ -132,9 +127,7 @@ class WithCommandDelay(EnclosingLaw):
         random = with_prefix("random.", dict.fromkeys(STATE, 0.0))
         return {**own, **random, **with_prefix("law.", dict(self.law.initial_memory))}
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         wanted, law = self.law.step(select_prefix("law.", memory), measurement, dt)
         kept, fresh = select_prefix("random.", memory), seeded(self.seed)
         state = {name: ops.where(memory["started"] > 0, kept[name], fresh[name]) for name in STATE}
@@ -181,9 +174,7 @@ class WithRateLimit(EnclosingLaw):
         last = with_prefix("last.", dict.fromkeys(self.inputs, 0.0))
         return {"started": 0.0, **last, **with_prefix("law.", dict(self.law.initial_memory))}
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         ranges = dict(measurement.ranges)
         for name, rate in zip(self.inputs, self.max_rate, strict=True):
             (low, high), last = ranges[name], memory[f"last.{name}"]
@@ -225,9 +216,7 @@ class WithManual(EnclosingLaw):
         own = {f"{kind}.{name}": 0.0 for kind in ("last", "offset") for name in self.inputs}
         return {"by_hand": 0.0, **own, **with_prefix("law.", dict(self.law.initial_memory))}
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         wanted, by_hand = measurement.setpoints, measurement.setpoints["manual"] >= 0.5
         given = {n: ops.clip(wanted[f"manual.{n}"], *measurement.ranges[n]) for n in self.inputs}
         ranges = {
@@ -273,9 +262,7 @@ class WithStuckValve(EnclosingLaw):
         """The number of samples so far, and the values of the law."""
         return {"samples": 0.0, **with_prefix("law.", self.law.initial_memory)}
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         wanted, later = self.law.step(select_prefix("law.", memory), measurement, dt)
         sticks = (memory["samples"] + 1e-6) * dt > self.stuck_time  # the product is rounded
         held = ops.where(sticks, self.stuck_opening, wanted[self.stuck_input])

@@ -1,20 +1,31 @@
-"""WithFilter: a law that receives a measured column through a notch or lead-lag filter."""
+"""Laws around another one that filter its signals: by a notch, the model of a dead time, or that of a period."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import Any, ClassVar
+
+import numpy as np
 
 from ...core import ops
-from ...core.declaration import model, parameter
+from ...core.declaration import Parameter, model, parameter
 from ...core.errors import ParameterError
 from ...core.ops import Value
 from ...core.reference import Reference
 from ...core.system import select_prefix, with_prefix
-from ...engine.loop.control_law import ControlLaw, EnclosingLaw
-from ...engine.loop.controller import Measurement
+from ...engine.loop.control_law import Commanded, ControlLaw, EnclosingLaw, Memory, Sampled, SplitRange, inputs_of
+from ...engine.loop.controller import Measurement, relative_unit
+from .enclosing import MAX_SAMPLES
 from .state_feedback import FRANKLIN1998
+
+
+def check_measured(owner: str, law: ControlLaw, column: str) -> None:
+    """Raise ParameterError where a law does not measure a column."""
+    if column not in law.measured_columns:
+        raise ParameterError(
+            f"{owner}: the law does not measure '{column}'; it measures {', '.join(law.measured_columns) or 'nothing'}."
+        )
 
 
 @model
@@ -52,11 +63,7 @@ class WithFilter(EnclosingLaw):
         return cls(law, column, (lead_time, 0.0), (lag_time, 0.0))
 
     def check(self) -> None:
-        if self.column not in self.law.measured_columns:
-            raise ParameterError(
-                f"WithFilter: the law does not measure '{self.column}'; it measures "
-                f"{', '.join(self.law.measured_columns) or 'nothing'}."
-            )
+        check_measured("WithFilter", self.law, self.column)
         if len(self.numerator) != 2 or len(self.denominator) != 2 or min(self.denominator) < 0:
             raise ParameterError(
                 f"WithFilter: numerator {self.numerator} and denominator {self.denominator}; give two coefficients "
@@ -69,9 +76,7 @@ class WithFilter(EnclosingLaw):
         own = {"started": 0.0, "first": 0.0, "second": 0.0}
         return {**own, **with_prefix("law.", dict(self.law.initial_memory))}
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[Mapping[str, Value], dict[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         x, f = measurement.columns[self.column], self.exact_frequency
         angle = ops.pi * ops.where(f > 0.0, f, 1.0) * dt
         k = ops.where(f > 0.0, 2.0 * ops.pi * f * ops.cos(angle) / ops.sin(angle), 2.0 / dt)
@@ -90,3 +95,170 @@ def _tustin(coefficients: tuple[Value, ...], k: Value) -> tuple[Value, Value, Va
     """Coefficients of 1, z^-1 and z^-2 of c_2 s^2 + c_1 s + 1, times (1 + z^-1)^2."""
     first, second = coefficients[0] * k, coefficients[1] * k * k
     return second + first + 1.0, 2.0 - 2.0 * second, second - first + 1.0
+
+
+SMITH1957 = Reference(
+    key="smith-1957",
+    authors="Smith, O. J. M.",
+    title="Closer control of loops with dead time",
+    where="Chemical Engineering Progress 53(5):217-219",
+    year=1957,
+    note="feedback of a model without the dead time",
+)
+HARA1988 = Reference(
+    key="hara-1988",
+    authors="Hara, S., Yamamoto, Y., Omata, T., Nakano, M.",
+    title="Repetitive control system: a new type servo system for periodic exogenous signals",
+    where="IEEE Transactions on Automatic Control 33(7):659-668",
+    year=1988,
+    doi="10.1109/9.1274",
+    note="internal model of a period with a low-pass filter",
+)
+TOMIZUKA1989 = Reference(
+    key="tomizuka-1989",
+    authors="Tomizuka, M., Tsao, T.-C., Chew, K.-K.",
+    title="Analysis and synthesis of discrete-time repetitive controllers",
+    where="Journal of Dynamic Systems, Measurement, and Control 111(3):353-358",
+    year=1989,
+    doi="10.1115/1.3153060",
+    note="zero-phase low-pass filter, stability of the sampled loop",
+)
+
+
+RATES = 4000
+"""Frequencies at which the convergence is judged (chosen)."""
+
+
+@model
+class SmithPredictor(EnclosingLaw):
+    """u = law(y_k + x_k - x_(k-n)),   x_(k+1) = a x_k + (1 - a) K u_k,   a = exp(-h/T): feedback without the dead time.
+
+    y measured column, x response of the model K/(1 + T s) without the dead time of n samples, u the command of the law,
+    of two inputs in split range positive less negative. Where the model is right, the response is that of the law
+    without dead time, n samples later. The plant must be stable: the error of an integrating one does not vanish after
+    a disturbance. The memory starts at rest with u = 0. Reference: Smith (1957).
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (SMITH1957,)
+
+    law: ControlLaw
+    column: str
+    commanded: Commanded
+    samples: int
+    static_gain: float = parameter("y/u", "K", "change of the column by the command", bounds=(-1e12, 1e12))
+    time_constant: float = parameter("s", "T", "time constant of the model", bounds=(1e-6, 1e6))
+
+    def check(self) -> None:
+        if not 0 <= self.samples <= MAX_SAMPLES:
+            raise ParameterError(f"SmithPredictor: samples is {self.samples}; allowed range: 0 to {MAX_SAMPLES}.")
+        check_measured("SmithPredictor", self.law, self.column)
+        if set(inputs_of(self.commanded)) != set(self.law.inputs):
+            raise ParameterError(
+                f"SmithPredictor: the model has the inputs {', '.join(inputs_of(self.commanded))}; the law commands "
+                f"{', '.join(self.law.inputs)}. Name the inputs of the law."
+            )
+
+    def unit_of(self, declared: Parameter, index: int, units: Mapping[str, str]) -> str:
+        """The unit of the gain: that of the column over that of the command."""
+        if declared.name != "static_gain":
+            return declared.unit
+        return relative_unit("u/y", units[inputs_of(self.commanded)[0]] or "1", units[self.column] or "1")
+
+    @property
+    def initial_memory(self) -> dict[str, float]:
+        """The response of the model now and up to n samples ago (the newest first), and the values of the law."""
+        response = {f"response{age}": 0.0 for age in range(self.samples + 1)}
+        return {**response, **with_prefix("law.", dict(self.law.initial_memory))}
+
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
+        now, before = memory["response0"], memory[f"response{self.samples}"]
+        columns = {**measurement.columns, self.column: measurement.columns[self.column] + now - before}
+        commands, law = self.law.step(select_prefix("law.", memory), measurement._replace(columns=columns), dt)
+        limited = {name: ops.clip(commands[name], *measurement.ranges[name]) for name in commands}
+        if isinstance(self.commanded, SplitRange):
+            applied = limited[self.commanded.positive] - limited[self.commanded.negative]
+        else:
+            applied = limited[self.commanded]
+        kept = ops.exp(-dt / self.time_constant)
+        later = {f"response{age + 1}": memory[f"response{age}"] for age in range(self.samples)}
+        response = {"response0": kept * now + (1.0 - kept) * self.static_gain * applied}
+        return commands, {**response, **later, **with_prefix("law.", law)}
+
+
+@model
+class RepetitiveControl(EnclosingLaw):
+    """law(y, r + w),   w_k = Q (w_(k-N) + k_r e_(k-N+m)),   e = r - y,   Q = 1 - 2 q + q (z + 1/z): periodic motion.
+
+    N `period_samples`, m `lead_samples`, k_r `gain`, r set point and y measured column of one name. Q is a
+    low-pass filter without phase shift: its gain 1 - 2 q (1 - cos(omega h)) falls to 1 - 4 q at the Nyquist frequency.
+    For a stable loop from the set point to y with the response T the error converges from period to period if
+    |Q (1 - k_r z^m T)| < 1 at all frequencies: `convergence_rate` computes the greatest value. Where Q = 1 no error is
+    left at the multiples of 1/(N h). While the inputs are limited the signal still learns.
+    References: Hara et al. (1988); Tomizuka, Tsao and Chew (1989).
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (HARA1988, TOMIZUKA1989)
+
+    law: ControlLaw
+    column: str
+    period_samples: int
+    lead_samples: int = 0
+    gain: float = parameter("1", "k_r", "part of the error that is learnt", bounds=(0.0, 10.0), default=0.5)
+    filter_weight: float = parameter("1", "q", "weight of both neighbours in Q", bounds=(0.0, 0.25), default=0.1)
+
+    def check(self) -> None:
+        if not (4 <= self.period_samples <= MAX_SAMPLES and 0 <= self.lead_samples <= self.period_samples - 2):
+            raise ParameterError(
+                f"RepetitiveControl: period and lead are {self.period_samples} and {self.lead_samples} samples; "
+                f"allowed range: a period of 4 to {MAX_SAMPLES}, a lead from 0 to two less than that."
+            )
+        check_measured("RepetitiveControl", self.law, self.column)
+        if self.column not in self.law.setpoints:
+            raise ParameterError(
+                f"RepetitiveControl: the law has no set point '{self.column}'; there are "
+                f"{', '.join(self.law.setpoints) or 'none'}."
+            )
+
+    @property
+    def initial_memory(self) -> dict[str, float]:
+        """Signal and error up to N + 1 samples ago (the newest first), and the values of the law."""
+        past = {f"{kind}{age}": 0.0 for kind in ("signal", "error") for age in range(1, self.period_samples + 2)}
+        return {**past, **with_prefix("law.", dict(self.law.initial_memory))}
+
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
+        wanted = measurement.setpoints[self.column]
+        error = wanted - measurement.columns[self.column]
+        errors = {0: error, **{age: memory[f"error{age}"] for age in range(1, self.period_samples + 2)}}
+        ages = (self.period_samples + 1, self.period_samples, self.period_samples - 1)
+        older, middle, newer = (memory[f"signal{age}"] + self.gain * errors[age - self.lead_samples] for age in ages)
+        signal = (1.0 - 2.0 * self.filter_weight) * middle + self.filter_weight * (older + newer)
+        setpoints = {**measurement.setpoints, self.column: wanted + signal}
+        commands, law = self.law.step(select_prefix("law.", memory), measurement._replace(setpoints=setpoints), dt)
+        later = {"signal1": signal, "error1": error}
+        for kind in ("signal", "error"):
+            later |= {f"{kind}{age + 1}": memory[f"{kind}{age}"] for age in range(1, self.period_samples + 1)}
+        return commands, {**later, **with_prefix("law.", law)}
+
+    def convergence_rate(self, linear_loop: Any) -> float:
+        """The greatest |Q (1 - k_r z^m T)| up to the Nyquist frequency [1]; below 1 the error converges.
+
+        linear_loop  of the enclosed `law` at the working point, with the same sample time
+
+        Raises ParameterError where that loop is not stable, or does not have the column.
+        """
+        if not linear_loop.is_stable:
+            raise ParameterError(
+                f"RepetitiveControl: the loop of the law is not stable, its pole of the greatest magnitude is "
+                f"{linear_loop.poles[0]:.4g}. Stabilise it first; repetitive control needs a stable loop."
+            )
+        closed = linear_loop.closed
+        for kind, names in (("set points", closed.inputs), ("columns", closed.outputs)):
+            if self.column not in names:
+                raise ParameterError(
+                    f"RepetitiveControl: '{self.column}' is not among the {kind} of the loop, {', '.join(names)}."
+                )
+        omega = np.linspace(0.0, math.pi, RATES + 1)[1:]
+        response = closed.frequency_response(omega / (2.0 * math.pi * linear_loop.sample_time))
+        t = response[:, closed.outputs.index(self.column), closed.inputs.index(self.column)]
+        q = 1.0 - 2.0 * self.filter_weight * (1.0 - np.cos(omega))
+        return float(np.abs(q * (1.0 - self.gain * np.exp(1j * self.lead_samples * omega) * t)).max())

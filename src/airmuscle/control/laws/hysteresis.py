@@ -14,7 +14,7 @@ from ...core.errors import ParameterError, suggestion
 from ...core.ops import Value
 from ...core.reference import Reference
 from ...core.system import select_prefix, with_prefix
-from ...engine.loop.control_law import ControlLaw, EnclosingLaw
+from ...engine.loop.control_law import ControlLaw, EnclosingLaw, Memory, Sampled
 from ...engine.loop.controller import Measurement
 from ...physics.muscle.friction.prandtl_ishlinskii import KUHNEN2003
 
@@ -195,9 +195,7 @@ class HysteresisCompensation(EnclosingLaw):
             **with_prefix("law.", dict(self.law.initial_memory)),
         }
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         commands, kept = self.law.step(select_prefix("law.", memory), measurement, dt)
         value, plays = self.inverse.step(select_prefix("hysteresis.", memory), commands[self.commanded])
         later = {**with_prefix("hysteresis.", plays), **with_prefix("law.", kept)}

@@ -11,25 +11,30 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.arrays import Array
-from ...core.errors import AirmuscleError
+from ...core.diagnostics import Status
 from ...core.reference import Reference
 from ...core.short_repr import ShortRepr
+from ...engine.compile.cache.kernel import Kernel
 from ...engine.loop.controller import Measurement, MultivariableController, failure_notes
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class CondensedProblem:
-    """min 1/2 z^T H z + (f e)^T z  with  l - z_0 <= z <= u - z_0,  l_A - A_e e <= A z <= u_A - A_e e.
+    """min 1/2 z^T H z + (f e)^T z  with limits of z_0 + z, of A z + A_e e and of the changes of z.
 
-    z = (v_0, ..., v_(N-1), s): deviations of the inputs from their target over N samples, and one slack variable s >= 0
-    for each limited column. e: deviation (n,) of the state from its target.
+    z = (v_1, ..., v_B, s): deviations of the inputs from their target, each held over a block of samples, and one slack
+    variable s >= 0 for each limited column. e: deviation (n,) of the state from its target.
 
+    horizon, inputs, slacks    number of samples, inputs and slack variables
     hessian      H (z, z)
     gradient     f (z, n)
+    moves        (N m, B m): inputs of the samples by those of the blocks
     rows         A (r, z): limited columns minus or plus their slack
     rows_by_state    A_e (r, n)
     limited      (r,) index of the limited column of each row
     upper        (r,) whether a row is an upper limit
+    narrowed     (B m,) and (r,): by how much the limits of inputs and of rows are narrower
+    max_change   (m,) of the inputs from one sample to the next; infinite where there is no limit
     """
 
     horizon: int
@@ -37,53 +42,16 @@ class CondensedProblem:
     slacks: int
     hessian: Array
     gradient: Array
+    moves: Array
     rows: Array
     rows_by_state: Array
     limited: npt.NDArray[np.intp]
     upper: npt.NDArray[np.bool_]
+    narrowed: tuple[Array, Array]
+    max_change: Array
 
     def __repr__(self) -> str:
         return f"CondensedProblem({self.horizon} samples, {self.inputs} inputs, {len(self.rows)} limits of columns)"
-
-
-def condense(
-    a: Array, b: Array, weights: Array, costs: Array, terminal: Array, horizon: int, columns: Array, slack_weight: float
-) -> CondensedProblem:
-    """The problem of x_(k+1) = a x_k + b v_k with the cost sum x^T W x + v^T R v, and the terminal cost x_N^T P x_N.
-
-    columns (l, n) are limited at every sample from the next one on; their slack s costs slack_weight s^2, and there is
-    none where slack_weight is infinite. Reference: Rawlings, Mayne and Diehl (2017), chapter 8.
-    """
-    n, m = b.shape
-    powers = [np.eye(n)]
-    for _ in range(horizon):
-        powers.append(a @ powers[-1])
-    forced = np.zeros((horizon, n, horizon, m))
-    for k in range(horizon):
-        for j in range(k + 1):
-            forced[k, :, j] = powers[k - j] @ b
-    by_input, by_state = forced.reshape(horizon * n, horizon * m), np.concatenate(powers[1:])
-    each = np.kron(np.eye(horizon), weights)
-    each[-n:, -n:] = terminal
-    soft = len(columns) if np.isfinite(slack_weight) else 0
-    size = horizon * m + soft
-    hessian, gradient = np.zeros((size, size)), np.zeros((size, n))
-    inner = by_input.T @ each @ by_input + np.kron(np.eye(horizon), costs)
-    hessian[: horizon * m, : horizon * m] = inner + inner.T
-    gradient[: horizon * m] = 2.0 * by_input.T @ each @ by_state
-    for i in range(soft):
-        hessian[horizon * m + i, horizon * m + i] = 2.0 * slack_weight
-    limited = np.kron(np.eye(horizon), columns)
-    rows = np.hstack([limited @ by_input, np.zeros((len(limited), soft))])
-    upper, lower, index = rows.copy(), rows.copy(), np.tile(np.arange(len(columns)), horizon)
-    if soft:
-        upper[np.arange(len(rows)), horizon * m + index] = -1.0
-        lower[np.arange(len(rows)), horizon * m + index] = 1.0
-    ahead = limited @ by_state
-    return CondensedProblem(
-        horizon, m, soft, hessian, gradient, np.vstack([upper, lower]), np.vstack([ahead, ahead]),
-        np.concatenate([index, index]), np.arange(2 * len(rows)) < len(rows),
-    )  # fmt: skip
 
 
 RAWLINGS2017 = Reference(
@@ -94,26 +62,44 @@ RAWLINGS2017 = Reference(
     year=2017,
     note="target calculation, disturbance model for offset-free control, condensed quadratic program",
 )
-ARNSTROM2022 = Reference(
-    key="arnstrom-2022",
-    authors="Arnström, D., Bemporad, A., Axehill, D.",
-    title="A dual active-set solver for embedded quadratic programming using recursive LDL^T updates",
-    where="IEEE Transactions on Automatic Control 67(8):4362-4369",
-    year=2022,
-    doi="10.1109/TAC.2022.3176430",
-    note="the solver DAQP",
+GOLDFARB_IDNANI1983 = Reference(
+    key="goldfarb-idnani-1983",
+    authors="Goldfarb, D., Idnani, A.",
+    title="A numerically stable dual method for solving strictly convex quadratic programs",
+    where="Mathematical Programming 27:1-33",
+    year=1983,
+    doi="10.1007/BF02591962",
+    note="dual active-set method",
 )
+CHISCI2001 = Reference(
+    key="chisci-2001",
+    authors="Chisci, L., Rossiter, J. A., Zappa, G.",
+    title="Systems with persistent disturbances: predictive control with restricted constraints",
+    where="Automatica 37(7):1019-1028",
+    year=2001,
+    doi="10.1016/S0005-1098(01)00051-6",
+    note="limits narrowed by the reach of bounded disturbances",
+)
+_sample = Kernel("predictive_sample", "predictive")
+UNLIMITED = 1e300
+"""A limit that nothing reaches."""
 
 
 class PredictiveMemory(NamedTuple):
-    """Memory of the controller: predicted deviation of states and disturbances (n + d,), planned inputs (N, m) of the
-    last solution, how many samples ago that was, active limits (z + r,) of it, and the number of failures so far."""
+    """Memory of the controller: predicted deviation of states and disturbances (n + d,), planned inputs (N m,) of the
+    last solution, inputs (m,) of the last sample, limits (r,) that were active, and two numbers: how many samples ago
+    the solution was, -1 without one, and the number of failures so far."""
 
     predicted: Array
     plan: Array
-    age: int
-    active: npt.NDArray[np.int32]
-    failures: int
+    inputs: Array
+    active: Array
+    counts: npt.NDArray[np.int64]
+
+    @property
+    def failures(self) -> int:
+        """The number of samples without a solution so far."""
+        return int(self.counts[1])
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -162,20 +148,22 @@ class LinearModelPredictive(ShortRepr, MultivariableController):
         x^_k = x^-_k + L (y_k - y_0 - C x^-_k),   x^ = (x, d)                      observer with disturbances d
         x_s = A x_s + B u_s + B_d d,   C_z x_s = r - z_0                            target, the smallest one
         min  sum |x_k - x_s|_Q^2 + |u_k - u_s|_R^2 + |x_N - x_s|_P^2 + rho |s|^2    over u_0 ... u_(N-1) and s >= 0
-             u_min <= u_k <= u_max,   z_min - s <= C_l x_k <= z_max + s
+             u_min + b_k <= u_k <= u_max - b_k,   z_min + c_k - s <= C_l x_k <= z_max - c_k + s,
+             |u_k - u_(k-1)| <= R h,   u_k constant over each block of samples
 
     P is the solution of the discrete Riccati equation, so that the law is the linear-quadratic regulator while no limit
     is active. There are as many disturbances as measured columns, therefore measured and controlled columns have no
-    offset at rest (Rawlings et al. 2017, chapter 1). Limits of inputs are the ranges of the loop.
+    offset at rest (Rawlings et al. 2017, chapter 1). Limits of inputs are the ranges of the loop. b_k and c_k are the
+    reach of bounded disturbances under the regulator until sample k (Chisci et al. 2001); 0 without them. The input
+    before the first sample is that of the operating point.
 
-    The quadratic program is condensed to the inputs and solved by DAQP (package `daqp`, extra `control`), which starts
-    from the limits that were active at the last sample. If there is no solution, which is possible with hard limits
-    only, the next input of the last plan is applied, after its end the target; `notes` states how often.
-    `airmuscle.control.design_predictive` designs it for a linearised plant.
-    References: Rawlings, Mayne and Diehl (2017); Arnström, Bemporad and Axehill (2022).
+    The quadratic program is condensed to the inputs and solved by a compiled dual active-set method (Goldfarb and
+    Idnani 1983), which starts from the limits that were active at the last sample; the export prints the same one in C.
+    If there is no solution, which is possible with hard limits only, the next input of the last plan is applied, after
+    its end the target; `notes` states how often. `design_predictive` designs it for a linearised plant.
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (RAWLINGS2017, ARNSTROM2022)
+    references: ClassVar[tuple[Reference, ...]] = (RAWLINGS2017, GOLDFARB_IDNANI1983, CHISCI2001)
 
     measured: tuple[str, ...]
     controlled: tuple[str, ...]
@@ -183,16 +171,18 @@ class LinearModelPredictive(ShortRepr, MultivariableController):
     observer: ObserverModel
     target: TargetMap
     problem: CondensedProblem
-    _solvers: list[Any] = dataclasses.field(init=False, repr=False, default_factory=list)
+    _idle: list[Any] = dataclasses.field(init=False, repr=False, default_factory=list)
 
     def __getstate__(self) -> dict[str, Any]:
-        """The fields without the workspaces of the solver, which belong to one process."""
-        return {**self.__dict__, "_solvers": []}
+        """The fields without compiled samples, which belong to one process."""
+        return {**{key: value for key, value in self.__dict__.items() if key != "constants"}, "_idle": []}
 
     def init(self) -> PredictiveMemory:
-        problem, count = self.problem, len(self.problem.hessian) + len(self.problem.rows)
-        empty, free = np.zeros((0, problem.inputs)), np.zeros(count, dtype=np.int32)
-        return PredictiveMemory(np.zeros(len(self.observer.transition)), empty, 0, free, 0)
+        problem, m = self.problem, len(self.commanded)
+        return PredictiveMemory(
+            np.zeros(len(self.observer.transition)), np.zeros(problem.horizon * m), np.zeros(m),
+            np.zeros(len(self.constants["scale"])), np.array([-1, 0]),
+        )  # fmt: skip
 
     def notes(self, memory: PredictiveMemory) -> tuple[str, ...]:
         return failure_notes("LinearModelPredictive", "quadratic program", memory.failures)
@@ -200,95 +190,111 @@ class LinearModelPredictive(ShortRepr, MultivariableController):
     def step(
         self, memory: PredictiveMemory, measurement: Measurement, dt: float
     ) -> tuple[Mapping[str, float], PredictiveMemory]:
-        model, columns, ranges = self.observer, measurement.columns, measurement.ranges
-        innovation = np.array([columns[name] for name in self.measured]) - model.measured
-        innovation -= model.output_matrix @ memory.predicted
-        estimate = memory.predicted + model.gain @ innovation
-        setpoint = np.array([measurement.setpoints[name] for name in self.controlled]) - self.target.controlled
+        model, ranges = self.observer, measurement.ranges
         low, high = np.array([ranges[name] for name in self.commanded]).T
-        low, high = (low - model.inputs) / model.input_sizes, (high - model.inputs) / model.input_sizes
-        plan, active = self.plan(estimate, setpoint, low, high, memory.active)
-        if plan is None:
-            age, plan = memory.age + 1, memory.plan
-            deviation = plan[age] if age < len(plan) else self._target_inputs @ np.concatenate([estimate, setpoint])
-            following = memory._replace(age=age, failures=memory.failures + 1)
-        else:
-            deviation = plan[0]
-            following = PredictiveMemory(memory.predicted, plan, 0, active, memory.failures)
-        applied = np.minimum(np.maximum(deviation, low), high)
-        predicted = model.transition @ estimate + model.input_matrix @ applied
-        commands = dict(zip(self.commanded, (model.inputs + model.input_sizes * applied).tolist(), strict=True))
-        return commands, following._replace(predicted=predicted)
+        _, later = self._sample(
+            memory, np.array([measurement.columns[name] for name in self.measured]) - model.measured,
+            np.array([measurement.setpoints[name] for name in self.controlled]) - self.target.controlled,
+            ((low - model.inputs) / model.input_sizes, (high - model.inputs) / model.input_sizes),
+        )  # fmt: skip
+        commands = (model.inputs + model.input_sizes * later.inputs).tolist()
+        return dict(zip(self.commanded, commands, strict=True)), later
 
     def plan(
-        self, estimate: Array, setpoint: Array, low: Array, high: Array, active: npt.NDArray[np.int32]
-    ) -> tuple[Array | None, npt.NDArray[np.int32]]:
-        """The planned inputs (N, m), or None where the program has no solution, and the active limits.
+        self, estimate: Array, setpoint: Array, low: Array, high: Array, memory: PredictiveMemory | None = None
+    ) -> Array | None:
+        """The planned inputs (N, m), or None where the program has no solution.
 
         Everything is a deviation from the operating point, scaled: states and disturbances (n + d,), set points (q,),
-        limits of the inputs (m,). `active` (z + r,) are the limits from which the solver starts.
+        limits of the inputs (m,). `memory` has the inputs of the last sample and the limits to start from.
         """
-        problem, (terms, target_inputs) = self.problem, (self._terms, self._target_inputs)
-        size, count = problem.horizon * problem.inputs, len(problem.hessian)
-        point = np.concatenate([estimate, setpoint])
-        values = terms @ point
-        gradient, shift = values[:count], values[count:]
-        upper, lower = self._limits
-        upper[:size].reshape(-1, problem.inputs)[:] = high
-        lower[:size].reshape(-1, problem.inputs)[:] = low
-        solver = self._solvers.pop() if self._solvers else None
-        if solver is None:
-            solver = _new_solver()
-            solver.setup(problem.hessian, gradient, problem.rows, upper - shift, lower - shift, active.copy())
-        else:
-            solver.update(f=gradient, bupper=upper - shift, blower=lower - shift, sense=active.copy())
-        z, _, flag, info = solver.solve()
-        self._solvers.append(solver)
-        if flag < 1 or not np.isfinite(z).all():
-            return None, active
-        return z[:size].reshape(problem.horizon, -1) + target_inputs @ point, _active(info["lam"])
+        before = (memory or self.init())._replace(predicted=estimate)
+        status, later = self._sample(before, self.observer.output_matrix @ estimate, setpoint, (low, high))
+        return later.plan.reshape(self.problem.horizon, -1) if status is Status.DONE else None
 
-    @functools.cached_property
-    def _terms(self) -> Array:
-        """Gradient and shift of all limits, linear in estimate and set points: (2 z + r, n + d + q)."""
-        problem, target, n = self.problem, self.target, self.problem.gradient.shape[1]
-        steady = np.hstack([np.zeros((n, n)), target.by_disturbance[:n], target.by_setpoint[:n]])
-        error = np.eye(n, steady.shape[1]) - steady
-        shift = (target.columns @ steady)[problem.limited] + problem.rows_by_state @ error
-        free = np.zeros((problem.slacks, steady.shape[1]))
-        return np.vstack([problem.gradient @ error, *[self._target_inputs] * problem.horizon, free, shift])
-
-    @functools.cached_property
-    def _target_inputs(self) -> Array:
-        """Inputs of the target, linear in estimate and set points: (m, n + d + q)."""
-        n, m = self.problem.gradient.shape[1], self.problem.inputs
-        return np.hstack([np.zeros((m, n)), self.target.by_disturbance[n:], self.target.by_setpoint[n:]])
+    def _sample(
+        self, memory: PredictiveMemory, y: Array, r: Array, limits: tuple[Array, Array]
+    ) -> tuple[Status, PredictiveMemory]:
+        """The status of the program and the memory after a sample, of scaled deviations."""
+        if not self._idle:
+            arrays = self.arrays()
+            self._idle.append((arrays, _sample.bind(*arrays.values())))
+        arrays, run = self._idle.pop()
+        for name, value in {"y": y, "r": r, "low": limits[0], "high": limits[1], **memory._asdict()}.items():
+            arrays[name][:] = value
+        status = Status(run())
+        later = PredictiveMemory(*[arrays[name].copy() for name in memory._fields])
+        self._idle.append((arrays, run))
+        return status, later
 
     @property
-    def _limits(self) -> tuple[Array, Array]:
-        """Upper and lower limits (z + r,), with 0 in place of those of the inputs."""
-        return self._constant_limits[0].copy(), self._constant_limits[1].copy()
+    def initial_memory(self) -> dict[str, float]:
+        """All values of the memory before the first sample, by name: `predicted0` and so on."""
+        return {f"{key}{i}": float(v) for key, values in self.init()._asdict().items() for i, v in enumerate(values)}
+
+    def arrays(self) -> dict[str, Array]:
+        """New arrays of all arguments of `predictive_sample`, by name: signals, constants, memory and workspace."""
+        known, memory = self.constants, self.init()
+        (p, _), (r, n), q = self.observer.output_matrix.shape, known["m"].shape, len(self.controlled)
+        m = len(self.commanded)
+        return {
+            **{name: np.zeros(size) for name, size in (("y", p), ("r", q), ("low", m), ("high", m))}, **known,
+            **memory._asdict(), "innovation": np.zeros(p), "point": np.zeros(known["rest"].shape[1]),
+            "lower": np.zeros(r), "upper": np.zeros(r), "order": np.zeros(n, dtype=np.int64),
+            "factor": np.zeros((n, n)), **{name: np.zeros(n) for name in ("multipliers", "change", "spare", "w")},
+        }  # fmt: skip
 
     @functools.cached_property
-    def _constant_limits(self) -> tuple[Array, Array]:
-        problem, target = self.problem, self.target
-        inputs = np.zeros(problem.horizon * problem.inputs)
-        top = np.where(problem.upper, target.upper[problem.limited], np.inf)
-        bottom = np.where(problem.upper, -np.inf, target.lower[problem.limited])
-        upper = np.concatenate([inputs, np.full(problem.slacks, np.inf), top])
-        return upper, np.concatenate([inputs, np.zeros(problem.slacks), bottom])
+    def constants(self) -> dict[str, Array]:
+        """The constant arrays of `predictive_sample`, in the order of its arguments.
 
+        The program is the shortest vector w = L^T z + L^-1 f e with limits of its rows, H = L L^T.
+        """
+        problem, model = self.problem, self.observer
+        n, m, count = problem.gradient.shape[1], problem.inputs, problem.moves.shape[1]
+        steady = np.hstack([self.target.by_disturbance, self.target.by_setpoint])
+        width = n + steady.shape[1] + m
+        at_rest = np.zeros((n + m, width))
+        at_rest[:, n : width - m] = steady
+        error, rest = np.eye(n, width) - at_rest[:n], at_rest[n:]
+        rows, shift, low, high, of_input = self._limits(error, at_rest)
+        factor = np.linalg.cholesky(problem.hessian)
+        free = np.linalg.solve(factor, problem.gradient @ error)
+        matrix = np.linalg.solve(factor, rows.T).T
+        length = np.linalg.norm(matrix, axis=1)
+        used = length > 1e-9 * length.max()  # no input changes the column of another row
+        scale = 1.0 / length[used]
+        matrix = matrix[used] * scale[:, None]
+        held = np.linalg.inv(factor.T)[:count]
+        arrays = (
+            model.output_matrix, model.gain, model.transition, model.input_matrix, rest, matrix, of_input[used], scale,
+            np.maximum(low[used] * scale, -UNLIMITED), np.minimum(high[used] * scale, UNLIMITED),
+            shift[used] * scale[:, None] + matrix @ free, problem.moves @ held,
+            np.tile(rest, (problem.horizon, 1)) - problem.moves @ held @ free,
+        )  # fmt: skip
+        names = ("by_output", "gain", "transition", "by_input", "rest", "m", "of_input", "scale", "fixed_low",
+                 "fixed_high", "by_point", "plan_by_w", "plan_by_point")  # fmt: skip
+        return {name: np.ascontiguousarray(array) for name, array in zip(names, arrays, strict=True)}
 
-def _active(multipliers: Array) -> npt.NDArray[np.int32]:
-    """Flags of DAQP for the limits with a multiplier: 1 active, 2 more at the lower limit."""
-    return (multipliers > 0.0).astype(np.int32) + 3 * (multipliers < 0.0).astype(np.int32)
-
-
-def _new_solver() -> Any:
-    try:
-        import daqp
-    except ImportError:
-        raise AirmuscleError(
-            "LinearModelPredictive needs the package 'daqp'; pip install airmuscle[control], or use StateFeedback."
-        ) from None
-    return daqp.Model()
+    def _limits(self, error: Array, at_rest: Array) -> tuple[Array, Array, Array, Array, Array]:
+        """All rows (r, z), what the point adds to their limits (r, N), the limits (r,), and their inputs (r,) or -1."""
+        problem, target, m = self.problem, self.target, self.problem.inputs
+        n, count, size = len(error), problem.moves.shape[1], len(problem.hessian)
+        own, slack = np.eye(size)[:count], np.eye(size)[count:]
+        rest = np.tile(at_rest[n:], (count // m, 1))
+        columns = (target.columns @ at_rest[:n])[problem.limited] + problem.rows_by_state @ error
+        narrow_inputs, narrow_rows = problem.narrowed
+        top = np.where(problem.upper, target.upper[problem.limited] - narrow_rows, np.inf)
+        bottom = np.where(problem.upper, -np.inf, target.lower[problem.limited] + narrow_rows)
+        changing = np.tile(np.isfinite(problem.max_change), count // m)
+        change, largest = own - np.eye(size, k=-m)[:count], np.tile(problem.max_change, count // m)
+        first = np.zeros_like(rest)
+        first[:m] = np.eye(m, rest.shape[1], k=rest.shape[1] - m) - rest[:m]
+        kinds = np.concatenate([np.tile(np.arange(m), count // m), np.full(len(slack) + len(columns), -1)])
+        return (
+            np.vstack([own, slack, problem.rows, change[changing]]),
+            np.vstack([-rest, np.zeros((len(slack), rest.shape[1])), -columns, first[changing]]),
+            np.concatenate([narrow_inputs, np.zeros(len(slack)), bottom, -largest[changing]]),
+            np.concatenate([-narrow_inputs, np.full(len(slack), np.inf), top, largest[changing]]),
+            np.append(kinds, np.full(int(changing.sum()), -1)),
+        )

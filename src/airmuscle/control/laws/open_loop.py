@@ -11,7 +11,7 @@ from ...core.declaration import Parameter, model, parameter
 from ...core.errors import ParameterError
 from ...core.ops import Value
 from ...core.reference import Reference
-from ...engine.loop.control_law import ControlLaw
+from ...engine.loop.control_law import ControlLaw, Memory, Sampled
 from ...engine.loop.controller import Measurement
 from .pid import ASTROM_HAGGLUND1995
 
@@ -29,9 +29,7 @@ class OpenLoopLaw(ControlLaw):
     def command(self, setpoints: Mapping[str, Value]) -> dict[str, Value]:
         """The command of every input [SI], from the set points by name."""
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         return self.command(measurement.setpoints), {}
 
 

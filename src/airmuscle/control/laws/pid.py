@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
 from typing import ClassVar
 
 from ...core import ops
@@ -11,7 +10,7 @@ from ...core.declaration import model, parameter
 from ...core.errors import ParameterError
 from ...core.ops import Value
 from ...core.reference import Reference
-from ...engine.loop.control_law import Commanded, SisoController, commands, range_of
+from ...engine.loop.control_law import Commanded, Memory, Sampled, SisoController, commands, range_of
 from ...engine.loop.controller import Measurement
 from .sliding_mode import sliding_memory, sliding_variable
 
@@ -67,9 +66,7 @@ class PID(SisoController):
         """Whether it has started (0 or 1), I and D [u], and c r - y of the last sample [y]."""
         return {"started": 0.0, "integral": 0.0, "derivative": 0.0, "weighted_error": 0.0}
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         setpoint, measured = measurement.setpoints[self.measured], measurement.columns[self.measured]
         proportional = self.gain * (self.setpoint_weight * setpoint - measured)
         weighted = self.derivative_weight * setpoint - measured
@@ -125,9 +122,7 @@ class OnOffController(SisoController):
         """Whether the maximum is commanded (0 or 1)."""
         return {"on": 0.0}
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         error = measurement.columns[self.measured] - measurement.setpoints[self.measured]
         half = self.hysteresis / 2
         on = ops.where(error < -half, 1.0, ops.where(error > half, 0.0, memory["on"]))
@@ -168,9 +163,7 @@ class DeadZoneController(SisoController):
         """The position (-1, 0 or 1), whether it has started, the last error and its filtered derivative."""
         return {**sliding_memory(), "position": 0.0}
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         error = measurement.setpoints[self.measured] - measurement.columns[self.measured]
         s, later = sliding_variable(memory, error, self.lead_time, self.filter_time, dt)
         inner = self.release * self.zone

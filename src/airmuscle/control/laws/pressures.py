@@ -11,7 +11,7 @@ from ...core.errors import ParameterError
 from ...core.ops import Value
 from ...core.reference import Reference
 from ...core.system import select_prefix, united, with_prefix
-from ...engine.loop.control_law import Commanded, ControlLaw, commands, inputs_of, range_of
+from ...engine.loop.control_law import Commanded, ControlLaw, Memory, Sampled, commands, inputs_of, range_of
 from ...engine.loop.controller import Measurement
 from ...physics.muscle.characteristic.tondu_lopez2000 import TONDU_LOPEZ_2000
 from .open_loop import OpenLoopLaw
@@ -101,9 +101,7 @@ class ProportionalFeedback(ControlLaw):
     def inputs(self) -> tuple[str, ...]:
         return tuple(name for each in self.commanded for name in inputs_of(each))
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         result: dict[str, Value] = {}
         for name, commanded in zip(self.controlled, self.commanded, strict=True):
             error = measurement.setpoints[name] - measurement.columns[name]
@@ -163,9 +161,7 @@ class Decentralised(ControlLaw):
             memory |= with_prefix(f"{i}.", law.initial_memory)
         return memory
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         commands: dict[str, Value] = {}
         later: dict[str, Value] = {}
         for i, law in enumerate(self.laws):

@@ -9,7 +9,7 @@ from ...core import ops
 from ...core.declaration import model, parameter
 from ...core.ops import Value
 from ...core.reference import Reference
-from ...engine.loop.control_law import Commanded, SisoController, commands, range_of
+from ...engine.loop.control_law import Commanded, Memory, Sampled, SisoController, commands, range_of
 from ...engine.loop.controller import Measurement
 
 
@@ -66,9 +66,7 @@ class SlidingMode(SisoController):
         """Whether it has started (0 or 1), the last error [y] and its filtered derivative [y/s]."""
         return sliding_memory()
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         error = measurement.setpoints[self.measured] - measurement.columns[self.measured]
         s, later = sliding_variable(memory, error, self.sliding_time, self.filter_time, dt)
         layer = ops.where(self.boundary_layer > 0, self.boundary_layer, 1.0)
@@ -115,9 +113,7 @@ class SuperTwisting(SisoController):
         """Whether it has started (0 or 1), the last error, its filtered derivative, and the integral w [u]."""
         return {**sliding_memory(), "integral": 0.0}
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         error = measurement.setpoints[self.measured] - measurement.columns[self.measured]
         s, later = sliding_variable(memory, error, self.sliding_time, self.filter_time, dt)
         sign = ops.where(s > 0.0, 1.0, ops.where(s < 0.0, -1.0, 0.0))

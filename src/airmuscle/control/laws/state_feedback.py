@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 from ...core import ops
@@ -11,7 +10,7 @@ from ...core.errors import ParameterError
 from ...core.ops import Value
 from ...core.reference import Reference
 from ...core.system import select_prefix, with_prefix
-from ...engine.loop.control_law import ControlLaw
+from ...engine.loop.control_law import ControlLaw, Memory, Sampled
 from ...engine.loop.controller import Measurement, MultivariableController
 
 FRANKLIN1998 = Reference(
@@ -81,9 +80,7 @@ class StateFeedback(MultivariableController, ControlLaw):
         """The controlled columns whose error is integrated."""
         return self.controlled if self.integral_gain else ()
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         predicted = list(select_prefix("state.", memory).values())
         integrals = select_prefix("integral.", memory)
         deviations = zip(self.measured, self.measured_offset, strict=True)

@@ -27,7 +27,7 @@ from .signals import TrackingMetrics, task_loop, task_signals, track
 from .tasks import DEGREE, STANDARD_TASKS, TUNING_BEGIN, TUNING_TASKS, ControlTask
 from .truths import BenchmarkTruth
 
-SETS_PER_GAIN, COMMISSIONING_RUNS = 100, 60
+SETS_PER_GAIN, COMMISSIONING_RUNS = 300, 60
 """Most sets of gains for each gain of a search, and most runs of a commissioning (chosen)."""
 TUNING_INTEGRATOR = RungeKutta4(5e-4)
 """Integrator of the searches (chosen); the median tracking index differs by less than 1e-6 from Rodas4(1e-6)."""

@@ -26,6 +26,8 @@ from .joints import BenchmarkJoint
 MAX_LEAD = 0.03
 """Greatest lead time [s] of a feed-forward (chosen): it replaces the lag of the pressures, never damping or inertia."""
 PID_BOUNDS: Bounds = {"gain": (2e4, 2e6), "integral_time": (0.02, 3.0), "derivative_time": (1e-3, 0.2)}
+PERMITTED_ANGLE = (2e-3, 0.2)
+"""Range of the permitted error [rad] of LQG and MPC, which is also sought on a truth: its bandwidth follows from it."""
 _SLIDING = (3e-3, 0.3)
 _LEAD, _FRICTION = "feed_forward.lead_time", "feedback.feed_forward.amplitude"
 FEED_FORWARD: Bounds = {_LEAD: (0.0, MAX_LEAD), _FRICTION: (0.0, 3e4)}
@@ -51,11 +53,17 @@ def _feed_forward() -> WithFeedForward:
     return WithFeedForward(lead, WithFeedForward(friction, motion))
 
 
-def _beside_feed_forward(joint: BenchmarkJoint, name: str, feedback: ControlLaw, bounds: Bounds) -> Contender:
-    """A feedback of the angle beside the feed-forward; its set points have the dead time of the encoder."""
+def _beside_feed_forward(
+    joint: BenchmarkJoint, name: str, feedback: ControlLaw, bounds: Bounds, commissioned: Bounds | None = None
+) -> Contender:
+    """A feedback of the angle beside the feed-forward; its set points have the dead time of the encoder.
+
+    commissioned  gains of the feedback that are also sought on a truth
+    """
     law = WithFeedForward(_feed_forward(), WithSetpointDelay(feedback, _delay(joint)))
     known = {**_inside("feed_forward.", FEED_FORWARD), **_inside("feedback.law.", bounds)}
-    return Contender(name, law, known, _inside("feed_forward.", COMMISSIONED))
+    sought = {**_inside("feed_forward.", COMMISSIONED), **_inside("feedback.law.", commissioned or {})}
+    return Contender(name, law, known, sought)
 
 
 def _delay(joint: BenchmarkJoint) -> int:
@@ -86,9 +94,10 @@ def standard_contenders(joint: BenchmarkJoint) -> tuple[Contender, ...]:
     quadratic = ours(
         "feed-forward + LQG", DeviationLaw(design),
         _inside("law.", {
-            "permitted_angle": (2e-3, 0.2), "speed_noise": (0.1, 100.0), "disturbance_noise": (10.0, 1e4),
+            "permitted_angle": PERMITTED_ANGLE, "speed_noise": (0.1, 100.0), "disturbance_noise": (10.0, 1e4),
             "pressure_time": (3e-3, 0.1),
         }),
+        {"law.permitted_angle": PERMITTED_ANGLE},
     )  # fmt: skip
     return (
         Contender("PID", pid, PID_BOUNDS, PID_BOUNDS),
@@ -102,6 +111,6 @@ def standard_contenders(joint: BenchmarkJoint) -> tuple[Contender, ...]:
              _inside("law.", {"bandwidth": (3.0, 100.0), "observer_bandwidth": (10.0, 500.0)})),
         quadratic,
         Contender("feed-forward + MPC", AlongMotion(_feed_forward(), design, _delay(joint)), {},
-                  _inside("feed_forward.", COMMISSIONED), quadratic),
+                  {**_inside("feed_forward.", COMMISSIONED), "design.permitted_angle": PERMITTED_ANGLE}, quadratic),
         _angle_and_stiffness(joint),
     )  # fmt: skip

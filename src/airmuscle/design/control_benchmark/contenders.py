@@ -16,6 +16,7 @@ from ...core.errors import ParameterError
 from ...core.ops import Value
 from ...core.tree import leaves
 from ...engine.loop import ControlLaw, Controller, Measurement, SigmaDelta, SplitRange, WithSensors
+from ...engine.loop.control_law import Memory, Sampled
 from ...engine.run.compiled_law import LawSample
 from ..tuning import load_scenario_loop
 from .joints import BenchmarkJoint
@@ -44,9 +45,7 @@ class Readings(ControlLaw):
     def inputs(self) -> tuple[str, ...]:
         return self.columns
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         return {name: measurement.columns[name] for name in self.columns}, {}
 
 

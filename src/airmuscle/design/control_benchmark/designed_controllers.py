@@ -17,7 +17,7 @@ from ...core.declaration import model, parameter
 from ...core.errors import ParameterError
 from ...core.ops import Value
 from ...core.reference import Reference
-from ...engine.loop.control_law import ControlLaw, EnclosingLaw
+from ...engine.loop.control_law import ControlLaw, EnclosingLaw, Memory, Sampled
 from ...engine.loop.control_loop import LawDesign
 from ...engine.loop.controller import Controller, Measurement
 from ...physics.analysis.linear_model import LinearModel
@@ -171,9 +171,7 @@ class DeviationLaw(EnclosingLaw):
     def setpoints(self) -> tuple[str, ...]:
         return ("angle",)
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[Mapping[str, Value], Mapping[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         deviation = measurement.columns["angle"] - measurement.setpoints["angle"]
         return self.law.step(memory, Measurement({READING: deviation}, {READING: 0.0}, measurement.ranges), dt)
 

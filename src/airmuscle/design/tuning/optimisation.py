@@ -235,11 +235,12 @@ class _Search:
         random, ends = np.random.default_rng([seed, 1]), list[float]()
         try:
             for start in _starts(first, self._energies(first)):
-                ends.append(self._descend(EvolutionStrategy(start, random)))
+                strategy = EvolutionStrategy(start, random)
+                if self.converged or not self._has_budget(strategy.size):
+                    break
+                ends.append(self._descend(strategy))
                 best, *others = sorted(ends)
                 self.converged = bool(others) and others[0] - best <= AGREEMENT * abs(best)
-                if self.converged or not self._has_budget(MIN_SETS):
-                    break
         except (Interrupted, KeyboardInterrupt):
             return True
         return False

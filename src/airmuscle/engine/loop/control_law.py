@@ -18,6 +18,11 @@ from ...core.reference import Reference
 from ...core.system import select_prefix, with_prefix
 from .controller import Controller, Measurement
 
+Memory = Mapping[str, Value]
+"""Values that a law stores from one sample to the next, by name."""
+Sampled = tuple[Mapping[str, Value], Mapping[str, Value]]
+"""The commands of a sample, and the memory of the next one."""
+
 
 class ControlLaw(Controller):
     """A sampled controller whose `step` is written over `airmuscle.core.ops`, as the laws of muscles and valves are.
@@ -36,9 +41,7 @@ class ControlLaw(Controller):
         return dict(self.initial_memory)
 
     @abc.abstractmethod
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[Mapping[str, Value], Mapping[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         """The command of every input until the next sample, `dt` [s] later, and the memory for that sample."""
 
 
@@ -181,9 +184,7 @@ class SigmaDelta(EnclosingLaw):
         sums = dict.fromkeys(self.inputs, 0.0)
         return {**with_prefix("sum.", sums), **with_prefix("law.", self.law.initial_memory)}
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         wanted, law = self.law.step(select_prefix("law.", memory), measurement, dt)
         positions: dict[str, Value] = {}
         sums: dict[str, Value] = {}

@@ -23,7 +23,7 @@ from ...core.system import System
 from ...core.tree import Structure, structure, with_ambient
 from ...core.units import quantity
 from ...recording.recording import Recording
-from .control_law import ControlLaw, EnclosingLaw, rebuilt
+from .control_law import ControlLaw, EnclosingLaw, Memory, Sampled, rebuilt
 from .controller import Controller, Measurement, named_signal_units
 from .driver import Driver, WithDrivers
 from .inputs import ZERO_INPUT, InputSignal, Schedule, check_input_names, check_input_signal
@@ -231,9 +231,7 @@ class LawDesign(EnclosingLaw):
     def law(self) -> ControlLaw:
         """The designed law."""
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[Mapping[str, Value], Mapping[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         return self.law.step(memory, measurement, dt)
 
 

@@ -14,7 +14,7 @@ from ...core.errors import ParameterError
 from ...core.ops import Value
 from ...core.reference import Reference
 from ...core.system import select_prefix, with_prefix
-from .control_law import ControlLaw, EnclosingLaw
+from .control_law import ControlLaw, EnclosingLaw, Memory, Sampled
 from .controller import Measurement, SignalRelated
 
 MAX_DELAY = 1000
@@ -159,9 +159,7 @@ class WithSensors(EnclosingLaw):
         random = with_prefix("random.", dict.fromkeys(STATE, 0.0))
         return {**memory, **random, **with_prefix("law.", self.law.initial_memory)}
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[Mapping[str, Value], dict[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         columns, later = self._read(memory, measurement.columns, dt)
         commands, law = self.law.step(select_prefix("law.", memory), measurement._replace(columns=columns), dt)
         return commands, {**later, **with_prefix("law.", law)}

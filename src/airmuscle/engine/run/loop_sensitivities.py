@@ -17,7 +17,7 @@ from ...core.errors import ParameterError, suggestion
 from ...core.ops import Value
 from ...core.system import System
 from ...recording.recording import Recording
-from ..loop.control_law import ControlLaw
+from ..loop.control_law import ControlLaw, Memory, Sampled
 from ..loop.control_loop import SETPOINT, ControlLoop
 from ..loop.controller import Measurement
 from .compiled_law import TracedSample, trace_sample
@@ -193,9 +193,7 @@ class LawWithSensitivities(ControlLaw):
         moved = self.columns[column]
         return casadi.DM([float(leaf.path in moved) for leaf in tree.leaves(self.law)])
 
-    def step(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-    ) -> tuple[dict[str, Value], dict[str, Value]]:
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         import casadi
 
         sample, law = trace_sample(self.law), self.law

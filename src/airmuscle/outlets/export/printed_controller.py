@@ -30,13 +30,14 @@ from .provenance import block_comment, filled, provenance
 SINGLE_TOLERANCE = 1e-4
 """Part of its range by which a command in single precision may differ from that in double precision (chosen)."""
 
-ABOUT = {
-    "double": "/* Replay of a recorded run. The expected commands are those of the printed operations in IEEE 754 "
+ABOUT = (
+    "/* Replay of a recorded run. The expected commands are those of the printed operations in IEEE 754 "
     "double precision;\n   they are met bit by bit if products and sums are not fused (gcc, clang: -ffp-contract=off, "
     "which -std=c99 implies for\n   gcc). */",
-    "float": "/* Replay of a recorded run in single precision. The expected commands are those of double precision. */",
-}
-"""Comment of the program that replays a run, by the type of numbers."""
+    "/* Replay of a recorded run. The expected commands are those of double precision, which are met within a "
+    "tolerance. */",
+)
+"""Comment of the program that replays a run: one that is exact, and one with a tolerance."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -68,18 +69,28 @@ class PrintedController:
         }  # fmt: skip
         return {key: str(count) for key, count in counts.items()}
 
+    @property
+    def header_places(self) -> dict[str, str]:
+        """The places of the header."""
+        return self.counts | {
+            "provenance": block_comment(self.provenance), "file": self.name, "enumerations": self._enumerations(),
+            "number": self.number,
+        }  # fmt: skip
+
     def source_files(self) -> dict[str, str]:
         """Header and source, by file name."""
         printer = Printer(CLanguage(self.number, f"{self.name}_", labels=self._labels))
         printer.add_code("sample", list(self.inputs), self.code, list(self.outputs))
-        places = self.counts | {
-            "provenance": block_comment(self.provenance), "file": self.name, "enumerations": self._enumerations(),
-            "functions": printer.text[-1], "constants": self._constants(), "number": self.number,
-        }  # fmt: skip
+        places = {**self.header_places, "functions": printer.text[-1], "constants": self._constants()}
         return {
             f"{self.name}.h": filled("controller.h", places, self.name),
             f"{self.name}.c": filled("controller.c", places, self.name),
         }
+
+    @property
+    def tolerance(self) -> float:
+        """Part of its range by which a command of the replay may differ; 0: no bit differs."""
+        return SINGLE_TOLERANCE if self.number == "float" else 0.0
 
     def sample_in(self, language: TargetLanguage) -> str:
         """The function of a sample in another language; its arguments are measurement, set point, memory, parameters,
@@ -111,9 +122,9 @@ class PrintedController:
         )
         places = {
             "provenance": block_comment(self.provenance), "file": self.name, "samples": str(len(samples.measured)),
-            "tables": "".join(tables), "number": number, "about": ABOUT[number],
-            "comparison": filled(f"replay_{'double' if number == 'double' else 'single'}.c", {
-                "tolerance": c_number(SINGLE_TOLERANCE),
+            "tables": "".join(tables), "number": number, "about": ABOUT[self.tolerance > 0],
+            "comparison": filled(f"replay_{'single' if self.tolerance else 'double'}.c", {
+                "tolerance": c_number(self.tolerance),
                 "ranges": c_array(f"static const double ranges[{upper}_COMMANDS + 1]", self.ranges_of(samples), 1),
             }, self.name),
         }  # fmt: skip
@@ -230,12 +241,12 @@ def check_single_precision(printed: PrintedController, samples: ReplayedSamples,
         )
 
 
-def check_control_law(problem: Problem) -> ControlLoop:
-    """The control loop of a problem. Raises ParameterError where its controller cannot be printed, by its name."""
+def check_control_law(problem: Problem, also: type = ControlLaw) -> ControlLoop:
+    """The control loop of a problem. Raises ParameterError where its controller is neither a ControlLaw nor `also`."""
     loop = problem.input
     if not isinstance(loop, ControlLoop):
         raise ParameterError("the problem has no controller to export; its input is a signal. Give it a ControlLoop.")
-    if not isinstance(loop.controller, ControlLaw):
+    if not isinstance(loop.controller, ControlLaw | also):
         raise ParameterError(
             f"{type(loop.controller).__name__} is a controller in Python and cannot be exported; derive it from "
             "ControlLaw and write its step over airmuscle.core.ops."

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...control import LinearModelPredictive
 from ...core.arrays import Array
 from ...core.atomic_output import atomic_folder
 from ...core.errors import ParameterError, suggestion
@@ -21,7 +22,8 @@ from ...engine.run.sampled_loop import prepare_loop
 from ...physics.muscle.characteristic import Characteristic
 from .exported_loop import CONTROLLER, export_loop
 from .identifiers import make_identifier
-from .printed_controller import check_control_law, check_single_precision, print_controller
+from .predictive_controller import print_predictive
+from .printed_controller import PrintedController, check_control_law, check_single_precision, print_controller
 from .printed_system import export_system
 from .provenance import provenance
 from .solver_text import check_open_loop, run_data
@@ -157,16 +159,26 @@ def write_controller(
     The function is `NAME_step(memory, measurement, setpoint, command)`. Sample time and ranges of the commands are
     constants. The program `main.c` replays the measurements of the run. In double precision it compares the commands
     bit by bit with those of the same operations in IEEE 754; in single precision they differ from these by at most 1e-4
-    of the range of the command. Raises ParameterError for a problem without a controller, a controller that is not a
-    ControlLaw, and one that single precision changes by more; SimulationError if the run fails, and FileError.
+    of the range of the command. The program of a LinearModelPredictive contains the solver of its quadratic program;
+    its commands differ from those of Python by at most 1e-9 of their range.
+
+    Raises ParameterError for a problem without a controller, a controller that is neither a ControlLaw nor a
+    LinearModelPredictive, and one that single precision changes by more; SimulationError if the run fails, and
+    FileError.
     """
-    loop = check_control_law(problem)
+    loop = check_control_law(problem, also=LinearModelPredictive)
     prepared = prepare_loop(problem, loop.init(problem.start_time))
     law = without_simulated(loop.controller)
     of_real_plant = dataclasses.replace(prepared, loop=dataclasses.replace(loop, controller=law))
     notes = () if law == loop.controller else (LEFT_OUT,)
-    printed = print_controller(of_real_plant, checked_name(name) or program_name(title or type(law).__name__), title,
-                               tunable, "float" if precision == Single() else "double", notes)  # fmt: skip
+    name = checked_name(name) or program_name(title or type(law).__name__)
+    printed: PrintedController
+    if isinstance(law, LinearModelPredictive):
+        _check_predictive(tunable, precision, arduino)
+        printed = print_predictive(of_real_plant, name, title)
+    else:
+        number = "float" if precision == Single() else "double"
+        printed = print_controller(of_real_plant, name, title, tunable, number, notes)
     recording = solve(problem).raise_if_incomplete().recording
     rows = np.searchsorted(recording["time"], prepared.instants[:-1] - 1e-9 * loop.sample_time)
     measured = np.column_stack([recording[f"{MEASURED}{column}"][rows] for column in loop.controller.measured_columns])
@@ -177,6 +189,15 @@ def write_controller(
     if arduino:
         return write_files(printed.arduino_files(loop.sample_time, prepared.setpoint_values[0].tolist()), folder)
     return write_files(printed.files(samples), folder)
+
+
+def _check_predictive(tunable: Sequence[str], precision: Precision, arduino: bool) -> None:
+    """Raise ParameterError for what a predictive controller in C has not."""
+    if tunable or precision != Double() or arduino:
+        raise ParameterError(
+            "LinearModelPredictive is exported as C in double precision with constant numbers; leave out tunable "
+            "parameters, single precision and the Arduino library."
+        )
 
 
 def _readings(law: Controller, measured: Array, sample_time: float) -> Array:

@@ -1,0 +1,221 @@
+"""Moving horizon estimation: the states of a window of samples with the least squared noise, within bounds."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from ...core.annotation import check_field_types
+from ...core.arrays import Array
+from ...core.diagnostics import Status
+from ...core.errors import ParameterError, SolveError
+from ...core.reference import Reference
+from ...core.short_repr import ShortRepr
+from ...engine.compile.cache.kernel import Kernel
+from ...recording.recording import Recording
+from .estimates import StateEstimate
+from .kalman_filters import ExtendedKalmanFilter
+from .riccati import check_known
+
+RAO2003 = Reference(
+    key="rao-2003",
+    authors="Rao, C. V., Rawlings, J. B., Mayne, D. Q.",
+    title="Constrained state estimation for nonlinear discrete-time systems: stability and moving horizon "
+    "approximations",
+    where="IEEE Transactions on Automatic Control 48(2):246-258",
+    year=2003,
+    doi="10.1109/TAC.2002.808470",
+    note="moving horizon estimation with an arrival cost from the extended Kalman filter",
+)
+MAX_HORIZON, STEPS, SETTLED = 200, 20, 1e-9
+"""Maximum number of samples of a window; Gauss-Newton steps, and the step in standard deviations that ends them
+(chosen)."""
+UNLIMITED = 1e300
+_shortest = Kernel("shortest_vector", "predictive")
+
+
+class WindowSample(NamedTuple):
+    """A sample of the window: inputs (m,) held before it, and measured columns (p,), NaN where one is missing."""
+
+    inputs: Array
+    values: Array
+
+
+class EstimationWindow(NamedTuple):
+    """The samples of the window, the filter's prediction before the first one, its estimate after the last one, and the
+    noise (z,) of the last solution, from which the next search starts."""
+
+    arrival: StateEstimate
+    samples: tuple[WindowSample, ...]
+    filtered: StateEstimate
+    noise: Array
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class MovingHorizonEstimator(ShortRepr):
+    """Moving horizon estimation (MHE): the states of the last N samples with the least squared noise, within bounds.
+
+        min  |x_0 - x^-|_(P^-1)^2 + sum_k |w_k|_(Q^-1)^2 + sum_k |y_k - o(x_k)|_(R^-1)^2   over x_0, w_0 ... w_(N-1)
+             x_(k+1) = g(x_k, u_k) + w_k,    x_min <= x_k <= x_max
+
+    g step, o outputs of the plant, Q and R noise of the extended Kalman filter `filter`; x^- and P its prediction
+    before the window (arrival cost). Without bounds and for a linear plant it is the Kalman filter; for a nonlinear one
+    the window is linearised anew at its best trajectory. The quadratic program of each Gauss-Newton step is solved by
+    the compiled method of LinearModelPredictive, with limits linearised at the last trajectory.
+
+    filter     ExtendedKalmanFilter with model, sample time and noise
+    horizon    number N of samples of the window
+    bounds     minimum and maximum of estimated states by name, such as {"air_mass": (0, 1)}
+
+    Raises ParameterError for an unknown name, a horizon outside 1 to 200, or a minimum that is not below the maximum.
+    Reference: Rao, Rawlings and Mayne (2003).
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (RAO2003,)
+
+    filter: ExtendedKalmanFilter
+    horizon: int = 10
+    bounds: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
+        check_known("MovingHorizonEstimator", "bounds", self.bounds, self.filter.states)
+        if not 1 <= self.horizon <= MAX_HORIZON:
+            raise ParameterError(
+                f"MovingHorizonEstimator: horizon is {self.horizon}; allowed range: 1 to {MAX_HORIZON} samples."
+            )
+        for name, (low, high) in self.bounds.items():
+            if not low < high:
+                raise ParameterError(
+                    f"MovingHorizonEstimator: the bounds of '{name}' are {low:g} and {high:g}; the minimum must be "
+                    "below the maximum."
+                )
+
+    def start(self, first: StateEstimate, values: Sequence[float], inputs: Sequence[float]) -> EstimationWindow:
+        """The window of the first sample, whose estimate before its measurement is `first`."""
+        sample = WindowSample(np.asarray(inputs, dtype=float), np.asarray(values, dtype=float))
+        filtered, _ = self.filter.correct(first, values, inputs)
+        return self._solved(EstimationWindow(first, (sample,), filtered, np.zeros(len(first.mean))))
+
+    def update(self, window: EstimationWindow, values: Sequence[float], inputs: Sequence[float]) -> EstimationWindow:
+        """The window one sample later, with measured columns (p,), NaN where one is missing, and inputs held before."""
+        sample = WindowSample(np.asarray(inputs, dtype=float), np.asarray(values, dtype=float))
+        predicted = self.filter.predict(window.filtered, sample.inputs.tolist())
+        filtered, _ = self.filter.correct(predicted, values, inputs)
+        samples, arrival, noise = (*window.samples, sample), window.arrival, window.noise
+        if len(samples) > self.horizon:
+            first, second = samples[0], samples[1]
+            corrected, _ = self.filter.correct(arrival, first.values.tolist(), first.inputs.tolist())
+            arrival, samples = self.filter.predict(corrected, second.inputs.tolist()), samples[1:]
+            noise = np.zeros(0)
+        size = len(arrival.mean) + (len(samples) - 1) * self._noisy.shape[1]
+        return self._solved(EstimationWindow(arrival, samples, filtered, np.append(noise, np.zeros(size))[:size]))
+
+    def mean(self, window: EstimationWindow) -> Array:
+        """The estimated states (n,) at the last sample of a window."""
+        return self._trajectory(window, window.noise)[0][-1]
+
+    def estimate(self, recording: Recording, first: StateEstimate) -> dict[str, Array]:
+        """The columns (N,) of the filter's `estimate`, from a recording with such rows."""
+        rows = self.filter.rows(recording)
+        means, window = [], None
+        for k, (values, held) in enumerate(zip(rows.measured, rows.held, strict=True)):
+            if window is None:
+                window = self.start(first, values, held)
+            else:
+                for _ in range(rows.counts[k - 1] - 1):
+                    window = self.update(window, np.full(len(values), np.nan), held)  # type: ignore[arg-type]
+                window = self.update(window, values, held)
+            means.append(self.mean(window))
+        return {"time": rows.time, **self.filter.table(np.array(means), rows.held)}
+
+    @property
+    def _noisy(self) -> Array:
+        """Square root (n, q) of the process noise of a sample, of the states that have some."""
+        deviations = np.sqrt(np.diag(self.filter.noise))
+        return np.diag(deviations)[:, deviations > 0]
+
+    def _trajectory(self, window: EstimationWindow, noise: Array) -> tuple[list[Array], list[Array]]:
+        """The states (n,) of the samples for a noise (z,), and their derivatives by it (n, z).
+
+        The noise is scaled: the deviation of the first state, then those of the steps, in standard deviations.
+        """
+        root, step = square_root(window.arrival.covariance), self._noisy
+        n, q = step.shape
+        slope = np.zeros((n, len(noise)))
+        slope[:, :n] = root
+        states, slopes = [window.arrival.mean + root @ noise[:n]], [slope]
+        for k, sample in enumerate(window.samples[1:]):
+            part = slice(n + k * q, n + (k + 1) * q)
+            state, matrix = self.filter.transition(states[-1], sample.inputs.tolist())
+            slope = matrix @ slopes[-1]
+            slope[:, part] += step
+            states.append(state + step @ noise[part])
+            slopes.append(slope)
+        return states, slopes
+
+    def _solved(self, window: EstimationWindow) -> EstimationWindow:
+        """The window with the noise of the best trajectory. Raises SolveError where none is within the bounds."""
+        names, noise = self.filter.states, window.noise
+        places = [names.index(name) for name in self.bounds]
+        low, high = (np.array([pair[i] for pair in self.bounds.values()]) for i in (0, 1))
+        for _ in range(STEPS):
+            states, slopes = self._trajectory(window, noise)
+            misfit, jacobian = self._residuals(window, states, slopes)
+            rows = np.vstack([slope[places] for slope in slopes])
+            here = np.concatenate([state[places] for state in states]) - rows @ noise
+            count = len(states)
+            better = least_squares(jacobian, misfit + jacobian @ noise, rows, np.tile(low, count) - here,
+                                   np.tile(high, count) - here)  # fmt: skip
+            if better is None:
+                raise SolveError(
+                    "MovingHorizonEstimator: no trajectory of the window is within the bounds. Widen them, or give "
+                    "states more process noise."
+                )
+            moved, noise = float(np.abs(better - noise).max()), better
+            if moved < SETTLED or (not places and moved < 1e-6):
+                break
+        return window._replace(noise=noise)
+
+    def _residuals(self, window: EstimationWindow, states: list[Array], slopes: list[Array]) -> tuple[Array, Array]:
+        """Measured minus predicted columns (r,) in standard deviations, and predictions by the noise (r, z)."""
+        deviations = np.sqrt(self.filter.variances)
+        misfits, rows = [], []
+        for sample, state, slope in zip(window.samples, states, slopes, strict=True):
+            predicted, by_state = self.filter.observation(state, sample.inputs.tolist())
+            here = ~np.isnan(sample.values)
+            misfits.append(((sample.values - predicted) / deviations)[here])
+            rows.append((by_state @ slope / deviations[:, None])[here])
+        return np.concatenate(misfits), np.vstack(rows)
+
+
+def square_root(covariance: Array) -> Array:
+    """The symmetric square root (n, n) of a covariance, which may be singular."""
+    scale = np.sqrt(np.where(np.diag(covariance) > 0, np.diag(covariance), 1.0))
+    values, axes = np.linalg.eigh(covariance / np.outer(scale, scale))
+    return np.asarray(scale[:, None] * (axes * np.sqrt(np.maximum(values, 0.0))) @ axes.T)
+
+
+def least_squares(jacobian: Array, wanted: Array, rows: Array, low: Array, high: Array) -> Array | None:
+    """The z (n,) that minimises |z|^2 + |wanted - jacobian z|^2 with low <= rows z <= high; None without one."""
+    size = jacobian.shape[1]
+    factor = np.linalg.cholesky(np.eye(size) + jacobian.T @ jacobian)
+    free = np.linalg.solve(factor, jacobian.T @ wanted)
+    matrix = np.linalg.solve(factor, rows.T).T if len(rows) else np.zeros((0, size))
+    length = np.linalg.norm(matrix, axis=1)
+    used = length > 1e-12 * length.max(initial=0.0)
+    if np.any(np.maximum(low, -high)[~used] > 0.0):
+        return None
+    matrix, scale = matrix[used] / length[used, None], 1.0 / length[used]
+    lower, upper = (np.clip(each[used] * scale - matrix @ free, -UNLIMITED, UNLIMITED) for each in (low, high))
+    w = np.zeros(size)
+    if len(matrix):
+        spare: list[Any] = [np.zeros(size) for _ in range(3)]
+        status = _shortest(np.ascontiguousarray(matrix), lower, upper, np.zeros(len(matrix)),
+                           np.zeros(size, dtype=np.int64), np.zeros((size, size)), *spare, w)  # fmt: skip
+        if status != Status.DONE:
+            return None
+    return np.asarray(np.linalg.solve(factor.T, w + free))

@@ -1,0 +1,299 @@
+"""A sample of linear predictive control: observer, limits, and the quadratic program by a dual active-set method."""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import Any
+
+import numba
+
+from ....core.diagnostics import Status
+from .calls import PART
+
+DONE, SINGULAR, NOT_CONVERGED = Status.DONE.value, Status.SINGULAR.value, Status.NOT_CONVERGED.value
+ITERATIONS, FEASIBLE, ACCURATE, DEPENDENT = 10, 1e-9, 1e-6, 1e-12
+"""Iterations for each row; permitted violation of a limit of a row of length 1; permitted error of
+a limit that is active, before the refinement; square of the distance of such a row
+from the space of the active ones up to which it depends on them (chosen)."""
+
+
+@PART
+def add_product(row: Any, x: Any, count: Any, value: Any) -> Any:
+    """`value` + the product of the first `count` numbers of `row` and `x`."""
+    total = value
+    for k in range(count):
+        total += row[k] * x[k]
+    return total
+
+
+@PART
+def extend_factor(m: Any, order: Any, count: Any, row: Any, factor: Any) -> Any:
+    """Write row `count` of the Cholesky factor of the products of the active rows; whether `row` is independent."""
+    square = add_product(m[row], m[row], m.shape[1], 0.0)
+    for j in range(count):
+        value = add_product(m[row], m[order[j]], m.shape[1], 0.0)
+        for k in range(j):
+            value -= factor[count, k] * factor[j, k]
+        value /= factor[j, j]
+        factor[count, j] = value
+        square -= value * value
+    independent = square > DEPENDENT
+    factor[count, count] = sqrt(square) if independent else 1.0
+    return independent
+
+
+@PART
+def solve_factor(factor: Any, count: Any, x: Any) -> None:
+    """Replace the first `count` numbers of `x` by the solution of L L^T y = x with the factor L."""
+    for i in range(count):
+        for k in range(i):
+            x[i] -= factor[i, k] * x[k]
+        x[i] /= factor[i, i]
+    for j in range(count):
+        last = count - 1 - j
+        for k in range(last + 1, count):
+            x[last] -= factor[k, last] * x[k]
+        x[last] /= factor[last, last]
+
+
+@PART
+def release(m: Any, order: Any, count: Any, place: Any, factor: Any, multipliers: Any, active: Any) -> None:
+    """Remove the active row at a place, of `count`."""
+    active[order[place]] = 0.0
+    for k in range(place, count - 1):
+        order[k] = order[k + 1]
+        multipliers[k] = multipliers[k + 1]
+        extend_factor(m, order, k, order[k], factor)
+
+
+@PART
+def vector_of(m: Any, order: Any, count: Any, multipliers: Any, w: Any) -> None:
+    """w = -m^T multipliers of the active rows."""
+    for j in range(w.shape[0]):
+        w[j] = 0.0
+    for k in range(count):
+        for j in range(w.shape[0]):
+            w[j] -= m[order[k], j] * multipliers[k]
+
+
+@PART
+def solve_active(
+    m: Any, lower: Any, upper: Any, active: Any, order: Any, count: Any, factor: Any, wanted: Any, rest: Any, w: Any
+) -> Any:  # fmt: skip
+    """The multipliers with which the active rows have their limits, with one refinement; the error that was left."""
+    error = 0.0
+    for k in range(count):
+        wanted[k] = 0.0
+    for _ in range(2):
+        vector_of(m, order, count, wanted, w)
+        error = 0.0
+        for k in range(count):
+            limit = upper[order[k]] if active[order[k]] > 0.0 else lower[order[k]]
+            rest[k] = add_product(m[order[k]], w, w.shape[0], -limit)
+            error = max(error, abs(rest[k]) / (1.0 + abs(limit)))
+        solve_factor(factor, count, rest)
+        for k in range(count):
+            wanted[k] += rest[k]
+    return error
+
+
+@PART
+def blocking_place(order: Any, count: Any, active: Any, multipliers: Any, change: Any) -> Any:
+    """Where a multiplier would first change its sign, on the way to multipliers + change (-1: nowhere)."""
+    place = -1
+    least = 1.0
+    for k in range(count):
+        side = active[order[k]]
+        if side * (multipliers[k] + change[k]) < 0.0:
+            share = multipliers[k] / -change[k]
+            if place < 0 or share < least:
+                place = k
+                least = share
+    return place
+
+
+@PART
+def worst_row(m: Any, lower: Any, upper: Any, active: Any, w: Any) -> Any:
+    """The row whose limit is violated most; -1 where none is."""
+    worst = -1
+    largest = FEASIBLE
+    for i in range(m.shape[0]):
+        if active[i] == 0.0:
+            value = add_product(m[i], w, m.shape[1], 0.0)
+            excess = max(value - upper[i], lower[i] - value) / (1.0 + min(abs(upper[i]), abs(lower[i])))
+            if excess > largest:
+                worst = i
+                largest = excess
+    return worst
+
+
+@PART
+def exchange(
+    m: Any, row: Any, order: Any, count: Any, active: Any, factor: Any, multipliers: Any, change: Any
+) -> Any:  # fmt: skip
+    """Make a row active that depends on the active ones, in place of one of them; whether a point keeps the limits."""
+    side = active[row]
+    for k in range(count):
+        change[k] = add_product(m[row], m[order[k]], m.shape[1], 0.0)
+    solve_factor(factor, count, change)
+    place = -1
+    least = 0.0
+    for k in range(count):
+        slope = side * active[order[k]] * change[k]
+        if slope > 1e-9:
+            share = abs(multipliers[k]) / slope
+            if place < 0 or share < least:
+                place = k
+                least = share
+    possible = place >= 0
+    if possible:
+        for k in range(count):
+            multipliers[k] -= side * least * change[k]
+        release(m, order, count, place, factor, multipliers, active)
+        possible = extend_factor(m, order, count - 1, row, factor)
+        order[count - 1] = row
+        multipliers[count - 1] = side * least
+    return possible
+
+
+@PART
+def begin_active(m: Any, active: Any, order: Any, factor: Any, multipliers: Any) -> Any:
+    """Take the rows that were active, without multipliers; how many are independent."""
+    count = 0
+    for i in range(m.shape[0]):
+        if active[i] != 0.0:
+            independent = False
+            if count < m.shape[1]:
+                independent = extend_factor(m, order, count, i, factor)
+            if independent:
+                order[count] = i
+                multipliers[count] = 0.0
+                count += 1
+            else:
+                active[i] = 0.0
+    return count
+
+
+@PART
+def shortest_vector(
+    m: Any, lower: Any, upper: Any, active: Any, order: Any, factor: Any, multipliers: Any, change: Any,
+    rest: Any, w: Any,
+) -> Any:  # fmt: skip
+    """The shortest `w` (n,) with lower <= m w <= upper, for rows of `m` (r, n) of length 1; a status.
+
+    active   (r,): 1.0 at the upper limit, -1 at the lower, 0 at none: the first guess, and the result
+    order, multipliers, change, rest (n,), factor (n, n): workspace
+
+    Dual active-set method: w = -m^T multipliers fulfils the limits of the active rows; the row that is violated most
+    becomes active, and one whose multiplier changes its sign is released. Every step lengthens w, so that no set of
+    active rows returns. SINGULAR: there is no such w. Reference: Goldfarb and Idnani (1983).
+    """
+    count = begin_active(m, active, order, factor, multipliers)
+    status = NOT_CONVERGED
+    for _ in range(ITERATIONS * m.shape[0] + ITERATIONS):
+        error = solve_active(m, lower, upper, active, order, count, factor, change, rest, w)
+        for k in range(count):
+            change[k] -= multipliers[k]
+        place = blocking_place(order, count, active, multipliers, change)
+        share = 1.0 if place < 0 else min(1.0, multipliers[place] / -change[place])
+        for k in range(count):
+            multipliers[k] += share * change[k]
+        if place >= 0:
+            release(m, order, count, place, factor, multipliers, active)
+            count -= 1
+            continue
+        vector_of(m, order, count, multipliers, w)
+        row = worst_row(m, lower, upper, active, w)
+        if row < 0:
+            status = DONE if error < ACCURATE else NOT_CONVERGED
+            break
+        value = add_product(m[row], w, m.shape[1], 0.0)
+        active[row] = 1.0 if value > upper[row] else -1.0
+        possible = False
+        if count < m.shape[1]:
+            possible = extend_factor(m, order, count, row, factor)
+        if possible:
+            order[count] = row
+            multipliers[count] = 0.0
+            count += 1
+        else:
+            possible = exchange(m, row, order, count, active, factor, multipliers, change)
+        if not possible:
+            status = SINGULAR
+            break
+    return status
+
+
+@PART
+def find_point(
+    y: Any, r: Any, by_output: Any, gain: Any, predicted: Any, inputs: Any, innovation: Any, point: Any
+) -> None:  # fmt: skip
+    """The point (N + q + m,): corrected states and disturbances, set points, inputs of the last sample."""
+    states, points = predicted.shape[0], r.shape[0]
+    for i in range(y.shape[0]):
+        innovation[i] = y[i] - add_product(by_output[i], predicted, states, 0.0)
+    for k in range(states):
+        point[k] = add_product(gain[k], innovation, y.shape[0], predicted[k])
+    for i in range(points):
+        point[states + i] = r[i]
+    for i in range(inputs.shape[0]):
+        point[states + points + i] = inputs[i]
+
+
+@PART
+def find_limits(
+    low: Any, high: Any, of_input: Any, scale: Any, fixed_low: Any, fixed_high: Any, by_point: Any, point: Any,
+    lower: Any, upper: Any,
+) -> None:  # fmt: skip
+    """The limits of all rows for a point; those of rows of an input contain its range."""
+    for i in range(lower.shape[0]):
+        shift = add_product(by_point[i], point, point.shape[0], 0.0)
+        lower[i] = fixed_low[i] + shift
+        upper[i] = fixed_high[i] + shift
+        if of_input[i] >= 0:
+            lower[i] += scale[i] * low[of_input[i]]
+            upper[i] += scale[i] * high[of_input[i]]
+
+
+@numba.njit(error_model="numpy", nogil=True)
+def predictive_sample(
+    y: Any, r: Any, low: Any, high: Any, by_output: Any, gain: Any, transition: Any, by_input: Any, rest: Any, m: Any,
+    of_input: Any, scale: Any, fixed_low: Any, fixed_high: Any, by_point: Any, plan_by_w: Any, plan_by_point: Any,
+    predicted: Any, plan: Any, inputs: Any, active: Any, counts: Any, innovation: Any, point: Any, lower: Any,
+    upper: Any, order: Any, factor: Any, multipliers: Any, change: Any, spare: Any, w: Any,
+) -> Any:  # fmt: skip
+    """One sample: the inputs in `inputs` (m,), and the memory of the next sample in place; the status of the program.
+
+    y, r              measured columns (p,) and set points (q,); low, high: limits of the inputs (m,)
+    by_output, gain, transition, by_input   (p, N), (N, p), (N, N), (N, m) of the observer
+    rest              (m, N + q + m) the inputs of the target by the point
+    m, of_input, scale, fixed_low, fixed_high, by_point   rows (r, n) of length 1, input or -1, scale, limits
+    plan_by_w, plan_by_point    (N_h m, n), (N_h m, N + q + m)
+    predicted         (N,); plan (N_h m,); inputs (m,) those of the last sample; active (r,)
+    counts            (2,): samples since the plan was found, -1 without one; failures so far
+
+    Without a solution the next input of the last plan is applied, after its end that of the target.
+    """
+    find_point(y, r, by_output, gain, predicted, inputs, innovation, point)
+    find_limits(low, high, of_input, scale, fixed_low, fixed_high, by_point, point, lower, upper)
+    status = shortest_vector(m, lower, upper, active, order, factor, multipliers, change, spare, w)
+    number = inputs.shape[0]
+    if status == DONE:
+        counts[0] = 0
+        for i in range(plan.shape[0]):
+            steady = add_product(plan_by_point[i], point, point.shape[0], 0.0)
+            plan[i] = add_product(plan_by_w[i], w, w.shape[0], steady)
+    else:
+        counts[1] += 1
+        if counts[0] >= 0:
+            counts[0] += 1
+    first = counts[0] * number
+    for i in range(number):
+        wanted = add_product(rest[i], point, point.shape[0], 0.0)
+        if counts[0] >= 0 and first < plan.shape[0]:
+            wanted = plan[first + i]
+        inputs[i] = min(max(wanted, low[i]), high[i])
+    for k in range(predicted.shape[0]):
+        free = add_product(transition[k], point, predicted.shape[0], 0.0)
+        predicted[k] = add_product(by_input[k], inputs, number, free)
+    return status
