@@ -125,7 +125,7 @@ def _instance(
             f"static const char *const {name}_parameter_names{parameters}", [leaf.path for leaf in printed.tunable]
         ),
     )
-    places = printed.counts | {
+    places = printed.places | {
         "provenance": block_comment(printed.provenance), "token": token, "period": c_number(sample_time),
         "start": c_number(start), "constants": "".join(constants),
         "functions": printed.sample_in(CLanguage("double", f"{name}_")),

@@ -43,7 +43,7 @@ class PrintedPredictive(PrintedController):
                  "at_measured": law.observer.measured, "at_controlled": law.target.controlled,
                  "low": self._deviations(0), "high": self._deviations(1)}  # fmt: skip
         places = {
-            **self.header_places, "constants": self._constants(),
+            **self.places, "constants": self._constants(),
             "tables": "".join(_table(f"{self.name}_{name}", array) for name, array in known.items()),
             "functions": CKernels(shapes).text("predictive", ["predictive_sample"]),
             "work": "".join(

@@ -60,19 +60,14 @@ class PrintedController:
         return instructions(list(self.inputs.values()), list(self.outputs.values()))
 
     @property
-    def counts(self) -> dict[str, str]:
-        """The numbers of memories, measurements, set points, commands and parameters, for the templates."""
+    def places(self) -> dict[str, str]:
+        """The places of a header: numbers of memories, measurements and so on, enumerations, provenance."""
         law = self.law
         counts = {
             "memory": len(law.initial_memory), "measurements": len(law.measured_columns),
             "setpoints": len(law.setpoints), "commands": len(law.inputs), "parameters": len(self.tunable),
         }  # fmt: skip
-        return {key: str(count) for key, count in counts.items()}
-
-    @property
-    def header_places(self) -> dict[str, str]:
-        """The places of the header."""
-        return self.counts | {
+        return {key: str(count) for key, count in counts.items()} | {
             "provenance": block_comment(self.provenance), "file": self.name, "enumerations": self._enumerations(),
             "number": self.number,
         }  # fmt: skip
@@ -81,7 +76,7 @@ class PrintedController:
         """Header and source, by file name."""
         printer = Printer(CLanguage(self.number, f"{self.name}_", labels=self._labels))
         printer.add_code("sample", list(self.inputs), self.code, list(self.outputs))
-        places = {**self.header_places, "functions": printer.text[-1], "constants": self._constants()}
+        places = {**self.places, "functions": printer.text[-1], "constants": self._constants()}
         return {
             f"{self.name}.h": filled("controller.h", places, self.name),
             f"{self.name}.c": filled("controller.c", places, self.name),
