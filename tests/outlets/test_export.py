@@ -584,7 +584,7 @@ def test_the_command_exports_a_law(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--to", "fortran"), "--to fortran: there are c, js, octave"),
+        (("--to", "fortran"), "--to is 'fortran'; allowed range: c, js, octave"),
         (("--to", "c", "--law", "--tunable", "x"), "all parameters of a law can be changed"),
     ],
 )

@@ -160,9 +160,12 @@ def test_without_a_compiler_for_the_processor_the_packages_are_named(tmp_path, m
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--controller", "--precision", "half"), "--precision half: there are double, float"),
+        (("--controller", "--precision", "half"), "--precision is 'half'; allowed range: double, float"),
         (("--precision", "float"), "--precision belongs to --controller"),
-        (("--controller", "--build", "--processor", "avr"), "--processor avr: there are cortex-m4, cortex-m7"),
+        (
+            ("--controller", "--build", "--processor", "avr"),
+            "--processor is 'avr'; allowed range: cortex-m4, cortex-m7",
+        ),
         (("--controller", "--processor", "cortex-m4"), "--processor belongs to --controller --build"),
     ],
 )

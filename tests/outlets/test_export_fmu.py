@@ -479,7 +479,7 @@ def test_a_start_without_equilibrium_is_named_and_nothing_is_written(tmp_path):
     [
         (("--to", "c", "--fmi", "2"), "--fmi, --sources-only and --platforms belong"),
         (("--to", "fmu", "--law"), "fmu contains a plant"),
-        (("--to", "simulink"), "there are c, js, octave, arduino, fmu, ssp, mujoco"),
+        (("--to", "simulink"), "allowed range: c, js, octave, arduino, fmu, ssp, mujoco"),
     ],
 )
 def test_options_that_do_not_fit_are_refused(options, message, tmp_path):

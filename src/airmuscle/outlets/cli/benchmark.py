@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
-import enum
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from ...core.errors import InputError, SimulationError, suggestion
 from ...design.control_benchmark import (
@@ -28,62 +23,48 @@ from ...design.control_benchmark.chapter import benchmark_chapter
 from ...design.control_benchmark.tasks import find_tasks
 from ...design.control_benchmark.truths import TRUTH_SEEDS
 from ...files.library.files import is_path
+from ..requests.declaration import option, request
 from .delivery import deliver
 from .execution import Execution
-from .interruption import check_interrupted
 from .options import Folder, Json
 from .request_options import with_requests
+from .terminal import counted_progress
 
 DEFAULT_BUDGET = 60
 """Sets of gains for each gain (chosen)."""
+JOINTS: Mapping[str, Callable[..., BenchmarkJoint]] = {"proportional": proportional_joint, "on-off": on_off_joint}
+"""The joints of the benchmark, by their valves."""
 LEARNED = "feed-forward + PID"
 """The controller whose feed-forward is learned from trial to trial."""
 
 
-class Valves(enum.StrEnum):
-    """The joints of the benchmark, by their valves."""
+@request
+class BenchmarkRequest:
+    """What a control benchmark is asked for."""
 
-    PROPORTIONAL = "proportional"
-    ON_OFF = "on-off"
-
-
-Seed = Annotated[
-    int, typer.Option(min=0, max=1_000_000, metavar="N", help="Seed of the optimiser and of the noise.")
-]  # fmt: skip
-
-
-Names = Annotated[
-    list[str] | None,
-    typer.Option(metavar="NAME", help="A controller, or a scenario file with one; repeat it for more. Default: all."),
-]  # fmt: skip
-Tasks = Annotated[
-    list[str] | None, typer.Option(metavar="NAME", help="A task; repeat it for several. Default: all.")
-]  # fmt: skip
-Truths = Annotated[
-    int, typer.Option(min=1, max=len(TRUTH_SEEDS), metavar="N", help="Plants on which controllers are judged.")
-]  # fmt: skip
-Searches = Annotated[
-    int, typer.Option(min=1, max=100, metavar="N", help="Searches of gains with different seeds.")
-]  # fmt: skip
-Budget = Annotated[
-    int, typer.Option(min=0, max=100_000, metavar="N", help="Most sets of gains for each gain; 0: no search.")
-]  # fmt: skip
-Runs = Annotated[
-    int, typer.Option(min=0, max=1000, metavar="N", help="Runs to commission a controller on a plant; 0: none.")
-]  # fmt: skip
-Trials = Annotated[
-    int, typer.Option(min=0, max=1000, metavar="N", help="Trials of iterative learning at 2 Hz; 0: none.")
-]  # fmt: skip
+    valves: Callable[..., BenchmarkJoint] = option(
+        "Valves of the joint.", choices=JOINTS, default="proportional", metavar="|".join(JOINTS)
+    )
+    controller: tuple[str, ...] = option(
+        "A controller, or a scenario file with one; repeat it for more. Default: all.", default=()
+    )
+    task: tuple[str, ...] = option("A task; repeat it for several. Default: all.", default=())
+    truths: int = option(
+        "Plants on which controllers are judged.", default=len(TRUTH_SEEDS), bounds=(1, len(TRUTH_SEEDS))
+    )
+    searches: int = option("Searches of gains with different seeds.", default=1, bounds=(1, 100))
+    budget: int = option("Most sets of gains for each gain; 0: no search.", default=DEFAULT_BUDGET, bounds=(0, 100_000))
+    runs: int = option(
+        "Runs to commission a controller on a plant; 0: none.", default=COMMISSIONING_RUNS, bounds=(0, 1000)
+    )
+    seed: int = option("Seed of the optimiser and of the noise.", default=1, bounds=(0, 1_000_000))
+    trials: int = option("Trials of iterative learning at 2 Hz; 0: none.", default=0, bounds=(0, 1000))
 
 
 @with_requests
 def benchmark(
-    execution: Execution,
-    valves: Annotated[Valves, typer.Option(help="Valves of the joint.")] = Valves.PROPORTIONAL,
-    controller: Names = None, task: Tasks = None, truths: Truths = len(TRUTH_SEEDS), searches: Searches = 1,
-    budget: Budget = DEFAULT_BUDGET, runs: Runs = COMMISSIONING_RUNS, seed: Seed = 1, trials: Trials = 0,
-    out: Folder = Path("benchmark"), json: Json = False,
-) -> None:  # fmt: skip
+    request: BenchmarkRequest, execution: Execution, out: Folder = Path("benchmark"), json: Json = False
+) -> None:
     """Benchmark controllers of a joint on common tasks.
 
     \b
@@ -100,17 +81,17 @@ def benchmark(
       airmuscle benchmark --controller PID --controller examples/joint_cascade.toml --runs 0
       airmuscle benchmark --join /shared/benchmark    (on each machine)
     """
-    joint = (proportional_joint if valves is Valves.PROPORTIONAL else on_off_joint)(TRUTH_SEEDS[:truths])
-    contenders, tasks = _contenders(joint, controller or []), find_tasks(tuple(task or ()))
+    joint, trials = request.valves(TRUTH_SEEDS[: request.truths]), request.trials
+    contenders, tasks = _contenders(joint, request.controller), find_tasks(request.task)
     if trials and (trials < 2 or LEARNED not in [each.name for each in contenders]):
         raise InputError(f"--trials needs at least 2 trials and the controller '{LEARNED}'.")
-    writes = execution.writes(out)
-    with execution.executor(alone=True) as workers, _progress() as show:
+    writes, seeds = execution.writes(out), range(request.seed, request.seed + request.searches)
+    with execution.executor(alone=True) as workers, counted_progress("control benchmark") as show:
         result = benchmark_controllers(
-            joint, contenders, tasks, seeds=range(seed, seed + searches), sets_per_gain=budget,
-            commissioning_runs=runs, progress=show, workers=workers,
+            joint, contenders, tasks, seeds=seeds, sets_per_gain=request.budget, commissioning_runs=request.runs,
+            progress=show, workers=workers,
         )  # fmt: skip
-    curves = _learned(result, trials, seed) if trials else []
+    curves = _learned(result, trials, request.seed) if trials else []
     chapter = benchmark_chapter(result, curves)
     deliver("benchmark", [chapter], json=json, out=out, title="Control benchmark", writes=writes)
     found = [run for each in result.results for run in each.runs.values()]
@@ -118,7 +99,7 @@ def benchmark(
         raise SimulationError(f"all runs failed; reason of the first: {found[0].reason}")
 
 
-def _contenders(joint: BenchmarkJoint, names: list[str]) -> tuple[Contender, ...]:
+def _contenders(joint: BenchmarkJoint, names: Sequence[str]) -> tuple[Contender, ...]:
     known = {each.name: each for each in standard_contenders(joint)}
     for name in names:
         if name not in known and is_path(name):
@@ -132,21 +113,3 @@ def _learned(result: BenchmarkResult, trials: int, seed: int) -> list[LearningCu
     """The trials of iterative learning with the tuned controller."""
     tuned = next(each for each in result.results if each.name == LEARNED)
     return [learn(result.joint, tuned, find_tasks(("sine 2 Hz",))[0], trials=trials, seed=seed)]
-
-
-@contextlib.contextmanager
-def _progress() -> Iterator[Callable[[str, int, int], None]]:
-    """Yield a callback (step, done, total) that draws one bar on stderr."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as display:
-        bar = display.add_task("control benchmark", total=None)
-
-        def show(step: str, done: int, total: int) -> None:
-            check_interrupted()
-            display.update(bar, description=step, completed=done, total=total)
-
-        yield show

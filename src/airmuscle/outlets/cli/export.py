@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+import functools
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from ...core.atomic_output import check_writable
+from ...engine.run.batch.lanes import Precision
 from ...files.library.entry_file import load_law
 from ...files.scenario.scenario import load_scenario
 from ..export import (
@@ -24,11 +27,21 @@ from ..export import (
     write_law,
     write_program,
 )
-from ..export.compiler import PLATFORMS, PROCESSORS, BuiltProgram, build_and_run, find_platform, run_in_emulator
+from ..export.compiler import (
+    PLATFORMS,
+    PROCESSORS,
+    BuiltProgram,
+    Processor,
+    build_and_run,
+    find_platform,
+    run_in_emulator,
+)
 from ..export.identifiers import make_identifier
 from ..export.robot_description import WRITERS
+from ..requests.declaration import RequestError, Where, option, request
 from .export_models import export_actuator, export_fmu, export_modelica, export_mujoco, export_robot
 from .options import Folder, Json, complete_entry
+from .request_options import with_requests
 from .terminal import echo, print_json
 
 TARGETS: dict[str, Target] = {"c": C99(), "js": JavaScript(), "octave": Octave()}
@@ -47,59 +60,71 @@ Source = Annotated[
         autocompletion=complete_entry,
     ),
 ]
-To = Annotated[str, typer.Option("--to", metavar="TARGET", help=f"Target: {', '.join(NAMES)}.")]
-ProgramName = Annotated[
-    str, typer.Option("--name", metavar="NAME", help="Name of the program; default: that of the source.")
-]
-Law = Annotated[bool, typer.Option("--law", help="Export only the static characteristic of a muscle.")]
-ControllerOnly = Annotated[
-    bool, typer.Option("--controller", help="Export only the controller of a scenario: c, arduino, fmu.")
-]
-Build = Annotated[
-    bool, typer.Option("--build", help="Compile the C program with the compiler of this machine, and run it.")
-]
-Tunable = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--tunable", metavar="PATH",
-        help="A parameter that the program can change; repeatable. Default: all, of a controller none.",
-    ),
-]  # fmt: skip
-PrecisionName = Annotated[
-    str, typer.Option("--precision", metavar="double|float", help="Type of the numbers of a controller.")
-]
-ProcessorName = Annotated[
-    str,
-    typer.Option(
-        "--processor", metavar="NAME",
-        help=f"With --controller --build: run in the emulator QEMU as {' or '.join(PROCESSORS)}, not on this machine.",
-    ),
-]  # fmt: skip
-Fmi = Annotated[
-    int | None, typer.Option("--fmi", metavar="2|3", help="Version of FMI for --to fmu and ssp. Default: 3.")
-]
-MuscleName = Annotated[
-    str, typer.Option("--muscle", metavar="NAME", help="One muscle of the plant; --to mujoco, torch, warp, onnx.")
-]
-SourcesOnly = Annotated[bool, typer.Option("--sources-only", help="An FMU without a binary; --to fmu, ssp.")]
 
 
-Platforms = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--platforms", metavar="NAME",
-        help=f"Binaries of an FMU for a platform, by the package ziglang; repeatable: {', '.join(PLATFORMS)}. Default: "
-        "this machine.",
-    ),
-]  # fmt: skip
+@request
+class ExportRequest:
+    """What an export is asked for."""
+
+    to: str = option(f"Target: {', '.join(NAMES)}.", choices=NAMES, metavar="TARGET")
+    name: str = option("Name of the program; default: that of the source.", default="")
+    law: bool = option("Export only the static characteristic of a muscle.", default=False)
+    controller: bool = option("Export only the controller of a scenario: c, arduino, fmu.", default=False)
+    build: bool = option("Compile the C program with the compiler of this machine, and run it.", default=False)
+    tunable: tuple[str, ...] = option(
+        "A parameter that the program can change; repeatable. Default: all, of a controller none.",
+        default=(),
+        metavar="PATH",
+    )
+    fmi: int | None = option("Version of FMI for --to fmu and ssp. Default: 3.", default=None, metavar="2|3")
+    sources_only: bool = option("An FMU without a binary; --to fmu, ssp.", default=False)
+    platforms: tuple[str, ...] = option(
+        f"Binaries of an FMU for a platform, by the package ziglang; repeatable: {', '.join(PLATFORMS)}. Default: this "
+        "machine.",
+        default=(),
+    )
+    muscle: str = option("One muscle of the plant; --to mujoco, torch, warp, onnx.", default="")
+    precision: Precision = option(
+        "Type of the numbers of a controller.", choices=PRECISIONS, default="double", metavar="double|float"
+    )
+    processor: Processor | None = option(
+        f"With --controller --build: run in the emulator QEMU as {' or '.join(PROCESSORS)}, not on this machine.",
+        choices=PROCESSORS,
+        default=None,
+    )
+
+    def check(self, where: Where) -> None:
+        """Raise RequestError for options that do not fit together."""
+        law, controller, to = self.law, self.controller, self.to
+        of_an_fmu = self.fmi is not None or self.sources_only or bool(self.platforms)
+        rules = {
+            "--controller: a controller is exported to C, and without --law; write --to c, --to arduino or --to fmu.":
+                controller and (law or to not in ("c", "arduino", "fmu")),
+            "--tunable: all parameters of a controller in an FMU can be changed; leave it out.":
+                controller and to == "fmu" and self.tunable,
+            "--to arduino: an Arduino library contains a controller; add --controller.":
+                to == "arduino" and not controller,
+            "--build: there is a program to compile with --to c and without --law.": self.build and (law or to != "c"),
+            f"--law: {to} contains a plant; leave --law out, or write --to c.": law and to not in TARGETS,
+            "--tunable: all parameters of an actuator can be changed; leave it out.":
+                to in ("mujoco", *WRITERS) and self.tunable,
+            "--tunable: all parameters of a law can be changed; leave it out.": law and self.tunable,
+            "--fmi, --sources-only and --platforms belong to --to fmu and ssp.":
+                of_an_fmu and to not in ("fmu", "ssp"),
+            "--precision belongs to --controller; plants are computed in double precision.":
+                self.precision != PRECISIONS["double"] and not controller,
+            "--processor belongs to --controller --build.": self.processor and not (controller and self.build),
+            "--sources-only and --platforms exclude each other.": self.sources_only and self.platforms,
+            f"--muscle belongs to --to mujoco, {', '.join(STACKS)}.":
+                self.muscle and to not in ("mujoco", "fmu", "ssp", *STACKS),
+        }  # fmt: skip
+        for message, applies in rules.items():
+            if applies:
+                raise RequestError(message)
 
 
-def export(
-    source: Source, to: To, out: Folder = DEFAULT_FOLDER, name: ProgramName = "", law: Law = False,
-    controller: ControllerOnly = False, build: Build = False, tunable: Tunable = None, fmi: Fmi = None,
-    sources_only: SourcesOnly = False, platforms: Platforms = None, muscle: MuscleName = "",
-    precision: PrecisionName = "double", processor: ProcessorName = "", json: Json = False,
-) -> None:  # fmt: skip
+@with_requests
+def export(source: Source, request: ExportRequest, out: Folder = DEFAULT_FOLDER, json: Json = False) -> None:
     """Export to C, MATLAB, FMU, MuJoCo, PyTorch and other targets.
 
     \b
@@ -122,24 +147,17 @@ def export(
       airmuscle export examples/pressure_loop.toml --controller --to fmu --out controller.fmu
       airmuscle export examples/pressure_loop.toml --to ssp --out loop.ssp
     """
-    _check_options(to, law, controller, build, tunable, fmi is not None or sources_only or bool(platforms))
-    _check_controller_options(controller, build, precision, processor)
-    name = name or make_identifier(Path(source).stem)
-    if to in ("fmu", "ssp"):
-        if sources_only and platforms:
-            raise typer.BadParameter("--sources-only and --platforms exclude each other.")
-        targets = [find_platform(each) for each in dict.fromkeys(platforms or ())]
-        part = "ssp" if to == "ssp" else "controller" if controller else "plant"
-        export_fmu(source, out, name, tunable, 3 if fmi is None else fmi, not sources_only, targets, part, json)
+    request = request if request.name else dataclasses.replace(request, name=make_identifier(Path(source).stem))
+    if request.to in ("fmu", "ssp"):
+        _export_fmu(source, out, request, json)
         return
-    if muscle and to not in ("mujoco", *STACKS):
-        raise typer.BadParameter(f"--muscle belongs to --to mujoco, {', '.join(STACKS)}.")
     check_writable(out)
-    if to not in TARGETS and to != "arduino":
-        _export_model(source, out, to, name, muscle, tunable, json)
+    if request.to not in TARGETS and request.to != "arduino":
+        _export_model(source, out, request, json)
         return
-    paths = _write(source, out, to, name, law, controller, tunable, precision)
-    built = (run_in_emulator(paths, PROCESSORS[processor]) if processor else build_and_run(paths)) if build else None
+    paths = _write(source, out, request)
+    run = functools.partial(run_in_emulator, processor=request.processor) if request.processor else build_and_run
+    built = run(paths) if request.build else None
     if json:
         result = {} if built is None else _build_results(built)
         print_json({"files": [str(path) for path in paths], **result})
@@ -147,14 +165,21 @@ def export(
     for path in paths:
         echo(f"file: {path}")
     if built is not None:
-        _print_build(built, controller)
-    echo(f"run: {_instruction(to, paths, law, controller)}")
+        _print_build(built, request.controller)
+    echo(f"run: {_instruction(request.to, paths, request.law, request.controller)}")
 
 
-def _export_model(
-    source: str, out: Path, to: str, name: str, muscle: str, tunable: list[str] | None, json: bool
-) -> None:
+def _export_fmu(source: str, out: Path, request: ExportRequest, json: bool) -> None:
+    """Write the FMU of a plant or of its controller, or both as an SSP package."""
+    targets = [find_platform(each) for each in dict.fromkeys(request.platforms)]
+    part = "ssp" if request.to == "ssp" else "controller" if request.controller else "plant"
+    fmi = 3 if request.fmi is None else request.fmi
+    export_fmu(source, out, request.name, request.tunable or None, fmi, not request.sources_only, targets, part, json)
+
+
+def _export_model(source: str, out: Path, request: ExportRequest, json: bool) -> None:
     """Write a model for a simulator or a learning stack."""
+    to, name, muscle = request.to, request.name, request.muscle
     if to == "mujoco":
         export_mujoco(source, out, name, muscle, json)
     elif to in WRITERS:
@@ -162,25 +187,23 @@ def _export_model(
     elif to in STACKS:
         export_actuator(source, out, name, muscle, STACKS[to], json)
     else:
-        export_modelica(source, out, name, tunable, json)
+        export_modelica(source, out, name, request.tunable or None, json)
 
 
-def _write(
-    source: str, out: Path, to: str, name: str, law: bool, controller: bool, tunable: list[str] | None, precision: str
-) -> tuple[Path, ...]:
+def _write(source: str, out: Path, request: ExportRequest) -> tuple[Path, ...]:
     """Write a law, a controller, or a plant with its run."""
-    if law:
+    if request.law:
         entry = load_law(source)
-        return write_law(entry.characteristic, out, TARGETS[to], name=name, title=entry.title)
+        return write_law(entry.characteristic, out, TARGETS[request.to], name=request.name, title=entry.title)
     scenario = load_scenario(source)
-    if controller:
+    common: dict[str, Any] = {"name": request.name, "title": scenario.title}
+    if request.controller:
         return write_controller(
-            scenario.problem, out, name=name, title=scenario.title, tunable=tunable or (),
-            precision=PRECISIONS[precision], arduino=to == "arduino",
+            scenario.problem, out, tunable=request.tunable, precision=request.precision,
+            arduino=request.to == "arduino", **common,
         )  # fmt: skip
-    return write_program(
-        scenario.problem, out, TARGETS[to], name=name, title=scenario.title, tunable=tunable, columns=scenario.columns
-    )
+    target, tunable = TARGETS[request.to], request.tunable or None
+    return write_program(scenario.problem, out, target, tunable=tunable, columns=scenario.columns, **common)
 
 
 def _print_build(built: BuiltProgram, controller: bool) -> None:
@@ -197,44 +220,6 @@ def _build_results(built: BuiltProgram) -> dict[str, str | int | None]:
     """The results of a build for JSON."""
     stack = {} if built.stack_size is None else {"stack_bytes": built.stack_size}
     return {"output": built.output, "code_bytes": built.code_size, **stack}
-
-
-def _check_controller_options(controller: bool, build: bool, precision: str, processor: str) -> None:
-    """Raise BadParameter for options of a controller that do not fit together."""
-    if precision not in PRECISIONS:
-        raise typer.BadParameter(f"--precision {precision}: there are {', '.join(PRECISIONS)}.")
-    if precision != "double" and not controller:
-        raise typer.BadParameter("--precision belongs to --controller; plants are computed in double precision.")
-    if processor and processor not in PROCESSORS:
-        raise typer.BadParameter(f"--processor {processor}: there are {', '.join(PROCESSORS)}.")
-    if processor and not (controller and build):
-        raise typer.BadParameter("--processor belongs to --controller --build.")
-
-
-def _check_options(
-    to: str, law: bool, controller: bool, build: bool, tunable: list[str] | None, of_an_fmu: bool
-) -> None:
-    """Raise BadParameter for options that do not fit together."""
-    if to not in NAMES:
-        raise typer.BadParameter(f"--to {to}: there are {', '.join(NAMES)}.")
-    if controller and (law or to not in ("c", "arduino", "fmu")):
-        raise typer.BadParameter(
-            "--controller: a controller is exported to C, and without --law; write --to c, --to arduino or --to fmu."
-        )
-    if controller and to == "fmu" and tunable:
-        raise typer.BadParameter("--tunable: all parameters of a controller in an FMU can be changed; leave it out.")
-    if to == "arduino" and not controller:
-        raise typer.BadParameter("--to arduino: an Arduino library contains a controller; add --controller.")
-    if build and (law or to != "c"):
-        raise typer.BadParameter("--build: there is a program to compile with --to c and without --law.")
-    if law and to not in TARGETS:
-        raise typer.BadParameter(f"--law: {to} contains a plant; leave --law out, or write --to c.")
-    if to in ("mujoco", *WRITERS) and tunable:
-        raise typer.BadParameter("--tunable: all parameters of an actuator can be changed; leave it out.")
-    if law and tunable:
-        raise typer.BadParameter("--tunable: all parameters of a law can be changed; leave it out.")
-    if of_an_fmu and to not in ("fmu", "ssp"):
-        raise typer.BadParameter("--fmi, --sources-only and --platforms belong to --to fmu and ssp.")
 
 
 def _instruction(to: str, paths: tuple[Path, ...], law: bool, controller: bool) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,7 @@ from .terminal import echo, print_json
 
 
 def export_fmu(
-    source: str, out: Path, name: str, tunable: list[str] | None, fmi: int, binary: bool, platforms: list[Platform],
+    source: str, out: Path, name: str, tunable: Sequence[str] | None, fmi: int, binary: bool, platforms: list[Platform],
     part: str, json: bool,
 ) -> None:  # fmt: skip
     """Write the FMU of a plant or of its controller, or both as an SSP package, into a folder or to a file.
@@ -107,7 +108,7 @@ def _is_plant(source: str) -> bool:
     return source in list_plants() if not file.exists() else "plant" in read_toml(file)
 
 
-def export_modelica(source: str, out: Path, name: str, tunable: list[str] | None, json: bool) -> None:
+def export_modelica(source: str, out: Path, name: str, tunable: Sequence[str] | None, json: bool) -> None:
     """Write a Modelica package into a folder."""
     scenario = load_scenario(source)
     paths = write_modelica(scenario.problem, out, name=name, title=scenario.title, tunable=tunable)

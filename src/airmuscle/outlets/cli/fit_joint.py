@@ -12,21 +12,31 @@ import typer
 from ...bench.joint import ArmFit, fit_joint, inspect_episodes, read_episode_mapping, read_episodes
 from ...core.atomic_output import check_writable
 from ...files.library.write import scenario_toml
+from ..requests.declaration import option, request
 from .delivery import deliver
 from .options import Folder, Json
+from .request_options import with_requests
 from .terminal import echo
 
 DURATION = 2.0
 """Duration [s] of the scenario that is written (chosen)."""
 
 
+@request
+class JointFitRequest:
+    """What the identification of a joint is asked for."""
+
+    mapping: Path = option("Mapping file (TOML): which column is what.")
+    inspect: bool = option("State what the record contains; fit nothing.", default=False)
+    left_out: float = option("Share of the episodes that judges the fit.", default=0.1, metavar="SHARE")
+    horizon: int = option("Rows of the free run.", default=40, bounds=(5, 1000), metavar="ROWS")
+    seed: int = option("Seed of the order of the windows.", default=0)
+
+
+@with_requests
 def fit_joint_command(
     source: Annotated[Path, typer.Argument(metavar="EPISODES", help="A folder of episodes, or one file with all.")],
-    mapping: Annotated[Path, typer.Option(metavar="FILE", help="Mapping file (TOML): which column is what.")],
-    inspect: Annotated[bool, typer.Option("--inspect", help="State what the record contains; fit nothing.")] = False,
-    left_out: Annotated[float, typer.Option(metavar="SHARE", help="Share of the episodes that judges the fit.")] = 0.1,
-    horizon: Annotated[int, typer.Option(min=5, max=1000, metavar="ROWS", help="Rows of the free run.")] = 40,
-    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the order of the windows.")] = 0,
+    request: JointFitRequest,
     out: Folder = Path("joint"),
     json: Json = False,
 ) -> None:
@@ -45,13 +55,14 @@ def fit_joint_command(
       airmuscle fit-joint episodes.npz --mapping arm.toml --out arm
     """
     check_writable(out)
-    rules = read_episode_mapping(mapping)
+    rules = read_episode_mapping(request.mapping)
     episodes = read_episodes(source, rules)
-    if inspect:
+    if request.inspect:
         echo(str(inspect_episodes(episodes, rules.pairs)))
         return
     fit = fit_joint(
-        episodes, pairs=rules.pairs, axes=rules.axes, left_out=left_out, rows=horizon, seed=seed,
+        episodes, pairs=rules.pairs, axes=rules.axes, left_out=request.left_out, rows=request.horizon,
+        seed=request.seed,
         progress=lambda text: None if json else echo(text),
     )  # fmt: skip
     title = f"Arm identified from {source.name}"

@@ -82,7 +82,7 @@ def _parameter(declared: Option) -> inspect.Parameter:
     if declared.kind is int:
         low, high = (int(bound) if math.isfinite(bound) else None for bound in declared.bounds)
         settings |= {"min": low, "max": high}
-    default = inspect.Parameter.empty if declared.needed else False if declared.kind is bool else declared.default
+    default = inspect.Parameter.empty if declared.needed else declared.default
     taken: Any = kind if default is not None else kind | None
     annotation = Annotated[taken, typer.Option(flag_of(declared), **settings)]
     return inspect.Parameter(declared.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)

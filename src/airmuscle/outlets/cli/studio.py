@@ -8,14 +8,34 @@ from typing import Annotated
 
 import typer
 
+from ..requests.declaration import option, request
 from ..studio import export_page, serve
 from ..studio.page import open_sheets
 from ..studio.server import warning_of
 from .options import complete_law
+from .request_options import with_requests
 from .terminal import echo
 
 
+@request
+class StudioRequest:
+    """How the page is served, or the file that is written instead."""
+
+    port: int = option("Port of the server; 0 stands for any free one.", default=8765)
+    host: str = option(
+        "Address of the server; 0.0.0.0 admits other machines, without encryption.",
+        default="127.0.0.1",
+        metavar="ADDRESS",
+    )
+    browser: bool = option("Open the page in the browser.", default=True, flag="--browser/--no-browser")
+    export: Path | None = option(
+        "Write one self-contained page instead, without a server.", default=None, metavar="FILE.html"
+    )
+
+
+@with_requests
 def studio(
+    request: StudioRequest,
     names: Annotated[
         list[str] | None,
         typer.Argument(
@@ -23,18 +43,6 @@ def studio(
             help="Muscles or laws to open: library entries or muscle files (TOML).",
             autocompletion=complete_law,
         ),
-    ] = None,
-    port: Annotated[int, typer.Option(metavar="N", help="Port of the server; 0 stands for any free one.")] = 8765,
-    host: Annotated[
-        str,
-        typer.Option(
-            metavar="ADDRESS", help="Address of the server; 0.0.0.0 admits other machines, without encryption."
-        ),
-    ] = "127.0.0.1",
-    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
-    export: Annotated[
-        Path | None,
-        typer.Option("--export", metavar="FILE.html", help="Write one self-contained page instead, without a server."),
     ] = None,
 ) -> None:
     """Show muscles and plants in the browser.
@@ -51,16 +59,16 @@ def studio(
       airmuscle studio dmsp-20-300 my/muscle.toml
       airmuscle studio dmsp-20-300 tondu-lopez --export chart.html
     """
-    if export is not None:
-        echo(f"page: {export_page(names or [], export)}")
+    if request.export is not None:
+        echo(f"page: {export_page(names or [], request.export)}")
         return
     opened = open_sheets(names or [])
 
     def started(address: str) -> None:
         echo(f"studio: {address}  (Ctrl-C ends it)")
-        if remark := warning_of(host):
+        if remark := warning_of(request.host):
             echo(f"note: {remark}", err=True)
-        if browser:
+        if request.browser:
             webbrowser.open(address)
 
-    serve(host, port, opened, started)
+    serve(request.host, request.port, opened, started)

@@ -19,10 +19,9 @@ from ...engine.processes import process_pool
 from ...report.write import REPORT_FILE
 from .delivery import print_result
 from .execution import Execution, contributions
-from .interruption import check_interrupted
 from .options import Folder, Json
 from .request_options import with_requests
-from .terminal import echo
+from .terminal import counted_progress, echo
 
 
 @with_requests
@@ -67,7 +66,7 @@ def _run(study: Study, out: Path, execution: Execution) -> tuple[StudyResult, st
     """
     try:
         with (
-            _progress(study.title) as show,
+            _progress() as show,
             execution.executor(len(study.chunks)) as workers,
             process_pool(workers) as executor,
         ):
@@ -81,19 +80,16 @@ def _run(study: Study, out: Path, execution: Execution) -> tuple[StudyResult, st
 
 
 @contextlib.contextmanager
-def _progress(title: str) -> Iterator[Callable[[int, int], None]]:
-    """Yield a callback (runs done, runs in total) that draws a progress bar on stderr."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+def _progress() -> Iterator[Callable[[int, int], None]]:
+    """Yield a callback (runs done, runs in total) that draws a bar, and states what an earlier command has saved."""
+    with counted_progress("runs") as show:
+        first = True
 
-    columns = (TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as display:
-        task = display.add_task(title, total=None)
-
-        def show(done: int, total: int) -> None:
-            check_interrupted()
-            if done and display.tasks[task].total is None:  # first call: runs saved by an earlier command
+        def show_runs(done: int, total: int) -> None:
+            nonlocal first
+            show("runs", done, total)
+            if done and first:
                 echo(f"resuming: {done} of {total} runs are already saved", err=True)
-            display.update(task, completed=done, total=total)
+            first = False
 
-        yield show
+        yield show_runs

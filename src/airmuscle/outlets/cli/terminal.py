@@ -16,6 +16,7 @@ from ...core.errors import printable
 from ...report.chapter import Table
 from ...report.data import as_json
 from ...report.text import table_lines
+from .interruption import check_interrupted
 
 WIDE = 160
 """Width [characters] of a table that is written to a file or to another program."""
@@ -70,6 +71,25 @@ def computation_progress(label: str) -> Iterator[Callable[[float], None]]:
     """Yield a callback (fraction done) that draws one bar."""
     with reading_progress(label) as show:
         yield lambda fraction: show("", fraction)
+
+
+@contextlib.contextmanager
+def counted_progress(label: str) -> Iterator[Callable[[str, int, int], None]]:
+    """Yield a callback (step, done, in total) that draws one bar with the number of its runs and the time left; it
+    raises KeyboardInterrupt after Ctrl-C."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as display:
+        bar = display.add_task(label, total=None)
+
+        def show(step: str, done: int, total: int) -> None:
+            check_interrupted()
+            display.update(bar, description=step, completed=done, total=total)
+
+        yield show
 
 
 def _without_markup(text: str) -> str:
