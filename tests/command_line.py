@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 from click.testing import Result
+from json_keys import undocumented
 from typer.testing import CliRunner
 
 from airmuscle.outlets.cli import app
 
 
 def airmuscle(*arguments: object, width: int = 160, **options: Any) -> Result:
-    """`airmuscle ARGUMENTS` in a terminal of this width; options are those of `CliRunner.invoke`, such as `input`."""
+    """`airmuscle ARGUMENTS` in a terminal of this width; options are those of `CliRunner.invoke`, such as `input`.
+
+    The keys of an answer in JSON are those that the documentation lists.
+    """
     environment = {"COLUMNS": str(width), **options.pop("env", {})}
-    return CliRunner().invoke(app, [str(argument) for argument in arguments], env=environment, **options)
+    result = CliRunner().invoke(app, [str(argument) for argument in arguments], env=environment, **options)
+    if "--json" in arguments and result.exit_code == 0 and result.stdout.startswith("{"):
+        assert undocumented(json.loads(result.stdout)) == [], "docs/json-keys.md lacks these keys"
+    return result

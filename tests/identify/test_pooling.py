@@ -330,6 +330,10 @@ def test_the_command_recommends_one_law_for_both_purposes_and_states_the_excess(
     assert answer["length_errors"]["resting_lengths"][0]["specimen"] == "100 mm"
     law = load(tmp_path / "out" / "muscle.toml").characteristic
     assert law.specimens == ("100 mm", "150 mm", "200 mm", "300 mm")
+    shown = answer_of(["fit", *files, *(each for each in common if each != "--json")]).splitlines()
+    assert len(shown) <= 45, "more than a screen"
+    assert sum(line.startswith("For other muscles of the same type") for line in shown) == 1
+    assert sum(line == "Laws that are not ranked" for line in shown) <= 1
 
 
 def test_a_purpose_names_the_rows_that_are_left_out():

@@ -41,6 +41,7 @@ from airmuscle.report import (
     Table,
     TableColumn,
     as_json,
+    as_text,
     count_verdicts,
     format_number,
     format_published,
@@ -121,6 +122,12 @@ class Links(HTMLParser):
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("report")
     return write_report([a_chapter(), a_chapter("Borzikova", fibres=40.0)], folder, title="Papers", date=DATE)
+
+
+def test_a_result_of_two_chapters_is_written_once_in_the_brief_view():
+    first, second, other = (Chapter(name, name, (result, "More."))
+                            for name, result in (("a", "One law."), ("b", "One law."), ("c", "Another law.")))  # fmt: skip
+    assert as_text([first, second, other], 80).split("\n") == ["a", "One law.", "", "b", "", "c", "Another law."]
 
 
 def test_the_folder_holds_page_claims_figures_and_data(report: Path):

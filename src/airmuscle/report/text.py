@@ -22,14 +22,19 @@ _UNIT = re.compile(r"\[[^\]]*\]")
 
 
 def as_text(chapters: Sequence[Chapter], width: int, rest: str = "the report") -> str:
-    """The brief view of the chapters; `rest` names the place of what it leaves out."""
-    shown = [chapter for chapter in chapters if chapter.brief]
-    return "\n\n".join("\n".join(_lines(chapter, width, rest)) for chapter in shown)
+    """The brief view of the chapters; `rest` names the place of what it leaves out. A result that the chapter before
+    states as well is not repeated."""
+    texts, stated = list[str](), tuple[str, ...]()
+    for chapter in (each for each in chapters if each.brief):
+        result = chapter.paragraphs[:1]
+        texts.append("\n".join(_lines(chapter, () if result == stated else result, width, rest)))
+        stated = result
+    return "\n\n".join(texts)
 
 
-def _lines(chapter: Chapter, width: int, rest: str) -> Iterator[str]:
+def _lines(chapter: Chapter, result: Sequence[str], width: int, rest: str) -> Iterator[str]:
     yield to_plain(chapter.title)
-    yield from map(to_plain, chapter.paragraphs[:1])
+    yield from map(to_plain, result)
     yield from _value_lines([each for each in chapter.values if each.brief])
     for table in chapter.tables:
         if table.brief_rows:

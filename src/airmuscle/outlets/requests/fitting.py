@@ -36,12 +36,14 @@ from ...files.library.initial_law import InitialLaw, find_initial_law, resting_l
 from ...physics.muscle.characteristic import ContractileSurface
 from ...physics.muscle.geometry import Geometry
 from ...recording import Recording
-from ...report.chapter import Chapter
+from ...report.chapter import Chapter, Table
 from .braid import check_one_length, with_braid
 from .fit import WEAK, FitRequest
 
 Progress = Callable[[str, float], None]
 """Called with a step and the fraction done."""
+RANKED = 5
+"""Laws of each ranking in the brief view, besides the recommended one, if there are several rankings (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -118,7 +120,7 @@ def _compare(
     errors = ranked_specimen_errors(best, selection.comparisons, recordings)
     entry = fitted_entry(best.fit, initial, names, left_out_ratio(best), recordings, errors)
     entry, more, notes = _more(request, best.fit, entry, recordings, progress, workers)
-    comparisons = _with_notes_once(compare_chapters(selection.comparisons, best, selection.reason))
+    comparisons = _in_one_screen(compare_chapters(selection.comparisons, best, selection.reason))
     odd = odd_specimen_notes(errors)
     notes = [*notes, *unused, *odd, *missing_geometry(entry)]
     comparisons[0] = dataclasses.replace(comparisons[0], notes=(*comparisons[0].notes, *notes))
@@ -184,13 +186,27 @@ def _shaped(request: FitRequest, found: Fit, recordings: list[Recording]) -> Any
     return fit_shape_constrained(found.model, recordings, free=free)
 
 
-def _with_notes_once(chapters: Sequence[Chapter]) -> list[Chapter]:
-    """The chapters without the notes that one before states."""
-    stated, once = set[str](), list[Chapter]()
+def _in_one_screen(chapters: Sequence[Chapter]) -> list[Chapter]:
+    """The chapters of a comparison, each without the notes that one before states. Of several chapters, the brief view
+    has fewer laws of the ranking, and those that are not ranked once."""
+    stated, brief = set[str](), list[Chapter]()
     for each in chapters:
-        once.append(dataclasses.replace(each, notes=tuple(note for note in each.notes if note not in stated)))
+        notes = tuple(note for note in each.notes if note not in stated)
+        tables = (
+            each.tables if len(chapters) == 1 else tuple(_shortened(each, table, not brief) for table in each.tables)
+        )
+        brief.append(dataclasses.replace(each, notes=notes, tables=tables))
         stated |= set(each.notes)
-    return once
+    return brief
+
+
+def _shortened(chapter: Chapter, table: Table, first: bool) -> Table:
+    """A table of laws with fewer rows in the brief view: of a ranking the first ones and the recommended law."""
+    if isinstance(table.brief, int):
+        return table if first else dataclasses.replace(table, brief=0)
+    recommended = next(each.value for each in chapter.values if each.name == "recommended")
+    laws = list(table.columns["law"].values)
+    return dataclasses.replace(table, brief=sorted({*table.brief[:RANKED], laws.index(recommended)}))
 
 
 def _notes_of(recordings: Sequence[Recording]) -> tuple[str, ...]:
