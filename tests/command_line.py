@@ -20,5 +20,6 @@ def airmuscle(*arguments: object, width: int = 160, **options: Any) -> Result:
     environment = {"COLUMNS": str(width), **options.pop("env", {})}
     result = CliRunner().invoke(app, [str(argument) for argument in arguments], env=environment, **options)
     if "--json" in arguments and result.exit_code == 0 and result.stdout.startswith("{"):
-        assert undocumented(json.loads(result.stdout)) == [], "docs/json-keys.md lacks these keys"
+        missing = undocumented(json.loads(result.stdout))
+        assert not missing, f"docs/json-keys.md lacks {missing}"
     return result

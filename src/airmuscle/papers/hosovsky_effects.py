@@ -101,10 +101,7 @@ def substitutions(parameters: UnpublishedParameters, suspected: SuspectedCauses)
     series = am.physics.CubicSeriesSpring(s.series_stiffness.value, s.series_hardening.value)
     length, diameter, dead = s.line_length.value, s.line_diameter.value, s.dead_volume.value
     critical = dataclasses.replace(MATRIX, critical_ratio=s.critical_ratio.value)
-    lumped, heat = (
-        am.physics.Tube.from_dimensions(length, diameter),
-        am.physics.EnergyBalance(s.heat_transfer.value),
-    )
+    lumped, heat = (am.physics.Tube.from_dimensions(length, diameter), am.physics.EnergyBalance(s.heat_transfer.value))
     indexed = am.physics.SubsonicIndexValve(MATRIX.conductance, MATRIX.critical_ratio, s.index.value)
     laminar = dataclasses.replace(MATRIX, laminar_ratio=s.laminar_ratio.value)
     hardening = am.physics.CubicSpring(stiffness, s.hardening.value)

@@ -10,16 +10,7 @@ import airmuscle as am
 
 from ..core.plotting import BLACK, LINES, new_figure
 from ..report.chapter import Plot
-from .hosovsky_plant import (
-    DISCHARGING,
-    DURATION,
-    FILLING,
-    MATRIX,
-    SCHEDULE,
-    UnpublishedParameters,
-    hanging_load,
-    plant,
-)
+from .hosovsky_plant import DISCHARGING, DURATION, FILLING, MATRIX, SCHEDULE, UnpublishedParameters, hanging_load, plant
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -38,11 +38,7 @@ class VolumeRequest:
 
 @with_requests
 def fit_volume_command(
-    files: Files,
-    request: VolumeRequest,
-    reading: ReadingRequest,
-    out: Folder = Path("volume"),
-    json: Json = False,
+    files: Files, request: VolumeRequest, reading: ReadingRequest, out: Folder = Path("volume"), json: Json = False
 ) -> None:
     """Fit the volume of a muscle over its contraction.
 

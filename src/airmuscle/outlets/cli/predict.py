@@ -34,8 +34,7 @@ Model = Annotated[
 Records = Annotated[
     list[Path],
     typer.Argument(
-        metavar="FILES",
-        help="Measurement files; for a scenario also a TOML file with [[record]], as of fit-dynamic.",
+        metavar="FILES", help="Measurement files; for a scenario also a TOML file with [[record]], as of fit-dynamic."
     ),
 ]
 

@@ -27,8 +27,7 @@ from .terminal import counted_progress, echo
 @with_requests
 def study(
     file: Annotated[
-        Path,
-        typer.Argument(metavar="STUDY.toml", help="A file with scenario, [vary], [design] and [metrics]."),
+        Path, typer.Argument(metavar="STUDY.toml", help="A file with scenario, [vary], [design] and [metrics].")
     ],
     execution: Execution,
     out: Folder = Path("study"),
@@ -65,11 +64,7 @@ def _run(study: Study, out: Path, execution: Execution) -> tuple[StudyResult, st
     If it is aborted, a message states how many runs were saved.
     """
     try:
-        with (
-            _progress() as show,
-            execution.executor(len(study.chunks)) as workers,
-            process_pool(workers) as executor,
-        ):
+        with _progress() as show, execution.executor(len(study.chunks)) as workers, process_pool(workers) as executor:
             result = run_study(study, out, executor, show)
         return result, f"{contributions(workers)}." if isinstance(workers, SharedFolder) else ""
     except (AirmuscleError, KeyboardInterrupt):

@@ -5,16 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ...bench.identify import (
-    BlockSplit,
-    GroupSplit,
-    Huber,
-    LeastSquares,
-    LevelSplit,
-    Loss,
-    RunSplit,
-    SpecimenSplit,
-)
+from ...bench.identify import BlockSplit, GroupSplit, Huber, LeastSquares, LevelSplit, Loss, RunSplit, SpecimenSplit
 from ...core.units import quantity
 from .braid import BraidSize, read_braid
 from .declaration import RequestError, Where, option, request
