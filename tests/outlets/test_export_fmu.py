@@ -18,6 +18,7 @@ import sys
 import zipfile
 from dataclasses import replace
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import plants
@@ -28,7 +29,7 @@ from command_line import airmuscle
 from airmuscle.control import PID
 from airmuscle.engine import ControlLoop, Problem, Rodas4, RungeKutta4, Schedule, solve
 from airmuscle.errors import FileError, ParameterError
-from airmuscle.outlets import write_fmu
+from airmuscle.outlets import write_controller_fmu, write_fmu
 from airmuscle.outlets.export import compiler
 from airmuscle.outlets.export.fmi_variables import BASE, base_powers
 from airmuscle.physics import ValidityRange
@@ -226,6 +227,75 @@ def test_a_parameter_can_be_tuned_between_steps(instance):
     instance.set(parameters__mechanism__mass=2 * instance.get("parameters.mechanism.mass")[0])
     assert instance.get("der(speed)")[0] != before
     instance.step(0.0, 0.01)
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_pressure_at_the_start_gives_the_air_mass(fmi, fmus):
+    """The other states are kept; the run is that of the library from this state."""
+    fmpy = pytest.importorskip("fmpy", reason="needs the package fmpy")
+    problem = problem_of()
+    plant, state = problem.system, dict(problem.initial_state)
+    state["air_mass"] *= (3e5 + plant.ambient.pressure) / (1e5 + plant.ambient.pressure)  # an ideal gas
+    expected = solve(replace(problem, initial_state=state)).recording
+    options = {"start_values": {"start.pressure": 3e5}, "stop_time": 0.5, "output_interval": 0.01}
+    run = fmpy.simulate_fmu(str(fmus("dmsp-20-300", fmi)), output=["pressure", "position"], fmi_type="CoSimulation",
+                            input=signal_of(problem.system.inputs), relative_tolerance=1e-9, **options)  # fmt: skip
+    assert run["pressure"][0] == pytest.approx(3e5, abs=1e-3)
+    rows = [np.flatnonzero(np.abs(run["time"] - t) < 1e-9)[-1] for t in expected["time"]]
+    for column in ("pressure", "position"):
+        clear = ~np.isin(np.round(expected["time"], 6), [t for t, _ in JUMPS])
+        assert np.abs(run[column][rows] - expected[column])[clear].max() <= 1e-7 * np.abs(expected[column]).max()
+
+
+def test_a_pressure_at_the_start_is_refused_after_it(instance):
+    with pytest.raises(Exception, match="fmi3SetFloat64"):
+        instance.set(start__pressure=2e5)
+    assert any("until the end of the initialization only" in text for _, text in instance.log)
+    assert instance.get("start.pressure") == pytest.approx(1e5, abs=1e-3)
+
+
+def test_terminals_are_valid_and_those_of_a_plant_and_its_controller_match(fmus, tmp_path):
+    etree = pytest.importorskip("lxml.etree", reason="needs the package lxml")
+    fmpy = pytest.importorskip("fmpy", reason="needs the package fmpy")
+    schema = etree.XMLSchema(file=str(Path(fmpy.__file__).parent / "schema/fmi3/fmi3TerminalsAndIcons.xsd"))
+    loop = ControlLoop(PID("pressure", "fill", 1e-5), 0.01, Schedule({"pressure": ((0.0, 2e5),)}))
+    problem = replace(problem_of(), input=loop)
+    controller = write_controller_fmu(problem, tmp_path / "controller.fmu", name="controller", binary=False).path
+    members = []
+    for path in (fmus("dmsp-20-300", 3), controller):
+        with zipfile.ZipFile(path) as file:
+            tree = etree.fromstring(file.read("terminalsAndIcons/terminalsAndIcons.xml"))
+        schema.assertValid(tree)
+        names = {e.get("name"): {m.get("memberName") for m in e} for e in tree.iter("Terminal")}
+        described = {v.name for v in fmpy.read_model_description(str(path)).modelVariables}
+        assert set().union(*names.values()) <= described
+        members.append(names)
+    plant, control = members
+    assert plant["commands"] >= control["commands"] == {"fill"}
+    assert plant["measurements"] >= control["measurements"] == {"pressure"}
+    assert control["setpoints"] == {"setpoint.pressure"}
+    with zipfile.ZipFile(fmus("dmsp-20-300", 2)) as file:
+        assert not [name for name in file.namelist() if "terminals" in name]
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_the_reference_results_are_met_with_the_inputs_beside_them(fmi, fmus, tmp_path):
+    fmpy = pytest.importorskip("fmpy", reason="needs the package fmpy")
+    path, extra = fmus("overlap", fmi), "extra/org.fmi-standard.fmi-ls-ref"
+    with zipfile.ZipFile(path) as file:
+        file.extractall(tmp_path)
+    manifest = ElementTree.parse(tmp_path / extra / "fmi-ls-manifest.xml").getroot()
+    assert manifest.get("{http://fmi-standard.org/fmi-ls-manifest}fmi-ls-name") == "org.fmi-standard.fmi-ls-ref"
+    assert {e.get("role"): e.get("source") for e in manifest} == {"testcase": "inputs.csv", "result": "results.csv"}
+    inputs, results = (np.genfromtxt(tmp_path / extra / f"{name}.csv", delimiter=",", names=True, deletechars="")
+                       for name in ("inputs", "results"))  # fmt: skip
+    columns = [name for name in results.dtype.names if name != "time"]
+    run = fmpy.simulate_fmu(str(path), fmi_type="CoSimulation", stop_time=0.5, output_interval=0.01, input=inputs,
+                            output=columns, record_events=True)  # fmt: skip
+    rows = [np.flatnonzero(np.abs(run["time"] - t) < 1e-9)[-1] for t in results["time"]]
+    clear = ~np.isin(np.round(results["time"], 6), [t for t, _ in JUMPS])
+    for column in columns:
+        assert np.abs(run[column][rows] - results[column])[clear].max() <= 1e-7 * np.abs(results[column]).max(), column
 
 
 def test_the_log_states_once_what_left_its_validity_range(tmp_path):

@@ -3,6 +3,7 @@ from ...engine.executors import shared_folder as shared_folder
 from ...engine.processes import process_pool as process_pool
 from .chapter import study_chapter as study_chapter
 from .chapter import write_study as write_study
+from .chunk import run_study as run_study
 from .design import DESIGNS as DESIGNS
 from .design import Grid as Grid
 from .design import LatinHypercube as LatinHypercube
@@ -33,6 +34,5 @@ from .metrics import TimeToReach as TimeToReach
 from .paths import read_difference as read_difference
 from .result import StudyResult as StudyResult
 from .result import sobol_indices as sobol_indices
-from .run import run_study as run_study
 from .study import Study as Study
 from .study import load_study as load_study

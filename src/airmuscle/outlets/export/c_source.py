@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import dataclasses
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,9 +16,8 @@ from ...engine.compile.text.programs import CLanguage
 from ...engine.run.integrators import Integrator
 from ...recording.recording import column_heading
 from .exported_loop import ExportedLoop
-from .identifiers import c_array, c_integers, c_number, c_string, c_strings, make_identifiers
+from .identifiers import block_comment, c_array, c_integers, c_number, c_string, c_strings, filled, make_identifiers
 from .printed_system import ExportedSystem
-from .provenance import block_comment, filled
 from .solver_text import BETWEEN, SHAPES, STEP, TABLEAU, RunData, SolverText
 
 PUBLIC = frozenset({"prepare", "rhs", "outputs", "partials", "indicators"})
@@ -144,8 +143,13 @@ class CSource:
 
 def csv_header(columns: Sequence[str]) -> str:
     """The line with the headings of time and these columns."""
+    return csv_text([column_heading(name) for name in ("time", *columns)], ())
+
+
+def csv_text(headings: Sequence[str], rows: Iterable[Sequence[float]]) -> str:
+    """Rows as CSV; the numbers are read back bit by bit."""
     file = io.StringIO()
-    csv.writer(file, lineterminator="\n").writerow([column_heading(name) for name in ("time", *columns)])
+    csv.writer(file, lineterminator="\n").writerows([headings, *rows])
     return file.getvalue()
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from ...core.atomic_output import temporary_folder
 from ...core.errors import FileError, ParameterError, suggestion
-from .provenance import template
+from .identifiers import template
 
 COMPILERS = ("gcc", "clang", "cc")
 OPTIONS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-fvisibility=hidden", "-s")

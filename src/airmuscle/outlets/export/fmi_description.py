@@ -9,8 +9,9 @@ from collections.abc import Mapping, Sequence
 from importlib import metadata
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
+from ...engine.loop.control_loop import SETPOINT
 from .fmi_variables import Variable, add_units, has_unit
-from .provenance import LICENCE
+from .identifiers import LICENCE
 
 _WORD = r"[A-Za-z_][A-Za-z0-9_]*(\[\d+\])?"
 _STRUCTURED = re.compile(rf"{_WORD}(\.{_WORD})*|der\({_WORD}(\.{_WORD})*\)")
@@ -56,9 +57,26 @@ class FmuDescription:
 
     def text(self, version: int) -> str:
         """The file for FMI 2 or 3."""
-        root = (self._fmi2 if version == 2 else self._fmi3)()
-        indent(root)
-        return '<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, encoding="unicode") + "\n"
+        return xml_text((self._fmi2 if version == 2 else self._fmi3)())
+
+    def terminals(self) -> str:
+        """The file terminalsAndIcons.xml of FMI 3: buses of the signals that plant and controller exchange."""
+        root = Element("fmiTerminalsAndIcons", fmiVersion="3.0")
+        parent = SubElement(root, "Terminals")
+        signals = [v for v in self.variables if v.causality in ("input", "output")]
+        names = {
+            "commands": [v.name for v in signals if (v.causality == "input") == self.has_states],
+            "measurements": [v.name for v in signals if (v.causality == "output") == self.has_states
+                             and not v.name.startswith(SETPOINT)],
+            "setpoints": [v.name for v in signals if v.name.startswith(SETPOINT)],
+        }  # fmt: skip
+        for terminal, members in names.items():
+            if members:
+                bus = SubElement(parent, "Terminal", name=terminal, matchingRule="bus")
+                for name in members:
+                    attributes = {"variableName": name, "memberName": name, "variableKind": "signal"}
+                    SubElement(bus, "TerminalMemberVariable", attributes)
+        return xml_text(root)
 
     def _root(self, attributes: Mapping[str, str]) -> Element:
         program = metadata.version("airmuscle")
@@ -155,6 +173,12 @@ class FmuDescription:
         """The states and inputs on which an unknown depends; of a state, itself."""
         known = self.dependencies.get(reference, ())
         return {"dependencies": " ".join(str(k + offset) for k in sorted(known))}
+
+
+def xml_text(root: Element) -> str:
+    """An element as the text of a file, indented."""
+    indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, encoding="unicode") + "\n"
 
 
 def _kind(v: Variable) -> dict[str, str]:

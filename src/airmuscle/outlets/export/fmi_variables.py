@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from xml.etree.ElementTree import Element, SubElement
 
 from ...core.errors import ParameterError, printable
@@ -20,8 +20,8 @@ from ...recording.columns import quantity_of
 from .printed_system import ExportedSystem, per_second
 from .solver_text import RunData
 
-PARAMETERS, TOLERANCE = "parameters", "relative_tolerance"
-"""Beginning of the names of parameters, and name of the tolerance."""
+PARAMETERS, TOLERANCE, START = "parameters", "relative_tolerance", "start"
+"""Beginning of the names of parameters, name of the tolerance, and beginning of the names of pressures at the start."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -44,8 +44,12 @@ class Variable:
     is_indicator: bool = False
 
 
-def make_variables(system: ExportedSystem, run: RunData, indicators: int = 0) -> list[Variable]:
+def make_variables(
+    system: ExportedSystem, run: RunData, indicators: int = 0, starts: Mapping[str, float] | None = None
+) -> list[Variable]:
     """The variables of an FMU, by increasing value reference, with so many event indicators at the end.
+
+    starts  pressures of muscles [Pa] at the start by their columns
 
     Raises ParameterError for two variables of one name.
     """
@@ -74,6 +78,10 @@ def make_variables(system: ExportedSystem, run: RunData, indicators: int = 0) ->
         about = "relative tolerance of the integrator in Co-Simulation"
         start = run.integrator.rtol
         add(TOLERANCE, "parameter", variability="tunable", initial="exact", start=start, description=about)
+    for column, pressure in (starts or {}).items():
+        about = "gauge pressure of the muscle at the start, from which its air mass follows; other states are kept"
+        add(f"{START}.{column}", "parameter", variability="fixed", initial="exact", start=pressure, unit="Pa",
+            description=about)  # fmt: skip
     for i in range(1, indicators + 1):
         about = "changes its sign where the rates are not smooth"
         add(f"event_indicator[{i}]", "local", is_indicator=True, description=about)

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
 
 from ...engine.compile.functions import Printer
 from ...engine.compile.jacobians import EventIndicators, Partials, event_indicators, partials
-from ...engine.run import Problem
+from ...engine.run import Problem, solve
 from ...engine.run.integrators import Rodas4
 from ...physics.plant.diagnostics import column_limits, describe_limit
 from ...physics.plant.plant import Plant
-from .c_source import CSource
+from .c_source import CSource, csv_text
 from .compiler import Platform
 from .fmi_description import FmuDescription, FmuExperiment
 from .fmi_package import FmuPackage, WrittenFmu, check_target, token_of
 from .fmi_variables import first_inputs, has_unit, make_variables, references_of
-from .identifiers import c_array, c_number, c_string, c_strings
+from .identifiers import c_array, c_number, c_string, c_strings, filled
 from .printed_system import acting_parameters
-from .provenance import filled
 from .targets import ExportedRun
 from .write import make_run
 
@@ -46,11 +49,35 @@ def write_fmu(
     binary   False: sources only. Without a C compiler the FMU contains sources only, which `remark` states
     platforms  instead of this machine, platforms for which zig compiles the binaries; it needs the package ziglang
 
-    The FMU contains no Python. The same arguments and version give the same file on one machine and compiler. Raises
-    ParameterError for what cannot be exported, which it names, and FileError.
+    The FMU contains no Python. It states terminals (FMI 3.0) and, as the layered standard FMI-LS-REF describes them,
+    the inputs of the problem and its run by the library as reference results. A pressure `start.pressure` that is set
+    before the end of the initialization gives the air mass of its muscle. The same arguments and version give the same
+    file on one machine and compiler. Raises ParameterError for what cannot be exported, which it names, and FileError.
     """
     target = check_target(path, fmi)
-    return fmu_package(problem, fmi, name, title, tunable).write(target, fmi, binary, platforms)
+    package = fmu_package(problem, fmi, name, title, tunable)
+    return replace(package, related=_reference(problem)).write(target, fmi, binary, platforms)
+
+
+def _reference(problem: Problem) -> dict[str, str]:
+    """The inputs of a problem and its run by the library, as CSV by the names of their files; none of a run that ends
+    early."""
+    solution = solve(problem)
+    if solution.recording["time"][-1] < problem.end_time:
+        return {}
+    recording, signals, names = solution.recording, problem.segments, problem.compiled.description.input_names
+    begins = [problem.start_time, *signals.ends[:-1].tolist()]
+    ends = np.minimum(signals.ends, problem.end_time).tolist()
+    rows = [
+        (time, *(values + slopes * (time - begin))[: len(names)].tolist())
+        for begin, end, values, slopes in zip(begins, ends, signals.values, signals.slopes, strict=True)
+        for time in (begin, end)
+    ]
+    results = [name for name in recording if name != "time" and name not in names]
+    columns = np.column_stack([recording[name] for name in ("time", *results)])
+    return {
+        "inputs.csv": csv_text(["time", *names], rows), "results.csv": csv_text(["time", *results], columns.tolist()),
+    }  # fmt: skip
 
 
 def fmu_package(
@@ -71,7 +98,8 @@ def _package(program: ExportedRun, fmi: int) -> FmuPackage:
         indicators.extend(printer)
 
     source = CSource(program.name, system, run.integrator, program.provenance, extend).files()
-    variables = make_variables(system, run, indicators.count if fmi == 3 else 0)
+    starts = _start_pressures(program, derivatives)
+    variables = make_variables(system, run, indicators.count if fmi == 3 else 0, {s.column: s.pressure for s in starts})
     token = token_of(*source.values(), *variables, fmi)
     dependencies: dict[int, list[int]] = {i: [i] for i in range(1, len(system.state_names) + 1)}
     for place in derivatives.places:
@@ -82,13 +110,43 @@ def _package(program: ExportedRun, fmi: int) -> FmuPackage:
         program.name, program.provenance[0], token, variables, dependencies, indicators.count,
         FmuExperiment(run.start, float(run.times[-1]), tolerance), (f"{program.name}.c",),
     )  # fmt: skip
-    instance = filled("instance.h", _instance(program, derivatives, indicators, token), program.name)
+    instance = filled("instance.h", _instance(program, derivatives, indicators, token, starts), program.name)
     return FmuPackage(about, program.provenance, {**source, f"{program.name}_instance.h": instance}, adjoint=True)
 
 
+class StartPressure(NamedTuple):
+    """The pressure of a muscle [Pa] at the start: its column, its row among rates and outputs, the state of its air."""
+
+    column: str
+    pressure: float
+    row: int
+    air_mass: int
+
+
+def _start_pressures(program: ExportedRun, derivatives: Partials) -> list[StartPressure]:
+    """The pressures of the muscles that follow from the mass of their air."""
+    system = program.system
+    plant = getattr(system.compiled.system, "plant", system.compiled.system)
+    if not isinstance(plant, Plant):
+        return []
+    state = dict(zip(system.state_names, program.run.initial.tolist(), strict=True))
+    outputs = system.compiled.system.outputs(
+        state, dict(zip(system.input_names, first_inputs(program.run), strict=True))
+    )
+    found = []
+    for prefix in plant.prefixes:
+        column, mass = f"{prefix}pressure", f"{prefix}air_mass"
+        if column in system.output_names and mass in system.state_names:
+            place = len(system.state_names) + list(system.output_names).index(column), system.state_names.index(mass)
+            if place in derivatives.places:
+                found.append(StartPressure(column, float(outputs[column]), *place))
+    return found
+
+
 def _instance(
-    program: ExportedRun, derivatives: Partials, indicators: EventIndicators, token: str
-) -> Mapping[str, str]:
+    program: ExportedRun, derivatives: Partials, indicators: EventIndicators, token: str,
+    starts: Sequence[StartPressure],
+) -> Mapping[str, str]:  # fmt: skip
     """The places of the template of an instance."""
     system, run, name = program.system, program.run, program.name
     known, limits = system.compiled.description, _limits(system.compiled.system, system.columns)
@@ -110,6 +168,9 @@ def _instance(
         c_array(f"static const double {name}_scales[{upper}_INDICATORS + 1]", scales, 1),
         _indices(f"{name}_rows", [row for row, _ in derivatives.places]),
         _indices(f"{name}_columns", [column for _, column in derivatives.places]),
+        _indices(f"{name}_pressure_rows", [each.row for each in starts]),
+        _indices(f"{name}_air_masses", [each.air_mass for each in starts]),
+        c_array(f"static const double {name}_start_pressures[]", [each.pressure for each in starts], 1),
         "/* Ranges that are reported once when a column leaves them. */\n"
         f"static const struct {{\n  int column;\n  double low, high;\n  const char *text;\n}} {name}_limits[] = {{\n"
         f'{rows}  {{0, 0.0, 0.0, ""}}\n}};\n',
@@ -117,7 +178,7 @@ def _instance(
     rtol = run.integrator.rtol if isinstance(run.integrator, Rodas4) else 0.0
     return {
         "file": name, "token": token, "partials": str(len(derivatives.places)), "limits": str(len(limits)),
-        "indicators": str(indicators.count), "slack": c_number(SLACK),
+        "indicators": str(indicators.count), "pressures": str(len(starts)), "slack": c_number(SLACK),
         "rtol": c_number(rtol), "start": c_number(run.start), "constants": "".join(constants),
     }  # fmt: skip
 

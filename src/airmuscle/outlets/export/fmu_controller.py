@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
-from xml.etree.ElementTree import Element, SubElement, indent, tostring
+from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
@@ -19,13 +19,12 @@ from ...engine.run import Problem, solve
 from ...engine.run.sampled_loop import SampledLoop, prepare_loop
 from ...engine.state import column_units
 from .compiler import Platform
-from .fmi_description import FmuDescription, FmuExperiment
+from .fmi_description import FmuDescription, FmuExperiment, xml_text
 from .fmi_package import FmuPackage, WrittenFmu, archive, check_target, token_of
 from .fmi_variables import Variable, base_powers, checked, has_unit, parameter_variables
 from .fmu import fmu_package
-from .identifiers import c_array, c_number, c_strings
+from .identifiers import block_comment, c_array, c_number, c_strings, filled
 from .printed_controller import PrintedController, check_control_law, print_controller
-from .provenance import block_comment, filled
 from .targets import program_name
 from .write import checked_name
 
@@ -200,8 +199,7 @@ def _structure(name: str, parts: dict[str, FmuDescription]) -> str:
     _units(root, sorted({v.unit for ports in inside.values() for v in ports.values() if has_unit(v.unit)}))
     experiment = parts["controller"].experiment
     SubElement(root, "ssd:DefaultExperiment", startTime=repr(experiment.start), stopTime=repr(experiment.stop))
-    indent(root)
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, encoding="unicode") + "\n"
+    return xml_text(root)
 
 
 def _ports(about: FmuDescription) -> dict[str, Variable]:

@@ -11,8 +11,7 @@ from ...core.atomic_output import atomic_folder
 from ...engine.run import Problem
 from .c_source import CSource
 from .fmi_variables import first_inputs
-from .identifiers import make_identifiers
-from .provenance import block_comment, filled
+from .identifiers import block_comment, filled, make_identifiers
 from .targets import ExportedRun
 from .write import make_run
 

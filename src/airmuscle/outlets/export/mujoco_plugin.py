@@ -24,9 +24,8 @@ from ...physics.plant import Plant, open_plant
 from .actuator import control_range, controls_of, single_muscle
 from .c_source import CSource
 from .compiler import compile_library
-from .identifiers import c_integers, c_number, c_strings
+from .identifiers import block_comment, c_integers, c_number, c_strings, filled, provenance
 from .printed_system import export_system
-from .provenance import block_comment, filled, provenance
 from .targets import program_name
 from .write import checked_name
 

@@ -13,8 +13,8 @@ from ...engine.compile.kernel_text import MatlabKernels
 from ...engine.compile.text.programs import DEFINITION, MatlabBody, MatlabLanguage
 from .c_source import csv_header
 from .exported_loop import ExportedLoop
+from .identifiers import filled, line_comment
 from .printed_system import ExportedSystem
-from .provenance import filled, line_comment
 from .solver_text import BETWEEN, SHAPES, STEP, RunData, SolverText, program_data
 
 _BODY = MatlabBody()

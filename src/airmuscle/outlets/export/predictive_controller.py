@@ -11,9 +11,8 @@ from ...core.arrays import Array
 from ...engine.compile.kernel_text import CKernels
 from ...engine.loop.controller import Measurement
 from ...engine.run.sampled_loop import SampledLoop
-from .identifiers import c_array, c_integers, c_number
+from .identifiers import c_array, c_integers, c_number, filled, provenance
 from .printed_controller import PrintedController, ReplayedSamples
-from .provenance import filled, provenance
 
 TOLERANCE = 1e-9
 """Part of its range by which a command in C may differ from that in Python (chosen): sums are in another order."""

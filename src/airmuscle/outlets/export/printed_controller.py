@@ -23,9 +23,8 @@ from ...engine.loop.control_loop import ControlLoop
 from ...engine.run import Problem
 from ...engine.run.compiled_law import trace_sample
 from ...engine.run.sampled_loop import SampledLoop
-from .identifiers import c_array, c_number, c_strings, make_identifiers, with_cmake
+from .identifiers import block_comment, c_array, c_number, c_strings, filled, make_identifiers, provenance, with_cmake
 from .printed_system import find_leaf, make_labels
-from .provenance import block_comment, filled, provenance
 
 SINGLE_TOLERANCE = 1e-4
 """Part of its range by which a command in single precision may differ from that in double precision (chosen)."""

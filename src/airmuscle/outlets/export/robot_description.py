@@ -16,8 +16,8 @@ from ...core.units import STANDARD_GRAVITY
 from ...physics.mechanism import AntagonisticJoint, Mechanism, MuscleRoute, PlanarArm, SerialArm
 from ...physics.mechanism.pulley_profile import ConstantRadius
 from ...physics.plant import Plant
+from .identifiers import provenance
 from .mujoco_plugin import REST_LENGTH, MuscleActuator, write_mujoco_plugin
-from .provenance import provenance
 from .targets import program_name
 from .write import checked_name
 

@@ -17,11 +17,19 @@ from ...engine.compile.text.programs import DEFINITION, CLanguage, JavaScriptLan
 from ...physics.muscle.characteristic import Characteristic, ContractionLaw, ForceLaw, PressureLaw
 from .c_source import CSource, loop_main
 from .exported_loop import ExportedLoop
-from .identifiers import c_array, c_strings, make_identifier, with_cmake
+from .identifiers import (
+    block_comment,
+    c_array,
+    c_strings,
+    filled,
+    line_comment,
+    make_identifier,
+    provenance,
+    with_cmake,
+)
 from .javascript_module import JavaScriptModule, to_json
 from .octave_functions import OctaveFunctions, m_array, m_strings
 from .printed_system import ExportedSystem
-from .provenance import block_comment, filled, line_comment, provenance
 from .solver_text import RunData
 
 FORMS: tuple[tuple[type[Characteristic], str, tuple[str, str], tuple[str, str, str]], ...] = (

@@ -21,11 +21,10 @@ from ...engine.run.batch.lanes import Double, Precision, Single
 from ...engine.run.sampled_loop import prepare_loop
 from ...physics.muscle.characteristic import Characteristic
 from .exported_loop import CONTROLLER, export_loop
-from .identifiers import make_identifier
+from .identifiers import make_identifier, provenance
 from .predictive_controller import print_predictive
 from .printed_controller import PrintedController, check_control_law, check_single_precision, print_controller
 from .printed_system import export_system
-from .provenance import provenance
 from .solver_text import check_open_loop, run_data
 from .targets import C99, ExportedRun, Target, print_law, program_name
 

@@ -110,6 +110,8 @@ static int model_set(model_instance *m, unsigned v, double value)
   return 0;
 }
 
+static void model_initialise(model_instance *m) { (void)m; }
+
 static int model_check(model_instance *m, model_report report, void *owner)
 {
   (void)m, (void)report, (void)owner;

@@ -73,7 +73,11 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, f
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) { UNUSED(c); return fmi2OK; }
-fmi2Status fmi2ExitInitializationMode(fmi2Component c) { return model_check(&C->m, report, c) ? fmi2Error : fmi2OK; }
+fmi2Status fmi2ExitInitializationMode(fmi2Component c)
+{
+  model_initialise(&C->m);
+  return model_check(&C->m, report, c) ? fmi2Error : fmi2OK;
+}
 fmi2Status fmi2Terminate(fmi2Component c) { UNUSED(c); return fmi2OK; }
 fmi2Status fmi2Reset(fmi2Component c) { model_reset(&C->m); return fmi2OK; }
 

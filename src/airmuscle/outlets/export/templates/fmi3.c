@@ -122,6 +122,7 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
 
 fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
 {
+  model_initialise(&C->m);
   return model_check(&C->m, report, instance) ? fmi3Error : fmi3OK;
 }
 

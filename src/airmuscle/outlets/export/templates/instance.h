@@ -13,6 +13,8 @@
 /* An event follows where an indicator lies so far beyond the change of its sign, so that rounding causes none. */
 #define MODEL_SLACK @slack@
 #define MODEL_RTOL_START @rtol@
+/* Pressures at the start, from which air masses follow. */
+#define MODEL_PRESSURES @pressures@
 
 /* Value references; 0 is time. The tolerance exists for an integrator that controls its error. */
 #define MODEL_FIRST_STATE 1u
@@ -21,8 +23,9 @@
 #define MODEL_FIRST_OUTPUT (MODEL_FIRST_INPUT + MODEL_INPUTS)
 #define MODEL_FIRST_PARAMETER (MODEL_FIRST_OUTPUT + MODEL_OUTPUTS)
 #define MODEL_TOLERANCE (MODEL_FIRST_PARAMETER + MODEL_PARAMETERS)
+#define MODEL_FIRST_PRESSURE (MODEL_TOLERANCE + (MODEL_RTOL_START > 0.0 ? 1u : 0u))
 /* Event indicators have value references in FMI 3.0. */
-#define MODEL_FIRST_INDICATOR (MODEL_TOLERANCE + (MODEL_RTOL_START > 0.0 ? 1u : 0u))
+#define MODEL_FIRST_INDICATOR (MODEL_FIRST_PRESSURE + MODEL_PRESSURES)
 /* Inputs of which derivatives by time can be given. */
 #define MODEL_LINEAR_INPUTS MODEL_INPUTS
 #define MODEL_ROWS (MODEL_STATES + MODEL_OUTPUTS)
@@ -38,7 +41,9 @@ typedef struct {
   double u[MODEL_INPUTS + 1], w[MODEL_INPUTS + 1], p[MODEL_PARAMETERS + 1], c[MODEL_PRECOMPUTED + 1];
   double f[MODEL_STATES], o[MODEL_OUTPUTS + 1];
   int unprepared, old_rates, old_outputs, jumped;
-  unsigned char told[MODEL_LIMITS + 1], above[MODEL_INDICATORS + 1];
+  double pressure[MODEL_PRESSURES + 1];
+  int is_initialised;
+  unsigned char told[MODEL_LIMITS + 1], above[MODEL_INDICATORS + 1], is_given[MODEL_PRESSURES + 1];
 } model_instance;
 
 typedef void (*model_report)(void *owner, int is_error, const char *text);
@@ -50,6 +55,7 @@ static void model_reset(model_instance *m)
   m->s.rtol = MODEL_RTOL_START;
   memcpy(m->u, model_start_inputs, sizeof m->u);
   memcpy(m->p, model_defaults, sizeof m->p);
+  memcpy(m->pressure, model_start_pressures, sizeof m->pressure);
   m->unprepared = m->old_rates = m->old_outputs = m->jumped = 1;
 }
 
@@ -101,6 +107,26 @@ static void model_settle(model_instance *m)
   for (i = 0; i < MODEL_INDICATORS; i++) m->above[i] = values[i] > 0.0;
 }
 
+/* End of the initialization: the air masses of the pressures that were given, by Newton steps; other states are kept. */
+static void model_initialise(model_instance *m)
+{
+  double D[MODEL_PARTIALS + 1];
+  int i, k, n;
+  for (i = 0; i < MODEL_PRESSURES; i++)
+    for (n = 0; m->is_given[i] && n < 30; n++) {
+      const double missing = m->pressure[i] - model_outputs_now(m)[model_pressure_rows[i] - MODEL_STATES];
+      double slope = 0.0;
+      if (!(fabs(missing) > 1e-7)) break;
+      model_partials(m->s.x, m->u, m->c, D);
+      for (k = 0; k < MODEL_PARTIALS; k++)
+        if (model_rows[k] == model_pressure_rows[i] && model_columns[k] == model_air_masses[i]) slope = D[k];
+      if (!(slope > 0.0)) break;
+      m->s.x[model_air_masses[i]] += missing / slope;
+      m->old_rates = m->old_outputs = m->jumped = 1;
+    }
+  m->is_initialised = 1;
+}
+
 /* The value of a variable; 1 for an unknown value reference. */
 static int model_get(model_instance *m, unsigned v, double *value)
 {
@@ -112,6 +138,7 @@ static int model_get(model_instance *m, unsigned v, double *value)
   else if (v < MODEL_FIRST_PARAMETER) *value = model_outputs_now(m)[v - MODEL_FIRST_OUTPUT];
   else if (v < MODEL_TOLERANCE) *value = m->p[v - MODEL_FIRST_PARAMETER];
   else if (v == MODEL_TOLERANCE && MODEL_RTOL_START > 0.0) *value = m->s.rtol;
+  else if (v >= MODEL_FIRST_PRESSURE && v < MODEL_FIRST_INDICATOR) *value = m->pressure[v - MODEL_FIRST_PRESSURE];
   else if (v >= MODEL_FIRST_INDICATOR && v < MODEL_FIRST_INDICATOR + MODEL_INDICATORS) {
     model_get_indicators(m, z);
     *value = z[v - MODEL_FIRST_INDICATOR];
@@ -130,6 +157,8 @@ static void model_set_default_tolerance(model_instance *m, double value)
 static const char *model_refusal(unsigned v, double value, char *text, size_t size)
 {
   const unsigned k = v - MODEL_FIRST_PARAMETER;
+  if (v >= MODEL_FIRST_PRESSURE && v < MODEL_FIRST_INDICATOR && isfinite(value))
+    return "a pressure at the start can be set until the end of the initialization only";
   if (v < MODEL_FIRST_PARAMETER || v >= MODEL_TOLERANCE || !isfinite(value))
     return "a variable cannot be set, or its value is not finite, or a tolerance is not in 0 to 1";
   snprintf(text, size, "%.300s is %.6g; allowed are %.6g to %.6g %.40s", model_parameter_names[k], value,
@@ -155,6 +184,9 @@ static int model_set(model_instance *m, unsigned v, double value)
     m->unprepared = 1;
   } else if (v == MODEL_TOLERANCE && MODEL_RTOL_START > 0.0 && value > 0.0 && value < 1.0) {
     m->s.rtol = value;
+  } else if (v >= MODEL_FIRST_PRESSURE && v < MODEL_FIRST_INDICATOR && !m->is_initialised) {
+    m->pressure[v - MODEL_FIRST_PRESSURE] = value;
+    m->is_given[v - MODEL_FIRST_PRESSURE] = 1;
   } else {
     return 1;
   }
