@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import Executor
 from typing import Any
 
 import numpy as np
@@ -132,6 +131,14 @@ class Evaluator:
                 self._evaluate(group, gains, part, metrics)
         return metrics
 
+    def distributed_metrics(self, calls: DistributedCalls, gains: Array) -> CaseMetrics:
+        """The metrics (E, M) by an executor, which calls `metrics_and_reasons`; they do not depend on it."""
+        parts = calls.results([gains[i : i + SETS_OF_A_TASK] for i in range(0, len(gains), SETS_OF_A_TASK)])
+        for _, reasons in parts:
+            for reason, count in reasons.items():
+                self._note(reason, count)
+        return joined_metrics([metrics for metrics, _ in parts])
+
     def _is_possible(self, row: list[float]) -> bool:
         """Whether the controller accepts these gains together."""
         try:
@@ -141,8 +148,8 @@ class Evaluator:
             return False
         return True
 
-    def _note(self, reason: str) -> None:
-        self.reasons[reason] = self.reasons.get(reason, 0) + 1
+    def _note(self, reason: str, count: int = 1) -> None:
+        self.reasons[reason] = self.reasons.get(reason, 0) + count
 
     def _parts(self, rows: npt.NDArray[np.intp], group: CaseGroup) -> Iterator[npt.NDArray[np.intp]]:
         samples = self.duration / group.loop.sample_time + 2
@@ -186,28 +193,8 @@ class Evaluator:
             )  # fmt: skip
 
 
-class DistributedEvaluator:
-    """Metrics by an executor, which divides sets of gains (E, D) into tasks of `SETS_OF_A_TASK`; by default in this
-    process. They do not depend on the executor."""
-
-    def __init__(self, evaluator: Evaluator, executor: Executor | None) -> None:
-        self._evaluator, self._alone = evaluator, executor is None
-        self._distribution = DistributedCalls(executor, _metrics_and_reasons, evaluator)
-
-    def metrics(self, gains: Array) -> CaseMetrics:
-        """The metrics (E, M) of gains (E, D). Raises Interrupted if the user stops the simulation."""
-        if self._alone:
-            return self._evaluator.metrics(gains)
-        parts = self._distribution.results(
-            [gains[i : i + SETS_OF_A_TASK] for i in range(0, len(gains), SETS_OF_A_TASK)]
-        )
-        for _, reasons in parts:
-            for reason, count in reasons.items():
-                self._evaluator.reasons[reason] = self._evaluator.reasons.get(reason, 0) + count
-        return joined_metrics([metrics for metrics, _ in parts])
-
-
-def _metrics_and_reasons(evaluator: Evaluator, gains: Array) -> tuple[CaseMetrics, dict[str, int]]:
+def metrics_and_reasons(evaluator: Evaluator, gains: Array) -> tuple[CaseMetrics, dict[str, int]]:
+    """The metrics of gains (E, D) as a task of an executor, and the reasons of failures."""
     fresh = dataclasses.replace(evaluator, reasons={})
     return fresh.metrics(gains), fresh.reasons
 

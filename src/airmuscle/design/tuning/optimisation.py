@@ -12,10 +12,11 @@ import numpy as np
 from ...core.arrays import Array
 from ...core.errors import ParameterError, SimulationError
 from ...core.tree import leaves
+from ...engine.distribution import DistributedCalls
 from ...engine.processes import Workers, process_pool
 from ...engine.run.integrators import Integrator
 from .case import GainRange, LoopCase, check_cases, gain_ranges, to_coordinates, to_gains
-from .evaluation import DistributedEvaluator, Evaluator, Interrupted, group_cases, joined_metrics
+from .evaluation import Evaluator, Interrupted, group_cases, joined_metrics, metrics_and_reasons
 from .result import CaseMetrics, Objective, RobustObjective, Tuning, TuningHistory
 from .tracking import RootMeanSquareError, TrackingIndex
 
@@ -195,6 +196,7 @@ class _Search:
         self.evaluator, self.ranges, self.objective, self.progress = evaluator, ranges, objective, progress
         self.budget, self.sets = budget, budget // len(evaluator.cases)
         self.present_count, self.converged = 0, False
+        self._calls: DistributedCalls | None = None
         self.gains: list[Array] = []
         self.metrics: list[CaseMetrics] = []
         self.values: list[Array] = []
@@ -229,7 +231,8 @@ class _Search:
         """Search until two descents agree or the budget is used; whether the user interrupted."""
         from scipy.stats import qmc
 
-        self._distributed = DistributedEvaluator(self.evaluator, executor)
+        if executor is not None:
+            self._calls = DistributedCalls(executor, metrics_and_reasons, self.evaluator)
         first = qmc.Sobol(d=len(self.ranges), scramble=True, seed=np.random.default_rng(seed)).random(self.population)
         first[: len(given)] = given if given else first[:0]
         random, ends = np.random.default_rng([seed, 1]), list[float]()
@@ -264,7 +267,8 @@ class _Search:
     def _energies(self, coordinates: Array) -> Array:
         """The energies (S,) of points (S, D): the objective, or a large number by the share of failed runs."""
         gains = to_gains(self.ranges, np.clip(coordinates, 0.0, 1.0))
-        metrics = self._distributed.metrics(gains)
+        calls, evaluator = self._calls, self.evaluator
+        metrics = evaluator.metrics(gains) if calls is None else evaluator.distributed_metrics(calls, gains)
         values = np.asarray(self.objective(metrics), dtype=float)
         if values.shape != (len(gains),):
             raise ParameterError(f"tune: the objective returned {values.shape}; it must return ({len(gains)},) values.")

@@ -15,10 +15,9 @@ from ...engine.compile.kernel_text import CKernels
 from ...engine.compile.text.programs import CLanguage
 from ...engine.run.integrators import Integrator
 from ...recording.recording import column_heading
-from .exported_loop import ExportedLoop
+from .exported_run import BETWEEN, SHAPES, STEP, TABLEAU, ExportedLoop, RunData, SolverText
 from .identifiers import block_comment, c_array, c_integers, c_number, c_string, c_strings, filled, make_identifiers
 from .printed_system import ExportedSystem
-from .solver_text import BETWEEN, SHAPES, STEP, TABLEAU, RunData, SolverText
 
 PUBLIC = frozenset({"prepare", "rhs", "outputs", "partials", "indicators"})
 """Printed functions that other files may call."""

@@ -17,8 +17,8 @@ from ...core.tree import Leaf
 from ...engine.compile.jacobians import Place
 from ...engine.run.integrators import Rodas4
 from ...recording.columns import quantity_of
+from .exported_run import RunData
 from .printed_system import ExportedSystem, per_second
-from .solver_text import RunData
 
 PARAMETERS, TOLERANCE, START = "parameters", "relative_tolerance", "start"
 """Beginning of the names of parameters, name of the tolerance, and beginning of the names of pressures at the start."""

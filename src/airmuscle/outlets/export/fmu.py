@@ -127,14 +127,12 @@ def _start_pressures(program: ExportedRun, derivatives: Partials) -> list[StartP
     """The pressures of the muscles that follow from the mass of their air."""
     system = program.system
     plant = getattr(system.compiled.system, "plant", system.compiled.system)
-    if not isinstance(plant, Plant):
-        return []
     state = dict(zip(system.state_names, program.run.initial.tolist(), strict=True))
     outputs = system.compiled.system.outputs(
         state, dict(zip(system.input_names, first_inputs(program.run), strict=True))
     )
     found = []
-    for prefix in plant.prefixes:
+    for prefix in plant.prefixes if isinstance(plant, Plant) else ():
         column, mass = f"{prefix}pressure", f"{prefix}air_mass"
         if column in system.output_names and mass in system.state_names:
             place = len(system.state_names) + list(system.output_names).index(column), system.state_names.index(mass)

@@ -13,10 +13,9 @@ import numpy as np
 from ...engine.compile.kernel_text import JavaScriptKernels
 from ...engine.compile.text.programs import JavaScriptLanguage
 from .c_source import csv_header
-from .exported_loop import ExportedLoop
+from .exported_run import BETWEEN, STEP, TABLEAU, ExportedLoop, RunData, SolverText, program_data
 from .identifiers import block_comment, filled
 from .printed_system import ExportedSystem
-from .solver_text import BETWEEN, STEP, TABLEAU, RunData, SolverText, program_data
 
 ULP = """/** The distance from a number to the next. */
 function ulp(value) {

@@ -12,10 +12,9 @@ from ...core.errors import printable
 from ...engine.compile.kernel_text import MatlabKernels
 from ...engine.compile.text.programs import DEFINITION, MatlabBody, MatlabLanguage
 from .c_source import csv_header
-from .exported_loop import ExportedLoop
+from .exported_run import BETWEEN, SHAPES, STEP, ExportedLoop, RunData, SolverText, program_data
 from .identifiers import filled, line_comment
 from .printed_system import ExportedSystem
-from .solver_text import BETWEEN, SHAPES, STEP, RunData, SolverText, program_data
 
 _BODY = MatlabBody()
 _IN_LINE = 6

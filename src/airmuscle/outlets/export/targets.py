@@ -16,7 +16,7 @@ from ...engine.compile.ir.emission import TargetLanguage
 from ...engine.compile.text.programs import DEFINITION, CLanguage, JavaScriptLanguage, MatlabLanguage
 from ...physics.muscle.characteristic import Characteristic, ContractionLaw, ForceLaw, PressureLaw
 from .c_source import CSource, loop_main
-from .exported_loop import ExportedLoop
+from .exported_run import ExportedLoop, RunData
 from .identifiers import (
     block_comment,
     c_array,
@@ -30,7 +30,6 @@ from .identifiers import (
 from .javascript_module import JavaScriptModule, to_json
 from .octave_functions import OctaveFunctions, m_array, m_strings
 from .printed_system import ExportedSystem
-from .solver_text import RunData
 
 FORMS: tuple[tuple[type[Characteristic], str, tuple[str, str], tuple[str, str, str]], ...] = (
     (ForceLaw, "force", ("pressure", "contraction"), ("force", "force_by_pressure", "stiffness")),

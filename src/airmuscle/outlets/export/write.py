@@ -20,12 +20,11 @@ from ...engine.run import Problem, solve
 from ...engine.run.batch.lanes import Double, Precision, Single
 from ...engine.run.sampled_loop import prepare_loop
 from ...physics.muscle.characteristic import Characteristic
-from .exported_loop import CONTROLLER, export_loop
+from .exported_run import CONTROLLER, check_open_loop, export_loop, run_data
 from .identifiers import make_identifier, provenance
 from .predictive_controller import print_predictive
 from .printed_controller import PrintedController, check_control_law, check_single_precision, print_controller
 from .printed_system import export_system
-from .solver_text import check_open_loop, run_data
 from .targets import C99, ExportedRun, Target, print_law, program_name
 
 NOTE = (
@@ -36,15 +35,9 @@ NOTE = (
 
 
 def write_program(
-    problem: Problem,
-    folder: str | Path,
-    target: Target = C99(),
-    *,
-    name: str = "",
-    title: str = "",
-    tunable: Sequence[str] | None = None,
-    columns: Sequence[str] = (),
-) -> tuple[Path, ...]:
+    problem: Problem, folder: str | Path, target: Target = C99(), *, name: str = "", title: str = "",
+    tunable: Sequence[str] | None = None, columns: Sequence[str] = (),
+) -> tuple[Path, ...]:  # fmt: skip
     """Write a system and its run as a program in another language; returns the paths of its files.
 
     problem  a system with its input signals or, for these targets, a control loop; initial state, output times and
