@@ -13,7 +13,7 @@ from ...core.atomic_output import temporary_folder
 from ...core.errors import AirmuscleError, SimulationError
 from ...design.study import Study, StudyResult, load_study, run_study
 from ...design.study.chapter import RESULTS_FILE, study_chapter, write_study
-from ...design.study.run import count_finished_runs
+from ...design.study.chunk import count_finished_runs
 from ...engine.executors import SharedFolder
 from ...engine.processes import process_pool
 from ...report.write import REPORT_FILE
