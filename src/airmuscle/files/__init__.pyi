@@ -4,6 +4,7 @@ from .library import ParameterUncertainty as ParameterUncertainty
 from .library import PlantEntry as PlantEntry
 from .library import ProductEntry as ProductEntry
 from .library import ValveEntry as ValveEntry
+from .library import allow_code as allow_code
 from .library import entries_of_product as entries_of_product
 from .library import list_data as list_data
 from .library import list_laws as list_laws

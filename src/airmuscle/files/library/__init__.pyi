@@ -25,6 +25,7 @@ from .fitted_entry import list_files as list_files
 from .location import Location as Location
 from .location import located_errors as located_errors
 from .models import PACKAGES as PACKAGES
+from .models import allow_code as allow_code
 from .models import model_class as model_class
 from .models import model_names as model_names
 from .plant_file import PLANT_READER as PLANT_READER

@@ -6,16 +6,20 @@ It contains every class that is declared with `@model`, unless it has `from_file
 
 from __future__ import annotations
 
+import contextlib
+import contextvars
 import functools
+import importlib
 import inspect
+import sys
 import types
 import typing
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ...control import laws
 from ...core.annotation import abridged, one_line
-from ...core.errors import UnknownNameError, suggestion
+from ...core.errors import Hint, HintedText, UnknownNameError, suggestion
 from ...engine import loop, run
 from ...physics import mechanism, muscle, plant, pneumatics
 from ...physics.muscle import characteristic, friction, geometry
@@ -59,6 +63,8 @@ def model_class(name: str, where: str, classes: Mapping[str, type[Any]] | None =
     """
     if not isinstance(name, str):
         raise UnknownNameError(f'{where} is {abridged(name)}; it must be a name in quotes, such as "Braid".')
+    if ":" in name and classes is None:
+        return _class_of_code(name, where)
     known = _registry() if classes is None else classes
     if name not in known:
         names = tuple(classes) if classes is not None else model_names(kind)
@@ -66,3 +72,43 @@ def model_class(name: str, where: str, classes: Mapping[str, type[Any]] | None =
         here = "" if names else " A table is due here, not the name of a model."
         raise UnknownNameError(f"{where}: no model '{one_line(name)}'{there}{here}{suggestion(name, known)}")
     return known[name]
+
+
+_ALLOWED = contextvars.ContextVar("allowed", default=False)
+
+
+@contextlib.contextmanager
+def allow_code() -> Iterator[None]:
+    """Within it, files may name a class of a user's module as `model = "module:Class"`, whose code then runs.
+
+    The module is one of the current folder, or installed. Its class is declared with `@model`, as those of the package.
+    Read only files of people whom you trust so: the module could do anything.
+    """
+    token = _ALLOWED.set(True)
+    try:
+        yield
+    finally:
+        _ALLOWED.reset(token)
+
+
+def _class_of_code(name: str, where: str) -> type[Any]:
+    """The class `module:Class` of a user. Raises UnknownNameError without permission, or where there is none."""
+    module, _, attribute = name.partition(":")
+    if not _ALLOWED.get():
+        raise UnknownNameError(HintedText(
+            f"{where}: '{one_line(name)}' is code of a user. Reading the file would run it, and a file may come from "
+            "anywhere, so that it is refused.", Hint("To run it because you trust it", function="files.allow_code"),
+        ))  # fmt: skip
+    sys.path.insert(0, "")
+    try:
+        cls = getattr(importlib.import_module(module), attribute)
+    except Exception as error:  # whatever the code of the user raises
+        raise UnknownNameError(
+            f"{where}: '{one_line(name)}' cannot be imported: {type(error).__name__}: {one_line(str(error))}. The "
+            "module must be installed, or in the current folder."
+        ) from None
+    finally:
+        sys.path.remove("")
+    if not (inspect.isclass(cls) and _is_file_model(cls)):
+        raise UnknownNameError(f"{where}: '{one_line(name)}' is no class that is declared with @model.")
+    return cls

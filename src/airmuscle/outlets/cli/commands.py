@@ -70,6 +70,8 @@ COMMANDS = (
     CommandRow("schema", "schema", "schema", "Print the JSON schema of scenario or muscle files."),
 )
 """All commands, in the order of use."""
+RUN_CODE = ("simulate", "study", "tune", "benchmark", "export")
+"""Commands with --allow-code."""
 _ROWS = {row.name: row for row in COMMANDS}
 _UsageError: Any = typer.BadParameter.__base__
 
@@ -88,7 +90,10 @@ class LazyCommands(TyperGroup):
         check_interrupted()
         command = typer.Typer(**SETTINGS)
         command.command(row.name)(function)
-        return _without_types(typer.main.get_command(command))
+        built = _without_types(typer.main.get_command(command))
+        if row.name in RUN_CODE:
+            built.params.append(_allow_code_option())
+        return built
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         if args[0] not in _ROWS:
@@ -109,6 +114,30 @@ class LazyCommands(TyperGroup):
             warnings.showwarning = functools.partial(_show_warning, ctx, warnings.showwarning)
             with _exit_codes(ctx), _printable_usage_errors(), deferred_sigint(), exclusive_folders():
                 return super().invoke(ctx)
+
+
+def _permit(ctx: typer.Context, value: bool) -> None:
+    """Permit the code of users until a command ends."""
+    if value:
+        ctx.with_resource(importlib.import_module("...files", __package__).allow_code())
+
+
+CODE_WORDS = 'Run classes that a file names as model = "module:Class"; only for files that you trust.'
+
+
+def _bearer(
+    allow_code: Annotated[bool, typer.Option("--allow-code", help=CODE_WORDS, callback=_permit, is_eager=True)] = False,
+) -> None:
+    """Bears the flag that several commands take."""
+
+
+def _allow_code_option() -> Any:
+    """The flag with which a command reads `model = "module:Class"` in its files."""
+    command = typer.Typer(**SETTINGS)
+    command.command()(_bearer)
+    (flag,) = (each for each in typer.main.get_command(command).params if each.name == "allow_code")
+    flag.expose_value = False
+    return flag
 
 
 def _without_types(command: Any) -> Any:

@@ -102,6 +102,10 @@ INSTRUCTIONS: Mapping[str, Mapping[str, Instruction]] = {
     "predict": _FILES,
     "convert": _FILES,
     "plan": {"fixed": _fix},
+    **{
+        name: {"files.allow_code": lambda hint: "use --allow-code"}
+        for name in ("simulate", "study", "tune", "benchmark", "export")
+    },
     "fit-dynamic": {**_RECORDS, "free": lambda hint: f"write free = {json.dumps(list(hint.value))} under [fit]"},
 }
 """Instructions by command and argument; a hint without an argument is found by its function."""
