@@ -96,7 +96,7 @@ class MovingHorizonEstimator(ShortRepr):
 
     def start(self, first: StateEstimate, values: Sequence[float], inputs: Sequence[float]) -> EstimationWindow:
         """The window of the first sample, whose estimate before its measurement is `first`."""
-        sample = WindowSample(np.asarray(inputs, dtype=float), np.asarray(values, dtype=float))
+        sample = WindowSample(np.array(inputs, dtype=float), np.array(values, dtype=float))
         filtered, _ = self.filter.correct(first, values, inputs)
         return self._solved(EstimationWindow(first, (sample,), filtered, np.zeros(len(first.mean))))
 
@@ -121,14 +121,11 @@ class MovingHorizonEstimator(ShortRepr):
     def estimate(self, recording: Recording, first: StateEstimate) -> dict[str, Array]:
         """The columns (N,) of the filter's `estimate`, from a recording with such rows."""
         rows = self.filter.rows(recording)
-        means, window = [], None
-        for k, (values, held) in enumerate(zip(rows.measured, rows.held, strict=True)):
-            if window is None:
-                window = self.start(first, values, held)
-            else:
-                for _ in range(rows.counts[k - 1] - 1):
-                    window = self.update(window, np.full(len(values), np.nan), held)  # type: ignore[arg-type]
-                window = self.update(window, values, held)
+        window = self.start(first, rows.measured[0], rows.held[0])
+        means, none = [self.mean(window)], np.full(len(self.filter.measured), np.nan)
+        for count, values, held in zip(rows.counts, rows.measured[1:], rows.held[1:], strict=True):
+            for each in (*[none] * (count - 1), values):
+                window = self.update(window, each, held)
             means.append(self.mean(window))
         return {"time": rows.time, **self.filter.table(np.array(means), rows.held)}
 

@@ -125,10 +125,6 @@ TOMIZUKA1989 = Reference(
 )
 
 
-RATES = 4000
-"""Frequencies at which the convergence is judged (chosen)."""
-
-
 @model
 class SmithPredictor(EnclosingLaw):
     """u = law(y_k + x_k - x_(k-n)),   x_(k+1) = a x_k + (1 - a) K u_k,   a = exp(-h/T): feedback without the dead time.
@@ -257,7 +253,7 @@ class RepetitiveControl(EnclosingLaw):
                 raise ParameterError(
                     f"RepetitiveControl: '{self.column}' is not among the {kind} of the loop, {', '.join(names)}."
                 )
-        omega = np.linspace(0.0, math.pi, RATES + 1)[1:]
+        omega = np.linspace(0.0, math.pi, 4001)[1:]  # their number is chosen
         response = closed.frequency_response(omega / (2.0 * math.pi * linear_loop.sample_time))
         t = response[:, closed.outputs.index(self.column), closed.inputs.index(self.column)]
         q = 1.0 - 2.0 * self.filter_weight * (1.0 - np.cos(omega))

@@ -31,10 +31,6 @@ class PrintedPredictive(PrintedController):
 
     law: LinearModelPredictive  # type: ignore[assignment]
 
-    @property
-    def tolerance(self) -> float:
-        return TOLERANCE
-
     def source_files(self) -> dict[str, str]:
         law, arrays = self.law, self.law.arrays()
         shapes = {name: tuple(map(str, array.shape)) for name, array in arrays.items()}
@@ -83,7 +79,9 @@ def print_predictive(prepared: SampledLoop, name: str, title: str) -> PrintedPre
     about = (f"Sample time {c_number(prepared.loop.sample_time)} s; set points {', '.join(law.controlled)}; measured "
              f"{', '.join(law.measured)}; commanded {', '.join(law.inputs)}.")  # fmt: skip
     lines = provenance(title or type(law).__name__, law, notes=[about, NOTE])
-    return PrintedPredictive(name, law, {}, {}, [prepared.ranges[n] for n in law.inputs], (), lines)
+    return PrintedPredictive(
+        name, law, {}, {}, [prepared.ranges[n] for n in law.inputs], (), lines, tolerance=TOLERANCE
+    )
 
 
 def _places(law: LinearModelPredictive) -> list[int]:

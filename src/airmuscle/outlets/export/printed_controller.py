@@ -52,6 +52,8 @@ class PrintedController:
     provenance: Sequence[str]
     number: str = "double"
     """Type of all numbers in C, double or float."""
+    tolerance: float = 0.0
+    """Part of its range by which a command of the replay may differ; 0: no bit differs."""
 
     @property
     def code(self) -> Code:
@@ -80,11 +82,6 @@ class PrintedController:
             f"{self.name}.h": filled("controller.h", places, self.name),
             f"{self.name}.c": filled("controller.c", places, self.name),
         }
-
-    @property
-    def tolerance(self) -> float:
-        """Part of its range by which a command of the replay may differ; 0: no bit differs."""
-        return SINGLE_TOLERANCE if self.number == "float" else 0.0
 
     def sample_in(self, language: TargetLanguage) -> str:
         """The function of a sample in another language; its arguments are measurement, set point, memory, parameters,
@@ -287,7 +284,8 @@ def print_controller(
         about.append(f"Not part of this program: the drivers between commands and openings ({kinds}).")
     lines = provenance(title or type(law).__name__, law, notes=[*about, *notes])
     ranges = [prepared.ranges[n] for n in law.inputs]
-    return PrintedController(name, law, inputs, outputs, ranges, tuple(known[i] for i in chosen), lines, number)
+    tolerance, variables = SINGLE_TOLERANCE if number == "float" else 0.0, tuple(known[i] for i in chosen)
+    return PrintedController(name, law, inputs, outputs, ranges, variables, lines, number, tolerance)
 
 
 def _limited(command: Any, low: float, high: float) -> Any:
