@@ -13,7 +13,7 @@ import pytest
 
 import airmuscle as am
 from airmuscle.bench import Candidate, RunSplit, compare, estimate_length_error, find_length_errors, select_for_both
-from airmuscle.bench.identify import blank_surface, corrected_length, law_selection
+from airmuscle.bench.identify import blank_surface, compare_chapter, corrected_length
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.physics import Braid, EffectiveLength, LogarithmicLength, TonduLopez2000
 from airmuscle.recording import Recording
@@ -106,7 +106,7 @@ def test_a_law_that_is_not_determined_for_one_purpose_is_not_the_one_law(monkeyp
     assert found.comparisons[0].ranking[0].candidate is family
     assert found.recommended[0].candidate is surface
     monkeypatch.setattr(
-        law_selection,
+        compare_chapter,
         "compare_splits",
         lambda runs, _, splits, **__: tuple(
             compare(two, [family if split == RunSplit() else surface], leave_out=split) for split in splits

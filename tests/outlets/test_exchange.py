@@ -10,7 +10,7 @@ import pytest
 from command_line import airmuscle
 
 from airmuscle.bench import ColumnMapping, Decimation, from_pandas, read, read_csv, to_xarray, write
-from airmuscle.bench.readers import large_csv
+from airmuscle.bench.readers import raw_csv
 from airmuscle.errors import AirmuscleError, ColumnError, FileError, ParameterError
 from airmuscle.recording import Recording
 
@@ -175,7 +175,7 @@ def reduce_from(rows: int, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_convert_keeps_all_rows_unless_fewer_are_asked_for(tmp_path, monkeypatch):
     """A long file, which `read` reduces: with limits that are a thousandth of the usual ones."""
-    monkeypatch.setattr(large_csv, "LARGE_FILE_BYTES", 20_000)
+    monkeypatch.setattr(raw_csv, "LARGE_FILE_BYTES", 20_000)
     reduce_from(2000, monkeypatch)
     path = tmp_path / "long.csv"
     rows = "\n".join(f"{k / 1000},{k % 700}" for k in range(6500))

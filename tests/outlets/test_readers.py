@@ -20,8 +20,8 @@ import pytest
 from airmuscle.bench import BlockMeans, ColumnMapping, Decimation, RecordedTime, read
 from airmuscle.bench.readers import (
     call_in_separate_process,
-    large_csv,
     mapping_of_tables,
+    raw_csv,
     read_mapping,
     seconds_from_clock,
     separate_process,
@@ -527,8 +527,8 @@ def test_time_out_of_order_is_rejected_unless_ordered_is_false(tmp_path: Path):
 @pytest.fixture
 def long_file(tmp_path: Path, monkeypatch) -> Path:
     """20 000 rows, read in chunks of 1000 like a file that does not fit into memory."""
-    monkeypatch.setattr(large_csv, "LARGE_FILE_BYTES", 10_000)
-    monkeypatch.setattr(large_csv, "_CHUNK_ROWS", 1000)
+    monkeypatch.setattr(raw_csv, "LARGE_FILE_BYTES", 10_000)
+    monkeypatch.setattr(raw_csv, "_CHUNK_ROWS", 1000)
     rows = "".join(f"{i};{0.5 * i:.1f}\n" for i in range(20_000)).replace(".", ",")
     path = tmp_path / "long.csv"
     path.write_text(f"# resting_length = 300 mm\ntime;force\ns;N\n{rows}")
@@ -537,7 +537,7 @@ def long_file(tmp_path: Path, monkeypatch) -> Path:
 
 def test_reading_in_chunks_gives_the_same_recording(long_file: Path, monkeypatch):
     parts = only(read(long_file))
-    monkeypatch.setattr(large_csv, "LARGE_FILE_BYTES", 1_000_000_000)
+    monkeypatch.setattr(raw_csv, "LARGE_FILE_BYTES", 1_000_000_000)
     whole = only(read(long_file))
     assert all(np.array_equal(parts[name], whole[name]) for name in whole)
     assert (parts.constants, parts.notes) == (whole.constants, whole.notes)
@@ -551,7 +551,7 @@ def test_decimation_keeps_rows_as_measured(long_file: Path, most: int):
     assert np.array_equal(recording["force"], 0.5 * recording["time"])
     assert len(recording) <= most
     assert (step == 1) == (recording.notes == ())
-    table = large_csv.read_large_csv(long_file, downsampling=Decimation(most))
+    table = raw_csv.read_large_csv(long_file, downsampling=Decimation(most))
     assert np.array_equal(table.rows, np.arange(4, 20_004, step)), "rows have the line numbers of the file"
     assert step == 1 or recording.notes[0].startswith(f"The file has 20000 rows; one in {step} is kept as measured")
 
@@ -571,7 +571,7 @@ def test_block_means_are_means(long_file: Path, most: int):
     expected = [np.mean(np.arange(20_000)[i : i + step]) for i in range(0, 20_000, step)]
     assert recording["time"] == pytest.approx(np.array(expected), rel=1e-12)
     assert f"each block of {step} is replaced by its mean" in recording.notes[0]
-    table = large_csv.read_large_csv(long_file, downsampling=BlockMeans(most))
+    table = raw_csv.read_large_csv(long_file, downsampling=BlockMeans(most))
     assert np.array_equal(table.rows, np.arange(4, 20_004, step)), (
         "rows have the number of the first line of their block"
     )
@@ -610,7 +610,7 @@ def peak_memory(path: Path, rows: int) -> int:
 
 
 def test_memory_depends_on_the_kept_rows_not_on_the_file(tmp_path: Path, monkeypatch):
-    monkeypatch.setattr(large_csv, "LARGE_FILE_BYTES", 10_000)
+    monkeypatch.setattr(raw_csv, "LARGE_FILE_BYTES", 10_000)
     peaks = [peak_memory(tmp_path / "long.csv", rows) for rows in (200_000, 500_000)]
     assert peaks[1] < 1.1 * peaks[0]
 

@@ -12,7 +12,7 @@ import pytest
 from command_line import airmuscle
 
 from airmuscle.bench import BlockMeans, ColumnMapping, Decimation, read
-from airmuscle.bench.readers import large_csv
+from airmuscle.bench.readers import raw_csv
 from airmuscle.errors import ColumnError, FileError
 from airmuscle.recording import Recording
 
@@ -57,7 +57,7 @@ def test_a_pipe_contains_what_the_file_contains(
 def test_of_too_many_rows_every_second_one_is_kept_until_they_are_few(
     monkeypatch: pytest.MonkeyPatch, chunk: int, most: int
 ):
-    monkeypatch.setattr(large_csv, "_CHUNK_ROWS", chunk)
+    monkeypatch.setattr(raw_csv, "_CHUNK_ROWS", chunk)
     recording = piped(monkeypatch, text(), downsampling=Decimation(most))
     step = 2 ** int(np.ceil(np.log2(ROWS / most)))
     assert np.array_equal(recording["force"], np.arange(0, ROWS, step))

@@ -12,7 +12,7 @@ import numpy as np
 
 import airmuscle as am
 
-from ..bench.identify.censored_least_squares import uncensored_rank
+from ..bench.identify.variable_projection import uncensored_rank
 from ..physics.muscle.characteristic.contractile_surface import exponents
 from ..report.chapter import Table
 from ..report.claims import AtMost, Claim, ClaimRow, Equal, Kind

@@ -17,10 +17,18 @@ from .contractions import (
     check_contraction_signs,
     check_elongation,
     check_length_and_contraction,
+    check_missing_codes,
+    without_missing_codes,
 )
-from .forces import check_force_area, check_force_signs, check_force_zero
-from .missing_codes import check_missing_codes, without_missing_codes
-from .pressures import check_absolute_isobars, check_lowest_pressures, check_mixed_pressures, check_pressure_limit
+from .pressures import (
+    check_absolute_isobars,
+    check_force_area,
+    check_force_signs,
+    check_force_zero,
+    check_lowest_pressures,
+    check_mixed_pressures,
+    check_pressure_limit,
+)
 
 __all__ = ["find_suspicious", "warn_of_suspicious_values", "without_missing_codes"]
 

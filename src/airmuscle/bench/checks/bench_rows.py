@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from ...core.arrays import Array
 from ...recording.recording import Recording
-from ..segment.remembered import remembered
+from ..segment.interval import remembered
 from ..segment.sensor import estimate_sensors
 
 MIN_FORCE = 0.05

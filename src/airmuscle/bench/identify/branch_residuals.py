@@ -22,8 +22,7 @@ from ...recording import Recording
 from ...recording.columns import QUANTITIES
 from ..segment import Branch, branch_directions, estimate_sensors, find_branches
 from ..segment.branches import branch_name
-from ..segment.interval import running_median
-from ..segment.remembered import remembered
+from ..segment.interval import remembered, running_median
 
 MIN_LOOP_ROWS = 12
 """Minimum number of rows of a branch (chosen)."""

@@ -1,17 +1,106 @@
-"""Candidates of a model comparison: laws that start themselves from measured points, and laws of partial pooling."""
+"""Candidates of a model comparison, and the evaluation of their forces at slack rows."""
 
 from __future__ import annotations
 
 import dataclasses
 import inspect
 from collections.abc import Sequence
+from typing import Any
 
-from ...core.errors import IdentificationError
+import numpy as np
+import numpy.typing as npt
+
+from ...core.arrays import Array
+from ...core.errors import HintedText, IdentificationError, SolveError
 from ...core.short_repr import ShortRepr
 from ...physics.muscle import characteristic
 from ...physics.muscle.characteristic import Characteristic, ContractileSurface, LogarithmicLength, PooledLengthLaw
+from ...physics.muscle.characteristic.base import ContractionLaw, ForceLaw
 from ...physics.muscle.characteristic.data_scales import DataScales
 from ...recording import Recording
+
+FORCE_GRID_POINTS = 801
+"""Grid points between zero and the maximum force; the law is interpolated linearly between them."""
+
+COARSE_STEP = 20
+"""Every 20th point is evaluated first; a row whose deficit does not rise along these is evaluated at every point."""
+
+
+def evaluate_force(law: Any, pressure: Array, contraction: Array, max_force: float) -> Array:
+    """Forces [N] at N points, shape (N,), defined at every point so that all laws are compared on the same rows.
+
+    `max_force` [N] limits the force of laws that give contraction or pressure. Where such a law needs a higher
+    pressure at zero load than is applied, the muscle is slack and the force is 0.
+    """
+    with np.errstate(all="ignore"):
+        if isinstance(law, ForceLaw):
+            force = np.asarray(law.force(pressure, contraction), dtype=float) + np.zeros(pressure.size)
+        else:
+            force = _invert_on_grid(law, pressure, contraction, max_force)
+    return np.asarray(np.nan_to_num(force, nan=0.0, posinf=max_force, neginf=-max_force))
+
+
+def slack_rows(law: Any, pressure: Array, contraction: Array) -> npt.NDArray[np.bool_]:
+    """Mask (N,) of the points at which a law that is solved for the force is slack: it has no root, even at zero load.
+
+    Always False for force laws. Raises IdentificationError where the law gives no force at a point without being slack.
+    """
+    nowhere = np.zeros(pressure.size, dtype=bool)
+    if isinstance(law, ForceLaw) or _solve_error(law, pressure, contraction) is None:
+        return nowhere
+    slack = np.asarray(_deficit(law, pressure, contraction, np.zeros(pressure.size)) > 0)
+    error = _solve_error(law, pressure[~slack], contraction[~slack])
+    if error is not None:
+        raise IdentificationError(
+            HintedText("It gives no force at a measured point. ", error.message),
+            cause="it gives no force at a measured point",
+        )
+    return slack
+
+
+def _solve_error(law: Any, pressure: Array, contraction: Array) -> SolveError | None:
+    try:
+        law.force(pressure, contraction)
+    except SolveError as error:
+        return error
+    return None
+
+
+def _deficit(law: Any, pressure: Array, contraction: Array, force: Array) -> Array:
+    """Negative where the muscle pulls more than the force: the contraction or the pressure that it lacks."""
+    if isinstance(law, ContractionLaw):
+        return np.asarray(contraction - law.contraction(pressure, force))
+    return np.asarray(law.pressure(contraction, force) - pressure)
+
+
+def _invert_on_grid(law: Any, pressure: Array, contraction: Array, max_force: float) -> Array:
+    """Forces at which the deficit first changes its sign: on a coarse grid, then on the fine grid in that interval."""
+    forces = np.linspace(0.0, max_force, FORCE_GRID_POINTS)
+    coarse = _deficit(law, pressure[:, None], contraction[:, None], forces[::COARSE_STEP])
+    rising = np.asarray((np.diff(coarse, axis=1) >= 0).all(axis=1))
+    interval = np.minimum(np.maximum((coarse < 0).sum(axis=1) - 1, 0), coarse.shape[1] - 2)
+    index = interval[:, None] * COARSE_STEP + np.arange(COARSE_STEP + 1)
+    result = np.zeros(pressure.size)
+    every = np.broadcast_to(np.arange(FORCE_GRID_POINTS), (int(np.count_nonzero(~rising)), FORCE_GRID_POINTS))
+    for rows, grid in ((rising, index[rising]), (~rising, every)):
+        result[rows] = _first_crossing(law, pressure[rows], contraction[rows], forces[grid])
+    return result
+
+
+def _first_crossing(law: Any, pressure: Array, contraction: Array, forces: Array) -> Array:
+    """The first force of each row of a grid (N, M) at which the deficit is not negative, by linear interpolation; the
+    first force of the row where it is not negative there, the last one where it is negative everywhere."""
+    deficit = _deficit(law, pressure[:, None], contraction[:, None], forces)
+    crossed = np.asarray(deficit >= 0)
+    crosses, rows = crossed.any(axis=1), np.arange(pressure.size)
+    first = np.where(crosses, crossed.argmax(axis=1), forces.shape[1] - 1)
+    previous = np.maximum(first - 1, 0)
+    high, low = deficit[rows, first], deficit[rows, previous]
+    with np.errstate(all="ignore"):
+        fraction = np.where((first > 0) & crosses, -low / (high - low), 1.0)
+    start = forces[rows, previous]
+    return np.asarray(start + fraction * (forces[rows, first] - start))
+
 
 MIN_POOLED = 3
 """Minimum number of specimens for partial pooling (chosen): the term in ln L0 takes up the difference of two."""

@@ -16,10 +16,9 @@ from ...core.errors import AirmuscleError, HintedText, IdentificationError
 from ...physics.muscle.characteristic import PooledLengthLaw
 from ...physics.muscle.characteristic.base import Characteristic
 from ...recording import Recording
-from .candidates import Candidate
+from .candidates import Candidate, evaluate_force, slack_rows
 from .cross_validation import Labels, specimen_name
 from .fit_points import FitPoints
-from .force_evaluation import evaluate_force, slack_rows
 from .group_refits import GroupRefits
 from .pooling import Pooling, make_pooling
 from .problem import FitProblem

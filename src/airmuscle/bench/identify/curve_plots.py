@@ -14,8 +14,8 @@ from ...core.errors import IdentificationError
 from ...recording import Recording
 from ...report.chapter import Plot
 from . import Band, Fit, confidence_band
-from .force_evaluation import evaluate_force
-from .levels import LEVEL_TOLERANCE, MAX_LEVEL_WIDTH, held_levels, is_pressure_ramp, levels_of
+from .candidates import evaluate_force
+from .cross_validation import LEVEL_TOLERANCE, MAX_LEVEL_WIDTH, held_levels, is_pressure_ramp, levels_of
 
 MAX_PANELS, MAX_RAMPS = 4, 6
 """Maximum numbers of resting lengths, and of contractions for each of them; evenly selected if there are more."""

@@ -16,7 +16,7 @@ from ...recording import Recording
 from ...report.chapter import NamedValue
 from ..checks import find_suspicious, without_missing_codes
 from ..segment import Outlier, estimate_sensors, find_outliers
-from ..segment.remembered import remembered
+from ..segment.interval import remembered
 from ..segment.sensor import estimate_noise
 from .branch_residuals import SensorDelay, delay_notes, find_delay
 from .contradictions import contradiction_notes, repeatability

@@ -10,10 +10,14 @@ import numpy as np
 from ...core.arrays import Array
 from ...core.errors import Hint, IdentificationError
 from ...core.tree import Leaf
-from .censored_least_squares import is_determined_without_censored, solve_censored_least_squares
 from .gauss_newton import gauss_newton
 from .problem import FitProblem
-from .variable_projection import find_initial_values, is_linear_parameter
+from .variable_projection import (
+    find_initial_values,
+    is_determined_without_censored,
+    is_linear_parameter,
+    solve_censored_least_squares,
+)
 from .weighting import LeastSquares, Loss
 
 SEARCH_STAGES = (("trf", 100), ("dogbox", 500), ("trf", 500))

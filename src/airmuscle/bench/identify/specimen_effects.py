@@ -18,9 +18,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.arrays import Array
-from .censored_least_squares import shortened_step
 from .parameter_covariance import NORMAL_QUANTILE
 from .pooled_covariance import PooledCovariance, Sums
+from .variable_projection import shortened_step
 
 _MAX_ITERATIONS = 100
 """Maximum number of Newton steps; the iteration is finite and took fewer than 10 in all tests."""

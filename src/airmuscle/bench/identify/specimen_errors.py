@@ -15,7 +15,7 @@ from .candidate_scores import FoldScore, RankedModel
 from .candidates import Candidate
 from .compared_points import ComparedPoints
 from .cross_validation import SpecimenSplit, label_folds, specimen_name
-from .left_out import MIN_MEMBERS, specimen_deviation, t_quantile
+from .group_refits import MIN_MEMBERS, specimen_deviation, t_quantile
 from .model_selection import Comparison
 from .result import Fit
 

@@ -14,11 +14,11 @@ from ...core.errors import Hint, IdentificationError
 from ...physics.muscle.characteristic import ContractileSurface
 from ...recording import Recording
 from ..segment.runs import RELATIVE_BAND
-from .censored_least_squares import RANK_TOLERANCE, uncensored_rank
 from .identifiability import singular_vectors
 from .parameter_covariance import ParameterCovariance, Runs, estimate_covariance
 from .problem import FitProblem
 from .solver import LeastSquaresSolution
+from .variable_projection import RANK_TOLERANCE, uncensored_rank
 from .weighting import Loss
 
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from ...core.arrays import Array
 from ...core.errors import ColumnError, FileError, suggestion
-from ..readers.optional_dependency import import_lab_package, run_reader
 from ..readers.raw_csv import read_csv_table
+from ..readers.separate_process import import_lab_package, run_reader
 from .episode_mapping import Channels, EpisodeMapping, read_episode_mapping
 from .episodes import Episode, Episodes, join, speed_of
 

@@ -16,11 +16,11 @@ from ...core.errors import ColumnError, FileError, ParameterError
 from ...core.units import AMBIENT_PRESSURE, UnitConversion
 from ...recording.displacement import displacement_columns
 from ...recording.heading import find_quantity_name
+from .channels import RawTable
 from .header import is_number
 from .interpret import interpret, resolve_headings, unit_conversion
 from .mapping import ColumnMapping
 from .plausibility import CONTRACTION_RANGE, MAX_MAGNITUDE
-from .table import RawTable
 from .text_format import TextFormat, TextHeader, has_content, is_comment, parse_header, split_cells
 
 MAX_UNREADABLE = 100

@@ -18,14 +18,11 @@ from ...recording.columns import QUANTITIES
 from ...recording.displacement import displacement_columns, proposal
 from ...recording.heading import UNIT_SPELLINGS, Heading, find_quantity_name, parse_heading
 from ...recording.recording import Recording
-from .clock import seconds_from_clock
-from .constants import check_constants, collect_constants, constant_from_column, parse_constant_name
+from .channels import Cells, RawTable
+from .constants import check_constants, collect_constants, constant_from_column, label_texts, parse_constant_name
 from .mapping import ColumnMapping
-from .plausibility import check_plausible
-from .repeated_columns import check_unique, check_width, without_repeated_columns
-from .specimens import label_texts
-from .table import Cells, RawTable
-from .time_base import TimeBase
+from .plausibility import check_plausible, check_unique, check_width, without_repeated_columns
+from .time_base import TimeBase, seconds_from_clock
 
 MAX_LABELS = 8
 """Maximum number of different texts of a column that is kept (chosen), such as the names of specimens."""

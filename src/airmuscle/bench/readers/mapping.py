@@ -36,13 +36,11 @@ from ...core.annotation import abridged, check_field_types
 from ...core.errors import AirmuscleError, ColumnError, ParameterError, listed, suggestion
 from ...recording.columns import QUANTITIES
 from ...recording.heading import parse_heading
-from .constants import parse_constant_name
+from .channels import RawTable
+from .constants import SPECIMEN, parse_constant_name
 from .file_kind import read_toml
-from .file_name import FileNamePattern
-from .header import bare_heading
+from .header import FileNamePattern, bare_heading
 from .missing_values import MISSING_VALUES, MissingValues, RefuseMissing, parse_code
-from .specimens import SPECIMEN
-from .table import RawTable
 from .text_format import TextFormat
 from .time_base import TIME_BASES, RecordedTime, TimeBase
 

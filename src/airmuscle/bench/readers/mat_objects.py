@@ -15,7 +15,7 @@ from typing import IO, Any, NamedTuple
 import numpy as np
 
 from ...core.arrays import Array
-from .optional_dependency import import_lab_package, is_installed
+from .separate_process import import_lab_package, is_installed
 
 READABLE = ("table", "timetable")
 """Classes whose objects can be read."""

@@ -11,12 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core.errors import FileError, suggestion
-from .channels import Channel, merge_channels
-from .downsampling import Decimation, Downsampling
-from .optional_dependency import import_lab_package, run_reader
-from .pieces import Reduction, check_reduced_lengths, read_reduced, with_reduction
-from .separate_process import read_in_separate_process
-from .table import RawTable
+from .channels import Channel, RawTable, merge_channels
+from .downsampling import Decimation, Downsampling, Reduction, check_reduced_lengths, read_reduced, with_reduction
+from .separate_process import import_lab_package, read_in_separate_process, run_reader
 
 
 class StoredTable(NamedTuple):

@@ -15,15 +15,12 @@ import numpy as np
 
 from ...core.errors import ColumnError, FileError, Hint, suggestion
 from ...recording.heading import parse_heading
-from .channels import Channel, merge_channels
-from .downsampling import Decimation, Downsampling
+from .channels import Channel, RawTable, merge_channels
+from .downsampling import Decimation, Downsampling, Reduction, with_reduction
 from .mat_contents import is_plain_hdf5, read_contents
 from .mat_objects import READABLE, MatlabObject, find_objects, read_objects
-from .optional_dependency import run_reader
-from .pieces import Reduction, with_reduction
 from .raw_columnar import read_hdf5_tables
-from .separate_process import read_in_separate_process
-from .table import RawTable
+from .separate_process import read_in_separate_process, run_reader
 
 
 def read_mat_tables(

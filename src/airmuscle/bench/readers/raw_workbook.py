@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...core.errors import ColumnError, FileError, listed, suggestion
-from .clock import seconds_from_clock
+from .channels import Cells, RawTable
 from .header import (
     COMMA_NUMBER,
     POINT_NUMBER,
@@ -21,10 +21,9 @@ from .header import (
     parse_unit_row,
     stated_heading_row,
 )
-from .optional_dependency import import_lab_package, run_reader
-from .separate_process import read_in_separate_process
-from .table import Cells, RawTable
+from .separate_process import import_lab_package, read_in_separate_process, run_reader
 from .text_format import TextFormat
+from .time_base import seconds_from_clock
 
 _NUMBERS = float | int | datetime.date | datetime.time | datetime.timedelta
 Rows = list[tuple[int, list[Any]]]

@@ -13,21 +13,19 @@ from ...core.errors import FileError, ParameterError, printable
 from ...recording.recording import Recording
 from ..checks import warn_of_suspicious_values
 from ..segment.outliers import without_outliers
+from .channels import RawTable
+from .constants import split_specimens
 from .downsampling import Decimation, Downsampling, downsample
 from .file_kind import check_text_file
 from .interpret import interpret
-from .large_csv import Progress, is_large_file, read_large_csv, read_text_stream
 from .mapping import ColumnMapping, apply_mapping, read_mapping
+from .plausibility import check_unit_consistency
 from .raw_columnar import read_hdf5_tables, read_parquet_tables
-from .raw_csv import read_csv_table
+from .raw_csv import Progress, is_large_file, read_csv_table, read_large_csv, read_text_stream
 from .raw_mat import read_mat_tables
-from .raw_mdf import read_mdf_tables
+from .raw_mdf import read_mdf_tables, read_tdms_tables
 from .raw_rosbag import read_rosbag_tables
-from .raw_tdms import read_tdms_tables
 from .raw_workbook import read_workbook_tables
-from .specimens import split_specimens
-from .table import RawTable
-from .unit_consistency import check_unit_consistency
 
 Source = str | Path | Iterable[str | Path]
 Tables = tuple[RawTable, ...]

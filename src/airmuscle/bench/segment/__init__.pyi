@@ -15,10 +15,10 @@ from .outliers import find_outliers as find_outliers
 from .outliers import without_outliers as without_outliers
 from .plateaus import Plateau as Plateau
 from .plateaus import find_plateaus as find_plateaus
+from .plateaus import maximum_rate as maximum_rate
 from .plateaus import plateau_points as plateau_points
-from .quasi_static import maximum_rate as maximum_rate
-from .quasi_static import quasi_static_rows as quasi_static_rows
-from .quasi_static import rate_of_change as rate_of_change
+from .plateaus import quasi_static_rows as quasi_static_rows
+from .plateaus import rate_of_change as rate_of_change
 from .runs import AT_REST as AT_REST
 from .runs import FREE as FREE
 from .runs import ISOBARIC as ISOBARIC
@@ -26,9 +26,9 @@ from .runs import ISOMETRIC as ISOMETRIC
 from .runs import ISOTONIC as ISOTONIC
 from .runs import Run as Run
 from .runs import find_runs as find_runs
-from .sampling import Sampling as Sampling
-from .sampling import analyse_sampling as analyse_sampling
+from .sensor import Sampling as Sampling
 from .sensor import Sensor as Sensor
+from .sensor import analyse_sampling as analyse_sampling
 from .sensor import estimate_noise as estimate_noise
 from .sensor import estimate_resolution as estimate_resolution
 from .sensor import estimate_sensors as estimate_sensors

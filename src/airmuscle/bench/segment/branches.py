@@ -18,11 +18,9 @@ import numpy as np
 
 from ...core.arrays import Array
 from ...recording.recording import Recording
-from .interval import Interval, running_median
-from .remembered import remembered
+from .interval import Interval, remembered, running_median
 from .runs import AT_REST, ISOBARIC, ISOMETRIC, ISOTONIC, Run, find_runs, moved_column
-from .sampling import count_rows
-from .sensor import Sensor, estimate_noise
+from .sensor import Sensor, count_rows, estimate_noise
 
 REVERSAL_FRACTION = 0.05
 """Fraction of the range by which the pressure must move back for a reversal (chosen)."""

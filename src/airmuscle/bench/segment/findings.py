@@ -12,10 +12,9 @@ from ...recording.columns import quantity_of
 from ...recording.displacement import ZERO_NOT_STATED
 from ...recording.recording import Recording
 from ..readers.time_base import UNIFORM, WITHOUT_TIME
-from .quasi_static import quasi_static_rows
+from .plateaus import quasi_static_rows
 from .runs import AT_REST, FREE, KINDS, Run, moved_column
-from .sampling import Sampling
-from .sensor import Sensor
+from .sensor import Sampling, Sensor
 from .static_points import find_static_points
 
 MAX_SATURATED_FRACTION = 0.5

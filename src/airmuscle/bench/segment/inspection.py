@@ -16,11 +16,9 @@ from ...recording.recording import Recording
 from .branches import Branch, branch_column_agreement, find_branches
 from .findings import Finding, check_swept, collect_findings
 from .outliers import Outlier, find_outliers
-from .plateaus import Plateau, find_plateaus
-from .quasi_static import quasi_static_rows
+from .plateaus import Plateau, find_plateaus, quasi_static_rows
 from .runs import AT_REST, Run, find_runs
-from .sampling import Sampling, analyse_sampling
-from .sensor import Sensor, estimate_sensors
+from .sensor import Sampling, Sensor, analyse_sampling, estimate_sensors
 from .static_points import StaticPoints, find_static_points
 
 

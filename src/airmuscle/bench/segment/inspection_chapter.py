@@ -17,7 +17,7 @@ from ..readers.constants import CONSTANT_QUANTITIES
 from ..reported import unit_column
 from .inspection import Inspection
 from .runs import Run
-from .sampling import Sampling
+from .sensor import Sampling
 
 MAX_FILES, MAX_RUNS, MAX_LISTED = 12, 8, 4
 """Rows of the brief view: files, runs of a file, and branches or outliers (chosen)."""

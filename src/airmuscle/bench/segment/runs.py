@@ -19,8 +19,7 @@ import numpy as np
 from ...core.arrays import Array
 from ...recording.displacement import MOVED
 from ...recording.recording import Recording
-from .interval import Interval, level_intervals
-from .remembered import remembered
+from .interval import Interval, level_intervals, remembered
 from .sensor import Sensor, estimate_sensors
 from .static_points import StaticPoints, find_static_points
 

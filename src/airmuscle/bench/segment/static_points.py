@@ -10,7 +10,7 @@ import numpy.typing as npt
 from ...core.arrays import Array
 from ...recording.displacement import MOVED
 from ...recording.recording import Recording
-from .remembered import remembered
+from .interval import remembered
 
 LEVEL_WIDTHS = (0.02, 0.01, 0.005, 0.002)
 """Maximum widths of a level, as fractions of the range of the quantity, the first that separates levels (chosen)."""

@@ -11,7 +11,7 @@ import numpy as np
 from ...bench.identify import Fit
 from ...bench.identify.campaign import Campaign, CreepStage, ReleaseStage, StaticStage
 from ...bench.identify.candidate_scores import RankedModel
-from ...bench.identify.left_out import LEVEL
+from ...bench.identify.group_refits import LEVEL
 from ...bench.identify.specimen_errors import SpecimenErrors, ranked_specimen_errors, resting_lengths_of, specimens_of
 from ...bench.segment import maximum_rate
 from ...core.errors import IdentificationError, printable

@@ -22,7 +22,7 @@ import numpy as np
 
 from ...bench.identify.dynamic import DynamicFit
 from ...bench.identify.dynamic.fit import OF_RECORD
-from ...bench.identify.left_out import LEVEL, degrees_of_freedom, root_mean_square, t_quantile
+from ...bench.identify.group_refits import LEVEL, degrees_of_freedom, root_mean_square, t_quantile
 from ...bench.identify.prediction import PlantUncertainty
 from ...bench.identify.prediction.dynamic import NORMAL_QUANTILE
 from ...bench.segment import maximum_rate

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 
-from ...bench.identify.volume_chapter import volume_chapter, volume_summary
+from ...bench.identify.static_fit_chapter import volume_chapter, volume_summary
 from ...bench.identify.volume_fit import VolumeFit, fit_volume, volume_points
 from ...core.atomic_output import check_writable
 from ...core.errors import ParameterError, PhysicsError

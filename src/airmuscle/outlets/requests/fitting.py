@@ -20,14 +20,12 @@ from ...bench.identify import (
     standard_candidates,
     weakly_determined,
 )
-from ...bench.identify.compare_chapter import compare_chapters
-from ...bench.identify.law_selection import LawSelection, select_law
+from ...bench.identify.compare_chapter import LawSelection, compare_chapters, select_law
 from ...bench.identify.problem import fitted_quantity_of
-from ...bench.identify.shape_chapter import shape_chapter
 from ...bench.identify.specimen_errors import odd_specimen_notes, ranked_specimen_errors, specimen_errors
 from ...bench.identify.static_fit_chapter import fit_chapter
 from ...bench.identify.surface.shape import fit_shape_constrained, shape_violations_of_fit
-from ...bench.identify.uncertainty_chapter import Uncertainty, length_error_chapter, uncertainty_chapter
+from ...bench.identify.uncertainty_chapter import Uncertainty, length_error_chapter, shape_chapter, uncertainty_chapter
 from ...core.errors import ParameterError
 from ...engine.processes import Workers
 from ...files.library.entry import Entry

@@ -10,12 +10,11 @@ from pathlib import Path
 
 import airmuscle as am
 
-from ...bench.readers.constants import parse_constant_name
+from ...bench.readers.channels import RawTable
+from ...bench.readers.constants import parse_constant_name, split_specimens
 from ...bench.readers.interpret import interpret, resolve_headings, unit_conversion
 from ...bench.readers.mapping import apply_mapping
 from ...bench.readers.reader import check_bench, read_tables
-from ...bench.readers.specimens import split_specimens
-from ...bench.readers.table import RawTable
 from ...bench.segment import check_contents
 from ...bench.segment.outliers import Outlier, find_bench_outliers
 from ...core.errors import AirmuscleError, AirmuscleWarning, ColumnError

@@ -7,8 +7,8 @@ from typing import Any
 
 import airmuscle as am
 
+from ...bench.identify.compare_chapter import LawSelection
 from ...bench.identify.curve_plots import band_curves
-from ...bench.identify.law_selection import LawSelection
 from ...bench.identify.static_fit_chapter import equation_section
 from ...report.chapter import Chapter
 from ...report.data import as_sheet, in_words

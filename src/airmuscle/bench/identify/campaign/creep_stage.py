@@ -15,8 +15,7 @@ from ....recording import Recording
 from ..hysteresis import fit_creep
 from ..hysteresis.creep import MIN_RATIO, CreepFit
 from .record import CampaignRecord
-from .rows import LeftOutStage, displacement, thin
-from .transient import find_motion
+from .transient import LeftOutStage, displacement, find_motion, thin
 
 NAME = "creep"
 FIT_ROWS = 400

@@ -26,7 +26,7 @@ from ..dynamic import (
 )
 from ..result import Estimate
 from .record import CampaignRecord
-from .rows import thin
+from .transient import thin
 
 FILL, DISCHARGE = "circuit.fill", "circuit.discharge"
 SUPPLY = "circuit.supply"

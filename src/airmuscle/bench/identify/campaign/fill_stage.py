@@ -35,7 +35,7 @@ from .fill_records import (
     with_supply_volume,
 )
 from .record import CampaignRecord
-from .rows import LeftOutStage
+from .transient import LeftOutStage
 from .volume import VolumeChange, VolumeEstimate, relate_volumes
 
 Fitted = Callable[[Sequence[Experiment], ValveUnknowns], DynamicFit]

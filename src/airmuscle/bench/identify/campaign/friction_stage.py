@@ -17,7 +17,7 @@ from ....physics.muscle import CreepElements
 from ....physics.muscle.friction import Friction, NoFriction
 from ....recording import Recording
 from ...segment.sensor import estimate_noise
-from ..force_evaluation import evaluate_force
+from ..candidates import evaluate_force
 from ..hysteresis import (
     HysteresisLoop,
     JointFit,
@@ -30,7 +30,7 @@ from ..hysteresis import (
 )
 from .creep_stage import creep_force
 from .record import CampaignRecord, RecordKind
-from .rows import PREDICTED_ROWS, LeftOutStage, displacement, held_steady, path_rows, with_force
+from .transient import PREDICTED_ROWS, LeftOutStage, displacement, held_steady, path_rows, with_force
 
 NAME = "hysteresis"
 MAX_LOOPS = 6

@@ -16,7 +16,7 @@ from ....recording import Recording
 from ...segment.runs import CONTRACTION_BAND
 from ..hysteresis import Hold, creep_elements, find_holds, fit_creep
 from .creep_stage import CreepStage, HeldRows, creep_force, fit_held_rows
-from .rows import LeftOutStage, with_force
+from .transient import LeftOutStage, with_force
 
 MAX_MOTION = 0.3
 """Maximum duration of the motion before a hold under a load, by its shortest time constant (chosen)."""

@@ -18,8 +18,7 @@ from ....physics.pneumatics import ClosedChamber
 from ....physics.pneumatics.gas import Polytropic
 from ..dynamic import DynamicFit, Experiment, InitialConditions, StartTime, fit_dynamic, stated_ambient
 from .record import CampaignRecord
-from .rows import LeftOutStage, displacement, thin
-from .transient import find_motion
+from .transient import LeftOutStage, displacement, find_motion, thin
 
 NAME = "release"
 FIT_ROWS = 300

@@ -20,8 +20,7 @@ from ....engine.run.bound_integrator import BoundIntegrator
 from ....engine.run.integrators import Integrator
 from ....engine.run.with_sensitivities import WithSensitivities
 from .experiment import CommandInstant, Experiment, InitialValue, StartTime, Unknown, with_command_instants
-from .initial_conditions import compile_conditions, solve_initial_state
-from .time_grid import TimeGrid, make_time_grid
+from .initial_conditions import TimeGrid, compile_conditions, make_time_grid, solve_initial_state
 
 MAX_STEPS = 1_000_000
 """Maximum number of steps of one simulation."""

@@ -1,6 +1,3 @@
-from .agreement import RunAgreement as RunAgreement
-from .agreement import agreement_of_run as agreement_of_run
-from .agreement import force_amplitude as force_amplitude
 from .creep import Creep as Creep
 from .creep import CreepFit as CreepFit
 from .creep import Hold as Hold
@@ -19,6 +16,9 @@ from .joint import fit_jointly as fit_jointly
 from .joint import identified_friction as identified_friction
 from .joint import loops_not_joined as loops_not_joined
 from .joint_result import JointFit as JointFit
+from .joint_result import RunAgreement as RunAgreement
+from .joint_result import agreement_of_run as agreement_of_run
+from .joint_result import force_amplitude as force_amplitude
 from .joint_result import preferred_fit as preferred_fit
 from .limits import Axis as Axis
 from .limits import DataLimits as DataLimits
@@ -28,9 +28,9 @@ from .loops import HysteresisLoop as HysteresisLoop
 from .loops import LoopFit as LoopFit
 from .loops import find_loops as find_loops
 from .loops import fit_loop as fit_loop
-from .plot import loop_path as loop_path
-from .plot import plot_loops as plot_loops
 from .result import HysteresisFit as HysteresisFit
+from .result import loop_path as loop_path
+from .result import plot_loops as plot_loops
+from .search import branch_gap as branch_gap
+from .search import repeat_difference as repeat_difference
 from .search import search_parameters as search_parameters
-from .series import branch_gap as branch_gap
-from .series import repeat_difference as repeat_difference

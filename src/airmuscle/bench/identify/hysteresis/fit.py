@@ -20,8 +20,7 @@ from ....recording import Recording
 from ...segment import motion_direction
 from .limits import MILLIMETRES, Axis, data_limits, resolved_stiffness
 from .result import HysteresisFit, assess_fit
-from .search import free_parameters, search_parameters
-from .series import LoopSeries
+from .search import LoopSeries, free_parameters, search_parameters
 
 RowMask = npt.NDArray[np.bool_]
 

@@ -16,7 +16,7 @@ from ....report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableCo
 from ....report.formatting import P_VALUE
 from ...segment import motion_direction
 from . import HysteresisFit, HysteresisLoop, JointFit, LoopFit, loops_not_joined, preferred_fit
-from .plot import plot_loops
+from .result import plot_loops
 
 SEPARATE_LOOPS = 2
 """Maximum number of loops of which the brief view has the laws of each; of more it has one row each (chosen)."""

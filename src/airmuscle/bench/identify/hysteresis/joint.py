@@ -15,14 +15,12 @@ from ....physics.muscle.friction import Friction, IdentifiedFriction, PressureSc
 from ...segment.runs import RELATIVE_BAND
 from ..identifiability import UndeterminedCombination
 from ..model_evidence import aicc, effective_sample_size, f_test_p_value
-from .agreement import agreement_of_run, force_amplitude
 from .fit import make_loop_series
-from .joint_result import JointFit, preferred_fit
+from .joint_result import JointFit, agreement_of_run, force_amplitude, preferred_fit
 from .limits import combine_limits
 from .loops import LoopFit
 from .result import SIGNIFICANCE_LEVEL, HysteresisFit
-from .search import free_parameters, search_parameters
-from .series import LoopSeries
+from .search import LoopSeries, free_parameters, search_parameters
 
 MIN_PRESSURE_RATIO = 1.2
 """Minimum ratio of the highest to the lowest pressure of the runs for a fitted dependence on pressure (chosen)."""

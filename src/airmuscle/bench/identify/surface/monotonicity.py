@@ -25,7 +25,7 @@ from ....core.arrays import Array
 from ....core.errors import IdentificationError
 from ....physics.muscle.characteristic.base import ContractionLaw
 from ....recording import Recording
-from ..censored_least_squares import shortened_step
+from ..variable_projection import shortened_step
 from .basis import LoadRange
 from .exponential import SurfaceFit, SurfaceProblem
 
