@@ -11,7 +11,7 @@ import sys
 def main() -> None:
     """Run the command line and exit with its exit code; an interruption exits with 130 (128 + SIGINT)."""
     try:
-        importlib.import_module("airmuscle.outlets.cli.interruption").main()
+        importlib.import_module("airmuscle.outlets.cli.entry_point").main()
     except KeyboardInterrupt:
         sys.stderr.write("interrupted\n")
         raise SystemExit(130) from None

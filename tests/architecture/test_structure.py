@@ -237,7 +237,7 @@ def test_modules_are_imported_by_name_in_few_files_only():
         "core/stubs.py",  # names of the faces that are imported on use
         "__main__.py",  # the command line, within the handling of an interruption
         "outlets/cli/commands.py",  # the module of a command
-        "outlets/cli/interruption.py",  # the command line, after SIGINT is handled
+        "outlets/cli/entry_point.py",  # the command line, after SIGINT is handled
         "engine/compile/cache/kernel.py",  # kernels that are not in the cache
         "files/library/models.py",  # models named in TOML files
         "bench/readers/separate_process.py",  # readers of laboratory formats, and those in native code

@@ -7,7 +7,7 @@ import os
 import pytest
 
 from airmuscle.engine import processes
-from airmuscle.outlets.cli import interruption
+from airmuscle.outlets.cli import entry_point
 
 
 @pytest.mark.parametrize(("given", "threads"), [(None, "1"), ("4", "4")])
@@ -24,12 +24,12 @@ def test_linear_algebra_uses_one_thread_unless_the_user_says_otherwise(
         seen.append(os.environ["OPENBLAS_NUM_THREADS"])
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(interruption.importlib, "import_module", interrupted)
+    monkeypatch.setattr(entry_point.importlib, "import_module", interrupted)
     with pytest.raises(SystemExit, match="130"):
-        interruption.main()
+        entry_point.main()
     assert seen == [threads]
 
 
 def test_the_command_and_its_workers_limit_the_same_libraries():
     """The names stand twice, because the command line sets them before it imports anything that loads NumPy."""
-    assert interruption._BLAS_THREADS == processes._BLAS_THREADS
+    assert entry_point._BLAS_THREADS == processes._BLAS_THREADS
