@@ -42,8 +42,8 @@ from ..library.files import is_path, list_plants, read_toml
 from ..library.location import Location, check_keys, located_errors
 from ..library.plant_file import plant_tables
 from ..library.scaling import scale_to_length
+from .identification import Record, build_records, with_observed
 from .initial_state import first_value, pressure_names, recorded_pressures
-from .record import Record, build_records, with_observed
 from .scenario import TABLES, Scenario, build_scenario
 from .values import FitTable, optional_table, read_observed, table_reader
 

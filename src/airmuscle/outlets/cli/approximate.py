@@ -14,7 +14,7 @@ from ...bench.identify.approximation import GRID_POINTS, sample_on_grid
 from ...core.errors import ParameterError
 from ...files.library.entry import Entry
 from ...files.library.entry_file import load_law
-from ...files.library.initial_law import find_initial_law
+from ...files.library.fitted_entry import find_initial_law
 from ...files.library.write import save
 from ...physics.muscle.characteristic import ValidityRange
 from ...physics.muscle.characteristic.validity_range import validity_range_of

@@ -27,8 +27,7 @@ from ...core.errors import AirmuscleError, ColumnError, FileError, Identificatio
 from ...core.fingerprint import fingerprint, program_fingerprint
 from ...engine.compile.cache.store import cache_folder, read_private
 from ...files.library.entry import Entry
-from ...files.library.fitted_entry import campaign_entry
-from ...files.library.initial_law import resting_lengths
+from ...files.library.fitted_entry import campaign_entry, resting_lengths
 from ...files.library.write import to_toml
 from ...files.scenario.campaign import RecordScenario, campaign_scenarios
 from ...physics.muscle.geometry import Geometry

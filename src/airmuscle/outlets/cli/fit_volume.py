@@ -12,8 +12,7 @@ from ...core.atomic_output import check_writable
 from ...core.errors import ParameterError, PhysicsError
 from ...files.library.entry import Entry
 from ...files.library.entry_file import load_law
-from ...files.library.fitted_entry import list_files
-from ...files.library.initial_law import resting_lengths
+from ...files.library.fitted_entry import list_files, resting_lengths
 from ...files.library.write import part_toml, to_toml
 from ...physics.muscle.characteristic import ValidityRange
 from ...physics.muscle.characteristic.energy_defect import EnergyDefect, maxwell_defect

@@ -10,7 +10,7 @@ from ...core import tree
 from ...core.errors import ParameterError
 from ...core.units import quantity
 from ...files.library.entry import Entry
-from ...files.library.initial_law import resting_lengths
+from ...files.library.fitted_entry import resting_lengths
 from ...physics.muscle.geometry import Braid, Geometry
 from ...recording import Recording
 from .declaration import RequestError, Where, option, request

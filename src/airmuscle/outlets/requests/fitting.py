@@ -29,8 +29,14 @@ from ...bench.identify.uncertainty_chapter import Uncertainty, length_error_chap
 from ...core.errors import ParameterError
 from ...engine.processes import Workers
 from ...files.library.entry import Entry
-from ...files.library.fitted_entry import fitted_entry, left_out_ratio, missing_geometry
-from ...files.library.initial_law import InitialLaw, find_initial_law, resting_lengths
+from ...files.library.fitted_entry import (
+    InitialLaw,
+    find_initial_law,
+    fitted_entry,
+    left_out_ratio,
+    missing_geometry,
+    resting_lengths,
+)
 from ...physics.muscle.characteristic import ContractileSurface
 from ...physics.muscle.geometry import Geometry
 from ...recording import Recording

@@ -15,11 +15,12 @@ from .joint_laws import statics_within_valves as statics_within_valves
 from .joint_sheet import joint_names as joint_names
 from .joint_sheet import joint_tables as joint_tables
 from .joint_sheet import sheet_of_joint as sheet_of_joint
+from .law_sheet import fill_template as fill_template
 from .page import export_page as export_page
 from .page import self_contained_page as self_contained_page
 from .plant_sheet import sheet_of_tables as sheet_of_tables
-from .requests import BadRequest as BadRequest
 from .security import Access as Access
+from .security import BadRequest as BadRequest
 from .security import is_loopback as is_loopback
 from .server import access_of as access_of
 from .server import bound_socket as bound_socket
@@ -31,7 +32,6 @@ from .tasks import MAX_TEXT as MAX_TEXT
 from .tasks import read_text_tables as read_text_tables
 from .tasks import sheet_of_any as sheet_of_any
 from .tasks import sheet_of_scenario_text as sheet_of_scenario_text
-from .toml_template import fill_template as fill_template
 from .worker import LimitedWorker as LimitedWorker
 from .worker import LimitError as LimitError
 from .worker import WorkerPool as WorkerPool

@@ -22,8 +22,17 @@ from ..requests.reading import ReadingRequest
 from .fit_routes import FitService
 from .joint_sheet import joint_names, sheet_of_joint
 from .page import MAX_PAGE_SHEETS, self_contained_page, server_page, web_files
-from .requests import BadRequest, decoded, json_answer, limited_body
-from .security import Access, Application, cookie_name, given_token, secured
+from .security import (
+    Access,
+    Application,
+    BadRequest,
+    cookie_name,
+    decoded,
+    given_token,
+    json_answer,
+    limited_body,
+    secured,
+)
 from .size_sheet import size_form, size_sheet
 from .tasks import (
     MAX_TEXT,

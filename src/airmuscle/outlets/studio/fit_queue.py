@@ -16,7 +16,7 @@ from typing import Any
 
 from ...core.errors import AirmuscleError
 from ..requests.declaration import RequestError
-from .requests import BadRequest
+from .security import BadRequest
 from .worker import LimitedWorker, LimitError
 
 FIT_WORKERS = 2

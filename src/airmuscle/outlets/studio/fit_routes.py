@@ -19,7 +19,7 @@ from .fit_settings import FitSettings, read_settings
 from .fit_sheet import sheet_of_files
 from .fit_task import DOWNLOADS, RESULT, run_fit
 from .fit_uploads import UploadStore, check_file_name
-from .requests import BadRequest, decoded, json_answer, limited_body
+from .security import BadRequest, decoded, json_answer, limited_body
 
 MAX_SETTINGS = 256 * 1024
 """Largest size of the settings [bytes] (chosen)."""

@@ -23,8 +23,7 @@ from ...bench.identify.hysteresis.joint import select_friction
 from ...bench.segment import check_contents, motion_direction
 from ...core.atomic_output import atomic_folder
 from ...core.errors import AirmuscleError, AirmuscleWarning
-from ...files.library.fitted_entry import missing_geometry
-from ...files.library.initial_law import resting_lengths
+from ...files.library.fitted_entry import missing_geometry, resting_lengths
 from ...files.library.write import part_toml, save
 from ...report.chapter import Chapter
 from ...report.data import as_json, as_sheet, in_words

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from ...bench.readers.reader import EXTENSIONS
 from ...core.atomic_output import is_running
-from .requests import BadRequest
+from .security import BadRequest
 
 MAX_FILE = 32 * 10**6
 """Largest size of a measurement file [bytes] (chosen)."""

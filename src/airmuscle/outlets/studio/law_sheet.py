@@ -1,4 +1,8 @@
-"""Sheet of a law: everything that the page shows of a muscle or a law, as plain data, with its printed functions."""
+"""Sheet of a law: all that the page shows of a muscle or a law, as plain data; TOML text with places for numbers.
+
+A template is a list of texts and integers: an integer is the place of the parameter of this index, which is written
+as Python writes a float, so that a page fills in numbers without a server.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +10,17 @@ import dataclasses
 import hashlib
 import json
 import math
+import re
 import warnings
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 import airmuscle as am
 
-from ...core import cite, leaves
-from ...core.errors import TraceError
+from ...core import cite, leaves, tree
+from ...core.errors import ParameterError, TraceError
 from ...core.tree import Leaf
 from ...core.units import conversion
 from ...files.library.entry import Entry
@@ -22,8 +28,13 @@ from ...files.library.write import to_toml
 from ...physics.muscle.characteristic.validity_range import validity_range_of
 from ...physics.muscle.geometry.straight_fibre import FibreTube
 from .law_program import print_law
-from .toml_template import Template, toml_template
 
+_FIRST = 7.0e250
+"""The first of the marks: numbers that no file contains."""
+_STEP = 1.0e240
+_MARK = re.compile(r"7(?:\.\d+)?e\+250")
+
+Template = list[str | int]
 MAX_PARAMETERS = 60
 """Maximum number of parameters with a slider; a law with more, such as a table, has none (chosen)."""
 SHOWN_UNITS: dict[str, tuple[tuple[float, str], ...]] = {
@@ -213,3 +224,25 @@ def _changed_template(entry: Entry) -> Template:
 
 def _first_line(text: str | None) -> str:
     return (text or "").strip().partition("\n")[0]
+
+
+def toml_template(write: Callable[[Any], str], model: Any, count: int) -> Template:
+    """The template of the text that `write` makes of a model with `count` leaves. Raises ParameterError."""
+    marks = [_FIRST + i * _STEP for i in range(count)]
+    place = {repr(mark): i for i, mark in enumerate(marks)}
+    text = write(tree.unflatten(model, marks))
+    template: Template = []
+    end = 0
+    for match in _MARK.finditer(text):
+        template += [text[end : match.start()], place[match.group()]]
+        end = match.end()
+    template.append(text[end:])
+    missing = set(range(count)) - {item for item in template if isinstance(item, int)}
+    if missing:
+        raise ParameterError(f"{type(model).__name__}: {len(missing)} parameters do not appear in its file.")
+    return template
+
+
+def fill_template(template: Template, values: list[float]) -> str:
+    """The text with these values, as the page fills it in."""
+    return "".join(repr(values[item]) if isinstance(item, int) else item for item in template)

@@ -20,8 +20,7 @@ from ...files.library.write import part_toml, tables_toml
 from ...files.scenario.scenario import TABLES, Scenario, build_scenario, initial_pressure
 from ...recording.columns import display_scale
 from ..export.write import make_run
-from .law_sheet import parameter_row, script_text
-from .toml_template import toml_template
+from .law_sheet import parameter_row, script_text, toml_template
 
 NAMES = (
     "states", "inputs", "outputs", "run", "Solver", "prepare", "outputsOf", "SIZES",

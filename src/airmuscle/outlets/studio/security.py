@@ -1,4 +1,4 @@
-"""Security of the studio: response headers, allowed hosts and origins, token, and limits of requests.
+"""Security of the studio: response headers, allowed hosts and origins, token, limits and sizes of requests, answers.
 
 The page has access to the programs that it computes and to nothing else: scripts and styles come from this server
 only, none are written in the page itself, and nothing is sent elsewhere. A request that changes something, or that
@@ -17,6 +17,8 @@ from collections.abc import Awaitable, Callable, Mapping, MutableMapping
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
+
+from ...core.errors import AirmuscleError
 
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
@@ -162,3 +164,37 @@ async def _answer(send: Send, status: int, text: str) -> None:
     headers = [(b"content-type", b"text/plain; charset=utf-8")]
     await send({"type": "http.response.start", "status": status, "headers": headers})
     await send({"type": "http.response.body", "body": text.encode()})
+
+
+class BadRequest(AirmuscleError):
+    """A request that the server does not understand, with its status."""
+
+    def __init__(self, message: str, status: int = 400) -> None:
+        super().__init__(message)
+        self.status = status
+
+
+async def limited_body(request: Any, limit: int) -> bytes:
+    """The body of a request. Raises BadRequest as soon as it exceeds the limit [bytes]."""
+    parts, size = [], 0
+    async for part in request.stream():
+        size += len(part)
+        if size > limit:
+            raise BadRequest(f"the text is larger than {limit // 1024} kB.", 413)
+        parts.append(part)
+    return b"".join(parts)
+
+
+def decoded(body: bytes) -> str:
+    """A body as text. Raises BadRequest unless it is UTF-8."""
+    try:
+        return body.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise BadRequest(f"the text is not UTF-8 (byte {error.start}).") from None
+
+
+def json_answer(content: Any, status: int = 200) -> Any:
+    """An answer in JSON."""
+    from starlette.responses import JSONResponse
+
+    return JSONResponse(content, status_code=status)
