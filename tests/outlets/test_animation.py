@@ -3,6 +3,9 @@ have the wanted format, and what cannot be drawn is refused."""
 
 from __future__ import annotations
 
+import dataclasses
+import itertools
+
 import numpy as np
 import pytest
 from control_plants import JOINT, LIFT
@@ -10,9 +13,10 @@ from control_plants import JOINT, LIFT
 import airmuscle as am
 from airmuscle.errors import ColumnError, FileError, ParameterError
 from airmuscle.files.library import catalogue
-from airmuscle.physics import Braid
+from airmuscle.physics import Braid, MuscleRoute, SerialArm, SpatialLink
 from airmuscle.physics.plant.drawing import muscle_outline
 
+ROUTES = (MuscleRoute((1,), (0.02,), 0.1), MuscleRoute((1,), (-0.02,), 0.1))
 FILL = am.Schedule({"fill": ((0.0, 0.3),)})
 
 
@@ -55,6 +59,20 @@ def test_the_pointer_has_the_angle_and_the_muscles_their_lengths(joint):
     assert muscles[0].points[:, 0].max() < muscles[1].points[:, 0].min()
 
 
+def test_the_end_of_a_planar_arm_is_drawn_where_its_tip_is():
+    arm = catalogue.load("arm-lilly-quesada").plant
+    run = am.simulate(arm, am.Schedule({}), duration=0.05,
+                      initial_state=arm.state_at(pressure=3e5))  # fmt: skip
+    drawing = run.animate(arm)._scene.draw({name: float(run[name][-1]) for name in run})
+    (links,) = drawing.lines
+    state = {c.name: float(run[c.name][-1]) for c in arm.mechanism.coordinates}
+    assert links[-1] == pytest.approx(arm.mechanism.tip(state), abs=1e-12)
+    muscles = [shape.points for shape in drawing.shapes if shape.pressure is not None]
+    assert len(muscles) == 4
+    for one, other in itertools.pairwise(muscles):
+        assert one[:, 0].max() < other[:, 0].min()
+
+
 def test_frames_follow_the_time_at_the_wanted_speed(joint):
     np.testing.assert_allclose(joint.animate(JOINT).times, np.arange(6) / 25, atol=1e-12)
     assert joint.animate(JOINT, speed=0.1).times.size == 51
@@ -73,8 +91,8 @@ def test_a_load_is_drawn_and_written(lift, tmp_path):
 
 
 def test_what_cannot_be_drawn_is_refused(lift, joint, tmp_path):
-    arm = catalogue.load("arm-lilly-quesada").plant
-    with pytest.raises(ParameterError, match="PlanarArm with 4 muscles cannot be drawn; possible are"):
+    arm = dataclasses.replace(JOINT, mechanism=SerialArm((SpatialLink((0, 0, 1), rotor_inertia=0.02),), ROUTES))
+    with pytest.raises(ParameterError, match="SerialArm with 2 muscles cannot be drawn; possible are"):
         lift.animate(arm)
     with pytest.raises(ParameterError, match="is no plant"):
         lift.animate("lift")

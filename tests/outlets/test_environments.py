@@ -29,7 +29,7 @@ from airmuscle.outlets import (
     ValueRange,
     register_environments,
 )
-from airmuscle.outlets.environments import PlantEnv
+from airmuscle.outlets.environments import OnOffActions, PlantEnv
 
 NAMES = ("Joint", "Lift", "Arm")
 gymnasium = pytest.importorskip("gymnasium", reason="gymnasium is not installed")
@@ -124,20 +124,55 @@ def test_an_episode_of_a_vector_ends_where_the_task_ends_it():
     assert observations[0, 1] == 0.0
 
 
-@pytest.mark.parametrize("name", ["Joint", "Lift"])
+@pytest.mark.parametrize("name", ["Joint", "Lift", "Arm"])
 def test_a_picture_shows_the_present_state(name):
     env = gymnasium.make(f"airmuscle/{name}-v0", render_mode="rgb_array")
     env.reset(seed=1)
     first = env.render()
     for _ in range(30):
-        env.step(np.ones(env.action_space.shape, np.float32) * np.array([1.0, -1.0])[: env.action_space.shape[0]])
+        env.step(np.resize([1.0, -1.0], env.action_space.shape).astype(np.float32))
     second = env.render()
     assert (first.dtype, first.ndim, first.shape[2]) == (np.uint8, 3, 3)
     assert first.shape == second.shape
     assert (first != second).any()
     assert (env.render() == second).all()
-    with pytest.raises(ParameterError, match="render_mode is 'human'; allowed are 'rgb_array' and None"):
-        PlantEnv(TASK, render_mode="human")
+    with pytest.raises(ParameterError, match="render_mode is 'ansi'; allowed are 'human', 'rgb_array' and None"):
+        PlantEnv(TASK, render_mode="ansi")
+
+
+def test_a_window_shows_each_state_until_it_is_closed():
+    import matplotlib.pyplot as plt
+
+    env = gymnasium.make("airmuscle/Lift-v0", render_mode="human")
+    drawn = gymnasium.make("airmuscle/Lift-v0", render_mode="rgb_array")
+    for each in (env, drawn):
+        each.reset(seed=1)
+        each.step(np.ones(1, np.float32))
+    (axes,) = plt.figure("airmuscle").axes
+    assert (axes.images[0].get_array() == drawn.render()).all()
+    assert env.render() is None
+    env.close()
+    assert "airmuscle" not in plt.get_figlabels()
+
+
+def test_on_off_valves_are_open_or_closed():
+    env, plain = gymnasium.make("airmuscle/JointOnOff-v0"), gymnasium.make("airmuscle/Joint-v0")
+    check_env(env, skip_render_check=True)
+    vector = gymnasium.make_vec("airmuscle/JointOnOff-v0", num_envs=2, vectorization_mode="vector_entry_point")
+    assert (env.action_space.nvec == 3).all()
+    assert vector.action_space.shape == (2, 2)
+    for each in (env, plain):
+        each.reset(seed=7)
+    vector.reset(seed=7)
+    rng = np.random.default_rng(2)
+    for _ in range(20):
+        action = rng.integers(0, 3, 2)
+        found = env.step(action)[0]
+        assert (found == plain.step(action - 1.0)[0]).all()
+        many = vector.step(np.array([action, action]))[0]
+        assert many[0] == pytest.approx(found, abs=1e-5)
+    with pytest.raises(ParameterError, match="is no pair of a fill and a discharge valve"):
+        OnOffActions(gymnasium.make("airmuscle/Arm-v0"))
 
 
 def test_a_mask_chooses_the_plants_that_begin_anew_as_in_the_vectors_of_gymnasium():

@@ -46,14 +46,14 @@ class PlantEnv(gymnasium.Env):  # type: ignore[misc, unused-ignore]
     an action that is not finite or of another shape.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": 100}
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 100}
 
     def __init__(
         self, task: EnvironmentTask, randomisation: tuple[Randomisation, ...] = (), *,
         integrator: RungeKutta4 = STEP, render_mode: str | None = None,
     ) -> None:  # fmt: skip
-        if render_mode not in (None, "rgb_array"):
-            raise ParameterError(f"render_mode is {render_mode!r}; allowed are 'rgb_array' and None.")
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ParameterError(f"render_mode is {render_mode!r}; allowed are 'human', 'rgb_array' and None.")
         self.task, self.render_mode = task, render_mode
         self._draw = EpisodeDraw(task, randomisation)
         whole_steps(task, integrator)
@@ -63,6 +63,7 @@ class PlantEnv(gymnasium.Env):  # type: ignore[misc, unused-ignore]
         names = [s.name for s in task.states]
         self._stepper = Stepper(task, dict(zip(names, states[0].tolist(), strict=True)), integrator=integrator)
         self._inputs, self._elapsed = [0.0] * (self._actions + 1), 0
+        self._window: Any = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -72,6 +73,7 @@ class PlantEnv(gymnasium.Env):  # type: ignore[misc, unused-ignore]
         parameters, states = self._draw.begin(self.np_random.random((1, self._draw.dimension)))
         outputs = self._stepper.begin(parameters[0], states[0])
         self._elapsed = 0
+        self._show()
         return outputs[: self._count].astype(np.float32), {}
 
     def step(self, action: Any) -> tuple[npt.NDArray[np.float32], float, bool, bool, dict[str, Any]]:
@@ -98,16 +100,40 @@ class PlantEnv(gymnasium.Env):  # type: ignore[misc, unused-ignore]
         reward, terminated = float(outputs[-2]), bool(outputs[-1] > 0.5)
         effort = self.task.effort_weight * sum(u * u for u in inputs[:-1]) / self._actions
         terms = {"closeness": reward + effort, "effort": effort}
+        self._show()
         return outputs[: self._count].astype(np.float32), reward, terminated, False, terms
 
     def render(self) -> Any:
         """The present state of the plant as the picture of `Recording.animate`, (height, width, 3) of uint8.
 
-        None without `render_mode="rgb_array"`; takes some tenths of a second. Raises ParameterError for an arm, which
-        is not drawn.
+        None without `render_mode="rgb_array"`; with "human" it is shown in a window of Matplotlib, also by `reset` and
+        `step`. It takes some tenths of a second. Raises ParameterError for an arm in space, which is not drawn.
         """
-        if self.render_mode is None:
-            return None
+        if self.render_mode != "human":
+            return None if self.render_mode is None else self._picture()
+        import matplotlib.pyplot as plt
+
+        if self._window is None:
+            self._window = plt.figure("airmuscle").add_axes((0.0, 0.0, 1.0, 1.0), frameon=False).imshow(self._picture())
+        self._window.set_data(self._picture())
+        plt.pause(1e-3)
+        return None
+
+    def _show(self) -> None:
+        """Show the state where a person looks at it."""
+        if self.render_mode == "human":
+            self.render()
+
+    def close(self) -> None:
+        """Close the window."""
+        if self._window is not None:
+            import matplotlib.pyplot as plt
+
+            plt.close(self._window.figure)
+            self._window = None
+
+    def _picture(self) -> Any:
+        """The picture of the present state."""
         plant = self.task.plant
         state = dict(zip((s.name for s in plant.states), self._stepper.state.tolist(), strict=True))
         values = {**plant.outputs(state, complete_inputs(plant, None)), **state}
@@ -117,6 +143,35 @@ class PlantEnv(gymnasium.Env):  # type: ignore[misc, unused-ignore]
         picture.draw(0)
         picture.figure.canvas.draw()
         return np.asarray(picture.figure.canvas.buffer_rgba())[..., :3].copy()
+
+
+class OnOffActions(gymnasium.ActionWrapper):  # type: ignore[misc, unused-ignore]
+    """A single environment whose actions open valves completely: 0 discharges, 1 closes both valves, 2 fills.
+
+    Raises ParameterError for an action of the task that is not a pair of a fill and a discharge valve.
+    """
+
+    def __init__(self, env: Any) -> None:
+        super().__init__(env)
+        check_pairs(env.unwrapped.task)
+        self.action_space = on_off_space(env.unwrapped.task)
+
+    def action(self, action: Any) -> npt.NDArray[np.float32]:
+        """The openings of an action (m,)."""
+        return np.asarray(action, np.float32) - 1.0
+
+
+def on_off_space(task: EnvironmentTask) -> Any:
+    """The space of actions of on/off valves."""
+    return gymnasium.spaces.MultiDiscrete([3] * len(task.actions))
+
+
+def check_pairs(task: EnvironmentTask) -> None:
+    """Raise ParameterError for an action that is not a pair of valves."""
+    if alone := [action.name for action in task.actions if len(action.inputs) != 2]:
+        raise ParameterError(
+            f"the action '{alone[0]}' is no pair of a fill and a discharge valve, which alone can be on/off valves."
+        )
 
 
 class MeasuredObservations(gymnasium.ObservationWrapper):  # type: ignore[misc, unused-ignore]
@@ -160,6 +215,11 @@ class MeasuredObservations(gymnasium.ObservationWrapper):  # type: ignore[misc, 
 def make_joint(task: EnvironmentTask | None = None, **options: Any) -> PlantEnv:
     """airmuscle/Joint-v0, or the same with another task, which is not randomised unless `randomisation` is given."""
     return _make(joint_task(), task, options)
+
+
+def make_on_off(task: EnvironmentTask | None = None, **options: Any) -> OnOffActions:
+    """airmuscle/JointOnOff-v0: that of the joint, whose valves are open or closed for a whole period."""
+    return OnOffActions(make_joint(task, **options))
 
 
 def make_lift(task: EnvironmentTask | None = None, **options: Any) -> PlantEnv:

@@ -48,7 +48,7 @@ class Animation:
             )
         self.times = time[0] + np.arange(count) * speed / FRAMES
         pressures = [f"{prefix}pressure" for prefix in scene.prefixes]
-        names = [*pressures, *(f"{prefix}contraction" for prefix in scene.prefixes), scene.coordinate]
+        names = [*pressures, *(f"{prefix}contraction" for prefix in scene.prefixes), *scene.coordinates]
         self._columns = {name: np.interp(self.times, time, recording[name]) for name in names}
         self._scene, self._largest = scene, max(float(recording[name].max()) for name in pressures)
         scene.make_room([float(recording[f"{prefix}contraction"].max()) for prefix in scene.prefixes])
@@ -70,9 +70,10 @@ class Animation:
         drawn.set(xlim=(left, right), ylim=(lower, upper), aspect="equal")
         drawn.set_axis_off()
         time, coordinate = recording["time"], self._scene.coordinate
-        factor, unit = (180 / np.pi, "°") if coordinate == "angle" else (1e3, "mm")
-        axes[0, 1].plot(time, factor * recording[coordinate], color=LINES[0])
-        axes[0, 1].set_ylabel(f"{coordinate} [{unit}]")
+        factor, unit = (180 / np.pi, "°") if coordinate != "position" else (1e3, "mm")
+        for name, colour in zip(self._scene.coordinates, LINES, strict=False):
+            axes[0, 1].plot(time, factor * recording[name], color=colour)
+        axes[0, 1].set_ylabel(f"{coordinate if len(self._scene.coordinates) == 1 else 'angles'} [{unit}]")
         for i, name in enumerate(pressures):
             label = name.removesuffix(".pressure") if len(pressures) > 1 else None
             axes[1, 1].plot(

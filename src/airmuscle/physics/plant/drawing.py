@@ -11,7 +11,7 @@ import numpy as np
 from ...core.arrays import Array
 from ...core.errors import ParameterError
 from ...core.system import select_prefix
-from ..mechanism import AntagonisticJoint, Mechanism
+from ..mechanism import AntagonisticJoint, Mechanism, PlanarArm
 from ..mechanism.base import Translation
 from ..mechanism.wrapper import MechanismWrapper
 from ..muscle.geometry import Geometry
@@ -84,6 +84,11 @@ class Scene(abc.ABC):
     def coordinate(self) -> str:
         """The column that is plotted beside the drawing."""
 
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """The columns by which the mechanism is drawn."""
+        return (self.coordinate,)
+
     @abc.abstractmethod
     def draw(self, row: Row) -> Drawing:
         """The drawing at one row."""
@@ -147,19 +152,59 @@ class LiftScene(Scene):
         return Drawing([ceiling, *muscle, load], [cable], [])
 
 
+class ArmScene(Scene):
+    """The links of a planar arm, with its muscles side by side above them."""
+
+    mechanism: PlanarArm
+
+    @property
+    def reach(self) -> float:
+        """The length of the arm [m]."""
+        return float(sum(link.length for link in self.mechanism.links))
+
+    @property
+    def limits(self) -> tuple[float, float, float, float]:
+        half = max(1.1 * self.reach, 1.2 * self.spacing * len(self.geometries))
+        return -half, half, -1.15 * self.reach, 0.25 * self.reach + 1.25 * self.length
+
+    @property
+    def coordinate(self) -> str:
+        return self.coordinates[0]
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        return tuple(c.name for c in self.mechanism.coordinates)
+
+    def draw(self, row: Row) -> Drawing:
+        angles = np.cumsum([row[name] for name in self.coordinates])
+        steps = [
+            link.length * np.array([np.sin(a), -np.cos(a)])
+            for link, a in zip(self.mechanism.links, angles, strict=True)
+        ]
+        points = np.vstack([np.zeros(2), np.cumsum(steps, axis=0)])
+        shapes = [Shape(_box(0.0, 0.15 * self.reach, 0.03 * self.reach, 0.06 * self.reach))]
+        for index in range(len(self.geometries)):
+            place = 2.2 * self.spacing * (index - 0.5 * (len(self.geometries) - 1))
+            shapes += self._muscle(index, row, place, 0.15 * self.reach, 1.0)[0]
+        return Drawing(shapes, [points], [(*point.tolist(), 0.03 * self.reach) for point in points])
+
+
 def scene_of(geometries: Sequence[Geometry], prefixes: Sequence[str], mechanism: Mechanism) -> Scene:
-    """The scene of a plant. Raises ParameterError for a mechanism that is neither a joint of two muscles nor a
-    translation by one muscle."""
+    """The scene of a plant. Raises ParameterError for a mechanism that is neither a joint of two muscles, a planar arm
+    nor a translation by one muscle."""
     inner: Mechanism = mechanism
     while isinstance(inner, MechanismWrapper):
         inner = inner.inner
     if isinstance(inner, AntagonisticJoint):
         return JointScene(geometries, prefixes, inner)
+    if isinstance(inner, PlanarArm):
+        return ArmScene(geometries, prefixes, inner)
     if isinstance(inner, Translation) and len(geometries) == 1:
         return LiftScene(geometries, prefixes, inner)
     raise ParameterError(
         f"animate: {type(inner).__name__} with {len(geometries)} muscles cannot be drawn; possible are an "
-        "AntagonisticJoint, and a load on one muscle (HangingMass, SpringLoad). recording.plot() plots any columns."
+        "AntagonisticJoint, a PlanarArm, and a load on one muscle (HangingMass, SpringLoad). "
+        "recording.plot() plots any columns."
     )
 
 
