@@ -29,7 +29,7 @@ from airmuscle.outlets import (
     ValueRange,
     register_environments,
 )
-from airmuscle.outlets.environments import OnOffActions, PlantEnv
+from airmuscle.outlets.environments import PlantEnv, with_on_off_valves
 
 NAMES = ("Joint", "Lift", "Arm")
 gymnasium = pytest.importorskip("gymnasium", reason="gymnasium is not installed")
@@ -172,7 +172,7 @@ def test_on_off_valves_are_open_or_closed():
         many = vector.step(np.array([action, action]))[0]
         assert many[0] == pytest.approx(found, abs=1e-5)
     with pytest.raises(ParameterError, match="is no pair of a fill and a discharge valve"):
-        OnOffActions(gymnasium.make("airmuscle/Arm-v0"))
+        with_on_off_valves(gymnasium.make("airmuscle/Arm-v0"))
 
 
 def test_a_mask_chooses_the_plants_that_begin_anew_as_in_the_vectors_of_gymnasium():

@@ -1,7 +1,6 @@
 from .plant_env import MeasuredObservations as MeasuredObservations
-from .plant_env import OnOffActions as OnOffActions
 from .plant_env import PlantEnv as PlantEnv
-from .plant_vector_env import OnOffVectorActions as OnOffVectorActions
+from .plant_env import with_on_off_valves as with_on_off_valves
 from .plant_vector_env import PlantVectorEnv as PlantVectorEnv
 from .randomisation import FactorRange as FactorRange
 from .randomisation import FitUncertainty as FitUncertainty

@@ -145,33 +145,26 @@ class PlantEnv(gymnasium.Env):  # type: ignore[misc, unused-ignore]
         return np.asarray(picture.figure.canvas.buffer_rgba())[..., :3].copy()
 
 
-class OnOffActions(gymnasium.ActionWrapper):  # type: ignore[misc, unused-ignore]
-    """A single environment whose actions open valves completely: 0 discharges, 1 closes both valves, 2 fills.
+def with_on_off_valves(env: Any) -> Any:
+    """An environment, single or vector, whose actions open valves completely: 0 discharges, 1 closes both, 2 fills.
 
     Raises ParameterError for an action of the task that is not a pair of a fill and a discharge valve.
     """
-
-    def __init__(self, env: Any) -> None:
-        super().__init__(env)
-        check_pairs(env.unwrapped.task)
-        self.action_space = on_off_space(env.unwrapped.task)
-
-    def action(self, action: Any) -> npt.NDArray[np.float32]:
-        """The openings of an action (m,)."""
-        return np.asarray(action, np.float32) - 1.0
-
-
-def on_off_space(task: EnvironmentTask) -> Any:
-    """The space of actions of on/off valves."""
-    return gymnasium.spaces.MultiDiscrete([3] * len(task.actions))
-
-
-def check_pairs(task: EnvironmentTask) -> None:
-    """Raise ParameterError for an action that is not a pair of valves."""
-    if alone := [action.name for action in task.actions if len(action.inputs) != 2]:
+    actions = env.unwrapped.task.actions
+    if alone := [action.name for action in actions if len(action.inputs) != 2]:
         raise ParameterError(
             f"the action '{alone[0]}' is no pair of a fill and a discharge valve, which alone can be on/off valves."
         )
+    space = gymnasium.spaces.MultiDiscrete([3] * len(actions))
+    if not isinstance(env, gymnasium.vector.VectorEnv):
+        return gymnasium.wrappers.TransformAction(env, openings_of, space)
+    all_spaces = gymnasium.vector.utils.batch_space(space, env.num_envs)
+    return gymnasium.wrappers.vector.TransformAction(env, openings_of, all_spaces, space)
+
+
+def openings_of(action: Any) -> npt.NDArray[np.float32]:
+    """The actions from -1 to 1 for those of on/off valves."""
+    return np.asarray(action, np.float32) - 1.0
 
 
 class MeasuredObservations(gymnasium.ObservationWrapper):  # type: ignore[misc, unused-ignore]
@@ -217,9 +210,9 @@ def make_joint(task: EnvironmentTask | None = None, **options: Any) -> PlantEnv:
     return _make(joint_task(), task, options)
 
 
-def make_on_off(task: EnvironmentTask | None = None, **options: Any) -> OnOffActions:
+def make_on_off(task: EnvironmentTask | None = None, **options: Any) -> Any:
     """airmuscle/JointOnOff-v0: that of the joint, whose valves are open or closed for a whole period."""
-    return OnOffActions(make_joint(task, **options))
+    return with_on_off_valves(make_joint(task, **options))
 
 
 def make_lift(task: EnvironmentTask | None = None, **options: Any) -> PlantEnv:

@@ -15,7 +15,7 @@ from ...core.errors import ParameterError
 from ...engine.run import RungeKutta4
 from ...engine.run.batch import Double, Precision
 from ...engine.run.batch.stepper import BatchStepper
-from .plant_env import STEP, action_space, check_pairs, observation_space, on_off_space
+from .plant_env import STEP, action_space, observation_space, with_on_off_valves
 from .randomisation import EpisodeDraw, Randomisation, whole_steps
 from .registration import EPISODE_PERIODS
 from .standard import arm_task, joint_task, lift_task
@@ -240,23 +240,9 @@ def make_joint_vector(num_envs: int = 1, task: EnvironmentTask | None = None, **
     return _make(joint_task(), num_envs, task, options)
 
 
-class OnOffVectorActions(gymnasium.vector.VectorActionWrapper):  # type: ignore[misc, unused-ignore]
-    """A vector environment with the actions of OnOffActions (N, m)."""
-
-    def __init__(self, env: Any) -> None:
-        super().__init__(env)
-        check_pairs(env.unwrapped.task)
-        self.single_action_space = on_off_space(env.unwrapped.task)
-        self.action_space = gymnasium.vector.utils.batch_space(self.single_action_space, env.num_envs)
-
-    def actions(self, actions: Any) -> npt.NDArray[np.float32]:
-        """The openings of actions (N, m)."""
-        return np.asarray(actions, np.float32) - 1.0
-
-
-def make_on_off_vector(num_envs: int = 1, task: EnvironmentTask | None = None, **options: Any) -> OnOffVectorActions:
+def make_on_off_vector(num_envs: int = 1, task: EnvironmentTask | None = None, **options: Any) -> Any:
     """A vector of airmuscle/JointOnOff-v0, or the same with another task."""
-    return OnOffVectorActions(make_joint_vector(num_envs, task, **options))
+    return with_on_off_valves(make_joint_vector(num_envs, task, **options))
 
 
 def make_lift_vector(num_envs: int = 1, task: EnvironmentTask | None = None, **options: Any) -> PlantVectorEnv:
