@@ -1,32 +1,99 @@
-"""Modelica package of a system: a block whose rates and outputs are external C functions."""
+"""Modelica package of a system: a block of equations."""
 
 from __future__ import annotations
 
 import dataclasses
 import re
-from collections.abc import Sequence
+import textwrap
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from ...core.atomic_output import atomic_folder
+from ...engine.compile.ir.emission import computed
+from ...engine.compile.ir.instructions import Operand, instructions
+from ...engine.compile.text.body import TextBody
 from ...engine.run import Problem
-from .c_source import CSource
 from .fmi_variables import first_inputs
 from .identifiers import block_comment, filled, make_identifiers
 from .targets import ExportedRun
-from .write import make_run
+from .write import make_run, write_files
 
 _WORDS = """
     algorithm and annotation block break class connect connector constant constrainedby der discrete each else
     elseif elsewhen encapsulated end enumeration equation expandable extends external false final flow for
     function if import impure in initial inner input loop model not operator or outer output package parameter
     partial protected public pure record redeclare replaceable return stream then true type when while within
-    time rates outputs plant
+    time plant log1p expm1 asinh
 """
 KEYWORDS = frozenset(_WORDS.split())
 """Words of Modelica, and names in the package, that are no names of variables."""
+_WHOLE = re.compile(r"(\d+)\.0")
 _FACTORS = r"[A-Za-z]+-?\d*(\.[A-Za-z]+-?\d*)*"
 _UNIT = re.compile(rf"(1|{_FACTORS})(/([A-Za-z]+-?\d*|\({_FACTORS}\)))?")
 """Units of the Modelica specification: whole exponents, and one fraction bar."""
+
+
+_OUTSIDE = {
+    "sqrt": ("{0} > 0.0", "0.0"), "log": ("{0} > 0.0", "-1e300"), "asin": ("abs({0}) <= 1.0", "0.0"),
+    "acos": ("abs({0}) <= 1.0", "0.0"),
+}  # fmt: skip
+"""Functions with their domains, and the value outside; there a choice leaves the value out, but tools stop (chosen)."""
+_EVENTS = ("abs", "floor")
+"""Functions that would cause events."""
+
+
+class ModelicaBody(TextBody):
+    """Equations, of which none causes an event; `variables` are the names of the elements of arrays."""
+
+    language = "Modelica"
+    margin, unequal = "    ", "<>"
+    infinity, not_a_number = "1.7976931348623157e308", "(0.0 / 0.0)"
+
+    def __init__(self, variables: Mapping[str, Sequence[str]]) -> None:
+        super().__init__()
+        self._variables, self.values = variables, list[str]()
+        self._taken = {name.casefold() for names in variables.values() for name in names}
+
+    def new_name(self) -> str:
+        name = super().new_name()
+        while name in self._taken:
+            name = super().new_name()
+        self.values.append(name)
+        return name
+
+    def remark(self, text: str) -> str:
+        return f"// {text}"
+
+    def load(self, array: str, index: int) -> str:
+        return self._variables[array][index]
+
+    def element(self, array: str, index: int) -> str:
+        name = self._variables[array][index]
+        return f"der({name})" if array == "f" else name
+
+    def choose(self, test: str, when_true: str, when_false: str) -> str:
+        left, relation, right = test.split(" ")
+        if relation in ("==", "<>"):  # Modelica has no equality of real numbers in equations
+            test = f"{left} < {right} or {left} > {right}"
+            when_true, when_false = (when_false, when_true) if relation == "==" else (when_true, when_false)
+        return self.put(f"noEvent(if {test} then {when_true} else {when_false})")
+
+    def call(self, function: str, x: Sequence[str]) -> str:
+        if function == "pow":
+            whole = _WHOLE.fullmatch(x[1])
+            if whole:
+                return self.put(f"{x[0]} ^ {whole[1]}")
+            return self.put(f"noEvent(if {x[0]} > 0.0 then {x[0]} ^ {x[1]} else 0.0)")
+        value = f"{function}({x[0]})"
+        if function in _OUTSIDE:
+            domain, outside = _OUTSIDE[function]
+            value = f"noEvent(if {domain.format(x[0])} then {value} else {outside})"
+        return self.put(f"noEvent({value})" if function in _EVENTS else value)
+
+    def unless_zero(
+        self, gates: Sequence[str], compute: Callable[[], dict[Operand, str]], instead: Mapping[Operand, str]
+    ) -> dict[Operand, str]:
+        inside = compute()  # equations have no branches: a product with the gate is zero
+        return {operand: inside[operand] for operand in instead}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,46 +107,34 @@ class ModelicaVariable:
 def write_modelica(
     problem: Problem, folder: str | Path, *, name: str = "", title: str = "", tunable: Sequence[str] | None = None
 ) -> tuple[Path, ...]:
-    """Write a system as a Modelica package, a folder `NAME` in `folder`, with C sources; the paths of its files.
+    """Write a system as a Modelica package of equations, a folder `NAME` in `folder`; the path of its file.
 
     The block `NAME.Plant` has the inputs, states, outputs and parameters of the system as variables with their units,
     and begins in the initial state of the problem; the simulating tool integrates it. Arguments and errors as for
     `write_program`.
     """
     program = make_run(problem, name=name, title=title, tunable=tunable)
-    files = modelica_files(program)
-    target = Path(folder) / program.name
-    with atomic_folder(target) as staging:
-        for file, text in files.items():
-            (staging / file).parent.mkdir(parents=True, exist_ok=True)
-            (staging / file).write_bytes(text.encode("utf-8", "replace"))
-    return tuple(target / file for file in files)
+    return write_files({"package.mo": modelica_text(program)}, Path(folder) / program.name)
 
 
-def modelica_files(program: ExportedRun) -> dict[str, str]:
-    """The files of the package by their paths in it."""
-    source = CSource(program.name, program.system, program.run.integrator, program.provenance).files()
-    include = {f"Resources/Include/{file}": text for file, text in source.items()}
-    wrapper = filled("modelica.c", {"file": program.name}, program.name)
-    return {"package.mo": _package(program), **include, f"Resources/Include/{program.name}_modelica.c": wrapper}
-
-
-def _package(program: ExportedRun) -> str:
-    system, run = program.system, program.run
+def modelica_text(program: ExportedRun) -> str:
+    """The package: the variables of the block, and its equations, in which each value has one name."""
+    system = program.system
     states, inputs, outputs, parameters = _variables(program)
-    assigned = [f"    {v.name} = x_[{i}];" for i, v in enumerate(states, 1)]
-    assigned += [f"    {v.name} = o_[{i}];" for i, v in enumerate(outputs, 1)]
-    values = {
-        "provenance": block_comment(program.provenance), "package": program.name, "file": program.name,
-        "title": program.provenance[0].replace("\\", " ").replace('"', "'"),
+    traced, groups = system.traced, {"x": states, "u": inputs, "p": parameters, "f": states, "o": outputs}
+    code = instructions([traced.x, traced.u, traced.p], [traced.f, traced.o])
+    body = ModelicaBody({array: [v.name for v in group] for array, group in groups.items()})
+    results = computed(body, code, ["x", "u", "p"], {}, {})
+    for (output, index), value in sorted(results.items()):
+        body.store("fo"[output], index, value)
+    values = textwrap.wrap(f"Real {', '.join(body.values)};", 116, initial_indent="    ", subsequent_indent="      ")
+    places = {
+        "provenance": block_comment(program.provenance), "package": program.name,
+        "title": _quoted(program.provenance[0]), "values": "\n".join(values) if body.values else "",
         "declarations": "\n".join(v.declaration for v in (*parameters, *inputs, *states, *outputs)),
-        "states": str(len(states)), "inputs": str(len(inputs) or 1), "parameters": str(len(parameters) or 1),
-        "outputs": str(len(outputs) or 1), "start": ", ".join(repr(x) for x in run.initial.tolist()),
-        "nominal": ", ".join(repr(x) for x in system.nominal.tolist()), "equations": "\n".join(assigned),
-        "input_names": ", ".join(v.name for v in inputs) or "0.0",
-        "parameter_names": ", ".join(v.name for v in parameters) or "0.0",
+        "equations": "\n".join(body.lines),
     }  # fmt: skip
-    return filled("modelica.mo", values, program.name)
+    return filled("modelica.mo", places, program.name)
 
 
 def _variables(program: ExportedRun) -> tuple[list[ModelicaVariable], ...]:
@@ -87,7 +142,12 @@ def _variables(program: ExportedRun) -> tuple[list[ModelicaVariable], ...]:
     system = program.system
     leaves = system.tunable
     groups = (
-        [(n, "Real", system.units[n], "") for n in system.state_names],
+        [
+            (n, "Real", system.units[n], f"start = {start!r}, fixed = true, nominal = {nominal!r}")
+            for n, start, nominal in zip(
+                system.state_names, program.run.initial.tolist(), system.nominal.tolist(), strict=True
+            )
+        ],
         [
             (n, "input Real", system.units[n], f"start = {start!r}")
             for n, start in zip(system.input_names, first_inputs(program.run), strict=True)
@@ -104,10 +164,15 @@ def _variables(program: ExportedRun) -> tuple[list[ModelicaVariable], ...]:
             text = [f'unit = "{in_units}"'] if in_units else []
             binding = f" = {value}" if kind.startswith("parameter") else ""
             text += [value] if value and not binding else []
-            label = name.replace("\\", " ").replace('"', "'")
+            label = _quoted(name)
             variables.append(ModelicaVariable(word, f'    {kind} {word}({", ".join(text)}){binding} "{label}";'))
         variable_groups.append(variables)
     return tuple(variable_groups)
+
+
+def _quoted(text: str) -> str:
+    """A text between double quotes."""
+    return text.replace("\\", " ").replace('"', "'")
 
 
 def _identifiers(names: Sequence[str]) -> list[str]:

@@ -3,31 +3,35 @@ package @package@ "@title@"
   block Plant "@title@"
 @declarations@
   protected
-    Real x_[@states@](start = {@start@}, each fixed = true, nominal = {@nominal@});
-    Real u_[@inputs@] = {@input_names@};
-    Real p_[@parameters@] = {@parameter_names@};
-    Real o_[@outputs@];
+@values@
   equation
-    der(x_) = rates(x_, u_, p_);
-    o_ = outputs(x_, u_, p_);
 @equations@
   end Plant;
 
-  function rates "Time derivatives of the states"
-    input Real x[@states@];
-    input Real u[@inputs@];
-    input Real p[@parameters@];
-    output Real f[@states@];
-  external "C" model_modelica_rates(x, u, p, f)
-    annotation (Include = "#include \"@file@_modelica.c\"", IncludeDirectory = "modelica://@package@/Resources/Include");
-  end rates;
+  function log1p "log(1 + x), also of a small x"
+    input Real x;
+    output Real y;
+  protected
+    Real u;
+  algorithm
+    u := 1.0 + x;
+    y := if u > 1.0 or u < 1.0 then log(u) * x / (u - 1.0) else x;
+  end log1p;
 
-  function outputs "Outputs"
-    input Real x[@states@];
-    input Real u[@inputs@];
-    input Real p[@parameters@];
-    output Real o[@outputs@];
-  external "C" model_modelica_outputs(x, u, p, o)
-    annotation (Include = "#include \"@file@_modelica.c\"", IncludeDirectory = "modelica://@package@/Resources/Include");
-  end outputs;
+  function expm1 "exp(x) - 1, also of a small x"
+    input Real x;
+    output Real y;
+  protected
+    Real u;
+  algorithm
+    u := exp(x);
+    y := if u > 1.0 or u < 1.0 then (u - 1.0) * (if abs(x) < 1.0 then x / log(u) else 1.0) else x;
+  end expm1;
+
+  function asinh "Inverse of sinh"
+    input Real x;
+    output Real y;
+  algorithm
+    y := if x < 0.0 then -log1p(-x + x * x / (1.0 + sqrt(x * x + 1.0))) else log1p(x + x * x / (1.0 + sqrt(x * x + 1.0)));
+  end asinh;
 end @package@;
