@@ -8,14 +8,13 @@ import html
 import io
 import json
 import zipfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from xml.etree.ElementTree import Element, SubElement
 
 from ...core.atomic_output import atomic_folder
 from ...core.errors import ParameterError
 from .compiler import Platform, this_platform
-from .fmi_description import FmuDescription, xml_text
+from .fmi_description import FmuDescription
 from .identifiers import block_comment, filled, template
 
 VERSIONS = (2, 3)
@@ -24,13 +23,8 @@ HEADERS = {
     3: ("fmi3FunctionTypes.h", "fmi3Functions.h", "fmi3PlatformTypes.h"),
 }
 """Headers of the standard by version, with its 2-clause BSD licence in each."""
-REFERENCES, REFERENCES_VERSION = "org.fmi-standard.fmi-ls-ref", "1.0.0-alpha.1"
-"""Name and version of the layered standard on related files of an FMU."""
-RELATED = {
-    "inputs.csv": ("testcase", "Inputs of the exported run: linear between rows, two rows at a jump"),
-    "results.csv": ("result", "States and outputs of the exported run, computed by airmuscle with its own integrator"),
-}
-"""Role and description of each related file."""
+REFERENCES = "extra/org.fmi-standard.fmi-ls-ref"
+"""Folder of reference data, whose manifest FMI-LS-REF 1.0.0-alpha.1 defines."""
 PAGE = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>{0}</title></head>
 <body><pre>{1}</pre></body></html>
@@ -58,7 +52,7 @@ class FmuPackage:
     provenance  lines of the comment at the beginning of each file
     sources     C sources and headers by name, without those of the standard
     adjoint     whether the instance has adjoint derivatives
-    related     reference data, CSV texts by their names, which the manifest of FMI-LS-REF lists
+    related     inputs.csv and results.csv, reference data that the manifest of FMI-LS-REF lists; or none
     """
 
     about: FmuDescription
@@ -86,8 +80,8 @@ class FmuPackage:
         if fmi == 3:  # FMI 2.0 has no terminals
             files["terminalsAndIcons/terminalsAndIcons.xml"] = self.about.terminals()
         if self.related:
-            texts = {**self.related, "fmi-ls-manifest.xml": _manifest(self.related)}
-            files |= {f"extra/{REFERENCES}/{file}": text for file, text in texts.items()}
+            texts = {**self.related, "fmi-ls-manifest.xml": template("fmi-ls-manifest.xml")}
+            files |= {f"{REFERENCES}/{file}": text for file, text in texts.items()}
         return {file: text.encode("utf-8", "replace") for file, text in files.items()}
 
     def write(
@@ -152,20 +146,6 @@ def archive(files: Mapping[str, bytes], first: str) -> bytes:
             entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
             zipped.writestr(entry, files[file])
     return buffer.getvalue()
-
-
-def _manifest(related: Iterable[str]) -> str:
-    """The list of related files, which FMI-LS-REF defines."""
-    space, about = "http://fmi-standard.org/fmi-ls-manifest", "information on related files included in an FMU."
-    attributes = {
-        "name": REFERENCES, "version": REFERENCES_VERSION, "description": f"Layered Standard providing {about}"
-    }  # fmt: skip
-    given = {f"fmi-ls:fmi-ls-{key}": text for key, text in attributes.items()}
-    root = Element("fmiReferences", {"xmlns:fmi-ls": space, **given})
-    for file in related:
-        role, description = RELATED[file]
-        SubElement(root, "Related", type="text/csv", source=file, role=role, description=description)
-    return xml_text(root)
 
 
 def _build_description(name: str, units: Sequence[str]) -> str:

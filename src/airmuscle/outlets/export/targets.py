@@ -27,9 +27,8 @@ from .identifiers import (
     provenance,
     with_cmake,
 )
-from .javascript_module import JavaScriptModule, to_json
-from .octave_functions import OctaveFunctions, m_array, m_strings
 from .printed_system import ExportedSystem
+from .scripting import JavaScriptModule, OctaveFunctions, m_array, m_strings, to_json
 
 FORMS: tuple[tuple[type[Characteristic], str, tuple[str, str], tuple[str, str, str]], ...] = (
     (ForceLaw, "force", ("pressure", "contraction"), ("force", "force_by_pressure", "stiffness")),
