@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
@@ -30,8 +29,6 @@ _WHOLE = re.compile(r"(\d+)\.0")
 _FACTORS = r"[A-Za-z]+-?\d*(\.[A-Za-z]+-?\d*)*"
 _UNIT = re.compile(rf"(1|{_FACTORS})(/([A-Za-z]+-?\d*|\({_FACTORS}\)))?")
 """Units of the Modelica specification: whole exponents, and one fraction bar."""
-
-
 _OUTSIDE = {
     "sqrt": ("{0} > 0.0", "0.0"), "log": ("{0} > 0.0", "-1e300"), "asin": ("abs({0}) <= 1.0", "0.0"),
     "acos": ("abs({0}) <= 1.0", "0.0"),
@@ -96,14 +93,6 @@ class ModelicaBody(TextBody):
         return {operand: inside[operand] for operand in instead}
 
 
-@dataclasses.dataclass(frozen=True)
-class ModelicaVariable:
-    """A variable with the text of its declaration."""
-
-    name: str
-    declaration: str
-
-
 def write_modelica(
     problem: Problem, folder: str | Path, *, name: str = "", title: str = "", tunable: Sequence[str] | None = None
 ) -> tuple[Path, ...]:
@@ -119,11 +108,10 @@ def write_modelica(
 
 def modelica_text(program: ExportedRun) -> str:
     """The package: the variables of the block, and its equations, in which each value has one name."""
-    system = program.system
-    states, inputs, outputs, parameters = _variables(program)
-    traced, groups = system.traced, {"x": states, "u": inputs, "p": parameters, "f": states, "o": outputs}
+    traced, declared = program.system.traced, _variables(program)
     code = instructions([traced.x, traced.u, traced.p], [traced.f, traced.o])
-    body = ModelicaBody({array: [v.name for v in group] for array, group in groups.items()})
+    names = {array: list(group) for array, group in declared.items()}
+    body = ModelicaBody({**names, "f": names["x"]})
     results = computed(body, code, ["x", "u", "p"], {}, {})
     for (output, index), value in sorted(results.items()):
         body.store("fo"[output], index, value)
@@ -131,52 +119,39 @@ def modelica_text(program: ExportedRun) -> str:
     places = {
         "provenance": block_comment(program.provenance), "package": program.name,
         "title": _quoted(program.provenance[0]), "values": "\n".join(values) if body.values else "",
-        "declarations": "\n".join(v.declaration for v in (*parameters, *inputs, *states, *outputs)),
+        "declarations": "\n".join(text for array in "puxo" for text in declared[array].values()),
         "equations": "\n".join(body.lines),
     }  # fmt: skip
     return filled("modelica.mo", places, program.name)
 
 
-def _variables(program: ExportedRun) -> tuple[list[ModelicaVariable], ...]:
-    """States, inputs, outputs and parameters, with distinct names."""
-    system = program.system
-    leaves = system.tunable
-    groups = (
-        [
-            (n, "Real", system.units[n], f"start = {start!r}, fixed = true, nominal = {nominal!r}")
-            for n, start, nominal in zip(
-                system.state_names, program.run.initial.tolist(), system.nominal.tolist(), strict=True
-            )
-        ],
-        [
-            (n, "input Real", system.units[n], f"start = {start!r}")
-            for n, start in zip(system.input_names, first_inputs(program.run), strict=True)
-        ],
-        [(n, "output Real", system.units[n], "") for n in system.output_names],
-        [(f"p.{leaf.path}", "parameter Real", leaf.declared.unit, repr(float(leaf.value))) for leaf in leaves],
-    )
-    words = iter(_identifiers([name for group in groups for name, *_ in group]))
-    variable_groups: list[list[ModelicaVariable]] = []
-    for group in groups:
-        variables = []
-        for name, kind, unit, value in group:
-            word, in_units = next(words), _modelica_unit(unit)
-            text = [f'unit = "{in_units}"'] if in_units else []
-            binding = f" = {value}" if kind.startswith("parameter") else ""
-            text += [value] if value and not binding else []
-            label = _quoted(name)
-            variables.append(ModelicaVariable(word, f'    {kind} {word}({", ".join(text)}){binding} "{label}";'))
-        variable_groups.append(variables)
-    return tuple(variable_groups)
+def _variables(program: ExportedRun) -> dict[str, dict[str, str]]:
+    """Declarations of states, inputs, outputs and parameters by their names in the package, by array."""
+    system, initial = program.system, program.run.initial.tolist()
+    begins = zip(initial, system.nominal.tolist(), strict=True)
+    states = [f"start = {start!r}, fixed = true, nominal = {nominal!r}" for start, nominal in begins]
+    inputs = [f"start = {start!r}" for start in first_inputs(program.run)]
+    groups = {
+        "x": [("Real", name, text, "") for name, text in zip(system.state_names, states, strict=True)],
+        "u": [("input Real", name, text, "") for name, text in zip(system.input_names, inputs, strict=True)],
+        "o": [("output Real", name, "", "") for name in system.output_names],
+        "p": [("parameter Real", f"p.{leaf.path}", "", f" = {float(leaf.value)!r}") for leaf in system.tunable],
+    }
+    units = system.units | {f"p.{leaf.path}": leaf.declared.unit for leaf in system.tunable}
+    identifiers = iter(make_identifiers([name for group in groups.values() for _, name, *_ in group]))
+    declarations: dict[str, dict[str, str]] = {array: {} for array in groups}
+    for array, group in groups.items():
+        for kind, name, text, binding in group:
+            word, unit = next(identifiers), _modelica_unit(units[name])
+            word = f"{word}_" if word.casefold() in KEYWORDS else word
+            attributes = ", ".join(filter(None, [f'unit = "{unit}"' if unit else "", text]))
+            declarations[array][word] = f'    {kind} {word}({attributes}){binding} "{_quoted(name)}";'
+    return declarations
 
 
 def _quoted(text: str) -> str:
     """A text between double quotes."""
     return text.replace("\\", " ").replace('"', "'")
-
-
-def _identifiers(names: Sequence[str]) -> list[str]:
-    return [f"{word}_" if word.casefold() in KEYWORDS else word for word in make_identifiers(names)]
 
 
 def _modelica_unit(unit: str) -> str:
