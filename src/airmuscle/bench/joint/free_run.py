@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 
 from ...core.arrays import Array
 from ...engine import RungeKutta4, simulate_batch
 from ...physics import PressureDriven
+from .. import baselines
+from ..baselines import ARX, DEPTH, PERSISTENCE
 from .descent import SUBSTEPS
-from .episodes import Episode, Episodes
+from .episodes import Episodes
 from .windows import HISTORY, Windows, WindowSignal, cut, start_of
 
 COVERAGE = 0.95
@@ -55,8 +56,6 @@ def coverage(errors: Array, episode: Array) -> Array:
 
 # Baselines: persistence, and a linear ARX model of all joints
 
-DEPTH, RIDGE = 4, 1e-6
-"""Rows of angles and pressures that the ARX model sees, and its regularisation (chosen)."""
 LIMIT = 9.0
 """Limit of an angle [rad], so that an unstable prediction ends in a large error and not in infinity."""
 
@@ -66,7 +65,7 @@ Predict = Callable[[Windows], Array]
 def baseline_errors(train: Episodes, judge: Episodes, rows: int) -> Mapping[str, Array]:
     """Errors (N, rows, J) [rad] of the free run of each baseline over the windows of `judge`, by its name."""
     windows = cut(judge, 0, rows)
-    known = {"persistence": persistence, f"ARX of depth {DEPTH}": fit_arx(train)}
+    known = {PERSISTENCE: persistence, ARX: fit_arx(train)}
     return {name: predict(windows) - windows.angle[:, HISTORY + 1 :] for name, predict in known.items()}
 
 
@@ -76,30 +75,7 @@ def persistence(windows: Windows) -> Array:
 
 
 def fit_arx(train: Episodes) -> Predict:
-    """Linear ARX model of the change of all angles, by least squares from DEPTH rows of all angles and pressures and
-    the pressures of the next row."""
-    pieces = [_regressors(run) for run in train.runs if len(run) > DEPTH + 1]
-    x, y = (np.concatenate(part) for part in zip(*pieces, strict=True))
-    mean, spread = x.mean(axis=0), x.std(axis=0) + 1e-9
-    design = np.column_stack([(x - mean) / spread, np.ones(len(x))])
-    normal = design.T @ design + RIDGE * len(design) * np.eye(design.shape[1])
-    coefficients = np.linalg.solve(normal, design.T @ y)
-
-    def predict(windows: Windows) -> Array:
-        angle = windows.angle[:, : HISTORY + 1].copy()
-        for row in range(HISTORY, HISTORY + windows.rows):
-            past = angle[:, row - DEPTH + 1 : row + 1].reshape(len(angle), -1)
-            pressure = windows.pressure[:, row - DEPTH + 1 : row + 2].reshape(len(angle), -1)
-            scaled = (np.concatenate([past, pressure], axis=1) - mean) / spread
-            following = angle[:, -1] + scaled @ coefficients[:-1] + coefficients[-1]
-            angle = np.concatenate([angle, np.clip(following, -LIMIT, LIMIT)[:, None]], axis=1)
-        return angle[:, HISTORY + 1 :]
-
-    return predict
-
-
-def _regressors(run: Episode) -> tuple[Array, Array]:
-    count = len(run) - DEPTH
-    past = sliding_window_view(run.angle, DEPTH, axis=0)[:count].transpose(0, 2, 1).reshape(count, -1)
-    pressure = sliding_window_view(run.pressure, DEPTH + 1, axis=0).transpose(0, 2, 1).reshape(count, -1)
-    return np.concatenate([past, pressure], axis=1), run.angle[DEPTH:] - run.angle[DEPTH - 1 : -1]
+    """Linear ARX model of the angles of all joints, driven by all pressures."""
+    runs = [(run.angle, run.pressure) for run in train.runs if len(run) > DEPTH + 1]
+    model, begin = baselines.fit_arx(runs, -LIMIT, LIMIT), HISTORY - DEPTH + 1
+    return lambda windows: model.free_run(windows.angle[:, begin : HISTORY + 1], windows.pressure[:, begin:])

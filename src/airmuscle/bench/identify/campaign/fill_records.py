@@ -4,7 +4,7 @@ unknowns of both valves."""
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -15,12 +15,14 @@ from ....physics.muscle.geometry import Vessel
 from ....physics.plant.plant import Plant
 from ....physics.pneumatics import FillDischarge, Supply, Tank, Valve
 from ....physics.pneumatics.gas import EnergyBalance
+from ...baselines import ARX, PERSISTENCE, TimedRecord, baseline_errors, skill
 from ..dynamic import (
     CommandInstants,
     DynamicFit,
     Experiment,
     InitialConditions,
     StartTime,
+    commands_at,
     fit_dynamic,
     stated_ambient,
 )
@@ -240,3 +242,27 @@ def fit_pressure(
         first, experiments, free=(HEAT_TRANSFER, *free), observed={"pressure": pressure_deviation(records)},
         per_record=(*own, StartTime(margin), CommandInstants(margin)), bounds={HEAT_TRANSFER: HEAT_TRANSFER_BOUNDS},
     )  # fmt: skip
+
+
+def fill_baselines(fit: DynamicFit) -> tuple[dict[str, float], ...]:
+    """Rms errors [Pa] of the pressure of each record by persistence and by an ARX model of the others."""
+    records = []
+    for model in fit.problem.record_models:
+        driven = dataclasses.replace(
+            model.experiment, command=model.command(fit.values), start_time=model.start_time(fit.values)
+        )
+        inputs = commands_at(model.plant, driven)
+        records.append(TimedRecord(model.times, model.measured, inputs, model.valid))
+    return tuple({name: float(rms[0]) for name, rms in each.items()} for each in baseline_errors(records))
+
+
+def describe_skills(errors: Sequence[float], baselines: Sequence[Mapping[str, float]]) -> str:
+    """The errors of the baselines and the skill of predictions with these errors, as a phrase; empty without them."""
+    parts = [
+        f"{name} {min(known) / 1e3:.3g} to {max(known) / 1e3:.3g} kPa"
+        for name in (PERSISTENCE, ARX)
+        if (known := [each[name] for each in baselines if name in each])
+    ]
+    pairs = zip(errors, baselines, strict=True) if baselines else ()
+    skills = [value for rms, each in pairs if (value := skill(rms, each)) is not None]
+    return f" ({', '.join(parts)}; skill {min(skills):.2g} to {max(skills):.2g})" if skills else ""

@@ -22,8 +22,10 @@ from .fill_records import (
     SUPPLY,
     ValveUnknowns,
     at_record,
+    describe_skills,
     describe_supply,
     detected_experiment,
+    fill_baselines,
     fit_pressure,
     has_supply_volume,
     held_contraction,
@@ -70,6 +72,8 @@ class FillStage(ShortRepr):
     contractions: Array
     cross_rms: tuple[float, ...]
     """Rms error of the pressure of each fill, predicted by the parameters of the others [Pa]; empty for one fill."""
+    baselines: tuple[Mapping[str, float], ...] = ()
+    """Those of the baselines of each fill [Pa], by name; the ARX model is fitted to the others, too."""
     supposed: tuple[str, ...] = ()
     """What the records do not determine or state, and what is taken for it, as sentences."""
 
@@ -112,7 +116,7 @@ class FillStage(ShortRepr):
         if self.cross_rms:
             text = (
                 f"Each fill predicted by the parameters of the others: rms error {min(self.cross_rms) / 1e3:.3g} to "
-                f"{max(self.cross_rms) / 1e3:.3g} kPa. "
+                f"{max(self.cross_rms) / 1e3:.3g} kPa{describe_skills(self.cross_rms, self.baselines)}. "
             )
         text += f"Joint fit of {len(rms)} records: rms residual {min(rms):.3g} to {max(rms):.3g} kPa."
         if self.estimate is not None:
@@ -244,7 +248,10 @@ def _fit_jointly(
         *valves.supposed,
         *describe_ambient([record.recording for record in records]),
     )
-    return FillStage(fit, tuple(records), tuple(experiments), geometry, estimate, contractions, tuple(cross), supposed)
+    others = fill_baselines(fit) if cross else ()
+    return FillStage(
+        fit, tuple(records), tuple(experiments), geometry, estimate, contractions, tuple(cross), others, supposed
+    )
 
 
 def _fit_common(

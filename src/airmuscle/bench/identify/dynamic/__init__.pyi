@@ -13,6 +13,7 @@ from .initial_conditions import InitialConditions as InitialConditions
 from .levenberg_marquardt import bounded_step as bounded_step
 from .levenberg_marquardt import minimise as minimise
 from .problem import DynamicProfile as DynamicProfile
+from .record_model import commands_at as commands_at
 from .record_ranking import RecordRanking as RecordRanking
 from .record_ranking import rank_records as rank_records
 from .regulator_fit import RegulatorFit as RegulatorFit

@@ -270,3 +270,10 @@ def separate_residuals(models: Sequence[RecordModel], residuals: Array) -> list[
 def count_readings(models: Sequence[RecordModel]) -> int:
     """The number of finite measured values."""
     return sum(int(model.valid.sum()) for model in models)
+
+
+def commands_at(plant: System, experiment: Experiment) -> Array:
+    """The inputs of the plant at the rows of a record (N, m); 0 before its start."""
+    times = experiment.recording["time"] - experiment.start_time
+    segments = experiment.command.segments(plant.inputs, 0.0, max(float(times[-1]), 1e-9))
+    return np.where(times[:, None] < 0.0, 0.0, segments.inputs_at(np.maximum(times, 0.0), 0.0))

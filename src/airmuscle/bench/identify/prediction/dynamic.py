@@ -23,7 +23,7 @@ from ..dynamic.experiment import (
     make_unknowns,
 )
 from ..dynamic.fit import fit_dynamic
-from ..dynamic.record_model import ModelOutputs, RecordModel
+from ..dynamic.record_model import ModelOutputs, RecordModel, commands_at
 from ..dynamic.reliability import RECORD_CONSEQUENCE
 from ..dynamic.result import DynamicFit
 from .result import (
@@ -141,7 +141,8 @@ def predict_dynamic(
     notes += [*range_notes(recording, ranges, NOISY_MARGIN), *faster]
     notes += [f"the band of {q.name} is {q.band}" for q in quantities if q.half_width is None and q.band]
     outside = rows_outside(recording, ranges, NOISY_MARGIN)
-    prediction = RecordPrediction(recording, tuple(quantities), tuple(notes), outside)
+    driving = commands_at(plant, experiment)
+    prediction = RecordPrediction(recording, tuple(quantities), tuple(notes), outside, driving)
     return with_band_notes(prediction, [*other_air, *(["faster changes"] if faster else [])], USUAL)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -13,10 +13,15 @@ from ....core.plotting import BLACK, BLUE, RED, legend_below, new_figure
 from ....core.reference import cite
 from ....recording.columns import display_scale, displayed
 from ....report.chapter import BY_ROW, Chapter, Plot, Table, TableColumn
+from ...baselines import ARX, PERSISTENCE, TimedRecord, baseline_errors, skill
 from ...reported import unit_column
 from ...segment.runs import CONTRACTION_BAND
 from . import QuantityPrediction, RecordPrediction
 
+BASELINES = (
+    "Skill: 1 - error/error of the better baseline. Persistence keeps the first value; the ARX model is fitted to the "
+    "other records, or to the other half of a single one, and runs freely from the first rows."
+)
 NO_BAND = "the model states no band"
 MAX_BRIEF = 15
 """Maximum number of predicted quantities in the brief view (chosen)."""
@@ -52,6 +57,7 @@ def _overview(model: str, thing: Any, predictions: Sequence[RecordPrediction]) -
             [_half_width(quantity) for _, quantity in pairs], BY_ROW, short="95 % band ±"
         ),
         "unit": unit_column(names),
+        **_baseline_columns(predictions),
         "rows within the band": TableColumn(
             [quantity.share for _, quantity in pairs], "1", "%", digits=3, short="within"
         ),
@@ -65,8 +71,8 @@ def _overview(model: str, thing: Any, predictions: Sequence[RecordPrediction]) -
     if not sources and all(quantity.share is None for _, quantity in pairs):
         reasons = dict.fromkeys(quantity.band or NO_BAND for _, quantity in pairs)
         sentences.append(f"No share of rows within a band is given: {'; '.join(reasons)}.")
-    table = Table("predictions", "Errors of the predicted values", columns, "Errors: predicted minus measured.",
-                  brief=MAX_BRIEF)  # fmt: skip
+    caption = "Errors: predicted minus measured." + (f" {BASELINES}" if "skill" in columns else "")
+    table = Table("predictions", "Errors of the predicted values", columns, caption, brief=MAX_BRIEF)
     return Chapter(
         name="prediction",
         title=f"Prediction by {model}",
@@ -75,6 +81,50 @@ def _overview(model: str, thing: Any, predictions: Sequence[RecordPrediction]) -
         notes=tuple(f"{each.origin}: {note}" for each in predictions for note in each.notes),
         references=tuple(cite(thing)),
     )
+
+
+def _baseline_columns(predictions: Sequence[RecordPrediction]) -> dict[str, Any]:
+    """The rms errors of the baselines of all quantities, and the skill of the model; empty without records in time."""
+    found = [(quantity, errors) for each in _with_baselines(predictions) for quantity, errors in each]
+    if not any(errors for _, errors in found):
+        return {}
+    names = {PERSISTENCE: PERSISTENCE, ARX: "ARX"}
+    columns: dict[str, Any] = {
+        f"rms error of {name}" if name == PERSISTENCE else f"rms error of an {name}": TableColumn(
+            [errors.get(name) for _, errors in found], BY_ROW, short=short
+        )
+        for name, short in names.items()
+    }
+    skills = [skill(quantity.rms, errors) for quantity, errors in found]
+    return {**columns, "skill": TableColumn(skills, "1", digits=2)}
+
+
+def _with_baselines(
+    predictions: Sequence[RecordPrediction],
+) -> Iterator[list[tuple[QuantityPrediction, dict[str, float]]]]:
+    """For each record its quantities with the rms errors of the baselines, from the records with the same ones."""
+    timed = {i: record for i, each in enumerate(predictions) if (record := _timed(each)) is not None}
+    errors: dict[int, list[dict[str, float]]] = {}
+    for names in dict.fromkeys(_names(each) for each in predictions):
+        alike = [i for i in timed if _names(predictions[i]) == names]
+        for i, found in zip(alike, baseline_errors([timed[i] for i in alike]), strict=True):
+            errors[i] = [{name: float(values[k]) for name, values in found.items()} for k in range(len(names))]
+    for i, each in enumerate(predictions):
+        yield list(zip(each.quantities, errors.get(i, [{} for _ in each.quantities]), strict=True))
+
+
+def _names(prediction: RecordPrediction) -> tuple[str, ...]:
+    return tuple(quantity.name for quantity in prediction.quantities)
+
+
+def _timed(prediction: RecordPrediction) -> TimedRecord | None:
+    """The record of a prediction for the baselines; None without inputs or without times that rise."""
+    time = prediction.recording["time"] if "time" in prediction.recording else np.zeros(0)
+    if prediction.inputs is None or time.size < 2 or not np.all(np.diff(time) > 0.0):
+        return None
+    quantities = prediction.quantities
+    measured, compared = (np.column_stack([getattr(q, name) for q in quantities]) for name in ("measured", "compared"))
+    return TimedRecord(time, measured, prediction.inputs, compared)
 
 
 def _half_width(quantity: QuantityPrediction) -> float | None:

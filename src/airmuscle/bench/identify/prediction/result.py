@@ -79,7 +79,8 @@ def predict_static(
     measured = recording[quantity.name]
     result = QuantityPrediction(quantity.name, measured, predicted, widths, (tension | pulling) & known, band)
     limits = ends_of(validity_range)
-    prediction = RecordPrediction(recording, (result,), (*remarks, *notes), rows_outside(recording, limits))
+    driving = np.column_stack([recording[name] for name in COLUMNS if name != quantity.name])
+    prediction = RecordPrediction(recording, (result,), (*remarks, *notes), rows_outside(recording, limits), driving)
     return with_band_notes(prediction, [*differences, *faster], USUAL)
 
 
@@ -287,6 +288,8 @@ class RecordPrediction(ShortRepr):
     notes: tuple[str, ...] = ()
     outside: npt.NDArray[np.bool_] | None = None
     """Mask (N,) of the rows outside the range of the fit; None where the range is not known."""
+    inputs: Array | None = None
+    """What drives the quantities at the rows (N, K) [SI]: commands of a plant, arguments of a law."""
 
     @property
     def origin(self) -> str:
