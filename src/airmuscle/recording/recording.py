@@ -14,8 +14,7 @@ from ..core.arrays import Array
 from ..core.errors import AirmuscleError, ColumnError, HintedText, ParameterError, listed, suggestion
 from ..core.reference import Reference
 from ..core.units import conversion
-from .columns import display_scale, quantity_of
-from .displacement import ZERO_NOT_STATED
+from .columns import ZERO_NOT_STATED, display_scale, quantity_of
 from .heading import split_unit
 from .notebook import Card, NotebookDisplay
 from .plot import plot_columns

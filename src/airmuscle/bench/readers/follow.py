@@ -14,7 +14,7 @@ import numpy as np
 from ...core.annotation import abridged
 from ...core.errors import ColumnError, FileError, ParameterError
 from ...core.units import AMBIENT_PRESSURE, UnitConversion
-from ...recording.displacement import displacement_columns
+from ...recording.columns import displacement_columns
 from ...recording.heading import find_quantity_name
 from .channels import RawTable
 from .header import is_number

@@ -14,8 +14,7 @@ import numpy as np
 from ...core.arrays import Array
 from ...core.errors import ColumnError, Hint, HintedText, UnitError, listed, suggestion
 from ...core.units import AMBIENT_PRESSURE, STANDARD_GRAVITY, UnitConversion, conversion, quantity
-from ...recording.columns import QUANTITIES
-from ...recording.displacement import displacement_columns, proposal
+from ...recording.columns import QUANTITIES, displacement_columns, proposal
 from ...recording.heading import UNIT_SPELLINGS, Heading, find_quantity_name, parse_heading
 from ...recording.recording import Recording
 from .channels import Cells, RawTable

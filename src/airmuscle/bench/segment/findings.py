@@ -8,8 +8,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from ...core.errors import ColumnError, Hint, HintedText
-from ...recording.columns import quantity_of
-from ...recording.displacement import ZERO_NOT_STATED
+from ...recording.columns import ZERO_NOT_STATED, quantity_of
 from ...recording.recording import Recording
 from ..readers.time_base import UNIFORM, WITHOUT_TIME
 from .plateaus import quasi_static_rows

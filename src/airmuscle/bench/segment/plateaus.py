@@ -13,7 +13,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 import numpy as np
 
 from ...core.arrays import Array
-from ...recording.displacement import MOVED
+from ...recording.columns import MOVED
 from ...recording.recording import Recording
 from .interval import Interval, Mask, level_intervals, running_median, true_intervals
 from .sensor import Sensor, count_rows, estimate_sensors

@@ -17,7 +17,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from ...core.arrays import Array
-from ...recording.displacement import MOVED
+from ...recording.columns import MOVED
 from ...recording.recording import Recording
 from .interval import Interval, level_intervals, remembered
 from .sensor import Sensor, estimate_sensors

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core.arrays import Array
-from ...recording.displacement import MOVED
+from ...recording.columns import MOVED
 from ...recording.recording import Recording
 from .interval import remembered
 

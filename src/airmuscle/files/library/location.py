@@ -93,22 +93,3 @@ def read_text(table: Mapping[str, Any], key: str, location: Location, *, needed:
 def with_article(name: str) -> str:
     """A class name with its indefinite article."""
     return f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"
-
-
-def check_type(thing: Any, kind: type[Any], location: Location) -> Any:
-    """Return an object if it is an instance of `kind`; otherwise raise ParameterError."""
-    if not isinstance(thing, kind):
-        raise ParameterError(
-            f"{location}: {type(thing).__name__} is not allowed here; {with_article(kind.__name__)} is required."
-        )
-    return thing
-
-
-def read_table_array(
-    tables: Mapping[str, Any], key: str, location: Location
-) -> list[tuple[Mapping[str, Any], Location]]:
-    """The tables written as [[key]], each with its location; empty if there are none. Raises ParameterError."""
-    rows = tables.get(key, [])
-    if not isinstance(rows, list) or not all(isinstance(row, Mapping) for row in rows):
-        raise ParameterError(f"{location}: '{key}' must be an array of tables; write [[{key}]] above each.")
-    return [(row, location.inside(f"{key} {i}")) for i, row in enumerate(rows, 1)]

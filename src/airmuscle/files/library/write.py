@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from ...bench.identify import Fit
-from ...bench.identify.static_fit_chapter import fit_chapter
 from ...core.annotation import abridged, one_line
 from ...core.atomic_output import atomic_file
 from ...core.errors import FileError, ParameterError
@@ -17,9 +16,6 @@ from ...physics.muscle import Muscle, Ratings
 from ...physics.muscle.characteristic.base import Characteristic
 from ...physics.muscle.characteristic.validity_range import ValidityRange
 from ...physics.plant.plant import Plant
-from ...recording import Recording
-from ...report.chapter import Chapter
-from ...report.write import write_into
 from .entry import OPTIONAL_PARTS, Check, Entry
 from .fitted_entry import fitted_entry
 from .uncertainty import ParameterUncertainty, StatedBand
@@ -81,15 +77,6 @@ def save(entry: Savable, path: str | Path) -> Path:
     if not isinstance(path, str | Path):
         raise FileError(f"save: {abridged(path)} is not a path; give a text or a Path.")
     return write_text(Path(path), to_toml(entry))
-
-
-def write_fit(
-    folder: Path, result: Fit, entry: Entry, recordings: Sequence[Recording], chapters: Sequence[Chapter] = ()
-) -> None:
-    """Write muscle.toml and the report into a folder made by `atomic_folder`; `chapters` precede that of the fit."""
-    save(entry, folder / "muscle.toml")
-    notes = tuple(dict.fromkeys(note for recording in recordings for note in recording.notes))
-    write_into(folder, [*chapters, fit_chapter(result, entry, notes)], title="Fit")
 
 
 def write_text(path: Path, text: str) -> Path:

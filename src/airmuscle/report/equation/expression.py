@@ -8,7 +8,6 @@ from collections.abc import Iterator
 NUMBER, SYMBOL, ADD, NEGATIVE, PRODUCT, QUOTIENT, POWER = "number", "symbol", "add", "neg", "mul", "div", "pow"
 MAXIMUM, MINIMUM, WHERE = "max", "min", "where"
 COMPARISONS = ("lt", "le", "eq", "ne")
-LOGICAL = ("not", "and", "or")
 FUNCTIONS = ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "asinh", "abs")
 
 
