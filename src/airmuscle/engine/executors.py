@@ -23,7 +23,7 @@ from typing import Any
 from ..core.atomic_output import atomic_file, check_writable
 from ..core.errors import FileError, InputError
 from ..core.fingerprint import program_fingerprint
-from .claims import Claims
+from .distribution import Claims
 from .processes import available_cores, process_pool
 
 CONNECT_TIMEOUT = 10.0
