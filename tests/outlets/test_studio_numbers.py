@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import dataclasses
 import importlib
 import re
@@ -15,6 +16,7 @@ from scenario_files import LIFT
 from studio_pages import BEGINNING, WEB, run_script, scripts
 
 import airmuscle as am
+from airmuscle.control import linearise_loop
 from airmuscle.core import flatten, leaves, with_parameters
 from airmuscle.errors import FileError, ParameterError, PhysicsError, TraceError
 from airmuscle.files import list_laws, load_scenario, to_toml
@@ -390,3 +392,27 @@ def test_the_command_names_what_cannot_be_shown(name):
     assert done.exit_code == 1
     assert done.stderr.startswith("error: ")
     assert name in done.stderr
+
+
+def test_the_loop_of_a_scenario_has_the_margins_of_the_library():
+    """Equal to those that are computed here, at the end of the run; OnOffController has no slope anywhere."""
+    path = EXAMPLES / "joint_cascade.toml"
+    scenario = load_scenario(path)
+    done = am.solve(scenario.problem)
+    linear = linearise_loop(scenario.plant, scenario.problem.input, done.final_state, control_state=done.control_state)
+    found, shown = linear.margins(), sheet_of_scenario_text(path.read_text())["loop"]
+    values = {name: float(value) for name, value, _ in shown["rows"]}
+    assert values["gain margin"] == pytest.approx(found.gain, rel=1e-3)
+    assert values["phase margin"] == pytest.approx(np.degrees(found.phase), rel=1e-3)
+    assert values["delay margin"] == pytest.approx(1e3 * found.delay, rel=1e-3)
+    assert values["sensitivity peak"] == pytest.approx(found.peak, rel=1e-3)
+    assert [base64.b64decode(each.partition(",")[2])[:5] for each in shown["figures"]] == [b"<?xml"] * 2
+    text = (EXAMPLES / "pressure_loop.toml").read_text()
+    assert "with valves open by 0.01" in sheet_of_scenario_text(text)["loop"]["text"]
+    switched = text.replace('model = "PID"', 'model = "OnOffController"').replace(
+        'gain = "1.5 1/bar"', 'hysteresis = "0.1 bar"'
+    )
+    row = sheet_of_scenario_text(re.sub("integral_time.*", "", switched))["loop"]
+    assert row["text"].startswith("There are no margins: linearise_loop: ")
+    assert row["figures"] == []
+    assert sheet_of_any("lift-dmsp-20")["loop"] is None

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import hashlib
+import io
 import json
 import re
 from collections.abc import Mapping
@@ -13,12 +15,13 @@ import numpy as np
 import airmuscle as am
 
 from ...core import cite
-from ...core.errors import ParameterError
+from ...core.errors import AirmuscleError, ParameterError
 from ...core.tree import Leaf, leaves
 from ...files.library.location import Location
 from ...files.library.write import part_toml, tables_toml
 from ...files.scenario.scenario import TABLES, Scenario, build_scenario, initial_pressure
 from ...recording.columns import display_scale
+from ...report.formatting import format_number
 from ..export.write import make_run
 from .law_sheet import parameter_row, script_text, toml_template
 
@@ -32,6 +35,8 @@ MAX_PARAMETERS = 120
 """Maximum number of parameters with a slider (chosen)."""
 OUTLINE_CONTRACTIONS, OUTLINE_POINTS = 31, 25
 """Grid of an outline (chosen)."""
+OPENED = 0.01
+"""Opening of the filling valves at whose closed position a loop has no slope (chosen)."""
 _EXPORT = re.compile(r"^export ", re.MULTILINE)
 _SOURCES = ("the file of the user", "chosen")
 
@@ -69,6 +74,7 @@ def sheet_of_tables(
         "references": [str(reference) for reference in cite(plant)],
         "toml": _toml(scenario, tables),
         "own_text": text,
+        "loop": _loop_row(scenario),
     }
     sheet["id"] = hashlib.sha256((module + json.dumps(sheet)).encode()).hexdigest()[:32]
     names = (*NAMES, "simulate") if program.loop else NAMES
@@ -176,6 +182,42 @@ def _mechanism_row(plant: am.Plant) -> dict[str, Any]:
         "coordinates": [c.name for c in plant.mechanism.coordinates],
         "radius": float(radius) if isinstance(radius, float) else 0.04,
     }
+
+
+def _loop_row(scenario: Scenario) -> dict[str, Any] | None:
+    """Margins, Bode and Nyquist plot of the loop of a scenario, linearised where its run ends; the reason without them.
+
+    Where valves are closed there, whose slopes differ on both sides, they are open by OPENED. None without a loop.
+    """
+    loop = scenario.problem.input
+    if not isinstance(loop, am.engine.ControlLoop):
+        return None
+    done = am.solve(scenario.problem)
+    opened = {name: OPENED for name in loop.controller.inputs if name.rpartition(".")[2] == "fill"}
+    reason = "the run of the scenario ended early."
+    for where, given in (("where its run ends", {"control_state": done.control_state}),
+                         (f"where its run ends, with valves open by {OPENED:g}", {"inputs": opened})):  # fmt: skip
+        try:
+            linear = am.control.linearise_loop(scenario.plant, loop, done.final_state, **given)
+            found = linear.margins()
+        except AirmuscleError as error:
+            reason = str(error)
+            continue
+        rows = [
+            ("gain margin", found.gain, ""), ("phase margin", np.degrees(found.phase), "deg"),
+            ("delay margin", 1e3 * found.delay, "ms"), ("sensitivity peak", found.peak, ""),
+        ]  # fmt: skip
+        texts = [(name, format_number(value), unit) for name, value, unit in rows]
+        text = f"Open loop at {linear.law.measured[0]}, linearised {where}."
+        return {"text": text, "rows": texts, "figures": [svg_uri(linear.bode()), svg_uri(linear.nyquist())]}
+    return {"text": f"There are no margins: {reason}", "rows": [], "figures": []}
+
+
+def svg_uri(figure: Any) -> str:
+    """A Matplotlib figure as an address of its SVG text."""
+    text = io.BytesIO()
+    figure.savefig(text, format="svg", metadata={"Date": None})
+    return f"data:image/svg+xml;base64,{base64.b64encode(text.getvalue()).decode()}"
 
 
 def _toml(scenario: Scenario, tables: Mapping[str, Any]) -> dict[str, Any]:

@@ -42,7 +42,7 @@
           card("Valves", ".early", element("div.row", {}, this.scheduleButton, this.liveButton), this.inputs), card("Parameters", "", this.resetButton, parameterHost)),
         element("div.stack.second", {},
           card("Plant in motion", ".first", element("div.row", {}, this.playButton, this.speedSelect, exports), element("div.bar", {}, element("span.small.soft", {}, "Time"), this.scrub, this.clock), element("div.motion", {}, drawingHost, traceHost), this.facts),
-          card("Source", ".late", this.about))));
+          this.loopCard = card("Loop", ".late", this.loop = element("div.small.loop")), card("Source", ".late", this.about))));
       this.drawing = new airmuscle.PlantDrawing(drawingHost);
       this.traces = new airmuscle.Traces(traceHost);
       this.traces.again = () => this.showTraces();
@@ -97,11 +97,21 @@
       this.nameSelected();
       this.parameters.show(sheet.parameters, sheet.parameters.map((row) => this.run.values[row.places[0]]), (i, value) => { this.run.set(sheet.parameters[i], value); this.changed(); }, (path) => groupName(path, sheet));
       this.about.replaceChildren(element("p", {}, element("strong", {}, sheet.title)), ...(sheet.warning ? [element("p.message", {}, sheet.warning)] : []), element("p.soft", {}, `Numbers: ${sheet.provenance}. ${sheet.note}`), element("ul", {}, ...sheet.references.map((r) => element("li", {}, r))));
+      this.showLoop(sheet.loop);
       this.drawing.begin(this.run);
       this.traces.begin(sheet, state.shown);
       this.buildInputs();
       this.setMode("schedule");
       this.host.dataset.shown = sheet.name;
+    }
+
+    /* Margins, Bode and Nyquist plot of the controller of the scenario, which Python computed. */
+    showLoop(loop) {
+      this.loopCard.hidden = !loop;
+      if (!loop) return;
+      this.loop.replaceChildren(element("p", {}, loop.text),
+        element("table", {}, ...loop.rows.map(([name, value, unit]) => element("tr", {}, element("th", { scope: "row" }, name), element("td", {}, `${value} ${unit}`)))),
+        ...loop.figures.map((src, i) => element("img", { src, alt: i ? "Nyquist plot of the open loop" : "Bode plot of the open loop" })));
     }
 
     nameSelected() { this.select.value = this.sheet.own_text ? "" : this.sheet.name; }
