@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import pickle
 import time
 from pathlib import Path
 
@@ -27,6 +28,7 @@ def main() -> None:
     parser.add_argument("--left-out", type=int, default=300)
     parser.add_argument("--uncoupled", action="store_true", help="ignore the axes of the mapping file")
     parser.add_argument("--figure", type=Path)
+    parser.add_argument("--pickle", type=Path, help="file for the fit itself (pickle)")
     parser.add_argument("--keep", type=Path, help="file for the errors of every window (NPZ)")
     given = parser.parse_args()
     start, spent = time.perf_counter(), time.process_time()
@@ -46,6 +48,12 @@ def main() -> None:
     for row in (9, 19, 29, 39):
         errors = np.degrees(np.sqrt(np.mean(fit.errors[:, row] ** 2, axis=0)))
         print(f"after {fit.horizon[row]:.3f} s: {', '.join(f'{e:.2f}' for e in errors)} deg")
+    judged = episodes[-given.left_out :]
+    for any_pose in (False, True):
+        print(f"from {'any pose' if any_pose else 'the poses in which episodes begin'}:")
+        print(am.bench.estimate_angles(fit, judged, any_pose=any_pose))
+    if given.pickle:
+        given.pickle.write_bytes(pickle.dumps(fit))
     if given.keep:
         np.savez(given.keep, errors=fit.errors, band=fit.band, episode=fit.episode, **fit.by_baseline)
     if given.figure:

@@ -169,7 +169,6 @@ def test_the_data_of_a_fit_are_examined_when_its_notes_are_first_read(tmp_path, 
     assert "40.2 N at zero pressure" in "".join(sent.notes)
     assert sent.notes == result.notes
     assert sent.scatter == result.scatter
-    assert sent.with_notes(["a remark"]).notes == ("a remark",)
 
 
 @pytest.mark.parametrize(("column", "code"), [(FORCE, -999.0), (FORCE, 9999.0), (PRESSURE, 9999.0)])

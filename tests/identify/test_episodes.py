@@ -10,7 +10,7 @@ import pytest
 from arm_episodes import STEP, changed, made_episodes
 
 from airmuscle.bench import fit_joint, inspect_episodes, read_episodes
-from airmuscle.bench.joint.windows import cut
+from airmuscle.bench.joint.episodes import cut
 from airmuscle.errors import ColumnError, FileError, IdentificationError, ParameterError
 
 MADE = made_episodes(3)

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from arm_episodes import made_episodes
+from arm_episodes import changed, made_episodes
 from command_line import airmuscle
 
 import airmuscle as am
-from airmuscle.bench import fit_joint
+from airmuscle.bench import estimate_angles, fit_joint
 from airmuscle.errors import ParameterError
 
 EPISODES = made_episodes(30)
@@ -61,6 +61,25 @@ def test_the_identified_arm_is_a_plant_that_settles(fitted):
     assert abs(solved["joint1.angular_speed"][-1]) < 0.05
 
 
+def test_angles_from_pressures_alone_hold_their_band_and_need_motion(fitted):
+    fit, _ = fitted
+    found = estimate_angles(fit, made_episodes(60, seed=1))
+    assert found.rms[0] < 0.1 * found.range[0]
+    assert 0.9 < found.coverage[0] < 0.99
+    # the joint moves in most rows, so that the pose in which an episode begins is forgotten
+    assert found.spread[:, -1].mean() < 0.5 * found.spread[:, 0].mean()
+    assert "joint 1: " in str(found)
+    assert "the angle is not seen until the joint moves" in str(found)
+
+
+def test_a_joint_that_does_not_move_is_not_seen(fitted):
+    fit, _ = fitted
+    at_rest = changed(EPISODES[24:26], pressure=lambda p: np.full_like(p, 1.5e5))
+    assert estimate_angles(fit, at_rest, any_pose=True).unseen[0] > estimate_angles(fit, EPISODES[24:26]).unseen[0]
+    with pytest.raises(ParameterError, match="the episodes have 2 joints and 4 pressures, the fit 1 and 2"):
+        estimate_angles(fit, made_episodes(1, joints=2))
+
+
 def test_impossible_arguments_are_refused():
     with pytest.raises(ParameterError, match="left_out is 1 of 30 episodes; give 4 episodes or more"):
         fit_joint(EPISODES, left_out=1.0)
@@ -83,10 +102,18 @@ def test_the_command_inspects_and_fits(tmp_path):
     names = [str(tmp_path / "all.npz"), "--mapping", str(tmp_path / "arm.toml")]
     shown = airmuscle("fit-joint", *names, "--inspect").output
     assert "12 episodes of 95 to 95 rows at 100 Hz" in shown
-    shown = airmuscle("fit-joint", *names, "--out", tmp_path / "out", "--left-out", "0.25").output
-    assert "free run over 0.4 s on 3 episodes left out" in " ".join(shown.split())
+    shown = airmuscle("fit-joint", *names, "--out", tmp_path / "out", "--left-out", "0.25", "--horizon", "12").output
+    assert "free run over 0.12 s on 3 episodes left out" in " ".join(shown.split())
     assert (tmp_path / "out" / "report.html").exists()
     plant = am.files.load_scenario(tmp_path / "out" / "scenario.toml")
     assert len(plant.plant.muscles) == 2
-    simulated = airmuscle("simulate", tmp_path / "out" / "scenario.toml", "--out", tmp_path / "run")
-    assert simulated.exit_code == 0, simulated.output
+    controlled = tmp_path / "out" / "controlled.toml"
+    for arguments in (
+        ("simulate", tmp_path / "out" / "scenario.toml", "--out", tmp_path / "run"),
+        ("simulate", controlled, "--out", tmp_path / "loop"),
+        ("tune", controlled, "--budget", "48", "--out", tmp_path / "tuning"),
+        ("export", controlled, "--to", "c", "--out", tmp_path / "c"),
+        ("export", controlled, "--controller", "--to", "c", "--out", tmp_path / "controller"),
+    ):
+        done = airmuscle(*map(str, arguments))
+        assert done.exit_code == 0, done.output

@@ -99,6 +99,7 @@ from .identify.prediction import RecordPrediction as RecordPrediction
 from .identify.prediction import predict_dynamic as predict_dynamic
 from .identify.prediction import predict_static as predict_static
 from .identify.static_fit_chapter import fit_chapter as fit_chapter
+from .joint import AngleEstimate as AngleEstimate
 from .joint import ArmFit as ArmFit
 from .joint import ArmParameter as ArmParameter
 from .joint import Channels as Channels
@@ -107,6 +108,7 @@ from .joint import EpisodeInspection as EpisodeInspection
 from .joint import EpisodeMapping as EpisodeMapping
 from .joint import Episodes as Episodes
 from .joint import PressureAction as PressureAction
+from .joint import estimate_angles as estimate_angles
 from .joint import fit_joint as fit_joint
 from .joint import inspect_episodes as inspect_episodes
 from .joint import read_episode_mapping as read_episode_mapping

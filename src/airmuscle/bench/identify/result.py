@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -112,10 +112,6 @@ class Fit(Reported):
     def scatter(self) -> Scatter | None:
         """Noise and repeatability of the measured force; None for laws that give contraction or pressure."""
         return self._remarks.scatter
-
-    def with_notes(self, notes: Iterable[str]) -> Fit:
-        """The fit with other notes."""
-        return dataclasses.replace(self, remarks=Remarks(tuple(notes), self.scatter))
 
     @property
     def degrees_of_freedom(self) -> int:

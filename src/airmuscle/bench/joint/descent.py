@@ -14,9 +14,9 @@ from ...core.arrays import Array
 from ...core.declaration import model
 from ...core.ops import Value, Values
 from ...core.system import StateVariable, System
-from ...engine import RungeKutta4, WithSensitivities, sensitivity, simulate_batch
+from ...engine import BatchSolution, RungeKutta4, WithSensitivities, sensitivity, simulate_batch
 from ...physics import PressureDriven, SerialArm, WithStickSlip
-from .windows import HISTORY, Windows, WindowSignal, start_of
+from .episodes import HISTORY, Windows, WindowSignal, start_of
 
 SUBSTEPS = 3
 """Steps of the integrator in a row."""
@@ -41,7 +41,7 @@ SIZES = {
 
 @dataclasses.dataclass(frozen=True)
 class SearchStage:
-    """Iterations with windows of `rows` rows, `batch` windows each."""
+    """Iterations with windows of `rows` rows, or of all if they have fewer, `batch` windows each."""
 
     rows: int
     iterations: int
@@ -76,10 +76,11 @@ class Descent:
         """
         count, rate = len(self.names), RATE
         normal, slope, tail = np.zeros((count, count)), np.zeros(count), []
-        best, cost = self.values.copy(), self._cost(self.values, schedule.rows)
+        rows = min(schedule.rows, self.windows.rows)
+        best, cost = self.values.copy(), self._cost(self.values, rows)
         for step in range(1, schedule.iterations + 1):
             which = self.rng.permutation(len(self.windows))[: schedule.batch]
-            batch = self.windows.part(np.sort(which), schedule.rows)
+            batch = self.windows.part(np.sort(which), rows)
             found = [self._of_joint(joint, batch) for joint in self.paths]
             self.spread = np.array(
                 [0.9 * s + 0.1 * max(e, 1e-3) for s, (*_, e) in zip(self.spread, found, strict=True)]
@@ -90,7 +91,7 @@ class Descent:
             tail.append(self.values.copy())
             if step % CHECKED == 0:
                 mean = np.mean(tail[-CHECKED:], axis=0)
-                reached = self._cost(mean, schedule.rows)
+                reached = self._cost(mean, rows)
                 if reached < cost:
                     best, cost = mean, reached
                 elif not reached < LOST * cost:
@@ -112,8 +113,6 @@ class Descent:
     def _of_joint(self, joint: int, batch: Windows) -> tuple[Array, Array, float]:
         """Normal matrix and slope of one joint in its own parameters, and its rms error [rad]."""
         error, gradient = gradients(self.arm, joint, self.paths[joint], batch)
-        lost = ~np.isfinite(error) | (np.abs(error) > OUTLIER) | ~np.isfinite(gradient).all(axis=-1)
-        error, gradient = np.where(lost, 0.0, error), np.where(lost[..., None], 0.0, gradient)
         weighted = gradient / np.sqrt(1.0 + (error / CLIP) ** 2)[..., None]
         count = gradient.shape[-1]
         flat = weighted.reshape(-1, count).T
@@ -140,23 +139,29 @@ class Descent:
         self.arm = with_values(self.arm, self.names, self.values)
 
 
+def over(
+    windows: Windows, system: System, inputs: list[WindowSignal], state: Mapping[str, Array], keep: list[str]
+) -> BatchSolution:
+    """Columns (N, rows + 1) of a system over all windows."""
+    return simulate_batch(
+        system, {}, inputs, duration=windows.rows * windows.sample_time, initial_states=state, keep=keep,
+        output_times=windows.sample_time * np.arange(windows.rows + 1),
+        integrator=RungeKutta4(windows.sample_time / SUBSTEPS),
+    )  # fmt: skip
+
+
 def joint_errors(arm: PressureDriven, joint: int, windows: Windows) -> Array:
     """Errors (N, rows) [rad] of the free run of one joint; the other joints move as measured."""
     system, known = OneJoint(arm, joint), start_of(arm, windows)
     angle = system.states[0].name
-    run = simulate_batch(
-        system, {}, signals(system, windows), duration=windows.rows * windows.sample_time,
-        initial_states={s.name: known[s.name] for s in system.states},
-        output_times=windows.sample_time * np.arange(windows.rows + 1),
-        integrator=RungeKutta4(windows.sample_time / SUBSTEPS), keep=[angle],
-    )  # fmt: skip
+    run = over(windows, system, signals(system, windows), {s.name: known[s.name] for s in system.states}, [angle])
     return np.asarray(run[angle][:, 1:] - windows.angle[:, HISTORY + 1 :, joint])
 
 
 def gradients(arm: PressureDriven, joint: int, paths: Sequence[str], windows: Windows) -> tuple[Array, Array]:
     """Errors of the free run of one joint (N, rows) [rad] and their derivatives (N, rows, P) by the parameters.
 
-    The other joints move as measured.
+    The other joints move as measured; both are 0 in rows of outliers.
     """
     system = OneJoint(arm, joint)
     columns = tuple((f"arm.{path}",) for path in paths)
@@ -169,13 +174,11 @@ def gradients(arm: PressureDriven, joint: int, paths: Sequence[str], windows: Wi
     angle = system.states[0].name
     observed = WithSensitivities(system, columns, (1.0,) * len(paths), observed=(angle,))
     keep = [angle, *(sensitivity(angle, k) for k in range(len(paths)))]
-    run = simulate_batch(
-        observed, {}, signals(system, windows), duration=windows.rows * windows.sample_time, initial_states=state,
-        output_times=windows.sample_time * np.arange(windows.rows + 1),
-        integrator=RungeKutta4(windows.sample_time / SUBSTEPS), keep=keep,
-    )  # fmt: skip
+    run = over(windows, observed, signals(system, windows), state, keep)
     error = run[angle][:, 1:] - windows.angle[:, HISTORY + 1 :, joint]
-    return error, np.stack([run[name][:, 1:] for name in keep[1:]], axis=-1)
+    gradient = np.stack([run[name][:, 1:] for name in keep[1:]], axis=-1)
+    lost = ~np.isfinite(error) | (np.abs(error) > OUTLIER) | ~np.isfinite(gradient).all(axis=-1)
+    return np.where(lost, 0.0, error), np.where(lost[..., None], 0.0, gradient)
 
 
 def _start_slope(arm: PressureDriven, path: str, known: Mapping[str, Array], windows: Windows) -> dict[str, Array]:

@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from ...core import tree
+from ...core.arrays import Array
 from ...core.errors import ParameterError
-from ...physics import PressureDriven
-from .descent import Descent, SearchStage
+from ...physics import (
+    Braid,
+    LinearInPressure,
+    Muscle,
+    MuscleRoute,
+    PressureDriven,
+    SerialArm,
+    SpatialLink,
+    StickSlip,
+    WithStickSlip,
+)
+from .descent import CLIP, Descent, SearchStage, gradients, typical_size
 from .episode_inspection import check_episodes, inspect_episodes
-from .episodes import Episodes
+from .episodes import HISTORY, ROWS, Episodes, Windows, cut, in_pairs
 from .free_run import band, baseline_errors, free_run, rms
-from .reduced_arm import own_parameters, reduced_arm, shared_parameters, stronger
-from .result import ArmFit
-from .separation import separate
-from .windows import HISTORY, ROWS, Windows, cut
+from .result import ArmFit, ArmParameter
 
 STRENGTHS = (1.0, 6.0)
 """Ratios of force and inertia from which the search of each joint starts (chosen)."""
@@ -68,7 +75,7 @@ def fit_joint(
             f"fit_joint: {len(found)} pairs and {len(axes)} axes are given for {episodes.joints} joints; give one each."
         )
     progress(f"delay of the pressures: {inspection.delay} rows")
-    ordered = _ordered(episodes, found)
+    ordered = in_pairs(episodes, found)
     split = max(1, round((1.0 - left_out) * len(ordered)))
     train, judge = cut(ordered[:split], inspection.delay, rows), cut(ordered[split:], inspection.delay, rows)
     arm, paths = _search(ordered[:split], train, tuple(axes), seed, progress)
@@ -83,7 +90,7 @@ def fit_joint(
     ]
     return ArmFit(
         arm, inspection, found, errors, judge.episode, others, band(errors),
-        tuple({e.path: e for estimates, _ in separated for e in estimates}.values()), tuple(dict.fromkeys(remarks)),
+        tuple({e.path: e for each, _ in separated for e in each}.values()), tuple(dict.fromkeys(remarks)), split,
     )  # fmt: skip
 
 
@@ -91,17 +98,6 @@ SCALE = (
     "pressures and angles do not contain the scale of the torques: the inertia of every joint is chosen, 0.1 kg m2; "
     "hang a known mass on the arm, or weigh its links, to fix it"
 )
-
-
-def _ordered(episodes: Episodes, pairs: Sequence[tuple[int, int]]) -> Episodes:
-    """Episodes whose pressures stand in the order of the pairs."""
-    order = [muscle - 1 for pair in pairs for muscle in pair]
-    if min(order) < 0 or max(order) >= episodes.muscles or len(set(order)) < len(order):
-        raise ParameterError(
-            f"fit_joint: pairs are {tuple(pairs)}; there are pressures 1 to {episodes.muscles}, each in one pair."
-        )
-    runs = [dataclasses.replace(run, pressure=run.pressure[:, order]) for run in episodes.runs]
-    return dataclasses.replace(episodes, runs=tuple(runs))
 
 
 def _search(
@@ -120,7 +116,7 @@ def _search(
             for factor in STRENGTHS
         ]
         best = min(trials, key=lambda trial: trial[0])[1]
-        cost = best.run(_shortened(SEARCH, best))
+        cost = best.run(SEARCH)
         arm = best.arm
         progress(f"joint {joint + 1}: {np.degrees(np.sqrt(cost)):.3g} deg, robust mean over the windows")
     return arm, dict(sorted(paths.items()))
@@ -134,12 +130,8 @@ def _by_coupling(axes: tuple[tuple[int, int, int], ...], joints: int) -> list[in
 
 def _trial(descent: Descent) -> tuple[float, Descent]:
     for schedule in TRIALS:
-        cost = descent.run(_shortened(schedule, descent))
+        cost = descent.run(schedule)
     return cost, descent
-
-
-def _shortened(schedule: SearchStage, descent: Descent) -> SearchStage:
-    return dataclasses.replace(schedule, rows=min(schedule.rows, descent.windows.rows))
 
 
 def _contacts(episodes: Episodes, errors: np.ndarray, windows: Windows, split: int) -> list[str]:
@@ -147,3 +139,142 @@ def _contacts(episodes: Episodes, errors: np.ndarray, windows: Windows, split: i
     worst = np.max(np.abs(errors) / rms(errors), axis=(1, 2))
     names = [episodes.runs[split + int(windows.episode[i])].name for i in np.argsort(-worst)[:3] if worst[i] > CONTACT]
     return [f"errors beyond {CONTACT:g} times the rms, by contact or friction: {', '.join(names)}"] if names else []
+
+
+# Separation of the parameters by a record: standard errors of the estimates, and directions that have no value
+
+UNSEPARATED, SHARE, NAMED = 1.0, 0.1, 6
+"""Standard error of a direction, relative to its parameters, from which it is not separated; share of a parameter in
+such directions that is named, and number of names (chosen)."""
+WINDOWS = 300
+"""Windows from which the information is computed (chosen)."""
+WORDS = {
+    "area": "effective area", "passive_force": "force without pressure", "slack_width": "width of slackening",
+    "lags": "lag of the pressure", "coulomb_torque": "dry friction", "presliding_angle": "presliding angle",
+    "load_arms": "growth of friction with tension", "static_excess": "stiction", "stribeck_speed": "Stribeck speed",
+    "damping": "viscous friction", "rotor_inertia": "inertia", "inertia": "inertia of a link",
+    "mass": "mass of a link", "centre": "centre of mass",
+    "zero_angle": "direction of gravity",
+}  # fmt: skip
+
+
+def separate(
+    arm: PressureDriven, joint: int, paths: Sequence[str], windows: Windows
+) -> tuple[list[ArmParameter], list[str]]:
+    """Estimates of one joint, and what the record does not separate, in words; from the Fisher information."""
+    some = windows.part(np.linspace(0, len(windows) - 1, min(WINDOWS, len(windows))).astype(int))
+    leaves = {leaf.path: leaf for leaf in tree.leaves(arm)}
+    values = np.array([float(leaves[path].value) for path in paths])
+    sizes = np.maximum(np.abs(values), [typical_size(path, leaves) for path in paths])
+    error, gradient = gradients(arm, joint, paths, some)
+    scaled = gradient * sizes
+    weight = 1.0 / np.sqrt(1.0 + (error / CLIP) ** 2)
+    scale = np.sqrt(np.mean(error**2) * windows.rows)  # the errors of one window count as one
+    information = (
+        np.einsum("nrp,nr,nrq->pq", scaled, weight, scaled) * (len(windows) / len(some)) / max(scale, 1e-9) ** 2
+    )
+    levels, directions = np.linalg.eigh(information)
+    weak = levels < 1.0 / UNSEPARATED**2
+    inverse = directions / np.sqrt(np.maximum(levels, 1e-12 * levels[-1]))
+    deviations = np.sqrt(np.sum(inverse**2, axis=1)) * sizes
+    estimates = [
+        ArmParameter(path, float(value), float(deviation))
+        for path, value, deviation in zip(paths, values, deviations, strict=True)
+    ]
+    return estimates, _words(joint, paths, np.sum(directions[:, weak] ** 2, axis=1))
+
+
+def _words(joint: int, paths: Sequence[str], shares: Array) -> list[str]:
+    """The parameters of the directions that are not separated, first those that have the least information."""
+    names = list(dict.fromkeys(_name(paths[i]) for i in np.argsort(-shares) if shares[i] > SHARE))
+    further = f" and {len(names) - NAMED} others" if len(names) > NAMED else ""
+    text = (
+        f"joint {joint + 1}: the record does not separate {', '.join(names[:NAMED])}{further}: combinations of them "
+        "may have any value; fix or measure them before they are read as properties of the arm"
+    )
+    return [text] if names else []
+
+
+def _name(path: str) -> str:
+    field = path.rsplit(".", 1)[-1]
+    muscle = path.split("]", maxsplit=1)[0].removeprefix("muscle[") if path.startswith("muscle[") else ""
+    word = WORDS[field.split("[", maxsplit=1)[0]]
+    if muscle:
+        return f"{word} of muscle {int(muscle) + 1}" + (f" (degree {field[-2]})" if field.endswith("]") else "")
+    if field.startswith(("lags", "load_arms")):
+        return f"{word} of muscle {int(field.split('[')[1][:-1]) + 1}"
+    return word
+
+
+# Reduced arm of unknown size from which a fit starts: muscles linear in pressure on links with stick-slip
+
+RADIUS, LENGTH, INERTIA, AREA = 0.03, 0.3, 0.1, 6.7e-4
+"""Moment arm [m], resting length and distance of joints [m], inertia [kg m^2] and area [m2] of every joint, chosen: a
+record of pressures and angles contains none of the first three, and each multiplies coefficients that are fitted."""
+
+
+def reduced_arm(middle: Array, axes: Sequence[tuple[int, int, int]] = ()) -> PressureDriven:
+    """Arm of J joints with a pair of muscles each, from which a fit starts.
+
+    middle  middle of the range of each joint [rad], about which forces are polynomials
+    axes    axes of the joints, if the coupling of the links is to be found; without them every joint has an inertia of
+            its own
+    """
+    count = len(middle)
+    routes = tuple(MuscleRoute((j + 1,), (sign * RADIUS,)) for j in range(count) for sign in (1.0, -1.0))
+    muscles = tuple(
+        _muscle(f"m{2 * j + k}", sign * RADIUS * float(middle[j]) / LENGTH)
+        for j in range(count)
+        for k, sign in enumerate((1.0, -1.0))
+    )
+    links = tuple(_link(j, axes[j] if axes else (0, 0, 1), LENGTH if axes and j else 0.0) for j in range(count))
+    loads = 0.1 * RADIUS * np.kron(np.eye(count), np.ones(2))
+    elements = tuple(StickSlip(0.5, tuple(row.tolist()), presliding_angle=4e-3) for row in loads)
+    return PressureDriven(muscles, WithStickSlip(SerialArm(links, routes), elements), (0.02,) * (2 * count))
+
+
+def _muscle(name: str, reference: float) -> Muscle:
+    full = 3e5 * AREA
+    law = LinearInPressure((AREA, 0.0, 0.0), (-0.05 * full, 0.0, 0.0), 0.3 * full, reference)
+    return Muscle(law, Braid(0.01, 0.43, LENGTH), name=name)
+
+
+def _link(number: int, axis: tuple[int, int, int], distance: float) -> SpatialLink:
+    if not distance:
+        return SpatialLink(axis, rotor_inertia=INERTIA, damping=0.5)
+    position = (distance, 0.0, 0.0) if number > 1 else (0.0, 0.0, 0.0)
+    return SpatialLink(axis, position, 1.0, (0.0, 0.0, 0.0), 0.0, INERTIA, 0.5)
+
+
+def stronger(arm: PressureDriven, joint: int, factor: float) -> PressureDriven:
+    """The arm with forces, dry friction and damping of one joint multiplied: another initial guess of its inertia."""
+    fields = ("area", "passive_force", "slack_width", "coulomb_torque", "damping")
+    own = {path for path in own_parameters(joint) if path.rsplit(".")[-1].startswith(fields)}
+    values = [float(leaf.value) * (factor if leaf.path in own else 1.0) for leaf in tree.leaves(arm)]
+    changed: PressureDriven = tree.unflatten(arm, values)
+    return changed
+
+
+def own_parameters(joint: int) -> list[str]:
+    """Paths of what a fit changes for one joint and its pair of muscles, in a `PressureDriven` of `reduced_arm`."""
+    pair = (2 * joint, 2 * joint + 1)
+    laws = [f"muscle[{m}].contractile." for m in pair]
+    paths = [f"{law}{name}[{k}]" for law in laws for name in ("area", "passive_force") for k in range(3)]
+    paths += [f"{law}slack_width" for law in laws] + [f"lags[{m}]" for m in pair]
+    element, link = f"mechanism.elements[{joint}].", f"mechanism.inner.links[{joint}]."
+    paths += [f"{element}{name}" for name in ("coulomb_torque", "presliding_angle")]
+    paths += [f"{element}load_arms[{m}]" for m in pair]
+    return [*paths, f"{element}static_excess", f"{element}stribeck_speed", f"{link}damping"]
+
+
+def shared_parameters(axes: Sequence[tuple[int, int, int]]) -> list[str]:
+    """Paths of what couples the joints of an arm whose axes are known.
+
+    The place of a mass along the axis of its joint has no effect on that joint, and is not among them.
+    """
+    links = [f"mechanism.inner.links[{j}]." for j in range(len(axes))]
+    paths = [f"{links[1]}zero_angle", *(f"{link}rotor_inertia" for link in links[1:])]
+    for link, axis in zip(links[1:], axes[1:], strict=True):
+        across = (k for k in range(3) if not axis[k])
+        paths += [f"{link}mass", f"{link}inertia", *(f"{link}centre[{k}]" for k in across)]
+    return paths

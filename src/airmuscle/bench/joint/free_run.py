@@ -12,8 +12,7 @@ from ...physics import PressureDriven
 from .. import baselines
 from ..baselines import ARX, DEPTH, PERSISTENCE
 from .descent import SUBSTEPS
-from .episodes import Episodes
-from .windows import HISTORY, Windows, WindowSignal, cut, start_of
+from .episodes import HISTORY, Episodes, Windows, WindowSignal, cut, start_of
 
 COVERAGE = 0.95
 """Share of the errors that a band holds."""
@@ -24,16 +23,20 @@ def free_run(arm: PressureDriven, windows: Windows) -> Array:
 
     A run that fails keeps the angles of its start.
     """
-    names = [c.name for c in arm.mechanism.coordinates]
-    inputs = [WindowSignal(np.ascontiguousarray(p), windows.sample_time) for p in windows.pressure[:, HISTORY:]]
-    run = simulate_batch(
-        arm, {}, inputs, duration=windows.rows * windows.sample_time, initial_states=start_of(arm, windows),
-        output_times=windows.sample_time * np.arange(windows.rows + 1),
-        integrator=RungeKutta4(windows.sample_time / SUBSTEPS), keep=names,
-    )  # fmt: skip
-    found = np.stack([run[name] for name in names], axis=-1)[:, 1:]
+    found = angles(arm, windows.pressure[:, HISTORY:], start_of(arm, windows), windows.sample_time)[:, 1:]
     kept = windows.angle[:, HISTORY : HISTORY + 1]
     return np.where(np.isfinite(found) & (np.abs(found - kept) < 2 * np.pi), found, kept)
+
+
+def angles(arm: PressureDriven, pressure: Array, start: Mapping[str, Array], sample_time: float) -> Array:
+    """Angles (N, R, J) [rad] under the pressures (N, R, M) from states (N,)."""
+    names, rows = [c.name for c in arm.mechanism.coordinates], pressure.shape[1]
+    run = simulate_batch(
+        arm, {}, [WindowSignal(np.ascontiguousarray(p), sample_time) for p in pressure],
+        duration=(rows - 1) * sample_time, initial_states=start, output_times=sample_time * np.arange(rows),
+        integrator=RungeKutta4(sample_time / SUBSTEPS), keep=names,
+    )  # fmt: skip
+    return np.stack([run[name] for name in names], axis=-1)
 
 
 def rms(errors: Array, axis: tuple[int, ...] = (0, 1)) -> Array:

@@ -94,12 +94,6 @@ class SumOfMotions(JointMotion):
         return np.asarray(np.sum([part.at(time) for part in self.parts], axis=0))
 
 
-def check_times(time: Array) -> None:
-    """Raise ParameterError unless times (N,) are finite and rise."""
-    if time.ndim != 1 or time.size < 2 or not np.isfinite(time).all() or not (np.diff(time) > 0).all():
-        raise ParameterError("the times of a motion must be at least two, finite, and rise.")
-
-
 def _fifth_degree(share: Array) -> Array:
     """The polynomial 10 s^3 - 15 s^4 + 6 s^5 and its derivatives by s (3, N), constant outside 0 to 1."""
     s = np.clip(share, 0.0, 1.0)

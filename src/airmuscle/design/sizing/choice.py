@@ -63,11 +63,6 @@ class MuscleChoice(ShortRepr):
         return self.count * (2 if isinstance(self.requirement, JointRequirement) else 1)
 
     @property
-    def contraction_used(self) -> float:
-        """Difference of the contractions of both end points [1]."""
-        return self.design.contracted.contraction - self.design.extended.contraction
-
-    @property
     def air(self) -> float | None:
         """Mass of the air [kg] that all muscles take in a cycle; None without a geometry.
 

@@ -15,14 +15,6 @@ from ...core.errors import ParameterError
 from ...core.reference import Reference
 from .tracking import waveform_amplitude
 
-SMITH1972 = Reference(
-    key="smith-1972",
-    authors="Smith, C. L.",
-    title="Digital Computer Process Control",
-    where="Intext Educational Publishers, Scranton",
-    year=1972,
-    note="times at 28.3 % and 63.2 % of a step response; cited after textbooks, not read",
-)
 ASTROM_HAGGLUND1984 = Reference(
     key="astrom-hagglund-1984",
     authors="Åström, K. J., Hägglund, T.",

@@ -10,16 +10,17 @@ import numpy as np
 import typer
 
 from ...bench.joint import ArmFit, fit_joint, inspect_episodes, read_episode_mapping, read_episodes
+from ...control.laws import PID, Cascade, CoContraction, Decentralised
 from ...core.atomic_output import check_writable
-from ...files.library.write import scenario_toml
+from ...files.library.write import model_table, scenario_toml
 from ..requests.declaration import option, request
 from .delivery import deliver
 from .options import Folder, Json
 from .request_options import with_requests
 from .terminal import echo
 
-DURATION = 2.0
-"""Duration [s] of the scenario that is written (chosen)."""
+DURATION, STEP = 2.0, 0.15
+"""Duration [s] of the scenarios, and step of the controlled one relative to the range of the angle (chosen)."""
 
 
 @request
@@ -46,8 +47,8 @@ def fit_joint_command(
     Episodes are short records with angles of the joints and pressures of their muscles: CSV, NPZ, JSON, HDF5 or
     Parquet, one file each or one for all. The mapping file says which column is what, in which unit, and may state
     the muscles of each joint and the axes of the joints. The free run is judged on the last episodes, beside
-    persistence and a linear ARX model. Writes DIR/report.html and DIR/scenario.toml, the arm with a
-    pressure regulator for each muscle, which simulate, tune and export take.
+    persistence and a linear ARX model. Writes DIR/report.html, DIR/scenario.toml, the arm with a pressure
+    regulator for each muscle, and DIR/controlled.toml, the same with a controller of each angle to be tuned.
 
     \b
     Examples:
@@ -62,20 +63,33 @@ def fit_joint_command(
         return
     fit = fit_joint(
         episodes, pairs=rules.pairs, axes=rules.axes, left_out=request.left_out, rows=request.horizon,
-        seed=request.seed,
-        progress=lambda text: None if json else echo(text),
+        seed=request.seed, progress=lambda text: None if json else echo(text),
     )  # fmt: skip
     title = f"Arm identified from {source.name}"
     chapter = dataclasses.replace(fit.chapter(), title=title)
-    files = {"scenario.toml": _scenario(fit, title)}
-    deliver("fit-joint", [chapter], json=json, out=out, title="Identified arm", files=files)
+    deliver("fit-joint", [chapter], json=json, out=out, title="Identified arm", files=_scenarios(fit, title))
 
 
-def _scenario(fit: ArmFit, title: str) -> str:
-    """The scenario of the arm with a pressure regulator for each muscle."""
+def _scenarios(fit: ArmFit, title: str) -> dict[str, str]:
+    """The arm with a pressure regulator for each muscle: at constant set points, and with a PID controller of
+    each angle to be tuned, which commands half the difference of the pressures of its pair."""
     names = [muscle.name for muscle in fit.arm.muscle]
     middle = np.median(fit.inspection.episodes.rows("pressure"), axis=0)
     levels = [max(float(middle[muscle - 1]), 0.0) for pair in fit.pairs for muscle in pair]
     held = {f"{name}.setpoint": [[0.0, level]] for name, level in zip(names, levels, strict=True)}
     run = {"duration": DURATION, "initial_state": {"pressure": float(np.mean(levels))}}
-    return scenario_toml(title, fit.plant(), held, run, "supply, orifices and volumes are chosen")
+    low, high = np.quantile(fit.inspection.episodes.rows("angle"), (0.01, 0.99), axis=0)
+    laws, wanted = [], {}
+    for j, (c, range_) in enumerate(zip(fit.arm.mechanism.coordinates, (high - low).tolist(), strict=True)):
+        mean = float(np.mean(levels[2 * j : 2 * j + 2]))
+        pair = CoContraction((f"{names[2 * j]}.setpoint", f"{names[2 * j + 1]}.setpoint"), mean)
+        pid = PID(c.name, "difference", gain=mean / range_, integral_time=0.5)
+        laws.append(Cascade(pid, pair, (-mean,), (mean,)))
+        wanted[c.name] = [[0.0, 0.0], [0.1, STEP * range_]]
+    controller = {**model_table(Decentralised(tuple(laws))), "sample_time": 0.01, "setpoint": wanted}
+    note = "supply, orifices and volumes are chosen"
+    tuned = f"{note}, and so are the gains: airmuscle tune finds better ones"
+    return {
+        "scenario.toml": scenario_toml(title, fit.plant(), held, run, note),
+        "controlled.toml": scenario_toml(f"{title}, controlled", fit.plant(), {"controller": controller}, run, tuned),
+    }

@@ -69,10 +69,6 @@ class AntagonisticJoint(Mechanism):
             self.offset + self.radius * self.profile.integral(-angle) / second,
         )
 
-    def moment_arms(self, angle: Value) -> tuple[Value, Value]:
-        """Moment arm [m] of the first muscle and, negative, of the second one at an angle [rad]."""
-        return self.radius * self.profile.ratio(angle), -self.radius * self.profile.ratio(-angle)
-
     def generalised_forces(
         self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]
     ) -> dict[str, Value]:

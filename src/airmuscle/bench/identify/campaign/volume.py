@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -122,8 +121,3 @@ def relate_volumes(
 def scaled_to_length(volume_at_rest: float, length: float, other: float) -> float:
     """Volume at rest [m3] of a muscle of another length: proportional to the length (chosen)."""
     return volume_at_rest * other / length
-
-
-def mean_contractions(contractions: Sequence[Array]) -> Array:
-    """The median contraction of each fill, shape (K,)."""
-    return np.array([float(np.median(values)) for values in contractions])
