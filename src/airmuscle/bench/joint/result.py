@@ -203,9 +203,8 @@ class AngleEstimate(ShortRepr):
     @property
     def coverage(self) -> Array:
         """Share (J,) of the rows inside the band."""
-        known = np.isfinite(self.measured)
-        inside = known & (np.abs(self.angle - self.measured) <= self.band)
-        return np.asarray(inside.sum(axis=(0, 1)) / known.sum(axis=(0, 1)))
+        inside = np.abs(self.angle - self.measured) <= self.band  # false after the end of an episode
+        return np.asarray(inside.sum(axis=(0, 1)) / np.isfinite(self.measured).sum(axis=(0, 1)))
 
     def __str__(self) -> str:
         return "\n".join(
@@ -245,8 +244,8 @@ def estimate_angles(fit: ArmFit, episodes: Episodes, *, any_pose: bool = False, 
     measured = _padded(own.runs, "angle")
     limits = limits[np.minimum(np.arange(angle.shape[1]), len(limits) - 1)]
     unseen = np.where(np.isfinite(measured), spread > UNSEEN * poses.std(axis=0), np.nan)
-    low, high = np.quantile(fitted.rows("angle"), (0.01, 0.99), axis=0)
-    return AngleEstimate(angle, spread, limits, measured, high - low, np.nanmean(unseen, axis=(0, 1)))
+    span = np.ptp(np.quantile(fitted.rows("angle"), (0.01, 0.99), axis=0), axis=0)
+    return AngleEstimate(angle, spread, limits, measured, span, np.nanmean(unseen, axis=(0, 1)))
 
 
 def _runs(

@@ -78,13 +78,12 @@ def _scenarios(fit: ArmFit, title: str) -> dict[str, str]:
     levels = [max(float(middle[muscle - 1]), 0.0) for pair in fit.pairs for muscle in pair]
     held = {f"{name}.setpoint": [[0.0, level]] for name, level in zip(names, levels, strict=True)}
     run = {"duration": DURATION, "initial_state": {"pressure": float(np.mean(levels))}}
-    low, high = np.quantile(fit.inspection.episodes.rows("angle"), (0.01, 0.99), axis=0)
+    ranges = np.ptp(np.quantile(fit.inspection.episodes.rows("angle"), (0.01, 0.99), axis=0), axis=0).tolist()
     laws, wanted = [], {}
-    for j, (c, range_) in enumerate(zip(fit.arm.mechanism.coordinates, (high - low).tolist(), strict=True)):
+    for j, (c, range_) in enumerate(zip(fit.arm.mechanism.coordinates, ranges, strict=True)):
         mean = float(np.mean(levels[2 * j : 2 * j + 2]))
         pair = CoContraction((f"{names[2 * j]}.setpoint", f"{names[2 * j + 1]}.setpoint"), mean)
-        pid = PID(c.name, "difference", gain=mean / range_, integral_time=0.5)
-        laws.append(Cascade(pid, pair, (-mean,), (mean,)))
+        laws.append(Cascade(PID(c.name, "difference", mean / range_, 0.5), pair, (-mean,), (mean,)))
         wanted[c.name] = [[0.0, 0.0], [0.1, STEP * range_]]
     controller = {**model_table(Decentralised(tuple(laws))), "sample_time": 0.01, "setpoint": wanted}
     note = "supply, orifices and volumes are chosen"
