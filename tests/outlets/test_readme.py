@@ -54,3 +54,33 @@ def test_the_commands_run(command, tmp_path, monkeypatch):
 def test_the_files_it_points_to_are_there():
     for target in re.findall(r"\]\(([^)]+)\)", README):
         assert (ROOT / target).exists(), target
+
+
+TOOLS = {
+    "Simulink, Dymola, OpenModelica and other importers of FMUs": ("test_export_fmu", "fmpy"),
+    "MuJoCo": ("test_export_mujoco", "mujoco"),
+    "MuJoCo, ROS": ("test_robot_description", "mujoco"),
+    "C and C++": ("test_export_loop", "g++"),
+    "microcontrollers": ("test_export_controller", "program"),  # compiler and QEMU
+    "browsers and Node": ("test_export_loop", "node"),
+    "MATLAB and Octave": ("test_export_loop", "octave-cli"),
+    "pandas, xarray, Parquet, HDF5 (extra `lab`)": ("test_exchange", "xarray"),
+    "ROS 1 and 2": ("test_rosbag", "rosbags"),
+    "Modelica tools": ("test_export_modelica", "rumoca"),
+    "python-control": ("../dynamics/test_linearise", "control"),
+    "JAX": ("test_jax", "jax"),
+    "PyTorch, mjlab, Isaac Lab": ("test_actuators", "torch"),
+    "Warp, Newton": ("test_actuators", "newton"),
+    "ONNX Runtime": ("test_actuators", "onnxruntime"),
+}
+"""The test of each way into a tool, and the program or package that it needs."""
+
+
+def test_each_way_into_a_tool_has_a_test_in_it():
+    table = README.partition("| tool | way |")[2].partition("\n\n")[0]
+    rows = re.findall(r"^\| ([^|]+) \|", table.partition("|---|---|")[2], flags=re.MULTILINE)
+    assert rows == list(TOOLS)
+    for row, (file, tool) in TOOLS.items():
+        text = (Path(__file__).parent / f"{file}.py").read_text(encoding="utf-8")
+        needed = re.search(rf'(importorskip|require)\([^)]*["\']{re.escape(tool)}', text)
+        assert needed or (f"require({tool})" in text), row
