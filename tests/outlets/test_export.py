@@ -398,6 +398,13 @@ def test_a_name_becomes_an_identifier(name, expected):
     assert make_identifiers([name]) == (expected,)
 
 
+def test_one_text_is_no_sequence_of_names_and_many_equal_names_are_numbered():
+    with pytest.raises(ParameterError, match="takes a sequence of names, not the text"):
+        make_identifiers("x" * 100_000)
+    words = make_identifiers(["x"] * 20_000)
+    assert (words[0], words[1], words[-1]) == ("x", "x_2", "x_20000")
+
+
 def test_identifiers_are_distinct_in_any_case_and_of_limited_length():
     names = ["a.b", "a_b", "A b", "x" * 300, "x" * 299 + "y", "X" * 300, *(["same"] * 30), "same_2", "µ", "μ"]
     words = make_identifiers(names)

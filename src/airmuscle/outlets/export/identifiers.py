@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from ...core.errors import printable
+from ...core.annotation import abridged
+from ...core.errors import ParameterError, printable
 from ...core.fingerprint import fingerprint
 from ...core.reference import cite
 from ...core.tree import leaves
@@ -46,17 +47,25 @@ def make_identifiers(names: Sequence[str]) -> tuple[str, ...]:
 
     Accents are dropped, other letters are written as their code point, `.` and all other characters become `_`. A
     keyword gets a final `_`, an identifier longer than LONGEST the digest of its name at its end, the second of two
-    equal identifiers a number. The same names give the same identifiers.
+    equal identifiers a number. The same names give the same identifiers. Raises ParameterError for a single text.
     """
+    if isinstance(names, str):
+        raise ParameterError(
+            f"make_identifiers takes a sequence of names, not the text {abridged(names)}; give [text], or use "
+            "make_identifier."
+        )
     taken: set[str] = set()
+    last: dict[str, int] = {}
     identifiers = []
     for name in names:
         word = _shortened(_word(name), name)
-        candidate, number = word, 1
+        number = last.get(word, 1)
+        candidate = word if number == 1 else f"{word[: LONGEST - 8]}_{number}"
         while candidate.casefold() in taken:
             number += 1
             candidate = f"{word[: LONGEST - 8]}_{number}"
         taken.add(candidate.casefold())
+        last[word] = number
         identifiers.append(candidate)
     return tuple(identifiers)
 
